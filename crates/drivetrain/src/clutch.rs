@@ -1,0 +1,107 @@
+//! The wet multi-plate clutch.
+
+use crate::{Real, Table1};
+
+/// A hydraulically applied wet clutch with a return spring.
+///
+/// Sign: slip is input side minus output side; a positive torque drives the output side. Left out:
+/// drag torque of the open clutch, heat, and the time oil needs to leave the plates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clutch<T> {
+    /// Effective radius `R` of the friction force, m.
+    pub mean_radius_m: T,
+    /// Number `N` of friction faces.
+    pub friction_faces: T,
+    /// Piston area `A`, m^2.
+    pub piston_area_m2: T,
+    /// Force `F_s` of the return spring, N.
+    pub return_spring_n: T,
+    /// Friction coefficient `mu` over slip speed `|dw|`, rad/s.
+    pub friction: Table1<T>,
+    /// Friction coefficient that holds the clutch while it sticks.
+    pub static_friction: T,
+}
+
+impl<T: Real> Clutch<T> {
+    /// Pressure at which the plates touch, Pa: `F_s / A`.
+    pub fn kiss_pressure(&self) -> T {
+        self.return_spring_n / self.piston_area_m2
+    }
+
+    /// Torque per clamp force, m: `mu(|dw|) R N`.
+    #[inline]
+    pub fn torque_per_force(&self, slip_rad_s: T) -> T {
+        self.friction.at(slip_rad_s.abs()) * self.lever()
+    }
+
+    /// Friction-free part of the torque law, m: `R N`.
+    #[inline]
+    pub fn lever(&self) -> T {
+        self.mean_radius_m * self.friction_faces
+    }
+
+    /// Force that presses the plates together, N: `max(A p - F_s, 0)`.
+    #[inline]
+    pub fn clamp_force(&self, pressure_pa: T) -> T {
+        (self.piston_area_m2 * pressure_pa - self.return_spring_n).max(T::zero())
+    }
+
+    /// Size of the torque the slipping clutch carries, N m: `mu(|dw|) R N max(A p - F_s, 0)`, Eq. (2.13).
+    #[inline]
+    pub fn torque_capacity(&self, pressure_pa: T, slip_rad_s: T) -> T {
+        self.torque_per_force(slip_rad_s) * self.clamp_force(pressure_pa)
+    }
+
+    /// Largest torque that the sticking clutch holds, N m.
+    #[inline]
+    pub fn static_capacity(&self, pressure_pa: T) -> T {
+        self.static_friction * self.lever() * self.clamp_force(pressure_pa)
+    }
+
+    /// Pressure at which the slipping clutch carries `torque_n_m`, Pa: the inverse of Eq. (2.13).
+    pub fn pressure_for(&self, torque_n_m: T, slip_rad_s: T) -> T {
+        (torque_n_m.abs() / self.torque_per_force(slip_rad_s) + self.return_spring_n) / self.piston_area_m2
+    }
+
+    /// The same clutch in another precision.
+    pub fn cast<U: Real>(&self) -> Clutch<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        Clutch {
+            mean_radius_m: to(self.mean_radius_m),
+            friction_faces: to(self.friction_faces),
+            piston_area_m2: to(self.piston_area_m2),
+            return_spring_n: to(self.return_spring_n),
+            friction: self.friction.cast(),
+            static_friction: to(self.static_friction),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clutch() -> Clutch<f64> {
+        Clutch {
+            mean_radius_m: 0.13,
+            friction_faces: 3.0,
+            piston_area_m2: 0.01,
+            return_spring_n: 600.0,
+            friction: Table1::constant(0.13),
+            static_friction: 0.14,
+        }
+    }
+
+    #[test]
+    fn no_torque_below_the_kiss_point() {
+        assert_eq!(clutch().kiss_pressure(), 60_000.0);
+        assert_eq!(clutch().torque_capacity(59_000.0, 10.0), 0.0);
+        assert!(clutch().torque_capacity(61_000.0, 10.0) > 0.0);
+    }
+
+    #[test]
+    fn pressure_for_inverts_the_torque_law() {
+        let pressure = clutch().pressure_for(100.0, 50.0);
+        assert!((clutch().torque_capacity(pressure, 50.0) - 100.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,86 @@
+//! The torque converter, in drive and in overrun.
+
+use crate::{Real, Table1};
+
+/// Below this engine speed, rad/s, the speed ratio is formed with this speed instead, so that it
+/// stays finite for a stalled engine.
+const SLOWEST_ENGINE_RAD_S: f64 = 1.0;
+
+/// Steady-state torque converter, Eq. (2.11) and (2.12).
+///
+/// `lambda = w_t / w_e`, pump torque `T_p = C(lambda) w_e^2`, turbine torque `T_t = t(lambda) T_p`.
+/// In overrun (`lambda > 1`) the capacity factor is negative: the turbine drives the pump. Left out:
+/// fluid inertia and the lock-up clutch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter<T> {
+    /// Capacity factor `C(lambda)`, N m s^2, positive below `lambda = 1` and negative above it.
+    pub capacity_n_m_s2: Table1<T>,
+    /// Torque ratio `t(lambda)`.
+    pub torque_ratio: Table1<T>,
+}
+
+/// Torques at the two sides of the converter, N m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConverterTorques<T> {
+    /// Torque the pump takes from the engine.
+    pub pump_n_m: T,
+    /// Torque the turbine gives to the gearbox.
+    pub turbine_n_m: T,
+}
+
+impl<T: Real> Converter<T> {
+    /// Pump and turbine torque at these speeds, Eq. (2.11).
+    #[inline]
+    pub fn torques(&self, engine_rad_s: T, turbine_rad_s: T) -> ConverterTorques<T> {
+        let engine_rad_s = engine_rad_s.max(T::of(SLOWEST_ENGINE_RAD_S));
+        let speed_ratio = turbine_rad_s / engine_rad_s;
+        let pump_n_m = self.capacity_n_m_s2.at(speed_ratio) * engine_rad_s * engine_rad_s;
+        ConverterTorques { pump_n_m, turbine_n_m: self.torque_ratio.at(speed_ratio) * pump_n_m }
+    }
+
+    /// The same converter in another precision.
+    pub fn cast<U: Real>(&self) -> Converter<U> {
+        Converter { capacity_n_m_s2: self.capacity_n_m_s2.cast(), torque_ratio: self.torque_ratio.cast() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn converter() -> Converter<f64> {
+        Converter {
+            capacity_n_m_s2: Table1::new(&[0.0, 0.9, 1.0, 1.5], &[4e-3, 2e-3, 0.0, -2e-3]).unwrap(),
+            torque_ratio: Table1::new(&[0.0, 0.9, 1.0], &[2.0, 1.0, 1.0]).unwrap(),
+        }
+    }
+
+    #[test]
+    fn stall_multiplies_torque_and_coupling_does_not() {
+        let stall = converter().torques(200.0, 0.0);
+        assert_eq!((stall.pump_n_m, stall.turbine_n_m), (160.0, 320.0));
+        let coupling = converter().torques(200.0, 180.0);
+        assert_eq!(coupling.pump_n_m, coupling.turbine_n_m);
+    }
+
+    #[test]
+    fn the_fluid_never_creates_power_in_drive_or_overrun() {
+        for percent in 0..200 {
+            let (engine, turbine) = (200.0, 2.0 * f64::from(percent));
+            let torques = converter().torques(engine, turbine);
+            assert!(torques.pump_n_m * engine - torques.turbine_n_m * turbine >= -1e-9);
+        }
+    }
+
+    #[test]
+    fn overrun_turns_the_flow_of_torque_around() {
+        let torques = converter().torques(100.0, 130.0);
+        assert!(torques.pump_n_m < 0.0 && torques.turbine_n_m < 0.0);
+    }
+
+    #[test]
+    fn a_stalled_engine_gives_finite_torques() {
+        let torques = converter().torques(0.0, 50.0);
+        assert!(torques.pump_n_m.is_finite() && torques.turbine_n_m.is_finite());
+    }
+}

@@ -1,0 +1,30 @@
+//! The engine: a torque map and a rotating mass.
+
+use crate::{Real, Table2};
+
+/// Engine with a steady-state torque map, `I_e dw_e/dt + C_e w_e = T_e(w_e, theta_th) - T_p`, Eq. (2.3).
+///
+/// Left out: manifold filling and combustion delay; the map answers a throttle change at once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Engine<T> {
+    /// Inertia of crank and pump wheel, kg m^2.
+    pub inertia_kg_m2: T,
+    /// Viscous drag `C_e`, N m s/rad.
+    pub drag_n_m_s: T,
+    /// Torque over speed (rows, rad/s) and throttle (columns, 0 closed to 1 open), N m.
+    pub torque_n_m: Table2<T>,
+}
+
+impl<T: Real> Engine<T> {
+    /// Torque of combustion and pumping at the crank, N m.
+    #[inline]
+    pub fn torque(&self, speed_rad_s: T, throttle: T) -> T {
+        self.torque_n_m.at(speed_rad_s, throttle)
+    }
+
+    /// Angular acceleration against the pump torque, rad/s^2, Eq. (2.3).
+    #[inline]
+    pub fn acceleration(&self, speed_rad_s: T, torque_n_m: T, pump_torque_n_m: T) -> T {
+        (torque_n_m - pump_torque_n_m - self.drag_n_m_s * speed_rad_s) / self.inertia_kg_m2
+    }
+}

@@ -1,0 +1,290 @@
+//! Lookup tables with linear interpolation.
+//!
+//! Outside its breakpoints a table holds its end value: a measured map says nothing beyond its edge,
+//! and a straight line drawn on from there can turn a torque negative.
+
+use crate::Real;
+
+/// Most breakpoints a [`Table1`], or the first axis of a [`Table2`], can hold.
+pub const MAX_POINTS: usize = 24;
+/// Most breakpoints on the second axis of a [`Table2`].
+pub const MAX_COLUMNS: usize = 12;
+
+/// Why a table cannot be made from the given numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TableError {
+    /// Fewer than two breakpoints.
+    TooShort,
+    /// More breakpoints than fit; holds the largest number that does.
+    TooLong(usize),
+    /// Axis and values differ in length: axis, values.
+    LengthMismatch(usize, usize),
+    /// The axis does not rise at this position (counted from 0).
+    NotIncreasing(usize),
+    /// A number at this position (counted from 0) is infinite or not a number.
+    NotFinite(usize),
+}
+
+impl core::fmt::Display for TableError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::TooShort => write!(f, "a table needs at least two breakpoints"),
+            Self::TooLong(max) => write!(f, "a table holds at most {max} breakpoints"),
+            Self::LengthMismatch(axis, values) => {
+                write!(f, "the axis has {axis} breakpoints and the table {values} values")
+            }
+            Self::NotIncreasing(at) => write!(f, "breakpoint {} is not above the one before it", at + 1),
+            Self::NotFinite(at) => write!(f, "number {} is not finite", at + 1),
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+/// Breakpoints of one axis, strictly rising.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Axis<T, const N: usize> {
+    points: [T; N],
+    len: usize,
+}
+
+impl<T: Real, const N: usize> Axis<T, N> {
+    fn new(points: &[T]) -> Result<Self, TableError> {
+        if points.len() < 2 {
+            return Err(TableError::TooShort);
+        }
+        if points.len() > N {
+            return Err(TableError::TooLong(N));
+        }
+        if let Some(at) = points.iter().position(|x| !x.is_finite()) {
+            return Err(TableError::NotFinite(at));
+        }
+        if let Some(at) = points.windows(2).position(|pair| pair[1] <= pair[0]) {
+            return Err(TableError::NotIncreasing(at + 1));
+        }
+        let mut axis = Self { points: [T::zero(); N], len: points.len() };
+        axis.points[..points.len()].copy_from_slice(points);
+        Ok(axis)
+    }
+
+    /// Index of the segment that holds `x`, end segments for values outside. Shape: `0..len - 1`.
+    #[inline]
+    fn segment(&self, x: T) -> usize {
+        // Counting beats a binary search here: the axes are short and the loop has no branches.
+        let interior = &self.points[1..self.len - 1];
+        interior.iter().filter(|&&point| point <= x).count()
+    }
+
+    #[inline]
+    fn clamp(&self, x: T) -> T {
+        x.max(self.points[0]).min(self.points[self.len - 1])
+    }
+
+    fn points(&self) -> &[T] {
+        &self.points[..self.len]
+    }
+}
+
+/// A function of one variable given by breakpoints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Table1<T> {
+    axis: Axis<T, MAX_POINTS>,
+    values: [T; MAX_POINTS],
+    slopes: [T; MAX_POINTS],
+}
+
+impl<T: Real> Table1<T> {
+    /// A table through the points `(axis[i], values[i])`, at most [`MAX_POINTS`] of them.
+    ///
+    /// # Errors
+    /// Lengths that differ, too few or too many points, an axis that does not rise, non-finite numbers.
+    pub fn new(axis: &[T], values: &[T]) -> Result<Self, TableError> {
+        if axis.len() != values.len() {
+            return Err(TableError::LengthMismatch(axis.len(), values.len()));
+        }
+        if let Some(at) = values.iter().position(|y| !y.is_finite()) {
+            return Err(TableError::NotFinite(at));
+        }
+        let axis = Axis::new(axis)?;
+        let mut table = Self { axis, values: [T::zero(); MAX_POINTS], slopes: [T::zero(); MAX_POINTS] };
+        table.values[..values.len()].copy_from_slice(values);
+        for i in 0..values.len() - 1 {
+            table.slopes[i] = (values[i + 1] - values[i]) / (axis.points[i + 1] - axis.points[i]);
+        }
+        Ok(table)
+    }
+
+    /// The same value everywhere.
+    pub fn constant(value: T) -> Self {
+        let mut table =
+            Self { axis: Axis { points: [T::zero(); MAX_POINTS], len: 2 }, values: [value; MAX_POINTS], slopes: [T::zero(); MAX_POINTS] };
+        table.axis.points[1] = T::one();
+        table
+    }
+
+    /// The value at `x`, linear between breakpoints, the end value outside them.
+    #[inline]
+    pub fn at(&self, x: T) -> T {
+        let x = self.axis.clamp(x);
+        let i = self.axis.segment(x);
+        self.values[i] + self.slopes[i] * (x - self.axis.points[i])
+    }
+
+    /// The argument at which a table of rising values reaches `value`; the end arguments outside.
+    ///
+    /// Meaningful only where the values rise; elsewhere it returns the first crossing.
+    pub fn inverse_at(&self, value: T) -> T {
+        let last = self.axis.len - 1;
+        if value <= self.values[0] {
+            return self.axis.points[0];
+        }
+        for i in 0..last {
+            if value <= self.values[i + 1] {
+                return self.axis.points[i] + (value - self.values[i]) / self.slopes[i];
+            }
+        }
+        self.axis.points[last]
+    }
+
+    /// Every value multiplied by `factor`, on the same axis.
+    #[must_use]
+    pub fn scaled(mut self, factor: T) -> Self {
+        for y in self.values.iter_mut().chain(self.slopes.iter_mut()) {
+            *y = *y * factor;
+        }
+        self
+    }
+
+    /// The breakpoints.
+    pub fn axis(&self) -> &[T] {
+        self.axis.points()
+    }
+
+    /// The values at the breakpoints.
+    pub fn values(&self) -> &[T] {
+        &self.values[..self.axis.len]
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> (T, T) {
+        self.values().iter().fold((self.values[0], self.values[0]), |(lo, hi), &y| (lo.min(y), hi.max(y)))
+    }
+
+    /// The same table in another precision.
+    pub fn cast<U: Real>(&self) -> Table1<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        Table1 {
+            axis: Axis { points: self.axis.points.map(to), len: self.axis.len },
+            values: self.values.map(to),
+            slopes: self.slopes.map(to),
+        }
+    }
+}
+
+/// A function of two variables given on a grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Table2<T> {
+    rows: Axis<T, MAX_POINTS>,
+    columns: Axis<T, MAX_COLUMNS>,
+    values: [[T; MAX_COLUMNS]; MAX_POINTS],
+}
+
+impl<T: Real> Table2<T> {
+    /// A table with `values[i][j]` at `(rows[i], columns[j])`.
+    ///
+    /// # Errors
+    /// As [`Table1::new`], on either axis; every row must have as many values as there are columns.
+    pub fn new<R: AsRef<[T]>>(rows: &[T], columns: &[T], values: &[R]) -> Result<Self, TableError> {
+        if rows.len() != values.len() {
+            return Err(TableError::LengthMismatch(rows.len(), values.len()));
+        }
+        let mut table = Self {
+            rows: Axis::new(rows)?,
+            columns: Axis::new(columns)?,
+            values: [[T::zero(); MAX_COLUMNS]; MAX_POINTS],
+        };
+        for (row, given) in table.values.iter_mut().zip(values) {
+            let given = given.as_ref();
+            if given.len() != columns.len() {
+                return Err(TableError::LengthMismatch(columns.len(), given.len()));
+            }
+            if let Some(at) = given.iter().position(|y| !y.is_finite()) {
+                return Err(TableError::NotFinite(at));
+            }
+            row[..given.len()].copy_from_slice(given);
+        }
+        Ok(table)
+    }
+
+    /// The value at `(row, column)`, bilinear inside the grid, the edge value outside it.
+    #[inline]
+    pub fn at(&self, row: T, column: T) -> T {
+        let (row, column) = (self.rows.clamp(row), self.columns.clamp(column));
+        let (i, j) = (self.rows.segment(row), self.columns.segment(column));
+        let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
+        let c = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
+        let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
+        across(i) + r * (across(i + 1) - across(i))
+    }
+
+    /// Every value multiplied by `factor`, on the same grid.
+    #[must_use]
+    pub fn scaled(mut self, factor: T) -> Self {
+        for y in self.values.iter_mut().flatten() {
+            *y = *y * factor;
+        }
+        self
+    }
+
+    /// Breakpoints of the rows.
+    pub fn rows(&self) -> &[T] {
+        self.rows.points()
+    }
+
+    /// Breakpoints of the columns.
+    pub fn columns(&self) -> &[T] {
+        self.columns.points()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_at_breakpoints_are_exact_and_between_them_linear() {
+        let table = Table1::new(&[0.0, 1.0, 3.0], &[10.0, 20.0, 0.0]).unwrap();
+        assert_eq!([0.0, 1.0, 3.0].map(|x| table.at(x)), [10.0, 20.0, 0.0]);
+        assert_eq!(table.at(2.0), 10.0);
+    }
+
+    #[test]
+    fn outside_the_axis_the_end_value_holds() {
+        let table = Table1::new(&[0.0, 1.0, 3.0], &[10.0, 20.0, 0.0]).unwrap();
+        assert_eq!((table.at(-5.0), table.at(9.0)), (10.0, 0.0));
+    }
+
+    #[test]
+    fn inverse_undoes_a_rising_table() {
+        let table = Table1::new(&[0.0, 0.2, 1.0], &[0.0, 0.1, 0.9]).unwrap();
+        for x in [0.0_f64, 0.13, 0.2, 0.77, 1.0] {
+            assert!((table.inverse_at(table.at(x)) - x).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_grid_is_bilinear_and_holds_its_edges() {
+        let table = Table2::new(&[0.0, 1.0], &[0.0, 2.0], &[[0.0, 2.0], [10.0, 12.0]]).unwrap();
+        assert_eq!(table.at(0.5, 1.0), 6.0);
+        assert_eq!(table.at(-1.0, 5.0), 2.0);
+    }
+
+    #[test]
+    fn a_malformed_table_is_refused_with_its_reason() {
+        assert_eq!(Table1::new(&[0.0], &[0.0]), Err(TableError::TooShort));
+        assert_eq!(Table1::new(&[0.0, 0.0], &[0.0, 1.0]), Err(TableError::NotIncreasing(1)));
+        assert_eq!(Table1::new(&[0.0, 1.0], &[0.0]), Err(TableError::LengthMismatch(2, 1)));
+        assert_eq!(Table1::new(&[0.0, 1.0], &[0.0, f64::NAN]), Err(TableError::NotFinite(1)));
+        assert_eq!(Table1::new(&[0.0; 99], &[0.0; 99]), Err(TableError::TooLong(MAX_POINTS)));
+    }
+}
