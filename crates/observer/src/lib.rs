@@ -1,1 +1,18 @@
-//! x
+//! Clutch-pressure observers that can run on a transmission controller.
+//!
+//! `no_std`, no allocation, generic over `f32` and `f64`. Tuning is `&self`, memory is `&mut State`, the
+//! result is returned: `step(&self, &mut State, &Input) -> Estimate`. A step never panics; input that is
+//! not finite or out of range gives an estimate with a flag.
+//!
+//! **Architecture invariant:** nothing here knows the simulated plant. An estimator cannot see the truth.
+#![no_std]
+
+pub mod rigid;
+pub mod rigid_model;
+pub mod signals;
+pub mod supervisor;
+
+pub use rigid::{RigidGains, RigidObserver, RigidState};
+pub use rigid_model::{RigidModel, SpeedModel};
+pub use signals::{Estimate, Health, Input, InputLimits};
+pub use supervisor::{Phase, Supervisor, SupervisorState};

@@ -1,0 +1,203 @@
+//! The reduced-order input-to-state-stable observer with constant gains, Eq. (2.43)-(2.45).
+
+use drivetrain::Real;
+
+use crate::{
+    Estimate, Health, Input, InputLimits, Phase, RigidModel, SpeedModel, Supervisor, SupervisorState,
+};
+
+/// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidGains<T> {
+    /// Torque phase: `L` on `w_t`.
+    pub torque_phase_pa_s_rad: T,
+    /// Inertia phase: `L` on `(w_t, dw)`.
+    pub inertia_phase_pa_s_rad: [T; 2],
+}
+
+impl<T: Real> RigidGains<T> {
+    /// No correction in any phase.
+    pub fn open_loop() -> Self {
+        Self { torque_phase_pa_s_rad: T::zero(), inertia_phase_pa_s_rad: [T::zero(); 2] }
+    }
+
+    /// The gain that serves in a phase. Before the shift and after lock-up the speeds say nothing about
+    /// the pressure and the valve model serves alone, Eq. (2.17c).
+    #[inline]
+    pub fn of(&self, phase: Phase) -> [T; 2] {
+        match phase {
+            Phase::TorquePhase => [self.torque_phase_pa_s_rad, T::zero()],
+            Phase::InertiaPhase => self.inertia_phase_pa_s_rad,
+            Phase::BeforeShift | Phase::AfterShift => [T::zero(); 2],
+        }
+    }
+
+    /// The same gains in another precision.
+    pub fn cast<U: Real>(&self) -> RigidGains<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        RigidGains {
+            torque_phase_pa_s_rad: to(self.torque_phase_pa_s_rad),
+            inertia_phase_pa_s_rad: self.inertia_phase_pa_s_rad.map(to),
+        }
+    }
+}
+
+/// The rigid reduced-order observer.
+///
+/// Continuous form: `eta = z^ - L y`, `d eta/dt = (A22 - L G)(eta + L y) + B2 - L F`, Eq. (2.45). With `F`,
+/// `G`, `A22` and `B2` frozen over one sample this integrates exactly, for `Phi = e^{A22 T}`, to
+///
+/// ```text
+/// z^+ = Phi z^ + Gam1 B2 + L (y+ - y - T F - G (Psi z^ + Gam2 B2))
+/// ```
+///
+/// where `Psi` is the integral of `e^{A22 s}` over the sample, `Gam1 = Psi` and `Gam2` the integral of
+/// `Psi`. No derivative of `y` is taken. `eta` is not stored: written this way the estimate does not
+/// jump when the gain changes with the phase, because only the change of `y` since the last sample
+/// enters, which is what setting `eta = z^ - L y` anew at a handover does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidObserver<T> {
+    /// The powertrain.
+    pub model: RigidModel<T>,
+    /// The gains.
+    pub gains: RigidGains<T>,
+    /// The phase supervisor.
+    pub supervisor: Supervisor<T>,
+    /// What counts as a measurement.
+    pub limits: InputLimits<T>,
+}
+
+/// Memory of a [`RigidObserver`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidState<T> {
+    pressure_pa: T,
+    valve_pressure_pa: T,
+    clutch_torque_n_m: T,
+    command: T,
+    started: bool,
+    supervisor: SupervisorState<T>,
+    last: Option<Sample<T>>,
+}
+
+/// The speeds of the last usable sample and what the model said there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sample<T> {
+    phase: Phase,
+    speeds: [T; 2],
+    model: SpeedModel<T>,
+}
+
+impl<T: Real> RigidState<T> {
+    /// An empty cylinder before the shift.
+    pub fn new() -> Self {
+        let zero = T::zero();
+        Self {
+            pressure_pa: zero,
+            valve_pressure_pa: zero,
+            clutch_torque_n_m: zero,
+            command: zero,
+            started: false,
+            supervisor: SupervisorState::new(),
+            last: None,
+        }
+    }
+}
+
+impl<T: Real> Default for RigidState<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> RigidObserver<T> {
+    /// Takes one sample and returns the estimate at its time.
+    #[inline]
+    pub fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
+        let dt = if state.started { input.dt_s } else { T::zero() };
+        if !(dt >= T::zero() && dt.is_finite()) {
+            return self.report(state, Health::TimeRejected);
+        }
+        state.started = true;
+        let speeds_valid = self.limits.speeds_valid(input);
+        self.advance(state, dt, speeds_valid.then_some([input.turbine_rad_s, input.slip_rad_s]));
+
+        let command_valid = self.limits.command_valid(input);
+        if command_valid {
+            state.command = input.command;
+        }
+        if speeds_valid {
+            self.observe(state, dt, input);
+        } else {
+            state.last = None;
+        }
+        self.report(
+            state,
+            match (speeds_valid, command_valid) {
+                (false, _) => Health::SpeedsRejected,
+                (true, false) => Health::CommandRejected,
+                (true, true) => Health::Good,
+            },
+        )
+    }
+
+    /// Carries the pressure over `dt` under the command held since the last sample, and corrects it by
+    /// how far the speeds moved otherwise than predicted.
+    #[inline]
+    fn advance(&self, state: &mut RigidState<T>, dt: T, speeds: Option<[T; 2]>) {
+        let valve = self.model.valve.linear(state.command);
+        let (a, b) = (valve.a22_per_s, valve.b2_pa_s);
+        let phi = (a * dt).exp();
+        let psi = (phi - T::one()) / a;
+        let gam2 = (psi - dt) / a;
+        let correction = match (state.last, speeds) {
+            (Some(last), Some(speeds)) => {
+                let gain = self.gains.of(last.phase);
+                let pressure_integral = psi * state.pressure_pa + gam2 * b;
+                let unpredicted = |i: usize| {
+                    let SpeedModel { free_rad_s2: f, per_pressure_rad_s2_pa: g } = last.model;
+                    speeds[i] - last.speeds[i] - dt * f[i] - g[i] * pressure_integral
+                };
+                gain[0] * unpredicted(0) + gain[1] * unpredicted(1)
+            }
+            _ => T::zero(),
+        };
+        state.pressure_pa = phi * state.pressure_pa + psi * b + correction;
+        state.valve_pressure_pa = phi * state.valve_pressure_pa + psi * b;
+    }
+
+    /// Finds the phase and stores what the model says at this sample.
+    #[inline]
+    fn observe(&self, state: &mut RigidState<T>, dt: T, input: &Input<T>) {
+        let (turbine, slip) = (input.turbine_rad_s, input.slip_rad_s);
+        let output = self.model.shift.output_speed(turbine, slip);
+        let offgoing_slip = self.model.shift.offgoing_slip(turbine, output);
+        let phase = self.supervisor.step(&mut state.supervisor, dt, state.valve_pressure_pa, offgoing_slip, slip);
+        let engine = input.engine_rad_s;
+        // Outside the shift the speeds say nothing about the pressure: no sample to correct by.
+        state.last = matches!(phase, Phase::TorquePhase | Phase::InertiaPhase).then(|| Sample {
+            phase,
+            speeds: [turbine, slip],
+            model: self.model.speed_model(phase, engine, turbine, slip),
+        });
+        state.clutch_torque_n_m = self.model.clutch_torque(phase, state.pressure_pa, engine, turbine, slip);
+    }
+
+    fn report(&self, state: &RigidState<T>, health: Health) -> Estimate<T> {
+        Estimate {
+            pressure_pa: state.pressure_pa,
+            clutch_torque_n_m: state.clutch_torque_n_m,
+            phase: state.supervisor.phase,
+            health,
+        }
+    }
+
+    /// The same observer in another precision.
+    pub fn cast<U: Real>(&self) -> RigidObserver<U> {
+        RigidObserver {
+            model: self.model.cast(),
+            gains: self.gains.cast(),
+            supervisor: self.supervisor.cast(),
+            limits: self.limits.cast(),
+        }
+    }
+}
