@@ -1,1 +1,16 @@
-//! x
+//! Vehicle and experiment files.
+//!
+//! A file is read into raw types that mirror its keys, then checked into types that the code can use
+//! without looking again. An error names file, line, key, value and allowed range, and gives a hint
+//! where a likely mistake can be seen.
+
+pub mod check;
+pub mod error;
+pub mod experiment;
+pub mod source;
+pub mod vehicle;
+
+pub use error::ConfigError;
+pub use experiment::{Experiment, OffNominal, Profile, ShiftCalibration};
+pub use source::Source;
+pub use vehicle::{DesignRequirement, ShiftClutch, Uncertainty, Vehicle};

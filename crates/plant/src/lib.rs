@@ -1,1 +1,36 @@
-//! x
+//! The truth: a hybrid simulation of the whole powertrain through launch and shift.
+//!
+//! Engine, converter, gear train with two shift clutches, drive shafts, tyres, vehicle and two valves
+//! make eight states. Clutches stick and slip as events: within a mode the equations are smooth, a mode
+//! ends where a slip reaches zero or a holding torque its limit, and that instant is located on the dense
+//! output of the integrator. Friction is never regularised.
+//!
+//! ```
+//! use config::{Experiment, Vehicle};
+//! use plant::simulate;
+//!
+//! let experiment = Experiment::e1()?;
+//! let vehicle = Vehicle::two_speed_at()?;
+//! let mut highest_pa = 0.0_f64;
+//! simulate(&vehicle, &experiment, |sample| highest_pa = highest_pa.max(sample.oncoming_pa))?;
+//! assert!(highest_pa > 0.5e6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod controller;
+pub mod delay;
+pub mod dopri5;
+pub mod energy;
+pub mod hybrid;
+pub mod mode;
+pub mod powertrain;
+pub mod simulate;
+pub mod state;
+
+pub use controller::{Commands, Measured, ShiftController, Stage};
+pub use energy::{PowerBalance, stored_energy};
+pub use hybrid::{HybridIntegrator, PlantError, Segment};
+pub use mode::{Contact, Direction, Mode};
+pub use powertrain::{Inputs, Powertrain, Torques};
+pub use simulate::{Sample, simulate};
+pub use state::State;

@@ -1,0 +1,339 @@
+//! The vehicle file, checked.
+
+mod gear_train;
+mod raw;
+
+use std::path::Path;
+
+use drivetrain::{
+    Clutch, Converter, Driveline, Engine, ReducedShift, RoadLoad, Table2, TableError, Tyre, Valve, ValveMaps,
+};
+use observer::{InputLimits, Supervisor};
+
+use crate::check::{Check, Numbers};
+use crate::{ConfigError, Source};
+use raw::{RawClutch, RawEngineMap, RawObserver, RawRequirement, RawUncertainty, RawValve, RawVehicleFile};
+
+/// A shift clutch with the valve that fills it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftClutch {
+    /// Geometry and friction.
+    pub clutch: Clutch<f64>,
+    /// The real valve: lag, gain and delay over the operating point.
+    pub valve: ValveMaps<f64>,
+}
+
+/// Ranges of what varies in the observer's model; their corners span the polytope of Eq. (2.46).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncertainty {
+    /// Friction coefficient of the oncoming clutch, least and greatest.
+    pub friction: (f64, f64),
+    /// Time constant of a proportional valve, s, least and greatest.
+    pub time_constant_s: Option<(f64, f64)>,
+    /// Duty cycle of a pulse-width valve, %, least and greatest.
+    pub command: Option<(f64, f64)>,
+}
+
+/// What the gain design must reach in one phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DesignRequirement {
+    /// Time in which an initial error must be gone, s: `4 / kappa2`.
+    pub settling_time_s: f64,
+    /// Bound on the model error `|w|`, rad/s^2.
+    pub model_error_max_rad_s2: f64,
+    /// Largest acceptable offset of the pressure estimate, Pa.
+    pub offset_max_pa: f64,
+}
+
+/// A vehicle: everything the plant, the observers and the design need to know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vehicle {
+    /// The file.
+    pub source: Source,
+    /// Its name for people.
+    pub name: String,
+    /// The engine.
+    pub engine: Engine<f64>,
+    /// The torque converter.
+    pub converter: Converter<f64>,
+    /// The bare gear train, reduced to the shift.
+    pub shift: ReducedShift<f64>,
+    /// Inertia `I_o` of the output shaft in [`Self::shift`], kg m^2.
+    pub output_inertia_kg_m2: f64,
+    /// The clutch that lets go.
+    pub offgoing: ShiftClutch,
+    /// The clutch that engages, whose pressure is estimated.
+    pub oncoming: ShiftClutch,
+    /// Differential, drive shafts, wheels.
+    pub driveline: Driveline<f64>,
+    /// The driven tyres.
+    pub tyre: Tyre<f64>,
+    /// Vehicle body and road.
+    pub road: RoadLoad<f64>,
+    /// The oncoming clutch's valve as the observers are told.
+    pub observer_valve: Valve<f64>,
+    /// What varies in the observers' model.
+    pub uncertainty: Uncertainty,
+    /// Thresholds of the phase supervisor.
+    pub supervisor: Supervisor<f64>,
+    /// What counts as a measurement.
+    pub limits: InputLimits<f64>,
+    /// Requirement in the torque phase.
+    pub torque_phase: DesignRequirement,
+    /// Requirement in the inertia phase.
+    pub inertia_phase: DesignRequirement,
+}
+
+impl Vehicle {
+    /// The two-speed transmission that ships with the program.
+    ///
+    /// # Errors
+    /// None in a released program; the tests read this file.
+    pub fn two_speed_at() -> Result<Self, ConfigError> {
+        Self::from_source(Source::built_in(
+            "vehicles/two_speed_at.toml",
+            include_str!("../../../../vehicles/two_speed_at.toml"),
+        ))
+    }
+
+    /// Reads and checks a vehicle file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not a vehicle file, or holds a value that cannot be right.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        Self::from_source(Source::read(path)?)
+    }
+
+    /// Checks the text of a vehicle file.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_source(source: Source) -> Result<Self, ConfigError> {
+        let raw: RawVehicleFile = source.parse()?;
+        let check = Check { source: &source };
+        let gear = gear_train::check(&check, &raw)?;
+        let (offgoing, oncoming) =
+            (clutch(&check, &gear.offgoing, &raw)?, clutch(&check, &gear.oncoming, &raw)?);
+        let driveline = Driveline {
+            final_ratio: check.number("driveline.final_ratio", &raw.driveline.final_ratio, 0.5..=10.0)?,
+            shaft_stiffness_n_m_rad: check.number(
+                "driveline.shaft_stiffness_n_m_rad",
+                &raw.driveline.shaft_stiffness_n_m_rad,
+                500.0..=200e3,
+            )?,
+            shaft_damping_n_m_s_rad: check.number(
+                "driveline.shaft_damping_n_m_s_rad",
+                &raw.driveline.shaft_damping_n_m_s_rad,
+                0.0..=2e3,
+            )?,
+            wheel_inertia_kg_m2: check.number(
+                "driveline.wheel_inertia_kg_m2",
+                &raw.driveline.wheel_inertia_kg_m2,
+                0.2..=50.0,
+            )?,
+        };
+        let tyre = Tyre {
+            max_force_n: check.number("tyre.max_force_n", &raw.tyre.max_force_n, 1e3..=200e3)?,
+            slip_scale: check.number("tyre.slip_scale", &raw.tyre.slip_scale, 0.01..=0.5)?,
+            floor_m_s: check.number("tyre.floor_m_s", &raw.tyre.floor_m_s, 0.1..=10.0)?,
+        };
+        let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
+        let supervisor = supervisor(&check, &raw.observer, kiss_pressure_pa)?;
+        Ok(Self {
+            name: raw.name.clone(),
+            engine: Engine {
+                inertia_kg_m2: check.number("engine.inertia_kg_m2", &raw.engine.inertia_kg_m2, 0.01..=5.0)?,
+                drag_n_m_s: check.number("engine.drag_n_m_s", &raw.engine.drag_n_m_s, 0.0..=1.0)?,
+                torque_n_m: engine_map(&check, &raw.engine.torque)?,
+            },
+            converter: converter(&check, &raw)?,
+            shift: gear.reduced,
+            output_inertia_kg_m2: gear.output_inertia_kg_m2,
+            offgoing,
+            oncoming,
+            driveline,
+            tyre,
+            road: road(&check, &raw)?,
+            observer_valve: observer_valve(&check, &raw.observer.valve)?,
+            uncertainty: uncertainty(&check, &raw.observer.uncertainty)?,
+            supervisor,
+            limits: InputLimits {
+                speed_max_rad_s: check.number(
+                    "observer.speed_max_rad_s",
+                    &raw.observer.speed_max_rad_s,
+                    100.0..=5e3,
+                )?,
+                command_max: check.number("observer.command_max", &raw.observer.command_max, 0.1..=100.0)?,
+            },
+            torque_phase: requirement(&check, "design.torque_phase", &raw.design.torque_phase)?,
+            inertia_phase: requirement(&check, "design.inertia_phase", &raw.design.inertia_phase)?,
+            source,
+        })
+    }
+}
+
+fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, ConfigError> {
+    let throttle = check.numbers("engine.torque.throttle", &raw.throttle, 0.0..=1.0)?;
+    let speed = check.numbers("engine.torque.speed_rad_s", &raw.speed_rad_s, 0.0..=2e3)?;
+    let key = "engine.torque.torque_n_m";
+    let rows = raw.torque_n_m.get_ref();
+    for (i, row) in rows.iter().enumerate() {
+        check.numbers(&format!("{key}[{i}]"), row, -2e3..=3e3)?;
+        if row.get_ref().len() != throttle.len() {
+            let message = format!("row has {} torques, `throttle` {} positions", row.get_ref().len(), throttle.len());
+            return Err(check.meaning(&format!("{key}[{i}]"), row.span().start, message, None));
+        }
+    }
+    let rows: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
+    Table2::new(speed, throttle, &rows).map_err(|error| {
+        let message = match error {
+            TableError::LengthMismatch(speeds, rows) => format!("{rows} rows of torque for {speeds} speeds"),
+            other => other.to_string(),
+        };
+        check.meaning(key, raw.torque_n_m.span().start, message, None)
+    })
+}
+
+fn converter(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Converter<f64>, ConfigError> {
+    let raw = &raw.converter;
+    let axis = || ("converter.speed_ratio", &raw.speed_ratio, 0.0..=10.0);
+    let converter = Converter {
+        capacity_n_m_s2: check.table(axis(), ("converter.capacity_n_m_s2", &raw.capacity_n_m_s2, -0.1..=0.1))?,
+        torque_ratio: check.table(axis(), ("converter.torque_ratio", &raw.torque_ratio, 0.5..=5.0))?,
+    };
+    let creates = |&ratio: &f64| {
+        let capacity = converter.capacity_n_m_s2.at(ratio);
+        capacity * (1.0 - converter.torque_ratio.at(ratio) * ratio) < -1e-9
+    };
+    if let Some(ratio) = raw.speed_ratio.get_ref().iter().find(|ratio| creates(ratio)) {
+        let message = format!("at a speed ratio of {ratio} the turbine gives more power than the pump takes");
+        let hint = "torque ratio times speed ratio stays below 1 in drive; in overrun the capacity is negative".into();
+        let at = raw.capacity_n_m_s2.span().start;
+        return Err(check.meaning("converter.capacity_n_m_s2", at, message, Some(hint)));
+    }
+    Ok(converter)
+}
+
+fn clutch(check: &Check<'_>, name: &str, raw: &RawVehicleFile) -> Result<ShiftClutch, ConfigError> {
+    let raw: &RawClutch = &raw.clutch[name];
+    let key = |field: &str| format!("clutch.{name}.{field}");
+    let table = |axis: &str, axis_raw: &Numbers, axis_max: f64, values: &str, raw: &Numbers, range| {
+        check.table((&key(axis), axis_raw, 0.0..=axis_max), (&key(values), raw, range))
+    };
+    Ok(ShiftClutch {
+        clutch: Clutch {
+            mean_radius_m: check.number(&key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
+            friction_faces: check.number(&key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
+            piston_area_m2: check.number(&key("piston_area_m2"), &raw.piston_area_m2, 0.001..=0.05)?,
+            return_spring_n: check.number(&key("return_spring_n"), &raw.return_spring_n, 0.0..=10e3)?,
+            static_friction: check.number(&key("static_friction"), &raw.static_friction, 0.02..=0.5)?,
+            friction: table(
+                "friction.slip_rad_s",
+                &raw.friction.slip_rad_s,
+                2e3,
+                "friction.coefficient",
+                &raw.friction.coefficient,
+                0.02..=0.5,
+            )?,
+        },
+        valve: ValveMaps {
+            time_constant_s: table(
+                "valve.lag.pressure_pa",
+                &raw.valve.lag.pressure_pa,
+                10e6,
+                "valve.lag.time_constant_s",
+                &raw.valve.lag.time_constant_s,
+                0.001..=2.0,
+            )?,
+            gain_pa_a: table(
+                "valve.gain.current_a",
+                &raw.valve.gain.current_a,
+                10.0,
+                "valve.gain.gain_pa_a",
+                &raw.valve.gain.gain_pa_a,
+                1e4..=20e6,
+            )?,
+            delay_s: table(
+                "valve.delay.current_a",
+                &raw.valve.delay.current_a,
+                10.0,
+                "valve.delay.delay_s",
+                &raw.valve.delay.delay_s,
+                0.0..=0.5,
+            )?,
+        },
+    })
+}
+
+fn road(check: &Check<'_>, raw: &RawVehicleFile) -> Result<RoadLoad<f64>, ConfigError> {
+    let raw = &raw.vehicle;
+    Ok(RoadLoad {
+        mass_kg: check.number("vehicle.mass_kg", &raw.mass_kg, 200.0..=60e3)?,
+        wheel_radius_m: check.number("vehicle.wheel_radius_m", &raw.wheel_radius_m, 0.1..=1.0)?,
+        front_area_m2: check.number("vehicle.front_area_m2", &raw.front_area_m2, 0.5..=15.0)?,
+        drag_coefficient: check.number("vehicle.drag_coefficient", &raw.drag_coefficient, 0.05..=2.0)?,
+        air_density_kg_m3: check.number("vehicle.air_density_kg_m3", &raw.air_density_kg_m3, 0.5..=2.0)?,
+        rolling_moment_n_m: check.number("vehicle.rolling_moment_n_m", &raw.rolling_moment_n_m, 0.0..=5e3)?,
+        grade_rad: check.number("vehicle.grade_rad", &raw.grade_rad, -0.4..=0.4)?,
+    })
+}
+
+fn observer_valve(check: &Check<'_>, raw: &RawValve) -> Result<Valve<f64>, ConfigError> {
+    // A tagged enum loses the places of its values, so an error points at the table.
+    let offset = check.source.text.find("[observer.valve]").unwrap_or(0);
+    let number = |key: &str, value: f64, range| {
+        check.number(&format!("observer.valve.{key}"), &toml::Spanned::new(offset..offset, value), range)
+    };
+    Ok(match *raw {
+        RawValve::Proportional { time_constant_s, gain_pa_a } => Valve::Proportional {
+            time_constant_s: number("time_constant_s", time_constant_s, 0.001..=2.0)?,
+            gain_pa_a: number("gain_pa_a", gain_pa_a, 1e4..=20e6)?,
+        },
+        RawValve::PulseWidth { flow_sqrt_pa_s, line_pressure_pa, operating_pressure_pa } => Valve::PulseWidth {
+            flow_sqrt_pa_s: number("flow_sqrt_pa_s", flow_sqrt_pa_s, 1.0..=1e6)?,
+            line_pressure_pa: number("line_pressure_pa", line_pressure_pa, 1e5..=10e6)?,
+            operating_pressure_pa: number("operating_pressure_pa", operating_pressure_pa, 0.0..=10e6)?,
+        },
+    })
+}
+
+fn uncertainty(check: &Check<'_>, raw: &RawUncertainty) -> Result<Uncertainty, ConfigError> {
+    let pair = |key: &str, numbers: &Numbers, range| -> Result<(f64, f64), ConfigError> {
+        let key = format!("observer.uncertainty.{key}");
+        match *check.numbers(&key, numbers, range)? {
+            [least, greatest] if least <= greatest => Ok((least, greatest)),
+            _ => {
+                let message = "expected [least, greatest]".to_owned();
+                Err(check.meaning(&key, numbers.span().start, message, None))
+            }
+        }
+    };
+    let optional = |key: &str, numbers: &Option<Numbers>, range| {
+        numbers.as_ref().map(|numbers| pair(key, numbers, range)).transpose()
+    };
+    Ok(Uncertainty {
+        friction: pair("friction", &raw.friction, 0.02..=0.5)?,
+        time_constant_s: optional("time_constant_s", &raw.time_constant_s, 0.001..=2.0)?,
+        command: optional("command", &raw.command, 0.0..=100.0)?,
+    })
+}
+
+fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Result<Supervisor<f64>, ConfigError> {
+    let raw = &raw.supervisor;
+    let number = |key: &str, value, range| check.number(&format!("observer.supervisor.{key}"), value, range);
+    Ok(Supervisor {
+        kiss_pressure_pa,
+        release_slip_rad_s: number("release_slip_rad_s", &raw.release_slip_rad_s, 0.1..=100.0)?,
+        lock_slip_rad_s: number("lock_slip_rad_s", &raw.lock_slip_rad_s, 0.1..=100.0)?,
+        lock_hold_s: number("lock_hold_s", &raw.lock_hold_s, 0.0..=1.0)?,
+    })
+}
+
+fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<DesignRequirement, ConfigError> {
+    let number = |key: &str, value, range| check.number(&format!("{table}.{key}"), value, range);
+    Ok(DesignRequirement {
+        settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
+        model_error_max_rad_s2: number("model_error_max_rad_s2", &raw.model_error_max_rad_s2, 0.0..=1e6)?,
+        offset_max_pa: number("offset_max_pa", &raw.offset_max_pa, 1e3..=10e6)?,
+    })
+}

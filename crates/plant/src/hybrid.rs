@@ -1,0 +1,320 @@
+//! The hybrid integrator: smooth steps within a mode, events between modes.
+
+use crate::dopri5::{self, Tolerance, Trial};
+use crate::state::{STATES, State};
+use crate::{Contact, Direction, Inputs, Mode, Powertrain};
+
+/// Relative tolerance of the integration, against the size of each state.
+pub const RELATIVE_TOLERANCE: f64 = 1e-6;
+/// Event functions (rad/s of slip, N m of holding torque) may fall this far below zero before the mode
+/// changes, so that rounding at a fresh change does not start another.
+const MARGIN_SLACK: f64 = 1e-9;
+/// Longest step, s: short enough that no event function crosses zero twice within one.
+const LONGEST_STEP_S: f64 = 0.02;
+/// Shortest step, s; an integration that needs less has diverged.
+const SHORTEST_STEP_S: f64 = 1e-10;
+/// Accuracy to which the time of an event is located, s.
+const EVENT_TIME_S: f64 = 1e-12;
+/// Mode changes at one instant before the plant is declared inconsistent.
+const MOST_CHANGES: usize = 8;
+
+/// Why a simulation could not go on.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The step size fell below its floor or a state became infinite.
+    #[error("the simulation diverged at {time_s:.4} s; check inertias, stiffnesses and time constants")]
+    Diverged {
+        /// When.
+        time_s: f64,
+    },
+    /// The clutches found no consistent mode.
+    #[error("the clutches change between sticking and slipping without end at {time_s:.4} s")]
+    Chatter {
+        /// When.
+        time_s: f64,
+    },
+}
+
+/// One accepted step, for whoever records the run.
+#[derive(Debug)]
+pub struct Segment<'a> {
+    /// Time at the start, s.
+    pub start_s: f64,
+    /// Time at the end, s.
+    pub end_s: f64,
+    /// The mode throughout.
+    pub mode: Mode,
+    /// The inputs throughout.
+    pub inputs: &'a Inputs,
+    trial: &'a Trial<STATES>,
+}
+
+impl Segment<'_> {
+    /// State at a time within the step.
+    pub fn at(&self, time_s: f64) -> State {
+        let length = self.end_s - self.start_s;
+        State::from_array(self.trial.at((time_s - self.start_s) / length))
+    }
+}
+
+/// Time, state and mode of the plant, and how to carry them on.
+#[derive(Debug, Clone)]
+pub struct HybridIntegrator {
+    /// Time, s.
+    pub time_s: f64,
+    /// Continuous state.
+    pub state: State,
+    /// Discrete state.
+    pub mode: Mode,
+    step_s: f64,
+    tolerance: Tolerance<STATES>,
+}
+
+impl HybridIntegrator {
+    /// Starts at this time and state. A clutch without slip sticks if it can hold.
+    pub fn new(powertrain: &Powertrain, time_s: f64, state: State, inputs: &Inputs) -> Result<Self, PlantError> {
+        Self::with_tolerance(powertrain, time_s, state, inputs, RELATIVE_TOLERANCE)
+    }
+
+    /// As [`Self::new`], with a relative tolerance of its own.
+    ///
+    /// # Errors
+    /// The clutches find no consistent mode.
+    pub fn with_tolerance(
+        powertrain: &Powertrain,
+        time_s: f64,
+        state: State,
+        inputs: &Inputs,
+        relative: f64,
+    ) -> Result<Self, PlantError> {
+        let shift = &powertrain.vehicle.shift;
+        let slips = [
+            shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),
+            shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s),
+        ];
+        let [offgoing, oncoming] = slips.map(|slip| Contact::Slipping(Direction::of(slip)));
+        let mut start = Self {
+            time_s,
+            state,
+            mode: Mode { offgoing, oncoming },
+            step_s: 1e-4,
+            tolerance: Tolerance { relative, scale: State::SCALE },
+        };
+        for (clutch, slip) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(slips) {
+            if slip.abs() < MARGIN_SLACK {
+                start.at_zero_slip(powertrain, inputs, clutch);
+            }
+        }
+        start.release_overloaded(powertrain, inputs)?;
+        Ok(start)
+    }
+
+    /// Integrates to `until_s` under constant inputs and shows every accepted step to `record`.
+    ///
+    /// # Errors
+    /// Divergence or chatter, see [`PlantError`].
+    pub fn advance(
+        &mut self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        until_s: f64,
+        record: &mut impl FnMut(&Segment<'_>),
+    ) -> Result<(), PlantError> {
+        // New inputs can overload a clutch at once.
+        self.release_overloaded(powertrain, inputs)?;
+        let mut slope = powertrain.derivative(self.mode, &self.state.to_array(), inputs);
+        let mut changes = 0;
+        while until_s - self.time_s > EVENT_TIME_S {
+            let (step_s, trial) = self.accepted_step(powertrain, inputs, &slope, until_s)?;
+            let Some(theta) = self.first_event(powertrain, inputs, &trial) else {
+                self.take(&trial, self.time_s + step_s, inputs, record);
+                slope = trial.end_slope;
+                changes = 0;
+                continue;
+            };
+            // Step anew to the event, so that its state has the accuracy of a step and not of the interpolant.
+            let mode = self.mode;
+            let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
+            let to_event = dopri5::step(&f, &self.state.to_array(), &slope, theta * step_s, &self.tolerance);
+            changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
+            if changes > MOST_CHANGES {
+                return Err(PlantError::Chatter { time_s: self.time_s });
+            }
+            self.take(&to_event, self.time_s + theta * step_s, inputs, record);
+            self.change_mode(powertrain, inputs)?;
+            slope = powertrain.derivative(self.mode, &self.state.to_array(), inputs);
+        }
+        self.time_s = until_s;
+        Ok(())
+    }
+
+    fn take(&mut self, trial: &Trial<STATES>, end_s: f64, inputs: &Inputs, record: &mut impl FnMut(&Segment<'_>)) {
+        record(&Segment { start_s: self.time_s, end_s, mode: self.mode, inputs, trial });
+        self.time_s = end_s;
+        self.state = State::from_array(trial.end);
+    }
+
+    /// Finds a step length whose error is small enough; returns it with its trial.
+    fn accepted_step(
+        &mut self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        slope: &[f64; STATES],
+        until_s: f64,
+    ) -> Result<(f64, Trial<STATES>), PlantError> {
+        let mode = self.mode;
+        let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
+        let x = self.state.to_array();
+        loop {
+            let rest = until_s - self.time_s;
+            // Stretch a little rather than leave a sliver for the next step.
+            let step_s = if self.step_s > 0.9 * rest { rest } else { self.step_s };
+            let trial = dopri5::step(&f, &x, slope, step_s, &self.tolerance);
+            let factor = (0.9 * trial.error.powf(-0.2)).clamp(0.2, 4.0);
+            if trial.error <= 1.0 {
+                // A step cut short by the end of the segment says nothing against the usual length.
+                let usual = if step_s < self.step_s { self.step_s } else { 0.0 };
+                self.step_s = usual.max(step_s * factor).min(LONGEST_STEP_S);
+                return Ok((step_s, trial));
+            }
+            self.step_s = if factor.is_nan() { 0.2 * step_s } else { factor * step_s };
+            if self.step_s < SHORTEST_STEP_S {
+                return Err(PlantError::Diverged { time_s: self.time_s });
+            }
+        }
+    }
+
+    /// Margins of offgoing and oncoming clutch, with the slack.
+    fn margins(&self, powertrain: &Powertrain, inputs: &Inputs, x: [f64; STATES]) -> [f64; 2] {
+        let x = State::from_array(x);
+        [
+            powertrain.offgoing_margin(self.mode, &x, inputs) + MARGIN_SLACK,
+            powertrain.oncoming_margin(self.mode, &x, inputs) + MARGIN_SLACK,
+        ]
+    }
+
+    /// Fraction of the step at which the first margin reaches zero, located on the dense output.
+    fn first_event(&self, powertrain: &Powertrain, inputs: &Inputs, trial: &Trial<STATES>) -> Option<f64> {
+        let at_end = self.margins(powertrain, inputs, trial.end);
+        if at_end.iter().all(|&margin| margin >= 0.0) {
+            return None;
+        }
+        (0..2)
+            .filter(|&i| at_end[i] < 0.0)
+            .map(|i| root(|theta| self.margins(powertrain, inputs, trial.at(theta))[i]))
+            .min_by(f64::total_cmp)
+    }
+
+    /// Changes the mode of every clutch whose margin is used up.
+    fn change_mode(&mut self, powertrain: &Powertrain, inputs: &Inputs) -> Result<(), PlantError> {
+        // The margin at the event is zero up to the accuracy of locating it.
+        const AT_EVENT: f64 = 1e-6;
+        let margins = self.margins(powertrain, inputs, self.state.to_array());
+        for (clutch, margin) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(margins) {
+            if margin > AT_EVENT {
+                continue;
+            }
+            match self.contact(clutch) {
+                Contact::Slipping(_) => self.at_zero_slip(powertrain, inputs, clutch),
+                Contact::Stuck => self.release(powertrain, inputs, clutch),
+            }
+        }
+        self.release_overloaded(powertrain, inputs)
+    }
+
+    /// A slip has reached zero: the clutch sticks if it can hold, else it slips on.
+    fn at_zero_slip(&mut self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) {
+        self.set_contact(clutch, Contact::Stuck);
+        if self.overload(powertrain, inputs, clutch) > 0.0 {
+            self.release(powertrain, inputs, clutch);
+        } else {
+            self.lock(powertrain);
+        }
+    }
+
+    /// Makes the speeds agree with the clutches that stick, conserving momentum.
+    fn lock(&mut self, powertrain: &Powertrain) {
+        let shift = &powertrain.vehicle.shift;
+        let (turbine, output) = (self.state.turbine_rad_s, self.state.output_rad_s);
+        (self.state.turbine_rad_s, self.state.output_rad_s) = match self.mode {
+            Mode { offgoing: Contact::Stuck, oncoming: Contact::Stuck } => (0.0, 0.0),
+            Mode { offgoing: Contact::Stuck, .. } => shift.after_lock_up(shift.slip_offgoing, turbine, output),
+            Mode { oncoming: Contact::Stuck, .. } => shift.after_lock_up(shift.slip_oncoming, turbine, output),
+            Mode { .. } => (turbine, output),
+        };
+    }
+
+    /// Releases sticking clutches that are asked for more than they can hold, the most overloaded first.
+    fn release_overloaded(&mut self, powertrain: &Powertrain, inputs: &Inputs) -> Result<(), PlantError> {
+        for _ in 0..MOST_CHANGES {
+            let worst = [ClutchId::Offgoing, ClutchId::Oncoming]
+                .into_iter()
+                .filter(|&clutch| self.contact(clutch) == Contact::Stuck)
+                .map(|clutch| (self.overload(powertrain, inputs, clutch), clutch))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            match worst {
+                Some((overload, clutch)) if overload > MARGIN_SLACK => self.release(powertrain, inputs, clutch),
+                _ => return Ok(()),
+            }
+        }
+        Err(PlantError::Chatter { time_s: self.time_s })
+    }
+
+    /// Lets a sticking clutch slip. Without it the slip would grow with the sign of the torque by which
+    /// it was held.
+    fn release(&mut self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) {
+        let holding = self.holding(powertrain, inputs, clutch);
+        self.set_contact(clutch, Contact::Slipping(Direction::of(holding)));
+    }
+
+    /// Torque asked of a sticking clutch beyond what it can hold, N m.
+    fn overload(&self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) -> f64 {
+        self.holding(powertrain, inputs, clutch).abs() - self.capacity(powertrain, clutch)
+    }
+
+    fn holding(&self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) -> f64 {
+        let torques = powertrain.torques(self.mode, &self.state, inputs).shift;
+        match clutch {
+            ClutchId::Offgoing => torques.offgoing_n_m,
+            ClutchId::Oncoming => torques.oncoming_n_m,
+        }
+    }
+
+    fn capacity(&self, powertrain: &Powertrain, clutch: ClutchId) -> f64 {
+        match clutch {
+            ClutchId::Offgoing => powertrain.vehicle.offgoing.clutch.static_capacity(self.state.offgoing_pa),
+            ClutchId::Oncoming => powertrain.vehicle.oncoming.clutch.static_capacity(self.state.oncoming_pa),
+        }
+    }
+
+    fn contact(&self, clutch: ClutchId) -> Contact {
+        match clutch {
+            ClutchId::Offgoing => self.mode.offgoing,
+            ClutchId::Oncoming => self.mode.oncoming,
+        }
+    }
+
+    fn set_contact(&mut self, clutch: ClutchId, contact: Contact) {
+        match clutch {
+            ClutchId::Offgoing => self.mode.offgoing = contact,
+            ClutchId::Oncoming => self.mode.oncoming = contact,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ClutchId {
+    Offgoing,
+    Oncoming,
+}
+
+/// Where in `(0, 1]` a function that is not negative at 0 turns negative, by bisection. The function is
+/// cheap and events are few; secant steps would save nothing.
+fn root(f: impl Fn(f64) -> f64) -> f64 {
+    let (mut not_negative, mut negative) = (0.0, 1.0);
+    while negative - not_negative > EVENT_TIME_S / LONGEST_STEP_S {
+        let middle = 0.5 * (not_negative + negative);
+        if f(middle) < 0.0 { negative = middle } else { not_negative = middle }
+    }
+    negative
+}

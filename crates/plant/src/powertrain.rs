@@ -1,0 +1,176 @@
+//! The equations of the powertrain, smooth within a mode.
+
+use config::Vehicle;
+use drivetrain::{Clutch, Engagement, ShiftCoefficients, ShiftTorques};
+
+use crate::state::{STATES, State};
+use crate::{Contact, Mode};
+
+/// What acts on the plant from outside, constant over a segment of the integration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inputs {
+    /// Throttle, 0 closed to 1 open.
+    pub throttle: f64,
+    /// Current that has arrived at the offgoing clutch's valve, A.
+    pub offgoing_a: f64,
+    /// Current that has arrived at the oncoming clutch's valve, A.
+    pub oncoming_a: f64,
+}
+
+/// Every torque and force of the powertrain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Torques {
+    /// Engine torque `T_e`, N m.
+    pub engine_n_m: f64,
+    /// Pump torque `T_p`, N m.
+    pub pump_n_m: f64,
+    /// Torques on the gear train, N m; those of sticking clutches are their holding torques.
+    pub shift: ShiftTorques<f64>,
+    /// Drive-shaft torque `T_s`, N m.
+    pub shaft_n_m: f64,
+    /// Tyre force `F_x`, N.
+    pub tyre_n: f64,
+}
+
+/// The powertrain of one vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Powertrain {
+    /// The vehicle as simulated.
+    pub vehicle: Vehicle,
+    coefficients: [ShiftCoefficients<f64>; 4],
+    grade_force_n: f64,
+}
+
+impl Powertrain {
+    /// The powertrain of this vehicle.
+    pub fn new(vehicle: Vehicle) -> Self {
+        let of = |engagement| vehicle.shift.coefficients(engagement);
+        Self {
+            coefficients: [
+                of(Engagement::BothSlipping),
+                of(Engagement::OffgoingStuck),
+                of(Engagement::OncomingStuck),
+                of(Engagement::BothStuck),
+            ],
+            grade_force_n: vehicle.road.grade_force(),
+            vehicle,
+        }
+    }
+
+    /// Coefficients of the gear train in this engagement.
+    #[inline]
+    pub fn coefficients(&self, engagement: Engagement) -> &ShiftCoefficients<f64> {
+        match engagement {
+            Engagement::BothSlipping => &self.coefficients[0],
+            Engagement::OffgoingStuck => &self.coefficients[1],
+            Engagement::OncomingStuck => &self.coefficients[2],
+            Engagement::BothStuck => &self.coefficients[3],
+        }
+    }
+
+    /// Every torque at this state.
+    #[inline]
+    pub fn torques(&self, mode: Mode, x: &State, inputs: &Inputs) -> Torques {
+        let mut torques = self.applied_torques(mode, x, inputs);
+        let coefficients = self.coefficients(mode.engagement());
+        let applied = torques.shift;
+        if mode.offgoing == Contact::Stuck {
+            torques.shift.offgoing_n_m = coefficients.holding_offgoing.at(&applied);
+        }
+        if mode.oncoming == Contact::Stuck {
+            torques.shift.oncoming_n_m = coefficients.holding_oncoming.at(&applied);
+        }
+        torques
+    }
+
+    /// Every torque but the holding torques, which stay zero: sticking clutches drop out of the
+    /// equations of motion.
+    #[inline]
+    fn applied_torques(&self, mode: Mode, x: &State, inputs: &Inputs) -> Torques {
+        let v = &self.vehicle;
+        let converter = v.converter.torques(x.engine_rad_s, x.turbine_rad_s);
+        let twist_rate = v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s);
+        let shaft_n_m = v.driveline.shaft_torque(x.twist_rad, twist_rate);
+        let friction = |contact: Contact, clutch: &Clutch<f64>, pressure_pa: f64, slip: f64| match contact {
+            Contact::Stuck => 0.0,
+            Contact::Slipping(direction) => direction.sign() * clutch.torque_capacity(pressure_pa, slip),
+        };
+        let offgoing_slip = v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s);
+        let oncoming_slip = v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s);
+        Torques {
+            engine_n_m: v.engine.torque(x.engine_rad_s, inputs.throttle),
+            pump_n_m: converter.pump_n_m,
+            shift: ShiftTorques {
+                turbine_n_m: converter.turbine_n_m,
+                offgoing_n_m: friction(mode.offgoing, &v.offgoing.clutch, x.offgoing_pa, offgoing_slip),
+                oncoming_n_m: friction(mode.oncoming, &v.oncoming.clutch, x.oncoming_pa, oncoming_slip),
+                output_n_m: shaft_n_m / v.driveline.final_ratio,
+            },
+            shaft_n_m,
+            tyre_n: v.tyre.force(v.road.wheel_radius_m * x.wheel_rad_s, x.vehicle_m_s),
+        }
+    }
+
+    /// Time derivative of the state.
+    #[inline]
+    pub fn derivative(&self, mode: Mode, x: &[f64; STATES], inputs: &Inputs) -> [f64; STATES] {
+        let x = State::from_array(*x);
+        let v = &self.vehicle;
+        let torques = self.applied_torques(mode, &x, inputs);
+        let gear = self.coefficients(mode.engagement());
+        State {
+            engine_rad_s: v.engine.acceleration(x.engine_rad_s, torques.engine_n_m, torques.pump_n_m),
+            turbine_rad_s: gear.turbine.at(&torques.shift),
+            output_rad_s: gear.output.at(&torques.shift),
+            twist_rad: v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s),
+            wheel_rad_s: self.wheel_acceleration(&x, &torques),
+            vehicle_m_s: self.vehicle_acceleration(&x, &torques),
+            offgoing_pa: v.offgoing.valve.pressure_rate(x.offgoing_pa, inputs.offgoing_a),
+            oncoming_pa: v.oncoming.valve.pressure_rate(x.oncoming_pa, inputs.oncoming_a),
+        }
+        .to_array()
+    }
+
+    /// `I_w dw_w/dt = T_s - T_w - R_w F_x`, rad/s^2.
+    #[inline]
+    fn wheel_acceleration(&self, x: &State, torques: &Torques) -> f64 {
+        let road = &self.vehicle.road;
+        (torques.shaft_n_m - road.rolling_moment(x.wheel_rad_s) - road.wheel_radius_m * torques.tyre_n)
+            / self.vehicle.driveline.wheel_inertia_kg_m2
+    }
+
+    /// `m dv/dt = F_x - F_A - F_G`, m/s^2.
+    #[inline]
+    pub fn vehicle_acceleration(&self, x: &State, torques: &Torques) -> f64 {
+        let road = &self.vehicle.road;
+        (torques.tyre_n - road.drag_force(x.vehicle_m_s) - self.grade_force_n) / road.mass_kg
+    }
+
+    /// How far the offgoing clutch is from a change of mode; the mode ends where this turns negative.
+    #[inline]
+    pub fn offgoing_margin(&self, mode: Mode, x: &State, inputs: &Inputs) -> f64 {
+        match mode.offgoing {
+            Contact::Slipping(direction) => {
+                direction.sign() * self.vehicle.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s)
+            }
+            Contact::Stuck => {
+                let holding = self.torques(mode, x, inputs).shift.offgoing_n_m;
+                self.vehicle.offgoing.clutch.static_capacity(x.offgoing_pa) - holding.abs()
+            }
+        }
+    }
+
+    /// The same for the oncoming clutch.
+    #[inline]
+    pub fn oncoming_margin(&self, mode: Mode, x: &State, inputs: &Inputs) -> f64 {
+        match mode.oncoming {
+            Contact::Slipping(direction) => {
+                direction.sign() * self.vehicle.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s)
+            }
+            Contact::Stuck => {
+                let holding = self.torques(mode, x, inputs).shift.oncoming_n_m;
+                self.vehicle.oncoming.clutch.static_capacity(x.oncoming_pa) - holding.abs()
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! One simulated drive: controller, valves, powertrain, recorder.
+
+use config::{Experiment, Vehicle};
+
+use crate::delay::DelayLine;
+use crate::{
+    Commands, HybridIntegrator, Inputs, Measured, Mode, PlantError, Powertrain, Segment, ShiftController, State,
+    Torques,
+};
+
+/// The plant at one instant: what a car measures, and the truth behind it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Time, s.
+    pub time_s: f64,
+    /// The states.
+    pub state: State,
+    /// Which clutches stick.
+    pub mode: Mode,
+    /// All torques.
+    pub torques: Torques,
+    /// What the controller commands: throttle and the currents before their delay.
+    pub commands: Commands,
+    /// Slip of the offgoing clutch, rad/s.
+    pub offgoing_slip_rad_s: f64,
+    /// Slip of the oncoming clutch, rad/s.
+    pub oncoming_slip_rad_s: f64,
+    /// Pressure of the oncoming clutch, Pa: what the observers look for.
+    pub oncoming_pa: f64,
+    /// Acceleration of the vehicle, m/s^2.
+    pub vehicle_m_s2: f64,
+}
+
+/// Simulates the experiment on the nominal `vehicle` with its differences applied, and shows a sample to
+/// `record` at every multiple of the sample time, from zero to the duration.
+///
+/// # Errors
+/// See [`PlantError`].
+pub fn simulate(
+    vehicle: &Vehicle,
+    experiment: &Experiment,
+    mut record: impl FnMut(&Sample),
+) -> Result<(), PlantError> {
+    let powertrain = Powertrain::new(experiment.simulated_vehicle(vehicle));
+    simulate_powertrain(&powertrain, vehicle, experiment, crate::hybrid::RELATIVE_TOLERANCE, |_| {}, &mut record)
+}
+
+/// As [`simulate`], for a powertrain and tolerance of choice, and with every step shown to `on_step`.
+///
+/// # Errors
+/// See [`PlantError`].
+pub fn simulate_powertrain(
+    powertrain: &Powertrain,
+    nominal: &Vehicle,
+    experiment: &Experiment,
+    relative_tolerance: f64,
+    mut on_step: impl FnMut(&Segment<'_>),
+    mut record: impl FnMut(&Sample),
+) -> Result<(), PlantError> {
+    let calibration = experiment.shift;
+    let mut controller = ShiftController::new(nominal, calibration);
+    let state = initial_state(powertrain, experiment);
+    let mut commands = controller.step(0.0, experiment.throttle.at(0.0), &measure(&state));
+    let mut valves = [DelayLine::new(commands.offgoing_a), DelayLine::new(commands.oncoming_a)];
+    let mut inputs = arrived(&mut valves, 0.0, commands.throttle);
+    let mut plant = HybridIntegrator::with_tolerance(powertrain, 0.0, state, &inputs, relative_tolerance)?;
+
+    let mut recorder = Recorder { next: 0, experiment };
+    let periods = (experiment.duration_s / calibration.control_period_s - 1e-9).ceil();
+    let mut period = 0.0;
+    while period < periods {
+        let start_s = period * calibration.control_period_s;
+        if period > 0.0 {
+            commands = controller.step(start_s, experiment.throttle.at(start_s), &measure(&plant.state));
+            let v = &powertrain.vehicle;
+            let [offgoing, oncoming] = &mut valves;
+            offgoing.send(start_s, v.offgoing.valve.delay_s.at(commands.offgoing_a), commands.offgoing_a);
+            oncoming.send(start_s, v.oncoming.valve.delay_s.at(commands.oncoming_a), commands.oncoming_a);
+        }
+        period += 1.0;
+        let end_s = (period * calibration.control_period_s).min(experiment.duration_s);
+        while plant.time_s < end_s {
+            inputs = arrived(&mut valves, plant.time_s, commands.throttle);
+            let arrival = valves.iter().filter_map(DelayLine::next_arrival_s).fold(end_s, f64::min);
+            plant.advance(powertrain, &inputs, arrival, &mut |segment| {
+                on_step(segment);
+                recorder.step(powertrain, &commands, segment, &mut record);
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Currents that have arrived at the valves, and the throttle.
+fn arrived(valves: &mut [DelayLine; 2], time_s: f64, throttle: f64) -> Inputs {
+    let [offgoing, oncoming] = valves;
+    Inputs { throttle, offgoing_a: offgoing.arrive(time_s), oncoming_a: oncoming.arrive(time_s) }
+}
+
+fn measure(state: &State) -> Measured {
+    Measured {
+        engine_rad_s: state.engine_rad_s,
+        turbine_rad_s: state.turbine_rad_s,
+        output_rad_s: state.output_rad_s,
+    }
+}
+
+/// In the gear before the shift, shafts relaxed, offgoing clutch at line pressure, oncoming empty.
+fn initial_state(powertrain: &Powertrain, experiment: &Experiment) -> State {
+    let v = &powertrain.vehicle;
+    let wheel = experiment.initial_vehicle_m_s / v.road.wheel_radius_m;
+    let output = wheel * v.driveline.final_ratio;
+    State {
+        engine_rad_s: experiment.initial_engine_rad_s,
+        turbine_rad_s: v.shift.ratio_offgoing() * output,
+        output_rad_s: output,
+        twist_rad: 0.0,
+        wheel_rad_s: wheel,
+        vehicle_m_s: experiment.initial_vehicle_m_s,
+        offgoing_pa: experiment.shift.line_pressure_pa,
+        oncoming_pa: 0.0,
+    }
+}
+
+/// Takes samples out of the steps.
+struct Recorder<'a> {
+    next: u32,
+    experiment: &'a Experiment,
+}
+
+impl Recorder<'_> {
+    fn step(
+        &mut self,
+        powertrain: &Powertrain,
+        commands: &Commands,
+        segment: &Segment<'_>,
+        record: &mut impl FnMut(&Sample),
+    ) {
+        // A sample on the border of two steps belongs to the first, except the one at time zero.
+        loop {
+            let time_s = f64::from(self.next) * self.experiment.sample_time_s;
+            if time_s > segment.end_s.min(self.experiment.duration_s + 1e-9) {
+                return;
+            }
+            let state = segment.at(time_s.max(segment.start_s));
+            let torques = powertrain.torques(segment.mode, &state, segment.inputs);
+            let shift = &powertrain.vehicle.shift;
+            record(&Sample {
+                time_s,
+                state,
+                mode: segment.mode,
+                torques,
+                commands: *commands,
+                offgoing_slip_rad_s: shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),
+                oncoming_slip_rad_s: shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s),
+                oncoming_pa: state.oncoming_pa,
+                vehicle_m_s2: powertrain.vehicle_acceleration(&state, &torques),
+            });
+            self.next += 1;
+        }
+    }
+}
