@@ -1,1 +1,38 @@
-//! x
+//! Observer gains by convex optimisation, with a certificate.
+//!
+//! The error of the rigid observer obeys `de/dt = (A22 - L G) e - L w`, Eq. (2.31). Where friction or the
+//! valve vary, `(A22, G)` lies in a polytope, and a gain that satisfies
+//!
+//! ```text
+//! A22_i - L G_i + kappa1 + kappa2 <= 0   at every vertex i                        (2.50)
+//! ```
+//!
+//! makes the error decay with `kappa2` and stay, for `|w|` bounded, within an offset (2.42). Among those
+//! gains the design takes the smallest, by a conic program (2.53).
+//!
+//! **Architecture invariant:** gains leave this crate only with their [`Certificate`], and every
+//! inequality in it is evaluated again by eigenvalues, not taken from the solver.
+//!
+//! ```
+//! use config::Vehicle;
+//! use design::design_rigid;
+//!
+//! let designed = design_rigid(&Vehicle::two_speed_at()?)?;
+//! let certificate = &designed.inertia_phase;
+//! assert!((certificate.gain_pa_s_rad[0] + 783.7).abs() < 0.1);
+//! assert!((certificate.offset_pa - 49.9e3).abs() < 0.1e3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use lapack_nalgebra as _;
+
+pub mod certificate;
+pub mod iss;
+pub mod lmi;
+pub mod polytope;
+pub mod rigid;
+
+pub use certificate::{Certificate, VertexMargin};
+pub use iss::{DesignError, IssRequirement, design_iss};
+pub use polytope::{Polytope, Vertex};
+pub use rigid::{RigidDesign, design_rigid, requirement, rigid_model, rigid_observer};

@@ -93,7 +93,7 @@ impl ShiftController {
         let (offgoing_pa, oncoming_pa) = match self.stage {
             Stage::Before => (line_pa, 0.0),
             Stage::Fill(since_s) => self.fill(time_s - since_s, &known),
-            Stage::TorquePhase(since_s) => self.transfer(time_s - since_s, &known),
+            Stage::TorquePhase(since_s) => self.transfer(time_s - since_s, measured, &known),
             Stage::InertiaPhase { .. } => (0.0, self.slip_control(time_s, measured, &known)),
             Stage::Locked(since_s) => {
                 let share = ((time_s - since_s) / self.calibration.lock_ramp_s).min(1.0);
@@ -153,21 +153,23 @@ impl ShiftController {
     }
 
     /// Pressures in the torque phase (offgoing, oncoming), Pa.
-    fn transfer(&self, elapsed_s: f64, known: &ShiftTorques<f64>) -> (f64, f64) {
+    fn transfer(&self, elapsed_s: f64, measured: &Measured, known: &ShiftTorques<f64>) -> (f64, f64) {
         let c = &self.calibration;
+        let v = &self.vehicle;
+        let slip = v.shift.oncoming_slip(measured.turbine_rad_s, measured.output_rad_s);
         // The oncoming torque at which nothing is left for the offgoing clutch to hold.
         let row = &self.torque_phase.holding_offgoing;
         let relief_n_m = -row.at(known) / row.per_oncoming_torque;
+        let oncoming_at = |share: f64| v.oncoming.clutch.pressure_for(share * relief_n_m, slip);
+        let offgoing_at = |share: f64| self.holding_pressure(known, share * relief_n_m, c.transfer_holding_margin);
+        // Both ramps are led by the lag that their valve has at the pressure of the moment.
         let share = (elapsed_s + c.lead_s) / c.torque_phase_s;
-        let oncoming_n_m = share * relief_n_m;
-        let slip = 0.0_f64.max(known.turbine_n_m);
-        let clutch = &self.vehicle.oncoming;
-        let pressure = |torque: f64| clutch.clutch.pressure_for(torque, slip);
-        // The ramp is led by the lag of the valve where the pressure is now.
-        let rate = (pressure(relief_n_m) - clutch.clutch.kiss_pressure()) / c.torque_phase_s;
-        let oncoming = pressure(oncoming_n_m);
-        let lead = clutch.valve.time_constant_s.at(oncoming) * rate;
-        (self.holding_pressure(known, oncoming_n_m, c.transfer_holding_margin), oncoming + lead)
+        let led = |clutch: &ShiftClutch, pressure: &dyn Fn(f64) -> f64| {
+            let ahead = share + c.control_period_s / c.torque_phase_s;
+            let rate = (pressure(ahead) - pressure(share)) / c.control_period_s;
+            pressure(share) + clutch.valve.time_constant_s.at(pressure(share)) * rate
+        };
+        (led(&v.offgoing, &offgoing_at), led(&v.oncoming, &oncoming_at))
     }
 
     /// Oncoming pressure that makes the slip follow its reference, Pa.

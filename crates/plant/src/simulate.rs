@@ -105,16 +105,20 @@ fn measure(state: &State) -> Measured {
     }
 }
 
-/// In the gear before the shift, shafts relaxed, offgoing clutch at line pressure, oncoming empty.
+/// In the gear before the shift, offgoing clutch at line pressure, oncoming empty. The shafts are twisted
+/// by what the turbine gives: a standing car has been held by its brake, which lets go at time zero.
 fn initial_state(powertrain: &Powertrain, experiment: &Experiment) -> State {
     let v = &powertrain.vehicle;
     let wheel = experiment.initial_vehicle_m_s / v.road.wheel_radius_m;
     let output = wheel * v.driveline.final_ratio;
+    let turbine = v.shift.ratio_offgoing() * output;
+    let turbine_n_m = v.converter.torques(experiment.initial_engine_rad_s, turbine).turbine_n_m;
+    let shaft_n_m = turbine_n_m * v.shift.ratio_offgoing() * v.driveline.final_ratio;
     State {
         engine_rad_s: experiment.initial_engine_rad_s,
-        turbine_rad_s: v.shift.ratio_offgoing() * output,
+        turbine_rad_s: turbine,
         output_rad_s: output,
-        twist_rad: 0.0,
+        twist_rad: shaft_n_m / v.driveline.shaft_stiffness_n_m_rad,
         wheel_rad_s: wheel,
         vehicle_m_s: experiment.initial_vehicle_m_s,
         offgoing_pa: experiment.shift.line_pressure_pa,

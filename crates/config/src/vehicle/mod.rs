@@ -39,6 +39,8 @@ pub struct Uncertainty {
 pub struct DesignRequirement {
     /// Time in which an initial error must be gone, s: `4 / kappa2`.
     pub settling_time_s: f64,
+    /// `kappa1`, 1/s, if it is given and not to be found by the design.
+    pub kappa1_per_s: Option<f64>,
     /// Bound on the model error `|w|`, rad/s^2.
     pub model_error_max_rad_s2: f64,
     /// Largest acceptable offset of the pressure estimate, Pa.
@@ -220,7 +222,7 @@ fn clutch(check: &Check<'_>, name: &str, raw: &RawVehicleFile) -> Result<ShiftCl
     let table = |axis: &str, axis_raw: &Numbers, axis_max: f64, values: &str, raw: &Numbers, range| {
         check.table((&key(axis), axis_raw, 0.0..=axis_max), (&key(values), raw, range))
     };
-    Ok(ShiftClutch {
+    let checked = ShiftClutch {
         clutch: Clutch {
             mean_radius_m: check.number(&key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
             friction_faces: check.number(&key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
@@ -262,7 +264,14 @@ fn clutch(check: &Check<'_>, name: &str, raw: &RawVehicleFile) -> Result<ShiftCl
                 0.0..=0.5,
             )?,
         },
-    })
+    };
+    let (holding, sliding) = (checked.clutch.static_friction, checked.clutch.friction.at(0.0));
+    if holding < sliding {
+        let message = format!("is {holding}, less than the {sliding} of `friction` at zero slip");
+        let hint = "a clutch that holds less than it drags would neither stick nor slip".to_owned();
+        return Err(check.meaning(&key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
+    }
+    Ok(checked)
 }
 
 fn road(check: &Check<'_>, raw: &RawVehicleFile) -> Result<RoadLoad<f64>, ConfigError> {
@@ -333,6 +342,7 @@ fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<D
     let number = |key: &str, value, range| check.number(&format!("{table}.{key}"), value, range);
     Ok(DesignRequirement {
         settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
+        kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
         model_error_max_rad_s2: number("model_error_max_rad_s2", &raw.model_error_max_rad_s2, 0.0..=1e6)?,
         offset_max_pa: number("offset_max_pa", &raw.offset_max_pa, 1e3..=10e6)?,
     })

@@ -207,6 +207,7 @@ pub(super) struct RawDesign {
 #[serde(deny_unknown_fields)]
 pub(super) struct RawRequirement {
     pub(super) settling_time_s: Number,
+    pub(super) kappa1_per_s: Option<Number>,
     pub(super) model_error_max_rad_s2: Number,
     pub(super) offset_max_pa: Number,
 }

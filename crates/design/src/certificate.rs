@@ -1,0 +1,125 @@
+//! What is promised about a gain, and the check of it that needs no solver.
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use crate::lmi::largest_eigenvalue;
+use crate::{IssRequirement, Polytope, Vertex};
+
+/// One vertex inequality of Eq. (2.50), evaluated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VertexMargin {
+    /// The vertex.
+    pub vertex: Vertex,
+    /// How fast the error decays there: `-lambda_max(sym(A22 - L G))`, 1/s.
+    pub decay_per_s: f64,
+    /// How far that exceeds `kappa1 + kappa2`, 1/s; not negative.
+    pub margin_per_s: f64,
+}
+
+/// A gain with what is promised about it.
+///
+/// Assumes that speeds and accelerations obey the rigid model up to an error `|w|` within the bound, and
+/// that the valve obeys its model exactly: the chapter's error model, Eq. (2.24), has no valve error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Certificate {
+    /// `L` on `(w_t, dw)`, Pa per rad/s.
+    pub gain_pa_s_rad: [f64; 2],
+    /// `kappa1`, 1/s.
+    pub kappa1_per_s: f64,
+    /// `kappa2`, 1/s: without model error the estimate's error decays at least as `e^(-kappa2 t)`.
+    pub kappa2_per_s: f64,
+    /// Bound on the model error `|w|`, rad/s^2.
+    pub model_error_max_rad_s2: f64,
+    /// Bound on the remaining error of the pressure, Pa, Eq. (2.42).
+    pub offset_pa: f64,
+    /// What was asked for, Pa.
+    pub offset_max_pa: f64,
+    /// Every vertex inequality.
+    pub vertices: Vec<VertexMargin>,
+    /// Iterations of the conic solver.
+    pub solver_iterations: u32,
+    /// SHA-256 of the vehicle file.
+    pub vehicle_sha256: String,
+}
+
+impl Certificate {
+    /// Evaluates every inequality for this gain, without the solver.
+    ///
+    /// Returns `None` if one of them does not hold: there is nothing to certify.
+    pub fn check(
+        gain_pa_s_rad: [f64; 2],
+        kappa1_per_s: f64,
+        requirement: &IssRequirement,
+        polytope: &Polytope,
+    ) -> Option<Self> {
+        let l = DMatrix::from_row_slice(1, 2, &gain_pa_s_rad);
+        let vertices: Vec<VertexMargin> = (polytope.vertices.iter())
+            .map(|vertex| {
+                let g = DMatrix::from_column_slice(2, 1, &vertex.g_rad_s2_pa);
+                let error_dynamics = DMatrix::from_element(1, 1, vertex.a22_per_s) - &l * g;
+                let decay_per_s = -largest_eigenvalue(&error_dynamics);
+                let margin_per_s = decay_per_s - kappa1_per_s - requirement.kappa2_per_s;
+                VertexMargin { vertex: vertex.clone(), decay_per_s, margin_per_s }
+            })
+            .collect();
+        let holds = |vertex: &VertexMargin| vertex.margin_per_s >= 0.0;
+        if !vertices.iter().all(holds) {
+            return None;
+        }
+        let gain_squared = largest_eigenvalue(&(l.transpose() * &l));
+        let offset_squared = requirement.model_error_max_rad_s2.powi(2) * gain_squared
+            / (4.0 * kappa1_per_s * requirement.kappa2_per_s);
+        Some(Self {
+            gain_pa_s_rad,
+            kappa1_per_s,
+            kappa2_per_s: requirement.kappa2_per_s,
+            model_error_max_rad_s2: requirement.model_error_max_rad_s2,
+            offset_pa: offset_squared.max(0.0).sqrt(),
+            offset_max_pa: requirement.offset_max_pa,
+            vertices,
+            solver_iterations: 0,
+            vehicle_sha256: String::new(),
+        })
+    }
+
+    /// Bound on the error after `elapsed_s`, Pa, if it was `initial_error_pa` at first, Eq. (2.40).
+    pub fn error_bound_pa(&self, initial_error_pa: f64, elapsed_s: f64) -> f64 {
+        let remains = (-2.0 * self.kappa2_per_s * elapsed_s).exp();
+        (initial_error_pa.powi(2) * remains + self.offset_pa.powi(2) * (1.0 - remains)).sqrt()
+    }
+
+    /// The smallest margin of all vertices, 1/s.
+    pub fn smallest_margin_per_s(&self) -> f64 {
+        self.vertices.iter().map(|vertex| vertex.margin_per_s).fold(f64::INFINITY, f64::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polytope() -> Polytope {
+        let vertex = |g: f64| Vertex { label: String::new(), a22_per_s: -25.0, g_rad_s2_pa: [g, 0.0] };
+        Polytope { vertices: vec![vertex(-0.01), vertex(-0.016)] }
+    }
+
+    const REQUIREMENT: IssRequirement =
+        IssRequirement { kappa1_per_s: None, kappa2_per_s: 40.0, model_error_max_rad_s2: 1600.0, offset_max_pa: 1e6 };
+
+    #[test]
+    fn a_gain_that_is_too_small_at_one_vertex_gets_no_certificate() {
+        // 55/s at the weak vertex needs |L| = 3000; a hair less must fail, a hair more must hold.
+        assert!(Certificate::check([-3000.0 * (1.0 - 1e-9), 0.0], 15.0, &REQUIREMENT, &polytope()).is_none());
+        let certificate = Certificate::check([-3000.0 * (1.0 + 1e-9), 0.0], 15.0, &REQUIREMENT, &polytope()).unwrap();
+        assert!(certificate.smallest_margin_per_s() < 1e-6);
+        assert!((certificate.vertices[1].margin_per_s - 18.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_error_bound_starts_at_the_initial_error_and_ends_at_the_offset() {
+        let certificate = Certificate::check([-4000.0, 0.0], 15.0, &REQUIREMENT, &polytope()).unwrap();
+        assert!((certificate.error_bound_pa(3e5, 0.0) - 3e5).abs() < 1e-6);
+        assert!((certificate.error_bound_pa(3e5, 10.0) - certificate.offset_pa).abs() < 1e-6);
+    }
+}

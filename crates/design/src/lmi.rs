@@ -1,0 +1,136 @@
+//! Linear matrix inequalities as conic programs.
+//!
+//! `min c'x` subject to `F0 + x1 F1 + ... + xn Fn >= 0` (positive semidefinite) for each of several
+//! blocks. A block of order 1 is a linear inequality. Scale the unknowns to the order of 1: the solver's
+//! tolerance is absolute.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT, SupportedConeT::NonnegativeConeT,
+    SupportedConeT::PSDTriangleConeT,
+};
+use nalgebra::DMatrix;
+
+/// A symmetric matrix that depends affinely on the unknowns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// `F0`, square.
+    pub constant: DMatrix<f64>,
+    /// `Fk`, one for each unknown, of the size of `F0`.
+    pub per_unknown: Vec<DMatrix<f64>>,
+}
+
+impl Block {
+    /// The matrix at these unknowns.
+    pub fn at(&self, unknowns: &[f64]) -> DMatrix<f64> {
+        self.per_unknown.iter().zip(unknowns).fold(self.constant.clone(), |sum, (f, x)| sum + f * *x)
+    }
+
+    /// A linear inequality `constant + coefficients' x >= 0`.
+    pub fn linear(constant: f64, coefficients: &[f64]) -> Self {
+        let one = |value| DMatrix::from_element(1, 1, value);
+        Self { constant: one(constant), per_unknown: coefficients.iter().map(|&c| one(c)).collect() }
+    }
+}
+
+/// A problem of linear matrix inequalities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// `c`, one number for each unknown.
+    pub objective: Vec<f64>,
+    /// What must be positive semidefinite.
+    pub blocks: Vec<Block>,
+}
+
+/// How a problem ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// A minimum was found.
+    Solved {
+        /// The unknowns.
+        unknowns: Vec<f64>,
+        /// Iterations of the solver.
+        iterations: u32,
+    },
+    /// No choice of unknowns satisfies every block.
+    Infeasible,
+    /// The solver gave up; holds its own word for it.
+    Failed(String),
+}
+
+impl Problem {
+    /// Solves the problem with an interior-point method.
+    pub fn solve(&self) -> Outcome {
+        let n = self.objective.len();
+        // A linear inequality is cheaper in the cone of non-negative numbers; those come first.
+        let (linear, matrix): (Vec<&Block>, Vec<&Block>) = self.blocks.iter().partition(|b| b.constant.nrows() == 1);
+        let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
+        if !linear.is_empty() {
+            cones.push(NonnegativeConeT(linear.len()));
+        }
+        cones.extend(matrix.iter().map(|block| PSDTriangleConeT(block.constant.nrows())));
+
+        // The solver wants A x + s = b with s in the cone: b holds F0 and A the negative of the Fk.
+        let stacked = |pick: &dyn Fn(&Block) -> &DMatrix<f64>| -> Vec<f64> {
+            linear.iter().chain(&matrix).flat_map(|block| upper_triangle(pick(block))).collect()
+        };
+        let b = stacked(&|block| &block.constant);
+        let columns: Vec<Vec<f64>> = (0..n).map(|k| stacked(&|block| &block.per_unknown[k])).collect();
+        let rows: Vec<Vec<f64>> = (0..b.len()).map(|i| columns.iter().map(|column| -column[i]).collect()).collect();
+        let a = CscMatrix::from(&rows);
+        let p = CscMatrix::zeros((n, n));
+
+        let settings = DefaultSettings { verbose: false, ..DefaultSettings::default() };
+        let mut solver = match DefaultSolver::new(&p, &self.objective, &a, &b, &cones, settings) {
+            Ok(solver) => solver,
+            Err(error) => return Outcome::Failed(error.to_string()),
+        };
+        solver.solve();
+        match solver.solution.status {
+            SolverStatus::Solved => {
+                Outcome::Solved { unknowns: solver.solution.x.clone(), iterations: solver.solution.iterations }
+            }
+            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => Outcome::Infeasible,
+            other => Outcome::Failed(format!("{other:?}")),
+        }
+    }
+}
+
+/// Upper triangle by columns, off-diagonal entries times the square root of 2, which keeps inner products.
+fn upper_triangle(matrix: &DMatrix<f64>) -> Vec<f64> {
+    let n = matrix.nrows();
+    let entry = |i: usize, j: usize| if i == j { matrix[(i, j)] } else { std::f64::consts::SQRT_2 * matrix[(i, j)] };
+    (0..n).flat_map(|j| (0..=j).map(move |i| (i, j))).map(|(i, j)| entry(i, j)).collect()
+}
+
+/// Largest eigenvalue of the symmetric part.
+pub fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
+    let symmetric = (matrix + matrix.transpose()) * 0.5;
+    symmetric.symmetric_eigenvalues().iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `min t` such that `t I - A >= 0` is the largest eigenvalue of `A`; order 5 needs the linked LAPACK.
+    #[test]
+    fn the_largest_eigenvalue_solves_its_own_program() {
+        let a = DMatrix::from_fn(5, 5, |i, j| 1.0 / (1.0 + i as f64 + j as f64));
+        let problem = Problem {
+            objective: vec![1.0],
+            blocks: vec![Block { constant: -a.clone(), per_unknown: vec![DMatrix::identity(5, 5)] }],
+        };
+        let Outcome::Solved { unknowns, .. } = problem.solve() else { panic!("{:?}", problem.solve()) };
+        assert!((unknowns[0] - largest_eigenvalue(&a)).abs() < 1e-7);
+    }
+
+    #[test]
+    fn contradicting_inequalities_are_infeasible() {
+        let problem = Problem {
+            objective: vec![0.0],
+            blocks: vec![Block::linear(-1.0, &[1.0]), Block::linear(-1.0, &[-1.0])],
+        };
+        assert_eq!(problem.solve(), Outcome::Infeasible);
+    }
+}

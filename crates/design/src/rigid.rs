@@ -1,0 +1,80 @@
+//! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
+
+use config::{DesignRequirement, Vehicle};
+use observer::{Phase, RigidGains, RigidModel, RigidObserver};
+use serde::Serialize;
+
+use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
+
+/// Certified gains of the rigid observer in both phases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RigidDesign {
+    /// Torque phase; the second entry of the gain is zero, because the slip is an input there.
+    pub torque_phase: Certificate,
+    /// Inertia phase.
+    pub inertia_phase: Certificate,
+}
+
+impl RigidDesign {
+    /// The gains alone.
+    pub fn gains(&self) -> RigidGains<f64> {
+        RigidGains {
+            torque_phase_pa_s_rad: self.torque_phase.gain_pa_s_rad[0],
+            inertia_phase_pa_s_rad: self.inertia_phase.gain_pa_s_rad,
+        }
+    }
+
+    /// The certificate of a phase in which the observer corrects.
+    pub fn of(&self, phase: Phase) -> Option<&Certificate> {
+        match phase {
+            Phase::TorquePhase => Some(&self.torque_phase),
+            Phase::InertiaPhase => Some(&self.inertia_phase),
+            Phase::BeforeShift | Phase::AfterShift => None,
+        }
+    }
+}
+
+/// What the vehicle file requires in a phase; before and after the shift there is nothing to design.
+pub fn requirement(vehicle: &Vehicle, phase: Phase) -> &DesignRequirement {
+    match phase {
+        Phase::InertiaPhase | Phase::AfterShift => &vehicle.inertia_phase,
+        Phase::BeforeShift | Phase::TorquePhase => &vehicle.torque_phase,
+    }
+}
+
+/// The powertrain as the rigid observer of this vehicle sees it.
+pub fn rigid_model(vehicle: &Vehicle) -> RigidModel<f64> {
+    RigidModel::new(
+        vehicle.shift,
+        vehicle.output_inertia_kg_m2,
+        vehicle.converter,
+        vehicle.oncoming.clutch,
+        vehicle.observer_valve,
+        vehicle.road,
+        vehicle.driveline,
+    )
+}
+
+/// The rigid observer of this vehicle with these gains.
+pub fn rigid_observer(vehicle: &Vehicle, gains: RigidGains<f64>) -> RigidObserver<f64> {
+    RigidObserver { model: rigid_model(vehicle), gains, supervisor: vehicle.supervisor, limits: vehicle.limits }
+}
+
+/// Designs the gains of both phases from the vehicle file's requirements.
+///
+/// # Errors
+/// The requirement that cannot be met, see [`DesignError`].
+pub fn design_rigid(vehicle: &Vehicle) -> Result<RigidDesign, DesignError> {
+    let phase = |phase| design_phase(vehicle, phase, &requirement(vehicle, phase).into());
+    Ok(RigidDesign { torque_phase: phase(Phase::TorquePhase)?, inertia_phase: phase(Phase::InertiaPhase)? })
+}
+
+/// Designs the gain of one phase.
+///
+/// # Errors
+/// The requirement that cannot be met, see [`DesignError`].
+pub fn design_phase(vehicle: &Vehicle, phase: Phase, requirement: &IssRequirement) -> Result<Certificate, DesignError> {
+    let polytope = Polytope::of(&rigid_model(vehicle), &vehicle.uncertainty, phase);
+    let certificate = design_iss(requirement, &polytope)?;
+    Ok(Certificate { vehicle_sha256: vehicle.source.sha256(), ..certificate })
+}
