@@ -14,5 +14,5 @@ pub mod supervisor;
 
 pub use rigid::{RigidGains, RigidObserver, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
-pub use signals::{Estimate, Health, Input, InputLimits};
+pub use signals::{Estimate, Estimator, Health, Input, InputLimits};
 pub use supervisor::{Phase, Supervisor, SupervisorState};

@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 use crate::{
-    Estimate, Health, Input, InputLimits, Phase, RigidModel, SpeedModel, Supervisor, SupervisorState,
+    Estimate, Estimator, Health, Input, InputLimits, Phase, RigidModel, SpeedModel, Supervisor, SupervisorState,
 };
 
 /// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
@@ -109,10 +109,15 @@ impl<T: Real> Default for RigidState<T> {
     }
 }
 
-impl<T: Real> RigidObserver<T> {
-    /// Takes one sample and returns the estimate at its time.
+impl<T: Real> Estimator<T> for RigidObserver<T> {
+    type State = RigidState<T>;
+
+    fn start(&self) -> RigidState<T> {
+        RigidState::new()
+    }
+
     #[inline]
-    pub fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
+    fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
         let dt = if state.started { input.dt_s } else { T::zero() };
         if !(dt >= T::zero() && dt.is_finite()) {
             return self.report(state, Health::TimeRejected);
@@ -139,7 +144,9 @@ impl<T: Real> RigidObserver<T> {
             },
         )
     }
+}
 
+impl<T: Real> RigidObserver<T> {
     /// Carries the pressure over `dt` under the command held since the last sample, and corrects it by
     /// how far the speeds moved otherwise than predicted.
     #[inline]
@@ -172,14 +179,15 @@ impl<T: Real> RigidObserver<T> {
         let output = self.model.shift.output_speed(turbine, slip);
         let offgoing_slip = self.model.shift.offgoing_slip(turbine, output);
         let phase = self.supervisor.step(&mut state.supervisor, dt, state.valve_pressure_pa, offgoing_slip, slip);
+        let acting = self.supervisor.acting_phase(phase, slip);
         let engine = input.engine_rad_s;
         // Outside the shift the speeds say nothing about the pressure: no sample to correct by.
-        state.last = matches!(phase, Phase::TorquePhase | Phase::InertiaPhase).then(|| Sample {
-            phase,
+        state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| Sample {
+            phase: acting,
             speeds: [turbine, slip],
-            model: self.model.speed_model(phase, engine, turbine, slip),
+            model: self.model.speed_model(acting, engine, turbine, slip),
         });
-        state.clutch_torque_n_m = self.model.clutch_torque(phase, state.pressure_pa, engine, turbine, slip);
+        state.clutch_torque_n_m = self.model.clutch_torque(acting, state.pressure_pa, engine, turbine, slip);
     }
 
     fn report(&self, state: &RigidState<T>, health: Health) -> Estimate<T> {

@@ -90,3 +90,15 @@ pub struct Estimate<T> {
     /// Whether the input could be used.
     pub health: Health,
 }
+
+/// An observer: tuning in `&self`, memory in its state, one estimate for each sample.
+pub trait Estimator<T> {
+    /// What it remembers from one sample to the next.
+    type State;
+
+    /// Its memory before the first sample.
+    fn start(&self) -> Self::State;
+
+    /// Takes one sample and returns the estimate at its time. Never panics; allocates nothing.
+    fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T>;
+}

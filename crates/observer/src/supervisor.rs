@@ -92,6 +92,15 @@ impl<T: Real> Supervisor<T> {
         state.phase
     }
 
+    /// The phase whose equations hold at this sample. Where the slip is too small to tell its sign, the
+    /// clutch may have locked already: the equations of the inertia phase would take the missing friction
+    /// for a missing pressure, long before the lock-up is confirmed.
+    #[inline]
+    pub fn acting_phase(&self, phase: Phase, oncoming_slip_rad_s: T) -> Phase {
+        let small = oncoming_slip_rad_s.abs() < self.lock_slip_rad_s;
+        if phase == Phase::InertiaPhase && small { Phase::AfterShift } else { phase }
+    }
+
     /// The same thresholds in another precision.
     pub fn cast<U: Real>(&self) -> Supervisor<U> {
         let to = |x: T| U::of(x.to_f64_exact());

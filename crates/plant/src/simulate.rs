@@ -4,7 +4,7 @@ use config::{Experiment, Vehicle};
 
 use crate::delay::DelayLine;
 use crate::{
-    Commands, HybridIntegrator, Inputs, Measured, Mode, PlantError, Powertrain, Segment, ShiftController, State,
+    Commands, HybridIntegrator, Inputs, Measured, Mode, PlantError, Powertrain, Segment, ShiftController, Stage, State,
     Torques,
 };
 
@@ -17,6 +17,8 @@ pub struct Sample {
     pub state: State,
     /// Which clutches stick.
     pub mode: Mode,
+    /// What the shift controller is about.
+    pub stage: Stage,
     /// All torques.
     pub torques: Torques,
     /// What the controller commands: throttle and the currents before their delay.
@@ -78,13 +80,14 @@ pub fn simulate_powertrain(
             oncoming.send(start_s, v.oncoming.valve.delay_s.at(commands.oncoming_a), commands.oncoming_a);
         }
         period += 1.0;
+        let stage = controller.stage();
         let end_s = (period * calibration.control_period_s).min(experiment.duration_s);
         while plant.time_s < end_s {
             inputs = arrived(&mut valves, plant.time_s, commands.throttle);
             let arrival = valves.iter().filter_map(DelayLine::next_arrival_s).fold(end_s, f64::min);
             plant.advance(powertrain, &inputs, arrival, &mut |segment| {
                 on_step(segment);
-                recorder.step(powertrain, &commands, segment, &mut record);
+                recorder.step(powertrain, &commands, stage, segment, &mut record);
             })?;
         }
     }
@@ -137,6 +140,7 @@ impl Recorder<'_> {
         &mut self,
         powertrain: &Powertrain,
         commands: &Commands,
+        stage: Stage,
         segment: &Segment<'_>,
         record: &mut impl FnMut(&Sample),
     ) {
@@ -153,6 +157,7 @@ impl Recorder<'_> {
                 time_s,
                 state,
                 mode: segment.mode,
+                stage,
                 torques,
                 commands: *commands,
                 offgoing_slip_rad_s: shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),

@@ -1,1 +1,14 @@
-//! x
+//! From a source of samples through observers to scores.
+//!
+//! A simulated drive and a measured log are two sources of the same [`trace::Trace`]; [`run()`] carries an
+//! observer over either, and [`score`] holds the estimates against the truth where there is one.
+
+pub mod comparison;
+pub mod drive;
+pub mod run;
+pub mod score;
+
+pub use comparison::{Comparison, StudyError, compare};
+pub use drive::{simulate_drive, true_phases};
+pub use run::{RunColumns, estimates_trace, run};
+pub use score::{PhaseScore, ShiftQuality, score};

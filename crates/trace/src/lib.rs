@@ -1,1 +1,123 @@
-//! x
+//! Named, unit-bearing time series and the files they live in.
+//!
+//! A trace is a time axis and columns over it. Names carry their unit (`turbine_speed_rad_s`). A file may
+//! use the units people measure in (`_rpm`, `_bar`, `_ms`); reading converts them, so that everything
+//! behind this crate is SI.
+
+pub mod atomic;
+pub mod csv_file;
+pub mod error;
+pub mod signal;
+pub mod units;
+
+use std::path::PathBuf;
+
+pub use atomic::write_whole;
+pub use csv_file::{read_csv, write_csv};
+pub use error::TraceError;
+
+/// The values of one column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Numbers; NaN where a sample was lost.
+    Numbers(Vec<f64>),
+    /// Words, such as phases.
+    Words(Vec<String>),
+}
+
+/// A named column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// The name, with its unit.
+    pub name: String,
+    /// One value for each time.
+    pub values: Values,
+}
+
+/// Columns over a common time axis.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trace {
+    /// The file it was read from, if any.
+    pub path: Option<PathBuf>,
+    /// Times, s, strictly rising.
+    pub time_s: Vec<f64>,
+    /// The other columns.
+    pub columns: Vec<Column>,
+}
+
+impl Trace {
+    /// An empty trace with these numeric columns.
+    pub fn with_columns(names: &[&str]) -> Self {
+        let column = |name: &&str| Column { name: (*name).to_owned(), values: Values::Numbers(Vec::new()) };
+        Self { path: None, time_s: Vec::new(), columns: names.iter().map(column).collect() }
+    }
+
+    /// Appends a row of numbers in the order of the columns.
+    ///
+    /// # Panics
+    /// If the row has not one value for each column, or a column holds words.
+    pub fn push(&mut self, time_s: f64, row: &[f64]) {
+        assert_eq!(row.len(), self.columns.len(), "one value for each column");
+        self.time_s.push(time_s);
+        for (column, &value) in self.columns.iter_mut().zip(row) {
+            match &mut column.values {
+                Values::Numbers(numbers) => numbers.push(value),
+                Values::Words(_) => panic!("column {} holds words", column.name),
+            }
+        }
+    }
+
+    /// Adds a column of numbers.
+    ///
+    /// # Panics
+    /// If it has not one value for each time.
+    pub fn add(&mut self, name: &str, values: Vec<f64>) {
+        assert_eq!(values.len(), self.time_s.len(), "one value for each time");
+        self.columns.push(Column { name: name.to_owned(), values: Values::Numbers(values) });
+    }
+
+    /// Adds a column of words.
+    ///
+    /// # Panics
+    /// If it has not one value for each time.
+    pub fn add_words(&mut self, name: &str, values: Vec<String>) {
+        assert_eq!(values.len(), self.time_s.len(), "one value for each time");
+        self.columns.push(Column { name: name.to_owned(), values: Values::Words(values) });
+    }
+
+    /// The numbers of a column, if there is such a column and it holds numbers.
+    pub fn get(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|column| column.name == name).and_then(|column| match &column.values {
+            Values::Numbers(numbers) => Some(numbers.as_slice()),
+            Values::Words(_) => None,
+        })
+    }
+
+    /// The numbers of a column.
+    ///
+    /// # Errors
+    /// There is no such column, or it holds words.
+    pub fn require(&self, name: &str) -> Result<&[f64], TraceError> {
+        self.get(name).ok_or_else(|| TraceError::MissingColumn {
+            path: self.path.clone().unwrap_or_default(),
+            wanted: name.to_owned(),
+            present: self.columns.iter().map(|column| column.name.clone()).collect(),
+        })
+    }
+
+    /// The same trace with only those columns that `keep` names.
+    #[must_use]
+    pub fn filtered(&self, keep: impl Fn(&str) -> bool) -> Self {
+        Self { columns: self.columns.iter().filter(|column| keep(&column.name)).cloned().collect(), ..self.clone() }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+}

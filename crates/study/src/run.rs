@@ -1,0 +1,66 @@
+//! The one loop that carries an observer over a trace, simulated or measured.
+
+use config::Vehicle;
+use observer::{Estimate, Estimator, Input};
+use trace::{Trace, TraceError, signal};
+
+/// The columns of a trace that the observers read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunColumns<'a> {
+    time_s: &'a [f64],
+    engine_rad_s: &'a [f64],
+    turbine_rad_s: &'a [f64],
+    slip_rad_s: Vec<f64>,
+    command_a: &'a [f64],
+}
+
+impl<'a> RunColumns<'a> {
+    /// Finds the columns. Where the slip of the oncoming clutch was not recorded it follows from turbine
+    /// and output speed.
+    ///
+    /// # Errors
+    /// A signal that is needed is missing.
+    pub fn of(trace: &'a Trace, vehicle: &Vehicle) -> Result<Self, TraceError> {
+        let turbine_rad_s = trace.require(signal::TURBINE_SPEED)?;
+        let slip_rad_s = match trace.get(signal::ONCOMING_SLIP) {
+            Some(slip) => slip.to_vec(),
+            None => {
+                let output = trace.require(signal::OUTPUT_SPEED)?;
+                turbine_rad_s.iter().zip(output).map(|(&t, &o)| vehicle.shift.oncoming_slip(t, o)).collect()
+            }
+        };
+        Ok(Self {
+            time_s: &trace.time_s,
+            engine_rad_s: trace.require(signal::ENGINE_SPEED)?,
+            turbine_rad_s,
+            slip_rad_s,
+            command_a: trace.require(signal::ONCOMING_CURRENT)?,
+        })
+    }
+
+    fn input(&self, i: usize) -> Input<f64> {
+        Input {
+            dt_s: if i == 0 { 0.0 } else { self.time_s[i] - self.time_s[i - 1] },
+            engine_rad_s: self.engine_rad_s[i],
+            turbine_rad_s: self.turbine_rad_s[i],
+            slip_rad_s: self.slip_rad_s[i],
+            command: self.command_a[i],
+        }
+    }
+}
+
+/// Runs an observer over every sample; one estimate for each.
+pub fn run(columns: &RunColumns<'_>, observer: &impl Estimator<f64>) -> Vec<Estimate<f64>> {
+    let mut state = observer.start();
+    (0..columns.time_s.len()).map(|i| observer.step(&mut state, &columns.input(i))).collect()
+}
+
+/// Estimates as a trace of their own.
+pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
+    let mut trace = Trace { path: None, time_s: time_s.to_vec(), columns: Vec::new() };
+    trace.add(signal::PRESSURE_ESTIMATE, estimates.iter().map(|e| e.pressure_pa).collect());
+    trace.add(signal::TORQUE_ESTIMATE, estimates.iter().map(|e| e.clutch_torque_n_m).collect());
+    trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().to_owned()).collect());
+    trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().to_owned()).collect());
+    trace
+}

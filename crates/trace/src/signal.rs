@@ -1,0 +1,64 @@
+//! Names of the signals.
+
+/// Time, s.
+pub const TIME: &str = "time_s";
+/// Engine speed, rad/s.
+pub const ENGINE_SPEED: &str = "engine_speed_rad_s";
+/// Turbine speed, rad/s.
+pub const TURBINE_SPEED: &str = "turbine_speed_rad_s";
+/// Gearbox output speed, rad/s.
+pub const OUTPUT_SPEED: &str = "output_speed_rad_s";
+/// Driven wheel speed, rad/s.
+pub const WHEEL_SPEED: &str = "wheel_speed_rad_s";
+/// Slip of the oncoming clutch, rad/s.
+pub const ONCOMING_SLIP: &str = "oncoming_slip_rad_s";
+/// Commanded current of the oncoming clutch's valve, A.
+pub const ONCOMING_CURRENT: &str = "oncoming_current_a";
+/// Commanded current of the offgoing clutch's valve, A.
+pub const OFFGOING_CURRENT: &str = "offgoing_current_a";
+/// Throttle, 0 to 1.
+pub const THROTTLE: &str = "throttle";
+
+/// True pressure of the oncoming clutch, Pa.
+pub const ONCOMING_PRESSURE: &str = "oncoming_pressure_pa";
+/// True pressure of the offgoing clutch, Pa.
+pub const OFFGOING_PRESSURE: &str = "offgoing_pressure_pa";
+/// True torque of the oncoming clutch, N m.
+pub const ONCOMING_TORQUE: &str = "oncoming_torque_n_m";
+/// True torque of the offgoing clutch, N m.
+pub const OFFGOING_TORQUE: &str = "offgoing_torque_n_m";
+/// True slip of the offgoing clutch, rad/s.
+pub const OFFGOING_SLIP: &str = "offgoing_slip_rad_s";
+/// True engine torque, N m.
+pub const ENGINE_TORQUE: &str = "engine_torque_n_m";
+/// True turbine torque, N m.
+pub const TURBINE_TORQUE: &str = "turbine_torque_n_m";
+/// True drive-shaft torque, N m.
+pub const SHAFT_TORQUE: &str = "shaft_torque_n_m";
+/// True vehicle speed, m/s.
+pub const VEHICLE_SPEED: &str = "vehicle_speed_m_s";
+/// True vehicle acceleration, m/s^2.
+pub const VEHICLE_ACCELERATION: &str = "vehicle_acceleration_m_s2";
+/// True phase of the shift, a word.
+pub const TRUE_PHASE: &str = "true_phase";
+
+/// Signals that a car measures or commands; everything else in a simulated trace is truth.
+pub const MEASURABLE: &[&str] = &[
+    ENGINE_SPEED,
+    TURBINE_SPEED,
+    OUTPUT_SPEED,
+    WHEEL_SPEED,
+    ONCOMING_SLIP,
+    ONCOMING_CURRENT,
+    OFFGOING_CURRENT,
+    THROTTLE,
+];
+
+/// Estimated pressure of the oncoming clutch, Pa.
+pub const PRESSURE_ESTIMATE: &str = "oncoming_pressure_estimate_pa";
+/// Estimated torque of the oncoming clutch, N m.
+pub const TORQUE_ESTIMATE: &str = "oncoming_torque_estimate_n_m";
+/// Phase as the supervisor sees it, a word.
+pub const PHASE: &str = "phase";
+/// Whether the input could be used, a word.
+pub const HEALTH: &str = "health";
