@@ -1,1 +1,35 @@
-fn main(){}
+//! The `wetclutch` command.
+//!
+//! **Architecture invariant:** this is the only crate that prints. Data goes to standard output, messages
+//! and progress to standard error.
+
+mod args;
+mod commands;
+mod failure;
+mod output;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+use failure::Failure;
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Demo(options) => commands::demo(&options),
+        Command::Simulate(options) => commands::simulate(&options),
+        Command::Design(options) => commands::design(&options),
+        Command::Estimate(options) => commands::estimate(&options),
+        Command::Check(options) => commands::check(&options),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        // Whoever reads our output has seen enough; that is no error.
+        Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::error(&failure.to_string());
+            failure.exit_code()
+        }
+    }
+}

@@ -9,6 +9,9 @@ use trace::{Trace, TraceError, signal};
 use crate::score::pressure_scores;
 use crate::{PhaseScore, RunColumns, ShiftQuality, run, simulate_drive};
 
+/// Name of the observer that does not correct.
+pub const OPEN_LOOP: &str = "open loop";
+
 /// Why a comparison could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
@@ -64,7 +67,7 @@ pub fn compare(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison,
     let columns = RunColumns::of(&trace, vehicle)?;
     let phases = crate::true_phases(&trace).unwrap_or_default();
     let torque_truth = trace.require(signal::ONCOMING_TORQUE)?;
-    let runs: Vec<ObserverRun> = [("ISS", design.gains()), ("open loop", RigidGains::open_loop())]
+    let runs: Vec<ObserverRun> = [("ISS", design.gains()), (OPEN_LOOP, RigidGains::open_loop())]
         .into_iter()
         .map(|(name, gains)| {
             let estimates = run(&columns, &rigid_observer(vehicle, gains));

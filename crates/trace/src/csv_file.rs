@@ -1,5 +1,6 @@
 //! Comma-separated files: one row of names with units, then one row for each time.
 
+use std::io::{self, Write};
 use std::path::Path;
 
 use crate::{Column, Trace, TraceError, Values, signal, units, write_whole};
@@ -67,24 +68,30 @@ fn check_times(path: &Path, trace: &Trace, lines: &[u64]) -> Result<(), TraceErr
 /// # Errors
 /// The file cannot be written.
 pub fn write_csv(path: &Path, trace: &Trace) -> Result<(), TraceError> {
-    write_whole(path, |writer| {
-        let mut writer = csv::Writer::from_writer(writer);
-        let names = std::iter::once(signal::TIME).chain(trace.columns.iter().map(|column| column.name.as_str()));
-        writer.write_record(names)?;
-        let number = |value: f64| if value.is_nan() { String::new() } else { value.to_string() };
-        for (i, &time_s) in trace.time_s.iter().enumerate() {
-            writer.write_field(number(time_s))?;
-            for column in &trace.columns {
-                match &column.values {
-                    Values::Numbers(numbers) => writer.write_field(number(numbers[i]))?,
-                    Values::Words(words) => writer.write_field(&words[i])?,
-                }
+    write_whole(path, |writer| write_rows(writer, trace))
+        .map_err(|source| TraceError::Io { path: path.to_owned(), source })
+}
+
+/// Writes the rows of a comma-separated file.
+///
+/// # Errors
+/// What the writer meets.
+pub fn write_rows(writer: &mut dyn Write, trace: &Trace) -> io::Result<()> {
+    let mut writer = csv::Writer::from_writer(writer);
+    let names = std::iter::once(signal::TIME).chain(trace.columns.iter().map(|column| column.name.as_str()));
+    writer.write_record(names)?;
+    let number = |value: f64| if value.is_nan() { String::new() } else { value.to_string() };
+    for (i, &time_s) in trace.time_s.iter().enumerate() {
+        writer.write_field(number(time_s))?;
+        for column in &trace.columns {
+            match &column.values {
+                Values::Numbers(numbers) => writer.write_field(number(numbers[i]))?,
+                Values::Words(words) => writer.write_field(&words[i])?,
             }
-            writer.write_record(None::<&[u8]>)?;
         }
-        writer.flush()
-    })
-    .map_err(|source| TraceError::Io { path: path.to_owned(), source })
+        writer.write_record(None::<&[u8]>)?;
+    }
+    writer.flush()
 }
 
 /// Cells of one column while it is read: numbers as long as every cell is one.

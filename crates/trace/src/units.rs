@@ -36,6 +36,11 @@ pub fn rpm(rad_s: f64) -> f64 {
     rad_s * 30.0 / PI
 }
 
+/// Metre per second in kilometres per hour.
+pub fn km_h(m_s: f64) -> f64 {
+    m_s * 3.6
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

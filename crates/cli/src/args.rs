@@ -1,0 +1,153 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+const EXAMPLES: &str = "\
+Examples:
+  wetclutch demo                                     the whole job on the built-in car
+  wetclutch simulate experiments/e1.toml -o out      a drive as CSV
+  wetclutch design vehicles/two_speed_at.toml        gains with their certificate
+  wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
+
+Files are SI throughout and say so in their keys and column names; measured files may also use
+_rpm, _bar, _mpa, _ma, _ms, _km_h, which are converted when read.
+Exit codes: 0 done, 1 the work failed (infeasible, diverged), 2 wrong usage or input.";
+
+/// A virtual pressure sensor for the wet clutches of automatic transmissions.
+///
+/// Estimates the hydraulic pressure in an engaging clutch from the speeds and the valve current that
+/// a car already measures, with a bound on the error.
+#[derive(Debug, Parser)]
+#[command(version, about, after_help = EXAMPLES, arg_required_else_help = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Simulate a shift, design the observer, estimate the pressure, write the report
+    Demo(Demo),
+    /// Simulate an experiment and write its signals as CSV
+    Simulate(Simulate),
+    /// Design observer gains and print them with their certificate
+    Design(Design),
+    /// Estimate pressure and torque from a file of measured signals
+    Estimate(Estimate),
+    /// Check a vehicle or experiment file
+    Check(Check),
+}
+
+/// Simulates a launch from rest and a power-on 1st to 2nd upshift of the built-in two-speed automatic,
+/// designs the observer's gains for it, runs the observer and the open loop on the same samples, prints
+/// their errors, and writes:
+///
+///   report.html    the report; opens from disk, needs no network
+///   shift.svg, drive.svg    its figures
+///   trace.csv      every simulated signal, the truth included
+///   measured.csv   only what a car measures
+///   estimate.csv   what the observer makes of it
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Demo {
+    /// Folder for the report
+    #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
+    pub(crate) output: PathBuf,
+}
+
+/// Simulates an experiment and writes two files: NAME.csv with every signal, the truth included, and
+/// NAME_measured.csv with only what a car measures. The same experiment gives the same bytes.
+#[derive(Debug, Args)]
+pub(crate) struct Simulate {
+    /// Experiment file
+    pub(crate) experiment: PathBuf,
+    /// Folder for the signals
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+}
+
+/// Designs the gains of the rigid observer by the five-step procedure: decay from the settling time,
+/// then the smallest gain that reaches it at every vertex of the polytope, with kappa1 raised until the
+/// bound on the remaining error is small enough. Requirements come from the vehicle file; options
+/// replace them.
+#[derive(Debug, Args)]
+pub(crate) struct Design {
+    /// Vehicle file
+    pub(crate) vehicle: PathBuf,
+    /// Phase to design for
+    #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
+    pub(crate) phase: PhaseChoice,
+    /// kappa1 in 1/s; without it (here or in the file) it is raised step by step
+    #[arg(long, value_name = "PER_S", value_parser = positive)]
+    pub(crate) kappa1: Option<f64>,
+    /// kappa2 in 1/s: the decay of the error; 4/kappa2 is the settling time
+    #[arg(long, value_name = "PER_S", value_parser = positive)]
+    pub(crate) kappa2: Option<f64>,
+    /// Bound on the model error |w| in rad/s^2
+    #[arg(long, value_name = "RAD_S2", value_parser = positive)]
+    pub(crate) error_bound: Option<f64>,
+    /// Largest acceptable offset of the estimate in Pa
+    #[arg(long, value_name = "PA", value_parser = positive)]
+    pub(crate) offset_max: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PhaseChoice {
+    /// Torque phase and inertia phase
+    Both,
+    /// Load moves from the offgoing to the oncoming clutch
+    Torque,
+    /// Both clutches slip
+    Inertia,
+}
+
+/// Runs an observer over a file of measured signals. The file needs the columns
+///
+///   time_s, engine_speed_rad_s, turbine_speed_rad_s, oncoming_current_a,
+///   and oncoming_slip_rad_s or output_speed_rad_s
+///
+/// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell is a lost sample. Where
+/// the file also holds the true pressure (a simulated trace), the error is reported.
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct Estimate {
+    /// File of measured signals
+    pub(crate) log: PathBuf,
+    /// Vehicle file
+    #[arg(long)]
+    pub(crate) vehicle: PathBuf,
+    /// Observer
+    #[arg(long, value_enum, default_value_t = ObserverChoice::Iss)]
+    pub(crate) observer: ObserverChoice,
+    /// File for the estimate; standard output if left out
+    #[arg(short, long, value_name = "OUT.csv")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ObserverChoice {
+    /// The rigid observer with certified gains
+    Iss,
+    /// The valve model alone
+    OpenLoop,
+}
+
+/// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
+/// names is checked too.
+#[derive(Debug, Args)]
+pub(crate) struct Check {
+    /// Vehicle or experiment file
+    pub(crate) file: PathBuf,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a number above 0".to_owned()),
+    }
+}

@@ -1,0 +1,39 @@
+//! `wetclutch check`.
+
+use config::{Experiment, Source, Vehicle};
+
+use crate::args::Check;
+use crate::failure::Failure;
+use crate::output;
+
+pub(crate) fn check(options: &Check) -> Result<(), Failure> {
+    let source = Source::read(&options.file)?;
+    if is_experiment(&source) {
+        let experiment = Experiment::from_source(source)?;
+        let vehicle = Vehicle::read(&experiment.vehicle_path())?;
+        output::line(&format!(
+            "experiment {} \"{}\": {} s, shift request at {} s",
+            experiment.name, experiment.title, experiment.duration_s, experiment.shift.request_s
+        ))?;
+        return describe(&vehicle);
+    }
+    describe(&Vehicle::from_source(source)?)
+}
+
+/// An experiment names its vehicle; a vehicle describes an engine.
+fn is_experiment(source: &Source) -> bool {
+    let begins = |word: &str| source.text.lines().any(|line| line.trim_start().starts_with(word));
+    begins("vehicle =") || begins("[shift") || !begins("[engine")
+}
+
+fn describe(vehicle: &Vehicle) -> Result<(), Failure> {
+    output::line(&format!(
+        "vehicle \"{}\": ratio {:.3} to {:.3}, {} kg, kiss point of the oncoming clutch {:.3} MPa",
+        vehicle.name,
+        vehicle.shift.ratio_offgoing(),
+        vehicle.shift.ratio_oncoming(),
+        vehicle.road.mass_kg,
+        trace::units::mpa(vehicle.oncoming.clutch.kiss_pressure()),
+    ))?;
+    Ok(())
+}

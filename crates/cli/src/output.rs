@@ -1,0 +1,48 @@
+//! Messages and tables. Colours appear on terminals only and never under `NO_COLOR`.
+
+use std::io::{self, Write};
+
+use anstyle::{AnsiColor, Style};
+
+const ERROR: Style = AnsiColor::Red.on_default().bold();
+const HINT: Style = AnsiColor::Cyan.on_default();
+
+/// An error on standard error; lines that begin with `hint:` stand out.
+pub(crate) fn error(message: &str) {
+    let mut stderr = anstream::stderr().lock();
+    // A message that cannot be delivered has nowhere else to go.
+    let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", coloured_hints(message));
+}
+
+/// A message on standard error.
+pub(crate) fn note(message: &str) {
+    let _ = writeln!(anstream::stderr().lock(), "{message}");
+}
+
+fn coloured_hints(message: &str) -> String {
+    let line = |line: &str| match line.strip_prefix("hint:") {
+        Some(rest) => format!("{HINT}hint:{HINT:#}{rest}"),
+        None => line.to_owned(),
+    };
+    message.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// A table on standard output: the first `left` columns to the left, the others to the right.
+pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| cell.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut stdout = io::stdout().lock();
+    for row in rows {
+        let cells = row.iter().zip(&widths).enumerate().map(|(j, (cell, &width))| {
+            if j < left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+        });
+        writeln!(stdout, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
+    }
+    Ok(())
+}
+
+/// A line on standard output.
+pub(crate) fn line(text: &str) -> io::Result<()> {
+    writeln!(io::stdout().lock(), "{text}")
+}
