@@ -34,9 +34,10 @@ pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut stdout = io::stdout().lock();
     for row in rows {
-        let cells = row.iter().zip(&widths).enumerate().map(|(j, (cell, &width))| {
-            if j < left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
-        });
+        let cells =
+            row.iter().zip(&widths).enumerate().map(|(j, (cell, &width))| {
+                if j < left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+            });
         writeln!(stdout, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
     }
     Ok(())

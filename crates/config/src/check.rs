@@ -84,13 +84,7 @@ impl Check<'_> {
         }
     }
 
-    fn in_range(
-        &self,
-        key: &str,
-        value: f64,
-        offset: usize,
-        range: &RangeInclusive<f64>,
-    ) -> Result<f64, ConfigError> {
+    fn in_range(&self, key: &str, value: f64, offset: usize, range: &RangeInclusive<f64>) -> Result<f64, ConfigError> {
         if range.contains(&value) {
             return Ok(value);
         }
@@ -109,18 +103,22 @@ impl Check<'_> {
 fn unit_hint(key: &str, value: f64, range: &RangeInclusive<f64>) -> Option<String> {
     let name = key.split('[').next().unwrap_or(key);
     // The longest suffix that fits is the key's unit: `_rad_s` is not `_s`.
-    let unit = MISTAKEN_UNITS.iter().map(|(unit, ..)| *unit).filter(|unit| name.ends_with(unit)).max_by_key(|u| u.len())?;
-    MISTAKEN_UNITS.iter().find(|(of, _, size)| *of == unit && range.contains(&(value * size))).map(|(_, wrong, size)| {
-        let right = unit.trim_start_matches('_').replace("rad_s", "rad/s").replace("m_s", "m/s").replace("pa_a", "Pa/A");
-        let right = match right.as_str() {
-            "throttle" | "position" | "coefficient" => "as a fraction".to_owned(),
-            "pa" => "Pa".to_owned(),
-            "a" => "A".to_owned(),
-            "n" => "N".to_owned(),
-            _ => right,
-        };
-        format!("{value} {wrong} is {} {right}", significant(value * size))
-    })
+    let unit =
+        MISTAKEN_UNITS.iter().map(|(unit, ..)| *unit).filter(|unit| name.ends_with(unit)).max_by_key(|u| u.len())?;
+    MISTAKEN_UNITS.iter().find(|(of, _, size)| *of == unit && range.contains(&(value * size))).map(
+        |(_, wrong, size)| {
+            let right =
+                unit.trim_start_matches('_').replace("rad_s", "rad/s").replace("m_s", "m/s").replace("pa_a", "Pa/A");
+            let right = match right.as_str() {
+                "throttle" | "position" | "coefficient" => "as a fraction".to_owned(),
+                "pa" => "Pa".to_owned(),
+                "a" => "A".to_owned(),
+                "n" => "N".to_owned(),
+                _ => right,
+            };
+            format!("{value} {wrong} is {} {right}", significant(value * size))
+        },
+    )
 }
 
 /// A number with at most six significant digits and no trailing zeros.

@@ -12,5 +12,5 @@ pub mod vehicle;
 
 pub use error::ConfigError;
 pub use experiment::{Experiment, OffNominal, Profile, ShiftCalibration};
-pub use source::Source;
+pub use source::{Kind, Source};
 pub use vehicle::{DesignRequirement, ShiftClutch, Uncertainty, Vehicle};

@@ -7,6 +7,15 @@ use sha2::{Digest, Sha256};
 
 use crate::ConfigError;
 
+/// What a configuration file describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A vehicle.
+    Vehicle,
+    /// A simulated drive.
+    Experiment,
+}
+
 /// Text of a file with its name and fingerprint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
@@ -40,6 +49,23 @@ impl Source {
     /// Line, counted from 1, of a byte offset.
     pub fn line(&self, offset: usize) -> usize {
         1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
+    }
+
+    /// What the file describes, by its tables.
+    ///
+    /// # Errors
+    /// The text is not TOML, or neither a vehicle nor an experiment.
+    pub fn kind(&self) -> Result<Kind, ConfigError> {
+        let tables: toml::Table = self.parse()?;
+        match (tables.contains_key("gear_train"), tables.contains_key("shift")) {
+            (true, false) => Ok(Kind::Vehicle),
+            (false, true) => Ok(Kind::Experiment),
+            _ => Err(ConfigError::Syntax {
+                path: self.path.clone(),
+                line: 1,
+                message: "neither a vehicle file (with [gear_train]) nor an experiment file (with [shift])".to_owned(),
+            }),
+        }
     }
 
     /// Reads the text into raw types.

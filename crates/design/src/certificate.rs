@@ -68,8 +68,8 @@ impl Certificate {
             return None;
         }
         let gain_squared = largest_eigenvalue(&(l.transpose() * &l));
-        let offset_squared = requirement.model_error_max_rad_s2.powi(2) * gain_squared
-            / (4.0 * kappa1_per_s * requirement.kappa2_per_s);
+        let offset_squared =
+            requirement.model_error_max_rad_s2.powi(2) * gain_squared / (4.0 * kappa1_per_s * requirement.kappa2_per_s);
         Some(Self {
             gain_pa_s_rad,
             kappa1_per_s,

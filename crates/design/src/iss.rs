@@ -1,8 +1,10 @@
 //! The five-step design of the input-to-state-stable observer, Theorem 2.2.
 //!
-//! 1. `kappa2` follows from the wanted settling time. 2. `kappa1` starts small. 3. The smallest gain that
-//! satisfies (2.50) is the solution of (2.53). 4. The offset follows from (2.42). 5. If it is too large,
-//! `kappa1` is raised.
+//! 1. `kappa2` follows from the wanted settling time.
+//! 2. `kappa1` starts small.
+//! 3. The smallest gain that satisfies (2.50) is the solution of (2.53).
+//! 4. The offset follows from (2.42).
+//! 5. If it is too large, `kappa1` is raised.
 //!
 //! In the scalar case `|L| = (kappa1 + kappa2 + A22)/|G_min|`, so the offset goes as
 //! `(kappa1 + kappa2 + A22)/sqrt(kappa1 kappa2)`: it has its minimum at `kappa1 = kappa2 + A22`, and past

@@ -127,10 +127,8 @@ mod tests {
 
     #[test]
     fn contradicting_inequalities_are_infeasible() {
-        let problem = Problem {
-            objective: vec![0.0],
-            blocks: vec![Block::linear(-1.0, &[1.0]), Block::linear(-1.0, &[-1.0])],
-        };
+        let problem =
+            Problem { objective: vec![0.0], blocks: vec![Block::linear(-1.0, &[1.0]), Block::linear(-1.0, &[-1.0])] };
         assert_eq!(problem.solve(), Outcome::Infeasible);
     }
 }

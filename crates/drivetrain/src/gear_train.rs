@@ -126,10 +126,15 @@ impl GearTrain<'_> {
         }
         let constraints = self.sets.len() + self.held.len();
         if n != constraints + 2 {
-            #[expect(clippy::cast_possible_wrap, clippy::cast_possible_truncation, reason = "counts of gearbox parts are small")]
+            #[expect(
+                clippy::cast_possible_wrap,
+                clippy::cast_possible_truncation,
+                reason = "counts of gearbox parts are small"
+            )]
             return Err(GearTrainError::DegreesOfFreedom(n as i32 - constraints as i32));
         }
-        let mut system = System { n, matrix: [[0.0; MAX_SHAFTS]; MAX_SHAFTS], right: [[0.0; 2]; MAX_SHAFTS], filled: 0 };
+        let mut system =
+            System { n, matrix: [[0.0; MAX_SHAFTS]; MAX_SHAFTS], right: [[0.0; 2]; MAX_SHAFTS], filled: 0 };
         for set in self.sets {
             let row = system.next_row();
             row[self.check(set.sun)?] += set.sun_teeth;

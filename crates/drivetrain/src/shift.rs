@@ -195,10 +195,8 @@ impl<T: Real> ReducedShift<T> {
             Engagement::BothStuck => (true, true),
         };
         let (t_off, t_on) = (given(off_stuck, torques.offgoing_n_m), given(on_stuck, torques.oncoming_n_m));
-        let force = [
-            torques.turbine_n_m - off[0] * t_off - on[0] * t_on,
-            -torques.output_n_m - off[1] * t_off - on[1] * t_on,
-        ];
+        let force =
+            [torques.turbine_n_m - off[0] * t_off - on[0] * t_on, -torques.output_n_m - off[1] * t_off - on[1] * t_on];
         let dot = |a: [T; 2], b: [T; 2]| a[0] * b[0] + a[1] * b[1];
         let free = self.solve(force);
         let held = |k: [T; 2]| {

@@ -116,8 +116,11 @@ impl<T: Real> Table1<T> {
 
     /// The same value everywhere.
     pub fn constant(value: T) -> Self {
-        let mut table =
-            Self { axis: Axis { points: [T::zero(); MAX_POINTS], len: 2 }, values: [value; MAX_POINTS], slopes: [T::zero(); MAX_POINTS] };
+        let mut table = Self {
+            axis: Axis { points: [T::zero(); MAX_POINTS], len: 2 },
+            values: [value; MAX_POINTS],
+            slopes: [T::zero(); MAX_POINTS],
+        };
         table.axis.points[1] = T::one();
         table
     }

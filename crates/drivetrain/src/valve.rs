@@ -142,7 +142,8 @@ mod tests {
 
     #[test]
     fn a_closed_pulse_width_valve_stays_finite() {
-        let valve = Valve::PulseWidth { flow_sqrt_pa_s: 2000.0_f64, line_pressure_pa: 1e6, operating_pressure_pa: 0.2e6 };
+        let valve =
+            Valve::PulseWidth { flow_sqrt_pa_s: 2000.0_f64, line_pressure_pa: 1e6, operating_pressure_pa: 0.2e6 };
         let linear = valve.linear(0.0);
         assert!(linear.a22_per_s.is_finite() && linear.b2_pa_s.is_finite());
     }

@@ -23,7 +23,12 @@ pub(crate) fn is(option: c_char, letter: u8) -> bool {
 ///
 /// # Safety
 /// `data` points to `columns` columns of `rows` values at a distance of `leading >= rows`.
-pub(crate) unsafe fn read<T: RealField + Copy>(data: *const T, rows: usize, columns: usize, leading: usize) -> DMatrix<T> {
+pub(crate) unsafe fn read<T: RealField + Copy>(
+    data: *const T,
+    rows: usize,
+    columns: usize,
+    leading: usize,
+) -> DMatrix<T> {
     // SAFETY: each index lies in the matrix that the caller described.
     DMatrix::from_fn(rows, columns, |i, j| unsafe { *data.add(i + j * leading) })
 }
@@ -58,7 +63,11 @@ pub(crate) fn transposed<T: RealField + Copy>(option: c_char, matrix: DMatrix<T>
 /// The symmetric matrix of which one triangle was given.
 pub(crate) fn symmetric<T: RealField + Copy>(triangle: c_char, matrix: &DMatrix<T>) -> DMatrix<T> {
     let upper = is(triangle, b'U');
-    DMatrix::from_fn(matrix.nrows(), matrix.nrows(), |i, j| if (i <= j) == upper { matrix[(i, j)] } else { matrix[(j, i)] })
+    DMatrix::from_fn(
+        matrix.nrows(),
+        matrix.nrows(),
+        |i, j| if (i <= j) == upper { matrix[(i, j)] } else { matrix[(j, i)] },
+    )
 }
 
 /// `alpha x + beta y`, where a zero `beta` ignores `y` even if it holds no numbers.
@@ -85,9 +94,8 @@ pub(crate) fn eigen<T: RealField + Copy>(matrix: DMatrix<T>) -> Option<(DMatrix<
     let n = matrix.nrows();
     let eigen = SymmetricEigen::try_new(matrix, T::default_epsilon(), MOST_ITERATIONS)?;
     let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&a, &b| {
-        eigen.eigenvalues[a].partial_cmp(&eigen.eigenvalues[b]).unwrap_or(std::cmp::Ordering::Equal)
-    });
+    order
+        .sort_by(|&a, &b| eigen.eigenvalues[a].partial_cmp(&eigen.eigenvalues[b]).unwrap_or(std::cmp::Ordering::Equal));
     let values = DMatrix::from_fn(n, 1, |i, _| eigen.eigenvalues[order[i]]);
     let vectors = DMatrix::from_fn(n, n, |i, j| eigen.eigenvectors[(i, order[j])]);
     Some((values, vectors))

@@ -4,7 +4,6 @@
     clippy::missing_safety_doc,
     reason = "each routine has the argument list and the demands of the BLAS or LAPACK routine of its name"
 )]
-#![expect(clippy::too_many_arguments, reason = "Fortran interfaces")]
 
 use std::ffi::{c_char, c_int};
 
@@ -32,14 +31,25 @@ macro_rules! routines {
         /// General matrix product, `C = alpha op(A) op(B) + beta C`.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $gemm(
-            transa: *const c_char, transb: *const c_char, m: *const c_int, n: *const c_int, k: *const c_int,
-            alpha: *const $real, a: *const $real, lda: *const c_int, b: *const $real, ldb: *const c_int,
-            beta: *const $real, c: *mut $real, ldc: *const c_int,
+            transa: *const c_char,
+            transb: *const c_char,
+            m: *const c_int,
+            n: *const c_int,
+            k: *const c_int,
+            alpha: *const $real,
+            a: *const $real,
+            lda: *const c_int,
+            b: *const $real,
+            ldb: *const c_int,
+            beta: *const $real,
+            c: *mut $real,
+            ldc: *const c_int,
         ) {
             // SAFETY: the arguments describe matrices as the routine's definition demands.
             unsafe {
                 let (m, n, k) = (size(*m), size(*n), size(*k));
-                let stored = |option: c_char, rows, columns| if is(option, b'N') { (rows, columns) } else { (columns, rows) };
+                let stored =
+                    |option: c_char, rows, columns| if is(option, b'N') { (rows, columns) } else { (columns, rows) };
                 let ((ar, ac), (br, bc)) = (stored(*transa, m, k), stored(*transb, k, n));
                 let a = transposed(*transa, read(a, ar, ac, size(*lda)));
                 let b = transposed(*transb, read(b, br, bc, size(*ldb)));
@@ -51,8 +61,16 @@ macro_rules! routines {
         /// General matrix times vector, `y = alpha op(A) x + beta y`.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $gemv(
-            trans: *const c_char, m: *const c_int, n: *const c_int, alpha: *const $real, a: *const $real,
-            lda: *const c_int, x: *const $real, incx: *const c_int, beta: *const $real, y: *mut $real,
+            trans: *const c_char,
+            m: *const c_int,
+            n: *const c_int,
+            alpha: *const $real,
+            a: *const $real,
+            lda: *const c_int,
+            x: *const $real,
+            incx: *const c_int,
+            beta: *const $real,
+            y: *mut $real,
             incy: *const c_int,
         ) {
             // SAFETY: the arguments describe a matrix and vectors as the routine's definition demands.
@@ -69,8 +87,16 @@ macro_rules! routines {
         /// Symmetric matrix times vector, `y = alpha A x + beta y`.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symv(
-            uplo: *const c_char, n: *const c_int, alpha: *const $real, a: *const $real, lda: *const c_int,
-            x: *const $real, incx: *const c_int, beta: *const $real, y: *mut $real, incy: *const c_int,
+            uplo: *const c_char,
+            n: *const c_int,
+            alpha: *const $real,
+            a: *const $real,
+            lda: *const c_int,
+            x: *const $real,
+            incx: *const c_int,
+            beta: *const $real,
+            y: *mut $real,
+            incy: *const c_int,
         ) {
             // SAFETY: the arguments describe a matrix and vectors as the routine's definition demands.
             unsafe {
@@ -86,8 +112,16 @@ macro_rules! routines {
         /// Symmetric rank-k update of one triangle, `C = alpha A A' + beta C` or `alpha A' A + beta C`.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $syrk(
-            uplo: *const c_char, trans: *const c_char, n: *const c_int, k: *const c_int, alpha: *const $real,
-            a: *const $real, lda: *const c_int, beta: *const $real, c: *mut $real, ldc: *const c_int,
+            uplo: *const c_char,
+            trans: *const c_char,
+            n: *const c_int,
+            k: *const c_int,
+            alpha: *const $real,
+            a: *const $real,
+            lda: *const c_int,
+            beta: *const $real,
+            c: *mut $real,
+            ldc: *const c_int,
         ) {
             // SAFETY: the arguments describe matrices as the routine's definition demands.
             unsafe {
@@ -103,9 +137,18 @@ macro_rules! routines {
         /// Symmetric rank-2k update of one triangle, `C = alpha (A B' + B A') + beta C`.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $syr2k(
-            uplo: *const c_char, trans: *const c_char, n: *const c_int, k: *const c_int, alpha: *const $real,
-            a: *const $real, lda: *const c_int, b: *const $real, ldb: *const c_int, beta: *const $real,
-            c: *mut $real, ldc: *const c_int,
+            uplo: *const c_char,
+            trans: *const c_char,
+            n: *const c_int,
+            k: *const c_int,
+            alpha: *const $real,
+            a: *const $real,
+            lda: *const c_int,
+            b: *const $real,
+            ldb: *const c_int,
+            beta: *const $real,
+            c: *mut $real,
+            ldc: *const c_int,
         ) {
             // SAFETY: the arguments describe matrices as the routine's definition demands.
             unsafe {
@@ -123,7 +166,11 @@ macro_rules! routines {
         /// Cholesky factor of a symmetric positive definite matrix, in the given triangle.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $potrf(
-            uplo: *const c_char, n: *const c_int, a: *mut $real, lda: *const c_int, info: *mut c_int,
+            uplo: *const c_char,
+            n: *const c_int,
+            a: *mut $real,
+            lda: *const c_int,
+            info: *mut c_int,
         ) {
             // SAFETY: the arguments describe a matrix as the routine's definition demands.
             unsafe {
@@ -142,8 +189,14 @@ macro_rules! routines {
         /// Solution of `A X = B` from the Cholesky factor of `A`.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $potrs(
-            uplo: *const c_char, n: *const c_int, nrhs: *const c_int, a: *const $real, lda: *const c_int,
-            b: *mut $real, ldb: *const c_int, info: *mut c_int,
+            uplo: *const c_char,
+            n: *const c_int,
+            nrhs: *const c_int,
+            a: *const $real,
+            lda: *const c_int,
+            b: *mut $real,
+            ldb: *const c_int,
+            info: *mut c_int,
         ) {
             // SAFETY: the arguments describe matrices as the routine's definition demands.
             unsafe {
@@ -162,8 +215,14 @@ macro_rules! routines {
         /// Solution of `A X = B` for a general square matrix.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $gesv(
-            n: *const c_int, nrhs: *const c_int, a: *mut $real, lda: *const c_int, _ipiv: *mut c_int,
-            b: *mut $real, ldb: *const c_int, info: *mut c_int,
+            n: *const c_int,
+            nrhs: *const c_int,
+            a: *mut $real,
+            lda: *const c_int,
+            _ipiv: *mut c_int,
+            b: *mut $real,
+            ldb: *const c_int,
+            info: *mut c_int,
         ) {
             // SAFETY: the arguments describe matrices as the routine's definition demands.
             unsafe {
@@ -180,10 +239,26 @@ macro_rules! routines {
         /// All eigenvalues, and on demand the vectors, of a symmetric matrix.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $syevr(
-            jobz: *const c_char, _range: *const c_char, uplo: *const c_char, n: *const c_int, a: *mut $real,
-            lda: *const c_int, _vl: *const $real, _vu: *const $real, _il: *const c_int, _iu: *const c_int,
-            _abstol: *const $real, m: *mut c_int, w: *mut $real, z: *mut $real, ldz: *const c_int,
-            _isuppz: *mut c_int, work: *mut $real, lwork: *const c_int, iwork: *mut c_int, _liwork: *const c_int,
+            jobz: *const c_char,
+            _range: *const c_char,
+            uplo: *const c_char,
+            n: *const c_int,
+            a: *mut $real,
+            lda: *const c_int,
+            _vl: *const $real,
+            _vu: *const $real,
+            _il: *const c_int,
+            _iu: *const c_int,
+            _abstol: *const $real,
+            m: *mut c_int,
+            w: *mut $real,
+            z: *mut $real,
+            ldz: *const c_int,
+            _isuppz: *mut c_int,
+            work: *mut $real,
+            lwork: *const c_int,
+            iwork: *mut c_int,
+            _liwork: *const c_int,
             info: *mut c_int,
         ) {
             // SAFETY: LAPACK's callers pass `iwork` of at least one element.
@@ -208,9 +283,20 @@ macro_rules! routines {
         /// Compact singular value decomposition.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $gesvd(
-            _jobu: *const c_char, _jobvt: *const c_char, m: *const c_int, n: *const c_int, a: *mut $real,
-            lda: *const c_int, s: *mut $real, u: *mut $real, ldu: *const c_int, vt: *mut $real, ldvt: *const c_int,
-            work: *mut $real, lwork: *const c_int, info: *mut c_int,
+            _jobu: *const c_char,
+            _jobvt: *const c_char,
+            m: *const c_int,
+            n: *const c_int,
+            a: *mut $real,
+            lda: *const c_int,
+            s: *mut $real,
+            u: *mut $real,
+            ldu: *const c_int,
+            vt: *mut $real,
+            ldvt: *const c_int,
+            work: *mut $real,
+            lwork: *const c_int,
+            info: *mut c_int,
         ) {
             answer_query!(lwork, work, info);
             // SAFETY: the arguments describe matrices as the routine's definition demands.
@@ -228,9 +314,20 @@ macro_rules! routines {
         /// Compact singular value decomposition, under LAPACK's other name for it.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $gesdd(
-            jobz: *const c_char, m: *const c_int, n: *const c_int, a: *mut $real, lda: *const c_int,
-            s: *mut $real, u: *mut $real, ldu: *const c_int, vt: *mut $real, ldvt: *const c_int, work: *mut $real,
-            lwork: *const c_int, _iwork: *mut c_int, info: *mut c_int,
+            jobz: *const c_char,
+            m: *const c_int,
+            n: *const c_int,
+            a: *mut $real,
+            lda: *const c_int,
+            s: *mut $real,
+            u: *mut $real,
+            ldu: *const c_int,
+            vt: *mut $real,
+            ldvt: *const c_int,
+            work: *mut $real,
+            lwork: *const c_int,
+            _iwork: *mut c_int,
+            info: *mut c_int,
         ) {
             // SAFETY: the two routines make the same demands.
             unsafe { $gesvd(jobz, jobz, m, n, a, lda, s, u, ldu, vt, ldvt, work, lwork, info) };

@@ -1,6 +1,9 @@
 //! Each routine is checked by the residual of its own equation, on matrices past the sizes that the
 //! solver treats in closed form.
 
+#![expect(clippy::unwrap_used, reason = "a test may")]
+#![expect(clippy::undocumented_unsafe_blocks, reason = "every call passes whole matrices with their own sizes")]
+
 use lapack_nalgebra::{dgemm_, dgemv_, dgesdd_, dgesv_, dpotrf_, dpotrs_, dsyevr_, dsymv_, dsyr2k_, dsyrk_};
 use nalgebra::DMatrix;
 
@@ -35,7 +38,21 @@ fn gemm_multiplies_with_either_side_transposed() {
     let (a, b, c) = (matrix(3, 5, 1), matrix(4, 3, 2), matrix(5, 4, 3));
     let mut result = c.clone();
     unsafe {
-        dgemm_(letter(b'T'), letter(b'T'), &5, &4, &3, &2.0, a.as_ptr(), &3, b.as_ptr(), &4, &0.5, result.as_mut_ptr(), &5);
+        dgemm_(
+            letter(b'T'),
+            letter(b'T'),
+            &5,
+            &4,
+            &3,
+            &2.0,
+            a.as_ptr(),
+            &3,
+            b.as_ptr(),
+            &4,
+            &0.5,
+            result.as_mut_ptr(),
+            &5,
+        );
     }
     assert_small(&(result - (a.transpose() * b.transpose() * 2.0 + c * 0.5)));
 }
@@ -45,7 +62,21 @@ fn a_zero_beta_ignores_what_was_there() {
     let (a, b) = (matrix(2, 2, 1), matrix(2, 2, 2));
     let mut result = DMatrix::from_element(2, 2, f64::NAN);
     unsafe {
-        dgemm_(letter(b'N'), letter(b'N'), &2, &2, &2, &1.0, a.as_ptr(), &2, b.as_ptr(), &2, &0.0, result.as_mut_ptr(), &2);
+        dgemm_(
+            letter(b'N'),
+            letter(b'N'),
+            &2,
+            &2,
+            &2,
+            &1.0,
+            a.as_ptr(),
+            &2,
+            b.as_ptr(),
+            &2,
+            &0.0,
+            result.as_mut_ptr(),
+            &2,
+        );
     }
     assert_small(&(result - a * b));
 }
@@ -119,9 +150,27 @@ fn eigenvalues_rise_and_vectors_satisfy_their_equation() {
     for lwork in [-1, 1] {
         unsafe {
             dsyevr_(
-                letter(b'V'), letter(b'A'), letter(b'U'), &N, copy.as_mut_ptr(), &N, &0.0, &0.0, &0, &0, &-1.0,
-                &mut found, values.as_mut_ptr(), vectors.as_mut_ptr(), &N, support.as_mut_ptr(), work.as_mut_ptr(),
-                &lwork, integers.as_mut_ptr(), &lwork, &mut info,
+                letter(b'V'),
+                letter(b'A'),
+                letter(b'U'),
+                &N,
+                copy.as_mut_ptr(),
+                &N,
+                &0.0,
+                &0.0,
+                &0,
+                &0,
+                &-1.0,
+                &mut found,
+                values.as_mut_ptr(),
+                vectors.as_mut_ptr(),
+                &N,
+                support.as_mut_ptr(),
+                work.as_mut_ptr(),
+                &lwork,
+                integers.as_mut_ptr(),
+                &lwork,
+                &mut info,
             );
         }
     }
@@ -139,8 +188,20 @@ fn singular_values_rebuild_the_matrix() {
     for lwork in [-1, 1] {
         unsafe {
             dgesdd_(
-                letter(b'S'), &4, &N, a.as_mut_ptr(), &4, s.as_mut_ptr(), u.as_mut_ptr(), &4, vt.as_mut_ptr(), &4,
-                work.as_mut_ptr(), &lwork, integers.as_mut_ptr(), &mut info,
+                letter(b'S'),
+                &4,
+                &N,
+                a.as_mut_ptr(),
+                &4,
+                s.as_mut_ptr(),
+                u.as_mut_ptr(),
+                &4,
+                vt.as_mut_ptr(),
+                &4,
+                work.as_mut_ptr(),
+                &lwork,
+                integers.as_mut_ptr(),
+                &mut info,
             );
         }
     }

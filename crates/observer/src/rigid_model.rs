@@ -125,14 +125,7 @@ impl<T: Real> RigidModel<T> {
     /// Torque of the oncoming clutch at this pressure, N m: Eq. (2.13) while it slips; once it is locked
     /// the torque the gear train asks of it, up to what it can hold.
     #[inline]
-    pub fn clutch_torque(
-        &self,
-        phase: Phase,
-        pressure_pa: T,
-        engine_rad_s: T,
-        turbine_rad_s: T,
-        slip_rad_s: T,
-    ) -> T {
+    pub fn clutch_torque(&self, phase: Phase, pressure_pa: T, engine_rad_s: T, turbine_rad_s: T, slip_rad_s: T) -> T {
         if phase == Phase::AfterShift {
             let known = self.known_torques(engine_rad_s, turbine_rad_s, slip_rad_s);
             let limit = self.clutch.static_capacity(pressure_pa);

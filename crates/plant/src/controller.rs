@@ -101,7 +101,8 @@ impl ShiftController {
             }
         };
         self.oncoming_pa = oncoming_pa;
-        let current = |clutch: &ShiftClutch, pressure_pa: f64| clutch.valve.current_for(pressure_pa.clamp(0.0, line_pa));
+        let current =
+            |clutch: &ShiftClutch, pressure_pa: f64| clutch.valve.current_for(pressure_pa.clamp(0.0, line_pa));
         Commands {
             throttle: driver_throttle * self.throttle_share(measured),
             offgoing_a: current(&self.vehicle.offgoing, offgoing_pa),
@@ -147,8 +148,11 @@ impl ShiftController {
     /// Pressures in the fill stage (offgoing, oncoming), Pa.
     fn fill(&self, elapsed_s: f64, known: &ShiftTorques<f64>) -> (f64, f64) {
         let c = &self.calibration;
-        let oncoming =
-            if elapsed_s < c.boost_s - 1e-9 { c.boost_pressure_pa } else { self.vehicle.oncoming.clutch.kiss_pressure() };
+        let oncoming = if elapsed_s < c.boost_s - 1e-9 {
+            c.boost_pressure_pa
+        } else {
+            self.vehicle.oncoming.clutch.kiss_pressure()
+        };
         (self.holding_pressure(known, 0.0, c.fill_holding_margin), oncoming)
     }
 

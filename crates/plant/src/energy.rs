@@ -28,14 +28,8 @@ impl PowerBalance {
             sinks: [
                 ("engine drag", v.engine.drag_n_m_s * x.engine_rad_s * x.engine_rad_s),
                 ("converter", t.pump_n_m * x.engine_rad_s - t.shift.turbine_n_m * x.turbine_rad_s),
-                (
-                    "offgoing clutch",
-                    t.shift.offgoing_n_m * v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s),
-                ),
-                (
-                    "oncoming clutch",
-                    t.shift.oncoming_n_m * v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s),
-                ),
+                ("offgoing clutch", t.shift.offgoing_n_m * v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s)),
+                ("oncoming clutch", t.shift.oncoming_n_m * v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s)),
                 ("shaft damping", v.driveline.shaft_damping_n_m_s_rad * twist_rate * twist_rate),
                 ("tyre slip", t.tyre_n * (rim - x.vehicle_m_s)),
                 ("rolling", v.road.rolling_moment(x.wheel_rad_s) * x.wheel_rad_s),

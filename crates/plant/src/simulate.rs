@@ -38,11 +38,7 @@ pub struct Sample {
 ///
 /// # Errors
 /// See [`PlantError`].
-pub fn simulate(
-    vehicle: &Vehicle,
-    experiment: &Experiment,
-    mut record: impl FnMut(&Sample),
-) -> Result<(), PlantError> {
+pub fn simulate(vehicle: &Vehicle, experiment: &Experiment, mut record: impl FnMut(&Sample)) -> Result<(), PlantError> {
     let powertrain = Powertrain::new(experiment.simulated_vehicle(vehicle));
     simulate_powertrain(&powertrain, vehicle, experiment, crate::hybrid::RELATIVE_TOLERANCE, |_| {}, &mut record)
 }
@@ -101,11 +97,7 @@ fn arrived(valves: &mut [DelayLine; 2], time_s: f64, throttle: f64) -> Inputs {
 }
 
 fn measure(state: &State) -> Measured {
-    Measured {
-        engine_rad_s: state.engine_rad_s,
-        turbine_rad_s: state.turbine_rad_s,
-        output_rad_s: state.output_rad_s,
-    }
+    Measured { engine_rad_s: state.engine_rad_s, turbine_rad_s: state.turbine_rad_s, output_rad_s: state.output_rad_s }
 }
 
 /// In the gear before the shift, offgoing clutch at line pressure, oncoming empty. The shafts are twisted

@@ -116,7 +116,13 @@ impl Figure {
             y += panel_height(panel);
         }
         for span in &self.spans {
-            scene.add(text(self.x((span.start_s + span.end_s) / 2.0), NAMES - 4.0, &span.label, "#444444", TextAnchor::Middle));
+            scene.add(text(
+                self.x((span.start_s + span.end_s) / 2.0),
+                NAMES - 4.0,
+                &span.label,
+                "#444444",
+                TextAnchor::Middle,
+            ));
         }
         let svg = SvgBackend::new().render_scene(&scene);
         // A view box lets the figure scale with the page around it.
@@ -185,10 +191,15 @@ impl Figure {
         layout.show_legend = false;
         for span in &self.spans {
             let (start, end) = (span.start_s.max(from), span.end_s.min(to));
-            layout = layout.with_shaded_region(ShadedRegion::vertical(start, end).with_color(span.colour).with_opacity(0.35));
+            layout = layout
+                .with_shaded_region(ShadedRegion::vertical(start, end).with_color(span.colour).with_opacity(0.35));
         }
         let panel_scene = render_multiple(plots, layout);
-        scene.add(Primitive::GroupStart { transform: Some(format!("translate(0,{y})")), title: None, extra_attrs: None });
+        scene.add(Primitive::GroupStart {
+            transform: Some(format!("translate(0,{y})")),
+            title: None,
+            extra_attrs: None,
+        });
         scene.elements.extend(panel_scene.elements);
         scene.defs.extend(panel_scene.defs);
         scene.add(Primitive::GroupEnd);
@@ -211,11 +222,11 @@ impl Figure {
         for (label_y, series) in spread(labels, f64::from(LABEL_SIZE) + 2.0, inside) {
             scene.add(text(WIDTH - RIGHT + 7.0, label_y + 4.0, &series.label, series.colour, TextAnchor::Start));
         }
-        if let Some(band) = &panel.band {
-            if let Some((time, width)) = visible(&band.half_width).into_iter().rev().find(|(_, w)| w.is_finite()) {
-                let at = map_y(width.min(high)) + 14.0;
-                scene.add(text(self.x(time) - 6.0, at, &band.label, colour::BLUE, TextAnchor::End));
-            }
+        if let Some(band) = &panel.band
+            && let Some((time, width)) = visible(&band.half_width).into_iter().rev().find(|(_, w)| w.is_finite())
+        {
+            let at = map_y(width.min(high)) + 14.0;
+            scene.add(text(self.x(time) - 6.0, at, &band.label, colour::BLUE, TextAnchor::End));
         }
     }
 }
@@ -271,7 +282,7 @@ fn pieces(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
 
 /// Moves labels apart so that they keep at least `distance` and stay inside a range if it can hold
 /// them, without changing their order.
-fn spread<'a>(mut labels: Vec<(f64, &'a Series)>, distance: f64, inside: (f64, f64)) -> Vec<(f64, &'a Series)> {
+fn spread(mut labels: Vec<(f64, &Series)>, distance: f64, inside: (f64, f64)) -> Vec<(f64, &Series)> {
     labels.sort_by(|a, b| a.0.total_cmp(&b.0));
     for _ in 0..200 {
         for label in &mut labels {

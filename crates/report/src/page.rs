@@ -110,9 +110,11 @@ pub fn findings(comparison: &Comparison) -> Vec<String> {
 
 fn score_rows(comparison: &Comparison, range_pa: f64) -> Vec<Value> {
     let row = |name: &str, score: &PhaseScore, torque: &PhaseScore| {
-        let cell = |pascal: f64| context! {
-            mpa => format!("{:.4}", mpa(pascal)),
-            percent => format!("{:.1}", 100.0 * pascal / range_pa),
+        let cell = |pascal: f64| {
+            context! {
+                mpa => format!("{:.4}", mpa(pascal)),
+                percent => format!("{:.1}", 100.0 * pascal / range_pa),
+            }
         };
         context! {
             observer => name,

@@ -33,8 +33,11 @@ pub fn shift_figure(comparison: &Comparison) -> Figure {
             Panel {
                 y_label: "pressure of B (MPa)".into(),
                 height: 190.0,
-                series: [vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)], t.pressure_estimates()]
-                    .concat(),
+                series: [
+                    vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)],
+                    t.pressure_estimates(),
+                ]
+                .concat(),
                 band: None,
                 y_range: Some((0.0, 0.5)),
             },

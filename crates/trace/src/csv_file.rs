@@ -18,7 +18,10 @@ pub fn read_csv(path: &Path) -> Result<Trace, TraceError> {
     let headers = reader.headers().map_err(|error| table(error.to_string()))?.clone();
     let names: Vec<(String, f64)> = headers.iter().map(units::to_si).collect();
     let time_at = names.iter().position(|(name, _)| name == signal::TIME).ok_or_else(|| {
-        table(format!("there is no column `time_s`\nhint: the columns are {}", headers.iter().collect::<Vec<_>>().join(", ")))
+        table(format!(
+            "there is no column `time_s`\nhint: the columns are {}",
+            headers.iter().collect::<Vec<_>>().join(", ")
+        ))
     })?;
     if let Some((i, (name, _))) =
         names.iter().enumerate().find(|(i, (name, _))| names[..*i].iter().any(|(earlier, _)| earlier == name))

@@ -1,6 +1,6 @@
 //! `wetclutch check`.
 
-use config::{Experiment, Source, Vehicle};
+use config::{Experiment, Kind, Source, Vehicle};
 
 use crate::args::Check;
 use crate::failure::Failure;
@@ -8,7 +8,7 @@ use crate::output;
 
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     let source = Source::read(&options.file)?;
-    if is_experiment(&source) {
+    if source.kind()? == Kind::Experiment {
         let experiment = Experiment::from_source(source)?;
         let vehicle = Vehicle::read(&experiment.vehicle_path())?;
         output::line(&format!(
@@ -18,12 +18,6 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
         return describe(&vehicle);
     }
     describe(&Vehicle::from_source(source)?)
-}
-
-/// An experiment names its vehicle; a vehicle describes an engine.
-fn is_experiment(source: &Source) -> bool {
-    let begins = |word: &str| source.text.lines().any(|line| line.trim_start().starts_with(word));
-    begins("vehicle =") || begins("[shift") || !begins("[engine")
 }
 
 fn describe(vehicle: &Vehicle) -> Result<(), Failure> {

@@ -49,7 +49,9 @@ pub(super) fn check(check: &Check<'_>, raw: &RawVehicleFile) -> Result<CheckedGe
         })
         .collect::<Result<Vec<_>, ConfigError>>()?;
     let held = (train.held.iter())
-        .map(|held| Ok((member("gear_train.held.input", &held.input)?, member("gear_train.held.output", &held.output)?)))
+        .map(|held| {
+            Ok((member("gear_train.held.input", &held.input)?, member("gear_train.held.output", &held.output)?))
+        })
         .collect::<Result<Vec<_>, ConfigError>>()?;
     let clutch = |key: &str, name: &Spanned<String>| {
         let raw = raw.clutch.get(name.get_ref()).ok_or_else(|| {

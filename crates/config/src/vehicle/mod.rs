@@ -114,8 +114,7 @@ impl Vehicle {
         let raw: RawVehicleFile = source.parse()?;
         let check = Check { source: &source };
         let gear = gear_train::check(&check, &raw)?;
-        let (offgoing, oncoming) =
-            (clutch(&check, &gear.offgoing, &raw)?, clutch(&check, &gear.oncoming, &raw)?);
+        let (offgoing, oncoming) = (clutch(&check, &gear.offgoing, &raw)?, clutch(&check, &gear.oncoming, &raw)?);
         let driveline = Driveline {
             final_ratio: check.number("driveline.final_ratio", &raw.driveline.final_ratio, 0.5..=10.0)?,
             shaft_stiffness_n_m_rad: check.number(

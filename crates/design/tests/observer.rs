@@ -1,0 +1,234 @@
+//! The rigid observer with designed gains: its certificate in simulation, and its manners.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+use config::Vehicle;
+use design::{design_rigid, rigid_observer};
+use drivetrain::Valve;
+use observer::{Estimator, Health, Input, Phase, RigidGains, RigidObserver, RigidState};
+use proptest::prelude::*;
+
+const ENGINE_RAD_S: f64 = 370.0;
+const DT_S: f64 = 1e-4;
+
+fn observer() -> RigidObserver<f64> {
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains())
+}
+
+fn input(dt_s: f64, turbine_rad_s: f64, slip_rad_s: f64, command: f64) -> Input<f64> {
+    Input { dt_s, engine_rad_s: ENGINE_RAD_S, turbine_rad_s, slip_rad_s, command }
+}
+
+/// A car that obeys the rigid model but for an error `w`, and the observer on it.
+struct Car {
+    observer: RigidObserver<f64>,
+    state: RigidState<f64>,
+    phase: Phase,
+    speeds: [f64; 2],
+    pressure_pa: f64,
+    command: f64,
+}
+
+impl Car {
+    /// In this phase, with an estimate that is wrong by `error_pa`.
+    fn start(phase: Phase, error_pa: f64) -> Self {
+        let observer = observer();
+        let command = 0.25;
+        // In first gear the slip of B is the turbine speed; less of it means that A has let go.
+        let speeds = if phase == Phase::TorquePhase { [360.0, 360.0] } else { [340.0, 300.0] };
+        let mut state = observer.start();
+        for dt in [0.0, 10.0, 1e-9] {
+            observer.step(&mut state, &input(dt, speeds[0], speeds[1], command));
+        }
+        let estimate = observer.step(&mut state, &input(1e-9, speeds[0], speeds[1], command));
+        assert_eq!(estimate.phase, phase);
+        Self { observer, state, phase, speeds, pressure_pa: estimate.pressure_pa + error_pa, command }
+    }
+
+    /// One sample later: the error of the estimate, Pa. The speeds go as in Eq. (2.24a), the pressure as
+    /// in Eq. (2.24b), both exactly for coefficients that stand still over the sample.
+    fn step(&mut self, w: [f64; 2]) -> f64 {
+        let model = self.observer.model;
+        let m = model.speed_model(self.phase, ENGINE_RAD_S, self.speeds[0], self.speeds[1]);
+        let before = self.pressure_pa;
+        self.pressure_pa = model.valve.linear(self.command).advance(before, DT_S);
+        let mean = 0.5 * (before + self.pressure_pa);
+        for i in 0..2 {
+            self.speeds[i] += DT_S * (m.free_rad_s2[i] + m.per_pressure_rad_s2_pa[i] * mean + w[i]);
+        }
+        if self.phase == Phase::TorquePhase {
+            self.speeds[1] = self.speeds[0];
+        }
+        let estimate = self.observer.step(&mut self.state, &input(DT_S, self.speeds[0], self.speeds[1], self.command));
+        self.pressure_pa - estimate.pressure_pa
+    }
+}
+
+/// The mean of start and end stands for the integral of the pressure over a sample; that and rounding
+/// leave less than this, Pa.
+const DISCRETISATION_PA: f64 = 20.0;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Theorem 2.1 in simulation: from any initial error, under any error of the model within its bound.
+    #[test]
+    fn prop_the_certified_bound_holds_in_simulation(
+        inertia in any::<bool>(),
+        initial in -0.2e6..0.2e6_f64,
+        errors in prop::collection::vec((0.0..1.0_f64, 0.0..6.3_f64), 15),
+    ) {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let design = design_rigid(&vehicle).unwrap();
+        let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
+        let certificate = design.of(phase).unwrap();
+        let mut car = Car::start(phase, initial);
+        for n in 0..1500_u32 {
+            let (size, angle) = errors[n as usize / 100];
+            let w = size * certificate.model_error_max_rad_s2;
+            // In the torque phase only the turbine speed is an output.
+            let w = if inertia { [w * angle.cos(), w * angle.sin()] } else { [w * angle.cos(), 0.0] };
+            let error = car.step(w);
+            let bound = certificate.error_bound_pa(initial, f64::from(n + 1) * DT_S);
+            prop_assert!(error.abs() <= bound + DISCRETISATION_PA, "{n}: {error} Pa, bound {bound} Pa");
+        }
+    }
+
+    /// Whatever the inputs, a step returns, and a usable sample afterwards gives a finite estimate again.
+    #[test]
+    fn prop_no_input_stops_the_observer(
+        samples in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 1..40),
+    ) {
+        let observer = observer();
+        let mut state = observer.start();
+        for (dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, command) in samples {
+            let estimate =
+                observer.step(&mut state, &Input { dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, command });
+            prop_assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite());
+        }
+        let estimate = observer.step(&mut state, &input(0.01, 300.0, 200.0, 0.3));
+        prop_assert!(estimate.health == Health::Good && estimate.pressure_pa.is_finite());
+    }
+}
+
+#[test]
+fn without_model_error_the_estimate_decays_at_least_with_kappa2() {
+    for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let kappa2 = design_rigid(&vehicle).unwrap().of(phase).unwrap().kappa2_per_s;
+        let mut car = Car::start(phase, 0.1e6);
+        for n in 1..=1000 {
+            let bound = 0.1e6 * (-kappa2 * f64::from(n) * DT_S).exp();
+            let error = car.step([0.0; 2]);
+            assert!(error.abs() <= bound + DISCRETISATION_PA, "{n}: {error} Pa, bound {bound} Pa");
+        }
+    }
+}
+
+#[test]
+fn the_estimate_does_not_jump_when_the_gain_changes() {
+    let mut car = Car::start(Phase::TorquePhase, 0.05e6);
+    for _ in 0..50 {
+        car.step([0.0; 2]);
+    }
+    let mut last = car.pressure_pa - car.step([0.0; 2]);
+    // The turbine leaves the speed of first gear: the phase changes and with it the gain.
+    car.phase = Phase::InertiaPhase;
+    let mut phases = Vec::new();
+    for _ in 0..200 {
+        car.speeds[1] -= 0.1;
+        let estimate = car.observer.step(&mut car.state, &input(DT_S, car.speeds[0], car.speeds[1], car.command));
+        phases.push(estimate.phase);
+        // In one sample of 0.1 ms the valve moves the pressure by less than 1 kPa and the correction, for
+        // at most 0.2 rad/s of unpredicted speed, by 0.2 * 1527 Pa.
+        assert!((estimate.pressure_pa - last).abs() < 1.3e3, "jump of {} Pa", estimate.pressure_pa - last);
+        last = estimate.pressure_pa;
+    }
+    assert!(phases.contains(&Phase::TorquePhase) && phases.contains(&Phase::InertiaPhase));
+}
+
+#[test]
+fn unusable_inputs_are_flagged_and_the_valve_model_goes_on() {
+    let observer = observer();
+    let mut state = observer.start();
+    let good = input(0.01, 300.0, 200.0, 0.3);
+    observer.step(&mut state, &good);
+    let health = |state: &mut RigidState<f64>, input: Input<f64>| observer.step(state, &input).health;
+    assert_eq!(health(&mut state, Input { turbine_rad_s: f64::NAN, ..good }), Health::SpeedsRejected);
+    assert_eq!(health(&mut state, Input { engine_rad_s: 1e9, ..good }), Health::SpeedsRejected);
+    assert_eq!(health(&mut state, Input { command: -0.1, ..good }), Health::CommandRejected);
+    assert_eq!(health(&mut state, Input { dt_s: f64::INFINITY, ..good }), Health::TimeRejected);
+    assert_eq!(health(&mut state, good), Health::Good);
+    // Without any speed the estimate is the open loop: after long, gain times current.
+    let estimate = observer.step(&mut state, &Input { dt_s: 5.0, slip_rad_s: f64::NAN, ..good });
+    assert!((estimate.pressure_pa - 0.3e6).abs() < 1.0);
+}
+
+#[test]
+fn zero_gain_is_the_valve_model_alone() {
+    let observer = RigidObserver { gains: RigidGains::open_loop(), ..observer() };
+    let mut state = observer.start();
+    let mut pressure = 0.0;
+    for n in 0..300 {
+        let command = 0.2 + 0.1 * (f64::from(n) * 0.05).sin();
+        let estimate = observer.step(&mut state, &input(0.01, 300.0, 250.0 - f64::from(n), command));
+        assert!((estimate.pressure_pa - pressure).abs() < 1e-6);
+        pressure = observer.model.valve.linear(command).advance(pressure, 0.01);
+    }
+}
+
+#[test]
+fn single_precision_follows_double_precision() {
+    let (double, mut car) = (observer(), Car::start(Phase::InertiaPhase, 0.1e6));
+    let single = double.cast::<f32>();
+    let (mut a, mut b) = (double.start(), single.start());
+    for n in 0..500 {
+        car.step([100.0, -200.0]);
+        let dt = if n == 1 { 10.0 } else { 0.01 };
+        let x = input(dt, car.speeds[0], car.speeds[1], car.command);
+        #[expect(clippy::cast_possible_truncation, reason = "single precision is what is tested")]
+        let y = Input {
+            dt_s: x.dt_s as f32,
+            engine_rad_s: x.engine_rad_s as f32,
+            turbine_rad_s: x.turbine_rad_s as f32,
+            slip_rad_s: x.slip_rad_s as f32,
+            command: x.command as f32,
+        };
+        let (x, y) = (double.step(&mut a, &x), single.step(&mut b, &y));
+        assert_eq!(x.phase, y.phase);
+        // A speed of 340 rad/s is rounded to 3e-5 rad/s, which a gain of 1527 Pa s/rad makes 0.05 Pa a
+        // sample; pressures are rounded to 0.03 Pa.
+        assert!((x.pressure_pa - f64::from(y.pressure_pa)).abs() < 5.0, "{n}: {} {}", x.pressure_pa, y.pressure_pa);
+    }
+}
+
+/// The valve of Remark 2.1: held against its own nonlinear law, near the point of its linearisation.
+#[test]
+fn a_pulse_width_valve_is_followed_near_its_operating_point() {
+    let mut vehicle = Vehicle::two_speed_at().unwrap();
+    let (flow, line, operating) = (6000.0, 1e6, 0.3e6);
+    vehicle.observer_valve =
+        Valve::PulseWidth { flow_sqrt_pa_s: flow, line_pressure_pa: line, operating_pressure_pa: operating };
+    vehicle.limits.command_max = 100.0;
+    vehicle.uncertainty.command = Some((40.0, 60.0));
+    // This valve is slower than the one that the file's requirements were written for.
+    vehicle.torque_phase.offset_max_pa = 1e6;
+    vehicle.inertia_phase.offset_max_pa = 1e6;
+    let certificates = design_rigid(&vehicle).unwrap();
+    assert_eq!(certificates.inertia_phase.vertices.len(), 4);
+
+    let observer = rigid_observer(&vehicle, RigidGains::open_loop());
+    let mut state = observer.start();
+    let mut truth = 0.0_f64;
+    for n in 0..2000 {
+        let duty = 31.0 + 0.5 * (f64::from(n) * 0.002).sin();
+        let estimate = observer.step(&mut state, &input(1e-3, 300.0, 300.0, duty));
+        if n > 1000 {
+            // The settled pressures agree within the linearisation's reach.
+            assert!((truth - estimate.pressure_pa).abs() < 0.02e6, "{n}: {truth} {}", estimate.pressure_pa);
+        }
+        let drop = 0.01 * line * duty - truth;
+        truth += 1e-3 * flow * drop.signum() * drop.abs().sqrt();
+    }
+}
