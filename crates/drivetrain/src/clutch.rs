@@ -49,7 +49,9 @@ impl<T: Real> Clutch<T> {
     /// Size of the torque the slipping clutch carries, N m: `mu(|dw|) R N max(A p - F_s, 0)`, Eq. (2.13).
     #[inline]
     pub fn torque_capacity(&self, pressure_pa: T, slip_rad_s: T) -> T {
-        self.torque_per_force(slip_rad_s) * self.clamp_force(pressure_pa)
+        let clamp_force = self.clamp_force(pressure_pa);
+        // An open clutch needs no look into the friction table; most of a drive one of them is open.
+        if clamp_force > T::zero() { self.torque_per_force(slip_rad_s) * clamp_force } else { T::zero() }
     }
 
     /// Largest torque that the sticking clutch holds, N m.

@@ -92,10 +92,11 @@ pub struct ValveMaps<T> {
 }
 
 impl<T: Real> ValveMaps<T> {
-    /// Rate of the cylinder pressure, Pa/s, at the current that has arrived, Eq. (2.4).
+    /// Rate of the cylinder pressure, Pa/s, Eq. (2.4), where `settled_pa` is the
+    /// [`Self::settled_pressure`] of the current that has arrived.
     #[inline]
-    pub fn pressure_rate(&self, pressure_pa: T, delayed_current_a: T) -> T {
-        (self.settled_pressure(delayed_current_a) - pressure_pa) / self.time_constant_s.at(pressure_pa)
+    pub fn pressure_rate(&self, pressure_pa: T, settled_pa: T) -> T {
+        (settled_pa - pressure_pa) / self.time_constant_s.at(pressure_pa)
     }
 
     /// Pressure that a constant current ends at, Pa: `K_cv(i) i`.

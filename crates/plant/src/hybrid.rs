@@ -186,11 +186,7 @@ impl HybridIntegrator {
 
     /// Margins of offgoing and oncoming clutch, with the slack.
     fn margins(&self, powertrain: &Powertrain, inputs: &Inputs, x: [f64; STATES]) -> [f64; 2] {
-        let x = State::from_array(x);
-        [
-            powertrain.offgoing_margin(self.mode, &x, inputs) + MARGIN_SLACK,
-            powertrain.oncoming_margin(self.mode, &x, inputs) + MARGIN_SLACK,
-        ]
+        powertrain.margins(self.mode, &State::from_array(x), inputs).map(|margin| margin + MARGIN_SLACK)
     }
 
     /// Fraction of the step at which the first margin reaches zero, located on the dense output.

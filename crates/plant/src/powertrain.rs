@@ -4,17 +4,28 @@ use config::Vehicle;
 use drivetrain::{Clutch, Engagement, ShiftCoefficients, ShiftTorques};
 
 use crate::state::{STATES, State};
-use crate::{Contact, Mode};
+use crate::{Contact, Direction, Mode};
 
 /// What acts on the plant from outside, constant over a segment of the integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs {
     /// Throttle, 0 closed to 1 open.
     pub throttle: f64,
-    /// Current that has arrived at the offgoing clutch's valve, A.
-    pub offgoing_a: f64,
-    /// Current that has arrived at the oncoming clutch's valve, A.
-    pub oncoming_a: f64,
+    /// Pressure at which the current that has arrived at the offgoing clutch's valve settles, Pa.
+    pub offgoing_settled_pa: f64,
+    /// Pressure at which the current that has arrived at the oncoming clutch's valve settles, Pa.
+    pub oncoming_settled_pa: f64,
+}
+
+impl Inputs {
+    /// The inputs when these currents, A, have arrived at the valves of this vehicle.
+    pub fn arrived(vehicle: &Vehicle, throttle: f64, offgoing_a: f64, oncoming_a: f64) -> Self {
+        Self {
+            throttle,
+            offgoing_settled_pa: vehicle.offgoing.valve.settled_pressure(offgoing_a),
+            oncoming_settled_pa: vehicle.oncoming.valve.settled_pressure(oncoming_a),
+        }
+    }
 }
 
 /// Every torque and force of the powertrain.
@@ -125,8 +136,8 @@ impl Powertrain {
             twist_rad: v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s),
             wheel_rad_s: self.wheel_acceleration(&x, &torques),
             vehicle_m_s: self.vehicle_acceleration(&x, &torques),
-            offgoing_pa: v.offgoing.valve.pressure_rate(x.offgoing_pa, inputs.offgoing_a),
-            oncoming_pa: v.oncoming.valve.pressure_rate(x.oncoming_pa, inputs.oncoming_a),
+            offgoing_pa: v.offgoing.valve.pressure_rate(x.offgoing_pa, inputs.offgoing_settled_pa),
+            oncoming_pa: v.oncoming.valve.pressure_rate(x.oncoming_pa, inputs.oncoming_settled_pa),
         }
         .to_array()
     }
@@ -146,31 +157,27 @@ impl Powertrain {
         (torques.tyre_n - road.drag_force(x.vehicle_m_s) - self.grade_force_n) / road.mass_kg
     }
 
-    /// How far the offgoing clutch is from a change of mode; the mode ends where this turns negative.
+    /// How far the offgoing and the oncoming clutch are from a change of mode: the slip of a slipping
+    /// clutch in its direction, rad/s, what a sticking one could hold beyond what it does, N m. The mode
+    /// ends where one of them turns negative.
     #[inline]
-    pub fn offgoing_margin(&self, mode: Mode, x: &State, inputs: &Inputs) -> f64 {
-        match mode.offgoing {
-            Contact::Slipping(direction) => {
-                direction.sign() * self.vehicle.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s)
-            }
-            Contact::Stuck => {
-                let holding = self.torques(mode, x, inputs).shift.offgoing_n_m;
-                self.vehicle.offgoing.clutch.static_capacity(x.offgoing_pa) - holding.abs()
-            }
+    pub fn margins(&self, mode: Mode, x: &State, inputs: &Inputs) -> [f64; 2] {
+        let v = &self.vehicle;
+        let slips = [
+            v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s),
+            v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s),
+        ];
+        if let Mode { offgoing: Contact::Slipping(off), oncoming: Contact::Slipping(on) } = mode {
+            return [off.sign() * slips[0], on.sign() * slips[1]];
         }
-    }
-
-    /// The same for the oncoming clutch.
-    #[inline]
-    pub fn oncoming_margin(&self, mode: Mode, x: &State, inputs: &Inputs) -> f64 {
-        match mode.oncoming {
-            Contact::Slipping(direction) => {
-                direction.sign() * self.vehicle.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s)
-            }
-            Contact::Stuck => {
-                let holding = self.torques(mode, x, inputs).shift.oncoming_n_m;
-                self.vehicle.oncoming.clutch.static_capacity(x.oncoming_pa) - holding.abs()
-            }
-        }
+        let torques = self.torques(mode, x, inputs).shift;
+        let margin = |contact, slip: f64, clutch: &Clutch<f64>, pressure_pa: f64, holding: f64| match contact {
+            Contact::Slipping(direction) => Direction::sign(direction) * slip,
+            Contact::Stuck => clutch.static_capacity(pressure_pa) - holding.abs(),
+        };
+        [
+            margin(mode.offgoing, slips[0], &v.offgoing.clutch, x.offgoing_pa, torques.offgoing_n_m),
+            margin(mode.oncoming, slips[1], &v.oncoming.clutch, x.oncoming_pa, torques.oncoming_n_m),
+        ]
     }
 }

@@ -60,7 +60,7 @@ pub fn simulate_powertrain(
     let state = initial_state(powertrain, experiment);
     let mut commands = controller.step(0.0, experiment.throttle.at(0.0), &measure(&state));
     let mut valves = [DelayLine::new(commands.offgoing_a), DelayLine::new(commands.oncoming_a)];
-    let mut inputs = arrived(&mut valves, 0.0, commands.throttle);
+    let mut inputs = arrived(powertrain, &mut valves, 0.0, commands.throttle);
     let mut plant = HybridIntegrator::with_tolerance(powertrain, 0.0, state, &inputs, relative_tolerance)?;
 
     let mut recorder = Recorder { next: 0, experiment };
@@ -79,7 +79,7 @@ pub fn simulate_powertrain(
         let stage = controller.stage();
         let end_s = (period * calibration.control_period_s).min(experiment.duration_s);
         while plant.time_s < end_s {
-            inputs = arrived(&mut valves, plant.time_s, commands.throttle);
+            inputs = arrived(powertrain, &mut valves, plant.time_s, commands.throttle);
             let arrival = valves.iter().filter_map(DelayLine::next_arrival_s).fold(end_s, f64::min);
             plant.advance(powertrain, &inputs, arrival, &mut |segment| {
                 on_step(segment);
@@ -91,9 +91,9 @@ pub fn simulate_powertrain(
 }
 
 /// Currents that have arrived at the valves, and the throttle.
-fn arrived(valves: &mut [DelayLine; 2], time_s: f64, throttle: f64) -> Inputs {
+fn arrived(powertrain: &Powertrain, valves: &mut [DelayLine; 2], time_s: f64, throttle: f64) -> Inputs {
     let [offgoing, oncoming] = valves;
-    Inputs { throttle, offgoing_a: offgoing.arrive(time_s), oncoming_a: oncoming.arrive(time_s) }
+    Inputs::arrived(&powertrain.vehicle, throttle, offgoing.arrive(time_s), oncoming.arrive(time_s))
 }
 
 fn measure(state: &State) -> Measured {

@@ -37,7 +37,7 @@ fn two_inertias_lock_when_and_at_the_speed_they_should() {
     let expected = shift.after_lock_up(shift.slip_oncoming, start.turbine_rad_s, start.output_rad_s);
 
     let powertrain = Powertrain::new(vehicle);
-    let inputs = Inputs { throttle: 0.0, offgoing_a: 0.0, oncoming_a: pressure / 1e6 };
+    let inputs = Inputs { throttle: 0.0, offgoing_settled_pa: 0.0, oncoming_settled_pa: pressure };
     let mut plant = HybridIntegrator::new(&powertrain, 0.0, start, &inputs).unwrap();
     let mut slipping_until = 0.0;
     plant
@@ -65,7 +65,7 @@ fn the_drive_shaft_swings_at_its_natural_frequency() {
     let expected = (13e3 * (1.0 / gearbox + 1.0 / vehicle.driveline.wheel_inertia_kg_m2)).sqrt();
 
     let powertrain = Powertrain::new(vehicle);
-    let inputs = Inputs { throttle: 0.0, offgoing_a: 1.0, oncoming_a: 0.0 };
+    let inputs = Inputs { throttle: 0.0, offgoing_settled_pa: 1e6, oncoming_settled_pa: 0.0 };
     let start = State { twist_rad: 0.01, offgoing_pa: 1e6, ..state(0.0, 0.0) };
     let mut plant = HybridIntegrator::with_tolerance(&powertrain, 0.0, start, &inputs, 1e-9).unwrap();
     assert_eq!(plant.mode.offgoing, Contact::Stuck);
@@ -108,7 +108,7 @@ fn halving_the_step_shows_order_5_on_a_smooth_phase() {
     let powertrain = Powertrain::new(vehicle);
     let slipping = Contact::Slipping(Direction::Forward);
     let mode = Mode { offgoing: Contact::Slipping(Direction::Backward), oncoming: slipping };
-    let inputs = Inputs { throttle: 0.5, offgoing_a: 0.0, oncoming_a: 0.3 };
+    let inputs = Inputs { throttle: 0.5, offgoing_settled_pa: 0.0, oncoming_settled_pa: 0.3e6 };
     let start = State {
         engine_rad_s: 380.0,
         twist_rad: 0.03,

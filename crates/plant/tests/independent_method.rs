@@ -30,11 +30,8 @@ fn at(samples: &[Sample], time_s: f64) -> Sample {
 fn assert_agreement(from_s: f64, duration_s: f64) {
     let powertrain = Powertrain::new(vehicle());
     let start = at(&samples(&e1(), RELATIVE_TOLERANCE), from_s);
-    let inputs = Inputs {
-        throttle: start.commands.throttle,
-        offgoing_a: start.commands.offgoing_a,
-        oncoming_a: start.commands.oncoming_a,
-    };
+    let c = start.commands;
+    let inputs = Inputs::arrived(&powertrain.vehicle, c.throttle, c.offgoing_a, c.oncoming_a);
     let mut plant = HybridIntegrator::new(&powertrain, 0.0, start.state, &inputs).unwrap();
     let mode = plant.mode;
     plant
