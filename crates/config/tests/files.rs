@@ -69,17 +69,26 @@ fn maps_that_do_not_fit_are_refused() {
     assert!(short.contains("`engine.torque.torque_n_m[0]`: row has 8 torques, `throttle` 9 positions"), "{short}");
     let falling = vehicle_error("throttle = [0.0, 0.05, 0.10", "throttle = [0.0, 0.10, 0.05");
     assert!(falling.contains("breakpoint 3 is not above the one before it"), "{falling}");
-    let creating = vehicle_error("2.00, 1.88, 1.77, 1.66, 1.55, 1.43, 1.32, 1.21, 1.10,", "2.00, 1.88, 1.77, 1.66, 1.55, 1.43, 1.32, 1.21, 1.60,");
+    let creating = vehicle_error(
+        "2.00, 1.88, 1.77, 1.66, 1.55, 1.43, 1.32, 1.21, 1.10,",
+        "2.00, 1.88, 1.77, 1.66, 1.55, 1.43, 1.32, 1.21, 1.60,",
+    );
     assert!(creating.contains("at a speed ratio of 0.8 the turbine gives more power"), "{creating}");
 }
 
 #[test]
 fn a_gear_train_that_is_none_is_refused_with_the_reason() {
     let unknown = vehicle_error("carrier = \"carrier\"", "carrier = \"planets\"");
-    assert!(unknown.contains("there is no shaft \"planets\"\nhint: the shafts are turbine, ring, carrier"), "{unknown}");
+    assert!(
+        unknown.contains("there is no shaft \"planets\"\nhint: the shafts are turbine, ring, carrier"),
+        "{unknown}"
+    );
     let downshift = vehicle_error("offgoing = \"a\"\noncoming = \"b\"", "offgoing = \"b\"\noncoming = \"a\"");
     assert!(downshift.contains("the ratio goes from 1.000 to 2.500, and an upshift lowers it"), "{downshift}");
-    let free = vehicle_error("[[gear_train.planetary_set]]\nsun = \"turbine\"\nring = \"ring\"\ncarrier = \"carrier\"\nsun_teeth = 40  # [chapter]\nring_teeth = 60 # [chapter]\n", "");
+    let free = vehicle_error(
+        "[[gear_train.planetary_set]]\nsun = \"turbine\"\nring = \"ring\"\ncarrier = \"carrier\"\nsun_teeth = 40  # [chapter]\nring_teeth = 60 # [chapter]\n",
+        "",
+    );
     assert!(free.contains("leave 3 degrees of freedom"), "{free}");
     let clutch = vehicle_error("oncoming = \"b\"", "oncoming = \"c\"");
     assert!(clutch.contains("there is no [clutch.c]\nhint: the clutches are a, b"), "{clutch}");

@@ -24,9 +24,45 @@ impl<T: Real> Tyre<T> {
         (rim_m_s - vehicle_m_s) / rim_m_s.abs().max(vehicle_m_s.abs()).max(self.floor_m_s)
     }
 
+    /// How fast the force rises with the speed of the rim, N s/m, at a constant reference speed.
+    pub fn damping(&self, rim_m_s: T, vehicle_m_s: T) -> T {
+        let reference = rim_m_s.abs().max(vehicle_m_s.abs()).max(self.floor_m_s);
+        let saturation = self.saturation(rim_m_s, vehicle_m_s);
+        self.max_force_n * T::of(2.0) / (self.slip_scale * reference) * (T::one() - saturation * saturation)
+    }
+
     /// Force on the vehicle, N, positive when it drives.
     #[inline]
     pub fn force(&self, rim_m_s: T, vehicle_m_s: T) -> T {
-        self.max_force_n * (T::of(2.0) * self.slip(rim_m_s, vehicle_m_s) / self.slip_scale).tanh()
+        self.max_force_n * self.saturation(rim_m_s, vehicle_m_s)
+    }
+
+    /// Share of the largest force, -1 to 1.
+    #[inline]
+    fn saturation(&self, rim_m_s: T, vehicle_m_s: T) -> T {
+        (T::of(2.0) * self.slip(rim_m_s, vehicle_m_s) / self.slip_scale).tanh()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TYRE: Tyre<f64> = Tyre { max_force_n: 13_200.0, slip_scale: 0.1, floor_m_s: 2.0 };
+
+    #[test]
+    fn the_force_saturates_and_brakes_as_it_drives() {
+        assert!(TYRE.force(20.0, 10.0) > 0.999 * TYRE.max_force_n);
+        assert_eq!(TYRE.force(9.9, 10.0), -TYRE.force(10.0, 9.9));
+        assert_eq!(TYRE.force(0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn the_damping_is_the_slope_of_the_force() {
+        // Below the floor and against a faster vehicle the reference does not depend on the rim.
+        for (rim, vehicle) in [(0.5, 0.3), (9.7, 10.0)] {
+            let slope = (TYRE.force(rim + 1e-6, vehicle) - TYRE.force(rim - 1e-6, vehicle)) / 2e-6;
+            assert!((TYRE.damping(rim, vehicle) / slope - 1.0).abs() < 1e-6);
+        }
     }
 }

@@ -105,14 +105,22 @@ impl<T: Real> ValveMaps<T> {
         self.gain_pa_a.at(current_a) * current_a
     }
 
-    /// Current that ends at `pressure_pa`, A: the inverse of [`Self::settled_pressure`], found by
-    /// fixed-point steps; the gain must vary slowly enough for `K_cv(i) i` to rise.
+    /// Current that ends at `pressure_pa`, A: the inverse of [`Self::settled_pressure`], which must rise.
+    ///
+    /// Between two breakpoints the gain is `K0 + s (i - i0)`, so `K(i) i = p` is a quadratic equation.
     pub fn current_for(&self, pressure_pa: T) -> T {
-        let mut current = pressure_pa / self.gain_pa_a.at(T::zero());
-        for _ in 0..20 {
-            current = pressure_pa / self.gain_pa_a.at(current);
-        }
-        current
+        let (currents, gains) = (self.gain_pa_a.axis(), self.gain_pa_a.values());
+        let beyond = currents.iter().zip(gains).position(|(&i, &k)| k * i > pressure_pa);
+        let (first, last) = match beyond {
+            Some(0) => return pressure_pa / gains[0],
+            Some(next) => (next - 1, next),
+            None => return pressure_pa / gains[gains.len() - 1],
+        };
+        let slope = (gains[last] - gains[first]) / (currents[last] - currents[first]);
+        let linear = gains[first] - slope * currents[first];
+        let root = (linear * linear + T::of(4.0) * slope * pressure_pa).max(T::zero()).sqrt();
+        // This form of the solution has no difference of near numbers and holds for a zero slope.
+        T::of(2.0) * pressure_pa / (linear + root)
     }
 }
 
@@ -156,9 +164,9 @@ mod tests {
             gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[0.7e6, 0.9e6, 1.1e6]).unwrap(),
             delay_s: Table1::constant(0.01),
         };
-        for pressure in [0.05e6_f64, 0.3e6, 0.9e6] {
+        for pressure in [0.0_f64, 0.05e6, 0.3e6, 0.9e6, 1.5e6] {
             let current = maps.current_for(pressure);
-            assert!((maps.settled_pressure(current) - pressure).abs() < 1.0);
+            assert!((maps.settled_pressure(current) - pressure).abs() < 1e-6);
         }
     }
 }

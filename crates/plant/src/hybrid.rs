@@ -1,11 +1,11 @@
 //! The hybrid integrator: smooth steps within a mode, events between modes.
 
-use crate::dopri5::{self, Tolerance, Trial};
+use crate::rosenbrock::{self, Tolerance, Trial};
 use crate::state::{STATES, State};
 use crate::{Contact, Direction, Inputs, Mode, Powertrain};
 
 /// Relative tolerance of the integration, against the size of each state.
-pub const RELATIVE_TOLERANCE: f64 = 1e-6;
+pub const RELATIVE_TOLERANCE: f64 = 1e-5;
 /// Event functions (rad/s of slip, N m of holding torque) may fall this far below zero before the mode
 /// changes, so that rounding at a fresh change does not start another.
 const MARGIN_SLACK: f64 = 1e-9;
@@ -135,7 +135,8 @@ impl HybridIntegrator {
             // Step anew to the event, so that its state has the accuracy of a step and not of the interpolant.
             let mode = self.mode;
             let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
-            let to_event = dopri5::step(&f, &self.state.to_array(), &slope, theta * step_s, &self.tolerance);
+            let row = powertrain.stiff_row(&self.state);
+            let to_event = rosenbrock::step(&f, &self.state.to_array(), &slope, &row, theta * step_s, &self.tolerance);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(PlantError::Chatter { time_s: self.time_s });
@@ -164,13 +165,13 @@ impl HybridIntegrator {
     ) -> Result<(f64, Trial<STATES>), PlantError> {
         let mode = self.mode;
         let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
-        let x = self.state.to_array();
+        let (x, row) = (self.state.to_array(), powertrain.stiff_row(&self.state));
         loop {
             let rest = until_s - self.time_s;
             // Stretch a little rather than leave a sliver for the next step.
             let step_s = if self.step_s > 0.9 * rest { rest } else { self.step_s };
-            let trial = dopri5::step(&f, &x, slope, step_s, &self.tolerance);
-            let factor = (0.9 * trial.error.powf(-0.2)).clamp(0.2, 4.0);
+            let trial = rosenbrock::step(&f, &x, slope, &row, step_s, &self.tolerance);
+            let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
             if trial.error <= 1.0 {
                 // A step cut short by the end of the segment says nothing against the usual length.
                 let usual = if step_s < self.step_s { self.step_s } else { 0.0 };

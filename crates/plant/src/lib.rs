@@ -19,11 +19,11 @@
 
 pub mod controller;
 pub mod delay;
-pub mod dopri5;
 pub mod energy;
 pub mod hybrid;
 pub mod mode;
 pub mod powertrain;
+pub mod rosenbrock;
 pub mod simulate;
 pub mod state;
 

@@ -3,7 +3,8 @@
 use config::Vehicle;
 use drivetrain::{Clutch, Engagement, ShiftCoefficients, ShiftTorques};
 
-use crate::state::{STATES, State};
+use crate::rosenbrock::StiffRow;
+use crate::state::{STATES, State, WHEEL};
 use crate::{Contact, Direction, Mode};
 
 /// What acts on the plant from outside, constant over a segment of the integration.
@@ -140,6 +141,24 @@ impl Powertrain {
             oncoming_pa: v.oncoming.valve.pressure_rate(x.oncoming_pa, inputs.oncoming_settled_pa),
         }
         .to_array()
+    }
+
+    /// The wheel's equation by wheel, vehicle, output and twist: the one row that the tyre makes stiff.
+    pub fn stiff_row(&self, x: &State) -> StiffRow<STATES> {
+        let (road, line) = (&self.vehicle.road, &self.vehicle.driveline);
+        let radius = road.wheel_radius_m;
+        let grip = self.vehicle.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s);
+        let gradient = State {
+            wheel_rad_s: -(radius * radius * grip + line.shaft_damping_n_m_s_rad),
+            vehicle_m_s: radius * grip,
+            output_rad_s: line.shaft_damping_n_m_s_rad / line.final_ratio,
+            twist_rad: line.shaft_stiffness_n_m_rad,
+            engine_rad_s: 0.0,
+            turbine_rad_s: 0.0,
+            offgoing_pa: 0.0,
+            oncoming_pa: 0.0,
+        };
+        StiffRow { state: WHEEL, gradient: gradient.to_array().map(|torque| torque / line.wheel_inertia_kg_m2) }
     }
 
     /// `I_w dw_w/dt = T_s - T_w - R_w F_x`, rad/s^2.

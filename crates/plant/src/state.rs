@@ -2,6 +2,8 @@
 
 /// Number of states.
 pub const STATES: usize = 8;
+/// Position of the wheel speed in the vector.
+pub const WHEEL: usize = 4;
 
 /// The continuous state. Pressures are gauge; twist is gearbox side minus wheel side.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -99,7 +99,7 @@ mod drive_of_9_5_s {
     }
 }
 
-/// Two seconds in first gear under constant inputs, both Dormand-Prince 5(4) at the same tolerance.
+/// Two seconds in first gear under constant inputs, both at the same relative tolerance.
 mod integrator {
     use super::*;
 

@@ -1,0 +1,188 @@
+//! One step of a linearly implicit Runge-Kutta method of order 3 with its dense output.
+//!
+//! At a few metres per second the tyre couples wheel and vehicle within less than a millisecond; an
+//! explicit method would take its step from that alone. This one treats the stiff row of the equations
+//! implicitly, which costs one division, and everything else explicitly. It is a W-method: its order
+//! does not depend on how well the row is known.
+//!
+//! Coefficients: ROS34PW2 of J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for partial
+//! differential algebraic equations of index 1, BIT 45 (2005) 761-787. Autonomous form: inputs are
+//! constant over a step.
+
+const GAMMA: f64 = 0.435_866_521_508_459;
+const ALPHA: [[f64; 3]; 4] = [
+    [0.0, 0.0, 0.0],
+    [0.871_733_043_016_918, 0.0, 0.0],
+    [0.844_570_600_153_694_2, -0.112_990_642_363_484_18, 0.0],
+    [0.0, 0.0, 1.0],
+];
+const GAMMAS: [[f64; 3]; 4] = [
+    [0.0, 0.0, 0.0],
+    [-0.871_733_043_016_918, 0.0, 0.0],
+    [-0.903_380_570_130_440_8, 0.054_180_672_388_095_326, 0.0],
+    [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 0.545_260_255_335_102_1],
+];
+const WEIGHTS: [f64; 4] = [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 1.545_260_255_335_102, GAMMA];
+const LOWER_ORDER: [f64; 4] = [0.378_109_031_458_193_7, -0.096_042_292_212_423_18, 0.5, 0.217_933_260_754_229_5];
+
+/// The row of the Jacobian that is treated implicitly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StiffRow<const N: usize> {
+    /// Which state's equation it is.
+    pub state: usize,
+    /// Derivative of that state's rate by every state.
+    pub gradient: [f64; N],
+}
+
+impl<const N: usize> StiffRow<N> {
+    /// Treats everything explicitly.
+    pub fn none() -> Self {
+        Self { state: 0, gradient: [0.0; N] }
+    }
+
+    fn times(&self, x: &[f64; N]) -> f64 {
+        self.gradient.iter().zip(x).map(|(g, x)| g * x).sum()
+    }
+}
+
+/// A step that was tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Trial<const N: usize> {
+    /// State at the end.
+    pub end: [f64; N],
+    /// Derivative at the end, with which the next step begins.
+    pub end_slope: [f64; N],
+    /// Error estimate over the tolerance; the step is good up to 1.
+    pub error: f64,
+    start: [f64; N],
+    start_slope: [f64; N],
+    length_s: f64,
+}
+
+impl<const N: usize> Trial<N> {
+    /// State at the fraction `theta` of the step: the cubic through both ends and their slopes.
+    #[inline]
+    pub fn at(&self, theta: f64) -> [f64; N] {
+        let rest = 1.0 - theta;
+        std::array::from_fn(|i| {
+            let change = self.end[i] - self.start[i];
+            let bend_start = self.length_s * self.start_slope[i] - change;
+            let bend_end = change - self.length_s * self.end_slope[i];
+            self.start[i] + theta * (change + rest * (rest * bend_start + theta * bend_end))
+        })
+    }
+}
+
+/// Tolerances: the error of state `i` is measured against `relative * (scale[i] + |x[i]|)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance<const N: usize> {
+    /// Relative tolerance.
+    pub relative: f64,
+    /// Size of each state below which the tolerance does not shrink further.
+    pub scale: [f64; N],
+}
+
+/// Tries a step of length `h` from `x`, where `slope = f(x)`.
+///
+/// The stages satisfy `(1 - h gamma J) k_i = h f(x + sum alpha_ij k_j) + h J sum gamma_ij k_j`.
+#[inline]
+pub fn step<const N: usize>(
+    f: &impl Fn(&[f64; N]) -> [f64; N],
+    x: &[f64; N],
+    slope: &[f64; N],
+    row: &StiffRow<N>,
+    h: f64,
+    tolerance: &Tolerance<N>,
+) -> Trial<N> {
+    let combine = |weights: &[f64], k: &[[f64; N]; 4]| -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (weight, k) in weights.iter().zip(k) {
+            for (sum, k) in sum.iter_mut().zip(k) {
+                *sum += weight * k;
+            }
+        }
+        sum
+    };
+    let r = row.state;
+    let pivot = 1.0 / (1.0 - h * GAMMA * row.gradient[r]);
+    let mut k = [[0.0; N]; 4];
+    for stage in 0..4 {
+        let rate = if stage == 0 {
+            *slope
+        } else {
+            let ahead = combine(&ALPHA[stage][..stage], &k);
+            f(&std::array::from_fn(|i| x[i] + ahead[i]))
+        };
+        let implicit = h * row.times(&combine(&GAMMAS[stage][..stage], &k));
+        let mut next = rate.map(|rate| h * rate);
+        // Of (1 - h gamma J) k = next only the stiff row is not solved already.
+        let known = next[r] + implicit;
+        next[r] = 0.0;
+        next[r] = pivot * (known + h * GAMMA * row.times(&next));
+        k[stage] = next;
+    }
+    let (change, lower) = (combine(&WEIGHTS, &k), combine(&LOWER_ORDER, &k));
+    let end: [f64; N] = std::array::from_fn(|i| x[i] + change[i]);
+    let scaled = |i: usize| {
+        let allowed = tolerance.relative * (tolerance.scale[i] + x[i].abs().max(end[i].abs()));
+        ((change[i] - lower[i]) / allowed).powi(2)
+    };
+    #[expect(clippy::cast_precision_loss, reason = "the number of states is small")]
+    let error = ((0..N).map(scaled).sum::<f64>() / N as f64).sqrt();
+    Trial { end, end_slope: f(&end), error, start: *x, start_slope: *slope, length_s: h }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLERANCE: Tolerance<2> = Tolerance { relative: 1.0, scale: [1.0; 2] };
+
+    fn oscillator(x: &[f64; 2]) -> [f64; 2] {
+        [x[1], -x[0]]
+    }
+
+    /// Error at `t = 2` of the oscillator that starts at (1, 0), and of the dense output in mid-step.
+    fn errors(steps: u32, row: &StiffRow<2>) -> (f64, f64) {
+        let h = 2.0 / f64::from(steps);
+        let (mut x, mut dense_error) = ([1.0, 0.0], 0.0_f64);
+        for n in 0..steps {
+            let trial = step(&oscillator, &x, &oscillator(&x), row, h, &TOLERANCE);
+            let middle = h * (f64::from(n) + 0.5);
+            dense_error = dense_error.max((trial.at(0.5)[0] - middle.cos()).abs());
+            x = trial.end;
+        }
+        ((x[0] - 2.0_f64.cos()).hypot(x[1] + 2.0_f64.sin()), dense_error)
+    }
+
+    #[test]
+    fn halving_the_step_shows_order_3_with_any_stiff_row() {
+        let right = StiffRow { state: 1, gradient: [-1.0, 0.0] };
+        let wrong = StiffRow { state: 0, gradient: [-2.0, 0.7] };
+        for row in [StiffRow::none(), right, wrong] {
+            let (coarse, fine) = (errors(80, &row), errors(160, &row));
+            let order = |a: f64, b: f64| (a / b).log2();
+            assert!((order(coarse.0, fine.0) - 3.0).abs() < 0.2, "{}", order(coarse.0, fine.0));
+            assert!((order(coarse.1, fine.1) - 3.0).abs() < 0.2, "{}", order(coarse.1, fine.1));
+        }
+    }
+
+    #[test]
+    fn a_stiff_row_is_stable_at_steps_far_beyond_its_time_constant() {
+        let f = |x: &[f64; 2]| [-1e5 * (x[0] - x[1]), -x[1]];
+        let row = StiffRow { state: 0, gradient: [-1e5, 1e5] };
+        let mut x = [3.0, 1.0];
+        for _ in 0..100 {
+            x = step(&f, &x, &f(&x), &row, 0.02, &TOLERANCE).end;
+        }
+        assert!((x[1] - (-2.0_f64).exp()).abs() < 1e-5 && (x[0] - x[1]).abs() < 1e-4, "{x:?}");
+    }
+
+    #[test]
+    fn the_dense_output_meets_both_ends_of_the_step() {
+        let x = [0.3, -0.8];
+        let trial = step(&oscillator, &x, &oscillator(&x), &StiffRow::none(), 0.4, &TOLERANCE);
+        assert_eq!(trial.at(0.0), x);
+        assert!(trial.at(1.0).iter().zip(trial.end).all(|(a, b)| (a - b).abs() < 1e-15));
+    }
+}
