@@ -29,36 +29,58 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Simulate a shift, design the observer, estimate the pressure, write the report
+    ///
+    /// Simulates a launch from rest and a power-on 1st to 2nd upshift of the built-in two-speed automatic,
+    /// designs the observer's gains for it, runs the observer and the open loop on the same samples, prints
+    /// their errors, and writes:
+    ///
+    ///   report.html    the report; opens from disk, needs no network
+    ///   shift.svg, drive.svg    its figures
+    ///   trace.csv      every simulated signal, the truth included
+    ///   measured.csv   only what a car measures
+    ///   estimate.csv   what the observer makes of it
+    #[command(verbatim_doc_comment)]
     Demo(Demo),
     /// Simulate an experiment and write its signals as CSV
+    ///
+    /// Simulates an experiment and writes two files: NAME.csv with every signal, the truth included, and
+    /// NAME_measured.csv with only what a car measures. The same experiment gives the same bytes.
+    #[command(verbatim_doc_comment)]
     Simulate(Simulate),
     /// Design observer gains and print them with their certificate
+    ///
+    /// Designs the gains of the rigid observer by the five-step procedure: decay from the settling time,
+    /// then the smallest gain that reaches it at every vertex of the polytope, with kappa1 raised until the
+    /// bound on the remaining error is small enough. Requirements come from the vehicle file; options
+    /// replace them.
+    #[command(verbatim_doc_comment)]
     Design(Design),
     /// Estimate pressure and torque from a file of measured signals
+    ///
+    /// Runs an observer over a file of measured signals. The file needs the columns
+    ///
+    ///   time_s, engine_speed_rad_s, turbine_speed_rad_s, oncoming_current_a,
+    ///   and oncoming_slip_rad_s or output_speed_rad_s
+    ///
+    /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell is a lost sample. Where
+    /// the file also holds the true pressure (a simulated trace), the error is reported.
+    #[command(verbatim_doc_comment)]
     Estimate(Estimate),
     /// Check a vehicle or experiment file
+    ///
+    /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
+    /// names is checked too.
+    #[command(verbatim_doc_comment)]
     Check(Check),
 }
 
-/// Simulates a launch from rest and a power-on 1st to 2nd upshift of the built-in two-speed automatic,
-/// designs the observer's gains for it, runs the observer and the open loop on the same samples, prints
-/// their errors, and writes:
-///
-///   report.html    the report; opens from disk, needs no network
-///   shift.svg, drive.svg    its figures
-///   trace.csv      every simulated signal, the truth included
-///   measured.csv   only what a car measures
-///   estimate.csv   what the observer makes of it
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct Demo {
     /// Folder for the report
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
     pub(crate) output: PathBuf,
 }
 
-/// Simulates an experiment and writes two files: NAME.csv with every signal, the truth included, and
-/// NAME_measured.csv with only what a car measures. The same experiment gives the same bytes.
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
     /// Experiment file
@@ -68,10 +90,6 @@ pub(crate) struct Simulate {
     pub(crate) output: PathBuf,
 }
 
-/// Designs the gains of the rigid observer by the five-step procedure: decay from the settling time,
-/// then the smallest gain that reaches it at every vertex of the polytope, with kappa1 raised until the
-/// bound on the remaining error is small enough. Requirements come from the vehicle file; options
-/// replace them.
 #[derive(Debug, Args)]
 pub(crate) struct Design {
     /// Vehicle file
@@ -106,15 +124,7 @@ pub(crate) enum PhaseChoice {
     Inertia,
 }
 
-/// Runs an observer over a file of measured signals. The file needs the columns
-///
-///   time_s, engine_speed_rad_s, turbine_speed_rad_s, oncoming_current_a,
-///   and oncoming_slip_rad_s or output_speed_rad_s
-///
-/// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell is a lost sample. Where
-/// the file also holds the true pressure (a simulated trace), the error is reported.
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct Estimate {
     /// File of measured signals
     pub(crate) log: PathBuf,
@@ -137,8 +147,6 @@ pub(crate) enum ObserverChoice {
     OpenLoop,
 }
 
-/// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
-/// names is checked too.
 #[derive(Debug, Args)]
 pub(crate) struct Check {
     /// Vehicle or experiment file

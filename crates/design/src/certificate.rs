@@ -44,7 +44,8 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// Evaluates every inequality for this gain, without the solver.
+    /// Evaluates every inequality (2.50) for this gain, without the solver: the error dynamics
+    /// `A22 - L G` of Eq. (2.31) must satisfy the condition (2.35) of Theorem 2.1 at every vertex.
     ///
     /// Returns `None` if one of them does not hold: there is nothing to certify.
     pub fn check(

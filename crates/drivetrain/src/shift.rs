@@ -112,12 +112,12 @@ pub struct ReducedShift<T> {
 }
 
 impl<T: Real> ReducedShift<T> {
-    /// Speed ratio `w_t / w_0` while the offgoing clutch sticks.
+    /// Speed ratio `w_t / w_0` while the offgoing clutch sticks; for the two-speed set `1 + 1/gamma`, Eq. (2.1).
     pub fn ratio_offgoing(&self) -> T {
         -self.slip_offgoing[1] / self.slip_offgoing[0]
     }
 
-    /// Speed ratio `w_t / w_0` while the oncoming clutch sticks.
+    /// Speed ratio `w_t / w_0` while the oncoming clutch sticks; for the two-speed set 1, Eq. (2.2).
     pub fn ratio_oncoming(&self) -> T {
         -self.slip_oncoming[1] / self.slip_oncoming[0]
     }
@@ -182,7 +182,8 @@ impl<T: Real> ReducedShift<T> {
         }
     }
 
-    /// Accelerations `(w_t, w_0)` and holding torques `(offgoing, oncoming)`. The torque of a sticking
+    /// Accelerations `(w_t, w_0)` and holding torques `(offgoing, oncoming)`: what Eq. (2.6) to (2.9) say of
+    /// the two-speed set, for any gear train. The torque of a sticking
     /// clutch is an unknown here, so its entry in `torques` has no effect.
     fn accelerate(&self, engagement: Engagement, torques: &ShiftTorques<T>) -> ([T; 2], [T; 2]) {
         let zero = T::zero();

@@ -49,7 +49,10 @@ fn assert_agreement(from_s: f64, duration_s: f64) {
     let reference = reference.y.last().unwrap();
     for (i, (ours, theirs)) in plant.state.to_array().iter().zip(reference).enumerate() {
         // A hundred times the tolerance of a step, for the growth of the error along the phase.
-        assert!((ours - theirs).abs() < 100.0 * TOLERANCE * (State::SCALE[i] + theirs.abs()), "state {i}: {ours} {theirs}");
+        assert!(
+            (ours - theirs).abs() < 100.0 * TOLERANCE * (State::SCALE[i] + theirs.abs()),
+            "state {i}: {ours} {theirs}"
+        );
     }
 }
 

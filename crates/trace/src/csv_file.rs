@@ -82,19 +82,28 @@ pub fn write_csv(path: &Path, trace: &Trace) -> Result<(), TraceError> {
 pub fn write_rows(writer: &mut dyn Write, trace: &Trace) -> io::Result<()> {
     let mut writer = csv::Writer::from_writer(writer);
     let names = std::iter::once(signal::TIME).chain(trace.columns.iter().map(|column| column.name.as_str()));
-    writer.write_record(names)?;
+    writer.write_record(names).map_err(into_io)?;
     let number = |value: f64| if value.is_nan() { String::new() } else { value.to_string() };
     for (i, &time_s) in trace.time_s.iter().enumerate() {
-        writer.write_field(number(time_s))?;
+        writer.write_field(number(time_s)).map_err(into_io)?;
         for column in &trace.columns {
             match &column.values {
-                Values::Numbers(numbers) => writer.write_field(number(numbers[i]))?,
-                Values::Words(words) => writer.write_field(&words[i])?,
+                Values::Numbers(numbers) => writer.write_field(number(numbers[i])),
+                Values::Words(words) => writer.write_field(&words[i]),
             }
+            .map_err(into_io)?;
         }
-        writer.write_record(None::<&[u8]>)?;
+        writer.write_record(None::<&[u8]>).map_err(into_io)?;
     }
     writer.flush()
+}
+
+/// The error of the writer below, with its kind: a broken pipe must stay one.
+fn into_io(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
 }
 
 /// Cells of one column while it is read: numbers as long as every cell is one.

@@ -72,7 +72,7 @@ fn print(phase: Phase, certificate: &Certificate) -> Result<(), Failure> {
     output::line("  certificate, evaluated by eigenvalues apart from the solver:")?;
     for vertex in &certificate.vertices {
         output::line(&format!(
-            "    {}: decay {:.4}/s, {:.1e}/s more than required",
+            "    {}: decay {:.4}/s, {:.6}/s more than required",
             vertex.vertex.label, vertex.decay_per_s, vertex.margin_per_s,
         ))?;
     }

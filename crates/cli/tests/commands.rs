@@ -1,0 +1,187 @@
+//! The command as a user meets it: what it writes, prints, and exits with.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
+const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
+
+fn wetclutch(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("wetclutch-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    std::fs::read_to_string(path).unwrap()
+}
+
+#[test]
+fn the_demo_writes_its_report_and_prints_its_table() {
+    let folder = Folder::new("demo");
+    let output = wetclutch(&["demo", "-o", &folder.path("out")]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let printed = stdout(&output);
+    for part in ["torque phase", "inertia phase", "open loop", "report.html"] {
+        assert!(printed.contains(part), "{part}: {printed}");
+    }
+    let html = read(folder.path("out/report.html"));
+    assert!(html.contains("<svg") && html.contains("certified band") && html.trim_end().ends_with("</html>"));
+    // Nothing is loaded from elsewhere; the only addresses are the names of XML vocabularies.
+    assert!(!html.contains("src=") && !html.contains("href=") && !html.contains("@import"));
+    for name in ["shift.svg", "drive.svg", "trace.csv", "measured.csv", "estimate.csv"] {
+        assert!(Path::new(&folder.path(&format!("out/{name}"))).exists(), "{name}");
+    }
+}
+
+#[test]
+fn estimate_gives_from_measured_signals_what_the_demo_showed() {
+    let folder = Folder::new("estimate");
+    wetclutch(&["demo", "-o", &folder.path("demo")]);
+    let (log, out) = (folder.path("demo/measured.csv"), folder.path("out.csv"));
+    let output = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(read(&out), read(folder.path("demo/estimate.csv")));
+    assert!(!read(&log).lines().next().unwrap().contains("pressure"));
+}
+
+#[test]
+fn simulate_writes_the_same_bytes_twice() {
+    let folder = Folder::new("simulate");
+    let run = |name: &str| {
+        let output = wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path(name)]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        read(folder.path(&format!("{name}/e1.csv")))
+    };
+    let (first, second) = (run("a"), run("b"));
+    assert!(first.starts_with("time_s,engine_speed_rad_s,turbine_speed_rad_s,"));
+    assert_eq!(first, second);
+}
+
+#[test]
+fn design_prints_the_chapters_gain_and_json_holds_the_certificate() {
+    let output = wetclutch(&["design", VEHICLE]);
+    assert!(stdout(&output).contains("L = (-783.7, -1310.8) Pa s/rad"), "{}", stdout(&output));
+    let output = wetclutch(&["design", VEHICLE, "--phase", "inertia", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let certificate = &json["inertia_phase"];
+    assert!((certificate["offset_pa"].as_f64().unwrap() - 49.9e3).abs() < 100.0);
+    assert_eq!(certificate["vertices"].as_array().unwrap().len(), 2);
+    assert_eq!(certificate["vehicle_sha256"].as_str().unwrap().len(), 64);
+}
+
+#[test]
+fn a_requirement_that_cannot_be_met_exits_with_1_and_names_it() {
+    let output = wetclutch(&["design", VEHICLE, "--phase", "inertia", "--offset-max", "10000"]);
+    assert_eq!(output.status.code(), Some(1));
+    let message = stderr(&output);
+    assert!(
+        message.contains("inertia phase: the offset bound cannot be brought below") && message.contains("hint:"),
+        "{message}"
+    );
+    assert!(stdout(&output).is_empty());
+}
+
+#[test]
+fn wrong_input_exits_with_2_and_says_where_it_is_wrong() {
+    let folder = Folder::new("wrong");
+    let path = folder.path("vehicle.toml");
+    std::fs::write(&path, read(VEHICLE).replace("piston_area_m2 = 0.01 ", "piston_area_m2 = 117 ")).unwrap();
+    let output = wetclutch(&["check", &path]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = stderr(&output);
+    assert!(message.contains(&format!("{path}:")) && message.contains("hint: 117 cm2 is 0.0117 m2"), "{message}");
+
+    std::fs::write(folder.path("log.csv"), "time_s,turbine_speed_rpm\n0,1000\n").unwrap();
+    let output = wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "-o", &folder.path("out.csv")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!Path::new(&folder.path("out.csv")).exists(), "no output appears beside an error");
+
+    for arguments in
+        [&["design"][..], &["estimate", "x.csv"], &["no-such-command"], &["design", VEHICLE, "--kappa1", "-3"]]
+    {
+        assert_eq!(wetclutch(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn check_says_what_a_good_file_describes() {
+    let output = wetclutch(&["check", EXPERIMENT]);
+    assert!(output.status.success());
+    let printed = stdout(&output);
+    assert!(printed.contains("experiment E1") && printed.contains("ratio 2.500 to 1.000"), "{printed}");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let folder = Folder::new("pipe");
+    wetclutch(&["demo", "-o", &folder.path("demo")]);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+        .args(["estimate", &folder.path("demo/measured.csv"), "--vehicle", VEHICLE])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(!stderr(&output).contains("panicked"));
+}
+
+#[test]
+fn messages_are_plain_where_nobody_can_see_colours() {
+    let output = wetclutch(&["check", "no-such-file.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).starts_with("error: no-such-file.toml: "), "{}", stderr(&output));
+}
+
+#[test]
+fn lost_samples_are_counted_and_do_not_stop_the_estimate() {
+    let folder = Folder::new("lost");
+    wetclutch(&["demo", "-o", &folder.path("demo")]);
+    let log = read(folder.path("demo/measured.csv"));
+    let lossy: Vec<String> = (log.lines().enumerate())
+        .map(|(i, line)| {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            if i > 0 && i % 100 == 0 {
+                cells[2] = "";
+            }
+            cells.join(",")
+        })
+        .collect();
+    std::fs::write(folder.path("lossy.csv"), lossy.join("\n")).unwrap();
+    let out = folder.path("out.csv");
+    let output = wetclutch(&["estimate", &folder.path("lossy.csv"), "--vehicle", VEHICLE, "-o", &out]);
+    assert!(output.status.success());
+    assert!(stderr(&output).contains("95 of 9501 samples have an unusable speed"), "{}", stderr(&output));
+    assert!(!read(&out).contains("NaN"));
+}
