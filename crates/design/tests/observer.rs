@@ -54,9 +54,8 @@ impl Car {
         let before = self.pressure_pa;
         self.pressure_pa = model.valve.linear(self.command).advance(before, DT_S);
         let mean = 0.5 * (before + self.pressure_pa);
-        for i in 0..2 {
-            self.speeds[i] += DT_S * (m.free_rad_s2[i] + m.per_pressure_rad_s2_pa[i] * mean + w[i]);
-        }
+        let rate = |i: usize| m.free_rad_s2[i] + m.per_pressure_rad_s2_pa[i] * mean + w[i];
+        self.speeds = [self.speeds[0] + DT_S * rate(0), self.speeds[1] + DT_S * rate(1)];
         if self.phase == Phase::TorquePhase {
             self.speeds[1] = self.speeds[0];
         }

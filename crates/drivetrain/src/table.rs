@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn the_segment_is_found_whatever_the_spacing() {
-        let axis = [-3.0, -2.99, -2.98, 0.0, 0.1, 0.100_001, 50.0, 1e4];
+        let axis = [-3.0_f64, -2.99, -2.98, 0.0, 0.1, 0.100_001, 50.0, 1e4];
         let values = [0.0, 5.0, -5.0, 7.0, 1.0, 2.0, 3.0, -1.0];
         let table = Table1::new(&axis, &values).unwrap();
         for (segment, ends) in axis.windows(2).enumerate() {

@@ -1,7 +1,7 @@
 //! From a source of samples through observers to scores.
 //!
 //! A simulated drive and a measured log are two sources of the same [`trace::Trace`]; [`run()`] carries an
-//! observer over either, and [`score`] holds the estimates against the truth where there is one.
+//! observer over either, and [`score()`] holds the estimates against the truth where there is one.
 
 pub mod comparison;
 pub mod drive;
