@@ -11,6 +11,9 @@ pub mod source;
 pub mod vehicle;
 
 pub use error::ConfigError;
-pub use experiment::{Experiment, OffNominal, Profile, ShiftCalibration};
+pub use experiment::{
+    CurrentSensor, Experiment, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile, Sensors, ShiftCalibration,
+    SpeedSensor,
+};
 pub use source::{Kind, Source};
-pub use vehicle::{DesignRequirement, ShiftClutch, Uncertainty, Vehicle};
+pub use vehicle::{CompliantRequirement, DesignRequirement, ErrorBounds, ShiftClutch, Uncertainty, Vehicle};

@@ -87,21 +87,39 @@ pub enum DesignError {
 /// # Errors
 /// See [`DesignError`]; each says which requirement cannot be met.
 pub fn design_iss(requirement: &IssRequirement, polytope: &Polytope) -> Result<Certificate, DesignError> {
-    let unreachable = |best: &Certificate| DesignError::OffsetUnreachable {
-        best_pa: best.offset_pa,
-        kappa1_per_s: best.kappa1_per_s,
-        wanted_pa: requirement.offset_max_pa,
+    five_steps(
+        requirement.kappa1_per_s,
+        requirement.kappa2_per_s,
+        requirement.offset_max_pa,
+        |certificate: &Certificate| (certificate.kappa1_per_s, certificate.offset_pa),
+        |kappa1_per_s| smallest_gain(kappa1_per_s, requirement, polytope),
+    )
+}
+
+/// Steps 2 to 5: raises `kappa1` until `smallest_gain` gives an acceptable offset, or takes the one `kappa1`
+/// that is given. `measure` reads `kappa1` (1/s) and offset (Pa) of a certificate.
+pub(crate) fn five_steps<C>(
+    kappa1_per_s: Option<f64>,
+    kappa2_per_s: f64,
+    offset_max_pa: f64,
+    measure: impl Fn(&C) -> (f64, f64),
+    smallest_gain: impl Fn(f64) -> Result<C, DesignError>,
+) -> Result<C, DesignError> {
+    let unreachable = |best: &C| {
+        let (kappa1_per_s, best_pa) = measure(best);
+        DesignError::OffsetUnreachable { best_pa, kappa1_per_s, wanted_pa: offset_max_pa }
     };
-    let acceptable = |certificate: &Certificate| certificate.offset_pa <= requirement.offset_max_pa;
-    if let Some(kappa1_per_s) = requirement.kappa1_per_s {
-        let certificate = smallest_gain(kappa1_per_s, requirement, polytope)?;
+    let acceptable = |certificate: &C| measure(certificate).1 <= offset_max_pa;
+    if let Some(kappa1_per_s) = kappa1_per_s {
+        let certificate = smallest_gain(kappa1_per_s)?;
         return if acceptable(&certificate) { Ok(certificate) } else { Err(unreachable(&certificate)) };
     }
-    let step = KAPPA1_STEP * requirement.kappa2_per_s;
-    let mut best = smallest_gain(step, requirement, polytope)?;
+    let step = KAPPA1_STEP * kappa2_per_s;
+    let mut best = smallest_gain(step)?;
     while !acceptable(&best) {
-        let next = smallest_gain(best.kappa1_per_s + step, requirement, polytope)?;
-        if next.offset_pa >= best.offset_pa || next.kappa1_per_s > KAPPA1_MOST * requirement.kappa2_per_s {
+        let next = smallest_gain(measure(&best).0 + step)?;
+        let (kappa1_per_s, offset_pa) = measure(&next);
+        if offset_pa >= measure(&best).1 || kappa1_per_s > KAPPA1_MOST * kappa2_per_s {
             return Err(unreachable(&best));
         }
         best = next;

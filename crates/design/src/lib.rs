@@ -27,12 +27,16 @@
 use lapack_nalgebra as _;
 
 pub mod certificate;
+pub mod compliant;
 pub mod iss;
 pub mod lmi;
 pub mod polytope;
 pub mod rigid;
+pub mod sliding;
 
 pub use certificate::{Certificate, VertexMargin};
+pub use compliant::{CompliantCertificate, CompliantDesign, compliant_observer, design_compliant};
 pub use iss::{DesignError, IssRequirement, design_iss};
 pub use polytope::{Polytope, Vertex};
-pub use rigid::{RigidDesign, design_rigid, requirement, rigid_model, rigid_observer};
+pub use rigid::{RigidDesign, design_rigid, requirement, rigid_model, rigid_observer, tracker};
+pub use sliding::{design_sliding, sliding_observer};

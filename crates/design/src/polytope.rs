@@ -41,7 +41,7 @@ impl Polytope {
 }
 
 /// `A22` at the extremes of the valve, with what is extreme there.
-fn valve_extremes(model: &RigidModel<f64>, uncertainty: &Uncertainty) -> Vec<(String, f64)> {
+pub(crate) fn valve_extremes(model: &RigidModel<f64>, uncertainty: &Uncertainty) -> Vec<(String, f64)> {
     match (model.valve, uncertainty.time_constant_s, uncertainty.command) {
         (Valve::Proportional { gain_pa_a, .. }, Some(range), _) => (distinct(range).into_iter())
             .map(|time_constant_s| {
@@ -57,6 +57,6 @@ fn valve_extremes(model: &RigidModel<f64>, uncertainty: &Uncertainty) -> Vec<(St
 }
 
 #[expect(clippy::float_cmp, reason = "a range written as one number twice is one vertex")]
-fn distinct((least, greatest): (f64, f64)) -> Vec<f64> {
+pub(crate) fn distinct((least, greatest): (f64, f64)) -> Vec<f64> {
     if least == greatest { vec![least] } else { vec![least, greatest] }
 }

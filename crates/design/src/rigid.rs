@@ -1,7 +1,7 @@
 //! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
 
 use config::{DesignRequirement, Vehicle};
-use observer::{Phase, RigidGains, RigidModel, RigidObserver};
+use observer::{Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Tracker};
 use serde::Serialize;
 
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
@@ -57,7 +57,18 @@ pub fn rigid_model(vehicle: &Vehicle) -> RigidModel<f64> {
 
 /// The rigid observer of this vehicle with these gains.
 pub fn rigid_observer(vehicle: &Vehicle, gains: RigidGains<f64>) -> RigidObserver<f64> {
-    RigidObserver { model: rigid_model(vehicle), gains, supervisor: vehicle.supervisor, limits: vehicle.limits }
+    RigidObserver { model: rigid_model(vehicle), gains, tracker: tracker(vehicle) }
+}
+
+/// Checks, valve and phase for the observers of this vehicle.
+pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
+    Tracker {
+        valve: vehicle.observer_valve,
+        shift: vehicle.shift,
+        supervisor: vehicle.supervisor,
+        limits: vehicle.limits,
+        discretisation: Discretisation::Exact,
+    }
 }
 
 /// Designs the gains of both phases from the vehicle file's requirements.

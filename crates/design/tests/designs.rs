@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 use config::Vehicle;
+use design::compliant::{CompliantRequirement, design_compliant_phase};
 use design::rigid::design_phase;
 use design::{Certificate, DesignError, IssRequirement, Polytope, Vertex, design_iss};
 use observer::Phase;
@@ -123,4 +124,23 @@ proptest! {
         let rate = mix(&|v| v.a22_per_s - l[0] * v.g_rad_s2_pa[0] - l[1] * v.g_rad_s2_pa[1]);
         prop_assert!(rate <= -50.0 + 1e-9);
     }
+}
+
+#[test]
+fn chapter_compliant_torque_phase_gain_and_offset() {
+    let wanted = CompliantRequirement {
+        kappa1_per_s: Some(15.0),
+        kappa2_per_s: 40.0,
+        h: nalgebra::DMatrix::from_row_slice(2, 2, &[2.38, 0.0, 0.0, 0.13]),
+        w_max: 1.0,
+        offset_max_pa: 1e9,
+    };
+    let certificate = design_compliant_phase(&vehicle(), Phase::TorquePhase, &wanted).unwrap();
+    let printed = [[-2.10, 30.0], [-6.46, -151.4]];
+    for (row, expected) in certificate.gain_normalised.iter().zip(printed) {
+        for (value, expected) in row.iter().zip(expected) {
+            assert!((value - expected).abs() < 0.002 * expected.abs() + 0.005, "{value} {expected}");
+        }
+    }
+    assert!((certificate.offset_normalised - 0.51).abs() < 0.005, "{}", certificate.offset_normalised);
 }

@@ -17,7 +17,7 @@ fn observer() -> RigidObserver<f64> {
 }
 
 fn input(dt_s: f64, turbine_rad_s: f64, slip_rad_s: f64, command: f64) -> Input<f64> {
-    Input { dt_s, engine_rad_s: ENGINE_RAD_S, turbine_rad_s, slip_rad_s, command }
+    Input { dt_s, engine_rad_s: ENGINE_RAD_S, turbine_rad_s, slip_rad_s, wheel_rad_s: f64::NAN, command }
 }
 
 /// A car that obeys the rigid model but for an error `w`, and the observer on it.
@@ -103,7 +103,7 @@ proptest! {
         let mut state = observer.start();
         for (dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, command) in samples {
             let estimate =
-                observer.step(&mut state, &Input { dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, command });
+                observer.step(&mut state, &Input { dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, wheel_rad_s: slip_rad_s, command });
             prop_assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite());
         }
         let estimate = observer.step(&mut state, &input(0.01, 300.0, 200.0, 0.3));
@@ -192,6 +192,7 @@ fn single_precision_follows_double_precision() {
             engine_rad_s: x.engine_rad_s as f32,
             turbine_rad_s: x.turbine_rad_s as f32,
             slip_rad_s: x.slip_rad_s as f32,
+            wheel_rad_s: f32::NAN,
             command: x.command as f32,
         };
         let (x, y) = (double.step(&mut a, &x), single.step(&mut b, &y));

@@ -7,12 +7,20 @@
 //! **Architecture invariant:** nothing here knows the simulated plant. An estimator cannot see the truth.
 #![no_std]
 
+pub mod compliant;
+pub mod compliant_model;
 pub mod rigid;
 pub mod rigid_model;
 pub mod signals;
+pub mod sliding;
 pub mod supervisor;
+pub mod tracker;
 
+pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
+pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use rigid::{RigidGains, RigidObserver, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
 pub use signals::{Estimate, Estimator, Health, Input, InputLimits};
+pub use sliding::{SlidingGains, SlidingObserver, SlidingState};
 pub use supervisor::{Phase, Supervisor, SupervisorState};
+pub use tracker::{Discretisation, Interval, Tracker, TrackerState};

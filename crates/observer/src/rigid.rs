@@ -2,9 +2,7 @@
 
 use drivetrain::Real;
 
-use crate::{
-    Estimate, Estimator, Health, Input, InputLimits, Phase, RigidModel, SpeedModel, Supervisor, SupervisorState,
-};
+use crate::{Estimate, Estimator, Health, Input, Interval, Phase, RigidModel, SpeedModel, Tracker, TrackerState};
 
 /// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,34 +46,30 @@ impl<T: Real> RigidGains<T> {
 /// `G`, `A22` and `B2` frozen over one sample this integrates exactly, for `Phi = e^{A22 T}`, to
 ///
 /// ```text
-/// z^+ = Phi z^ + Gam1 B2 + L (y+ - y - T F - G (Psi z^ + Gam2 B2))
+/// z^+ = Phi z^ + Psi B2 + L (y+ - y - T F - G (Psi z^ + Gam2 B2))
 /// ```
 ///
-/// where `Psi` is the integral of `e^{A22 s}` over the sample, `Gam1 = Psi` and `Gam2` the integral of
-/// `Psi`. No derivative of `y` is taken. `eta` is not stored: written this way the estimate does not
-/// jump when the gain changes with the phase, because only the change of `y` since the last sample
-/// enters, which is what setting `eta = z^ - L y` anew at a handover does.
+/// where `Psi` is the integral of `e^{A22 s}` over the sample and `Gam2` the integral of `Psi`; forward Euler
+/// is the same with `Phi = 1 + A22 T`, `Psi = T`, `Gam2 = 0`. No derivative of `y` is taken. `eta` is not
+/// stored: written this way the estimate does not jump when the gain changes with the phase, because only
+/// the change of `y` since the last sample enters, which is what setting `eta = z^ - L y` anew at a
+/// handover does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidObserver<T> {
     /// The powertrain.
     pub model: RigidModel<T>,
     /// The gains.
     pub gains: RigidGains<T>,
-    /// The phase supervisor.
-    pub supervisor: Supervisor<T>,
-    /// What counts as a measurement.
-    pub limits: InputLimits<T>,
+    /// Checks, valve and phase.
+    pub tracker: Tracker<T>,
 }
 
 /// Memory of a [`RigidObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidState<T> {
+    tracker: TrackerState<T>,
     pressure_pa: T,
-    valve_pressure_pa: T,
     clutch_torque_n_m: T,
-    command: T,
-    started: bool,
-    supervisor: SupervisorState<T>,
     last: Option<Sample<T>>,
 }
 
@@ -90,16 +84,7 @@ struct Sample<T> {
 impl<T: Real> RigidState<T> {
     /// An empty cylinder before the shift.
     pub fn new() -> Self {
-        let zero = T::zero();
-        Self {
-            pressure_pa: zero,
-            valve_pressure_pa: zero,
-            clutch_torque_n_m: zero,
-            command: zero,
-            started: false,
-            supervisor: SupervisorState::new(),
-            last: None,
-        }
+        Self { tracker: TrackerState::new(), pressure_pa: T::zero(), clutch_torque_n_m: T::zero(), last: None }
     }
 }
 
@@ -118,69 +103,40 @@ impl<T: Real> Estimator<T> for RigidObserver<T> {
 
     #[inline]
     fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
-        let dt = if state.started { input.dt_s } else { T::zero() };
-        if !(dt >= T::zero() && dt.is_finite()) {
+        let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
             return self.report(state, Health::TimeRejected);
-        }
-        state.started = true;
-        let speeds_valid = self.limits.speeds_valid(input);
-        self.advance(state, dt, speeds_valid.then_some([input.turbine_rad_s, input.slip_rad_s]));
-
-        let command_valid = self.limits.command_valid(input);
-        if command_valid {
-            state.command = input.command;
-        }
-        if speeds_valid {
-            self.observe(state, dt, input);
+        };
+        let speeds = interval.speeds_valid().then_some([input.turbine_rad_s, input.slip_rad_s]);
+        let correction = self.correction(state, &interval, speeds);
+        state.pressure_pa = interval.pressure(state.pressure_pa) + correction;
+        if interval.speeds_valid() {
+            self.observe(state, interval.dt_s, input);
         } else {
             state.last = None;
         }
-        self.report(
-            state,
-            match (speeds_valid, command_valid) {
-                (false, _) => Health::SpeedsRejected,
-                (true, false) => Health::CommandRejected,
-                (true, true) => Health::Good,
-            },
-        )
+        self.report(state, interval.health)
     }
 }
 
 impl<T: Real> RigidObserver<T> {
-    /// Carries the pressure over `dt` under the command held since the last sample, and corrects it by
-    /// how far the speeds moved otherwise than predicted.
+    /// `L` times how far the speeds moved otherwise than predicted, Pa.
     #[inline]
-    fn advance(&self, state: &mut RigidState<T>, dt: T, speeds: Option<[T; 2]>) {
-        let valve = self.model.valve.linear(state.command);
-        let (a, b) = (valve.a22_per_s, valve.b2_pa_s);
-        let phi = (a * dt).exp();
-        let psi = (phi - T::one()) / a;
-        let gam2 = (psi - dt) / a;
-        let correction = match (state.last, speeds) {
-            (Some(last), Some(speeds)) => {
-                let gain = self.gains.of(last.phase);
-                let pressure_integral = psi * state.pressure_pa + gam2 * b;
-                let unpredicted = |i: usize| {
-                    let SpeedModel { free_rad_s2: f, per_pressure_rad_s2_pa: g } = last.model;
-                    speeds[i] - last.speeds[i] - dt * f[i] - g[i] * pressure_integral
-                };
-                gain[0] * unpredicted(0) + gain[1] * unpredicted(1)
-            }
-            _ => T::zero(),
+    fn correction(&self, state: &RigidState<T>, interval: &Interval<T>, speeds: Option<[T; 2]>) -> T {
+        let (Some(last), Some(speeds)) = (state.last, speeds) else { return T::zero() };
+        let gain = self.gains.of(last.phase);
+        let pressure_integral = interval.pressure_integral(state.pressure_pa);
+        let unpredicted = |i: usize| {
+            let SpeedModel { free_rad_s2: f, per_pressure_rad_s2_pa: g } = last.model;
+            speeds[i] - last.speeds[i] - interval.dt_s * f[i] - g[i] * pressure_integral
         };
-        state.pressure_pa = phi * state.pressure_pa + psi * b + correction;
-        state.valve_pressure_pa = phi * state.valve_pressure_pa + psi * b;
+        gain[0] * unpredicted(0) + gain[1] * unpredicted(1)
     }
 
     /// Finds the phase and stores what the model says at this sample.
     #[inline]
     fn observe(&self, state: &mut RigidState<T>, dt: T, input: &Input<T>) {
-        let (turbine, slip) = (input.turbine_rad_s, input.slip_rad_s);
-        let output = self.model.shift.output_speed(turbine, slip);
-        let offgoing_slip = self.model.shift.offgoing_slip(turbine, output);
-        let phase = self.supervisor.step(&mut state.supervisor, dt, state.valve_pressure_pa, offgoing_slip, slip);
-        let acting = self.supervisor.acting_phase(phase, slip);
-        let engine = input.engine_rad_s;
+        let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
+        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
         // Outside the shift the speeds say nothing about the pressure: no sample to correct by.
         state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| Sample {
             phase: acting,
@@ -194,18 +150,14 @@ impl<T: Real> RigidObserver<T> {
         Estimate {
             pressure_pa: state.pressure_pa,
             clutch_torque_n_m: state.clutch_torque_n_m,
-            phase: state.supervisor.phase,
+            shaft_torque_n_m: None,
+            phase: state.tracker.supervisor.phase,
             health,
         }
     }
 
     /// The same observer in another precision.
     pub fn cast<U: Real>(&self) -> RigidObserver<U> {
-        RigidObserver {
-            model: self.model.cast(),
-            gains: self.gains.cast(),
-            supervisor: self.supervisor.cast(),
-            limits: self.limits.cast(),
-        }
+        RigidObserver { model: self.model.cast(), gains: self.gains.cast(), tracker: self.tracker.cast() }
     }
 }

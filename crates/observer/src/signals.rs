@@ -15,6 +15,8 @@ pub struct Input<T> {
     pub turbine_rad_s: T,
     /// Slip of the oncoming clutch `dw`, rad/s.
     pub slip_rad_s: T,
+    /// Speed of the driven wheels `w_w`, rad/s; NaN where it is not measured.
+    pub wheel_rad_s: T,
     /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
     pub command: T,
 }
@@ -36,6 +38,12 @@ impl<T: Real> InputLimits<T> {
         input.engine_rad_s.abs() <= self.speed_max_rad_s
             && input.turbine_rad_s.abs() <= self.speed_max_rad_s
             && input.slip_rad_s.abs() <= self.speed_max_rad_s + self.speed_max_rad_s
+    }
+
+    /// Whether the wheel speed can be used.
+    #[inline]
+    pub fn wheel_valid(&self, input: &Input<T>) -> bool {
+        input.wheel_rad_s.abs() <= self.speed_max_rad_s
     }
 
     /// Whether the valve command can be used.
@@ -85,6 +93,8 @@ pub struct Estimate<T> {
     pub pressure_pa: T,
     /// Torque of the oncoming clutch, N m, positive when it drives its output side.
     pub clutch_torque_n_m: T,
+    /// Drive-shaft torque, N m, where the observer estimates it.
+    pub shaft_torque_n_m: Option<T>,
     /// Phase of the shift, as the supervisor sees it.
     pub phase: Phase,
     /// Whether the input could be used.

@@ -24,6 +24,7 @@ pub mod hybrid;
 pub mod mode;
 pub mod powertrain;
 pub mod rosenbrock;
+pub mod sensors;
 pub mod simulate;
 pub mod state;
 

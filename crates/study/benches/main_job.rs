@@ -32,6 +32,7 @@ mod observer_step {
             engine_rad_s: 370.0,
             turbine_rad_s: 340.0 - 0.01 * f64::from(n),
             slip_rad_s: 300.0 - 0.02 * f64::from(n),
+            wheel_rad_s: f64::NAN,
             command: 0.25,
         };
         (0..1000).map(sample).collect()
@@ -58,6 +59,7 @@ mod observer_step {
             engine_rad_s: x.engine_rad_s as f32,
             turbine_rad_s: x.turbine_rad_s as f32,
             slip_rad_s: x.slip_rad_s as f32,
+            wheel_rad_s: f32::NAN,
             command: x.command as f32,
         };
         let samples: Vec<Input<f32>> = samples().into_iter().map(single).collect();

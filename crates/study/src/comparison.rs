@@ -1,16 +1,21 @@
 //! Several observers on the same drive.
 
-use config::{Experiment, Vehicle};
-use design::{DesignError, RigidDesign, design_rigid, rigid_observer};
-use observer::{Estimate, Phase, RigidGains};
+use config::{Experiment, ObserverEntry, ObserverKind, Vehicle};
+use design::{CompliantDesign, DesignError, RigidDesign, design_compliant, design_rigid};
+use observer::{Estimate, Phase};
 use plant::PlantError;
 use trace::{Trace, TraceError, signal};
 
-use crate::score::pressure_scores;
-use crate::{PhaseScore, RunColumns, ShiftQuality, run, simulate_drive};
+use crate::observers::AnyObserver;
+use crate::sampling::{sampled, through_sensors};
+use crate::{PhaseScore, RunColumns, ShiftQuality, score, simulate_drive, true_phases};
 
-/// Name of the observer that does not correct.
-pub const OPEN_LOOP: &str = "open loop";
+/// Share of the range within which a pressure error counts as settled.
+const SETTLED_SHARE: f64 = 0.05;
+/// Clutch-torque error that counts as settled, N m.
+const SETTLED_CLUTCH_N_M: f64 = 10.0;
+/// Shaft-torque error that counts as settled, N m.
+const SETTLED_SHAFT_N_M: f64 = 50.0;
 
 /// Why a comparison could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -29,87 +34,143 @@ pub enum StudyError {
 /// One observer's part in a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverRun {
-    /// Short name for tables.
-    pub name: &'static str,
-    /// One estimate for each sample.
+    /// What was run.
+    pub entry: ObserverEntry,
+    /// Times of its samples, s.
+    pub time_s: Vec<f64>,
+    /// True pressure of the oncoming clutch at these times, Pa.
+    pub truth_pa: Vec<f64>,
+    /// One estimate for each.
     pub estimates: Vec<Estimate<f64>>,
-    /// Errors of the pressure by phase.
+    /// Errors of the pressure by phase, Pa.
     pub pressure: Vec<PhaseScore>,
-    /// Errors of the clutch torque by phase.
+    /// Errors of the clutch torque by phase, N m.
     pub torque: Vec<PhaseScore>,
+    /// Errors of the shaft torque by phase, N m, if it estimates that.
+    pub shaft: Option<Vec<PhaseScore>>,
 }
 
 /// Observers on one drive, with the truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
+    /// The experiment.
+    pub experiment: Experiment,
     /// The drive.
     pub trace: Trace,
-    /// The true phase at each sample.
+    /// The true phase at each sample of the drive.
     pub phases: Vec<Phase>,
-    /// The certified gains.
-    pub design: RigidDesign,
-    /// The observers; the open loop, which every result is held against, comes last.
+    /// Certified gains of the rigid observer.
+    pub rigid: RigidDesign,
+    /// Certified gains of the compliant observer.
+    pub compliant: CompliantDesign,
+    /// The observers in the order of the experiment.
     pub runs: Vec<ObserverRun>,
     /// The shift, if it was completed.
     pub quality: Option<ShiftQuality>,
-    /// Certified bound on the error at each sample, Pa, where the observer corrects.
+    /// Certified bound on the error of the first observer at each of its samples, Pa, where it is the rigid
+    /// one with designed gains and corrects.
     pub bound_pa: Vec<Option<f64>>,
 }
 
-/// Simulates the experiment, designs the gains for the nominal vehicle, and runs the rigid observer and
-/// the open loop over the same samples.
+/// Simulates the experiment, designs gains for the nominal vehicle, and runs the experiment's observers
+/// over the same drive.
 ///
 /// # Errors
 /// Simulation, design, or signals; see [`StudyError`].
 pub fn compare(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison, StudyError> {
     let trace = simulate_drive(vehicle, experiment)?;
-    let design = design_rigid(vehicle)?;
-    let columns = RunColumns::of(&trace, vehicle)?;
-    let phases = crate::true_phases(&trace).unwrap_or_default();
-    let torque_truth = trace.require(signal::ONCOMING_TORQUE)?;
-    let runs: Vec<ObserverRun> = [("ISS", design.gains()), (OPEN_LOOP, RigidGains::open_loop())]
-        .into_iter()
-        .map(|(name, gains)| {
-            let estimates = run(&columns, &rigid_observer(vehicle, gains));
-            ObserverRun {
-                name,
-                pressure: pressure_scores(&trace, &estimates).unwrap_or_default(),
-                torque: crate::score(&phases, torque_truth, |i| estimates[i].clutch_torque_n_m),
-                estimates,
-            }
-        })
-        .collect();
-    let bound_pa = certified_bound(&trace, &design, &runs[0].estimates)?;
-    Ok(Comparison { quality: ShiftQuality::of(&trace, &vehicle.shift), phases, design, runs, bound_pa, trace })
+    let (rigid, compliant) = (design_rigid(vehicle)?, design_compliant(vehicle)?);
+    let runs = (experiment.observers.iter())
+        .map(|entry| run_entry(vehicle, experiment, entry, &trace))
+        .collect::<Result<Vec<_>, StudyError>>()?;
+    let bound_pa = match runs.first() {
+        Some(run) if run.entry.kind == ObserverKind::Rigid && run.entry.gains.is_none() => certified_bound(run, &rigid),
+        _ => Vec::new(),
+    };
+    Ok(Comparison {
+        quality: ShiftQuality::of(&trace, &vehicle.shift),
+        phases: true_phases(&trace).unwrap_or_default(),
+        experiment: experiment.clone(),
+        rigid,
+        compliant,
+        runs,
+        bound_pa,
+        trace,
+    })
+}
+
+fn run_entry(
+    vehicle: &Vehicle,
+    experiment: &Experiment,
+    entry: &ObserverEntry,
+    whole: &Trace,
+) -> Result<ObserverRun, StudyError> {
+    let ideal = sampled(whole, entry.sample_time_s);
+    let trace = match &experiment.sensors {
+        Some(sensors) if entry.real_sensors => through_sensors(whole, &ideal, sensors, vehicle),
+        _ => ideal,
+    };
+    let observer = AnyObserver::of(vehicle, entry)?;
+    let estimates = observer.run(&RunColumns::of(&trace, vehicle)?);
+    let phases = true_phases(&trace).unwrap_or_default();
+    let time = &trace.time_s;
+    let truth_pa = trace.require(signal::ONCOMING_PRESSURE)?;
+    let settled_pa = SETTLED_SHARE * experiment.shift.line_pressure_pa;
+    let clutch = trace.require(signal::ONCOMING_TORQUE)?;
+    let shaft = trace.require(signal::SHAFT_TORQUE)?;
+    let has_shaft = matches!(observer, AnyObserver::Compliant(_));
+    Ok(ObserverRun {
+        entry: entry.clone(),
+        pressure: score(time, &phases, truth_pa, settled_pa, |i| estimates[i].pressure_pa),
+        torque: score(time, &phases, clutch, SETTLED_CLUTCH_N_M, |i| estimates[i].clutch_torque_n_m),
+        shaft: has_shaft.then(|| {
+            score(time, &phases, shaft, SETTLED_SHAFT_N_M, |i| estimates[i].shaft_torque_n_m.unwrap_or(f64::NAN))
+        }),
+        truth_pa: truth_pa.to_vec(),
+        time_s: trace.time_s.clone(),
+        estimates,
+    })
 }
 
 /// The bound (2.40) along the drive: in each phase it starts from the error that the estimate has there.
-fn certified_bound(
-    trace: &Trace,
-    design: &RigidDesign,
-    estimates: &[Estimate<f64>],
-) -> Result<Vec<Option<f64>>, TraceError> {
-    let truth = trace.require(signal::ONCOMING_PRESSURE)?;
+fn certified_bound(run: &ObserverRun, design: &RigidDesign) -> Vec<Option<f64>> {
     let mut entered: Option<(Phase, f64, f64)> = None;
-    Ok((0..trace.len())
+    (0..run.time_s.len())
         .map(|i| {
-            let (phase, time_s) = (estimates[i].phase, trace.time_s[i]);
-            let error = (truth[i] - estimates[i].pressure_pa).abs();
+            let (phase, time_s) = (run.estimates[i].phase, run.time_s[i]);
+            let error = (run.truth_pa[i] - run.estimates[i].pressure_pa).abs();
             let (_, since_s, initial) = match entered {
                 Some(same) if same.0 == phase => same,
                 _ => *entered.insert((phase, time_s, error)),
             };
             design.of(phase).map(|certificate| certificate.error_bound_pa(initial, time_s - since_s))
         })
-        .collect())
+        .collect()
+}
+
+impl ObserverRun {
+    /// Score of the pressure in a phase.
+    pub fn pressure_in(&self, phase: Phase) -> Option<&PhaseScore> {
+        self.pressure.iter().find(|score| score.phase == phase && score.samples > 0)
+    }
 }
 
 impl Comparison {
+    /// The run of this name.
+    pub fn run(&self, name: &str) -> Option<&ObserverRun> {
+        self.runs.iter().find(|run| run.entry.name == name)
+    }
+
+    /// The open loop, which every result is held against.
+    pub fn open_loop(&self) -> Option<&ObserverRun> {
+        self.runs.iter().find(|run| run.entry.kind == ObserverKind::OpenLoop)
+    }
+
     /// Share of the samples with a bound at which the error of the first observer lies within it, and
     /// the largest excess over it, Pa.
     pub fn bound_coverage(&self, phase: Phase) -> Option<(f64, f64)> {
-        let truth = self.trace.get(signal::ONCOMING_PRESSURE)?;
-        let excesses: Vec<f64> = (self.runs[0].estimates.iter().zip(truth).zip(&self.bound_pa))
+        let run = self.runs.first()?;
+        let excesses: Vec<f64> = (run.estimates.iter().zip(&run.truth_pa).zip(&self.bound_pa))
             .filter(|((estimate, _), _)| estimate.phase == phase)
             .filter_map(|((estimate, truth), bound)| bound.map(|b| (truth - estimate.pressure_pa).abs() - b))
             .collect();

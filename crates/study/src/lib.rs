@@ -5,10 +5,13 @@
 
 pub mod comparison;
 pub mod drive;
+pub mod observers;
 pub mod run;
+pub mod sampling;
 pub mod score;
 
-pub use comparison::{Comparison, StudyError, compare};
+pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use drive::{simulate_drive, true_phases};
+pub use observers::AnyObserver;
 pub use run::{RunColumns, estimates_trace, run};
 pub use score::{PhaseScore, ShiftQuality, score};

@@ -11,6 +11,7 @@ pub struct RunColumns<'a> {
     engine_rad_s: &'a [f64],
     turbine_rad_s: &'a [f64],
     slip_rad_s: Vec<f64>,
+    wheel_rad_s: Option<&'a [f64]>,
     command_a: &'a [f64],
 }
 
@@ -34,6 +35,7 @@ impl<'a> RunColumns<'a> {
             engine_rad_s: trace.require(signal::ENGINE_SPEED)?,
             turbine_rad_s,
             slip_rad_s,
+            wheel_rad_s: trace.get(signal::WHEEL_SPEED),
             command_a: trace.require(signal::ONCOMING_CURRENT)?,
         })
     }
@@ -44,6 +46,7 @@ impl<'a> RunColumns<'a> {
             engine_rad_s: self.engine_rad_s[i],
             turbine_rad_s: self.turbine_rad_s[i],
             slip_rad_s: self.slip_rad_s[i],
+            wheel_rad_s: self.wheel_rad_s.map_or(f64::NAN, |wheel| wheel[i]),
             command: self.command_a[i],
         }
     }
@@ -60,6 +63,10 @@ pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
     let mut trace = Trace { path: None, time_s: time_s.to_vec(), columns: Vec::new() };
     trace.add(signal::PRESSURE_ESTIMATE, estimates.iter().map(|e| e.pressure_pa).collect());
     trace.add(signal::TORQUE_ESTIMATE, estimates.iter().map(|e| e.clutch_torque_n_m).collect());
+    if estimates.iter().any(|e| e.shaft_torque_n_m.is_some()) {
+        let shaft = |e: &Estimate<f64>| e.shaft_torque_n_m.unwrap_or(f64::NAN);
+        trace.add(signal::SHAFT_ESTIMATE, estimates.iter().map(shaft).collect());
+    }
     trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().to_owned()).collect());
     trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().to_owned()).collect());
     trace

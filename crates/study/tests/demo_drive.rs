@@ -5,7 +5,7 @@
 use config::{Experiment, Vehicle};
 use design::rigid_observer;
 use observer::Phase;
-use study::{Comparison, RunColumns, compare, run};
+use study::{Comparison, ObserverRun, RunColumns, compare, run};
 use trace::{read_csv, signal, write_csv};
 
 fn comparison() -> (Vehicle, Comparison) {
@@ -23,7 +23,7 @@ fn a_replay_of_measurable_signals_gives_the_very_same_estimate() {
     std::fs::remove_file(&path).unwrap();
     assert!(log.get(signal::ONCOMING_PRESSURE).is_none());
     let columns = RunColumns::of(&log, &vehicle).unwrap();
-    let estimates = run(&columns, &rigid_observer(&vehicle, comparison.design.gains()));
+    let estimates = run(&columns, &rigid_observer(&vehicle, comparison.rigid.gains()));
     assert_eq!(estimates, comparison.runs[0].estimates);
 }
 
@@ -32,7 +32,7 @@ fn output_speed_serves_where_the_slip_was_not_recorded() {
     let (vehicle, comparison) = comparison();
     let without = comparison.trace.filtered(|name| name != signal::ONCOMING_SLIP);
     let columns = RunColumns::of(&without, &vehicle).unwrap();
-    let estimates = run(&columns, &rigid_observer(&vehicle, comparison.design.gains()));
+    let estimates = run(&columns, &rigid_observer(&vehicle, comparison.rigid.gains()));
     for (a, b) in estimates.iter().zip(&comparison.runs[0].estimates) {
         assert!((a.pressure_pa - b.pressure_pa).abs() < 1.0);
     }
@@ -55,8 +55,9 @@ fn the_supervisor_finds_the_true_phases_within_a_few_hundredths_of_a_second() {
 #[test]
 fn the_observer_halves_the_inertia_phase_error_and_stays_inside_its_bound() {
     let (_, comparison) = comparison();
-    let rms = |run: usize| comparison.runs[run].pressure.iter().find(|s| s.phase == Phase::InertiaPhase).unwrap().rms;
-    assert!(rms(0) < 0.6 * rms(1), "{} {}", rms(0), rms(1));
+    let rms = |run: &ObserverRun| run.pressure_in(Phase::InertiaPhase).unwrap().rms;
+    let (rigid, open_loop) = (rms(&comparison.runs[0]), rms(comparison.open_loop().unwrap()));
+    assert!(rigid < 0.6 * open_loop, "{rigid} {open_loop}");
     assert_eq!(comparison.bound_coverage(Phase::InertiaPhase).unwrap().0, 1.0);
 }
 

@@ -58,6 +58,8 @@ pub const MEASURABLE: &[&str] = &[
 pub const PRESSURE_ESTIMATE: &str = "oncoming_pressure_estimate_pa";
 /// Estimated torque of the oncoming clutch, N m.
 pub const TORQUE_ESTIMATE: &str = "oncoming_torque_estimate_n_m";
+/// Estimated drive-shaft torque, N m.
+pub const SHAFT_ESTIMATE: &str = "shaft_torque_estimate_n_m";
 /// Phase as the supervisor sees it, a word.
 pub const PHASE: &str = "phase";
 /// Whether the input could be used, a word.

@@ -1,5 +1,6 @@
 //! The experiment file, checked.
 
+mod observers;
 mod raw;
 
 use std::path::{Path, PathBuf};
@@ -9,6 +10,8 @@ use drivetrain::Table1;
 use crate::check::{Check, Number};
 use crate::{ConfigError, Source, Vehicle};
 use raw::{RawExperiment, RawOffNominal, RawShift};
+
+pub use observers::{CurrentSensor, GivenGains, ObserverEntry, ObserverKind, Sensors, SpeedSensor};
 
 /// A signal over time, linear between its points, held outside them.
 pub type Profile = Table1<f64>;
@@ -96,15 +99,33 @@ pub struct Experiment {
     pub off_nominal: OffNominal,
     /// The shift controller's calibration.
     pub shift: ShiftCalibration,
+    /// The car's sensors, if the experiment describes them.
+    pub sensors: Option<Sensors>,
+    /// The observers to be run.
+    pub observers: Vec<ObserverEntry>,
 }
 
 impl Experiment {
+    /// Experiments E1 to E4, as they ship with the program.
+    ///
+    /// # Errors
+    /// None in a released program; the tests read these files.
+    pub fn built_in() -> Result<[Self; 4], ConfigError> {
+        let read = |path, text| Self::from_source(Source::built_in(path, text));
+        Ok([
+            read("experiments/e1.toml", include_str!("../../../../experiments/e1.toml"))?,
+            read("experiments/e2.toml", include_str!("../../../../experiments/e2.toml"))?,
+            read("experiments/e3.toml", include_str!("../../../../experiments/e3.toml"))?,
+            read("experiments/e4.toml", include_str!("../../../../experiments/e4.toml"))?,
+        ])
+    }
+
     /// Experiment E1, as it ships with the program.
     ///
     /// # Errors
-    /// None in a released program; the tests read this file.
+    /// As [`Self::built_in`].
     pub fn e1() -> Result<Self, ConfigError> {
-        Self::from_source(Source::built_in("experiments/e1.toml", include_str!("../../../../experiments/e1.toml")))
+        Self::built_in().map(|[e1, ..]| e1)
     }
 
     /// Reads and checks an experiment file.
@@ -127,8 +148,12 @@ impl Experiment {
             ("throttle.time_s", &raw.throttle.time_s, 0.0..=600.0),
             ("throttle.position", &raw.throttle.position, 0.0..=1.0),
         )?;
+        let has_sensors = raw.sensors.is_some();
+        let observers = raw.observer.iter().map(|entry| observers::observer(&check, entry, has_sensors));
         Ok(Self {
             vehicle: PathBuf::from(raw.vehicle.get_ref()),
+            sensors: raw.sensors.as_ref().map(|sensors| observers::sensors(&check, sensors)).transpose()?,
+            observers: observers.collect::<Result<_, _>>()?,
             duration_s,
             sample_time_s: check.number("sample_time_s", &raw.sample_time_s, 1e-5..=0.1)?,
             initial_engine_rad_s: check.number("initial.engine_rad_s", &raw.initial.engine_rad_s, 0.0..=1e3)?,

@@ -18,6 +18,96 @@ pub(super) struct RawExperiment {
     #[serde(default)]
     pub(super) off_nominal: RawOffNominal,
     pub(super) shift: RawShift,
+    pub(super) sensors: Option<RawSensors>,
+    #[serde(default)]
+    pub(super) observer: Vec<Spanned<RawObserver>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawSensors {
+    pub(super) seed: u64,
+    pub(super) engine: RawSpeedSensor,
+    pub(super) turbine: RawSpeedSensor,
+    pub(super) output: RawSpeedSensor,
+    pub(super) wheel: RawSpeedSensor,
+    pub(super) current: RawCurrentSensor,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawSpeedSensor {
+    pub(super) teeth: Number,
+    pub(super) timer_s: Number,
+    pub(super) periods: Number,
+    pub(super) sample_time_s: Number,
+    pub(super) delay_s: Number,
+    pub(super) noise_rad_s: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCurrentSensor {
+    pub(super) noise_a: Number,
+    pub(super) offset_a: Number,
+    pub(super) resolution_a: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawObserver {
+    pub(super) name: String,
+    pub(super) kind: RawKind,
+    pub(super) sample_time_s: Option<Number>,
+    #[serde(default)]
+    pub(super) discretisation: RawDiscretisation,
+    #[serde(default)]
+    pub(super) sensors: RawSignals,
+    pub(super) gains: Option<RawGains>,
+}
+
+#[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum RawKind {
+    OpenLoop,
+    Rigid,
+    Compliant,
+    Sliding,
+}
+
+#[derive(Deserialize, Clone, Copy, Default)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum RawDiscretisation {
+    #[default]
+    Exact,
+    Euler,
+}
+
+#[derive(Deserialize, Clone, Copy, Default, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum RawSignals {
+    #[default]
+    Ideal,
+    Real,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, deny_unknown_fields)]
+pub(super) enum RawGains {
+    Rigid {
+        torque_phase_pa_s_rad: f64,
+        inertia_phase_pa_s_rad: [f64; 2],
+    },
+    Sliding {
+        torque_speed_rad_s2: f64,
+        torque_pressure_pa_s: f64,
+        inertia_speed_rad_s2: [f64; 2],
+        inertia_pressure_pa_s: [f64; 2],
+    },
+    Compliant {
+        torque_phase_normalised: [[f64; 2]; 2],
+        inertia_phase_normalised: [[f64; 3]; 2],
+    },
 }
 
 #[derive(Deserialize)]

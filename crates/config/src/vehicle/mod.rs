@@ -12,7 +12,10 @@ use observer::{InputLimits, Supervisor};
 
 use crate::check::{Check, Numbers};
 use crate::{ConfigError, Source};
-use raw::{RawClutch, RawEngineMap, RawObserver, RawRequirement, RawUncertainty, RawValve, RawVehicleFile};
+use raw::{
+    RawClutch, RawCompliantRequirement, RawEngineMap, RawErrorBounds, RawObserver, RawRequirement, RawUncertainty,
+    RawValve, RawVehicleFile,
+};
 
 /// A shift clutch with the valve that fills it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +48,32 @@ pub struct DesignRequirement {
     pub model_error_max_rad_s2: f64,
     /// Largest acceptable offset of the pressure estimate, Pa.
     pub offset_max_pa: f64,
+}
+
+/// What the gain design of the compliant observer must reach in one phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompliantRequirement {
+    /// Time in which an initial error must be gone, s: `4 / kappa2`.
+    pub settling_time_s: f64,
+    /// `kappa1`, 1/s, if it is given and not to be found by the design.
+    pub kappa1_per_s: Option<f64>,
+    /// Largest acceptable offset of the pressure estimate, Pa.
+    pub offset_max_pa: f64,
+}
+
+/// Largest errors of what the observers are told about the car.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorBounds {
+    /// Turbine torque from the converter's maps, N m.
+    pub turbine_torque_n_m: f64,
+    /// Pressure from the valve model alone, Pa.
+    pub pressure_pa: f64,
+    /// Mass of the vehicle, kg.
+    pub mass_kg: f64,
+    /// Grade, rad.
+    pub grade_rad: f64,
+    /// Largest drive-shaft torque of a shift, N m: a mass error acts in its proportion.
+    pub shaft_torque_n_m: f64,
 }
 
 /// A vehicle: everything the plant, the observers and the design need to know.
@@ -84,6 +113,14 @@ pub struct Vehicle {
     pub torque_phase: DesignRequirement,
     /// Requirement in the inertia phase.
     pub inertia_phase: DesignRequirement,
+    /// Requirement on the compliant observer in the torque phase.
+    pub compliant_torque_phase: CompliantRequirement,
+    /// Requirement on the compliant observer in the inertia phase.
+    pub compliant_inertia_phase: CompliantRequirement,
+    /// Largest errors of what the observers are told.
+    pub error_bounds: ErrorBounds,
+    /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
+    pub shaft_settling_s: f64,
 }
 
 impl Vehicle {
@@ -168,6 +205,10 @@ impl Vehicle {
             },
             torque_phase: requirement(&check, "design.torque_phase", &raw.design.torque_phase)?,
             inertia_phase: requirement(&check, "design.inertia_phase", &raw.design.inertia_phase)?,
+            compliant_torque_phase: compliant(&check, "torque_phase", &raw.design.compliant.torque_phase)?,
+            compliant_inertia_phase: compliant(&check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
+            error_bounds: error_bounds(&check, &raw.design.error_bounds)?,
+            shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
             source,
         })
     }
@@ -344,5 +385,29 @@ fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<D
         kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
         model_error_max_rad_s2: number("model_error_max_rad_s2", &raw.model_error_max_rad_s2, 0.0..=1e6)?,
         offset_max_pa: number("offset_max_pa", &raw.offset_max_pa, 1e3..=10e6)?,
+    })
+}
+
+fn compliant(
+    check: &Check<'_>,
+    phase: &str,
+    raw: &RawCompliantRequirement,
+) -> Result<CompliantRequirement, ConfigError> {
+    let number = |key: &str, value, range| check.number(&format!("design.compliant.{phase}.{key}"), value, range);
+    Ok(CompliantRequirement {
+        settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
+        kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
+        offset_max_pa: number("offset_max_pa", &raw.offset_max_pa, 1e3..=10e6)?,
+    })
+}
+
+fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, ConfigError> {
+    let number = |key: &str, value, range| check.number(&format!("design.error_bounds.{key}"), value, range);
+    Ok(ErrorBounds {
+        turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
+        pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
+        mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
+        grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
+        shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
     })
 }

@@ -168,6 +168,7 @@ pub(super) struct RawRoad {
 pub(super) struct RawObserver {
     pub(super) speed_max_rad_s: Number,
     pub(super) command_max: Number,
+    pub(super) shaft_settling_s: Number,
     pub(super) valve: RawValve,
     pub(super) uncertainty: RawUncertainty,
     pub(super) supervisor: RawSupervisor,
@@ -201,6 +202,33 @@ pub(super) struct RawSupervisor {
 pub(super) struct RawDesign {
     pub(super) torque_phase: RawRequirement,
     pub(super) inertia_phase: RawRequirement,
+    pub(super) error_bounds: RawErrorBounds,
+    pub(super) compliant: RawCompliantDesign,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawErrorBounds {
+    pub(super) turbine_torque_n_m: Number,
+    pub(super) pressure_pa: Number,
+    pub(super) mass_kg: Number,
+    pub(super) grade_rad: Number,
+    pub(super) shaft_torque_n_m: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCompliantDesign {
+    pub(super) torque_phase: RawCompliantRequirement,
+    pub(super) inertia_phase: RawCompliantRequirement,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCompliantRequirement {
+    pub(super) settling_time_s: Number,
+    pub(super) kappa1_per_s: Option<Number>,
+    pub(super) offset_max_pa: Number,
 }
 
 #[derive(Deserialize)]

@@ -1,0 +1,139 @@
+//! The full-order sliding-mode observer, held against the others, Eq. (2.55) and (2.59).
+
+use drivetrain::Real;
+
+use crate::{Estimate, Estimator, Health, Input, Phase, RigidModel, SpeedModel, Tracker, TrackerState};
+
+/// Gains of the sliding-mode observer. The pressure gains are negative where the speed falls with the
+/// pressure: in sliding the pressure error decays with `mu R N A (ks3 C13/ks1 + ...)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlidingGains<T> {
+    /// Torque phase: `kst1`, rad/s^2.
+    pub torque_speed_rad_s2: T,
+    /// Torque phase: `kst2`, Pa/s.
+    pub torque_pressure_pa_s: T,
+    /// Inertia phase: `ks1` on `w_t` and `ks2` on `dw`, rad/s^2.
+    pub inertia_speed_rad_s2: [T; 2],
+    /// Inertia phase: `ks3` and `ks4`, Pa/s.
+    pub inertia_pressure_pa_s: [T; 2],
+}
+
+/// The sliding-mode observer on the rigid model.
+///
+/// Carried over a sample by forward Euler, as the chapter did: the sign of the speed error stands still
+/// over the sample, which is where chatter comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlidingObserver<T> {
+    /// The powertrain.
+    pub model: RigidModel<T>,
+    /// The gains.
+    pub gains: SlidingGains<T>,
+    /// Checks, valve and phase.
+    pub tracker: Tracker<T>,
+}
+
+/// Memory of a [`SlidingObserver`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlidingState<T> {
+    tracker: TrackerState<T>,
+    pressure_pa: T,
+    clutch_torque_n_m: T,
+    last: Option<Sample<T>>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sample<T> {
+    phase: Phase,
+    /// Estimated speeds `y^`, rad/s.
+    estimated: [T; 2],
+    /// Signs of the speed errors.
+    signs: [T; 2],
+    model: SpeedModel<T>,
+}
+
+impl<T: Real> Estimator<T> for SlidingObserver<T> {
+    type State = SlidingState<T>;
+
+    fn start(&self) -> SlidingState<T> {
+        let (tracker, zero) = (TrackerState::new(), T::zero());
+        SlidingState { tracker, pressure_pa: zero, clutch_torque_n_m: zero, last: None }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut SlidingState<T>, input: &Input<T>) -> Estimate<T> {
+        let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
+            return self.report(state, Health::TimeRejected);
+        };
+        let dt = interval.dt_s;
+        let before = state.pressure_pa;
+        state.pressure_pa = interval.pressure(before);
+        let mut estimated = None;
+        if let Some(last) = state.last {
+            let (speed, pressure) = self.gains_of(last.phase);
+            state.pressure_pa = state.pressure_pa + dt * (pressure[0] * last.signs[0] + pressure[1] * last.signs[1]);
+            let advanced = |i: usize| {
+                let rate = last.model.free_rad_s2[i] + last.model.per_pressure_rad_s2_pa[i] * before;
+                last.estimated[i] + dt * (rate + speed[i] * last.signs[i])
+            };
+            estimated = Some((last.phase, [advanced(0), advanced(1)]));
+        }
+        if interval.speeds_valid() {
+            self.observe(state, dt, input, estimated);
+        } else {
+            state.last = None;
+        }
+        self.report(state, interval.health)
+    }
+}
+
+impl<T: Real> SlidingObserver<T> {
+    /// Speed gains and pressure gains of a phase, on `(w_t, dw)`.
+    #[inline]
+    fn gains_of(&self, phase: Phase) -> ([T; 2], [T; 2]) {
+        let (g, zero) = (&self.gains, T::zero());
+        match phase {
+            Phase::InertiaPhase => (g.inertia_speed_rad_s2, g.inertia_pressure_pa_s),
+            _ => ([g.torque_speed_rad_s2, zero], [g.torque_pressure_pa_s, zero]),
+        }
+    }
+
+    /// Finds the phase and the signs of the speed errors. Where a phase begins, the estimated speeds
+    /// begin at the measured ones.
+    #[inline]
+    fn observe(&self, state: &mut SlidingState<T>, dt: T, input: &Input<T>, estimated: Option<(Phase, [T; 2])>) {
+        let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
+        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
+        let measured = [turbine, slip];
+        state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| {
+            let estimated = match estimated {
+                Some((phase, speeds)) if phase == acting && speeds.iter().all(|speed| speed.is_finite()) => speeds,
+                _ => measured,
+            };
+            // The friction is taken at the estimated slip, as in Eq. (2.55); in the torque phase the slip
+            // is measured.
+            let slip = if acting == Phase::InertiaPhase { estimated[1] } else { slip };
+            let sign = |i: usize| match measured[i] - estimated[i] {
+                error if error > T::zero() => T::one(),
+                error if error < T::zero() => -T::one(),
+                _ => T::zero(),
+            };
+            Sample {
+                phase: acting,
+                estimated,
+                signs: [sign(0), sign(1)],
+                model: self.model.speed_model(acting, engine, turbine, slip),
+            }
+        });
+        state.clutch_torque_n_m = self.model.clutch_torque(acting, state.pressure_pa, engine, turbine, slip);
+    }
+
+    fn report(&self, state: &SlidingState<T>, health: Health) -> Estimate<T> {
+        Estimate {
+            pressure_pa: state.pressure_pa,
+            clutch_torque_n_m: state.clutch_torque_n_m,
+            shaft_torque_n_m: None,
+            phase: state.tracker.supervisor.phase,
+            health,
+        }
+    }
+}

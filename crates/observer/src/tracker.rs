@@ -1,0 +1,152 @@
+//! What every observer does alike with a sample: checks, valve, phase.
+
+use drivetrain::{LinearValve, Real, ReducedShift, Valve};
+
+use crate::{Health, Input, InputLimits, Phase, Supervisor, SupervisorState};
+
+/// How the frozen dynamics are carried over a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Discretisation {
+    /// By the matrix exponential: exact for coefficients that stand still over the sample.
+    Exact,
+    /// By forward Euler, as the chapter did.
+    Euler,
+}
+
+/// Checks input, follows the valve model and the phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracker<T> {
+    /// The oncoming clutch's valve.
+    pub valve: Valve<T>,
+    /// Kinematics of the shift.
+    pub shift: ReducedShift<T>,
+    /// The phase supervisor.
+    pub supervisor: Supervisor<T>,
+    /// What counts as a measurement.
+    pub limits: InputLimits<T>,
+    /// How the valve and the pressure are carried over a sample.
+    pub discretisation: Discretisation,
+}
+
+/// Memory of a [`Tracker`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackerState<T> {
+    /// Pressure by the valve model alone, Pa.
+    pub valve_pressure_pa: T,
+    /// The phase.
+    pub supervisor: SupervisorState<T>,
+    command: T,
+    started: bool,
+}
+
+/// The time between two samples, with the valve under the command that was held over it:
+/// `z+ = phi z + psi b2`, and `psi z + gam2 b2` is the integral of `z`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval<T> {
+    /// Its length, s.
+    pub dt_s: T,
+    /// The valve.
+    pub valve: LinearValve<T>,
+    /// `e^(A22 T)`.
+    pub phi: T,
+    /// Integral of `e^(A22 s)`, s.
+    pub psi: T,
+    /// Integral of `psi`, s^2.
+    pub gam2: T,
+    /// What could be used of the sample at its end.
+    pub health: Health,
+}
+
+impl<T: Real> Interval<T> {
+    /// Whether the speeds at its end can be used.
+    #[inline]
+    pub fn speeds_valid(&self) -> bool {
+        self.health != Health::SpeedsRejected
+    }
+
+    /// Pressure at its end by the valve model, Pa, Eq. (2.17c).
+    #[inline]
+    pub fn pressure(&self, pressure_pa: T) -> T {
+        self.phi * pressure_pa + self.psi * self.valve.b2_pa_s
+    }
+
+    /// Integral of that pressure over it, Pa s.
+    #[inline]
+    pub fn pressure_integral(&self, pressure_pa: T) -> T {
+        self.psi * pressure_pa + self.gam2 * self.valve.b2_pa_s
+    }
+}
+
+impl<T: Real> TrackerState<T> {
+    /// An empty cylinder before the shift.
+    pub fn new() -> Self {
+        let zero = T::zero();
+        Self { valve_pressure_pa: zero, supervisor: SupervisorState::new(), command: zero, started: false }
+    }
+}
+
+impl<T: Real> Default for TrackerState<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Tracker<T> {
+    /// Takes a sample: the interval that it ends, or `None` if its time step cannot be used.
+    #[inline]
+    pub fn begin(&self, state: &mut TrackerState<T>, input: &Input<T>) -> Option<Interval<T>> {
+        let dt_s = if state.started { input.dt_s } else { T::zero() };
+        if !(dt_s >= T::zero() && dt_s.is_finite()) {
+            return None;
+        }
+        state.started = true;
+        let (speeds_valid, command_valid) = (self.limits.speeds_valid(input), self.limits.command_valid(input));
+        let health = match (speeds_valid, command_valid) {
+            (false, _) => Health::SpeedsRejected,
+            (true, false) => Health::CommandRejected,
+            (true, true) => Health::Good,
+        };
+        let interval = self.interval(state.command, dt_s, health);
+        state.valve_pressure_pa = interval.pressure(state.valve_pressure_pa);
+        if command_valid {
+            state.command = input.command;
+        }
+        Some(interval)
+    }
+
+    #[inline]
+    fn interval(&self, command: T, dt_s: T, health: Health) -> Interval<T> {
+        let valve = self.valve.linear(command);
+        let a = valve.a22_per_s;
+        let (phi, psi, gam2) = match self.discretisation {
+            Discretisation::Exact => {
+                let phi = (a * dt_s).exp();
+                let psi = (phi - T::one()) / a;
+                (phi, psi, (psi - dt_s) / a)
+            }
+            Discretisation::Euler => (T::one() + a * dt_s, dt_s, T::zero()),
+        };
+        Interval { dt_s, valve, phi, psi, gam2, health }
+    }
+
+    /// The phase at a sample whose speeds can be used, and the phase whose equations hold there.
+    #[inline]
+    pub fn phase(&self, state: &mut TrackerState<T>, dt_s: T, input: &Input<T>) -> (Phase, Phase) {
+        let (turbine, slip) = (input.turbine_rad_s, input.slip_rad_s);
+        let output = self.shift.output_speed(turbine, slip);
+        let offgoing_slip = self.shift.offgoing_slip(turbine, output);
+        let phase = self.supervisor.step(&mut state.supervisor, dt_s, state.valve_pressure_pa, offgoing_slip, slip);
+        (phase, self.supervisor.acting_phase(phase, slip))
+    }
+
+    /// The same tracker in another precision.
+    pub fn cast<U: Real>(&self) -> Tracker<U> {
+        Tracker {
+            valve: self.valve.cast(),
+            shift: self.shift.cast(),
+            supervisor: self.supervisor.cast(),
+            limits: self.limits.cast(),
+            discretisation: self.discretisation,
+        }
+    }
+}

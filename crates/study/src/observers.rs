@@ -1,0 +1,71 @@
+//! Any of the observers, built from a vehicle and an entry of an experiment file.
+
+use config::{GivenGains, ObserverEntry, ObserverKind, Vehicle};
+use design::compliant::physical_gains;
+use design::{
+    DesignError, compliant_observer, design_compliant, design_rigid, design_sliding, rigid_observer, sliding_observer,
+};
+use observer::{CompliantObserver, Discretisation, Estimate, RigidGains, RigidObserver, SlidingObserver};
+
+use crate::{RunColumns, run};
+
+/// One of the observers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AnyObserver {
+    /// Rigid reduced-order observer; with zero gains, the open loop.
+    Rigid(RigidObserver<f64>),
+    /// Reduced-order observer with elastic drive shafts.
+    Compliant(CompliantObserver<f64>),
+    /// Full-order sliding-mode observer.
+    Sliding(SlidingObserver<f64>),
+}
+
+impl AnyObserver {
+    /// The observer of this kind with designed gains and exact discretisation.
+    ///
+    /// # Errors
+    /// There are no gains for what the vehicle file requires.
+    pub fn designed(vehicle: &Vehicle, kind: ObserverKind) -> Result<Self, DesignError> {
+        Ok(match kind {
+            ObserverKind::OpenLoop => Self::Rigid(rigid_observer(vehicle, RigidGains::open_loop())),
+            ObserverKind::Rigid => Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains())),
+            ObserverKind::Compliant => Self::Compliant(compliant_observer(vehicle, design_compliant(vehicle)?.gains())),
+            ObserverKind::Sliding => Self::Sliding(sliding_observer(vehicle, design_sliding(vehicle))),
+        })
+    }
+
+    /// The observer that an entry of an experiment file describes.
+    ///
+    /// # Errors
+    /// Gains are to be designed, and there are none for what the vehicle file requires.
+    pub fn of(vehicle: &Vehicle, entry: &ObserverEntry) -> Result<Self, DesignError> {
+        let observer = match entry.gains {
+            None => Self::designed(vehicle, entry.kind)?,
+            Some(GivenGains::Rigid(gains)) => Self::Rigid(rigid_observer(vehicle, gains)),
+            Some(GivenGains::Sliding(gains)) => Self::Sliding(sliding_observer(vehicle, gains)),
+            Some(GivenGains::CompliantNormalised(torque, inertia)) => {
+                Self::Compliant(compliant_observer(vehicle, physical_gains(&torque, &inertia)))
+            }
+        };
+        Ok(observer.with_discretisation(entry.discretisation))
+    }
+
+    fn with_discretisation(mut self, discretisation: Discretisation) -> Self {
+        let tracker = match &mut self {
+            Self::Rigid(observer) => &mut observer.tracker,
+            Self::Compliant(observer) => &mut observer.tracker,
+            Self::Sliding(observer) => &mut observer.tracker,
+        };
+        tracker.discretisation = discretisation;
+        self
+    }
+
+    /// Runs it over every sample; one estimate for each.
+    pub fn run(&self, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
+        match self {
+            Self::Rigid(observer) => run(columns, observer),
+            Self::Compliant(observer) => run(columns, observer),
+            Self::Sliding(observer) => run(columns, observer),
+        }
+    }
+}
