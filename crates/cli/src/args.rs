@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 const EXAMPLES: &str = "\
 Examples:
   wetclutch demo                                     the whole job on the built-in car
+  wetclutch reproduce                                the source chapter's experiments, row by row
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
   wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
@@ -60,12 +61,22 @@ pub(crate) enum Command {
     /// Runs an observer over a file of measured signals. The file needs the columns
     ///
     ///   time_s, engine_speed_rad_s, turbine_speed_rad_s, oncoming_current_a,
-    ///   and oncoming_slip_rad_s or output_speed_rad_s
+    ///   oncoming_slip_rad_s or output_speed_rad_s,
+    ///   and for the compliant observer wheel_speed_rad_s
     ///
     /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell is a lost sample. Where
     /// the file also holds the true pressure (a simulated trace), the error is reported.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
+    /// Run the source chapter's experiments and set its statements beside what was measured
+    ///
+    /// Runs experiments E1 to E4 of the source chapter on the built-in car, and writes:
+    ///
+    ///   reproduction.html   statements, figures, scores; opens from disk
+    ///   reproduction.md     statements and scores as Markdown
+    ///   e1.svg ... e4.svg, map_*.svg    the figures
+    #[command(verbatim_doc_comment)]
+    Reproduce(Reproduce),
     /// Check a vehicle or experiment file
     ///
     /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
@@ -132,7 +143,7 @@ pub(crate) struct Estimate {
     #[arg(long)]
     pub(crate) vehicle: PathBuf,
     /// Observer
-    #[arg(long, value_enum, default_value_t = ObserverChoice::Iss)]
+    #[arg(long, value_enum, default_value_t = ObserverChoice::Rigid)]
     pub(crate) observer: ObserverChoice,
     /// File for the estimate; standard output if left out
     #[arg(short, long, value_name = "OUT.csv")]
@@ -141,10 +152,25 @@ pub(crate) struct Estimate {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
-    /// The rigid observer with certified gains
-    Iss,
+    /// Reduced-order, rigid driveline, certified gains
+    #[value(alias = "iss")]
+    Rigid,
+    /// Reduced-order with elastic drive shafts, certified gains; needs wheel_speed_rad_s, gives shaft torque too
+    Compliant,
+    /// Full-order sliding mode, gains from the sliding condition
+    Sliding,
     /// The valve model alone
     OpenLoop,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Reproduce {
+    /// Folder for page and figures
+    #[arg(short, long, value_name = "DIR", default_value = "wetclutch-reproduction")]
+    pub(crate) output: PathBuf,
+    /// Print the rows as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

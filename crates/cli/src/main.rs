@@ -21,6 +21,7 @@ fn main() -> ExitCode {
         Command::Simulate(options) => commands::simulate(&options),
         Command::Design(options) => commands::design(&options),
         Command::Estimate(options) => commands::estimate(&options),
+        Command::Reproduce(options) => commands::reproduce(&options),
         Command::Check(options) => commands::check(&options),
     };
     match result {

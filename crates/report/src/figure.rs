@@ -1,4 +1,4 @@
-//! Stacked panels over one time axis, drawn as SVG.
+//! Stacked panels over one axis, drawn as SVG.
 //!
 //! Series are labelled directly at their right end, in their own colour, and moved apart where they
 //! would overlap; phases of the shift are shaded through all panels and named above the first.
@@ -26,6 +26,8 @@ pub mod colour {
     pub const PURPLE: &str = "#AA4499";
     /// A fifth quantity.
     pub const ORANGE: &str = "#C98A00";
+    /// A sixth quantity.
+    pub const SKY: &str = "#3F9FD0";
 }
 
 const WIDTH: f64 = 860.0;
@@ -50,7 +52,7 @@ pub struct Series {
     pub colour: &'static str,
     /// Whether it is drawn dashed.
     pub dashed: bool,
-    /// Points (time, value); a NaN value is a gap.
+    /// Points, by a rising first coordinate; a NaN value is a gap.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -59,7 +61,7 @@ pub struct Series {
 pub struct Band {
     /// Its name, written inside it.
     pub label: String,
-    /// Points (time, half width); a NaN half width is a gap.
+    /// Points and half widths; a NaN half width is a gap.
     pub half_width: Vec<(f64, f64)>,
 }
 
@@ -78,24 +80,26 @@ pub struct Panel {
     pub y_range: Option<(f64, f64)>,
 }
 
-/// A named span of time.
+/// A named span of the common axis.
 #[derive(Debug, Clone)]
 pub struct Span {
     /// Its name.
     pub label: String,
-    /// Start, s.
-    pub start_s: f64,
-    /// End, s.
-    pub end_s: f64,
+    /// Start.
+    pub start: f64,
+    /// End.
+    pub end: f64,
     /// Its colour.
     pub colour: &'static str,
 }
 
-/// Panels over one time axis.
+/// Panels over one axis.
 #[derive(Debug, Clone)]
 pub struct Figure {
-    /// First and last time shown, s.
-    pub time_range_s: (f64, f64),
+    /// Quantity and unit of the common axis.
+    pub x_label: &'static str,
+    /// First and last value of the common axis.
+    pub x_range: (f64, f64),
     /// Shaded spans.
     pub spans: Vec<Span>,
     /// The panels from top to bottom.
@@ -117,7 +121,7 @@ impl Figure {
         }
         for span in &self.spans {
             scene.add(text(
-                self.x((span.start_s + span.end_s) / 2.0),
+                self.x((span.start + span.end) / 2.0),
                 NAMES - 4.0,
                 &span.label,
                 "#444444",
@@ -129,13 +133,13 @@ impl Figure {
         svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {WIDTH} {height}\" "), 1)
     }
 
-    fn x(&self, time_s: f64) -> f64 {
-        let (from, to) = self.time_range_s;
-        LEFT + (time_s - from) / (to - from) * (WIDTH - LEFT - RIGHT)
+    fn x(&self, value: f64) -> f64 {
+        let (from, to) = self.x_range;
+        LEFT + (value - from) / (to - from) * (WIDTH - LEFT - RIGHT)
     }
 
     fn draw(&self, scene: &mut Scene, panel: &Panel, y: f64, last: bool) {
-        let (from, to) = self.time_range_s;
+        let (from, to) = self.x_range;
         let visible = |points: &[(f64, f64)]| thinned(points, from, to);
         let (low, high, step) = panel.y_axis(from, to);
         let bottom = if last { AXIS } else { BOTTOM };
@@ -169,7 +173,7 @@ impl Figure {
             }
         }
 
-        let time_step = nice_step((to - from) / 7.0);
+        let x_step = nice_step((to - from) / 7.0);
         let mut layout = Layout::auto_from_plots(&plots)
             .with_width(WIDTH)
             .with_height(whole)
@@ -180,8 +184,8 @@ impl Figure {
             .with_y_axis_min(low)
             .with_y_axis_max(high)
             .with_y_tick_step(step)
-            .with_x_tick_step(time_step)
-            .with_x_tick_format(TickFormat::Fixed(decimals(time_step)))
+            .with_x_tick_step(x_step)
+            .with_x_tick_format(TickFormat::Fixed(decimals(x_step)))
             .with_y_tick_format(TickFormat::Fixed(decimals(step)))
             .with_tick_size(TICK_SIZE)
             .with_label_size(LABEL_SIZE)
@@ -190,7 +194,7 @@ impl Figure {
         layout.suppress_x_ticks = !last;
         layout.show_legend = false;
         for span in &self.spans {
-            let (start, end) = (span.start_s.max(from), span.end_s.min(to));
+            let (start, end) = (span.start.max(from), span.end.min(to));
             layout = layout
                 .with_shaded_region(ShadedRegion::vertical(start, end).with_color(span.colour).with_opacity(0.35));
         }
@@ -216,7 +220,7 @@ impl Figure {
         });
         if last {
             let middle = LEFT + (WIDTH - LEFT - RIGHT) / 2.0;
-            scene.add(text(middle, y + TOP + panel.height + 36.0, "time (s)", "#000000", TextAnchor::Middle));
+            scene.add(text(middle, y + TOP + panel.height + 36.0, self.x_label, "#000000", TextAnchor::Middle));
         }
         let inside = (y + TOP + 4.0, y + TOP + panel.height - 2.0);
         for (label_y, series) in spread(labels, f64::from(LABEL_SIZE) + 2.0, inside) {
@@ -232,6 +236,12 @@ impl Figure {
 }
 
 impl Panel {
+    /// The panel with this range of values.
+    #[must_use]
+    pub fn within(self, low: f64, high: f64) -> Self {
+        Self { y_range: Some((low, high)), ..self }
+    }
+
     /// Lowest and highest value of the axis and the distance of its ticks.
     fn y_axis(&self, from: f64, to: f64) -> (f64, f64, f64) {
         let step_of = |low: f64, high: f64| nice_step((high - low) / (self.height / 34.0));
@@ -263,7 +273,7 @@ fn decimals(step: f64) -> usize {
     digits
 }
 
-/// The points within a range of time, no closer than half a pixel.
+/// The points within a range, no closer than half a pixel.
 fn thinned(points: &[(f64, f64)], from: f64, to: f64) -> Vec<(f64, f64)> {
     let closest = 0.5 * (to - from) / (WIDTH - LEFT - RIGHT);
     let mut kept: Vec<(f64, f64)> = Vec::new();

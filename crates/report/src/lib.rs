@@ -1,7 +1,11 @@
-//! Figures and the HTML report of a comparison.
+//! Figures and the HTML reports.
 
 pub mod figure;
+pub mod map_figures;
 pub mod page;
+pub mod reproduction;
 pub mod shift_figure;
+pub mod tables;
 
 pub use page::{Page, PageError};
+pub use reproduction::Reproduction;

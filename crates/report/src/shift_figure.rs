@@ -1,6 +1,7 @@
 //! The figures of a shift and of the drive around it.
 
-use study::Comparison;
+use config::ObserverKind;
+use study::{Comparison, ObserverRun};
 use trace::{signal, units};
 
 use crate::figure::{Band, Figure, Panel, Series, Span, colour};
@@ -9,134 +10,105 @@ use crate::figure::{Band, Figure, Panel, Series, Span, colour};
 const TORQUE_PHASE: &str = "#fdf0d5";
 /// Colour of the inertia phase.
 const INERTIA_PHASE: &str = "#e3eef7";
+/// Colours of the observers in their order; the open loop has its own.
+const OBSERVERS: [&str; 5] = [colour::BLUE, colour::GREEN, colour::ORANGE, colour::PURPLE, colour::SKY];
+/// How much is shown before the load transfer and after lock-up, s.
+const MARGIN_S: f64 = 0.35;
 
-/// Speeds, pressures, torques, shaft torque, currents and errors through the shift.
+/// Speeds, pressures, errors, torques and currents through the shift.
 pub fn shift_figure(comparison: &Comparison) -> Figure {
-    let spans = spans(comparison);
-    let from = spans.first().map_or(0.0, |span| span.start_s - 0.35);
-    let to = spans.last().map_or(1.0, |span| span.end_s + 0.35);
     let t = Curves { comparison };
-    Figure {
-        time_range_s: (from.max(0.0), to),
-        panels: vec![
-            Panel {
-                y_label: "speed (rpm)".into(),
-                height: 130.0,
-                series: vec![
-                    t.signal("engine", colour::GREEN, signal::ENGINE_SPEED, units::rpm),
-                    t.signal("turbine", colour::BLACK, signal::TURBINE_SPEED, units::rpm),
-                    t.signal("output", colour::PURPLE, signal::OUTPUT_SPEED, units::rpm),
-                ],
-                band: None,
-                y_range: None,
-            },
-            Panel {
-                y_label: "pressure of B (MPa)".into(),
-                height: 190.0,
-                series: [
-                    vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)],
-                    t.pressure_estimates(),
-                ]
-                .concat(),
-                band: None,
-                y_range: Some((0.0, 0.5)),
-            },
-            Panel {
-                y_label: "error (MPa)".into(),
-                height: 150.0,
-                series: t.pressure_errors(),
-                band: Some(Band { label: "certified band of ISS".into(), half_width: t.bound() }),
-                y_range: Some((-0.14, 0.14)),
-            },
-            Panel {
-                y_label: "torque (N m)".into(),
-                height: 150.0,
-                series: vec![
-                    t.signal("clutch A", colour::PURPLE, signal::OFFGOING_TORQUE, |x| x),
-                    t.signal("clutch B, true", colour::BLACK, signal::ONCOMING_TORQUE, |x| x),
-                    t.torque_estimate("clutch B, ISS"),
-                    t.signal("turbine", colour::GREEN, signal::TURBINE_TORQUE, |x| x),
-                ],
-                band: None,
-                y_range: None,
-            },
-            Panel {
-                y_label: "shaft (N m)".into(),
-                height: 90.0,
-                series: vec![t.signal("drive shafts", colour::BLACK, signal::SHAFT_TORQUE, |x| x)],
-                band: None,
-                y_range: None,
-            },
-            Panel {
-                y_label: "current (A), throttle".into(),
-                height: 120.0,
-                series: vec![
-                    t.signal("current A", colour::PURPLE, signal::OFFGOING_CURRENT, |x| x),
-                    t.signal("current B", colour::BLACK, signal::ONCOMING_CURRENT, |x| x),
-                    t.signal("throttle (0–1)", colour::ORANGE, signal::THROTTLE, |x| x),
-                ],
-                band: None,
-                y_range: Some((0.0, 1.0)),
-            },
-        ],
-        spans,
+    let bound = t.bound();
+    let panels = vec![
+        t.speeds(130.0),
+        panel(
+            "pressure of B (MPa)",
+            190.0,
+            [vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)], t.pressures()].concat(),
+        )
+        .within(0.0, 0.5),
+        Panel {
+            band: (!bound.is_empty())
+                .then(|| Band { label: "certified band of the rigid observer".into(), half_width: bound }),
+            ..panel("error (MPa)", 150.0, t.pressure_errors()).within(-0.14, 0.14)
+        },
+        panel(
+            "torque (N m)",
+            150.0,
+            vec![
+                t.signal("clutch A", colour::PURPLE, signal::OFFGOING_TORQUE, |x| x),
+                t.signal("clutch B, true", colour::BLACK, signal::ONCOMING_TORQUE, |x| x),
+                t.clutch_torque(),
+                t.signal("turbine", colour::GREEN, signal::TURBINE_TORQUE, |x| x),
+            ],
+        ),
+        panel(
+            "shaft torque (N m)",
+            120.0,
+            [vec![t.signal("true", colour::BLACK, signal::SHAFT_TORQUE, |x| x)], t.shaft_torques()].concat(),
+        ),
+        panel(
+            "current (A), throttle",
+            120.0,
+            vec![
+                t.signal("current A", colour::PURPLE, signal::OFFGOING_CURRENT, |x| x),
+                t.signal("current B", colour::BLACK, signal::ONCOMING_CURRENT, |x| x),
+                t.signal("throttle (0–1)", colour::ORANGE, signal::THROTTLE, |x| x),
+            ],
+        )
+        .within(0.0, 1.0),
+    ];
+    t.around_shift(panels)
+}
+
+/// Pressures and errors through the shift: what an experiment with several observers is about.
+pub fn observers_figure(comparison: &Comparison) -> Figure {
+    let t = Curves { comparison };
+    let mut panels = vec![
+        panel(
+            "pressure of B (MPa)",
+            190.0,
+            [vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)], t.pressures()].concat(),
+        )
+        .within(0.0, 0.5),
+        panel("error (MPa)", 190.0, t.pressure_errors()).within(-0.14, 0.14),
+    ];
+    let shaft = t.shaft_torques();
+    if !shaft.is_empty() {
+        let truth = t.signal("true", colour::BLACK, signal::SHAFT_TORQUE, |x| x);
+        panels.push(panel("shaft torque (N m)", 150.0, [vec![truth], shaft].concat()));
     }
+    t.around_shift(panels)
 }
 
 /// Speeds and acceleration from standstill to the end.
 pub fn drive_figure(comparison: &Comparison) -> Figure {
     let t = Curves { comparison };
     let end = comparison.trace.time_s.last().copied().unwrap_or(1.0);
+    let unnamed = |span: Span| Span { label: String::new(), ..span };
     Figure {
-        time_range_s: (0.0, end),
-        spans: spans(comparison).into_iter().map(|span| Span { label: String::new(), ..span }).collect(),
+        x_label: "time (s)",
+        x_range: (0.0, end),
+        spans: t.spans().into_iter().map(unnamed).collect(),
         panels: vec![
-            Panel {
-                y_label: "speed (rpm)".into(),
-                height: 150.0,
-                series: vec![
-                    t.signal("engine", colour::GREEN, signal::ENGINE_SPEED, units::rpm),
-                    t.signal("turbine", colour::BLACK, signal::TURBINE_SPEED, units::rpm),
-                    t.signal("output", colour::PURPLE, signal::OUTPUT_SPEED, units::rpm),
-                ],
-                band: None,
-                y_range: None,
-            },
-            Panel {
-                y_label: "vehicle (km/h)".into(),
-                height: 90.0,
-                series: vec![t.signal("vehicle", colour::BLACK, signal::VEHICLE_SPEED, units::km_h)],
-                band: None,
-                y_range: None,
-            },
-            Panel {
-                y_label: "accel. (m/s²)".into(),
-                height: 90.0,
-                series: vec![t.signal("vehicle", colour::BLACK, signal::VEHICLE_ACCELERATION, |x| x)],
-                band: None,
-                y_range: None,
-            },
+            t.speeds(150.0),
+            panel("vehicle (km/h)", 90.0, vec![t.signal("vehicle", colour::BLACK, signal::VEHICLE_SPEED, units::km_h)]),
+            panel("accel. (m/s²)", 90.0, vec![t.signal("vehicle", colour::BLACK, signal::VEHICLE_ACCELERATION, |x| x)]),
         ],
     }
 }
 
-/// Torque and inertia phase as shaded spans.
-fn spans(comparison: &Comparison) -> Vec<Span> {
-    let Some(quality) = &comparison.quality else { return Vec::new() };
-    vec![
-        Span {
-            label: "torque phase".into(),
-            start_s: quality.torque_phase_start_s,
-            end_s: quality.inertia_phase_start_s,
-            colour: TORQUE_PHASE,
-        },
-        Span {
-            label: "inertia phase".into(),
-            start_s: quality.inertia_phase_start_s,
-            end_s: quality.lock_up_s,
-            colour: INERTIA_PHASE,
-        },
-    ]
+fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
+    Panel { y_label: y_label.to_owned(), height, series, band: None, y_range: None }
+}
+
+/// Colour of an observer: the open loop's own, or that of its place among the others.
+fn observer_colour(runs: &[ObserverRun], at: usize) -> &'static str {
+    if runs[at].entry.kind == ObserverKind::OpenLoop {
+        return colour::VERMILION;
+    }
+    let before = runs[..at].iter().filter(|run| run.entry.kind != ObserverKind::OpenLoop).count();
+    OBSERVERS[before % OBSERVERS.len()]
 }
 
 struct Curves<'a> {
@@ -144,44 +116,90 @@ struct Curves<'a> {
 }
 
 impl Curves<'_> {
-    fn points(&self, value: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
-        self.comparison.trace.time_s.iter().enumerate().map(|(i, &t)| (t, value(i))).collect()
+    /// Panels around the shift, its phases shaded.
+    fn around_shift(&self, panels: Vec<Panel>) -> Figure {
+        let spans = self.spans();
+        let whole = (0.0, self.comparison.trace.time_s.last().copied().unwrap_or(1.0));
+        let x_range = match (spans.first(), spans.last()) {
+            (Some(first), Some(last)) => ((first.start - MARGIN_S).max(whole.0), (last.end + MARGIN_S).min(whole.1)),
+            _ => whole,
+        };
+        Figure { x_label: "time (s)", x_range, spans, panels }
+    }
+
+    /// Torque and inertia phase as shaded spans.
+    fn spans(&self) -> Vec<Span> {
+        let Some(quality) = &self.comparison.quality else { return Vec::new() };
+        let span = |label: &str, start, end, colour| Span { label: label.to_owned(), start, end, colour };
+        let middle = quality.inertia_phase_start_s;
+        vec![
+            span("torque phase", quality.torque_phase_start_s, middle, TORQUE_PHASE),
+            span("inertia phase", middle, quality.lock_up_s, INERTIA_PHASE),
+        ]
+    }
+
+    fn speeds(&self, height: f64) -> Panel {
+        panel(
+            "speed (rpm)",
+            height,
+            vec![
+                self.signal("engine", colour::GREEN, signal::ENGINE_SPEED, units::rpm),
+                self.signal("turbine", colour::BLACK, signal::TURBINE_SPEED, units::rpm),
+                self.signal("output", colour::PURPLE, signal::OUTPUT_SPEED, units::rpm),
+            ],
+        )
     }
 
     /// A column of the trace, in the unit that people read.
     fn signal(&self, label: &str, colour: &'static str, name: &str, unit: impl Fn(f64) -> f64) -> Series {
         let values = self.comparison.trace.get(name).unwrap_or_default();
-        let points = self.points(|i| values.get(i).map_or(f64::NAN, |&v| unit(v)));
+        let points = self.comparison.trace.time_s.iter().zip(values).map(|(&t, &v)| (t, unit(v))).collect();
         Series { label: label.to_owned(), colour, dashed: false, points }
     }
 
-    fn estimate_series(&self, value: impl Fn(usize, usize) -> f64) -> Vec<Series> {
-        (self.comparison.runs.iter().zip([colour::BLUE, colour::VERMILION]).enumerate())
-            .map(|(run, (observer, colour))| Series {
-                label: observer.name.to_owned(),
-                colour,
-                dashed: observer.name == study::comparison::OPEN_LOOP,
-                points: self.points(|i| value(run, i)),
+    /// A curve of each observer; those without a finite value are left out.
+    fn of_observers(&self, value: impl Fn(&ObserverRun, usize) -> f64) -> Vec<Series> {
+        let runs = &self.comparison.runs;
+        (runs.iter().enumerate())
+            .map(|(at, run)| Series {
+                label: run.entry.name.clone(),
+                colour: observer_colour(runs, at),
+                dashed: run.entry.kind == ObserverKind::OpenLoop,
+                points: run.time_s.iter().enumerate().map(|(i, &t)| (t, value(run, i))).collect(),
             })
+            .filter(|series| series.points.iter().any(|(_, value)| value.is_finite()))
             .collect()
     }
 
-    fn pressure_estimates(&self) -> Vec<Series> {
-        self.estimate_series(|run, i| units::mpa(self.comparison.runs[run].estimates[i].pressure_pa))
+    fn pressures(&self) -> Vec<Series> {
+        self.of_observers(|run, i| units::mpa(run.estimates[i].pressure_pa))
     }
 
     fn pressure_errors(&self) -> Vec<Series> {
-        let truth = self.comparison.trace.get(signal::ONCOMING_PRESSURE).unwrap_or_default();
-        self.estimate_series(|run, i| units::mpa(truth[i] - self.comparison.runs[run].estimates[i].pressure_pa))
+        self.of_observers(|run, i| units::mpa(run.truth_pa[i] - run.estimates[i].pressure_pa))
     }
 
-    fn torque_estimate(&self, label: &str) -> Series {
-        let estimates = &self.comparison.runs[0].estimates;
-        let points = self.points(|i| estimates[i].clutch_torque_n_m);
-        Series { label: label.to_owned(), colour: colour::BLUE, dashed: false, points }
+    fn shaft_torques(&self) -> Vec<Series> {
+        self.of_observers(|run, i| run.estimates[i].shaft_torque_n_m.unwrap_or(f64::NAN))
+    }
+
+    /// Clutch torque as the first observer estimates it.
+    fn clutch_torque(&self) -> Series {
+        let points = self.comparison.runs.first().map(|run| {
+            run.time_s.iter().zip(&run.estimates).map(|(&t, estimate)| (t, estimate.clutch_torque_n_m)).collect()
+        });
+        let name = self.comparison.runs.first().map_or("", |run| &run.entry.name);
+        Series {
+            label: format!("clutch B, {name}"),
+            colour: colour::BLUE,
+            dashed: false,
+            points: points.unwrap_or_default(),
+        }
     }
 
     fn bound(&self) -> Vec<(f64, f64)> {
-        self.points(|i| self.comparison.bound_pa[i].map_or(f64::NAN, units::mpa))
+        let Some(run) = self.comparison.runs.first() else { return Vec::new() };
+        let bounds = self.comparison.bound_pa.iter().map(|bound| bound.map_or(f64::NAN, units::mpa));
+        run.time_s.iter().copied().zip(bounds).collect()
     }
 }

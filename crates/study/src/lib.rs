@@ -9,9 +9,11 @@ pub mod observers;
 pub mod run;
 pub mod sampling;
 pub mod score;
+pub mod statements;
 
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use drive::{simulate_drive, true_phases};
 pub use observers::AnyObserver;
 pub use run::{RunColumns, estimates_trace, run};
 pub use score::{PhaseScore, ShiftQuality, score};
+pub use statements::{Chapter, Statement, Verdict, reproduce};

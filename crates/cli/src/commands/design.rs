@@ -4,7 +4,7 @@ use config::Vehicle;
 use design::rigid::design_phase;
 use design::{Certificate, IssRequirement, requirement};
 use observer::Phase;
-use report::page::phase_name;
+use report::tables::phase_name;
 use trace::units;
 
 use crate::args::{Design, PhaseChoice};

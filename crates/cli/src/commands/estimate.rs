@@ -2,13 +2,11 @@
 
 use std::io::Write;
 
-use config::Vehicle;
-use design::{design_rigid, rigid_observer};
-use observer::{Estimate as Sample, Health, RigidGains};
-use report::page::phase_name;
-use study::score::pressure_scores;
-use study::{RunColumns, estimates_trace, run};
-use trace::{Trace, read_csv, units, write_csv};
+use config::{ObserverKind, Vehicle};
+use observer::{Estimate as Sample, Health};
+use report::tables::phase_name;
+use study::{AnyObserver, RunColumns, estimates_trace, score, true_phases};
+use trace::{Trace, read_csv, signal, units, write_csv};
 
 use crate::args::{Estimate, ObserverChoice};
 use crate::failure::Failure;
@@ -18,11 +16,16 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let vehicle = Vehicle::read(&options.vehicle)?;
     let log = read_csv(&options.log)?;
     let columns = RunColumns::of(&log, &vehicle)?;
-    let gains = match options.observer {
-        ObserverChoice::Iss => design_rigid(&vehicle)?.gains(),
-        ObserverChoice::OpenLoop => RigidGains::open_loop(),
+    let kind = match options.observer {
+        ObserverChoice::Rigid => ObserverKind::Rigid,
+        ObserverChoice::Compliant => ObserverKind::Compliant,
+        ObserverChoice::Sliding => ObserverKind::Sliding,
+        ObserverChoice::OpenLoop => ObserverKind::OpenLoop,
     };
-    let estimates = run(&columns, &rigid_observer(&vehicle, gains));
+    if kind == ObserverKind::Compliant {
+        log.require(signal::WHEEL_SPEED)?;
+    }
+    let estimates = AnyObserver::designed(&vehicle, kind)?.run(&columns);
     let result = estimates_trace(&log.time_s, &estimates);
     match &options.output {
         Some(path) => write_csv(path, &result)?,
@@ -43,7 +46,9 @@ fn report_on(log: &Trace, estimates: &[Sample<f64>]) {
             output::note(&format!("{} of {} samples have {meaning}", count(health), estimates.len()));
         }
     }
-    for score in pressure_scores(log, estimates).unwrap_or_default().iter().filter(|score| score.samples > 0) {
+    let (Some(phases), Some(truth)) = (true_phases(log), log.get(signal::ONCOMING_PRESSURE)) else { return };
+    let scores = score(&log.time_s, &phases, truth, 0.0, |i| estimates[i].pressure_pa);
+    for score in scores.iter().filter(|score| score.samples > 0) {
         output::note(&format!(
             "error against the true pressure, {}: peak {:.4} MPa, RMS {:.4} MPa",
             phase_name(score.phase),

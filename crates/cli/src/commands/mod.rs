@@ -4,10 +4,21 @@ mod check;
 mod demo;
 mod design;
 mod estimate;
+mod reproduce;
 mod simulate;
 
 pub(crate) use check::check;
 pub(crate) use demo::demo;
 pub(crate) use design::design;
 pub(crate) use estimate::estimate;
+pub(crate) use reproduce::reproduce;
 pub(crate) use simulate::simulate;
+
+use std::path::Path;
+
+use crate::failure::Failure;
+
+/// Writes a text file, whole or not at all.
+fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
+}

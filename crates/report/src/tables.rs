@@ -1,0 +1,124 @@
+//! Scores and certificates as rows of a table, the same for pages and terminals.
+
+use design::{Certificate, CompliantCertificate};
+use minijinja::{Value, context};
+use observer::Phase;
+use study::{Comparison, PhaseScore};
+use trace::units::mpa;
+
+/// Name of a phase for people.
+pub fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::BeforeShift => "before the shift",
+        Phase::TorquePhase => "torque phase",
+        Phase::InertiaPhase => "inertia phase",
+        Phase::AfterShift => "after lock-up",
+    }
+}
+
+/// A time in ms, or a word for one that never came.
+fn settling(score: &PhaseScore) -> String {
+    score.settling_s.map_or_else(|| "never".to_owned(), |s| format!("{:.0}", 1e3 * s))
+}
+
+/// One row for each phase and observer.
+pub(crate) fn score_rows(comparison: &Comparison) -> Vec<Value> {
+    let range_pa = comparison.experiment.shift.line_pressure_pa;
+    let phases = comparison.runs.first().map_or(0, |run| run.pressure.len());
+    let cell = |pascal: f64| {
+        context! {
+            mpa => format!("{:.4}", mpa(pascal)),
+            percent => format!("{:.1}", 100.0 * pascal / range_pa),
+        }
+    };
+    let mut rows = Vec::new();
+    for phase in 0..phases {
+        let present = comparison.runs.iter().filter(|run| run.pressure[phase].samples > 0);
+        for (n, run) in present.enumerate() {
+            let (pressure, torque) = (&run.pressure[phase], &run.torque[phase]);
+            rows.push(context! {
+                first => n == 0,
+                phase => phase_name(pressure.phase),
+                observer => &run.entry.name,
+                peak => cell(pressure.peak),
+                rms => cell(pressure.rms),
+                mean => cell(pressure.mean),
+                settling_ms => settling(pressure),
+                chatter => format!("{:.3}", mpa(pressure.chatter)),
+                torque_peak => format!("{:.1}", torque.peak),
+                torque_rms => format!("{:.1}", torque.rms),
+                shaft_rms => run.shaft.as_ref().map_or_else(|| "–".to_owned(), |shaft| format!("{:.0}", shaft[phase].rms)),
+            });
+        }
+    }
+    rows
+}
+
+/// The certificates of the rigid observer.
+pub(crate) fn rigid_certificates(comparison: &Comparison) -> Vec<Value> {
+    let one = |phase: Phase, certificate: &Certificate| {
+        let outputs = if phase == Phase::TorquePhase { 1 } else { 2 };
+        let gain = certificate.gain_pa_s_rad[..outputs].iter();
+        context! {
+            phase => phase_name(phase),
+            gain => gain.map(|l| format!("{l:.1}")).collect::<Vec<_>>().join(", "),
+            kappa1 => format!("{:.2}", certificate.kappa1_per_s),
+            kappa2 => format!("{:.2}", certificate.kappa2_per_s),
+            settling => format!("{:.2}", 4.0 / certificate.kappa2_per_s),
+            model_error => format!("{:.1}", certificate.model_error_max_rad_s2),
+            offset => format!("{:.4}", mpa(certificate.offset_pa)),
+            offset_max => format!("{:.4}", mpa(certificate.offset_max_pa)),
+            vertices => certificate.vertices.iter().map(|v| context! {
+                label => &v.vertex.label,
+                decay => format!("{:.4}", v.decay_per_s),
+                margin => margin(v.margin_per_s),
+            }).collect::<Vec<_>>(),
+        }
+    };
+    let design = &comparison.rigid;
+    vec![one(Phase::TorquePhase, &design.torque_phase), one(Phase::InertiaPhase, &design.inertia_phase)]
+}
+
+/// The certificates of the compliant observer.
+pub(crate) fn compliant_certificates(comparison: &Comparison) -> Vec<Value> {
+    let matrix = |rows: &[Vec<f64>]| -> Vec<String> {
+        rows.iter().map(|row| row.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>().join(",  ")).collect()
+    };
+    let one = |phase: Phase, certificate: &CompliantCertificate| {
+        context! {
+            phase => phase_name(phase),
+            gain => matrix(&certificate.gain_normalised),
+            h => matrix(&certificate.h_normalised),
+            kappa1 => format!("{:.2}", certificate.kappa1_per_s),
+            kappa2 => format!("{:.2}", certificate.kappa2_per_s),
+            offset => format!("{:.4}", mpa(certificate.offset_pa)),
+            offset_shaft => format!("{:.0}", certificate.offset_n_m),
+            offset_max => format!("{:.4}", mpa(certificate.offset_max_pa)),
+            vertices => certificate.vertices.iter().map(|v| context! {
+                label => &v.label,
+                decay => format!("{:.4}", v.decay_per_s),
+                margin => margin(v.margin_per_s),
+            }).collect::<Vec<_>>(),
+        }
+    };
+    let design = &comparison.compliant;
+    vec![one(Phase::TorquePhase, &design.torque_phase), one(Phase::InertiaPhase, &design.inertia_phase)]
+}
+
+fn margin(per_s: f64) -> String {
+    if per_s < 0.01 { format!("{per_s:.1e}") } else { format!("{per_s:.4}") }
+}
+
+/// What a calibrator asks of the shift.
+pub(crate) fn quality_rows(comparison: &Comparison) -> Option<Vec<(&'static str, String)>> {
+    let q = comparison.quality.as_ref()?;
+    Some(vec![
+        ("torque phase", format!("{:.3} s", q.inertia_phase_start_s - q.torque_phase_start_s)),
+        ("inertia phase", format!("{:.3} s", q.lock_up_s - q.inertia_phase_start_s)),
+        ("flare of the turbine", format!("{:.2} rad/s", q.flare_rad_s)),
+        ("least drive-shaft torque", format!("{:.0} N m", q.least_shaft_torque_n_m)),
+        ("jerk, peak over 20 ms", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
+        ("vibration dose value above 0.4 Hz", format!("{:.2} m/s^1.75", q.vibration_dose_m_s175)),
+        ("friction work in clutch B", format!("{:.1} kJ", 1e-3 * q.friction_work_j)),
+    ])
+}
