@@ -47,6 +47,8 @@ pub enum Stage {
         from_rad_s: f64,
         /// Integral of the slip error, rad.
         error_integral_rad: f64,
+        /// Feedforward torque of the period before, N m.
+        feedforward_n_m: Option<f64>,
     },
     /// Locked; holds the time it began, s.
     Locked(f64),
@@ -120,19 +122,23 @@ impl ShiftController {
         self.stage = match self.stage {
             Stage::Before if passed(0.0, c.request_s) => Stage::Fill(time_s),
             Stage::Fill(since_s) if passed(since_s, c.boost_s + c.settle_s) => Stage::TorquePhase(time_s),
-            Stage::TorquePhase(_) if offgoing_slip.abs() > c.release_slip_rad_s => {
-                Stage::InertiaPhase { since_s: time_s, from_rad_s: oncoming_slip, error_integral_rad: 0.0 }
-            }
+            Stage::TorquePhase(_) if offgoing_slip.abs() > c.release_slip_rad_s => Stage::InertiaPhase {
+                since_s: time_s,
+                from_rad_s: oncoming_slip,
+                error_integral_rad: 0.0,
+                feedforward_n_m: None,
+            },
             Stage::InertiaPhase { .. } if oncoming_slip.abs() < c.lock_slip_rad_s => Stage::Locked(time_s),
             same => same,
         };
     }
 
-    /// Turbine torque from the converter's maps and load of a level road, N m.
+    /// Turbine torque from the converter's maps and what was learnt, and load of a level road, N m.
     fn known_torques(&self, measured: &Measured) -> ShiftTorques<f64> {
         let v = &self.vehicle;
+        let mapped = v.converter.torques(measured.engine_rad_s, measured.turbine_rad_s).turbine_n_m;
         ShiftTorques {
-            turbine_n_m: v.converter.torques(measured.engine_rad_s, measured.turbine_rad_s).turbine_n_m,
+            turbine_n_m: self.calibration.torque_factor * mapped,
             output_n_m: v.driveline.rigid_output_load(&v.road, measured.output_rad_s),
             ..ShiftTorques::default()
         }
@@ -179,7 +185,8 @@ impl ShiftController {
     /// Oncoming pressure that makes the slip follow its reference, Pa.
     fn slip_control(&mut self, time_s: f64, measured: &Measured, known: &ShiftTorques<f64>) -> f64 {
         let c = &self.calibration;
-        let Stage::InertiaPhase { since_s, from_rad_s, error_integral_rad } = &mut self.stage else {
+        let Stage::InertiaPhase { since_s, from_rad_s, error_integral_rad, feedforward_n_m: before } = &mut self.stage
+        else {
             return 0.0;
         };
         let slip = self.vehicle.shift.oncoming_slip(measured.turbine_rad_s, measured.output_rad_s);
@@ -191,7 +198,13 @@ impl ShiftController {
 
         let row = &self.inertia_phase.slip_oncoming;
         let feedforward_n_m = (rate - row.at(known)) / row.per_oncoming_torque;
-        let torque_n_m = feedforward_n_m + c.proportional_n_m_s_rad * error + c.integral_n_m_rad * *error_integral_rad;
+        // The feedforward is led by the lag of the valve: the turbine torque rises fast when the throttle returns.
+        let rate = (feedforward_n_m - before.replace(feedforward_n_m).unwrap_or(feedforward_n_m)) / c.control_period_s;
+        let lag_s = self.vehicle.oncoming.valve.time_constant_s.at(self.oncoming_pa);
+        let torque_n_m = feedforward_n_m
+            + lag_s * rate
+            + c.proportional_n_m_s_rad * error
+            + c.integral_n_m_rad * *error_integral_rad;
         self.vehicle.oncoming.clutch.pressure_for(torque_n_m.max(0.0), slip)
     }
 

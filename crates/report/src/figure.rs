@@ -28,11 +28,13 @@ pub mod colour {
     pub const ORANGE: &str = "#C98A00";
     /// A sixth quantity.
     pub const SKY: &str = "#3F9FD0";
+    /// A seventh quantity.
+    pub const GREY: &str = "#777777";
 }
 
-const WIDTH: f64 = 860.0;
+const WIDTH: f64 = 900.0;
 const LEFT: f64 = 74.0;
-const RIGHT: f64 = 132.0;
+const RIGHT: f64 = 176.0;
 const TOP: f64 = 8.0;
 const BOTTOM: f64 = 10.0;
 /// Space below the last panel for the time axis.

@@ -10,8 +10,8 @@ use crate::figure::{Figure, Panel, Series, colour};
 const FAMILY: [&str; 6] = [colour::BLUE, colour::SKY, colour::GREEN, colour::ORANGE, colour::VERMILION, colour::PURPLE];
 /// Points of a curve.
 const POINTS: u32 = 200;
-/// Engine speed of the figure of `f1` and `f2`, rad/s, as in Fig. 2.6.
-const ENGINE_RAD_S: f64 = 500.0;
+/// Slip of the figure of `f1` and `f2`, rad/s; they hardly depend on it.
+const SLIP_RAD_S: f64 = 150.0;
 
 /// The figures by file name.
 pub fn map_figures(vehicle: &Vehicle, model: &RigidModel<f64>) -> Vec<(&'static str, String)> {
@@ -76,13 +76,13 @@ fn friction(vehicle: &Vehicle) -> Figure {
     figure
 }
 
-/// Fig. 2.6: `f1` and `f2` of Eq. (2.18) over the turbine speed for several slips.
+/// Fig. 2.6: `f1` and `f2` of Eq. (2.18) over the turbine speed for several engine speeds.
 fn observer_maps(model: &RigidModel<f64>) -> Figure {
     let family = |output: usize| -> Vec<Series> {
-        ([50.0, 150.0, 250.0].iter().zip(FAMILY))
-            .map(|(&slip, colour)| {
-                curve(&format!("slip {slip:.0} rad/s"), colour, 100.0, 450.0, |turbine| {
-                    let at = model.speed_model(Phase::InertiaPhase, ENGINE_RAD_S, turbine, slip);
+        ([300.0, 400.0, 500.0].iter().zip(FAMILY))
+            .map(|(&engine, colour)| {
+                curve(&format!("engine {engine:.0} rad/s"), colour, 100.0, 450.0, |turbine| {
+                    let at = model.speed_model(Phase::InertiaPhase, engine, turbine, SLIP_RAD_S);
                     (turbine, at.free_rad_s2[output])
                 })
             })

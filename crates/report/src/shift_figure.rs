@@ -11,7 +11,7 @@ const TORQUE_PHASE: &str = "#fdf0d5";
 /// Colour of the inertia phase.
 const INERTIA_PHASE: &str = "#e3eef7";
 /// Colours of the observers in their order; the open loop has its own.
-const OBSERVERS: [&str; 5] = [colour::BLUE, colour::GREEN, colour::ORANGE, colour::PURPLE, colour::SKY];
+const OBSERVERS: [&str; 6] = [colour::BLUE, colour::GREEN, colour::ORANGE, colour::PURPLE, colour::SKY, colour::GREY];
 /// How much is shown before the load transfer and after lock-up, s.
 const MARGIN_S: f64 = 0.35;
 

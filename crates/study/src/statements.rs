@@ -1,6 +1,7 @@
 //! The source chapter's statements, each held against what was measured here.
 
 use config::{Experiment, Vehicle};
+use drivetrain::{Table1, Valve, ValveMaps};
 use observer::Phase;
 use serde::Serialize;
 use trace::units::mpa;
@@ -44,6 +45,40 @@ pub struct Statement {
     pub because: String,
 }
 
+/// Runs that take one cause of error away, to say what an error is made of.
+struct Without {
+    /// E1 with tyres that hardly slip.
+    tyre_slip: Comparison,
+    /// E1 with a valve that obeys the observers' model.
+    valve_error: Comparison,
+    /// E2 on a level road.
+    grade: Comparison,
+}
+
+impl Without {
+    fn run(vehicle: &Vehicle, e1: &Experiment, e2: &Experiment) -> Result<Self, StudyError> {
+        let mut stiff = vehicle.clone();
+        stiff.tyre.slip_scale /= 20.0;
+        let mut ideal = vehicle.clone();
+        if let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve {
+            for clutch in [&mut ideal.offgoing, &mut ideal.oncoming] {
+                clutch.valve = ValveMaps {
+                    time_constant_s: Table1::constant(time_constant_s),
+                    gain_pa_a: Table1::constant(gain_pa_a),
+                    delay_s: Table1::constant(0.0),
+                };
+            }
+        }
+        let mut level = e2.clone();
+        level.off_nominal.grade_rad = None;
+        Ok(Self {
+            tyre_slip: compare(&stiff, e1)?,
+            valve_error: compare(&ideal, e1)?,
+            grade: compare(vehicle, &level)?,
+        })
+    }
+}
+
 /// The experiments, run, and the statements about them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chapter {
@@ -60,7 +95,7 @@ pub struct Chapter {
 pub fn reproduce(vehicle: &Vehicle, experiments: &[Experiment; 4]) -> Result<Chapter, StudyError> {
     let [e1, e2, e3, e4] = experiments;
     let experiments = [compare(vehicle, e1)?, compare(vehicle, e2)?, compare(vehicle, e3)?, compare(vehicle, e4)?];
-    let statements = statements(vehicle, &experiments);
+    let statements = statements(vehicle, &experiments, &Without::run(vehicle, e1, e2)?);
     Ok(Chapter { experiments, statements })
 }
 
@@ -107,11 +142,11 @@ const COMPLIANT_SAMPLED: &str = "compliant, 100 Hz, sensors";
 const T: Phase = Phase::TorquePhase;
 const I: Phase = Phase::InertiaPhase;
 
-fn statements(vehicle: &Vehicle, [e1, e2, e3, e4]: &[Comparison; 4]) -> Vec<Statement> {
+fn statements(vehicle: &Vehicle, [e1, e2, e3, e4]: &[Comparison; 4], without: &Without) -> Vec<Statement> {
     let mut rows = nominal(e1);
     rows.extend(off_nominal(e1, e2));
     rows.extend(sliding(vehicle, e3));
-    rows.extend(compliant(e2, e4));
+    rows.extend(compliant(e2, e4, without));
     rows.extend(offsets(e1, e2));
     rows
 }
@@ -126,7 +161,13 @@ fn nominal(e1: &Comparison) -> Vec<Statement> {
             experiment: "E1",
             claim: "The rigid observer’s error peak is lower than with L = 0",
             chapter: "about 35 % lower",
-            ours: format!("{} against {}: {lower:.0} % lower", in_mpa(peak), in_mpa(open_peak)),
+            ours: format!(
+                "{} against {}: {:.0} % {}",
+                in_mpa(peak),
+                in_mpa(open_peak),
+                lower.abs(),
+                if lower < 0.0 { "higher" } else { "lower" }
+            ),
             verdict: verdict(lower > 20.0),
             because: format!(
                 "the peak of the whole shift lies in the torque phase, where the observer can do little about the \
@@ -257,7 +298,7 @@ fn least_multipliers(vehicle: &Vehicle, period_s: f64) -> (f64, f64) {
     })
 }
 
-fn compliant(e2: &Comparison, e4: &Comparison) -> Vec<Statement> {
+fn compliant(e2: &Comparison, e4: &Comparison, without: &Without) -> Vec<Statement> {
     let (ours, rigid) = (of(e4, COMPLIANT, T), of(e4, RIGID, T));
     let sampled = of(e4, COMPLIANT_SAMPLED, T);
     let (off, off_rigid, off_open) = (of(e2, COMPLIANT, T), of(e2, RIGID, T), open(e2, T));
@@ -270,9 +311,12 @@ fn compliant(e2: &Comparison, e4: &Comparison) -> Vec<Statement> {
             chapter: "much smaller than the rigid observer’s",
             ours: format!("RMS {} against {}: {lower:.0} % lower", in_mpa(ours.rms), in_mpa(rigid.rms)),
             verdict: verdict(ours.rms < 0.5 * rigid.rms),
-            because:
-                "lower, but not much: tyre slip and the valve’s delay, gain and lag, which its model leaves out, remain"
-                    .to_owned(),
+            because: format!(
+                "what remains is tyre slip and the valve, which its model leaves out: {} with tyres that hardly slip, {} \
+                 with a valve that obeys its model",
+                in_mpa(of(&without.tyre_slip, COMPLIANT, T).rms),
+                in_mpa(of(&without.valve_error, COMPLIANT, T).rms)
+            ),
         },
         Statement {
             experiment: "E4",
@@ -280,10 +324,12 @@ fn compliant(e2: &Comparison, e4: &Comparison) -> Vec<Statement> {
             chapter: "estimated too",
             ours: format!("RMS error {shaft_t:.0} N m in the torque phase, {shaft_i:.0} N m in the inertia phase"),
             verdict: verdict(shaft_t < 250.0 && shaft_i < 250.0),
-            because:
-                "of about 750 N m before the shift; the torque phase’s error is mostly tyre slip, which the model \
-                      takes for twist"
-                    .to_owned(),
+            because: format!(
+                "of about 750 N m before the shift; in the torque phase {:.0} N m with tyres that hardly slip, {:.0} N m \
+                 with a valve that obeys its model",
+                shaft_rms(&without.tyre_slip, COMPLIANT, T),
+                shaft_rms(&without.valve_error, COMPLIANT, T)
+            ),
         },
         Statement {
             experiment: "E4",
@@ -312,10 +358,13 @@ fn compliant(e2: &Comparison, e4: &Comparison) -> Vec<Statement> {
                 in_mpa(off_open.rms)
             ),
             verdict: verdict(off.rms < off_rigid.rms),
-            because:
-                "uphill, the load that the model does not know drives the wheel’s equation, and the gain carries it \
-                      into the pressure"
-                    .to_owned(),
+            because: format!(
+                "the grade, which the model does not know, drives the wheel’s equation, and the gain carries it into the \
+                 pressure: on a level road it is {} against {} rigid and {} open loop",
+                in_mpa(of(&without.grade, COMPLIANT, T).rms),
+                in_mpa(of(&without.grade, RIGID, T).rms),
+                in_mpa(open(&without.grade, T).rms)
+            ),
         },
     ]
 }

@@ -40,6 +40,8 @@ pub struct ShiftCalibration {
     pub control_period_s: f64,
     /// Line pressure, to which a clutch is applied outside the shift, Pa.
     pub line_pressure_pa: f64,
+    /// Turbine torque over what the converter's maps say, as the controller has learnt it.
+    pub torque_factor: f64,
     /// How far ahead trajectories are read, s, for the dead time of the valves.
     pub lead_s: f64,
     /// Pressure commanded at first to fill the oncoming clutch, Pa.
@@ -208,6 +210,10 @@ fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCali
         request_s: number("request_s", &raw.request_s, 0.0..=duration_s)?,
         control_period_s: number("control_period_s", &raw.control_period_s, 1e-4..=0.1)?,
         line_pressure_pa: number("line_pressure_pa", &raw.line_pressure_pa, 1e5..=10e6)?,
+        torque_factor: match &raw.torque_factor {
+            Some(factor) => number("torque_factor", factor, 0.1..=10.0)?,
+            None => 1.0,
+        },
         lead_s: number("lead_s", &raw.lead_s, 0.0..=0.5)?,
         boost_pressure_pa: number("fill.boost_pressure_pa", &fill.boost_pressure_pa, 0.0..=10e6)?,
         boost_s: number("fill.boost_s", &fill.boost_s, 0.0..=2.0)?,

@@ -141,6 +141,7 @@ pub(super) struct RawShift {
     pub(super) control_period_s: Number,
     pub(super) line_pressure_pa: Number,
     pub(super) lead_s: Number,
+    pub(super) torque_factor: Option<Number>,
     pub(super) fill: RawFill,
     pub(super) torque_phase: RawTorquePhase,
     pub(super) inertia_phase: RawInertiaPhase,
