@@ -50,7 +50,7 @@ pub(crate) enum Command {
     Simulate(Simulate),
     /// Design observer gains and print them with their certificate
     ///
-    /// Designs the gains of the rigid observer by the five-step procedure: decay from the settling time,
+    /// Designs the gains of an observer by the five-step procedure: decay from the settling time,
     /// then the smallest gain that reaches it at every vertex of the polytope, with kappa1 raised until the
     /// bound on the remaining error is small enough. Requirements come from the vehicle file; options
     /// replace them.
@@ -105,6 +105,9 @@ pub(crate) struct Simulate {
 pub(crate) struct Design {
     /// Vehicle file
     pub(crate) vehicle: PathBuf,
+    /// Observer to design for
+    #[arg(long, value_enum, default_value_t = DesignChoice::Rigid)]
+    pub(crate) observer: DesignChoice,
     /// Phase to design for
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
@@ -114,8 +117,8 @@ pub(crate) struct Design {
     /// kappa2 in 1/s: the decay of the error; 4/kappa2 is the settling time
     #[arg(long, value_name = "PER_S", value_parser = positive)]
     pub(crate) kappa2: Option<f64>,
-    /// Bound on the model error |w| in rad/s^2
-    #[arg(long, value_name = "RAD_S2", value_parser = positive)]
+    /// Bound on the model error |w|: in rad/s^2 for the rigid observer, normalised for the compliant one
+    #[arg(long, value_name = "BOUND", value_parser = positive)]
     pub(crate) error_bound: Option<f64>,
     /// Largest acceptable offset of the estimate in Pa
     #[arg(long, value_name = "PA", value_parser = positive)]
@@ -123,6 +126,16 @@ pub(crate) struct Design {
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DesignChoice {
+    /// Reduced-order, rigid driveline
+    Rigid,
+    /// Reduced-order with elastic drive shafts
+    Compliant,
+    /// Full-order sliding mode: gains from the sliding condition, without a certificate
+    Sliding,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

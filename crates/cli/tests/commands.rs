@@ -185,3 +185,77 @@ fn lost_samples_are_counted_and_do_not_stop_the_estimate() {
     assert!(stderr(&output).contains("95 of 9501 samples have an unusable speed"), "{}", stderr(&output));
     assert!(!read(&out).contains("NaN"));
 }
+
+#[test]
+fn every_observer_runs_on_a_log() {
+    let folder = Folder::new("observers");
+    wetclutch(&["demo", "-o", &folder.path("demo")]);
+    let log = folder.path("demo/measured.csv");
+    let mut outputs = Vec::new();
+    for observer in ["rigid", "compliant", "sliding", "open-loop"] {
+        let output = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--observer", observer]);
+        assert!(output.status.success(), "{observer}: {}", stderr(&output));
+        let text = stdout(&output);
+        assert_eq!(text.lines().next().unwrap().contains("shaft_torque_estimate_n_m"), observer == "compliant");
+        assert_eq!(text.lines().count(), 9502);
+        outputs.push(text);
+    }
+    outputs.dedup();
+    assert_eq!(outputs.len(), 4, "four observers, four estimates");
+}
+
+#[test]
+fn the_compliant_observer_asks_for_the_wheel_speed() {
+    let folder = Folder::new("wheel");
+    std::fs::write(
+        folder.path("log.csv"),
+        "time_s,engine_speed_rpm,turbine_speed_rpm,output_speed_rpm,oncoming_current_a\n0,2000,1900,760,0\n",
+    )
+    .unwrap();
+    let run =
+        |observer| wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "--observer", observer]);
+    assert!(run("rigid").status.success());
+    let output = run("compliant");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("there is no column `wheel_speed_rad_s`"), "{}", stderr(&output));
+}
+
+#[test]
+fn reproduce_writes_page_markdown_and_figures_and_prints_its_rows() {
+    let folder = Folder::new("reproduce");
+    let output = wetclutch(&["reproduce", "-o", &folder.path("a"), "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let rows: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert!(rows.as_array().unwrap().len() >= 15);
+    assert!(rows[0]["verdict"] == "agrees" || rows[0]["verdict"] == "differs");
+    for name in ["reproduction.html", "e1.svg", "e2.svg", "e3.svg", "e4.svg", "map_engine.svg", "map_f1_f2.svg"] {
+        assert!(Path::new(&folder.path(&format!("a/{name}"))).exists(), "{name}");
+    }
+    let html = read(folder.path("a/reproduction.html"));
+    assert!(html.contains("certified band") && html.contains("Sliding 1 (large)"));
+}
+
+#[test]
+fn the_reproduction_in_the_documentation_is_what_the_program_writes() {
+    let folder = Folder::new("stale");
+    wetclutch(&["reproduce", "-o", &folder.path("a")]);
+    let committed = read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reproduction.md"));
+    assert!(
+        read(folder.path("a/reproduction.md")) == committed,
+        "docs/reproduction.md is stale: run `cargo run --release -- reproduce` and copy reproduction.md there"
+    );
+}
+
+#[test]
+fn design_serves_every_observer() {
+    let printed = |observer| {
+        let output = wetclutch(&["design", VEHICLE, "--observer", observer]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        stdout(&output)
+    };
+    assert!(printed("compliant").contains("offset bound 0.1769 MPa"), "{}", printed("compliant"));
+    assert!(printed("sliding").contains("1923"), "{}", printed("sliding"));
+    let output = wetclutch(&["design", VEHICLE, "--observer", "compliant", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(json["torque_phase"]["gain_normalised"].as_array().unwrap().len(), 2);
+}

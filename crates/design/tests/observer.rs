@@ -3,10 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 use config::Vehicle;
-use design::{design_rigid, rigid_observer};
+use design::{compliant_observer, design_compliant, design_rigid, design_sliding, rigid_observer, sliding_observer};
 use drivetrain::Valve;
-use observer::{Estimator, Health, Input, Phase, RigidGains, RigidObserver, RigidState};
+use observer::{Discretisation, Estimator, Health, Input, Phase, RigidGains, RigidObserver, RigidState};
 use proptest::prelude::*;
+use proptest::test_runner::TestCaseError;
 
 const ENGINE_RAD_S: f64 = 370.0;
 const DT_S: f64 = 1e-4;
@@ -96,19 +97,29 @@ proptest! {
 
     /// Whatever the inputs, a step returns, and a usable sample afterwards gives a finite estimate again.
     #[test]
-    fn prop_no_input_stops_the_observer(
+    fn prop_no_input_stops_an_observer(
         samples in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 1..40),
     ) {
-        let observer = observer();
-        let mut state = observer.start();
-        for (dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, command) in samples {
-            let estimate =
-                observer.step(&mut state, &Input { dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, wheel_rad_s: slip_rad_s, command });
-            prop_assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite());
-        }
-        let estimate = observer.step(&mut state, &input(0.01, 300.0, 200.0, 0.3));
-        prop_assert!(estimate.health == Health::Good && estimate.pressure_pa.is_finite());
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        survives(&observer(), &samples)?;
+        survives(&compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains()), &samples)?;
+        survives(&sliding_observer(&vehicle, design_sliding(&vehicle)), &samples)?;
     }
+}
+
+fn survives(observer: &impl Estimator<f64>, samples: &[(f64, f64, f64, f64, f64)]) -> Result<(), TestCaseError> {
+    let mut state = observer.start();
+    for &(dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, command) in samples {
+        let wheel_rad_s = slip_rad_s;
+        let input = Input { dt_s, engine_rad_s, turbine_rad_s, slip_rad_s, wheel_rad_s, command };
+        let estimate = observer.step(&mut state, &input);
+        prop_assert!(estimate.pressure_pa.is_finite() && estimate.clutch_torque_n_m.is_finite());
+        prop_assert!(estimate.shaft_torque_n_m.is_none_or(f64::is_finite));
+    }
+    let usable = Input { wheel_rad_s: 40.0, ..input(0.01, 300.0, 200.0, 0.3) };
+    let estimate = observer.step(&mut state, &usable);
+    prop_assert!(estimate.health == Health::Good && estimate.pressure_pa.is_finite());
+    Ok(())
 }
 
 #[test]
@@ -231,4 +242,123 @@ fn a_pulse_width_valve_is_followed_near_its_operating_point() {
         let drop = 0.01 * line * duty - truth;
         truth += 1e-3 * flow * drop.signum() * drop.abs().sqrt();
     }
+}
+
+/// At 30 ms a sample multiplies the error by 1 - 73 * 0.03 = -1.2 by Euler's rule and by -0.5 exactly, at
+/// the strong vertex of the inertia phase.
+#[test]
+fn the_exact_form_is_stable_where_eulers_rule_is_not() {
+    let errors = |discretisation| {
+        let mut slow = observer();
+        slow.tracker.discretisation = discretisation;
+        slow.model.clutch.friction = drivetrain::Table1::constant(0.16);
+        let model = slow.model;
+        let (dt, command, mut speeds, mut pressure) = (0.03, 0.25, [340.0, 300.0], 0.25e6);
+        let mut state = slow.start();
+        for first in [0.0, 10.0, 1e-9] {
+            slow.step(&mut state, &input(first, speeds[0], speeds[1], command));
+        }
+        // The truth starts elsewhere than the estimate; its speeds follow the frozen model exactly.
+        pressure += 0.02e6;
+        (0..12)
+            .map(|_| {
+                let m = model.speed_model(Phase::InertiaPhase, ENGINE_RAD_S, speeds[0], speeds[1]);
+                let valve = model.valve.linear(command);
+                let (phi, a) = ((valve.a22_per_s * dt).exp(), valve.a22_per_s);
+                let psi = (phi - 1.0) / a;
+                let integral = psi * pressure + (psi - dt) / a * valve.b2_pa_s;
+                let moved = |i: usize| dt * m.free_rad_s2[i] + m.per_pressure_rad_s2_pa[i] * integral;
+                speeds = [speeds[0] + moved(0), speeds[1] + moved(1)];
+                pressure = phi * pressure + psi * valve.b2_pa_s;
+                // The speeds are set back so that the phase goes on; the observer sees their change only.
+                let estimate = slow.step(&mut state, &input(dt, speeds[0], speeds[1], command));
+                (pressure - estimate.pressure_pa).abs()
+            })
+            .take_while(|error| error.is_finite())
+            .collect::<Vec<f64>>()
+    };
+    let (exact, euler) = (errors(Discretisation::Exact), errors(Discretisation::Euler));
+    assert!(exact[5] < 0.05 * exact[0], "{exact:?}");
+    assert!(euler[5] > euler[0], "{euler:?}");
+}
+
+/// A car that obeys the compliant model: both estimates converge from wrong starts.
+#[test]
+fn the_compliant_observer_finds_pressure_and_shaft_torque_of_its_own_model() {
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let design = design_compliant(&vehicle).unwrap();
+    let observer = compliant_observer(&vehicle, design.gains());
+    let model = observer.model;
+    for (phase, mut speeds) in
+        [(Phase::TorquePhase, [360.0, 360.0, 48.0]), (Phase::InertiaPhase, [340.0, 300.0, 320.0 / 2.5 / 3.0])]
+    {
+        let command = 0.25;
+        let at = |dt: f64, y: [f64; 3]| Input { wheel_rad_s: y[2], ..input(dt, y[0], y[1], command) };
+        let mut state = observer.start();
+        for dt in [0.0, 10.0, 1e-9] {
+            observer.step(&mut state, &at(dt, speeds));
+        }
+        let start = observer.step(&mut state, &at(1e-9, speeds));
+        assert_eq!(start.phase, phase);
+        let (mut shaft, mut pressure) = (start.shaft_torque_n_m.unwrap() + 100.0, start.pressure_pa + 0.05e6);
+        let kappa2 = design.of(phase).unwrap().kappa2_per_s;
+        // Normalised: 100 N m are 0.1 and 0.05 MPa are 0.5.
+        let initial = 0.1_f64.hypot(0.5);
+        for n in 1..=1500 {
+            let m = model.speed_model(phase, ENGINE_RAD_S, speeds[0], speeds[1], speeds[2]);
+            let shaft_rate = model.shaft_rate(speeds[0], speeds[1], speeds[2]);
+            let next = model.rigid.valve.linear(command).advance(pressure, DT_S);
+            let (mean_shaft, mean_pressure) = (shaft + 0.5 * DT_S * shaft_rate, 0.5 * (pressure + next));
+            for (speed, (free, [per_shaft, per_pressure])) in
+                speeds.iter_mut().zip(m.free_rad_s2.iter().zip(m.influence))
+            {
+                *speed += DT_S * (free + per_shaft * mean_shaft + per_pressure * mean_pressure);
+            }
+            if phase == Phase::TorquePhase {
+                speeds[1] = speeds[0];
+            }
+            shaft += DT_S * shaft_rate;
+            pressure = next;
+            let estimate = observer.step(&mut state, &at(DT_S, speeds));
+            let errors = [(shaft - estimate.shaft_torque_n_m.unwrap()) / 1e3, (pressure - estimate.pressure_pa) / 1e5];
+            let bound = initial * (-kappa2 * f64::from(n) * DT_S).exp();
+            let error = errors[0].hypot(errors[1]);
+            assert!(error <= bound + 1e-3, "{phase:?} {n}: {error} {bound} {:?}", estimate.phase);
+        }
+    }
+}
+
+#[test]
+fn before_the_shift_the_shaft_torque_starts_at_its_steady_value() {
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let observer = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
+    let mut state = observer.start();
+    let sample = Input { wheel_rad_s: 40.0, ..input(0.0, 300.0, 300.0, 0.0) };
+    let shaft = observer.step(&mut state, &sample).shaft_torque_n_m.unwrap();
+    let turbine = vehicle.converter.torques(ENGINE_RAD_S, 300.0).turbine_n_m;
+    // Turbine torque times both ratios, less what accelerates the gearbox.
+    assert!((0.9..1.0).contains(&(shaft / (turbine * 2.5 * 3.0))), "{shaft}");
+    let lost = observer.step(&mut state, &Input { wheel_rad_s: f64::NAN, dt_s: 0.01, ..sample });
+    assert_eq!(lost.health, Health::SpeedsRejected);
+    assert!((lost.shaft_torque_n_m.unwrap() / shaft - 1.0).abs() < 0.05);
+}
+
+/// In sliding the pressure error decays by the pressure gains; what remains is their switching.
+#[test]
+fn the_sliding_observer_brings_a_wrong_pressure_down() {
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let mut car = Car::start(Phase::InertiaPhase, 0.08e6);
+    let sliding = sliding_observer(&vehicle, design_sliding(&vehicle));
+    let mut state = sliding.start();
+    for dt in [0.0, 10.0, 1e-9] {
+        sliding.step(&mut state, &input(dt, car.speeds[0], car.speeds[1], car.command));
+    }
+    let mut error = f64::NAN;
+    for _ in 0..1200 {
+        car.step([0.0; 2]);
+        let estimate = sliding.step(&mut state, &input(DT_S, car.speeds[0], car.speeds[1], car.command));
+        error = car.pressure_pa - estimate.pressure_pa;
+    }
+    // Open loop would have e^-3 of the 0.08 MPa left.
+    assert!(error.abs() < 0.5 * 0.08e6 * (-3.0_f64).exp(), "{error}");
 }

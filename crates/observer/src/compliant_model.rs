@@ -99,7 +99,7 @@ impl<T: Real> CompliantModel<T> {
         }
     }
 
-    /// Rate of the shaft torque, N m/s, Eq. (2.61c), (2.63d): `K_s (w_0/i_df - w_w)`.
+    /// Rate of the shaft torque, N m/s, Eq. (2.61c) and (2.63d): `K_s (w_0/i_df - w_w)`.
     #[inline]
     pub fn shaft_rate(&self, turbine: T, slip: T, wheel: T) -> T {
         let line = &self.rigid.driveline;

@@ -119,7 +119,8 @@ impl<T: Real> Estimator<T> for RigidObserver<T> {
 }
 
 impl<T: Real> RigidObserver<T> {
-    /// `L` times how far the speeds moved otherwise than predicted, Pa.
+    /// The correction of Eq. (2.28) over a sample, Pa: `L` times how far the speeds moved otherwise than
+    /// predicted.
     #[inline]
     fn correction(&self, state: &RigidState<T>, interval: &Interval<T>, speeds: Option<[T; 2]>) -> T {
         let (Some(last), Some(speeds)) = (state.last, speeds) else { return T::zero() };

@@ -1,4 +1,5 @@
-//! The full-order sliding-mode observer, held against the others, Eq. (2.55) and (2.59).
+//! The full-order sliding-mode observer, held against the others: Eq. (2.55) in the inertia phase, (2.59) in
+//! the torque phase.
 
 use drivetrain::Real;
 

@@ -7,10 +7,12 @@
 
 use config::{Experiment, Vehicle};
 use design::rigid::design_phase;
-use design::{design_rigid, requirement, rigid_observer};
+use design::{
+    compliant_observer, design_compliant, design_rigid, design_sliding, requirement, rigid_observer, sliding_observer,
+};
 use differential_equations::prelude::*;
 use divan::{Bencher, black_box};
-use observer::{Estimator, Input, Phase};
+use observer::{Estimator, Input, Phase, RigidGains};
 use plant::state::STATES;
 use plant::{HybridIntegrator, Inputs, Mode, Powertrain, State};
 
@@ -38,15 +40,41 @@ mod observer_step {
         (0..1000).map(sample).collect()
     }
 
-    #[divan::bench(name = "rigid f64, 1000 steps")]
-    fn rigid_f64(bencher: Bencher) {
-        let vehicle = vehicle();
-        let observer = rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains());
-        let samples = samples();
+    /// The same samples with the wheel speed that goes with them.
+    fn with_wheel() -> Vec<Input<f64>> {
+        let wheel = |x: Input<f64>| Input { wheel_rad_s: (x.turbine_rad_s - 0.6 * x.slip_rad_s) / 3.0, ..x };
+        samples().into_iter().map(wheel).collect()
+    }
+
+    fn bench(bencher: Bencher, observer: &impl Estimator<f64>) {
+        let samples = with_wheel();
         bencher.counter(samples.len()).bench_local(|| {
             let mut state = observer.start();
             samples.iter().fold(0.0, |sum, input| sum + observer.step(&mut state, black_box(input)).pressure_pa)
         });
+    }
+
+    #[divan::bench(name = "compliant f64, 1000 steps")]
+    fn compliant(bencher: Bencher) {
+        let vehicle = vehicle();
+        bench(bencher, &compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains()));
+    }
+
+    #[divan::bench(name = "sliding f64, 1000 steps")]
+    fn sliding(bencher: Bencher) {
+        let vehicle = vehicle();
+        bench(bencher, &sliding_observer(&vehicle, design_sliding(&vehicle)));
+    }
+
+    #[divan::bench(name = "open loop f64, 1000 steps")]
+    fn open_loop(bencher: Bencher) {
+        bench(bencher, &rigid_observer(&vehicle(), RigidGains::open_loop()));
+    }
+
+    #[divan::bench(name = "rigid f64, 1000 steps")]
+    fn rigid_f64(bencher: Bencher) {
+        let vehicle = vehicle();
+        bench(bencher, &rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains()));
     }
 
     #[divan::bench(name = "rigid f32, 1000 steps")]

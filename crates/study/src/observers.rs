@@ -10,12 +10,12 @@ use observer::{CompliantObserver, Discretisation, Estimate, RigidGains, RigidObs
 use crate::{RunColumns, run};
 
 /// One of the observers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum AnyObserver {
     /// Rigid reduced-order observer; with zero gains, the open loop.
     Rigid(RigidObserver<f64>),
     /// Reduced-order observer with elastic drive shafts.
-    Compliant(CompliantObserver<f64>),
+    Compliant(Box<CompliantObserver<f64>>),
     /// Full-order sliding-mode observer.
     Sliding(SlidingObserver<f64>),
 }
@@ -29,7 +29,9 @@ impl AnyObserver {
         Ok(match kind {
             ObserverKind::OpenLoop => Self::Rigid(rigid_observer(vehicle, RigidGains::open_loop())),
             ObserverKind::Rigid => Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains())),
-            ObserverKind::Compliant => Self::Compliant(compliant_observer(vehicle, design_compliant(vehicle)?.gains())),
+            ObserverKind::Compliant => {
+                Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
+            }
             ObserverKind::Sliding => Self::Sliding(sliding_observer(vehicle, design_sliding(vehicle))),
         })
     }
@@ -44,7 +46,7 @@ impl AnyObserver {
             Some(GivenGains::Rigid(gains)) => Self::Rigid(rigid_observer(vehicle, gains)),
             Some(GivenGains::Sliding(gains)) => Self::Sliding(sliding_observer(vehicle, gains)),
             Some(GivenGains::CompliantNormalised(torque, inertia)) => {
-                Self::Compliant(compliant_observer(vehicle, physical_gains(&torque, &inertia)))
+                Self::Compliant(Box::new(compliant_observer(vehicle, physical_gains(&torque, &inertia))))
             }
         };
         Ok(observer.with_discretisation(entry.discretisation))
@@ -64,7 +66,7 @@ impl AnyObserver {
     pub fn run(&self, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
         match self {
             Self::Rigid(observer) => run(columns, observer),
-            Self::Compliant(observer) => run(columns, observer),
+            Self::Compliant(observer) => run(columns, observer.as_ref()),
             Self::Sliding(observer) => run(columns, observer),
         }
     }

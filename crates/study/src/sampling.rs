@@ -4,9 +4,8 @@ use config::{Sensors, SpeedSensor, Vehicle};
 use plant::sensors::{Noise, read_current, read_speed};
 use trace::{Column, Trace, Values, signal};
 
-/// The samples of a trace that lie at multiples of a period; all of them without one.
-pub fn sampled(trace: &Trace, period_s: Option<f64>) -> Trace {
-    let Some(period_s) = period_s else { return trace.clone() };
+/// The samples of a trace that lie at multiples of a period.
+pub fn sampled(trace: &Trace, period_s: f64) -> Trace {
     let mut next = 0.0;
     let kept: Vec<usize> = (trace.time_s.iter().enumerate())
         .filter(|&(_, &time)| {
@@ -72,8 +71,8 @@ mod tests {
         for i in 0..101 {
             trace.push(f64::from(i) * 1e-3, &[f64::from(i)]);
         }
-        let kept = sampled(&trace, Some(0.01));
+        let kept = sampled(&trace, 0.01);
         assert_eq!(kept.get("x").unwrap(), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0]);
-        assert_eq!(sampled(&trace, None), trace);
+        assert_eq!(sampled(&trace, 0.001), trace);
     }
 }

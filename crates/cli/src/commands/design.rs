@@ -1,13 +1,15 @@
 //! `wetclutch design`.
 
 use config::Vehicle;
+use design::compliant::{CompliantRequirement, compliant_requirement, design_compliant_phase};
 use design::rigid::design_phase;
-use design::{Certificate, IssRequirement, requirement};
+use design::{Certificate, CompliantCertificate, DesignError, IssRequirement, design_sliding, requirement};
 use observer::Phase;
 use report::tables::phase_name;
+use serde_json::{Map, Value, json};
 use trace::units;
 
-use crate::args::{Design, PhaseChoice};
+use crate::args::{Design, DesignChoice, PhaseChoice};
 use crate::failure::Failure;
 use crate::output;
 
@@ -18,23 +20,33 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
         PhaseChoice::Torque => &[Phase::TorquePhase],
         PhaseChoice::Inertia => &[Phase::InertiaPhase],
     };
-    let mut designed = Vec::new();
+    let mut object = Map::new();
+    let mut text = Vec::new();
     for &phase in phases {
-        let required = replaced(requirement(&vehicle, phase).into(), options);
-        let certificate = design_phase(&vehicle, phase, &required)
-            .map_err(|error| Failure::Work(format!("{}: {error}", phase_name(phase))))?;
-        designed.push((phase, certificate));
+        let failed = |error: DesignError| Failure::Work(format!("{}: {error}", phase_name(phase)));
+        let (json, lines) = match options.observer {
+            DesignChoice::Rigid => {
+                let required = replaced(requirement(&vehicle, phase).into(), options);
+                let certificate = design_phase(&vehicle, phase, &required).map_err(failed)?;
+                (serde_json::to_value(&certificate)?, rigid_lines(phase, &certificate))
+            }
+            DesignChoice::Compliant => {
+                let required = replaced_compliant(compliant_requirement(&vehicle, phase), options);
+                let certificate = design_compliant_phase(&vehicle, phase, &required).map_err(failed)?;
+                (serde_json::to_value(&certificate)?, compliant_lines(phase, &certificate))
+            }
+            DesignChoice::Sliding => sliding(&vehicle, phase),
+        };
+        object.insert(phase.name().to_owned(), json);
+        text.extend(lines);
     }
     if options.json {
-        let object: serde_json::Map<String, serde_json::Value> = (designed.iter())
-            .map(|(phase, certificate)| Ok((phase.name().to_owned(), serde_json::to_value(certificate)?)))
-            .collect::<Result<_, serde_json::Error>>()?;
         output::line(&serde_json::to_string_pretty(&object)?)?;
         return Ok(());
     }
     output::line(&format!("{} ({})\n", vehicle.name, vehicle.source.path.display()))?;
-    for (phase, certificate) in &designed {
-        print(*phase, certificate)?;
+    for line in &text {
+        output::line(line)?;
     }
     output::line(&format!("vehicle file sha256 {}", vehicle.source.sha256()))?;
     Ok(())
@@ -50,32 +62,87 @@ fn replaced(required: IssRequirement, options: &Design) -> IssRequirement {
     }
 }
 
-fn print(phase: Phase, certificate: &Certificate) -> Result<(), Failure> {
+fn replaced_compliant(required: CompliantRequirement, options: &Design) -> CompliantRequirement {
+    CompliantRequirement {
+        kappa1_per_s: options.kappa1.or(required.kappa1_per_s),
+        kappa2_per_s: options.kappa2.unwrap_or(required.kappa2_per_s),
+        w_max: options.error_bound.unwrap_or(required.w_max),
+        offset_max_pa: options.offset_max.unwrap_or(required.offset_max_pa),
+        ..required
+    }
+}
+
+fn rigid_lines(phase: Phase, certificate: &Certificate) -> Vec<String> {
     let gain = certificate.gain_pa_s_rad;
     let gain = match phase {
         Phase::TorquePhase => format!("L = {:.1} Pa s/rad on the turbine speed", gain[0]),
         _ => format!("L = ({:.1}, {:.1}) Pa s/rad on turbine speed and slip", gain[0], gain[1]),
     };
-    output::line(&format!("{}: {gain}", phase_name(phase)))?;
-    output::line(&format!(
-        "  kappa1 {:.2}/s, kappa2 {:.2}/s: an initial error is gone after {:.3} s",
-        certificate.kappa1_per_s,
-        certificate.kappa2_per_s,
-        4.0 / certificate.kappa2_per_s,
-    ))?;
-    output::line(&format!(
+    let vertices = certificate.vertices.iter().map(|v| (v.vertex.label.as_str(), v.decay_per_s, v.margin_per_s));
+    let mut lines =
+        vec![format!("{}: {gain}", phase_name(phase)), kappas(certificate.kappa1_per_s, certificate.kappa2_per_s)];
+    lines.push(format!(
         "  offset bound {:.4} MPa (required {:.4}) for model errors up to {:.1} rad/s^2 and an exact valve model",
         units::mpa(certificate.offset_pa),
         units::mpa(certificate.offset_max_pa),
         certificate.model_error_max_rad_s2,
-    ))?;
-    output::line("  certificate, evaluated by eigenvalues apart from the solver:")?;
-    for vertex in &certificate.vertices {
-        output::line(&format!(
-            "    {}: decay {:.4}/s, {:.6}/s more than required",
-            vertex.vertex.label, vertex.decay_per_s, vertex.margin_per_s,
-        ))?;
-    }
-    output::line("")?;
-    Ok(())
+    ));
+    lines.extend(vertex_lines(vertices));
+    lines
+}
+
+fn compliant_lines(phase: Phase, certificate: &CompliantCertificate) -> Vec<String> {
+    let outputs = if phase == Phase::TorquePhase { "(w_t, w_w)" } else { "(w_t, dw, w_w)" };
+    let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:9.3}")).collect::<Vec<_>>().join(" ");
+    let gain = &certificate.gain_normalised;
+    let vertices = certificate.vertices.iter().map(|v| (v.label.as_str(), v.decay_per_s, v.margin_per_s));
+    let mut lines = vec![
+        format!(
+            "{}: L on {outputs}, normalised by 1000 N m, 0.1 MPa, 100 rad/s and 10 rad/s (wheel)",
+            phase_name(phase)
+        ),
+        format!("  shaft torque  {}", row(&gain[0])),
+        format!("  pressure      {}", row(&gain[1])),
+        kappas(certificate.kappa1_per_s, certificate.kappa2_per_s),
+        format!(
+            "  offset bound {:.4} MPa (required {:.4}), {:.0} N m, for |w| up to {:.2} and an exact valve model",
+            units::mpa(certificate.offset_pa),
+            units::mpa(certificate.offset_max_pa),
+            certificate.offset_n_m,
+            certificate.w_max,
+        ),
+    ];
+    lines.extend(vertex_lines(vertices));
+    lines
+}
+
+fn kappas(kappa1: f64, kappa2: f64) -> String {
+    format!("  kappa1 {kappa1:.2}/s, kappa2 {kappa2:.2}/s: an initial error is gone after {:.3} s", 4.0 / kappa2)
+}
+
+fn vertex_lines<'a>(vertices: impl Iterator<Item = (&'a str, f64, f64)>) -> Vec<String> {
+    let mut lines = vec!["  certificate, evaluated by eigenvalues apart from the solver:".to_owned()];
+    lines
+        .extend(vertices.map(|(label, decay, margin)| {
+            format!("    {label}: decay {decay:.4}/s, {margin:.6}/s more than required")
+        }));
+    lines.push(String::new());
+    lines
+}
+
+/// Gains of the sliding-mode observer in a phase.
+fn sliding(vehicle: &Vehicle, phase: Phase) -> (Value, Vec<String>) {
+    let gains = design_sliding(vehicle);
+    let (speed, pressure) = match phase {
+        Phase::TorquePhase => (vec![gains.torque_speed_rad_s2], vec![gains.torque_pressure_pa_s]),
+        _ => (gains.inertia_speed_rad_s2.to_vec(), gains.inertia_pressure_pa_s.to_vec()),
+    };
+    let list = |values: &[f64]| values.iter().map(|x| format!("{x:.4e}")).collect::<Vec<_>>().join(", ");
+    let rounded = speed.iter().map(|x| format!("{x:.0}")).collect::<Vec<_>>().join(", ");
+    let lines = vec![
+        format!("{}: sliding on the speeds with {rounded} rad/s^2", phase_name(phase)),
+        format!("  pressure gains {} Pa/s", list(&pressure)),
+        String::new(),
+    ];
+    (json!({ "speed_rad_s2": speed, "pressure_pa_s": pressure }), lines)
 }

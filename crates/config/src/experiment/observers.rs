@@ -25,11 +25,15 @@ pub enum ObserverKind {
 pub enum GivenGains {
     /// Of the rigid observer.
     Rigid(RigidGains<f64>),
-    /// Of the sliding-mode observer.
+    /// Of the sliding-mode observer, such as Eq. (2.57), (2.58) and (2.60).
     Sliding(SlidingGains<f64>),
-    /// Of the compliant observer, in the chapter's normalised units: torque phase, inertia phase.
+    /// Of the compliant observer, in the chapter's normalised units, such as Eq. (2.87) and (2.88): torque
+    /// phase, inertia phase.
     CompliantNormalised([[f64; 2]; 2], [[f64; 3]; 2]),
 }
+
+/// Sample time of an observer that gives none, s: the usual period of a transmission controller.
+const SAMPLE_TIME_S: f64 = 0.01;
 
 /// One observer of an experiment.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +42,8 @@ pub struct ObserverEntry {
     pub name: String,
     /// What it is.
     pub kind: ObserverKind,
-    /// Its sample time, s; that of the recording if not given.
-    pub sample_time_s: Option<f64>,
+    /// Its sample time, s.
+    pub sample_time_s: f64,
     /// How it is carried over a sample.
     pub discretisation: Discretisation,
     /// Whether it sees the signals through the experiment's sensors.
@@ -169,11 +173,10 @@ pub(super) fn observer(
             RawKind::Compliant => ObserverKind::Compliant,
             RawKind::Sliding => ObserverKind::Sliding,
         },
-        sample_time_s: raw
-            .sample_time_s
-            .as_ref()
-            .map(|value| check.number("observer.sample_time_s", value, 1e-4..=0.2))
-            .transpose()?,
+        sample_time_s: match &raw.sample_time_s {
+            Some(value) => check.number("observer.sample_time_s", value, 1e-4..=0.2)?,
+            None => SAMPLE_TIME_S,
+        },
         discretisation: match raw.discretisation {
             RawDiscretisation::Exact => Discretisation::Exact,
             RawDiscretisation::Euler => Discretisation::Euler,

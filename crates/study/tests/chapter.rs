@@ -1,0 +1,74 @@
+//! The source chapter's experiments as a whole.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+use config::{Experiment, Vehicle};
+use observer::Phase;
+use study::{Chapter, Comparison, reproduce};
+
+fn chapter() -> Chapter {
+    reproduce(&Vehicle::two_speed_at().unwrap(), &Experiment::built_in().unwrap()).unwrap()
+}
+
+fn chatter(comparison: &Comparison, name: &str) -> f64 {
+    comparison.run(name).unwrap().pressure_in(Phase::InertiaPhase).unwrap().chatter
+}
+
+fn rms(comparison: &Comparison, name: &str, phase: Phase) -> f64 {
+    comparison.run(name).unwrap().pressure_in(phase).unwrap().rms
+}
+
+#[test]
+fn every_statement_has_a_figure_and_the_same_run_gives_the_same_rows() {
+    let (first, second) = (chapter(), chapter());
+    assert_eq!(first.statements, second.statements);
+    for statement in &first.statements {
+        assert!(!statement.ours.contains("NaN") && !statement.because.contains("NaN"), "{statement:?}");
+    }
+    for experiment in ["E1", "E2", "E3", "E4"] {
+        assert!(first.statements.iter().any(|statement| statement.experiment == experiment));
+    }
+}
+
+#[test]
+fn every_experiment_completes_its_shift_without_flare_or_tie_up() {
+    for comparison in &chapter().experiments {
+        let quality = comparison.quality.unwrap();
+        let name = &comparison.experiment.name;
+        assert!((0.2..0.3).contains(&(quality.inertia_phase_start_s - quality.torque_phase_start_s)), "{name}");
+        assert!((0.3..0.4).contains(&(quality.lock_up_s - quality.inertia_phase_start_s)), "{name}");
+        assert!(quality.flare_rad_s < 3.0 && quality.least_shaft_torque_n_m > 0.0, "{name}");
+        // Rated comfortable below about 10 m/s^3; E2 has half again the torque.
+        assert!(quality.jerk_peak_m_s3 < 12.0, "{name}: {}", quality.jerk_peak_m_s3);
+    }
+}
+
+#[test]
+fn sliding_chatters_more_the_larger_its_gains() {
+    let [_, _, e3, _] = &chapter().experiments;
+    let [small, large, continuous] =
+        ["Sliding 2 (small)", "Sliding 1 (large)", "Sliding, continuous gains"].map(|name| chatter(e3, name));
+    assert!(small < large && large < continuous, "{small} {large} {continuous}");
+    assert!(chatter(e3, "ISS, exact") < 0.2 * small);
+}
+
+#[test]
+fn the_chapters_compliant_gains_do_as_well_as_ours() {
+    let [_, _, _, e4] = &chapter().experiments;
+    for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
+        let (ours, theirs) = (rms(e4, "compliant", phase), rms(e4, "compliant, chapter's gains", phase));
+        assert!((ours / theirs - 1.0).abs() < 0.1, "{phase:?}: {ours} {theirs}");
+    }
+}
+
+#[test]
+fn sensors_change_the_estimate_and_their_seed_changes_the_noise() {
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let [_, _, _, mut e4] = Experiment::built_in().unwrap();
+    let name = "compliant, 100 Hz, sensors";
+    let first = study::compare(&vehicle, &e4).unwrap();
+    e4.sensors.as_mut().unwrap().seed += 1;
+    let second = study::compare(&vehicle, &e4).unwrap();
+    assert!(first.run(name).unwrap().estimates != second.run(name).unwrap().estimates);
+    assert_eq!(first.run("compliant").unwrap().estimates, second.run("compliant").unwrap().estimates);
+}
