@@ -123,6 +123,9 @@ pub(crate) struct Design {
     /// Largest acceptable offset of the estimate in Pa
     #[arg(long, value_name = "PA", value_parser = positive)]
     pub(crate) offset_max: Option<f64>,
+    /// Sample time in s, for the peak-to-peak design
+    #[arg(long, value_name = "S", value_parser = positive, default_value = "0.01")]
+    pub(crate) sample_time: f64,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -130,8 +133,10 @@ pub(crate) struct Design {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DesignChoice {
-    /// Reduced-order, rigid driveline
+    /// Reduced-order, rigid driveline, by the chapter's five steps
     Rigid,
+    /// The same observer with the smallest bound on its sampled error, valve error included
+    PeakToPeak,
     /// Reduced-order with elastic drive shafts
     Compliant,
     /// Full-order sliding mode: gains from the sliding condition, without a certificate
@@ -168,6 +173,9 @@ pub(crate) enum ObserverChoice {
     /// Reduced-order, rigid driveline, certified gains
     #[value(alias = "iss")]
     Rigid,
+    /// Reduced-order, rigid driveline, gains with the smallest bound at the log's sample time; open loop where no
+    /// gain beats it
+    PeakToPeak,
     /// Reduced-order with elastic drive shafts, certified gains; needs wheel_speed_rad_s, gives shaft torque too
     Compliant,
     /// Full-order sliding mode, gains from the sliding condition

@@ -192,7 +192,7 @@ fn every_observer_runs_on_a_log() {
     wetclutch(&["demo", "-o", &folder.path("demo")]);
     let log = folder.path("demo/measured.csv");
     let mut outputs = Vec::new();
-    for observer in ["rigid", "compliant", "sliding", "open-loop"] {
+    for observer in ["rigid", "peak-to-peak", "compliant", "sliding", "open-loop"] {
         let output = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--observer", observer]);
         assert!(output.status.success(), "{observer}: {}", stderr(&output));
         let text = stdout(&output);
@@ -200,8 +200,9 @@ fn every_observer_runs_on_a_log() {
         assert_eq!(text.lines().count(), 9502);
         outputs.push(text);
     }
+    outputs.sort();
     outputs.dedup();
-    assert_eq!(outputs.len(), 4, "four observers, four estimates");
+    assert_eq!(outputs.len(), 5, "five observers, five estimates");
 }
 
 #[test]
@@ -255,6 +256,8 @@ fn design_serves_every_observer() {
     };
     assert!(printed("compliant").contains("offset bound 0.1769 MPa"), "{}", printed("compliant"));
     assert!(printed("sliding").contains("1923"), "{}", printed("sliding"));
+    let text = printed("peak-to-peak");
+    assert!(text.contains("torque phase: no gain has a smaller bound than open loop, which is used"), "{text}");
     let output = wetclutch(&["design", VEHICLE, "--observer", "compliant", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(json["torque_phase"]["gain_normalised"].as_array().unwrap().len(), 2);

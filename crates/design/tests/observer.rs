@@ -3,7 +3,10 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 use config::Vehicle;
-use design::{compliant_observer, design_compliant, design_rigid, design_sliding, rigid_observer, sliding_observer};
+use design::{
+    compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding, rigid_observer,
+    sliding_observer,
+};
 use drivetrain::Valve;
 use observer::{Discretisation, Estimator, Health, Input, Phase, RigidGains, RigidObserver, RigidState};
 use proptest::prelude::*;
@@ -104,6 +107,74 @@ proptest! {
         survives(&observer(), &samples)?;
         survives(&compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains()), &samples)?;
         survives(&sliding_observer(&vehicle, design_sliding(&vehicle)), &samples)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// The peak-to-peak certificate in simulation: whatever torques, readings and valve do within their
+    /// bounds, the error stays below what is left of the first one and the certified bound.
+    #[test]
+    fn prop_the_peak_to_peak_bound_holds_in_simulation(
+        inertia in any::<bool>(),
+        initial in -0.2e6..0.2e6_f64,
+        errors in prop::collection::vec((-1.0..1.0_f64, -1.0..1.0_f64, -1.0..1.0_f64, -1.0..1.0_f64, any::<bool>()), 60),
+    ) {
+        const T: f64 = 0.01;
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let bounds = vehicle.error_bounds;
+        let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
+        let certificates = [Phase::TorquePhase, Phase::InertiaPhase].map(|p| design_peak_to_peak(&vehicle, p, T).unwrap());
+        let certificate = &certificates[usize::from(inertia)];
+        let gains = RigidGains {
+            torque_phase_pa_s_rad: certificates[0].gain_pa_s_rad[0],
+            inertia_phase_pa_s_rad: certificates[1].gain_pa_s_rad,
+        };
+        let observer = rigid_observer(&vehicle, gains);
+        let model = observer.model;
+        let (command, mut speeds) = (0.25, if inertia { [340.0, 300.0] } else { [360.0, 360.0] });
+        let mut state = observer.start();
+        for dt in [0.0, 10.0, 1e-9] {
+            observer.step(&mut state, &input(dt, speeds[0], speeds[1], command));
+        }
+        let start = observer.step(&mut state, &input(1e-9, speeds[0], speeds[1], command));
+        prop_assert_eq!(start.phase, phase);
+        let mut pressure = start.pressure_pa + initial;
+        let valve = model.valve.linear(command);
+        let phi = (valve.a22_per_s * T).exp();
+        let psi = (phi - 1.0) / valve.a22_per_s;
+        let gam2 = (psi - T) / valve.a22_per_s;
+        let mut left = initial.abs();
+        for (turbine, output, reading, v, pulsed) in errors {
+            // Now and then the worst case at once: everything at its limit.
+            let worst = |x: f64| if pulsed { x.signum() } else { x };
+            let rows = model.coefficients(phase);
+            let torques = drivetrain::ShiftTorques {
+                turbine_n_m: worst(turbine) * bounds.turbine_torque_n_m,
+                output_n_m: worst(output) * bounds.output_torque_n_m,
+                ..Default::default()
+            };
+            let w = [rows.turbine.at(&torques), rows.slip_oncoming.at(&torques)];
+            let n = [bounds.turbine_change_rad_s, bounds.slip_change_rad_s].map(|q| worst(reading) * q);
+            let m = model.speed_model(phase, ENGINE_RAD_S, speeds[0], speeds[1]);
+            let integral = psi * pressure + gam2 * valve.b2_pa_s;
+            for i in 0..2 {
+                speeds[i] += T * (m.free_rad_s2[i] + w[i]) + m.per_pressure_rad_s2_pa[i] * integral + n[i];
+            }
+            if !inertia {
+                speeds[1] = speeds[0];
+            }
+            pressure = phi * pressure + psi * valve.b2_pa_s + worst(v) * psi * bounds.valve_rate_pa_s;
+            let estimate = observer.step(&mut state, &input(T, speeds[0], speeds[1], command));
+            if estimate.phase != phase || speeds[1] < 20.0 {
+                break;
+            }
+            left *= certificate.contraction;
+            let error = (pressure - estimate.pressure_pa).abs();
+            // One pascal for rounding.
+            prop_assert!(error <= left + certificate.bound_pa + 1.0, "{error} > {left} + {}", certificate.bound_pa);
+        }
     }
 }
 

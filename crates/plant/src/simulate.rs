@@ -121,6 +121,9 @@ fn initial_state(powertrain: &Powertrain, experiment: &Experiment) -> State {
     }
 }
 
+/// Times closer than this are the same instant, s: sums of periods differ in their last bits.
+const SAME_INSTANT_S: f64 = 1e-9;
+
 /// Takes samples out of the steps.
 struct Recorder<'a> {
     next: u32,
@@ -136,13 +139,17 @@ impl Recorder<'_> {
         segment: &Segment<'_>,
         record: &mut impl FnMut(&Sample),
     ) {
-        // A sample on the border of two steps belongs to the first, except the one at time zero.
+        // A sample on the border of two steps belongs to the second: at the instant of a new command it shows
+        // that command, as the controller that gave it would log it. Only the very last has no second.
+        let duration_s = self.experiment.duration_s;
+        let last = segment.end_s > duration_s - SAME_INSTANT_S;
+        let until_s = if last { duration_s + SAME_INSTANT_S } else { segment.end_s - SAME_INSTANT_S };
         loop {
             let time_s = f64::from(self.next) * self.experiment.sample_time_s;
-            if time_s > segment.end_s.min(self.experiment.duration_s + 1e-9) {
+            if time_s > until_s {
                 return;
             }
-            let state = segment.at(time_s.max(segment.start_s));
+            let state = segment.at(time_s.clamp(segment.start_s, segment.end_s));
             let torques = powertrain.torques(segment.mode, &state, segment.inputs);
             let shift = &powertrain.vehicle.shift;
             record(&Sample {

@@ -164,7 +164,8 @@ impl Figure {
             }
         }
         let mut labels = Vec::new();
-        for series in &panel.series {
+        // The first series lies on top.
+        for series in panel.series.iter().rev() {
             let points = visible(&series.points);
             let last_value = points.iter().rev().map(|p| p.1).find(|v| v.is_finite());
             labels.extend(last_value.map(|v| (map_y(v.clamp(low, high)), series)));

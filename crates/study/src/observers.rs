@@ -3,9 +3,10 @@
 use config::{GivenGains, ObserverEntry, ObserverKind, Vehicle};
 use design::compliant::physical_gains;
 use design::{
-    DesignError, compliant_observer, design_compliant, design_rigid, design_sliding, rigid_observer, sliding_observer,
+    DesignError, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding,
+    rigid_observer, sliding_observer,
 };
-use observer::{CompliantObserver, Discretisation, Estimate, RigidGains, RigidObserver, SlidingObserver};
+use observer::{CompliantObserver, Discretisation, Estimate, Phase, RigidGains, RigidObserver, SlidingObserver};
 
 use crate::{RunColumns, run};
 
@@ -21,14 +22,22 @@ pub enum AnyObserver {
 }
 
 impl AnyObserver {
-    /// The observer of this kind with designed gains and exact discretisation.
+    /// The observer of this kind for this sample time, with designed gains and exact discretisation.
     ///
     /// # Errors
     /// There are no gains for what the vehicle file requires.
-    pub fn designed(vehicle: &Vehicle, kind: ObserverKind) -> Result<Self, DesignError> {
+    pub fn designed(vehicle: &Vehicle, kind: ObserverKind, sample_time_s: f64) -> Result<Self, DesignError> {
         Ok(match kind {
             ObserverKind::OpenLoop => Self::Rigid(rigid_observer(vehicle, RigidGains::open_loop())),
             ObserverKind::Rigid => Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains())),
+            ObserverKind::PeakToPeak => {
+                let phase = |phase| design_peak_to_peak(vehicle, phase, sample_time_s);
+                let gains = RigidGains {
+                    torque_phase_pa_s_rad: phase(Phase::TorquePhase)?.gain_pa_s_rad[0],
+                    inertia_phase_pa_s_rad: phase(Phase::InertiaPhase)?.gain_pa_s_rad,
+                };
+                Self::Rigid(rigid_observer(vehicle, gains))
+            }
             ObserverKind::Compliant => {
                 Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
             }
@@ -42,7 +51,7 @@ impl AnyObserver {
     /// Gains are to be designed, and there are none for what the vehicle file requires.
     pub fn of(vehicle: &Vehicle, entry: &ObserverEntry) -> Result<Self, DesignError> {
         let observer = match entry.gains {
-            None => Self::designed(vehicle, entry.kind)?,
+            None => Self::designed(vehicle, entry.kind, entry.sample_time_s)?,
             Some(GivenGains::Rigid(gains)) => Self::Rigid(rigid_observer(vehicle, gains)),
             Some(GivenGains::Sliding(gains)) => Self::Sliding(sliding_observer(vehicle, gains)),
             Some(GivenGains::CompliantNormalised(torque, inertia)) => {

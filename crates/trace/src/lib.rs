@@ -111,6 +111,13 @@ impl Trace {
         Self { columns: self.columns.iter().filter(|column| keep(&column.name)).cloned().collect(), ..self.clone() }
     }
 
+    /// Median time between two samples, s; 10 ms where there are fewer than two.
+    pub fn median_step_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(0.01)
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()

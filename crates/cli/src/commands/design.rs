@@ -3,7 +3,10 @@
 use config::Vehicle;
 use design::compliant::{CompliantRequirement, compliant_requirement, design_compliant_phase};
 use design::rigid::design_phase;
-use design::{Certificate, CompliantCertificate, DesignError, IssRequirement, design_sliding, requirement};
+use design::{
+    Certificate, CompliantCertificate, DesignError, IssRequirement, PeakToPeakCertificate, design_peak_to_peak,
+    design_sliding, requirement,
+};
 use observer::Phase;
 use report::tables::phase_name;
 use serde_json::{Map, Value, json};
@@ -34,6 +37,10 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
                 let required = replaced_compliant(compliant_requirement(&vehicle, phase), options);
                 let certificate = design_compliant_phase(&vehicle, phase, &required).map_err(failed)?;
                 (serde_json::to_value(&certificate)?, compliant_lines(phase, &certificate))
+            }
+            DesignChoice::PeakToPeak => {
+                let certificate = design_peak_to_peak(&vehicle, phase, options.sample_time).map_err(failed)?;
+                (serde_json::to_value(&certificate)?, peak_to_peak_lines(phase, &certificate))
             }
             DesignChoice::Sliding => sliding(&vehicle, phase),
         };
@@ -113,6 +120,35 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate) -> Vec<Stri
         ),
     ];
     lines.extend(vertex_lines(vertices));
+    lines
+}
+
+fn peak_to_peak_lines(phase: Phase, certificate: &PeakToPeakCertificate) -> Vec<String> {
+    let [first, second] = certificate.gain_pa_s_rad;
+    let name = phase_name(phase);
+    let mut lines = vec![if certificate.open_loop {
+        format!("{name}: no gain has a smaller bound than open loop, which is used")
+    } else {
+        format!("{name}: L = ({first:.1}, {second:.1}) Pa s/rad on turbine speed and slip")
+    }];
+    lines.push(format!(
+        "  bound {:.4} MPa, open loop {:.4} MPa, at a sample time of {} s, valve error included",
+        units::mpa(certificate.bound_pa),
+        units::mpa(certificate.open_loop_bound_pa),
+        certificate.sample_time_s,
+    ));
+    lines.extend(
+        certificate
+            .contributions
+            .iter()
+            .map(|part| format!("    of which {}: {:.4} MPa", part.cause, units::mpa(part.bound_pa))),
+    );
+    lines.push("  certificate, evaluated apart from the solver for the gain in single precision:".to_owned());
+    lines.extend(
+        (certificate.vertices.iter())
+            .map(|v| format!("    {}: a sample multiplies the error by {:.4}", v.vertex.label, v.factor)),
+    );
+    lines.push(String::new());
     lines
 }
 

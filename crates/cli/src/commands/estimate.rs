@@ -18,6 +18,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let columns = RunColumns::of(&log, &vehicle)?;
     let kind = match options.observer {
         ObserverChoice::Rigid => ObserverKind::Rigid,
+        ObserverChoice::PeakToPeak => ObserverKind::PeakToPeak,
         ObserverChoice::Compliant => ObserverKind::Compliant,
         ObserverChoice::Sliding => ObserverKind::Sliding,
         ObserverChoice::OpenLoop => ObserverKind::OpenLoop,
@@ -25,7 +26,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     if kind == ObserverKind::Compliant {
         log.require(signal::WHEEL_SPEED)?;
     }
-    let estimates = AnyObserver::designed(&vehicle, kind)?.run(&columns);
+    let estimates = AnyObserver::designed(&vehicle, kind, log.median_step_s())?.run(&columns);
     let result = estimates_trace(&log.time_s, &estimates);
     match &options.output {
         Some(path) => write_csv(path, &result)?,

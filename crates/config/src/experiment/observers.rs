@@ -12,8 +12,10 @@ use crate::check::Check;
 pub enum ObserverKind {
     /// The valve model alone.
     OpenLoop,
-    /// Rigid reduced-order observer.
+    /// Rigid reduced-order observer, gains by the chapter's five steps.
     Rigid,
+    /// The same observer, gains with the smallest bound on the sampled error, valve error included.
+    PeakToPeak,
     /// Reduced-order observer with elastic drive shafts.
     Compliant,
     /// Full-order sliding-mode observer.
@@ -170,6 +172,7 @@ pub(super) fn observer(
         kind: match raw.kind {
             RawKind::OpenLoop => ObserverKind::OpenLoop,
             RawKind::Rigid => ObserverKind::Rigid,
+            RawKind::PeakToPeak => ObserverKind::PeakToPeak,
             RawKind::Compliant => ObserverKind::Compliant,
             RawKind::Sliding => ObserverKind::Sliding,
         },

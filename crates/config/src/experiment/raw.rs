@@ -71,6 +71,7 @@ pub(super) struct RawObserver {
 pub(super) enum RawKind {
     OpenLoop,
     Rigid,
+    PeakToPeak,
     Compliant,
     Sliding,
 }

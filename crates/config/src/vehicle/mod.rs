@@ -74,6 +74,14 @@ pub struct ErrorBounds {
     pub grade_rad: f64,
     /// Largest drive-shaft torque of a shift, N m: a mass error acts in its proportion.
     pub shaft_torque_n_m: f64,
+    /// Torque at the gearbox output that the rigid model leaves out (torsion, tyre slip, grade), N m.
+    pub output_torque_n_m: f64,
+    /// Rate of the pressure that the valve model leaves out, Pa/s.
+    pub valve_rate_pa_s: f64,
+    /// Error of the change of the turbine speed from one sample to the next, rad/s.
+    pub turbine_change_rad_s: f64,
+    /// Error of the change of the slip from one sample to the next, rad/s.
+    pub slip_change_rad_s: f64,
 }
 
 /// A vehicle: everything the plant, the observers and the design need to know.
@@ -409,5 +417,9 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
         grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
         shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
+        output_torque_n_m: number("output_torque_n_m", &raw.output_torque_n_m, 0.0..=50e3)?,
+        valve_rate_pa_s: number("valve_rate_pa_s", &raw.valve_rate_pa_s, 0.0..=1e9)?,
+        turbine_change_rad_s: number("turbine_change_rad_s", &raw.turbine_change_rad_s, 0.0..=50.0)?,
+        slip_change_rad_s: number("slip_change_rad_s", &raw.slip_change_rad_s, 0.0..=50.0)?,
     })
 }
