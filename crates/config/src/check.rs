@@ -99,8 +99,14 @@ impl Check<'_> {
     }
 }
 
+/// A value that misses its range by less than this factor is in the right unit, and just wrong.
+const WRONG_UNIT_FACTOR: f64 = 3.0;
+
 /// The unit in which the value would make sense.
 fn unit_hint(key: &str, value: f64, range: &RangeInclusive<f64>) -> Option<String> {
+    if value <= WRONG_UNIT_FACTOR * range.end() && value >= range.start() / WRONG_UNIT_FACTOR {
+        return None;
+    }
     let name = key.split('[').next().unwrap_or(key);
     // The longest suffix that fits is the key's unit: `_rad_s` is not `_s`.
     let unit =
@@ -139,5 +145,7 @@ mod tests {
         assert_eq!(hint("design.offset_max_pa", 0.05, 1e3..=1e6), "0.05 MPa is 50000 Pa");
         assert_eq!(hint("throttle.position[2]", 22.0, 0.0..=1.0), "22 % is 0.22 as a fraction");
         assert_eq!(hint("clutch.b.friction_faces", 300.0, 1.0..=20.0), "");
+        assert_eq!(hint("shift.request_s", 7.4, 0.0..=5.0), "");
+        assert_eq!(hint("shift.request_s", 7400.0, 0.0..=9.5), "7400 ms is 7.4 s");
     }
 }

@@ -191,6 +191,14 @@ mod tests {
     }
 
     #[test]
+    fn a_word_among_numbers_is_named_with_its_row() {
+        let path = file("word", "time_s,turbine_speed_rad_s\n0,1\n1,\n2,n/a\n");
+        let message = read_csv(&path).unwrap().require("turbine_speed_rad_s").unwrap_err().to_string();
+        assert!(message.contains("column `turbine_speed_rad_s` holds `n/a` (row 3), which is no number"), "{message}");
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
     fn a_missing_signal_names_the_one_that_looks_near() {
         let path = file("near", "time_s,turbine_speed\n0,1\n");
         let message = read_csv(&path).unwrap().require("turbine_speed_rad_s").unwrap_err().to_string();

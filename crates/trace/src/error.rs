@@ -31,6 +31,18 @@ pub enum TraceError {
         /// What is wrong.
         message: String,
     },
+    /// A signal that is needed holds something else than numbers.
+    #[error("{}: column `{column}` holds `{text}` (row {row}), which is no number\nhint: leave a lost sample empty", path.display())]
+    NotNumbers {
+        /// The file.
+        path: PathBuf,
+        /// The signal.
+        column: String,
+        /// Row of the first cell that is no number, counted from 1 below the names.
+        row: usize,
+        /// What stands there.
+        text: String,
+    },
     /// A signal that is needed is not there.
     #[error("{}: there is no column `{wanted}`\nhint: {}", path.display(), column_hint(wanted, present))]
     MissingColumn {

@@ -98,11 +98,21 @@ impl Trace {
     /// # Errors
     /// There is no such column, or it holds words.
     pub fn require(&self, name: &str) -> Result<&[f64], TraceError> {
-        self.get(name).ok_or_else(|| TraceError::MissingColumn {
-            path: self.path.clone().unwrap_or_default(),
-            wanted: name.to_owned(),
-            present: self.columns.iter().map(|column| column.name.clone()).collect(),
-        })
+        let path = || self.path.clone().unwrap_or_default();
+        match self.columns.iter().find(|column| column.name == name).map(|column| &column.values) {
+            Some(Values::Numbers(numbers)) => Ok(numbers),
+            Some(Values::Words(words)) => {
+                let is_number = |word: &String| word.is_empty() || word.parse::<f64>().is_ok();
+                let first = words.iter().position(|word| !is_number(word)).unwrap_or(0);
+                let text = words.get(first).cloned().unwrap_or_default();
+                Err(TraceError::NotNumbers { path: path(), column: name.to_owned(), row: first + 1, text })
+            }
+            None => Err(TraceError::MissingColumn {
+                path: path(),
+                wanted: name.to_owned(),
+                present: self.columns.iter().map(|column| column.name.clone()).collect(),
+            }),
+        }
     }
 
     /// The same trace with only those columns that `keep` names.

@@ -7,10 +7,10 @@ use report::Page;
 use report::page::findings;
 use report::tables::phase_name;
 use study::{Comparison, compare, estimates_trace};
-use trace::{signal, units, write_csv};
+use trace::{signal, units};
 
 use crate::args::Demo;
-use crate::commands::write_text;
+use crate::commands::{write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
 
@@ -26,10 +26,10 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
         write_text(&folder.join(name), svg)?;
     }
     let trace = &comparison.trace;
-    write_csv(&folder.join("trace.csv"), trace)?;
-    write_csv(&folder.join("measured.csv"), &trace.filtered(|name| signal::MEASURABLE.contains(&name)))?;
+    write_trace(&folder.join("trace.csv"), trace)?;
+    write_trace(&folder.join("measured.csv"), &trace.filtered(|name| signal::MEASURABLE.contains(&name)))?;
     let rigid = &comparison.runs[0];
-    write_csv(&folder.join("estimate.csv"), &estimates_trace(&rigid.time_s, &rigid.estimates))?;
+    write_trace(&folder.join("estimate.csv"), &estimates_trace(&rigid.time_s, &rigid.estimates))?;
 
     print(&comparison, &folder.join("report.html"))
 }

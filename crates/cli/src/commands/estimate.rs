@@ -6,9 +6,10 @@ use config::{ObserverKind, Vehicle};
 use observer::{Estimate as Sample, Health};
 use report::tables::phase_name;
 use study::{AnyObserver, RunColumns, estimates_trace, score, true_phases};
-use trace::{Trace, read_csv, signal, units, write_csv};
+use trace::{Trace, read_csv, signal, units};
 
 use crate::args::{Estimate, ObserverChoice};
+use crate::commands::write_trace;
 use crate::failure::Failure;
 use crate::output;
 
@@ -29,7 +30,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let estimates = AnyObserver::designed(&vehicle, kind, log.median_step_s())?.run(&columns);
     let result = estimates_trace(&log.time_s, &estimates);
     match &options.output {
-        Some(path) => write_csv(path, &result)?,
+        Some(path) => write_trace(path, &result)?,
         None => trace::csv_file::write_rows(&mut std::io::stdout().lock() as &mut dyn Write, &result)?,
     }
     report_on(&log, &estimates);

@@ -16,7 +16,15 @@ pub(crate) use simulate::simulate;
 
 use std::path::Path;
 
+use trace::Trace;
+
 use crate::failure::Failure;
+
+/// Writes a trace as a comma-separated file, whole or not at all.
+fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
+    // A file that cannot be written is no fault of the input.
+    trace::write_csv(path, trace).map_err(|error| Failure::Work(error.to_string()))
+}
 
 /// Writes a text file, whole or not at all.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {

@@ -2,9 +2,10 @@
 
 use config::{Experiment, Vehicle};
 use study::{ShiftQuality, simulate_drive};
-use trace::{signal, write_csv};
+use trace::signal;
 
 use crate::args::Simulate;
+use crate::commands::write_trace;
 use crate::failure::Failure;
 use crate::output;
 
@@ -15,8 +16,8 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     let name = experiment.name.to_lowercase();
     let whole = options.output.join(format!("{name}.csv"));
     let measured = options.output.join(format!("{name}_measured.csv"));
-    write_csv(&whole, &trace)?;
-    write_csv(&measured, &trace.filtered(|name| signal::MEASURABLE.contains(&name)))?;
+    write_trace(&whole, &trace)?;
+    write_trace(&measured, &trace.filtered(|name| signal::MEASURABLE.contains(&name)))?;
     match ShiftQuality::of(&trace, &vehicle.shift) {
         Some(quality) => output::note(&format!(
             "shift: torque phase {:.3} to {:.3} s, inertia phase to {:.3} s, flare {:.1} rad/s, jerk {:.1} m/s^3",
