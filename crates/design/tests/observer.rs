@@ -261,27 +261,36 @@ fn zero_gain_is_the_valve_model_alone() {
 
 #[test]
 fn single_precision_follows_double_precision() {
-    let (double, mut car) = (observer(), Car::start(Phase::InertiaPhase, 0.1e6));
-    let single = double.cast::<f32>();
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let compliant = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
+    assert_single_follows_double(&observer(), &observer().cast::<f32>(), 5.0);
+    // Its gain on the wheel speed is ten times as large, and so is what rounding a speed costs.
+    assert_single_follows_double(&compliant, &compliant.cast::<f32>(), 50.0);
+}
+
+/// A speed of 340 rad/s is rounded to 3e-5 rad/s, which a gain of 1527 Pa s/rad makes 0.05 Pa a sample;
+/// pressures are rounded to 0.03 Pa.
+fn assert_single_follows_double(double: &impl Estimator<f64>, single: &impl Estimator<f32>, tolerance_pa: f64) {
+    let mut car = Car::start(Phase::InertiaPhase, 0.1e6);
     let (mut a, mut b) = (double.start(), single.start());
     for n in 0..500 {
         car.step([100.0, -200.0]);
         let dt = if n == 1 { 10.0 } else { 0.01 };
-        let x = input(dt, car.speeds[0], car.speeds[1], car.command);
+        let wheel_rad_s = (car.speeds[0] - 0.6 * car.speeds[1]) / 3.0;
+        let x = Input { wheel_rad_s, ..input(dt, car.speeds[0], car.speeds[1], car.command) };
         #[expect(clippy::cast_possible_truncation, reason = "single precision is what is tested")]
         let y = Input {
             dt_s: x.dt_s as f32,
             engine_rad_s: x.engine_rad_s as f32,
             turbine_rad_s: x.turbine_rad_s as f32,
             slip_rad_s: x.slip_rad_s as f32,
-            wheel_rad_s: f32::NAN,
+            wheel_rad_s: x.wheel_rad_s as f32,
             command: x.command as f32,
         };
         let (x, y) = (double.step(&mut a, &x), single.step(&mut b, &y));
         assert_eq!(x.phase, y.phase);
-        // A speed of 340 rad/s is rounded to 3e-5 rad/s, which a gain of 1527 Pa s/rad makes 0.05 Pa a
-        // sample; pressures are rounded to 0.03 Pa.
-        assert!((x.pressure_pa - f64::from(y.pressure_pa)).abs() < 5.0, "{n}: {} {}", x.pressure_pa, y.pressure_pa);
+        let difference = (x.pressure_pa - f64::from(y.pressure_pa)).abs();
+        assert!(difference < tolerance_pa, "{n}: {} {}", x.pressure_pa, y.pressure_pa);
     }
 }
 

@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 use crate::compliant_model::{CompliantSpeedModel, OUTPUTS};
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Tracker, TrackerState};
+use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Track, Tracker};
 
 /// Gains of the compliant observer on `(w_t, dw, w_w)`: first row for the shaft torque, N m per rad/s, second
 /// row for the pressure, Pa per rad/s. In the torque phase the slip is no output and its column is zero.
@@ -43,11 +43,8 @@ pub struct CompliantObserver<T> {
 /// Memory of a [`CompliantObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompliantState<T> {
-    tracker: TrackerState<T>,
-    pressure_pa: T,
+    track: Track<T, Sample<T>>,
     shaft_torque_n_m: Option<T>,
-    clutch_torque_n_m: T,
-    last: Option<Sample<T>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,19 +60,13 @@ impl<T: Real> Estimator<T> for CompliantObserver<T> {
     type State = CompliantState<T>;
 
     fn start(&self) -> CompliantState<T> {
-        CompliantState {
-            tracker: TrackerState::new(),
-            pressure_pa: T::zero(),
-            shaft_torque_n_m: None,
-            clutch_torque_n_m: T::zero(),
-            last: None,
-        }
+        CompliantState { track: Track::new(), shaft_torque_n_m: None }
     }
 
     #[inline]
     fn step(&self, state: &mut CompliantState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(mut interval) = self.tracker.begin(&mut state.tracker, input) else {
-            return self.report(state, Health::TimeRejected);
+        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
+            return state.track.estimate(state.shaft_torque_n_m, Health::TimeRejected);
         };
         if !self.tracker.limits.wheel_valid(input) {
             interval.health = Health::SpeedsRejected;
@@ -84,9 +75,9 @@ impl<T: Real> Estimator<T> for CompliantObserver<T> {
         self.advance(state, &interval, speeds);
         match speeds {
             Some(speeds) => self.observe(state, interval.dt_s, input, speeds),
-            None => state.last = None,
+            None => state.track.last = None,
         }
-        self.report(state, interval.health)
+        state.track.estimate(state.shaft_torque_n_m, interval.health)
     }
 }
 
@@ -105,9 +96,9 @@ impl<T: Real> CompliantObserver<T> {
     #[inline]
     fn advance(&self, state: &mut CompliantState<T>, interval: &Interval<T>, speeds: Option<[T; OUTPUTS]>) {
         let dt = interval.dt_s;
-        let pressure_integral = interval.pressure_integral(state.pressure_pa);
-        state.pressure_pa = interval.pressure(state.pressure_pa);
-        let (Some(last), Some(shaft)) = (state.last, state.shaft_torque_n_m) else { return };
+        let pressure_integral = interval.pressure_integral(state.track.pressure_pa);
+        state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
+        let (Some(last), Some(shaft)) = (state.track.last, state.shaft_torque_n_m) else { return };
         let mut predicted = shaft + dt * last.shaft_rate;
         match (self.gains_of(last.phase), speeds) {
             (Some(gain), Some(speeds)) => {
@@ -120,7 +111,7 @@ impl<T: Real> CompliantObserver<T> {
                         - per_shaft * shaft_integral
                         - per_pressure * pressure_integral;
                     predicted = predicted + gain[0][i] * unpredicted;
-                    state.pressure_pa = state.pressure_pa + gain[1][i] * unpredicted;
+                    state.track.pressure_pa = state.track.pressure_pa + gain[1][i] * unpredicted;
                 }
             }
             (None, _) => {
@@ -137,27 +128,18 @@ impl<T: Real> CompliantObserver<T> {
     fn observe(&self, state: &mut CompliantState<T>, dt: T, input: &Input<T>, speeds: [T; OUTPUTS]) {
         let engine = input.engine_rad_s;
         let [turbine, slip, wheel] = speeds;
-        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
+        let (_, acting) = self.tracker.phase(&mut state.track.tracker, dt, input);
         let steady_n_m = self.model.steady_shaft_torque(acting, engine, turbine, wheel);
         state.shaft_torque_n_m = state.shaft_torque_n_m.or(Some(steady_n_m));
-        state.last = Some(Sample {
+        state.track.last = Some(Sample {
             phase: acting,
             speeds,
             shaft_rate: self.model.shaft_rate(turbine, slip, wheel),
             steady_n_m,
             model: self.model.speed_model(acting, engine, turbine, slip, wheel),
         });
-        state.clutch_torque_n_m = self.model.rigid.clutch_torque(acting, state.pressure_pa, engine, turbine, slip);
-    }
-
-    fn report(&self, state: &CompliantState<T>, health: Health) -> Estimate<T> {
-        Estimate {
-            pressure_pa: state.pressure_pa,
-            clutch_torque_n_m: state.clutch_torque_n_m,
-            shaft_torque_n_m: state.shaft_torque_n_m,
-            phase: state.tracker.supervisor.phase,
-            health,
-        }
+        state.track.clutch_torque_n_m =
+            self.model.rigid.clutch_torque(acting, state.track.pressure_pa, engine, turbine, slip);
     }
 
     /// The same observer in another precision.

@@ -18,9 +18,9 @@ pub mod tracker;
 
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
-pub use rigid::{RigidGains, RigidObserver, RigidState};
+pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
 pub use signals::{Estimate, Estimator, Health, Input, InputLimits};
-pub use sliding::{SlidingGains, SlidingObserver, SlidingState};
+pub use sliding::{SlidingGains, SlidingObserver, SlidingSample, SlidingState};
 pub use supervisor::{Phase, Supervisor, SupervisorState};
-pub use tracker::{Discretisation, Interval, Tracker, TrackerState};
+pub use tracker::{Discretisation, Interval, Track, Tracker, TrackerState};

@@ -2,7 +2,7 @@
 
 use drivetrain::Real;
 
-use crate::{Estimate, Estimator, Health, Input, Interval, Phase, RigidModel, SpeedModel, Tracker, TrackerState};
+use crate::{Estimate, Estimator, Health, Input, Interval, Phase, RigidModel, SpeedModel, Track, Tracker};
 
 /// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,46 +65,27 @@ pub struct RigidObserver<T> {
 }
 
 /// Memory of a [`RigidObserver`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RigidState<T> {
-    tracker: TrackerState<T>,
-    pressure_pa: T,
-    clutch_torque_n_m: T,
-    last: Option<Sample<T>>,
-}
+pub type RigidState<T> = Track<T, RigidSample<T>>;
 
 /// The speeds of the last usable sample and what the model said there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Sample<T> {
+pub struct RigidSample<T> {
     phase: Phase,
     speeds: [T; 2],
     model: SpeedModel<T>,
-}
-
-impl<T: Real> RigidState<T> {
-    /// An empty cylinder before the shift.
-    pub fn new() -> Self {
-        Self { tracker: TrackerState::new(), pressure_pa: T::zero(), clutch_torque_n_m: T::zero(), last: None }
-    }
-}
-
-impl<T: Real> Default for RigidState<T> {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 impl<T: Real> Estimator<T> for RigidObserver<T> {
     type State = RigidState<T>;
 
     fn start(&self) -> RigidState<T> {
-        RigidState::new()
+        Track::new()
     }
 
     #[inline]
     fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
         let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
-            return self.report(state, Health::TimeRejected);
+            return state.estimate(None, Health::TimeRejected);
         };
         let speeds = interval.speeds_valid().then_some([input.turbine_rad_s, input.slip_rad_s]);
         let correction = self.correction(state, &interval, speeds);
@@ -114,7 +95,7 @@ impl<T: Real> Estimator<T> for RigidObserver<T> {
         } else {
             state.last = None;
         }
-        self.report(state, interval.health)
+        state.estimate(None, interval.health)
     }
 }
 
@@ -139,22 +120,12 @@ impl<T: Real> RigidObserver<T> {
         let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
         let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
         // Outside the shift the speeds say nothing about the pressure: no sample to correct by.
-        state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| Sample {
+        state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| RigidSample {
             phase: acting,
             speeds: [turbine, slip],
             model: self.model.speed_model(acting, engine, turbine, slip),
         });
         state.clutch_torque_n_m = self.model.clutch_torque(acting, state.pressure_pa, engine, turbine, slip);
-    }
-
-    fn report(&self, state: &RigidState<T>, health: Health) -> Estimate<T> {
-        Estimate {
-            pressure_pa: state.pressure_pa,
-            clutch_torque_n_m: state.clutch_torque_n_m,
-            shaft_torque_n_m: None,
-            phase: state.tracker.supervisor.phase,
-            health,
-        }
     }
 
     /// The same observer in another precision.

@@ -3,7 +3,7 @@
 
 use drivetrain::Real;
 
-use crate::{Estimate, Estimator, Health, Input, Phase, RigidModel, SpeedModel, Tracker, TrackerState};
+use crate::{Estimate, Estimator, Health, Input, Phase, RigidModel, SpeedModel, Track, Tracker};
 
 /// Gains of the sliding-mode observer. The pressure gains are negative where the speed falls with the
 /// pressure: in sliding the pressure error decays with `mu R N A (ks3 C13/ks1 + ...)`.
@@ -17,6 +17,19 @@ pub struct SlidingGains<T> {
     pub inertia_speed_rad_s2: [T; 2],
     /// Inertia phase: `ks3` and `ks4`, Pa/s.
     pub inertia_pressure_pa_s: [T; 2],
+}
+
+impl<T: Real> SlidingGains<T> {
+    /// The same gains in another precision.
+    pub fn cast<U: Real>(&self) -> SlidingGains<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        SlidingGains {
+            torque_speed_rad_s2: to(self.torque_speed_rad_s2),
+            torque_pressure_pa_s: to(self.torque_pressure_pa_s),
+            inertia_speed_rad_s2: self.inertia_speed_rad_s2.map(to),
+            inertia_pressure_pa_s: self.inertia_pressure_pa_s.map(to),
+        }
+    }
 }
 
 /// The sliding-mode observer on the rigid model.
@@ -34,16 +47,11 @@ pub struct SlidingObserver<T> {
 }
 
 /// Memory of a [`SlidingObserver`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SlidingState<T> {
-    tracker: TrackerState<T>,
-    pressure_pa: T,
-    clutch_torque_n_m: T,
-    last: Option<Sample<T>>,
-}
+pub type SlidingState<T> = Track<T, SlidingSample<T>>;
 
+/// The estimated speeds at the last usable sample, their errors' signs, and what the model said there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Sample<T> {
+pub struct SlidingSample<T> {
     phase: Phase,
     /// Estimated speeds `y^`, rad/s.
     estimated: [T; 2],
@@ -56,14 +64,13 @@ impl<T: Real> Estimator<T> for SlidingObserver<T> {
     type State = SlidingState<T>;
 
     fn start(&self) -> SlidingState<T> {
-        let (tracker, zero) = (TrackerState::new(), T::zero());
-        SlidingState { tracker, pressure_pa: zero, clutch_torque_n_m: zero, last: None }
+        Track::new()
     }
 
     #[inline]
     fn step(&self, state: &mut SlidingState<T>, input: &Input<T>) -> Estimate<T> {
         let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
-            return self.report(state, Health::TimeRejected);
+            return state.estimate(None, Health::TimeRejected);
         };
         let dt = interval.dt_s;
         let before = state.pressure_pa;
@@ -83,7 +90,7 @@ impl<T: Real> Estimator<T> for SlidingObserver<T> {
         } else {
             state.last = None;
         }
-        self.report(state, interval.health)
+        state.estimate(None, interval.health)
     }
 }
 
@@ -118,7 +125,7 @@ impl<T: Real> SlidingObserver<T> {
                 error if error < T::zero() => -T::one(),
                 _ => T::zero(),
             };
-            Sample {
+            SlidingSample {
                 phase: acting,
                 estimated,
                 signs: [sign(0), sign(1)],
@@ -128,13 +135,8 @@ impl<T: Real> SlidingObserver<T> {
         state.clutch_torque_n_m = self.model.clutch_torque(acting, state.pressure_pa, engine, turbine, slip);
     }
 
-    fn report(&self, state: &SlidingState<T>, health: Health) -> Estimate<T> {
-        Estimate {
-            pressure_pa: state.pressure_pa,
-            clutch_torque_n_m: state.clutch_torque_n_m,
-            shaft_torque_n_m: None,
-            phase: state.tracker.supervisor.phase,
-            health,
-        }
+    /// The same observer in another precision.
+    pub fn cast<U: Real>(&self) -> SlidingObserver<U> {
+        SlidingObserver { model: self.model.cast(), gains: self.gains.cast(), tracker: self.tracker.cast() }
     }
 }

@@ -2,7 +2,7 @@
 
 use drivetrain::{LinearValve, Real, ReducedShift, Valve};
 
-use crate::{Health, Input, InputLimits, Phase, Supervisor, SupervisorState};
+use crate::{Estimate, Health, Input, InputLimits, Phase, Supervisor, SupervisorState};
 
 /// How the frozen dynamics are carried over a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,6 +88,36 @@ impl<T: Real> TrackerState<T> {
 impl<T: Real> Default for TrackerState<T> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// What the reduced-order and the sliding-mode observers remember alike: the pressure, and the last sample
+/// they can correct by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Track<T, S> {
+    pub(crate) tracker: TrackerState<T>,
+    pub(crate) pressure_pa: T,
+    pub(crate) clutch_torque_n_m: T,
+    pub(crate) last: Option<S>,
+}
+
+impl<T: Real, S> Track<T, S> {
+    /// An empty cylinder before the shift.
+    pub(crate) fn new() -> Self {
+        let zero = T::zero();
+        Self { tracker: TrackerState::new(), pressure_pa: zero, clutch_torque_n_m: zero, last: None }
+    }
+
+    /// The estimate as it stands.
+    #[inline]
+    pub(crate) fn estimate(&self, shaft_torque_n_m: Option<T>, health: Health) -> Estimate<T> {
+        Estimate {
+            pressure_pa: self.pressure_pa,
+            clutch_torque_n_m: self.clutch_torque_n_m,
+            shaft_torque_n_m,
+            phase: self.tracker.supervisor.phase,
+            health,
+        }
     }
 }
 
