@@ -77,6 +77,12 @@ pub(crate) enum Command {
     ///   e1.svg ... e4.svg, map_*.svg    the figures
     #[command(verbatim_doc_comment)]
     Reproduce(Reproduce),
+    /// Run all observers over many scenarios and rank them against the open loop
+    ///
+    /// Runs every observer of an experiment file on every [[scenario]] in it: at 100 Hz, behind real sensors, on the
+    /// same drives. Prints the RMS error of each in each phase, and its ratio to the open loop's.
+    #[command(verbatim_doc_comment)]
+    Bench(Bench),
     /// Check a vehicle or experiment file
     ///
     /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
@@ -190,6 +196,15 @@ pub(crate) struct Reproduce {
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-reproduction")]
     pub(crate) output: PathBuf,
     /// Print the rows as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Bench {
+    /// Experiment file with [[scenario]] tables; the built-in experiments/bench.toml if left out
+    pub(crate) experiment: Option<PathBuf>,
+    /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
 }

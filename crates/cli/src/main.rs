@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Design(options) => commands::design(&options),
         Command::Estimate(options) => commands::estimate(&options),
         Command::Reproduce(options) => commands::reproduce(&options),
+        Command::Bench(options) => commands::bench(&options),
         Command::Check(options) => commands::check(&options),
     };
     match result {

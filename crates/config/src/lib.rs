@@ -12,8 +12,8 @@ pub mod vehicle;
 
 pub use error::ConfigError;
 pub use experiment::{
-    CurrentSensor, Experiment, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile, Sensors, ShiftCalibration,
-    SpeedSensor,
+    CurrentSensor, Experiment, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile, Scenario, Sensors,
+    ShiftCalibration, SpeedSensor,
 };
 pub use source::{Kind, Source};
 pub use vehicle::{CompliantRequirement, DesignRequirement, ErrorBounds, ShiftClutch, Uncertainty, Vehicle};

@@ -3,6 +3,7 @@
 //! A simulated drive and a measured log are two sources of the same [`trace::Trace`]; [`run()`] carries an
 //! observer over either, and [`score()`] holds the estimates against the truth where there is one.
 
+pub mod bench;
 pub mod comparison;
 pub mod drive;
 pub mod observers;
@@ -11,6 +12,7 @@ pub mod sampling;
 pub mod score;
 pub mod statements;
 
+pub use bench::{Bench, bench};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use drive::{simulate_drive, true_phases};
 pub use observers::AnyObserver;

@@ -1,5 +1,6 @@
 //! One file for each subcommand.
 
+mod bench;
 mod check;
 mod demo;
 mod design;
@@ -7,6 +8,7 @@ mod estimate;
 mod reproduce;
 mod simulate;
 
+pub(crate) use bench::bench;
 pub(crate) use check::check;
 pub(crate) use demo::demo;
 pub(crate) use design::design;

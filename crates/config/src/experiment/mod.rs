@@ -9,7 +9,7 @@ use drivetrain::Table1;
 
 use crate::check::{Check, Number};
 use crate::{ConfigError, Source, Vehicle};
-use raw::{RawExperiment, RawOffNominal, RawShift};
+use raw::{RawExperiment, RawOffNominal, RawScenario, RawShift};
 
 pub use observers::{CurrentSensor, GivenGains, ObserverEntry, ObserverKind, Sensors, SpeedSensor};
 
@@ -25,10 +25,31 @@ pub struct OffNominal {
     pub converter_capacity_factor: f64,
     /// Factor on the friction of the oncoming clutch.
     pub friction_factor: f64,
+    /// Factor on the lag of both valves.
+    pub valve_lag_factor: f64,
+    /// Factor on the gain of both valves.
+    pub valve_gain_factor: f64,
+    /// Constant delay of both valves, s, if not the vehicle file's map.
+    pub valve_delay_s: Option<f64>,
     /// Mass, kg, if not the vehicle file's.
     pub mass_kg: Option<f64>,
     /// Grade, rad, if not the vehicle file's.
     pub grade_rad: Option<f64>,
+}
+
+/// A variation of an experiment, for the bench.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// Its name in tables.
+    pub name: String,
+    /// The driver's throttle, in place of the profile's last position.
+    pub throttle: Option<f64>,
+    /// Age of the speed readings, s, in place of the sensors' own.
+    pub sensor_delay_s: Option<f64>,
+    /// Factor on the noise of all sensors.
+    pub sensor_noise_factor: f64,
+    /// In what the car differs from the nominal one.
+    pub off_nominal: OffNominal,
 }
 
 /// Calibration of the shift controller.
@@ -105,6 +126,8 @@ pub struct Experiment {
     pub sensors: Option<Sensors>,
     /// The observers to be run.
     pub observers: Vec<ObserverEntry>,
+    /// Variations for the bench.
+    pub scenarios: Vec<Scenario>,
 }
 
 impl Experiment {
@@ -120,6 +143,15 @@ impl Experiment {
             read("experiments/e3.toml", include_str!("../../../../experiments/e3.toml"))?,
             read("experiments/e4.toml", include_str!("../../../../experiments/e4.toml"))?,
         ])
+    }
+
+    /// The bench, as it ships with the program.
+    ///
+    /// # Errors
+    /// As [`Self::built_in`].
+    pub fn bench() -> Result<Self, ConfigError> {
+        let text = include_str!("../../../../experiments/bench.toml");
+        Self::from_source(Source::built_in("experiments/bench.toml", text))
     }
 
     /// Experiment E1, as it ships with the program.
@@ -156,6 +188,7 @@ impl Experiment {
             vehicle: PathBuf::from(raw.vehicle.get_ref()),
             sensors: raw.sensors.as_ref().map(|sensors| observers::sensors(&check, sensors)).transpose()?,
             observers: observers.collect::<Result<_, _>>()?,
+            scenarios: raw.scenario.iter().map(|raw| scenario(&check, raw)).collect::<Result<_, _>>()?,
             duration_s,
             sample_time_s: check.number("sample_time_s", &raw.sample_time_s, 1e-5..=0.1)?,
             initial_engine_rad_s: check.number("initial.engine_rad_s", &raw.initial.engine_rad_s, 0.0..=1e3)?,
@@ -174,6 +207,31 @@ impl Experiment {
         self.source.path.parent().map_or_else(|| self.vehicle.clone(), |folder| folder.join(&self.vehicle))
     }
 
+    /// This experiment with the variations of a scenario. The shift controller has learnt the turbine torque of
+    /// the scenario's car, as one that adapts would.
+    #[must_use]
+    pub fn with_scenario(&self, scenario: &Scenario) -> Self {
+        let mut varied = self.clone();
+        varied.off_nominal = scenario.off_nominal;
+        varied.shift.torque_factor *= scenario.off_nominal.converter_capacity_factor;
+        if let Some(throttle) = scenario.throttle {
+            let (times, mut positions) = (self.throttle.axis(), self.throttle.values().to_vec());
+            if let Some(last) = positions.last_mut() {
+                *last = throttle;
+            }
+            // The times are those of a table that was checked.
+            varied.throttle = Table1::new(times, &positions).unwrap_or(self.throttle);
+        }
+        if let Some(sensors) = &mut varied.sensors {
+            for sensor in [&mut sensors.engine, &mut sensors.turbine, &mut sensors.output, &mut sensors.wheel] {
+                sensor.delay_s = scenario.sensor_delay_s.unwrap_or(sensor.delay_s);
+                sensor.noise_rad_s *= scenario.sensor_noise_factor;
+            }
+            sensors.current.noise_a *= scenario.sensor_noise_factor;
+        }
+        varied
+    }
+
     /// The car that is simulated: the nominal one with the differences applied.
     pub fn simulated_vehicle(&self, nominal: &Vehicle) -> Vehicle {
         let mut vehicle = nominal.clone();
@@ -183,6 +241,11 @@ impl Experiment {
         let oncoming = &mut vehicle.oncoming.clutch;
         oncoming.friction = oncoming.friction.scaled(change.friction_factor);
         oncoming.static_friction *= change.friction_factor;
+        for valve in [&mut vehicle.offgoing.valve, &mut vehicle.oncoming.valve] {
+            valve.time_constant_s = valve.time_constant_s.scaled(change.valve_lag_factor);
+            valve.gain_pa_a = valve.gain_pa_a.scaled(change.valve_gain_factor);
+            valve.delay_s = change.valve_delay_s.map_or(valve.delay_s, Table1::constant);
+        }
         vehicle.road.mass_kg = change.mass_kg.unwrap_or(vehicle.road.mass_kg);
         vehicle.road.grade_rad = change.grade_rad.unwrap_or(vehicle.road.grade_rad);
         vehicle
@@ -198,8 +261,24 @@ fn off_nominal(check: &Check<'_>, raw: &RawOffNominal) -> Result<OffNominal, Con
         engine_torque_factor: factor("engine_torque_factor", &raw.engine_torque_factor)?,
         converter_capacity_factor: factor("converter_capacity_factor", &raw.converter_capacity_factor)?,
         friction_factor: factor("friction_factor", &raw.friction_factor)?,
+        valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor)?,
+        valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor)?,
+        valve_delay_s: optional("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
         mass_kg: optional("mass_kg", &raw.mass_kg, 200.0..=60e3)?,
         grade_rad: optional("grade_rad", &raw.grade_rad, -0.4..=0.4)?,
+    })
+}
+
+fn scenario(check: &Check<'_>, raw: &RawScenario) -> Result<Scenario, ConfigError> {
+    let optional = |key: &str, value: &Option<Number>, range| {
+        value.as_ref().map(|value| check.number(&format!("scenario.{key}"), value, range)).transpose()
+    };
+    Ok(Scenario {
+        name: raw.name.clone(),
+        throttle: optional("throttle", &raw.throttle, 0.0..=1.0)?,
+        sensor_delay_s: optional("sensor_delay_s", &raw.sensor_delay_s, 0.0..=0.2)?,
+        sensor_noise_factor: optional("sensor_noise_factor", &raw.sensor_noise_factor, 0.0..=100.0)?.unwrap_or(1.0),
+        off_nominal: off_nominal(check, &raw.off_nominal)?,
     })
 }
 

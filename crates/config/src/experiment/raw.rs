@@ -21,6 +21,19 @@ pub(super) struct RawExperiment {
     pub(super) sensors: Option<RawSensors>,
     #[serde(default)]
     pub(super) observer: Vec<Spanned<RawObserver>>,
+    #[serde(default)]
+    pub(super) scenario: Vec<RawScenario>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawScenario {
+    pub(super) name: String,
+    pub(super) throttle: Option<Number>,
+    pub(super) sensor_delay_s: Option<Number>,
+    pub(super) sensor_noise_factor: Option<Number>,
+    #[serde(default)]
+    pub(super) off_nominal: RawOffNominal,
 }
 
 #[derive(Deserialize)]
@@ -131,6 +144,9 @@ pub(super) struct RawOffNominal {
     pub(super) engine_torque_factor: Option<Number>,
     pub(super) converter_capacity_factor: Option<Number>,
     pub(super) friction_factor: Option<Number>,
+    pub(super) valve_lag_factor: Option<Number>,
+    pub(super) valve_gain_factor: Option<Number>,
+    pub(super) valve_delay_s: Option<Number>,
     pub(super) mass_kg: Option<Number>,
     pub(super) grade_rad: Option<Number>,
 }

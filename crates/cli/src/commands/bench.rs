@@ -1,0 +1,67 @@
+//! `wetclutch bench`.
+
+use config::{Experiment, Vehicle};
+use study::bench::BenchRow;
+use trace::units;
+
+use crate::args::Bench;
+use crate::failure::Failure;
+use crate::output;
+
+pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
+    let (vehicle, experiment) = match &options.experiment {
+        Some(path) => {
+            let experiment = Experiment::read(path)?;
+            (Vehicle::read(&experiment.vehicle_path())?, experiment)
+        }
+        None => (Vehicle::two_speed_at()?, Experiment::bench()?),
+    };
+    let all = experiment.scenarios.len();
+    if all == 0 {
+        let path = experiment.source.path.display();
+        return Err(Failure::Input(format!(
+            "{path}: there is no [[scenario]] to run\nhint: see experiments/bench.toml"
+        )));
+    }
+    output::note(&format!("running {} observers on {all} scenarios", experiment.observers.len()));
+    let result = study::bench(&vehicle, &experiment, |_| ())?;
+    if options.json {
+        output::line(&serde_json::to_string_pretty(&result)?)?;
+        return Ok(());
+    }
+
+    output::line("RMS error of the pressure, MPa: torque phase / inertia phase\n")?;
+    let names = experiment.observers.iter().map(|entry| entry.name.clone());
+    let mut rows = vec![std::iter::once("scenario".to_owned()).chain(names).collect()];
+    rows.extend(result.rows.iter().map(cells));
+    output::table(1, &rows)?;
+
+    output::line("\nover the open loop's (median, worst), best in the inertia phase first\n")?;
+    let head = ["observer", "torque phase", "worst", "inertia phase", "worst", "chatter MPa"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    rows.extend(result.ranking.iter().map(|s| {
+        let ratio = |value: f64| format!("{value:.2}");
+        vec![
+            s.observer.clone(),
+            ratio(s.torque_phase_median_ratio),
+            ratio(s.torque_phase_worst_ratio),
+            ratio(s.inertia_phase_median_ratio),
+            ratio(s.inertia_phase_worst_ratio),
+            format!("{:.3}", units::mpa(s.chatter_median_pa)),
+        ]
+    }));
+    output::table(1, &rows)?;
+    let missing: Vec<&str> = result.rows.iter().filter(|row| !row.completed).map(|row| row.scenario.as_str()).collect();
+    if !missing.is_empty() {
+        output::note(&format!("not completed within the simulated time, and not ranked: {}", missing.join(", ")));
+    }
+    Ok(())
+}
+
+fn cells(row: &BenchRow) -> Vec<String> {
+    let cell = |torque: f64, inertia: f64| format!("{:.3} / {:.3}", units::mpa(torque), units::mpa(inertia));
+    let scores = row.cells.iter().map(|c| {
+        if row.completed { cell(c.torque_phase_rms_pa, c.inertia_phase_rms_pa) } else { "no shift".to_owned() }
+    });
+    std::iter::once(row.scenario.clone()).chain(scores).collect()
+}
