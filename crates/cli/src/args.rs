@@ -8,6 +8,7 @@ const EXAMPLES: &str = "\
 Examples:
   wetclutch demo                                     the whole job on the built-in car
   wetclutch reproduce                                the source chapter's experiments, row by row
+  wetclutch bench                                    all observers on many drives, ranked
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
   wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
@@ -79,7 +80,7 @@ pub(crate) enum Command {
     Reproduce(Reproduce),
     /// Run all observers over many scenarios and rank them against the open loop
     ///
-    /// Runs every observer of an experiment file on every [[scenario]] in it: at 100 Hz, behind real sensors, on the
+    /// Runs every observer of an experiment file on every scenario table in it: at 100 Hz, behind real sensors, on the
     /// same drives. Prints the RMS error of each in each phase, and its ratio to the open loop's.
     #[command(verbatim_doc_comment)]
     Bench(Bench),
@@ -202,7 +203,7 @@ pub(crate) struct Reproduce {
 
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// Experiment file with [[scenario]] tables; the built-in experiments/bench.toml if left out
+    /// Experiment file with scenario tables; the built-in experiments/bench.toml if left out
     pub(crate) experiment: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]

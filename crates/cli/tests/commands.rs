@@ -262,3 +262,15 @@ fn design_serves_every_observer() {
     let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(json["torque_phase"]["gain_normalised"].as_array().unwrap().len(), 2);
 }
+
+#[test]
+fn bench_ranks_the_observers_and_an_experiment_without_scenarios_is_told_so() {
+    let output = wetclutch(&["bench", "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert!(json["rows"].as_array().unwrap().len() >= 22);
+    assert_eq!(json["ranking"].as_array().unwrap().len(), 5);
+    let output = wetclutch(&["bench", EXPERIMENT]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("there is no [[scenario]] to run"), "{}", stderr(&output));
+}

@@ -72,3 +72,32 @@ fn sensors_change_the_estimate_and_their_seed_changes_the_noise() {
     assert!(first.run(name).unwrap().estimates != second.run(name).unwrap().estimates);
     assert_eq!(first.run("compliant").unwrap().estimates, second.run("compliant").unwrap().estimates);
 }
+
+/// The bench on some of its scenarios, with this seed for the sensors' noise.
+fn bench_with(seed: u64) -> study::Bench {
+    let mut experiment = Experiment::bench().unwrap();
+    experiment.sensors.as_mut().unwrap().seed = seed;
+    let kept = ["nominal", "throttle 40 %", "7 degrees uphill", "valve lag x 1.5", "hot oil"];
+    experiment.scenarios.retain(|scenario| kept.contains(&scenario.name.as_str()));
+    assert_eq!(experiment.scenarios.len(), kept.len());
+    study::bench(&Vehicle::two_speed_at().unwrap(), &experiment, |_| ()).unwrap()
+}
+
+#[test]
+fn the_bench_ranks_alike_whatever_the_seed() {
+    let names = |bench: &study::Bench| bench.ranking.iter().map(|s| s.observer.clone()).collect::<Vec<_>>();
+    let (first, second) = (bench_with(1), bench_with(2));
+    assert!(first.rows.iter().all(|row| row.completed));
+    assert!(first.rows != second.rows, "other noise, other numbers");
+    assert_eq!(names(&first)[0], names(&second)[0]);
+    assert_eq!(names(&first)[0], "peak-to-peak");
+}
+
+#[test]
+fn where_peak_to_peak_says_open_loop_it_is_no_worse_than_open_loop() {
+    let bench = bench_with(1);
+    let summary = bench.ranking.iter().find(|s| s.observer == "peak-to-peak").unwrap();
+    // Its torque phase is the open loop's but for samples in which the phase is seen late or early.
+    assert!(summary.torque_phase_worst_ratio < 1.05, "{}", summary.torque_phase_worst_ratio);
+    assert!(summary.inertia_phase_median_ratio < 0.6, "{}", summary.inertia_phase_median_ratio);
+}
