@@ -163,13 +163,13 @@ impl Figure {
                 ));
             }
         }
-        let mut labels = Vec::new();
+        let labels = panel.series.iter().filter_map(|series| {
+            let last = visible(&series.points).into_iter().rev().map(|p| p.1).find(|v| v.is_finite());
+            last.map(|value| (map_y(value.clamp(low, high)), series))
+        });
         // The first series lies on top.
         for series in panel.series.iter().rev() {
-            let points = visible(&series.points);
-            let last_value = points.iter().rev().map(|p| p.1).find(|v| v.is_finite());
-            labels.extend(last_value.map(|v| (map_y(v.clamp(low, high)), series)));
-            for piece in pieces(&points) {
+            for piece in pieces(&visible(&series.points)) {
                 let style = if series.dashed { LineStyle::Custom("6 3".into()) } else { LineStyle::Solid };
                 let line = LinePlot::new().with_data(piece).with_color(series.colour).with_line_style(style);
                 plots.push(Plot::Line(line.with_stroke_width(1.7)));
@@ -226,7 +226,7 @@ impl Figure {
             scene.add(text(middle, y + TOP + panel.height + 36.0, self.x_label, "#000000", TextAnchor::Middle));
         }
         let inside = (y + TOP + 4.0, y + TOP + panel.height - 2.0);
-        for (label_y, series) in spread(labels, f64::from(LABEL_SIZE) + 2.0, inside) {
+        for (label_y, series) in spread(labels.collect(), f64::from(LABEL_SIZE) + 2.0, inside) {
             scene.add(text(WIDTH - RIGHT + 7.0, label_y + 4.0, &series.label, series.colour, TextAnchor::Start));
         }
         if let Some(band) = &panel.band
