@@ -86,6 +86,8 @@ impl<T: Real> Supervisor<T> {
             Phase::BeforeShift if filled => Phase::TorquePhase,
             Phase::TorquePhase | Phase::InertiaPhase | Phase::AfterShift if released => Phase::BeforeShift,
             Phase::TorquePhase if let_go => Phase::InertiaPhase,
+            // A single noisy reading is no release, and a clutch can grip again.
+            Phase::InertiaPhase if !let_go && !small => Phase::TorquePhase,
             Phase::InertiaPhase if small && state.small_slip_s >= self.lock_hold_s => Phase::AfterShift,
             same => same,
         };
@@ -152,6 +154,12 @@ mod tests {
     fn a_standing_car_is_not_taken_for_a_locked_clutch() {
         let phases = walk(&[(0.0, 0.0, 0.0); 8]);
         assert_eq!(phases, [Phase::BeforeShift; 8]);
+    }
+
+    #[test]
+    fn a_release_that_was_none_is_taken_back() {
+        let phases = walk(&[(70e3, 0.0, 300.0), (70e3, -6.0, 300.0), (70e3, 0.5, 300.0)]);
+        assert_eq!(phases[..3], [Phase::TorquePhase, Phase::InertiaPhase, Phase::TorquePhase]);
     }
 
     #[test]
