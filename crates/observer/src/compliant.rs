@@ -66,13 +66,20 @@ impl<T: Real> Estimator<T> for CompliantObserver<T> {
     #[inline]
     fn step(&self, state: &mut CompliantState<T>, input: &Input<T>) -> Estimate<T> {
         let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
+            state.track.last = None;
             return state.track.estimate(state.shaft_torque_n_m, Health::TimeRejected);
         };
         if !self.tracker.limits.wheel_valid(input) {
             interval.health = Health::SpeedsRejected;
         }
         let speeds = interval.speeds_valid().then_some([input.turbine_rad_s, input.slip_rad_s, input.wheel_rad_s]);
+        if !interval.short {
+            // The twist is lost over a long gap, as it is unknown at the start.
+            state.shaft_torque_n_m = None;
+        }
         self.advance(state, &interval, speeds);
+        state.track.recover();
+        state.shaft_torque_n_m = state.shaft_torque_n_m.filter(|torque| torque.is_finite());
         match speeds {
             Some(speeds) => self.observe(state, interval.dt_s, input, speeds),
             None => state.track.last = None,

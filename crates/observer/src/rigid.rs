@@ -85,11 +85,15 @@ impl<T: Real> Estimator<T> for RigidObserver<T> {
     #[inline]
     fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
         let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
+            // What lies between the last sample and the next is not known: no sample to correct by.
+            state.last = None;
             return state.estimate(None, Health::TimeRejected);
         };
-        let speeds = interval.speeds_valid().then_some([input.turbine_rad_s, input.slip_rad_s]);
+        let usable = interval.speeds_valid() && interval.short;
+        let speeds = usable.then_some([input.turbine_rad_s, input.slip_rad_s]);
         let correction = self.correction(state, &interval, speeds);
         state.pressure_pa = interval.pressure(state.pressure_pa) + correction;
+        state.recover();
         if interval.speeds_valid() {
             self.observe(state, interval.dt_s, input);
         } else {

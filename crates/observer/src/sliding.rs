@@ -70,13 +70,14 @@ impl<T: Real> Estimator<T> for SlidingObserver<T> {
     #[inline]
     fn step(&self, state: &mut SlidingState<T>, input: &Input<T>) -> Estimate<T> {
         let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
+            state.last = None;
             return state.estimate(None, Health::TimeRejected);
         };
         let dt = interval.dt_s;
         let before = state.pressure_pa;
         state.pressure_pa = interval.pressure(before);
         let mut estimated = None;
-        if let Some(last) = state.last {
+        if let Some(last) = state.last.filter(|_| interval.short) {
             let (speed, pressure) = self.gains_of(last.phase);
             state.pressure_pa = state.pressure_pa + dt * (pressure[0] * last.signs[0] + pressure[1] * last.signs[1]);
             let advanced = |i: usize| {
@@ -85,6 +86,7 @@ impl<T: Real> Estimator<T> for SlidingObserver<T> {
             };
             estimated = Some((last.phase, [advanced(0), advanced(1)]));
         }
+        state.recover();
         if interval.speeds_valid() {
             self.observe(state, dt, input, estimated);
         } else {

@@ -26,6 +26,9 @@ pub struct Tracker<T> {
     pub limits: InputLimits<T>,
     /// How the valve and the pressure are carried over a sample.
     pub discretisation: Discretisation,
+    /// Longest time between two samples over which the speeds may correct the estimate, s: the model is
+    /// frozen over it, and the gains are made for short ones. Over a longer gap the valve model serves alone.
+    pub sample_max_s: T,
 }
 
 /// Memory of a [`Tracker`].
@@ -55,6 +58,8 @@ pub struct Interval<T> {
     pub gam2: T,
     /// What could be used of the sample at its end.
     pub health: Health,
+    /// Whether it is short enough to correct the estimate by the speeds at its ends.
+    pub short: bool,
 }
 
 impl<T: Real> Interval<T> {
@@ -108,6 +113,15 @@ impl<T: Real, S> Track<T, S> {
         Self { tracker: TrackerState::new(), pressure_pa: zero, clutch_torque_n_m: zero, last: None }
     }
 
+    /// Goes back to the valve model if the estimate is no number any more.
+    #[inline]
+    pub(crate) fn recover(&mut self) {
+        if !self.pressure_pa.is_finite() {
+            self.pressure_pa = self.tracker.valve_pressure_pa;
+            self.last = None;
+        }
+    }
+
     /// The estimate as it stands.
     #[inline]
     pub(crate) fn estimate(&self, shaft_torque_n_m: Option<T>, health: Health) -> Estimate<T> {
@@ -148,15 +162,16 @@ impl<T: Real> Tracker<T> {
     fn interval(&self, command: T, dt_s: T, health: Health) -> Interval<T> {
         let valve = self.valve.linear(command);
         let a = valve.a22_per_s;
+        let short = dt_s <= self.sample_max_s;
         let (phi, psi, gam2) = match self.discretisation {
-            Discretisation::Exact => {
+            Discretisation::Euler if short => (T::one() + a * dt_s, dt_s, T::zero()),
+            Discretisation::Exact | Discretisation::Euler => {
                 let phi = (a * dt_s).exp();
                 let psi = (phi - T::one()) / a;
                 (phi, psi, (psi - dt_s) / a)
             }
-            Discretisation::Euler => (T::one() + a * dt_s, dt_s, T::zero()),
         };
-        Interval { dt_s, valve, phi, psi, gam2, health }
+        Interval { dt_s, valve, phi, psi, gam2, health, short }
     }
 
     /// The phase at a sample whose speeds can be used, and the phase whose equations hold there.
@@ -177,6 +192,7 @@ impl<T: Real> Tracker<T> {
             supervisor: self.supervisor.cast(),
             limits: self.limits.cast(),
             discretisation: self.discretisation,
+            sample_max_s: U::of(self.sample_max_s.to_f64_exact()),
         }
     }
 }

@@ -36,7 +36,10 @@ impl AnyObserver {
                     torque_phase_pa_s_rad: phase(Phase::TorquePhase)?.gain_pa_s_rad[0],
                     inertia_phase_pa_s_rad: phase(Phase::InertiaPhase)?.gain_pa_s_rad,
                 };
-                Self::Rigid(rigid_observer(vehicle, gains))
+                let mut observer = rigid_observer(vehicle, gains);
+                // These gains are made for this sample time, and serve over one lost sample too.
+                observer.tracker.sample_max_s = 2.0 * sample_time_s;
+                Self::Rigid(observer)
             }
             ObserverKind::Compliant => {
                 Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
