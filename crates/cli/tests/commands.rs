@@ -274,3 +274,15 @@ fn bench_ranks_the_observers_and_an_experiment_without_scenarios_is_told_so() {
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("there is no [[scenario]] to run"), "{}", stderr(&output));
 }
+
+#[test]
+fn a_log_too_slow_for_the_gains_is_said_to_be() {
+    let folder = Folder::new("slow");
+    let rows: String = (0..20).map(|i| format!("{},2000,1900,760,0.1\n", f64::from(i) * 0.1)).collect();
+    let names = "time_s,engine_speed_rpm,turbine_speed_rpm,output_speed_rpm,oncoming_current_a\n";
+    std::fs::write(folder.path("log.csv"), format!("{names}{rows}")).unwrap();
+    let run =
+        |observer| wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "--observer", observer]);
+    assert!(stderr(&run("rigid")).contains("samples are 100 ms apart, and this observer corrects over at most 40 ms"));
+    assert!(stderr(&run("peak-to-peak")).is_empty(), "{}", stderr(&run("peak-to-peak")));
+}

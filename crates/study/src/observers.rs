@@ -74,6 +74,15 @@ impl AnyObserver {
         self
     }
 
+    /// Longest time between two samples over which the speeds correct its estimate, s.
+    pub fn sample_max_s(&self) -> f64 {
+        match self {
+            Self::Rigid(observer) => observer.tracker.sample_max_s,
+            Self::Compliant(observer) => observer.tracker.sample_max_s,
+            Self::Sliding(observer) => observer.tracker.sample_max_s,
+        }
+    }
+
     /// Runs it over every sample; one estimate for each.
     pub fn run(&self, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
         match self {

@@ -27,7 +27,16 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     if kind == ObserverKind::Compliant {
         log.require(signal::WHEEL_SPEED)?;
     }
-    let estimates = AnyObserver::designed(&vehicle, kind, log.median_step_s())?.run(&columns);
+    let observer = AnyObserver::designed(&vehicle, kind, log.median_step_s())?;
+    if log.median_step_s() > observer.sample_max_s() && kind != ObserverKind::OpenLoop {
+        output::note(&format!(
+            "samples are {:.0} ms apart, and this observer corrects over at most {:.0} ms: the valve model alone serves\n\
+             hint: `--observer peak-to-peak` designs its gains for the log's own sample time",
+            1e3 * log.median_step_s(),
+            1e3 * observer.sample_max_s(),
+        ));
+    }
+    let estimates = observer.run(&columns);
     let result = estimates_trace(&log.time_s, &estimates);
     match &options.output {
         Some(path) => write_trace(path, &result)?,
