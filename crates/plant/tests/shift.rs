@@ -44,7 +44,7 @@ fn the_shift_is_one_that_a_calibrator_would_accept() {
     assert!(filling.clone().all(|s| (s.torques.shaft_n_m / steady - 1.0).abs() < 0.1), "shuffle at the fill");
 }
 
-/// Each signal within 0.1 % of its range of a run with a ten thousand times tighter tolerance.
+/// Each signal within 0.1 % of its range of a run with a hundred thousand times tighter tolerance.
 #[test]
 fn default_tolerance_is_good_to_a_thousandth_of_each_range() {
     let (usual, tight) = (samples(&e1(), RELATIVE_TOLERANCE), samples(&e1(), 1e-10));

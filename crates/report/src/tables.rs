@@ -21,6 +21,11 @@ fn settling(score: &PhaseScore) -> String {
     score.settling_s.map_or_else(|| "never".to_owned(), |s| format!("{:.0}", 1e3 * s))
 }
 
+/// Peak, RMS and mean size of a torque error.
+fn triple(score: &PhaseScore) -> String {
+    format!("{:.1} / {:.1} / {:.1}", score.peak, score.rms, score.mean)
+}
+
 /// One row for each phase and observer.
 pub(crate) fn score_rows(comparison: &Comparison) -> Vec<Value> {
     let range_pa = comparison.experiment.shift.line_pressure_pa;
@@ -45,9 +50,8 @@ pub(crate) fn score_rows(comparison: &Comparison) -> Vec<Value> {
                 mean => cell(pressure.mean),
                 settling_ms => settling(pressure),
                 chatter => format!("{:.3}", mpa(pressure.chatter)),
-                torque_peak => format!("{:.1}", torque.peak),
-                torque_rms => format!("{:.1}", torque.rms),
-                shaft_rms => run.shaft.as_ref().map_or_else(|| "–".to_owned(), |shaft| format!("{:.0}", shaft[phase].rms)),
+                torque => triple(torque),
+                shaft => run.shaft.as_ref().map_or_else(|| "–".to_owned(), |shaft| triple(&shaft[phase])),
             });
         }
     }

@@ -13,6 +13,7 @@ use design::{
 use differential_equations::prelude::*;
 use divan::{Bencher, black_box};
 use observer::{Estimator, Input, Phase, RigidGains};
+use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::state::STATES;
 use plant::{HybridIntegrator, Inputs, Mode, Powertrain, State};
 
@@ -174,7 +175,7 @@ mod integrator {
         let problem = FirstGear { powertrain: &powertrain, mode, inputs: INPUTS };
         bencher.bench_local(|| {
             IVP::ode(&problem, 0.0, 2.0, black_box(START.to_array()))
-                .method(ExplicitRungeKutta::dopri5().rtol(1e-6).atol(1e-4))
+                .method(ExplicitRungeKutta::dopri5().rtol(RELATIVE_TOLERANCE).atol(RELATIVE_TOLERANCE))
                 .solve()
                 .unwrap()
                 .y

@@ -4,7 +4,7 @@ use config::{Experiment, Vehicle};
 use drivetrain::{Table1, Valve, ValveMaps};
 use observer::Phase;
 use serde::Serialize;
-use trace::units::mpa;
+use trace::{signal, units::mpa};
 
 use crate::{Comparison, ObserverRun, PhaseScore, StudyError, compare};
 
@@ -123,6 +123,32 @@ fn shaft_rms(comparison: &Comparison, name: &str, phase: Phase) -> f64 {
     shaft.and_then(|scores| scores.iter().find(|score| score.phase == phase)).map_or(f64::NAN, |score| score.rms)
 }
 
+/// How many times more the speeds accelerate per pressure in the inertia phase than in the torque phase.
+fn visibility(vehicle: &Vehicle) -> f64 {
+    let model = design::rigid_model(vehicle);
+    let size = |phase| {
+        let [turbine, slip] = model.influence(phase, vehicle.uncertainty.friction.0);
+        turbine.hypot(slip)
+    };
+    size(I) / size(T)
+}
+
+/// Error of the estimate at the first sample of the inertia phase, Pa.
+fn handed_over(comparison: &Comparison, name: &str) -> f64 {
+    let (Some(run), Some(quality)) = (comparison.run(name), &comparison.quality) else { return f64::NAN };
+    let at = run.time_s.partition_point(|&time| time < quality.inertia_phase_start_s);
+    run.truth_pa.get(at).map_or(f64::NAN, |truth| (truth - run.estimates[at].pressure_pa).abs())
+}
+
+/// Drive-shaft torque at the start of the load transfer, N m.
+fn shaft_before(comparison: &Comparison) -> f64 {
+    let (Some(shaft), Some(quality)) = (comparison.trace.get(signal::SHAFT_TORQUE), &comparison.quality) else {
+        return f64::NAN;
+    };
+    let at = comparison.trace.time_s.partition_point(|&time| time < quality.torque_phase_start_s);
+    shaft.get(at).copied().unwrap_or(f64::NAN)
+}
+
 /// How much lower `ours` is, %.
 fn reduction(ours: f64, theirs: f64) -> f64 {
     100.0 * (1.0 - ours / theirs)
@@ -143,15 +169,15 @@ const T: Phase = Phase::TorquePhase;
 const I: Phase = Phase::InertiaPhase;
 
 fn statements(vehicle: &Vehicle, [e1, e2, e3, e4]: &[Comparison; 4], without: &Without) -> Vec<Statement> {
-    let mut rows = nominal(e1);
-    rows.extend(off_nominal(e1, e2));
+    let mut rows = nominal(vehicle, e1);
+    rows.extend(off_nominal(e1, e2, without));
     rows.extend(sliding(vehicle, e3));
     rows.extend(compliant(e2, e4, without));
     rows.extend(offsets(e1, e2));
     rows
 }
 
-fn nominal(e1: &Comparison) -> Vec<Statement> {
+fn nominal(vehicle: &Vehicle, e1: &Comparison) -> Vec<Statement> {
     let (torque, inertia) = (of(e1, RIGID, T), of(e1, RIGID, I));
     let (open_t, open_i) = (open(e1, T), open(e1, I));
     let (peak, open_peak) = (torque.peak.max(inertia.peak), open_t.peak.max(open_i.peak));
@@ -181,7 +207,11 @@ fn nominal(e1: &Comparison) -> Vec<Statement> {
             chapter: "0.05 MPa",
             ours: format!("peak {}", in_mpa(inertia.peak)),
             verdict: verdict(inertia.peak <= 0.05e6),
-            because: format!("the peak is what the torque phase hands over; RMS {}", in_mpa(inertia.rms)),
+            because: format!(
+                "the torque phase hands over {}; RMS {}",
+                in_mpa(handed_over(e1, RIGID)),
+                in_mpa(inertia.rms)
+            ),
         },
         Statement {
             experiment: "E1",
@@ -189,7 +219,10 @@ fn nominal(e1: &Comparison) -> Vec<Statement> {
             chapter: "much better",
             ours: format!("RMS {} against {}", in_mpa(inertia.rms), in_mpa(torque.rms)),
             verdict: verdict(inertia.rms < torque.rms),
-            because: "the speeds show the pressure 124 times more weakly in the torque phase".to_owned(),
+            because: format!(
+                "the speeds show the pressure {:.0} times more weakly in the torque phase",
+                visibility(vehicle)
+            ),
         },
         Statement {
             experiment: "E1",
@@ -197,14 +230,12 @@ fn nominal(e1: &Comparison) -> Vec<Statement> {
             chapter: "acceptable; L = 0 shown beside it",
             ours: format!("RMS {} against {} open loop", in_mpa(torque.rms), in_mpa(open_t.rms)),
             verdict: verdict(torque.rms < open_t.rms),
-            because: "there it is no better than the valve model alone: nearly blind, it can only pass on what shaft \
-                      torsion does to the turbine speed"
-                .to_owned(),
+            because: "there it is no better than the valve model alone".to_owned(),
         },
     ]
 }
 
-fn off_nominal(e1: &Comparison, e2: &Comparison) -> Vec<Statement> {
+fn off_nominal(e1: &Comparison, e2: &Comparison, without: &Without) -> Vec<Statement> {
     let (torque, inertia) = (of(e2, RIGID, T), of(e2, RIGID, I));
     let nominal = of(e1, RIGID, T);
     let settled = inertia.settling_s.map_or_else(|| "never".to_owned(), |s| format!("after {:.0} ms", 1e3 * s));
@@ -215,7 +246,10 @@ fn off_nominal(e1: &Comparison, e2: &Comparison) -> Vec<Statement> {
             chapter: "becomes larger",
             ours: format!("peak {} against {} nominal", in_mpa(torque.peak), in_mpa(nominal.peak)),
             verdict: verdict(torque.peak > nominal.peak),
-            because: "shaft torsion, tyre slip and grade, which the rigid model leaves out".to_owned(),
+            because: format!(
+                "errors of turbine torque, mass and grade, which the rigid model does not know; on a level road its peak is {}",
+                in_mpa(of(&without.grade, RIGID, T).peak)
+            ),
         },
         Statement {
             experiment: "E2",
@@ -224,8 +258,7 @@ fn off_nominal(e1: &Comparison, e2: &Comparison) -> Vec<Statement> {
             ours: format!("RMS {}, peak {}; below 0.05 MPa {settled}", in_mpa(inertia.rms), in_mpa(inertia.peak)),
             verdict: verdict(inertia.rms < open(e2, I).rms && inertia.settling_s.is_some_and(|s| s < 0.1)),
             because: format!(
-                "the phase begins with the torque phase’s error, which decays with the certified rate; open loop has \
-                 RMS {}",
+                "the phase begins with the torque phase’s error; open loop has RMS {}",
                 in_mpa(open(e2, I).rms)
             ),
         },
@@ -326,8 +359,9 @@ fn compliant(e2: &Comparison, e4: &Comparison, without: &Without) -> Vec<Stateme
             ours: format!("RMS error {shaft_t:.0} N m in the torque phase, {shaft_i:.0} N m in the inertia phase"),
             verdict: verdict(shaft_t < 250.0 && shaft_i < 250.0),
             because: format!(
-                "of about 750 N m before the shift; in the torque phase {:.0} N m with tyres that hardly slip, {:.0} N m \
+                "of {:.0} N m before the shift; in the torque phase {:.0} N m with tyres that hardly slip, {:.0} N m \
                  with a valve that obeys its model",
+                shaft_before(e4),
                 shaft_rms(&without.tyre_slip, COMPLIANT, T),
                 shaft_rms(&without.valve_error, COMPLIANT, T)
             ),

@@ -84,7 +84,7 @@ fn bench_with(seed: u64) -> study::Bench {
 }
 
 #[test]
-fn the_bench_ranks_alike_whatever_the_seed() {
+fn another_seed_gives_other_numbers_and_the_same_best_observer() {
     let names = |bench: &study::Bench| bench.ranking.iter().map(|s| s.observer.clone()).collect::<Vec<_>>();
     let (first, second) = (bench_with(1), bench_with(2));
     assert!(first.rows.iter().all(|row| row.completed));
@@ -94,10 +94,11 @@ fn the_bench_ranks_alike_whatever_the_seed() {
 }
 
 #[test]
-fn where_peak_to_peak_says_open_loop_it_is_no_worse_than_open_loop() {
+fn with_usual_sensors_peak_to_peak_is_hardly_worse_than_open_loop_where_it_uses_it() {
     let bench = bench_with(1);
     let summary = bench.ranking.iter().find(|s| s.observer == "peak-to-peak").unwrap();
-    // Its torque phase is the open loop's but for samples in which the phase is seen late or early.
+    // Its torque phase is the open loop's but for samples in which the phase is seen late or early. The
+    // scenario with three times the sensor noise, left out here, has false releases and a ratio above this.
     assert!(summary.torque_phase_worst_ratio < 1.05, "{}", summary.torque_phase_worst_ratio);
     assert!(summary.inertia_phase_median_ratio < 0.6, "{}", summary.inertia_phase_median_ratio);
 }
