@@ -23,7 +23,8 @@ fn settling(score: &PhaseScore) -> String {
 
 /// Peak, RMS and mean size of a torque error.
 fn triple(score: &PhaseScore) -> String {
-    format!("{:.1} / {:.1} / {:.1}", score.peak, score.rms, score.mean)
+    let one = |value: f64| if value < 100.0 { format!("{value:.1}") } else { format!("{value:.0}") };
+    format!("{} / {} / {}", one(score.peak), one(score.rms), one(score.mean))
 }
 
 /// One row for each phase and observer.
