@@ -7,6 +7,9 @@ pub trait Real: num_traits::Float + core::fmt::Debug + Send + Sync + 'static {
 
     /// The value as `f64`, exactly.
     fn to_f64_exact(self) -> f64;
+
+    /// The whole number below a value that is not negative; zero for NaN.
+    fn whole(self) -> usize;
 }
 
 impl Real for f64 {
@@ -18,6 +21,13 @@ impl Real for f64 {
     #[inline]
     fn to_f64_exact(self) -> f64 {
         self
+    }
+
+    #[inline]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounding down is the purpose")]
+    fn whole(self) -> usize {
+        // Through i32, for which processors have an instruction; tables have few bins.
+        self as i32 as usize
     }
 }
 
@@ -31,5 +41,12 @@ impl Real for f32 {
     #[inline]
     fn to_f64_exact(self) -> f64 {
         f64::from(self)
+    }
+
+    #[inline]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounding down is the purpose")]
+    fn whole(self) -> usize {
+        // Through i32, for which processors have an instruction; tables have few bins.
+        self as i32 as usize
     }
 }

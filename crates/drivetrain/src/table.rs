@@ -92,7 +92,7 @@ impl<T: Real, const N: usize> Axis<T, N> {
     /// Index of the segment that holds `x`, a value within the axis.
     #[inline]
     fn segment(&self, x: T) -> usize {
-        let bin = ((x - self.points[0]) * self.bins_per_unit).to_usize().unwrap_or(0);
+        let bin = ((x - self.points[0]) * self.bins_per_unit).whole();
         let mut segment = usize::from(self.first_segment[bin.min(BINS - 1)]);
         while segment + 2 < self.len && self.points[segment + 1] <= x {
             segment += 1;
@@ -102,7 +102,15 @@ impl<T: Real, const N: usize> Axis<T, N> {
 
     #[inline]
     fn clamp(&self, x: T) -> T {
-        x.max(self.points[0]).min(self.points[self.len - 1])
+        let (first, last) = (self.points[0], self.points[self.len - 1]);
+        // NaN stays NaN.
+        if x < first {
+            first
+        } else if x > last {
+            last
+        } else {
+            x
+        }
     }
 
     fn points(&self) -> &[T] {

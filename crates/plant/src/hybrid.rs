@@ -2,7 +2,7 @@
 
 use crate::rosenbrock::{self, Tolerance, Trial};
 use crate::state::{STATES, State};
-use crate::{Contact, Direction, Inputs, Mode, Powertrain};
+use crate::{Contact, Direction, Inputs, Mode, Powertrain, Torques};
 
 /// Relative tolerance of the integration, against the size of each state.
 pub const RELATIVE_TOLERANCE: f64 = 1e-5;
@@ -15,6 +15,8 @@ const LONGEST_STEP_S: f64 = 0.02;
 const SHORTEST_STEP_S: f64 = 1e-10;
 /// Accuracy to which the time of an event is located, s.
 const EVENT_TIME_S: f64 = 1e-12;
+/// Evaluations of an event function after which its zero is taken as found.
+const MOST_EVALUATIONS: usize = 100;
 /// Mode changes at one instant before the plant is declared inconsistent.
 const MOST_CHANGES: usize = 8;
 
@@ -46,7 +48,7 @@ pub struct Segment<'a> {
     pub mode: Mode,
     /// The inputs throughout.
     pub inputs: &'a Inputs,
-    trial: &'a Trial<STATES>,
+    trial: &'a Trial<STATES, Torques>,
 }
 
 impl Segment<'_> {
@@ -68,6 +70,22 @@ pub struct HybridIntegrator {
     pub mode: Mode,
     step_s: f64,
     tolerance: Tolerance<STATES>,
+    /// What the last step found at its end, where that still holds.
+    known: Option<(Inputs, Rates)>,
+}
+
+/// The right-hand side at one state.
+#[derive(Debug, Clone, Copy)]
+struct Rates {
+    slope: [f64; STATES],
+    applied: Torques,
+}
+
+impl Rates {
+    fn of(powertrain: &Powertrain, mode: Mode, state: &State, inputs: &Inputs) -> Self {
+        let (slope, applied) = powertrain.derivative_with_torques(mode, &state.to_array(), inputs);
+        Self { slope, applied }
+    }
 }
 
 impl HybridIntegrator {
@@ -99,6 +117,7 @@ impl HybridIntegrator {
             mode: Mode { offgoing, oncoming },
             step_s: 1e-4,
             tolerance: Tolerance { relative, scale: State::SCALE },
+            known: None,
         };
         for (clutch, slip) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(slips) {
             if slip.abs() < MARGIN_SLACK {
@@ -120,57 +139,77 @@ impl HybridIntegrator {
         until_s: f64,
         record: &mut impl FnMut(&Segment<'_>),
     ) -> Result<(), PlantError> {
-        // New inputs can overload a clutch at once.
-        self.release_overloaded(powertrain, inputs)?;
-        let mut slope = powertrain.derivative(self.mode, &self.state.to_array(), inputs);
+        // New inputs change pressures and speeds only by and by: the mode is still the right one.
+        let mut rates = match self.known.take() {
+            Some((same, rates)) if same == *inputs => rates,
+            _ => Rates::of(powertrain, self.mode, &self.state, inputs),
+        };
         let mut changes = 0;
         while until_s - self.time_s > EVENT_TIME_S {
-            let (step_s, trial) = self.accepted_step(powertrain, inputs, &slope, until_s)?;
+            let (step_s, trial) = self.accepted_step(powertrain, inputs, &rates, until_s)?;
             let Some(theta) = self.first_event(powertrain, inputs, &trial) else {
                 self.take(&trial, self.time_s + step_s, inputs, record);
-                slope = trial.end_slope;
+                rates = Rates { slope: trial.end_slope, applied: trial.end_applied };
                 changes = 0;
                 continue;
             };
             // Step anew to the event, so that its state has the accuracy of a step and not of the interpolant.
             let mode = self.mode;
             let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
-            let row = powertrain.stiff_row(&self.state);
-            let to_event = rosenbrock::step(&f, &self.state.to_array(), &slope, &row, theta * step_s, &self.tolerance);
+            let at_end = |x: &[f64; STATES]| powertrain.derivative_with_torques(mode, x, inputs);
+            let row = powertrain.stiff_row(&self.state, rates.applied.tyre_n);
+            let to_event = rosenbrock::step(
+                &f,
+                &at_end,
+                &self.state.to_array(),
+                &rates.slope,
+                &row,
+                theta * step_s,
+                &self.tolerance,
+            );
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(PlantError::Chatter { time_s: self.time_s });
             }
             self.take(&to_event, self.time_s + theta * step_s, inputs, record);
             self.change_mode(powertrain, inputs)?;
-            slope = powertrain.derivative(self.mode, &self.state.to_array(), inputs);
+            rates = Rates::of(powertrain, self.mode, &self.state, inputs);
         }
         self.time_s = until_s;
+        self.known = Some((*inputs, rates));
         Ok(())
     }
 
-    fn take(&mut self, trial: &Trial<STATES>, end_s: f64, inputs: &Inputs, record: &mut impl FnMut(&Segment<'_>)) {
+    fn take(
+        &mut self,
+        trial: &Trial<STATES, Torques>,
+        end_s: f64,
+        inputs: &Inputs,
+        record: &mut impl FnMut(&Segment<'_>),
+    ) {
         record(&Segment { start_s: self.time_s, end_s, mode: self.mode, inputs, trial });
         self.time_s = end_s;
         self.state = State::from_array(trial.end);
     }
 
     /// Finds a step length whose error is small enough; returns it with its trial.
+    #[inline]
     fn accepted_step(
         &mut self,
         powertrain: &Powertrain,
         inputs: &Inputs,
-        slope: &[f64; STATES],
+        rates: &Rates,
         until_s: f64,
-    ) -> Result<(f64, Trial<STATES>), PlantError> {
+    ) -> Result<(f64, Trial<STATES, Torques>), PlantError> {
         let mode = self.mode;
         let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
-        let (x, row) = (self.state.to_array(), powertrain.stiff_row(&self.state));
+        let at_end = |x: &[f64; STATES]| powertrain.derivative_with_torques(mode, x, inputs);
+        let (x, row) = (self.state.to_array(), powertrain.stiff_row(&self.state, rates.applied.tyre_n));
         loop {
             let rest = until_s - self.time_s;
             // Stretch a little rather than leave a sliver for the next step.
             let step_s = if self.step_s > 0.9 * rest { rest } else { self.step_s };
-            let trial = rosenbrock::step(&f, &x, slope, &row, step_s, &self.tolerance);
+            let trial = rosenbrock::step(&f, &at_end, &x, &rates.slope, &row, step_s, &self.tolerance);
             let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
             if trial.error <= 1.0 {
                 // A step cut short by the end of the segment says nothing against the usual length.
@@ -191,8 +230,10 @@ impl HybridIntegrator {
     }
 
     /// Fraction of the step at which the first margin reaches zero, located on the dense output.
-    fn first_event(&self, powertrain: &Powertrain, inputs: &Inputs, trial: &Trial<STATES>) -> Option<f64> {
-        let at_end = self.margins(powertrain, inputs, trial.end);
+    fn first_event(&self, powertrain: &Powertrain, inputs: &Inputs, trial: &Trial<STATES, Torques>) -> Option<f64> {
+        let slack = |margin: f64| margin + MARGIN_SLACK;
+        let end = State::from_array(trial.end);
+        let at_end = powertrain.margins_under(self.mode, &end, &trial.end_applied).map(slack);
         if at_end.iter().all(|&margin| margin >= 0.0) {
             return None;
         }
@@ -305,13 +346,47 @@ enum ClutchId {
     Oncoming,
 }
 
-/// Where in `(0, 1]` a function that is not negative at 0 turns negative, by bisection. The function is
-/// cheap and events are few; secant steps would save nothing.
+/// Where in `(0, 1]` a function that is not negative at 0 turns negative, by the Illinois variant of the false
+/// position, which ends within [`EVENT_TIME_S`] on the negative side.
 fn root(f: impl Fn(f64) -> f64) -> f64 {
-    let (mut not_negative, mut negative) = (0.0, 1.0);
-    while negative - not_negative > EVENT_TIME_S / LONGEST_STEP_S {
-        let middle = 0.5 * (not_negative + negative);
-        if f(middle) < 0.0 { negative = middle } else { not_negative = middle }
+    let mut not_negative = (0.0, f(0.0).max(0.0));
+    let mut negative = (1.0, f(1.0));
+    let close = EVENT_TIME_S / LONGEST_STEP_S;
+    for evaluation in 0..MOST_EVALUATIONS {
+        let (width, value) = (negative.0 - not_negative.0, not_negative.1 - negative.1);
+        if width <= close {
+            break;
+        }
+        // Aiming a little beyond the zero brings the other end in, too. Bisection ends what converges badly.
+        let aim = not_negative.0 + width * (not_negative.1 / value) + 0.5 * close;
+        let at = if evaluation < MOST_EVALUATIONS / 2 && aim < negative.0 { aim } else { not_negative.0 + 0.5 * width };
+        let here = f(at);
+        if here < 0.0 {
+            negative = (at, here);
+            not_negative.1 *= 0.5;
+        } else {
+            not_negative = (at, here);
+            negative.1 *= 0.5;
+        }
     }
-    negative
+    negative.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_is_found_from_the_negative_side() {
+        let functions: [(fn(f64) -> f64, f64); 4] = [
+            (|x| 0.3 - x, 0.3),
+            (|x| 1e-9 - x.powi(5), 1e-9_f64.powf(0.2)),
+            (|x| (0.7 - x) * (1.0 + 1e3 * x), 0.7),
+            (|x| if x < 0.999 { 1e-12 } else { -1e3 }, 0.999),
+        ];
+        for (f, exact) in functions {
+            let found = root(f);
+            assert!(f(found) < 0.0 && (found - exact).abs() < 1e-10, "{found} for {exact}");
+        }
+    }
 }

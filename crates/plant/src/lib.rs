@@ -33,5 +33,5 @@ pub use energy::{PowerBalance, stored_energy};
 pub use hybrid::{HybridIntegrator, PlantError, Segment};
 pub use mode::{Contact, Direction, Mode};
 pub use powertrain::{Inputs, Powertrain, Torques};
-pub use simulate::{Sample, simulate};
+pub use simulate::{Sample, Simulation, simulate};
 pub use state::State;

@@ -83,14 +83,19 @@ impl Powertrain {
     /// Every torque at this state.
     #[inline]
     pub fn torques(&self, mode: Mode, x: &State, inputs: &Inputs) -> Torques {
-        let mut torques = self.applied_torques(mode, x, inputs);
+        self.with_holding_torques(mode, &self.applied_torques(mode, x, inputs))
+    }
+
+    /// The torques with those that the sticking clutches hold.
+    #[inline]
+    fn with_holding_torques(&self, mode: Mode, applied: &Torques) -> Torques {
+        let mut torques = *applied;
         let coefficients = self.coefficients(mode.engagement());
-        let applied = torques.shift;
         if mode.offgoing == Contact::Stuck {
-            torques.shift.offgoing_n_m = coefficients.holding_offgoing.at(&applied);
+            torques.shift.offgoing_n_m = coefficients.holding_offgoing.at(&applied.shift);
         }
         if mode.oncoming == Contact::Stuck {
-            torques.shift.oncoming_n_m = coefficients.holding_oncoming.at(&applied);
+            torques.shift.oncoming_n_m = coefficients.holding_oncoming.at(&applied.shift);
         }
         torques
     }
@@ -126,11 +131,22 @@ impl Powertrain {
     /// Time derivative of the state.
     #[inline]
     pub fn derivative(&self, mode: Mode, x: &[f64; STATES], inputs: &Inputs) -> [f64; STATES] {
+        self.derivative_with_torques(mode, x, inputs).0
+    }
+
+    /// Time derivative of the state, and the torques that make it but for the holding torques.
+    #[inline]
+    pub(crate) fn derivative_with_torques(
+        &self,
+        mode: Mode,
+        x: &[f64; STATES],
+        inputs: &Inputs,
+    ) -> ([f64; STATES], Torques) {
         let x = State::from_array(*x);
         let v = &self.vehicle;
         let torques = self.applied_torques(mode, &x, inputs);
         let gear = self.coefficients(mode.engagement());
-        State {
+        let rates = State {
             engine_rad_s: v.engine.acceleration(x.engine_rad_s, torques.engine_n_m, torques.pump_n_m),
             turbine_rad_s: gear.turbine.at(&torques.shift),
             output_rad_s: gear.output.at(&torques.shift),
@@ -139,15 +155,16 @@ impl Powertrain {
             vehicle_m_s: self.vehicle_acceleration(&x, &torques),
             offgoing_pa: v.offgoing.valve.pressure_rate(x.offgoing_pa, inputs.offgoing_settled_pa),
             oncoming_pa: v.oncoming.valve.pressure_rate(x.oncoming_pa, inputs.oncoming_settled_pa),
-        }
-        .to_array()
+        };
+        (rates.to_array(), torques)
     }
 
-    /// The wheel's equation by wheel, vehicle, output and twist: the one row that the tyre makes stiff.
-    pub fn stiff_row(&self, x: &State) -> StiffRow<STATES> {
+    /// The wheel's equation by wheel, vehicle, output and twist: the one row that the tyre makes stiff. `tyre_n`
+    /// is the tyre's force at this state.
+    pub fn stiff_row(&self, x: &State, tyre_n: f64) -> StiffRow<STATES> {
         let (road, line) = (&self.vehicle.road, &self.vehicle.driveline);
         let radius = road.wheel_radius_m;
-        let grip = self.vehicle.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s);
+        let grip = self.vehicle.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s, tyre_n);
         let gradient = State {
             wheel_rad_s: -(radius * radius * grip + line.shaft_damping_n_m_s_rad),
             vehicle_m_s: radius * grip,
@@ -181,15 +198,18 @@ impl Powertrain {
     /// ends where one of them turns negative.
     #[inline]
     pub fn margins(&self, mode: Mode, x: &State, inputs: &Inputs) -> [f64; 2] {
+        self.margins_under(mode, x, &self.applied_torques(mode, x, inputs))
+    }
+
+    /// As [`Self::margins`], under torques that are known but for the holding torques.
+    #[inline]
+    pub(crate) fn margins_under(&self, mode: Mode, x: &State, applied: &Torques) -> [f64; 2] {
         let v = &self.vehicle;
         let slips = [
             v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s),
             v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s),
         ];
-        if let Mode { offgoing: Contact::Slipping(off), oncoming: Contact::Slipping(on) } = mode {
-            return [off.sign() * slips[0], on.sign() * slips[1]];
-        }
-        let torques = self.torques(mode, x, inputs).shift;
+        let torques = self.with_holding_torques(mode, applied).shift;
         let margin = |contact, slip: f64, clutch: &Clutch<f64>, pressure_pa: f64, holding: f64| match contact {
             Contact::Slipping(direction) => Direction::sign(direction) * slip,
             Contact::Stuck => clutch.static_capacity(pressure_pa) - holding.abs(),

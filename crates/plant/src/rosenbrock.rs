@@ -24,6 +24,12 @@ const GAMMAS: [[f64; 3]; 4] = [
 ];
 const WEIGHTS: [f64; 4] = [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 1.545_260_255_335_102, GAMMA];
 const LOWER_ORDER: [f64; 4] = [0.378_109_031_458_193_7, -0.096_042_292_212_423_18, 0.5, 0.217_933_260_754_229_5];
+const ERROR_WEIGHTS: [f64; 4] = [
+    WEIGHTS[0] - LOWER_ORDER[0],
+    WEIGHTS[1] - LOWER_ORDER[1],
+    WEIGHTS[2] - LOWER_ORDER[2],
+    WEIGHTS[3] - LOWER_ORDER[3],
+];
 
 /// The row of the Jacobian that is treated implicitly.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,11 +53,13 @@ impl<const N: usize> StiffRow<N> {
 
 /// A step that was tried.
 #[derive(Debug, Clone, Copy)]
-pub struct Trial<const N: usize> {
+pub struct Trial<const N: usize, E = ()> {
     /// State at the end.
     pub end: [f64; N],
     /// Derivative at the end, with which the next step begins.
     pub end_slope: [f64; N],
+    /// What the right-hand side had besides the derivative at the end.
+    pub end_applied: E,
     /// Error estimate over the tolerance; the step is good up to 1.
     pub error: f64,
     start: [f64; N],
@@ -59,7 +67,7 @@ pub struct Trial<const N: usize> {
     length_s: f64,
 }
 
-impl<const N: usize> Trial<N> {
+impl<const N: usize, E> Trial<N, E> {
     /// State at the fraction `theta` of the step: the cubic through both ends and their slopes.
     #[inline]
     pub fn at(&self, theta: f64) -> [f64; N] {
@@ -82,54 +90,57 @@ pub struct Tolerance<const N: usize> {
     pub scale: [f64; N],
 }
 
-/// Tries a step of length `h` from `x`, where `slope = f(x)`.
+/// Tries a step of length `h` from `x`, where `slope = f(x)`; `at_end` is `f` with what else is wanted at the end.
 ///
 /// The stages satisfy `(1 - h gamma J) k_i = h f(x + sum alpha_ij k_j) + h J sum gamma_ij k_j`.
 #[inline]
-pub fn step<const N: usize>(
+pub fn step<const N: usize, E>(
     f: &impl Fn(&[f64; N]) -> [f64; N],
+    at_end: &impl Fn(&[f64; N]) -> ([f64; N], E),
     x: &[f64; N],
     slope: &[f64; N],
     row: &StiffRow<N>,
     h: f64,
     tolerance: &Tolerance<N>,
-) -> Trial<N> {
-    let combine = |weights: &[f64], k: &[[f64; N]; 4]| -> [f64; N] {
-        let mut sum = [0.0; N];
-        for (weight, k) in weights.iter().zip(k) {
-            for (sum, k) in sum.iter_mut().zip(k) {
-                *sum += weight * k;
-            }
-        }
-        sum
-    };
+) -> Trial<N, E> {
     let r = row.state;
     let pivot = 1.0 / (1.0 - h * GAMMA * row.gradient[r]);
     let mut k = [[0.0; N]; 4];
+    let mut row_times_k = [0.0; 4];
     for stage in 0..4 {
-        let rate = if stage == 0 {
-            *slope
-        } else {
-            let ahead = combine(&ALPHA[stage][..stage], &k);
-            f(&std::array::from_fn(|i| x[i] + ahead[i]))
-        };
-        let implicit = h * row.times(&combine(&GAMMAS[stage][..stage], &k));
+        let rate = if stage == 0 { *slope } else { f(&combine(x, &ALPHA[stage], &k)) };
         let mut next = rate.map(|rate| h * rate);
         // Of (1 - h gamma J) k = next only the stiff row is not solved already.
-        let known = next[r] + implicit;
+        let earlier: f64 = GAMMAS[stage].iter().zip(&row_times_k).map(|(gamma, row_k)| gamma * row_k).sum();
+        let known = next[r] + h * earlier;
         next[r] = 0.0;
         next[r] = pivot * (known + h * GAMMA * row.times(&next));
+        row_times_k[stage] = row.times(&next);
         k[stage] = next;
     }
-    let (change, lower) = (combine(&WEIGHTS, &k), combine(&LOWER_ORDER, &k));
-    let end: [f64; N] = std::array::from_fn(|i| x[i] + change[i]);
+    let end = combine(x, &WEIGHTS, &k);
+    let error = combine(&[0.0; N], &ERROR_WEIGHTS, &k);
     let scaled = |i: usize| {
         let allowed = tolerance.relative * (tolerance.scale[i] + x[i].abs().max(end[i].abs()));
-        ((change[i] - lower[i]) / allowed).powi(2)
+        let share = error[i] / allowed;
+        share * share
     };
     #[expect(clippy::cast_precision_loss, reason = "the number of states is small")]
     let error = ((0..N).map(scaled).sum::<f64>() / N as f64).sqrt();
-    Trial { end, end_slope: f(&end), error, start: *x, start_slope: *slope, length_s: h }
+    let (end_slope, end_applied) = at_end(&end);
+    Trial { end, end_slope, end_applied, error, start: *x, start_slope: *slope, length_s: h }
+}
+
+/// `x + sum of weight[j] k[j]`.
+#[inline]
+fn combine<const N: usize, const M: usize>(x: &[f64; N], weights: &[f64; M], k: &[[f64; N]; 4]) -> [f64; N] {
+    let mut sum = *x;
+    for (weight, k) in weights.iter().zip(k) {
+        for (sum, k) in sum.iter_mut().zip(k) {
+            *sum += weight * k;
+        }
+    }
+    sum
 }
 
 #[cfg(test)]
@@ -142,12 +153,16 @@ mod tests {
         [x[1], -x[0]]
     }
 
+    fn alone<const N: usize>(f: impl Fn(&[f64; N]) -> [f64; N]) -> impl Fn(&[f64; N]) -> ([f64; N], ()) {
+        move |x| (f(x), ())
+    }
+
     /// Error at `t = 2` of the oscillator that starts at (1, 0), and of the dense output in mid-step.
     fn errors(steps: u32, row: &StiffRow<2>) -> (f64, f64) {
         let h = 2.0 / f64::from(steps);
         let (mut x, mut dense_error) = ([1.0, 0.0], 0.0_f64);
         for n in 0..steps {
-            let trial = step(&oscillator, &x, &oscillator(&x), row, h, &TOLERANCE);
+            let trial = step(&oscillator, &alone(oscillator), &x, &oscillator(&x), row, h, &TOLERANCE);
             let middle = h * (f64::from(n) + 0.5);
             dense_error = dense_error.max((trial.at(0.5)[0] - middle.cos()).abs());
             x = trial.end;
@@ -173,7 +188,7 @@ mod tests {
         let row = StiffRow { state: 0, gradient: [-1e5, 1e5] };
         let mut x = [3.0, 1.0];
         for _ in 0..100 {
-            x = step(&f, &x, &f(&x), &row, 0.02, &TOLERANCE).end;
+            x = step(&f, &alone(f), &x, &f(&x), &row, 0.02, &TOLERANCE).end;
         }
         assert!((x[1] - (-2.0_f64).exp()).abs() < 1e-5 && (x[0] - x[1]).abs() < 1e-4, "{x:?}");
     }
@@ -181,7 +196,7 @@ mod tests {
     #[test]
     fn the_dense_output_meets_both_ends_of_the_step() {
         let x = [0.3, -0.8];
-        let trial = step(&oscillator, &x, &oscillator(&x), &StiffRow::none(), 0.4, &TOLERANCE);
+        let trial = step(&oscillator, &alone(oscillator), &x, &oscillator(&x), &StiffRow::none(), 0.4, &TOLERANCE);
         assert_eq!(trial.at(0.0), x);
         assert!(trial.at(1.0).iter().zip(trial.end).all(|(a, b)| (a - b).abs() < 1e-15));
     }

@@ -38,56 +38,121 @@ pub struct Sample {
 ///
 /// # Errors
 /// See [`PlantError`].
-pub fn simulate(vehicle: &Vehicle, experiment: &Experiment, mut record: impl FnMut(&Sample)) -> Result<(), PlantError> {
+pub fn simulate(vehicle: &Vehicle, experiment: &Experiment, record: impl FnMut(&Sample)) -> Result<(), PlantError> {
     let powertrain = Powertrain::new(experiment.simulated_vehicle(vehicle));
-    simulate_powertrain(&powertrain, vehicle, experiment, crate::hybrid::RELATIVE_TOLERANCE, |_| {}, &mut record)
+    Simulation::new(&powertrain, vehicle, experiment)?.advance(experiment.duration_s, record)
 }
 
-/// As [`simulate`], for a powertrain and tolerance of choice, and with every step shown to `on_step`.
-///
-/// # Errors
-/// See [`PlantError`].
-pub fn simulate_powertrain(
-    powertrain: &Powertrain,
-    nominal: &Vehicle,
-    experiment: &Experiment,
-    relative_tolerance: f64,
-    mut on_step: impl FnMut(&Segment<'_>),
-    mut record: impl FnMut(&Sample),
-) -> Result<(), PlantError> {
-    let calibration = experiment.shift;
-    let mut controller = ShiftController::new(nominal, calibration);
-    let state = initial_state(powertrain, experiment);
-    let mut commands = controller.step(0.0, experiment.throttle.at(0.0), &measure(&state));
-    let mut valves = [DelayLine::new(commands.offgoing_a), DelayLine::new(commands.oncoming_a)];
-    let mut inputs = arrived(powertrain, &mut valves, 0.0, commands.throttle);
-    let mut plant = HybridIntegrator::with_tolerance(powertrain, 0.0, state, &inputs, relative_tolerance)?;
+/// A drive on its way: a copy of it goes on from where the original stands.
+#[derive(Debug, Clone)]
+pub struct Simulation<'a> {
+    powertrain: &'a Powertrain,
+    experiment: &'a Experiment,
+    controller: ShiftController,
+    commands: Commands,
+    valves: [DelayLine; 2],
+    plant: HybridIntegrator,
+    /// Periods of the controller that have begun.
+    periods: f64,
+    recorder: Recorder,
+}
 
-    let mut recorder = Recorder { next: 0, experiment };
-    let periods = (experiment.duration_s / calibration.control_period_s - 1e-9).ceil();
-    let mut period = 0.0;
-    while period < periods {
-        let start_s = period * calibration.control_period_s;
-        if period > 0.0 {
-            commands = controller.step(start_s, experiment.throttle.at(start_s), &measure(&plant.state));
-            let v = &powertrain.vehicle;
-            let [offgoing, oncoming] = &mut valves;
-            offgoing.send(start_s, v.offgoing.valve.delay_s.at(commands.offgoing_a), commands.offgoing_a);
-            oncoming.send(start_s, v.oncoming.valve.delay_s.at(commands.oncoming_a), commands.oncoming_a);
-        }
-        period += 1.0;
-        let stage = controller.stage();
-        let end_s = (period * calibration.control_period_s).min(experiment.duration_s);
-        while plant.time_s < end_s {
-            inputs = arrived(powertrain, &mut valves, plant.time_s, commands.throttle);
-            let arrival = valves.iter().filter_map(DelayLine::next_arrival_s).fold(end_s, f64::min);
-            plant.advance(powertrain, &inputs, arrival, &mut |segment| {
-                on_step(segment);
-                recorder.step(powertrain, &commands, stage, segment, &mut record);
-            })?;
+impl<'a> Simulation<'a> {
+    /// At time zero. `nominal` is the vehicle that the shift controller knows.
+    ///
+    /// # Errors
+    /// See [`PlantError`].
+    pub fn new(powertrain: &'a Powertrain, nominal: &Vehicle, experiment: &'a Experiment) -> Result<Self, PlantError> {
+        Self::with_tolerance(powertrain, nominal, experiment, crate::hybrid::RELATIVE_TOLERANCE)
+    }
+
+    /// As [`Self::new`], with a relative tolerance of its own.
+    ///
+    /// # Errors
+    /// See [`PlantError`].
+    pub fn with_tolerance(
+        powertrain: &'a Powertrain,
+        nominal: &Vehicle,
+        experiment: &'a Experiment,
+        relative_tolerance: f64,
+    ) -> Result<Self, PlantError> {
+        let mut controller = ShiftController::new(nominal, experiment.shift);
+        let state = initial_state(powertrain, experiment);
+        let commands = controller.step(0.0, experiment.throttle.at(0.0), &measure(&state));
+        let mut valves = [DelayLine::new(commands.offgoing_a), DelayLine::new(commands.oncoming_a)];
+        let inputs = arrived(powertrain, &mut valves, 0.0, commands.throttle);
+        let plant = HybridIntegrator::with_tolerance(powertrain, 0.0, state, &inputs, relative_tolerance)?;
+        let recorder = Recorder { next: 0, sample_time_s: experiment.sample_time_s, duration_s: experiment.duration_s };
+        Ok(Self { powertrain, experiment, controller, commands, valves, plant, periods: 1.0, recorder })
+    }
+
+    /// Time reached, s.
+    pub fn time_s(&self) -> f64 {
+        self.plant.time_s
+    }
+
+    /// What the shift controller is about.
+    pub fn stage(&self) -> Stage {
+        self.controller.stage()
+    }
+
+    /// Records nothing before this time, s.
+    pub fn record_from(&mut self, time_s: f64) {
+        while f64::from(self.recorder.next) * self.recorder.sample_time_s < time_s - SAME_INSTANT_S {
+            self.recorder.next += 1;
         }
     }
-    Ok(())
+
+    /// Goes on to `until_s`, but not beyond the experiment's duration, and shows a sample to `record` at every
+    /// multiple of the sample time.
+    ///
+    /// # Errors
+    /// See [`PlantError`].
+    pub fn advance(&mut self, until_s: f64, record: impl FnMut(&Sample)) -> Result<(), PlantError> {
+        self.advance_with_steps(until_s, |_| {}, record)
+    }
+
+    /// As [`Self::advance`], with every step of the integrator shown to `on_step`.
+    ///
+    /// # Errors
+    /// See [`PlantError`].
+    pub fn advance_with_steps(
+        &mut self,
+        until_s: f64,
+        mut on_step: impl FnMut(&Segment<'_>),
+        mut record: impl FnMut(&Sample),
+    ) -> Result<(), PlantError> {
+        let period_s = self.experiment.shift.control_period_s;
+        let until_s = until_s.min(self.experiment.duration_s);
+        while self.plant.time_s < until_s - SAME_INSTANT_S {
+            if self.plant.time_s >= self.periods * period_s {
+                self.control(self.periods * period_s);
+                self.periods += 1.0;
+            }
+            let stage = self.controller.stage();
+            let end_s = (self.periods * period_s).min(until_s);
+            while self.plant.time_s < end_s {
+                let inputs = arrived(self.powertrain, &mut self.valves, self.plant.time_s, self.commands.throttle);
+                let arrival = self.valves.iter().filter_map(DelayLine::next_arrival_s).fold(end_s, f64::min);
+                let (powertrain, commands, recorder) = (self.powertrain, &self.commands, &mut self.recorder);
+                self.plant.advance(powertrain, &inputs, arrival, &mut |segment| {
+                    on_step(segment);
+                    recorder.step(powertrain, commands, stage, segment, &mut record);
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of the shift controller, whose commands set out to the valves.
+    fn control(&mut self, now_s: f64) {
+        self.commands = self.controller.step(now_s, self.experiment.throttle.at(now_s), &measure(&self.plant.state));
+        let v = &self.powertrain.vehicle;
+        let [offgoing, oncoming] = &mut self.valves;
+        let commands = &self.commands;
+        offgoing.send(now_s, v.offgoing.valve.delay_s.at(commands.offgoing_a), commands.offgoing_a);
+        oncoming.send(now_s, v.oncoming.valve.delay_s.at(commands.oncoming_a), commands.oncoming_a);
+    }
 }
 
 /// Currents that have arrived at the valves, and the throttle.
@@ -125,12 +190,14 @@ fn initial_state(powertrain: &Powertrain, experiment: &Experiment) -> State {
 const SAME_INSTANT_S: f64 = 1e-9;
 
 /// Takes samples out of the steps.
-struct Recorder<'a> {
+#[derive(Debug, Clone)]
+struct Recorder {
     next: u32,
-    experiment: &'a Experiment,
+    sample_time_s: f64,
+    duration_s: f64,
 }
 
-impl Recorder<'_> {
+impl Recorder {
     fn step(
         &mut self,
         powertrain: &Powertrain,
@@ -141,11 +208,10 @@ impl Recorder<'_> {
     ) {
         // A sample on the border of two steps belongs to the second: at the instant of a new command it shows
         // that command, as the controller that gave it would log it. Only the very last has no second.
-        let duration_s = self.experiment.duration_s;
-        let last = segment.end_s > duration_s - SAME_INSTANT_S;
-        let until_s = if last { duration_s + SAME_INSTANT_S } else { segment.end_s - SAME_INSTANT_S };
+        let last = segment.end_s > self.duration_s - SAME_INSTANT_S;
+        let until_s = if last { self.duration_s + SAME_INSTANT_S } else { segment.end_s - SAME_INSTANT_S };
         loop {
-            let time_s = f64::from(self.next) * self.experiment.sample_time_s;
+            let time_s = f64::from(self.next) * self.sample_time_s;
             if time_s > until_s {
                 return;
             }

@@ -15,7 +15,7 @@ use divan::{Bencher, black_box};
 use observer::{Estimator, Input, Phase, RigidGains};
 use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::state::STATES;
-use plant::{HybridIntegrator, Inputs, Mode, Powertrain, State};
+use plant::{HybridIntegrator, Inputs, Mode, Powertrain, Simulation, State};
 
 fn main() {
     divan::main();
@@ -128,6 +128,22 @@ mod drive_of_9_5_s {
     fn fine(bencher: Bencher) {
         run(bencher, 0.001);
     }
+}
+
+/// From a warm state at the shift request: fill, load transfer, inertia phase, lock-up, recorded every 10 ms.
+#[divan::bench(name = "shift window of 1.5 s")]
+fn shift_window(bencher: Bencher) {
+    let vehicle = vehicle();
+    let experiment = Experiment { sample_time_s: 0.01, ..Experiment::e1().unwrap() };
+    let powertrain = Powertrain::new(vehicle.clone());
+    let request_s = experiment.shift.request_s;
+    let mut warm = Simulation::new(&powertrain, &vehicle, &experiment).unwrap();
+    warm.advance(request_s, |_| {}).unwrap();
+    bencher.bench_local(|| {
+        let (mut shift, mut sum) = (black_box(&warm).clone(), 0.0);
+        shift.advance(request_s + 1.5, |sample| sum += sample.oncoming_pa).unwrap();
+        sum
+    });
 }
 
 /// Two seconds in first gear under constant inputs, both at the same relative tolerance.

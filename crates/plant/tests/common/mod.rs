@@ -4,8 +4,7 @@
 
 use config::{Experiment, Vehicle};
 use drivetrain::{Table1, Table2};
-use plant::simulate::simulate_powertrain;
-use plant::{Powertrain, Sample, Segment};
+use plant::{Powertrain, Sample, Segment, Simulation};
 
 pub(crate) fn vehicle() -> Vehicle {
     Vehicle::two_speed_at().unwrap()
@@ -37,7 +36,7 @@ pub(crate) fn bare_gear_train() -> Vehicle {
     v.converter.capacity_n_m_s2 = Table1::constant(0.0);
     v.driveline.shaft_stiffness_n_m_rad = 0.0;
     v.driveline.shaft_damping_n_m_s_rad = 0.0;
-    v.tyre.max_force_n = 0.0;
+    v.tyre.max_force_n = 1e-9;
     v.road.rolling_moment_n_m = 0.0;
     v
 }
@@ -47,7 +46,8 @@ pub(crate) fn samples(experiment: &Experiment, tolerance: f64) -> Vec<Sample> {
     let nominal = vehicle();
     let powertrain = Powertrain::new(experiment.simulated_vehicle(&nominal));
     let mut samples = Vec::new();
-    simulate_powertrain(&powertrain, &nominal, experiment, tolerance, |_| {}, |sample| samples.push(*sample)).unwrap();
+    let mut drive = Simulation::with_tolerance(&powertrain, &nominal, experiment, tolerance).unwrap();
+    drive.advance(experiment.duration_s, |sample| samples.push(*sample)).unwrap();
     samples
 }
 
@@ -58,5 +58,7 @@ pub(crate) fn each_step(
     tolerance: f64,
     on_step: impl FnMut(&Segment<'_>),
 ) {
-    simulate_powertrain(powertrain, &vehicle(), experiment, tolerance, on_step, |_| {}).unwrap();
+    let nominal = vehicle();
+    let mut drive = Simulation::with_tolerance(powertrain, &nominal, experiment, tolerance).unwrap();
+    drive.advance_with_steps(experiment.duration_s, on_step, |_| {}).unwrap();
 }
