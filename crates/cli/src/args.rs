@@ -1,6 +1,9 @@
 //! The command line.
 
+use std::fmt;
+use std::ops::Range;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -9,6 +12,7 @@ Examples:
   wetclutch demo                                     the whole job on the built-in car
   wetclutch reproduce                                the source chapter's experiments, row by row
   wetclutch bench                                    all observers on many drives, ranked
+  wetclutch study experiments/settings.toml -o out   two thousand shifts, their errors and what moves them
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
   wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
@@ -84,6 +88,22 @@ pub(crate) enum Command {
     /// same drives. Prints the RMS error of each in each phase, and its ratio to the open loop's.
     #[command(verbatim_doc_comment)]
     Bench(Bench),
+    /// Run thousands of shifts with varied parameters
+    ///
+    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary. Writes
+    ///
+    ///   runs.csv, runs.parquet    one row for each run: factors, seed, how it ended, shift quality, scores
+    ///   study.html                distributions, what moves the error, the worst runs; opens from disk
+    ///   figures/                  its figures
+    ///
+    /// The same study gives the same bytes on any number of threads, in one go or resumed, whole or in shards.
+    #[command(verbatim_doc_comment)]
+    Study(StudyOptions),
+    /// Put the shards of a study together
+    ///
+    /// Puts together what `study --shard 1/N` to `study --shard N/N` wrote, to the same bytes as the study in one go.
+    #[command(verbatim_doc_comment)]
+    Merge(Merge),
     /// Check a vehicle or experiment file
     ///
     /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
@@ -208,6 +228,83 @@ pub(crate) struct Bench {
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct StudyOptions {
+    /// Study file
+    pub(crate) study: PathBuf,
+    /// Folder for rows and page
+    #[arg(short, long, value_name = "DIR", default_value = "wetclutch-study")]
+    pub(crate) output: PathBuf,
+    /// Complete what is in the folder already
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Make only the Ith of N equal parts
+    #[arg(long, value_name = "I/N")]
+    pub(crate) shard: Option<Shard>,
+    /// Number of threads; as many as the machine has if left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Make this one run again, with all its signals and its figure
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["resume", "shard"])]
+    pub(crate) run: Option<u64>,
+}
+
+impl StudyOptions {
+    /// The number of threads.
+    pub(crate) fn threads(&self) -> usize {
+        let available = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        self.threads.map_or_else(available, usize::from)
+    }
+}
+
+/// One of equal parts of a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shard {
+    /// Which, from 1.
+    pub(crate) index: u64,
+    /// Of how many.
+    pub(crate) count: u64,
+}
+
+impl Shard {
+    /// The runs of this part.
+    pub(crate) fn of(self, runs: u64) -> Range<u64> {
+        let edge =
+            |part: u64| u64::try_from(u128::from(runs) * u128::from(part) / u128::from(self.count)).unwrap_or(runs);
+        edge(self.index - 1)..edge(self.index)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if (1..=count).contains(&index) => Ok(Self { index, count }),
+            _ => Err("expected I/N with I from 1 to N, such as 2/4".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Merge {
+    /// Study file
+    pub(crate) study: PathBuf,
+    /// Folders of all shards, in their order
+    #[arg(required = true)]
+    pub(crate) shards: Vec<PathBuf>,
+    /// Folder for the whole
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -86,6 +86,7 @@ impl From<PageError> for Failure {
 impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
+            StudyError::Config(error) => error.into(),
             StudyError::Plant(error) => error.into(),
             StudyError::Design(error) => error.into(),
             StudyError::Trace(error) => error.into(),

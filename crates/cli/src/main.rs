@@ -23,6 +23,8 @@ fn main() -> ExitCode {
         Command::Estimate(options) => commands::estimate(&options),
         Command::Reproduce(options) => commands::reproduce(&options),
         Command::Bench(options) => commands::bench(&options),
+        Command::Study(options) => commands::study(&options),
+        Command::Merge(options) => commands::merge(&options),
         Command::Check(options) => commands::check(&options),
     };
     match result {

@@ -1,4 +1,4 @@
-//! Vehicle and experiment files.
+//! Vehicle, experiment and study files.
 //!
 //! A file is read into raw types that mirror its keys, then checked into types that the code can use
 //! without looking again. An error names file, line, key, value and allowed range, and gives a hint
@@ -8,6 +8,7 @@ pub mod check;
 pub mod error;
 pub mod experiment;
 pub mod source;
+pub mod study;
 pub mod vehicle;
 
 pub use error::ConfigError;
@@ -16,4 +17,5 @@ pub use experiment::{
     ShiftCalibration, SpeedSensor,
 };
 pub use source::{Kind, Source};
+pub use study::{Factor, Plan, Study, Target, Values, Varied};
 pub use vehicle::{CompliantRequirement, DesignRequirement, ErrorBounds, ShiftClutch, Uncertainty, Vehicle};

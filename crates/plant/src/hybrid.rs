@@ -378,15 +378,13 @@ mod tests {
 
     #[test]
     fn a_root_is_found_from_the_negative_side() {
-        let functions: [(fn(f64) -> f64, f64); 4] = [
-            (|x| 0.3 - x, 0.3),
-            (|x| 1e-9 - x.powi(5), 1e-9_f64.powf(0.2)),
-            (|x| (0.7 - x) * (1.0 + 1e3 * x), 0.7),
-            (|x| if x < 0.999 { 1e-12 } else { -1e3 }, 0.999),
-        ];
-        for (f, exact) in functions {
+        let check = |f: &dyn Fn(f64) -> f64, exact: f64| {
             let found = root(f);
             assert!(f(found) < 0.0 && (found - exact).abs() < 1e-10, "{found} for {exact}");
-        }
+        };
+        check(&|x| 0.3 - x, 0.3);
+        check(&|x| 1e-9 - x.powi(5), 1e-9_f64.powf(0.2));
+        check(&|x| (0.7 - x) * (1.0 + 1e3 * x), 0.7);
+        check(&|x| if x < 0.999 { 1e-12 } else { -1e3 }, 0.999);
     }
 }

@@ -5,7 +5,9 @@ pub mod map_figures;
 pub mod page;
 pub mod reproduction;
 pub mod shift_figure;
+pub mod study_page;
 pub mod tables;
 
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;
+pub use study_page::StudyPage;

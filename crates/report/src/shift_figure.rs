@@ -1,8 +1,8 @@
 //! The figures of a shift and of the drive around it.
 
 use config::ObserverKind;
-use study::{Comparison, ObserverRun};
-use trace::{signal, units};
+use study::{Comparison, ObserverRun, ShiftQuality};
+use trace::{Trace, signal, units};
 
 use crate::figure::{Band, Figure, Panel, Series, Span, colour};
 
@@ -11,13 +11,14 @@ const TORQUE_PHASE: &str = "#fdf0d5";
 /// Colour of the inertia phase.
 const INERTIA_PHASE: &str = "#e3eef7";
 /// Colours of the observers in their order; the open loop has its own.
-const OBSERVERS: [&str; 6] = [colour::BLUE, colour::GREEN, colour::ORANGE, colour::PURPLE, colour::SKY, colour::GREY];
+pub(crate) const OBSERVERS: [&str; 6] =
+    [colour::BLUE, colour::GREEN, colour::ORANGE, colour::PURPLE, colour::SKY, colour::GREY];
 /// How much is shown before the load transfer and after lock-up, s.
 const MARGIN_S: f64 = 0.35;
 
 /// Speeds, pressures, errors, torques and currents through the shift.
 pub fn shift_figure(comparison: &Comparison) -> Figure {
-    let t = Curves { comparison };
+    let t = Curves::of(comparison);
     let bound = t.bound();
     let panels = vec![
         t.speeds(130.0),
@@ -63,7 +64,12 @@ pub fn shift_figure(comparison: &Comparison) -> Figure {
 
 /// Pressures and errors through the shift: what an experiment with several observers is about.
 pub fn observers_figure(comparison: &Comparison) -> Figure {
-    let t = Curves { comparison };
+    observers_of(&comparison.runs, &comparison.trace, comparison.quality.as_ref())
+}
+
+/// As [`observers_figure`], of a run without the rest of a comparison.
+pub fn observers_of(runs: &[ObserverRun], trace: &Trace, quality: Option<&ShiftQuality>) -> Figure {
+    let t = Curves { runs, trace, quality, bound_pa: &[] };
     let mut panels = vec![
         panel(
             "pressure of B (MPa)",
@@ -83,7 +89,7 @@ pub fn observers_figure(comparison: &Comparison) -> Figure {
 
 /// Speeds and acceleration from standstill to the end.
 pub fn drive_figure(comparison: &Comparison) -> Figure {
-    let t = Curves { comparison };
+    let t = Curves::of(comparison);
     let end = comparison.trace.time_s.last().copied().unwrap_or(1.0);
     let unnamed = |span: Span| Span { label: String::new(), ..span };
     Figure {
@@ -102,24 +108,38 @@ fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
     Panel { y_label: y_label.to_owned(), height, series, band: None, y_range: None }
 }
 
-/// Colour of an observer: the open loop's own, or that of its place among the others.
-fn observer_colour(runs: &[ObserverRun], at: usize) -> &'static str {
-    if runs[at].entry.kind == ObserverKind::OpenLoop {
-        return colour::VERMILION;
-    }
-    let before = runs[..at].iter().filter(|run| run.entry.kind != ObserverKind::OpenLoop).count();
-    OBSERVERS[before % OBSERVERS.len()]
+/// Colours of observers of these kinds: the open loop has its own, the others go by their place.
+pub(crate) fn observer_colours(kinds: impl Iterator<Item = ObserverKind>) -> Vec<&'static str> {
+    let mut others = OBSERVERS.iter().cycle();
+    kinds
+        .map(|kind| match kind {
+            ObserverKind::OpenLoop => colour::VERMILION,
+            _ => others.next().copied().unwrap_or(colour::GREY),
+        })
+        .collect()
 }
 
 struct Curves<'a> {
-    comparison: &'a Comparison,
+    runs: &'a [ObserverRun],
+    trace: &'a Trace,
+    quality: Option<&'a ShiftQuality>,
+    bound_pa: &'a [Option<f64>],
 }
 
-impl Curves<'_> {
+impl<'a> Curves<'a> {
+    fn of(comparison: &'a Comparison) -> Self {
+        Self {
+            runs: &comparison.runs,
+            trace: &comparison.trace,
+            quality: comparison.quality.as_ref(),
+            bound_pa: &comparison.bound_pa,
+        }
+    }
+
     /// Panels around the shift, its phases shaded.
     fn around_shift(&self, panels: Vec<Panel>) -> Figure {
         let spans = self.spans();
-        let whole = (0.0, self.comparison.trace.time_s.last().copied().unwrap_or(1.0));
+        let whole = (0.0, self.trace.time_s.last().copied().unwrap_or(1.0));
         let x_range = match (spans.first(), spans.last()) {
             (Some(first), Some(last)) => ((first.start - MARGIN_S).max(whole.0), (last.end + MARGIN_S).min(whole.1)),
             _ => whole,
@@ -129,7 +149,7 @@ impl Curves<'_> {
 
     /// Torque and inertia phase as shaded spans.
     fn spans(&self) -> Vec<Span> {
-        let Some(quality) = &self.comparison.quality else { return Vec::new() };
+        let Some(quality) = self.quality else { return Vec::new() };
         let span = |label: &str, start, end, colour| Span { label: label.to_owned(), start, end, colour };
         let middle = quality.inertia_phase_start_s;
         vec![
@@ -152,18 +172,18 @@ impl Curves<'_> {
 
     /// A column of the trace, in the unit that people read.
     fn signal(&self, label: &str, colour: &'static str, name: &str, unit: impl Fn(f64) -> f64) -> Series {
-        let values = self.comparison.trace.get(name).unwrap_or_default();
-        let points = self.comparison.trace.time_s.iter().zip(values).map(|(&t, &v)| (t, unit(v))).collect();
+        let values = self.trace.get(name).unwrap_or_default();
+        let points = self.trace.time_s.iter().zip(values).map(|(&t, &v)| (t, unit(v))).collect();
         Series { label: label.to_owned(), colour, dashed: false, points }
     }
 
     /// A curve of each observer; those without a finite value are left out.
     fn of_observers(&self, value: impl Fn(&ObserverRun, usize) -> f64) -> Vec<Series> {
-        let runs = &self.comparison.runs;
-        (runs.iter().enumerate())
-            .map(|(at, run)| Series {
+        let colours = observer_colours(self.runs.iter().map(|run| run.entry.kind));
+        (self.runs.iter().zip(colours))
+            .map(|(run, colour)| Series {
                 label: run.entry.name.clone(),
-                colour: observer_colour(runs, at),
+                colour,
                 dashed: run.entry.kind == ObserverKind::OpenLoop,
                 points: run.time_s.iter().enumerate().map(|(i, &t)| (t, value(run, i))).collect(),
             })
@@ -185,10 +205,10 @@ impl Curves<'_> {
 
     /// Clutch torque as the first observer estimates it.
     fn clutch_torque(&self) -> Series {
-        let points = self.comparison.runs.first().map(|run| {
+        let points = self.runs.first().map(|run| {
             run.time_s.iter().zip(&run.estimates).map(|(&t, estimate)| (t, estimate.clutch_torque_n_m)).collect()
         });
-        let name = self.comparison.runs.first().map_or("", |run| &run.entry.name);
+        let name = self.runs.first().map_or("", |run| &run.entry.name);
         Series {
             label: format!("clutch B, {name}"),
             colour: colour::BLUE,
@@ -198,8 +218,8 @@ impl Curves<'_> {
     }
 
     fn bound(&self) -> Vec<(f64, f64)> {
-        let Some(run) = self.comparison.runs.first() else { return Vec::new() };
-        let bounds = self.comparison.bound_pa.iter().map(|bound| bound.map_or(f64::NAN, units::mpa));
+        let Some(run) = self.runs.first() else { return Vec::new() };
+        let bounds = self.bound_pa.iter().map(|bound| bound.map_or(f64::NAN, units::mpa));
         run.time_s.iter().copied().zip(bounds).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! Several observers on the same drive.
 
-use config::{Experiment, ObserverEntry, ObserverKind, Vehicle};
+use config::{ConfigError, Experiment, ObserverEntry, ObserverKind, Vehicle};
 use design::{CompliantDesign, DesignError, RigidDesign, design_compliant, design_rigid};
 use observer::{Estimate, Phase};
 use plant::PlantError;
@@ -20,6 +20,9 @@ const SETTLED_SHAFT_N_M: f64 = 50.0;
 /// Why a comparison could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
+    /// Values of a study's factors that do not go together.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// The simulation failed.
     #[error(transparent)]
     Plant(#[from] PlantError),
@@ -80,9 +83,8 @@ pub struct Comparison {
 pub fn compare(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison, StudyError> {
     let trace = simulate_drive(vehicle, experiment)?;
     let (rigid, compliant) = (design_rigid(vehicle)?, design_compliant(vehicle)?);
-    let runs = (experiment.observers.iter())
-        .map(|entry| run_entry(vehicle, experiment, entry, &trace))
-        .collect::<Result<Vec<_>, StudyError>>()?;
+    let observers = observers(vehicle, experiment)?;
+    let runs = run_observers(vehicle, experiment, &observers, &trace)?;
     let bound_pa = match runs.first() {
         Some(run) if run.entry.kind == ObserverKind::Rigid && run.entry.gains.is_none() => certified_bound(run, &rigid),
         _ => Vec::new(),
@@ -99,20 +101,52 @@ pub fn compare(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison,
     })
 }
 
-fn run_entry(
+/// The experiment's observers, in its order.
+///
+/// # Errors
+/// There are no gains for what the vehicle file requires.
+pub fn observers(vehicle: &Vehicle, experiment: &Experiment) -> Result<Vec<AnyObserver>, DesignError> {
+    experiment.observers.iter().map(|entry| AnyObserver::of(vehicle, entry)).collect()
+}
+
+/// Runs the experiment's observers over a recorded drive, each behind its sensors and at its sample time.
+///
+/// # Errors
+/// A signal is missing.
+pub fn run_observers(
+    vehicle: &Vehicle,
+    experiment: &Experiment,
+    observers: &[AnyObserver],
+    whole: &Trace,
+) -> Result<Vec<ObserverRun>, TraceError> {
+    let mut seen: Vec<((f64, bool), Trace)> = Vec::new();
+    (experiment.observers.iter().zip(observers))
+        .map(|(entry, observer)| {
+            // Observers of the same sample time see the same signals.
+            let signals = (entry.sample_time_s, entry.real_sensors);
+            let at = seen.iter().position(|(same, _)| *same == signals).unwrap_or_else(|| {
+                let ideal = sampled(whole, entry.sample_time_s);
+                let trace = match &experiment.sensors {
+                    Some(sensors) if entry.real_sensors => through_sensors(whole, &ideal, sensors, vehicle),
+                    _ => ideal,
+                };
+                seen.push((signals, trace));
+                seen.len() - 1
+            });
+            run_observer(vehicle, experiment, entry, observer, &seen[at].1)
+        })
+        .collect()
+}
+
+fn run_observer(
     vehicle: &Vehicle,
     experiment: &Experiment,
     entry: &ObserverEntry,
-    whole: &Trace,
-) -> Result<ObserverRun, StudyError> {
-    let ideal = sampled(whole, entry.sample_time_s);
-    let trace = match &experiment.sensors {
-        Some(sensors) if entry.real_sensors => through_sensors(whole, &ideal, sensors, vehicle),
-        _ => ideal,
-    };
-    let observer = AnyObserver::of(vehicle, entry)?;
-    let estimates = observer.run(&RunColumns::of(&trace, vehicle)?);
-    let phases = true_phases(&trace).unwrap_or_default();
+    observer: &AnyObserver,
+    trace: &Trace,
+) -> Result<ObserverRun, TraceError> {
+    let estimates = observer.run(&RunColumns::of(trace, vehicle)?);
+    let phases = true_phases(trace).unwrap_or_default();
     let time = &trace.time_s;
     let truth_pa = trace.require(signal::ONCOMING_PRESSURE)?;
     let settled_pa = SETTLED_SHARE * experiment.shift.line_pressure_pa;

@@ -2,7 +2,7 @@
 
 use config::{Experiment, Vehicle};
 use observer::Phase;
-use plant::{Contact, Mode, PlantError, Sample, Stage, simulate};
+use plant::{Contact, Mode, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
 use trace::{Trace, signal};
 
 /// Columns of a simulated trace, measurable ones first.
@@ -32,14 +32,59 @@ const COLUMNS: &[&str] = &[
 /// # Errors
 /// See [`PlantError`].
 pub fn simulate_drive(vehicle: &Vehicle, experiment: &Experiment) -> Result<Trace, PlantError> {
-    let mut trace = Trace::with_columns(COLUMNS);
-    let mut phases = Vec::new();
-    simulate(vehicle, experiment, |sample| {
-        trace.push(sample.time_s, &row(sample));
-        phases.push(phase(sample).name().to_owned());
-    })?;
-    trace.add_words(signal::TRUE_PHASE, phases);
-    Ok(trace)
+    let mut recording = Recording::new();
+    simulate(vehicle, experiment, |sample| recording.take(sample))?;
+    Ok(recording.finish())
+}
+
+/// How long before the shift request a shift is recorded, s: observers find the state of the driveline in it.
+const BEFORE_REQUEST_S: f64 = 1.2;
+/// How long after lock-up a shift is recorded, s.
+const AFTER_LOCK_UP_S: f64 = 0.6;
+/// How often a shift is looked at whether it has ended, s.
+const LOOK_S: f64 = 0.05;
+
+/// As [`simulate_drive`], but simulates `car`, while the shift controller knows `nominal`, and keeps only the
+/// shift: from a second before its request until it has ended.
+///
+/// # Errors
+/// See [`PlantError`].
+pub fn simulate_shift(car: &Vehicle, nominal: &Vehicle, experiment: &Experiment) -> Result<Trace, PlantError> {
+    let powertrain = Powertrain::new(experiment.simulated_vehicle(car));
+    let mut drive = Simulation::new(&powertrain, nominal, experiment)?;
+    drive.record_from(experiment.shift.request_s - BEFORE_REQUEST_S);
+    let mut recording = Recording::new();
+    let mut until_s = experiment.shift.request_s;
+    loop {
+        drive.advance(until_s, |sample| recording.take(sample))?;
+        let ended = matches!(drive.stage(), Stage::Locked(since_s) if drive.time_s() > since_s + AFTER_LOCK_UP_S);
+        if ended || until_s >= experiment.duration_s {
+            return Ok(recording.finish());
+        }
+        until_s += LOOK_S;
+    }
+}
+
+/// Samples on their way to a trace.
+struct Recording {
+    trace: Trace,
+    phases: Vec<String>,
+}
+
+impl Recording {
+    fn new() -> Self {
+        Self { trace: Trace::with_columns(COLUMNS), phases: Vec::new() }
+    }
+
+    fn take(&mut self, sample: &Sample) {
+        self.trace.push(sample.time_s, &row(sample));
+        self.phases.push(phase(sample).name().to_owned());
+    }
+
+    fn finish(mut self) -> Trace {
+        self.trace.add_words(signal::TRUE_PHASE, self.phases);
+        self.trace
+    }
 }
 
 /// The values of a sample in the order of [`COLUMNS`].

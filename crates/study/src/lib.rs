@@ -4,6 +4,7 @@
 //! observer over either, and [`score()`] holds the estimates against the truth where there is one.
 
 pub mod bench;
+pub mod campaign;
 pub mod comparison;
 pub mod drive;
 pub mod observers;
@@ -13,6 +14,7 @@ pub mod score;
 pub mod statements;
 
 pub use bench::{Bench, bench};
+pub use campaign::{Campaign, Row, Status, Summary, execute};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use drive::{simulate_drive, true_phases};
 pub use observers::AnyObserver;

@@ -7,6 +7,8 @@
 pub mod atomic;
 pub mod csv_file;
 pub mod error;
+pub mod parquet_file;
+pub mod rows;
 pub mod signal;
 pub mod units;
 
@@ -15,6 +17,8 @@ use std::path::PathBuf;
 pub use atomic::write_whole;
 pub use csv_file::{read_csv, write_csv};
 pub use error::TraceError;
+pub use parquet_file::{ColumnKind, write_parquet};
+pub use rows::{GrowingTable, partial_path, read_rows};
 
 /// The values of one column.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,6 +7,7 @@ mod design;
 mod estimate;
 mod reproduce;
 mod simulate;
+mod study;
 
 pub(crate) use bench::bench;
 pub(crate) use check::check;
@@ -15,6 +16,7 @@ pub(crate) use design::design;
 pub(crate) use estimate::estimate;
 pub(crate) use reproduce::reproduce;
 pub(crate) use simulate::simulate;
+pub(crate) use study::{merge, study};
 
 use std::path::Path;
 

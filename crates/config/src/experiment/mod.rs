@@ -207,13 +207,12 @@ impl Experiment {
         self.source.path.parent().map_or_else(|| self.vehicle.clone(), |folder| folder.join(&self.vehicle))
     }
 
-    /// This experiment with the variations of a scenario. The shift controller has learnt the turbine torque of
-    /// the scenario's car, as one that adapts would.
+    /// This experiment with the variations of a scenario, and a shift controller that has adapted to them.
     #[must_use]
     pub fn with_scenario(&self, scenario: &Scenario) -> Self {
         let mut varied = self.clone();
         varied.off_nominal = scenario.off_nominal;
-        varied.shift.torque_factor *= scenario.off_nominal.converter_capacity_factor;
+        varied.adapt_controller();
         if let Some(throttle) = scenario.throttle {
             let (times, mut positions) = (self.throttle.axis(), self.throttle.values().to_vec());
             if let Some(last) = positions.last_mut() {
@@ -230,6 +229,11 @@ impl Experiment {
             sensors.current.noise_a *= scenario.sensor_noise_factor;
         }
         varied
+    }
+
+    /// Lets the shift controller know the turbine torque of the simulated car, as one that adapts would.
+    pub fn adapt_controller(&mut self) {
+        self.shift.torque_factor *= self.off_nominal.converter_capacity_factor;
     }
 
     /// The car that is simulated: the nominal one with the differences applied.

@@ -1,0 +1,134 @@
+//! The columns of a study's table.
+
+use config::{Experiment, ObserverKind, Study};
+use observer::Phase;
+
+use crate::ObserverRun;
+
+/// The phases that are scored.
+pub const PHASES: [Phase; 2] = [Phase::TorquePhase, Phase::InertiaPhase];
+
+/// What is scored of each observer in each phase.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Metric {
+    /// RMS error of the pressure, Pa.
+    PressureRms,
+    /// Largest error of the pressure, Pa.
+    PressurePeak,
+    /// Variation of the pressure estimate beyond that of the truth, Pa.
+    Chatter,
+    /// RMS error of the clutch torque, N m.
+    TorqueRms,
+    /// RMS error of the drive-shaft torque, N m.
+    ShaftRms,
+}
+
+impl Metric {
+    /// All of them, in the order of the table.
+    pub const ALL: [Self; 5] = [Self::PressureRms, Self::PressurePeak, Self::Chatter, Self::TorqueRms, Self::ShaftRms];
+
+    /// The end of its column's name, with the unit.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PressureRms => "pressure_rms_pa",
+            Self::PressurePeak => "pressure_peak_pa",
+            Self::Chatter => "chatter_pa",
+            Self::TorqueRms => "clutch_torque_rms_n_m",
+            Self::ShaftRms => "shaft_torque_rms_n_m",
+        }
+    }
+
+    fn of(self, run: &ObserverRun, phase: Phase) -> Option<f64> {
+        let scores = match self {
+            Self::PressureRms | Self::PressurePeak | Self::Chatter => &run.pressure,
+            Self::TorqueRms => &run.torque,
+            Self::ShaftRms => run.shaft.as_ref()?,
+        };
+        let score = scores.iter().find(|score| score.phase == phase && score.samples > 0)?;
+        Some(match self {
+            Self::PressurePeak => score.peak,
+            Self::Chatter => score.chatter,
+            Self::PressureRms | Self::TorqueRms | Self::ShaftRms => score.rms,
+        })
+    }
+}
+
+/// What a calibrator asks of the shift, in the order of the table.
+pub const QUALITY: [&str; 7] = [
+    "torque_phase_s",
+    "inertia_phase_s",
+    "flare_rad_s",
+    "least_shaft_torque_n_m",
+    "jerk_peak_m_s3",
+    "vibration_dose_m_s175",
+    "friction_work_j",
+];
+
+/// Where everything stands in a row of numbers: factors, shift quality, scores.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// Names of the factors.
+    pub factors: Vec<String>,
+    /// Names of the observers.
+    pub observers: Vec<String>,
+    /// Position of the open loop among the observers, if it is there.
+    pub open_loop: Option<usize>,
+}
+
+impl Layout {
+    /// The layout of a study's rows.
+    pub fn of(study: &Study) -> Self {
+        let experiment: &Experiment = &study.experiment;
+        Self {
+            factors: study.factors.iter().map(|factor| factor.name.clone()).collect(),
+            observers: experiment.observers.iter().map(|entry| entry.name.clone()).collect(),
+            open_loop: experiment.observers.iter().position(|entry| entry.kind == ObserverKind::OpenLoop),
+        }
+    }
+
+    /// How many numbers a row has.
+    pub fn width(&self) -> usize {
+        self.scores_at() + self.observers.len() * PHASES.len() * Metric::ALL.len()
+    }
+
+    /// Position of a quality of the shift.
+    pub fn quality(&self, name: &str) -> Option<usize> {
+        QUALITY.iter().position(|&quality| quality == name).map(|at| self.factors.len() + at)
+    }
+
+    /// Position of an observer's score.
+    pub fn score(&self, observer: usize, phase: usize, metric: Metric) -> usize {
+        let at = Metric::ALL.iter().position(|&m| m == metric).unwrap_or(0);
+        self.scores_at() + (observer * PHASES.len() + phase) * Metric::ALL.len() + at
+    }
+
+    /// The names of all columns: run, seed, factors, status, quality, scores.
+    pub fn header(&self) -> Vec<String> {
+        let mut names = vec!["run".to_owned(), "seed".to_owned()];
+        names.extend(self.factors.iter().cloned());
+        names.push("status".to_owned());
+        names.extend(QUALITY.map(str::to_owned));
+        for observer in &self.observers {
+            for phase in PHASES {
+                let start = format!("{}.{}", observer.replace([' ', ','], "_"), phase.name());
+                names.extend(Metric::ALL.map(|metric| format!("{start}.{}", metric.name())));
+            }
+        }
+        names
+    }
+
+    fn scores_at(&self) -> usize {
+        self.factors.len() + QUALITY.len()
+    }
+
+    /// The scores of all observers.
+    pub(super) fn scores(&self, runs: &[ObserverRun]) -> Vec<f64> {
+        let mut scores = Vec::with_capacity(self.width() - self.scores_at());
+        for run in runs {
+            for phase in PHASES {
+                scores.extend(Metric::ALL.map(|metric| metric.of(run, phase).unwrap_or(f64::NAN)));
+            }
+        }
+        scores
+    }
+}

@@ -1,0 +1,179 @@
+//! Which values the factors take in which run.
+//!
+//! Every plan is a function of the run's number alone: runs can be made in any order, on any thread or machine.
+
+use config::{Plan, Study, Values};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Values of the factors in a run, in the order of the factors.
+pub fn factor_values(study: &Study, run: u64) -> Vec<f64> {
+    let places = places(study, run);
+    study.factors.iter().zip(places).map(|(factor, place)| value(&factor.values, place)).collect()
+}
+
+/// Seed of a run's sensors.
+pub fn run_seed(study: &Study, run: u64) -> u64 {
+    mixed(study.seed, run)
+}
+
+/// Which of Saltelli's samples a run belongs to: its group, and 0 for A, 1 for B, 2 + i for A with column i of B.
+pub fn saltelli_place(study: &Study, run: u64) -> (u64, u64) {
+    let group = study.factors.len() as u64 + 2;
+    (run / group, run % group)
+}
+
+/// Where each factor stands in its values, from 0 to 1; levels count by their middle.
+pub(crate) fn places(study: &Study, run: u64) -> Vec<f64> {
+    let count = study.factors.len();
+    match study.plan {
+        Plan::FullFactorial => {
+            let mut rest = run;
+            let level = |values: &Values| {
+                let levels = values.levels() as u64;
+                let at = rest % levels;
+                rest /= levels;
+                as_f64(at) / as_f64(levels) + 0.5 / as_f64(levels)
+            };
+            // The last factor changes fastest.
+            let mut places: Vec<f64> = study.factors.iter().rev().map(|f| &f.values).map(level).collect();
+            places.reverse();
+            places.iter().zip(&study.factors).map(|(&place, factor)| ends_for_levels(&factor.values, place)).collect()
+        }
+        Plan::LatinHypercube => (0..count as u64)
+            .map(|i| {
+                let layer = shuffled(run, study.runs, mixed(study.seed, i));
+                (as_f64(layer) + unit(study.seed, run, i)) / as_f64(study.runs)
+            })
+            .collect(),
+        Plan::Sobol => (0..count).map(|i| sobol(study, run, i)).collect(),
+        Plan::Random => (0..count as u64).map(|i| unit(study.seed, run, i)).collect(),
+        Plan::Saltelli => {
+            let (group, sample) = saltelli_place(study, run);
+            let from_b = |i: usize| sample == 1 || sample == 2 + i as u64;
+            (0..count).map(|i| sobol(study, group, if from_b(i) { count + i } else { i })).collect()
+        }
+    }
+}
+
+/// Levels of a range reach from end to end.
+fn ends_for_levels(values: &Values, place: f64) -> f64 {
+    match values {
+        Values::List(_) => place,
+        _ => {
+            let levels = values.levels() as f64;
+            ((place * levels - 0.5) / (levels - 1.0)).clamp(0.0, 1.0)
+        }
+    }
+}
+
+fn sobol(study: &Study, run: u64, dimension: usize) -> f64 {
+    #[expect(clippy::cast_possible_truncation, reason = "both halves are meant; dimensions are few")]
+    let (index, dimension, seed) = (run as u32, dimension as u32, (mixed(study.seed, run >> 32) >> 32) as u32);
+    f64::from(sobol_burley::sample(index, dimension, seed))
+}
+
+/// The value at a place between 0 and 1.
+fn value(values: &Values, place: f64) -> f64 {
+    match *values {
+        Values::List(ref list) => {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
+            let at = (place * list.len() as f64) as usize;
+            list[at.min(list.len() - 1)]
+        }
+        Values::Uniform(low, high, _) => low + place * (high - low),
+        Values::LogUniform(low, high, _) => low * (high / low).powf(place),
+        Values::Normal(mean, deviation, _) => {
+            // Cut off at three deviations.
+            let unit = Normal::standard();
+            let (low, high) = (unit.cdf(-3.0), unit.cdf(3.0));
+            mean + deviation * unit.inverse_cdf(low + place * (high - low)).clamp(-3.0, 3.0)
+        }
+    }
+}
+
+/// Where a value stands in its factor's values, from 0 to 1.
+pub(crate) fn place_of(values: &Values, value: f64) -> f64 {
+    match values {
+        Values::List(list) => {
+            let at = list.iter().position(|&x| x.total_cmp(&value).is_eq()).unwrap_or(0);
+            (at as f64 + 0.5) / list.len() as f64
+        }
+        Values::Uniform(low, high, _) => (value - low) / (high - low),
+        Values::LogUniform(low, high, _) => (value / low).ln() / (high / low).ln(),
+        Values::Normal(mean, deviation, _) => Normal::standard().cdf((value - mean) / deviation),
+    }
+}
+
+/// A number from 0 to 1 that belongs to a run and a factor.
+fn unit(seed: u64, run: u64, factor: u64) -> f64 {
+    as_f64(mixed(mixed(seed, factor + 1), run) >> 11) / as_f64(1 << 53)
+}
+
+/// A number that belongs to two others: the mixing function of G. Steele, D. Lea, C. Flood, Fast splittable
+/// pseudorandom number generators, OOPSLA 2014.
+fn mixed(seed: u64, of: u64) -> u64 {
+    let z = seed.wrapping_add(of.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Where `at` goes in a permutation of `count` numbers that belongs to the seed: a Feistel network over the next
+/// power of four, walked until it comes back into range.
+fn shuffled(at: u64, count: u64, seed: u64) -> u64 {
+    let half_bits = (64 - count.saturating_sub(1).leading_zeros()).div_ceil(2).max(1);
+    let mask = (1_u64 << half_bits) - 1;
+    let mut x = at;
+    loop {
+        let (mut left, mut right) = (x >> half_bits, x & mask);
+        for round in 0..4 {
+            (left, right) = (right, left ^ (mixed(seed ^ round, right) & mask));
+        }
+        x = (left << half_bits) | right;
+        if x < count {
+            return x;
+        }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts far below 2^53, or the upper 53 bits")]
+fn as_f64(x: u64) -> f64 {
+    x as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shuffle_meets_every_number_once() {
+        for count in [1, 2, 7, 64, 1000] {
+            let mut seen: Vec<u64> = (0..count).map(|at| shuffled(at, count, 5)).collect();
+            assert!(count < 7 || seen != (0..count).collect::<Vec<_>>());
+            seen.sort_unstable();
+            assert_eq!(seen, (0..count).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn numbers_of_runs_and_factors_are_spread_evenly() {
+        let (mut mean, mut cross) = (0.0, 0.0);
+        for run in 0..10_000 {
+            let (a, b) = (unit(1, run, 0), unit(1, run, 1));
+            mean += a / 1e4;
+            cross += (a - 0.5) * (b - 0.5) / 1e4;
+        }
+        // Five standard errors.
+        assert!((mean - 0.5).abs() < 5.0 * 0.289 / 100.0 && cross.abs() < 5.0 / 12.0 / 100.0, "{mean} {cross}");
+    }
+
+    #[test]
+    fn a_normal_factor_has_its_mean_and_deviation() {
+        let normal = Values::Normal(10.0, 2.0, 3);
+        let draws: Vec<f64> = (0..1000).map(|i| value(&normal, (f64::from(i) + 0.5) / 1000.0)).collect();
+        let mean = draws.iter().sum::<f64>() / 1000.0;
+        let deviation = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1000.0).sqrt();
+        assert!((mean - 10.0).abs() < 1e-6 && (deviation - 1.973).abs() < 0.01, "{mean} {deviation}");
+        assert!(draws.iter().all(|x| (4.0..=16.0).contains(x)));
+    }
+}

@@ -1,0 +1,246 @@
+//! One run of a study.
+
+use std::fmt::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use config::{ConfigError, Study, Varied};
+use design::DesignError;
+use plant::PlantError;
+use trace::Trace;
+
+use super::layout::{Layout, QUALITY};
+use super::plan::{factor_values, run_seed};
+use crate::comparison::{ObserverRun, observers, run_observers};
+use crate::drive::simulate_shift;
+use crate::{AnyObserver, ShiftQuality, StudyError};
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Status {
+    /// A shift with all its phases.
+    Ok,
+    /// A shift with all its phases, in which the clutches worked against one another until the car was braked.
+    TieUp,
+    /// The oncoming clutch did not lock within the experiment's time.
+    NoLockUp,
+    /// The simulation diverged.
+    Diverged,
+    /// The values of the factors do not go together.
+    Refused,
+    /// There are no gains for what the varied vehicle file requires.
+    NoGains,
+    /// A defect of this program; the message stands on standard error.
+    Crashed,
+}
+
+impl Status {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Ok, Self::TieUp, Self::NoLockUp, Self::Diverged, Self::Refused, Self::NoGains, Self::Crashed];
+
+    /// A word for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::TieUp => "tie_up",
+            Self::NoLockUp => "no_lock_up",
+            Self::Diverged => "diverged",
+            Self::Refused => "refused",
+            Self::NoGains => "no_gains",
+            Self::Crashed => "crashed",
+        }
+    }
+
+    /// The status that a word means.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
+
+    /// Whether the shift passed all its phases, so that its scores mean something.
+    pub fn is_scored(self) -> bool {
+        matches!(self, Self::Ok | Self::TieUp)
+    }
+}
+
+/// One row of a study's table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Number of the run.
+    pub run: u64,
+    /// Seed of its sensors.
+    pub seed: u64,
+    /// How it ended.
+    pub status: Status,
+    /// Factors, shift quality and scores as [`Layout`] places them; NaN where there is none.
+    pub numbers: Vec<f64>,
+}
+
+/// A study made ready to run: gains are designed once where no factor changes what they follow from.
+#[derive(Debug)]
+pub struct Campaign {
+    /// The study.
+    pub study: Study,
+    /// Where everything stands in a row.
+    pub layout: Layout,
+    observers: Option<Vec<AnyObserver>>,
+}
+
+/// A run in full, for a closer look.
+#[derive(Debug)]
+pub struct Run {
+    /// The files of the run.
+    pub varied: Varied,
+    /// The drive.
+    pub trace: Trace,
+    /// Its observers.
+    pub observers: Vec<ObserverRun>,
+    /// The shift, if it was completed.
+    pub quality: Option<ShiftQuality>,
+}
+
+/// Why a run gave nothing to score.
+enum RunError {
+    Refused(ConfigError),
+    Plant(PlantError),
+    Design(DesignError),
+    Other(StudyError),
+}
+
+impl Campaign {
+    /// Makes a study ready.
+    ///
+    /// # Errors
+    /// There are no gains for the study's vehicle.
+    pub fn new(study: Study) -> Result<Self, DesignError> {
+        let layout = Layout::of(&study);
+        let observers = observers(&study.vehicle, &study.experiment)?;
+        Ok(Self { observers: (!study.varies_vehicle()).then_some(observers), layout, study })
+    }
+
+    /// Makes a run. What can go wrong in it is its status.
+    ///
+    /// # Errors
+    /// The recorded drive lacks a signal, which no study file can cause.
+    pub fn row(&self, run: u64) -> Result<Row, StudyError> {
+        let values = factor_values(&self.study, run);
+        self.row_at(run, &values)
+    }
+
+    /// As [`Self::row`], with values of its own.
+    ///
+    /// # Errors
+    /// As [`Self::row`].
+    pub fn row_at(&self, run: u64, values: &[f64]) -> Result<Row, StudyError> {
+        let seed = run_seed(&self.study, run);
+        let mut numbers = values.to_vec();
+        // One defect must not cost a study of thousands.
+        let attempt = catch_unwind(AssertUnwindSafe(|| self.full(values, seed)));
+        let Ok(attempt) = attempt else {
+            numbers.resize(self.layout.width(), f64::NAN);
+            return Ok(Row { run, seed, status: Status::Crashed, numbers });
+        };
+        let status = match attempt {
+            Ok(run) => {
+                let status = match run.quality {
+                    None => Status::NoLockUp,
+                    Some(quality) if quality.least_shaft_torque_n_m < 0.0 => Status::TieUp,
+                    Some(_) => Status::Ok,
+                };
+                if let Some(quality) = &run.quality {
+                    numbers.extend(quality_numbers(quality));
+                    numbers.extend(self.layout.scores(&run.observers));
+                }
+                status
+            }
+            Err(RunError::Refused(_)) => Status::Refused,
+            Err(RunError::Plant(_)) => Status::Diverged,
+            Err(RunError::Design(_)) => Status::NoGains,
+            Err(RunError::Other(error)) => return Err(error),
+        };
+        numbers.resize(self.layout.width(), f64::NAN);
+        Ok(Row { run, seed, status, numbers })
+    }
+
+    /// Makes a run and keeps all of it.
+    ///
+    /// # Errors
+    /// The values do not go together; see [`StudyError`] for the rest.
+    pub fn run_in_full(&self, run: u64) -> Result<Run, StudyError> {
+        self.full(&factor_values(&self.study, run), run_seed(&self.study, run)).map_err(|error| match error {
+            RunError::Refused(error) => StudyError::Config(error),
+            RunError::Plant(error) => StudyError::Plant(error),
+            RunError::Design(error) => StudyError::Design(error),
+            RunError::Other(error) => error,
+        })
+    }
+
+    fn full(&self, values: &[f64], seed: u64) -> Result<Run, RunError> {
+        let mut varied = self.study.varied(values).map_err(RunError::Refused)?;
+        if let Some(sensors) = &mut varied.experiment.sensors {
+            sensors.seed = seed;
+        }
+        varied.experiment.adapt_controller();
+        let designed;
+        let ready = match &self.observers {
+            Some(ready) => ready,
+            None => {
+                designed = observers(&varied.vehicle, &varied.experiment).map_err(RunError::Design)?;
+                &designed
+            }
+        };
+        let trace = simulate_shift(&varied.car, &varied.vehicle, &varied.experiment).map_err(RunError::Plant)?;
+        let quality = ShiftQuality::of(&trace, &varied.vehicle.shift);
+        let observers = run_observers(&varied.vehicle, &varied.experiment, ready, &trace)
+            .map_err(|error| RunError::Other(error.into()))?;
+        Ok(Run { trace, observers, quality, varied })
+    }
+}
+
+/// In the order of [`QUALITY`].
+fn quality_numbers(quality: &ShiftQuality) -> [f64; QUALITY.len()] {
+    [
+        quality.inertia_phase_start_s - quality.torque_phase_start_s,
+        quality.lock_up_s - quality.inertia_phase_start_s,
+        quality.flare_rad_s,
+        quality.least_shaft_torque_n_m,
+        quality.jerk_peak_m_s3,
+        quality.vibration_dose_m_s175,
+        quality.friction_work_j,
+    ]
+}
+
+impl Row {
+    /// The row as the cells of a table with the layout's header.
+    pub fn line(&self, layout: &Layout) -> String {
+        let mut line = format!("{},{}", self.run, self.seed);
+        let number = |line: &mut String, value: f64| {
+            // Writing to a string cannot fail.
+            let _ = if value.is_nan() { write!(line, ",") } else { write!(line, ",{value}") };
+        };
+        let (factors, rest) = self.numbers.split_at(layout.factors.len());
+        for &value in factors {
+            number(&mut line, value);
+        }
+        let _ = write!(line, ",{}", self.status.name());
+        for &value in rest {
+            number(&mut line, value);
+        }
+        line
+    }
+
+    /// The row that these cells hold, if they are one.
+    pub fn from_cells<'a>(cells: impl Iterator<Item = &'a str>, layout: &Layout) -> Option<Self> {
+        let mut cells = cells;
+        let (run, seed) = (cells.next()?.parse().ok()?, cells.next()?.parse().ok()?);
+        let number = |cell: &str| if cell.is_empty() { Some(f64::NAN) } else { cell.parse().ok() };
+        let mut numbers = Vec::with_capacity(layout.width());
+        for _ in 0..layout.factors.len() {
+            numbers.push(number(cells.next()?)?);
+        }
+        let status = Status::from_name(cells.next()?)?;
+        for cell in cells {
+            numbers.push(number(cell)?);
+        }
+        (numbers.len() == layout.width()).then_some(Self { run, seed, status, numbers })
+    }
+}

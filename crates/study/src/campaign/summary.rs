@@ -1,0 +1,342 @@
+//! What a study's rows say together, gathered row by row in memory that does not grow with their number.
+
+use std::collections::BTreeMap;
+
+use config::{Plan, Study};
+
+use super::layout::{Layout, Metric, PHASES};
+use super::plan::{place_of, saltelli_place};
+use super::row::{Row, Status};
+
+/// Bins of a distribution per factor of two: quantiles are good to half a per cent.
+const BINS_PER_OCTAVE: f64 = 64.0;
+/// Bins over a factor's values for its main effect.
+pub const EFFECT_BINS: usize = 10;
+/// How many of the worst runs are kept.
+pub const WORST: usize = 10;
+
+/// How a positive quantity is distributed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Distribution {
+    bins: BTreeMap<i32, u64>,
+    count: u64,
+    largest: f64,
+}
+
+impl Distribution {
+    fn push(&mut self, value: f64) {
+        if !value.is_finite() {
+            return;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+        let bin = (value.max(1e-12).log2() * BINS_PER_OCTAVE).floor().clamp(-1e6, 1e6) as i32;
+        *self.bins.entry(bin).or_default() += 1;
+        self.count += 1;
+        self.largest = self.largest.max(value);
+    }
+
+    /// How many values there were.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The largest value.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// The value below which this share of the values lies; NaN without values.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let wanted = share * as_f64(self.count);
+        let mut below = 0;
+        for (&bin, &count) in &self.bins {
+            below += count;
+            if as_f64(below) >= wanted {
+                return ((f64::from(bin) + 0.5) / BINS_PER_OCTAVE).exp2().min(self.largest);
+            }
+        }
+        f64::NAN
+    }
+
+    /// Share of the values below a limit.
+    pub fn share_below(&self, limit: f64) -> f64 {
+        let below: u64 = self.bins.iter().filter(|&(&bin, _)| upper_edge(bin) <= limit).map(|(_, count)| count).sum();
+        as_f64(below) / as_f64(self.count.max(1))
+    }
+}
+
+fn upper_edge(bin: i32) -> f64 {
+    ((f64::from(bin) + 1.0) / BINS_PER_OCTAVE).exp2()
+}
+
+/// Sums from which a mean and a variance follow.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Moments {
+    count: f64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Moments {
+    fn push(&mut self, value: f64) {
+        self.count += 1.0;
+        let step = value - self.mean;
+        self.mean += step / self.count;
+        self.squares += step * (value - self.mean);
+    }
+
+    fn variance(&self) -> f64 {
+        if self.count > 1.0 { self.squares / (self.count - 1.0) } else { 0.0 }
+    }
+}
+
+/// How one factor moves one score.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FactorEffect {
+    /// The factor.
+    pub factor: String,
+    /// Mean of the score over the factor's bins from its smallest to its largest value; NaN for an empty bin.
+    pub means: Vec<f64>,
+    /// First-order Sobol index: share of the score's variance that this factor explains alone.
+    pub first_order: f64,
+    /// Total Sobol index: share of the variance that would go if the factor were known, interactions included;
+    /// only a Saltelli plan gives it.
+    pub total: Option<f64>,
+}
+
+/// Sums for the effects of all factors on one score.
+#[derive(Debug, Clone, PartialEq)]
+struct Effects {
+    all: Moments,
+    bins: Vec<[Moments; EFFECT_BINS]>,
+    /// Of Saltelli's arrangement: sums of (fB - fABi)^2 / 2 and (fA - fABi)^2 / 2, moments of fA and fB (M. Jansen,
+    /// Analysis of variance designs for model output, Comput. Phys. Commun. 117 (1999) 35).
+    first: Vec<f64>,
+    total: Vec<f64>,
+    pairs: f64,
+    samples: Moments,
+}
+
+/// What a study's rows say together.
+#[derive(Debug, Clone)]
+pub struct Summary {
+    study: Study,
+    /// Where everything stands in a row.
+    pub layout: Layout,
+    /// How many runs ended how.
+    pub statuses: BTreeMap<Status, u64>,
+    rms: Vec<Distribution>,
+    ratios: Vec<Distribution>,
+    chatter: Vec<Distribution>,
+    effects: Vec<Effects>,
+    /// Rows of the group of a Saltelli plan that is not complete yet.
+    group: Vec<Row>,
+    /// The runs in which the first observer has the largest RMS error of the pressure in either phase, the worst
+    /// first.
+    pub worst: Vec<Row>,
+}
+
+impl Summary {
+    /// Of no rows yet.
+    pub fn new(study: &Study) -> Self {
+        let layout = Layout::of(study);
+        let scores = layout.observers.len() * PHASES.len();
+        let factors = layout.factors.len();
+        let effects = Effects {
+            all: Moments::default(),
+            bins: vec![[Moments::default(); EFFECT_BINS]; factors],
+            first: vec![0.0; factors],
+            total: vec![0.0; factors],
+            pairs: 0.0,
+            samples: Moments::default(),
+        };
+        Self {
+            study: study.clone(),
+            layout,
+            statuses: BTreeMap::new(),
+            rms: vec![Distribution::default(); scores],
+            ratios: vec![Distribution::default(); scores],
+            chatter: vec![Distribution::default(); scores],
+            effects: vec![effects; scores],
+            group: Vec::new(),
+            worst: Vec::new(),
+        }
+    }
+
+    /// Number of rows.
+    pub fn runs(&self) -> u64 {
+        self.statuses.values().sum()
+    }
+
+    /// RMS error of an observer's pressure in a phase, Pa.
+    pub fn rms(&self, observer: usize, phase: usize) -> &Distribution {
+        &self.rms[observer * PHASES.len() + phase]
+    }
+
+    /// The same over that of the open loop in the same run.
+    pub fn ratio(&self, observer: usize, phase: usize) -> &Distribution {
+        &self.ratios[observer * PHASES.len() + phase]
+    }
+
+    /// Chatter of an observer in a phase, Pa.
+    pub fn chatter(&self, observer: usize, phase: usize) -> &Distribution {
+        &self.chatter[observer * PHASES.len() + phase]
+    }
+
+    /// Takes the next row; rows come in the order of their numbers.
+    pub fn push(&mut self, row: &Row) {
+        *self.statuses.entry(row.status).or_default() += 1;
+        if self.study.plan == Plan::Saltelli {
+            self.take_group(row);
+        }
+        if !row.status.is_scored() {
+            return;
+        }
+        let places = self.places(row);
+        for observer in 0..self.layout.observers.len() {
+            for phase in 0..PHASES.len() {
+                let at = observer * PHASES.len() + phase;
+                let value = |observer, metric| row.numbers[self.layout.score(observer, phase, metric)];
+                let rms = value(observer, Metric::PressureRms);
+                if !rms.is_finite() {
+                    continue;
+                }
+                self.rms[at].push(rms);
+                self.chatter[at].push(value(observer, Metric::Chatter));
+                if let Some(open_loop) = self.layout.open_loop {
+                    self.ratios[at].push(rms / value(open_loop, Metric::PressureRms));
+                }
+                self.effects[at].push(rms, &places);
+            }
+        }
+        self.keep_if_among_the_worst(row);
+    }
+
+    fn places(&self, row: &Row) -> Vec<f64> {
+        self.study.factors.iter().zip(&row.numbers).map(|(factor, &value)| place_of(&factor.values, value)).collect()
+    }
+
+    fn keep_if_among_the_worst(&mut self, row: &Row) {
+        let size = |row: &Row, layout: &Layout| {
+            let rms = |phase| row.numbers[layout.score(0, phase, Metric::PressureRms)];
+            (0..PHASES.len()).map(rms).fold(0.0, f64::max)
+        };
+        let mine = size(row, &self.layout);
+        let at = self.worst.iter().position(|other| mine > size(other, &self.layout)).unwrap_or(self.worst.len());
+        if at < WORST {
+            self.worst.insert(at, row.clone());
+            self.worst.truncate(WORST);
+        }
+    }
+
+    /// Saltelli's estimators for a whole group of runs.
+    fn take_group(&mut self, row: &Row) {
+        let (_, sample) = saltelli_place(&self.study, row.run);
+        if sample == 0 {
+            self.group.clear();
+        }
+        self.group.push(row.clone());
+        let factors = self.layout.factors.len();
+        if self.group.len() != factors + 2 || !self.group.iter().all(|row| row.status.is_scored()) {
+            return;
+        }
+        for observer in 0..self.layout.observers.len() {
+            for phase in 0..PHASES.len() {
+                let column = self.layout.score(observer, phase, Metric::PressureRms);
+                let f: Vec<f64> = self.group.iter().map(|row| row.numbers[column]).collect();
+                let effects = &mut self.effects[observer * PHASES.len() + phase];
+                effects.pairs += 1.0;
+                effects.samples.push(f[0]);
+                effects.samples.push(f[1]);
+                for i in 0..factors {
+                    effects.first[i] += 0.5 * (f[1] - f[2 + i]).powi(2);
+                    effects.total[i] += 0.5 * (f[0] - f[2 + i]).powi(2);
+                }
+            }
+        }
+    }
+
+    /// How the factors move the RMS error of an observer's pressure in a phase, Pa.
+    pub fn effects(&self, observer: usize, phase: usize) -> Vec<FactorEffect> {
+        let effects = &self.effects[observer * PHASES.len() + phase];
+        let saltelli = effects.pairs > 0.0 && effects.samples.variance() > 0.0;
+        (self.layout.factors.iter().enumerate())
+            .map(|(i, factor)| FactorEffect {
+                factor: factor.clone(),
+                means: effects.bins[i].iter().map(|bin| if bin.count > 0.0 { bin.mean } else { f64::NAN }).collect(),
+                first_order: if saltelli {
+                    1.0 - effects.first[i] / effects.pairs / effects.samples.variance()
+                } else {
+                    effects.explained(i)
+                },
+                total: saltelli.then(|| effects.total[i] / effects.pairs / effects.samples.variance()),
+            })
+            .collect()
+    }
+}
+
+impl Effects {
+    fn push(&mut self, value: f64, places: &[f64]) {
+        self.all.push(value);
+        for (bins, place) in self.bins.iter_mut().zip(places) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place from 0 to 1")]
+            let bin = (place * EFFECT_BINS as f64) as usize;
+            bins[bin.min(EFFECT_BINS - 1)].push(value);
+        }
+    }
+
+    /// Share of the variance between the means of the bins, less what chance alone would put there.
+    fn explained(&self, factor: usize) -> f64 {
+        let bins = self.bins[factor].iter().filter(|bin| bin.count > 0.0);
+        let count = bins.clone().count() as f64;
+        if self.all.count <= count || self.all.squares <= 0.0 {
+            return f64::NAN;
+        }
+        let between: f64 = bins.clone().map(|bin| bin.count * (bin.mean - self.all.mean).powi(2)).sum();
+        let within = bins.map(|bin| bin.squares).sum::<f64>() / (self.all.count - count);
+        (between - (count - 1.0) * within) / self.all.squares
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts far below 2^53")]
+fn as_f64(count: u64) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_good_to_a_per_cent() {
+        let mut distribution = Distribution::default();
+        (1..=1000).for_each(|i| distribution.push(f64::from(i)));
+        for share in [0.05, 0.5, 0.95] {
+            assert!((distribution.quantile(share) / (1000.0 * share) - 1.0).abs() < 0.01);
+        }
+        assert_eq!((distribution.largest(), distribution.quantile(1.0)), (1000.0, 1000.0));
+        assert!((distribution.share_below(250.0) - 0.25).abs() < 0.01);
+    }
+
+    #[test]
+    fn the_explained_share_is_that_of_a_known_function() {
+        // f = 3 a + b on the unit square: variances 9/12 and 1/12.
+        let mut effects = Effects {
+            all: Moments::default(),
+            bins: vec![[Moments::default(); EFFECT_BINS]; 3],
+            first: vec![],
+            total: vec![],
+            pairs: 0.0,
+            samples: Moments::default(),
+        };
+        for i in 0..10_000_u32 {
+            let place = |k: u32| (f64::from(i) * [0.618_034, 0.414_214, 0.732_051][k as usize]).fract();
+            effects.push(3.0 * place(0) + place(1), &[place(0), place(1), place(2)]);
+        }
+        let shares = [0, 1, 2].map(|i| effects.explained(i));
+        // Ten bins cannot see what varies within them: one hundredth of the factor's share.
+        for (share, exact) in shares.iter().zip([0.9 * 0.99, 0.1 * 0.99, 0.0]) {
+            assert!((share - exact).abs() < 0.01, "{shares:?}");
+        }
+    }
+}
