@@ -204,7 +204,14 @@ impl Study {
             return Err(check.meaning("factor", place, message, Some("give one of them a `name`".to_owned())));
         }
         let runs = runs(&check, &raw, &factors)?;
-        let tables = [vehicle.source.parse()?, experiment.source.parse()?];
+        let vehicle_table = vehicle.source.parse()?;
+        let mut experiment_table: Table = experiment.source.parse()?;
+        // Every run reads its files anew; what no run needs costs time.
+        experiment.scenarios.clear();
+        for unused in ["scenario", "observer"] {
+            experiment_table.remove(unused);
+        }
+        let tables = [vehicle_table, experiment_table];
         let (vehicle, experiment) = (Arc::new(vehicle), Arc::new(experiment));
         let (plan, seed) = (raw.plan, raw.seed);
         let study = Self {
@@ -258,14 +265,13 @@ impl Study {
             let both = of(Target::Vehicle).chain(of(Target::Car));
             Arc::new(Vehicle::from_source(changed(&self.vehicle.source, vehicle_table, both)?)?)
         };
-        let mut experiment = if of(Target::Experiment).count() == 0 {
+        let experiment = if of(Target::Experiment).count() == 0 {
             Experiment::clone(&self.experiment)
         } else {
             let source = changed(&self.experiment.source, experiment_table, of(Target::Experiment))?;
             let observers = self.experiment.observers.clone();
             Experiment { observers, ..Experiment::from_source(source)? }
         };
-        experiment.scenarios.clear();
         Ok(Varied { car, vehicle, experiment })
     }
 

@@ -66,13 +66,15 @@ pub fn read_speed(
 /// Times at which teeth pass, in steps of the timer.
 fn tooth_times(sensor: &SpeedSensor, time_s: &[f64], speed_rad_s: &[f64]) -> Vec<f64> {
     let pitch = std::f64::consts::TAU / sensor.teeth;
-    let tick = |time: f64| if sensor.timer_s > 0.0 { (time / sensor.timer_s).round() * sensor.timer_s } else { time };
+    let ticks_per_s = if sensor.timer_s > 0.0 { 1.0 / sensor.timer_s } else { 0.0 };
+    let tick = |time: f64| if ticks_per_s > 0.0 { (time * ticks_per_s).round() * sensor.timer_s } else { time };
     let mut edges = Vec::new();
-    let mut angle = 0.0;
+    // How far the wheel has to turn until the next tooth passes.
+    let mut to_go = pitch;
     for i in 1..time_s.len() {
         let (dt, from, to) = (time_s[i] - time_s[i - 1], speed_rad_s[i - 1].abs(), speed_rad_s[i].abs());
         let turned = 0.5 * (from + to) * dt;
-        let mut next = pitch - angle;
+        let mut next = to_go;
         while next <= turned {
             // Within the interval the speed changes linearly: the angle is a quadratic function of time.
             let bend = (to - from) / dt;
@@ -80,7 +82,7 @@ fn tooth_times(sensor: &SpeedSensor, time_s: &[f64], speed_rad_s: &[f64]) -> Vec
             edges.push(tick(time_s[i - 1] + 2.0 * next / (from + root)));
             next += pitch;
         }
-        angle = (angle + turned) % pitch;
+        to_go = next - turned;
     }
     edges
 }

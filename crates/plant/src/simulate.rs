@@ -127,7 +127,7 @@ impl<'a> Simulation<'a> {
         while self.plant.time_s < until_s - SAME_INSTANT_S {
             if self.plant.time_s >= self.periods * period_s {
                 self.control(self.periods * period_s);
-                self.periods += 1.0;
+                self.periods = self.next_change(self.periods);
             }
             let stage = self.controller.stage();
             let end_s = (self.periods * period_s).min(until_s);
@@ -142,6 +142,23 @@ impl<'a> Simulation<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The period, after this one, in which the controller may command something new. Before a shift it goes by the
+    /// clock alone: while the driver's throttle rests there is nothing to integrate up to.
+    fn next_change(&self, period: f64) -> f64 {
+        let now_s = self.plant.time_s;
+        let next = period + 1.0;
+        let Stage::Before = self.controller.stage() else { return next };
+        let throttle = &self.experiment.throttle;
+        let points = throttle.axis().iter().zip(throttle.values());
+        let here = throttle.at(now_s);
+        // It rests until the last point before the first one of another value.
+        let rests = points.clone().filter(|(time, _)| **time >= now_s).take_while(|(_, value)| **value == here);
+        let another = points.clone().any(|(time, value)| *time > now_s && *value != here);
+        let resting_s = if another { rests.last().map_or(now_s, |(time, _)| *time) } else { f64::INFINITY };
+        let calm_s = resting_s.min(self.experiment.shift.request_s);
+        next.max((calm_s / self.experiment.shift.control_period_s).floor())
     }
 
     /// One step of the shift controller, whose commands set out to the valves.

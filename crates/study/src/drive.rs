@@ -3,7 +3,7 @@
 use config::{Experiment, Vehicle};
 use observer::Phase;
 use plant::{Contact, Mode, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
-use trace::{Trace, signal};
+use trace::{Trace, Word, signal};
 
 /// Columns of a simulated trace, measurable ones first.
 const COLUMNS: &[&str] = &[
@@ -65,20 +65,25 @@ pub fn simulate_shift(car: &Vehicle, nominal: &Vehicle, experiment: &Experiment)
     }
 }
 
+/// Samples for which room is made at once: a shift at a millisecond.
+const EXPECTED_SAMPLES: usize = 4096;
+
 /// Samples on their way to a trace.
 struct Recording {
     trace: Trace,
-    phases: Vec<String>,
+    phases: Vec<Word>,
 }
 
 impl Recording {
     fn new() -> Self {
-        Self { trace: Trace::with_columns(COLUMNS), phases: Vec::new() }
+        let mut trace = Trace::with_columns(COLUMNS);
+        trace.reserve(EXPECTED_SAMPLES);
+        Self { trace, phases: Vec::with_capacity(EXPECTED_SAMPLES) }
     }
 
     fn take(&mut self, sample: &Sample) {
         self.trace.push(sample.time_s, &row(sample));
-        self.phases.push(phase(sample).name().to_owned());
+        self.phases.push(phase(sample).name().into());
     }
 
     fn finish(mut self) -> Trace {

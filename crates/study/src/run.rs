@@ -67,7 +67,7 @@ pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
         let shaft = |e: &Estimate<f64>| e.shaft_torque_n_m.unwrap_or(f64::NAN);
         trace.add(signal::SHAFT_ESTIMATE, estimates.iter().map(shaft).collect());
     }
-    trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().to_owned()).collect());
-    trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().to_owned()).collect());
+    trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().into()).collect());
+    trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().into()).collect());
     trace
 }

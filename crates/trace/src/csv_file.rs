@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crate::{Column, Trace, TraceError, Values, signal, units, write_whole};
+use crate::{Column, Trace, TraceError, Values, Word, signal, units, write_whole};
 
 /// Reads a comma-separated file. The first row names the columns; `time_s` (or `time_ms`) must be among
 /// them and rise. An empty cell is a lost sample and becomes NaN; a column with other text holds words.
@@ -89,7 +89,7 @@ pub fn write_rows(writer: &mut dyn Write, trace: &Trace) -> io::Result<()> {
         for column in &trace.columns {
             match &column.values {
                 Values::Numbers(numbers) => writer.write_field(number(numbers[i])),
-                Values::Words(words) => writer.write_field(&words[i]),
+                Values::Words(words) => writer.write_field(words[i].as_ref()),
             }
             .map_err(into_io)?;
         }
@@ -133,7 +133,7 @@ impl Cells {
 
     fn into_values(self, factor: f64) -> Values {
         match self.words {
-            Some(words) => Values::Words(words),
+            Some(words) => Values::Words(words.into_iter().map(Word::from).collect()),
             None => Values::Numbers(self.numbers.into_iter().map(|number| number * factor).collect()),
         }
     }
@@ -162,7 +162,7 @@ mod tests {
         let mut trace = Trace::with_columns(&["a_pa", "b_rad_s"]);
         trace.push(0.1, &[1.0 / 3.0, f64::NAN]);
         trace.push(0.2, &[-1e-300, 6.02e23]);
-        trace.add_words("phase", vec!["torque_phase".to_owned(), "inertia_phase".to_owned()]);
+        trace.add_words("phase", vec!["torque_phase".into(), "inertia_phase".into()]);
         let path = file("round", "");
         write_csv(&path, &trace).unwrap();
         let back = read_csv(&path).unwrap();

@@ -12,6 +12,7 @@ pub mod rows;
 pub mod signal;
 pub mod units;
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 pub use atomic::write_whole;
@@ -20,13 +21,16 @@ pub use error::TraceError;
 pub use parquet_file::{ColumnKind, write_parquet};
 pub use rows::{GrowingTable, partial_path, read_rows};
 
+/// A word of a column; the program's own cost nothing to copy.
+pub type Word = Cow<'static, str>;
+
 /// The values of one column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// Numbers; NaN where a sample was lost.
     Numbers(Vec<f64>),
     /// Words, such as phases.
-    Words(Vec<String>),
+    Words(Vec<Word>),
 }
 
 /// A named column.
@@ -54,6 +58,16 @@ impl Trace {
     pub fn with_columns(names: &[&str]) -> Self {
         let column = |name: &&str| Column { name: (*name).to_owned(), values: Values::Numbers(Vec::new()) };
         Self { path: None, time_s: Vec::new(), columns: names.iter().map(column).collect() }
+    }
+
+    /// Makes room for more rows of numbers.
+    pub fn reserve(&mut self, rows: usize) {
+        self.time_s.reserve(rows);
+        for column in &mut self.columns {
+            if let Values::Numbers(numbers) = &mut column.values {
+                numbers.reserve(rows);
+            }
+        }
     }
 
     /// Appends a row of numbers in the order of the columns.
@@ -84,7 +98,7 @@ impl Trace {
     ///
     /// # Panics
     /// If it has not one value for each time.
-    pub fn add_words(&mut self, name: &str, values: Vec<String>) {
+    pub fn add_words(&mut self, name: &str, values: Vec<Word>) {
         assert_eq!(values.len(), self.time_s.len(), "one value for each time");
         self.columns.push(Column { name: name.to_owned(), values: Values::Words(values) });
     }
@@ -106,9 +120,9 @@ impl Trace {
         match self.columns.iter().find(|column| column.name == name).map(|column| &column.values) {
             Some(Values::Numbers(numbers)) => Ok(numbers),
             Some(Values::Words(words)) => {
-                let is_number = |word: &String| word.is_empty() || word.parse::<f64>().is_ok();
+                let is_number = |word: &Word| word.is_empty() || word.parse::<f64>().is_ok();
                 let first = words.iter().position(|word| !is_number(word)).unwrap_or(0);
-                let text = words.get(first).cloned().unwrap_or_default();
+                let text = words.get(first).cloned().unwrap_or_default().into_owned();
                 Err(TraceError::NotNumbers { path: path(), column: name.to_owned(), row: first + 1, text })
             }
             None => Err(TraceError::MissingColumn {
