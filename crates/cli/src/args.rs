@@ -104,6 +104,17 @@ pub(crate) enum Command {
     /// Puts together what `study --shard 1/N` to `study --shard N/N` wrote, to the same bytes as the study in one go.
     #[command(verbatim_doc_comment)]
     Merge(Merge),
+    /// Find by simulation how wrong the observers' models are
+    ///
+    /// Runs a study and measures, at every instant of its shifts, what the rigid and the compliant model cannot explain of
+    /// the accelerations: the |w| and the H that the gain designs ask for, and what they are made of.
+    #[command(verbatim_doc_comment)]
+    ErrorBound(ErrorBoundOptions),
+    /// Search a study's factors for the run that hurts an observer most
+    ///
+    /// Makes the runs of a study, then goes on from the worst of them with the simplex method of Nelder and Mead.
+    #[command(verbatim_doc_comment)]
+    WorstCase(WorstCaseOptions),
     /// Check a vehicle or experiment file
     ///
     /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
@@ -132,6 +143,9 @@ pub(crate) struct Simulate {
 pub(crate) struct Design {
     /// Vehicle file
     pub(crate) vehicle: PathBuf,
+    /// File whose values stand in place of the vehicle file's, such as what `error-bound` writes
+    #[arg(long, value_name = "BOUNDS.toml")]
+    pub(crate) bounds: Option<PathBuf>,
     /// Observer to design for
     #[arg(long, value_enum, default_value_t = DesignChoice::Rigid)]
     pub(crate) observer: DesignChoice,
@@ -243,20 +257,63 @@ pub(crate) struct StudyOptions {
     /// Make only the Ith of N equal parts
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<Shard>,
-    /// Number of threads; as many as the machine has if left out
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) threads: Option<u16>,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
     /// Make this one run again, with all its signals and its figure
     #[arg(long, value_name = "RUN", conflicts_with_all = ["resume", "shard"])]
     pub(crate) run: Option<u64>,
 }
 
-impl StudyOptions {
+#[derive(Debug, Args)]
+pub(crate) struct Threads {
+    /// Number of threads; as many as the machine has if left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl Threads {
     /// The number of threads.
-    pub(crate) fn threads(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         let available = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         self.threads.map_or_else(available, usize::from)
     }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ErrorBoundOptions {
+    /// Study file
+    pub(crate) study: PathBuf,
+    /// File for the bounds, which `design --bounds` reads; standard output if left out
+    #[arg(short, long, value_name = "BOUNDS.toml")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct WorstCaseOptions {
+    /// Study file
+    pub(crate) study: PathBuf,
+    /// Name of the observer to hurt; the study's first if left out
+    #[arg(long)]
+    pub(crate) observer: Option<String>,
+    /// Phase in which
+    #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
+    pub(crate) phase: PhaseChoice,
+    /// How many of the study's worst runs to search from
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(crate) starts: u16,
+    /// Most steps of each search
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    pub(crate) iterations: u64,
+    /// Folder for the case as a study file and its figure
+    #[arg(short, long, value_name = "DIR", default_value = "wetclutch-worst-case")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
 }
 
 /// One of equal parts of a study.

@@ -87,6 +87,7 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Config(error) => error.into(),
+            StudyError::Search(_) => Self::Work(error.to_string()),
             StudyError::Plant(error) => error.into(),
             StudyError::Design(error) => error.into(),
             StudyError::Trace(error) => error.into(),

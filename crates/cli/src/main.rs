@@ -25,6 +25,8 @@ fn main() -> ExitCode {
         Command::Bench(options) => commands::bench(&options),
         Command::Study(options) => commands::study(&options),
         Command::Merge(options) => commands::merge(&options),
+        Command::ErrorBound(options) => commands::error_bound(&options),
+        Command::WorstCase(options) => commands::worst_case(&options),
         Command::Check(options) => commands::check(&options),
     };
     match result {

@@ -288,6 +288,17 @@ impl Study {
     }
 }
 
+impl Factor {
+    /// What it does to the value in the file, as the study file writes it.
+    pub fn change_name(&self) -> &'static str {
+        match self.change {
+            Change::Set => "set",
+            Change::Scale => "scale",
+            Change::Add => "add",
+        }
+    }
+}
+
 impl Values {
     /// Smallest and largest value.
     pub fn ends(&self) -> [f64; 2] {

@@ -201,11 +201,18 @@ pub fn compliant_requirement(vehicle: &Vehicle, phase: Phase) -> CompliantRequir
         Phase::InertiaPhase | Phase::AfterShift => &vehicle.compliant_inertia_phase,
         Phase::BeforeShift | Phase::TorquePhase => &vehicle.compliant_torque_phase,
     };
+    let (h, w_max) = match &required.error_matrix {
+        None => (error_matrix(&compliant_model(vehicle), &vehicle.error_bounds, phase), std::f64::consts::SQRT_2),
+        Some(given) => {
+            let causes = (1..=3).rev().find(|&n| given.iter().any(|row| row[n - 1] != 0.0)).unwrap_or(1);
+            (DMatrix::from_fn(outputs(phase).len(), causes, |i, j| given[i][j]), 1.0)
+        }
+    };
     CompliantRequirement {
         kappa1_per_s: required.kappa1_per_s,
         kappa2_per_s: 4.0 / required.settling_time_s,
-        h: error_matrix(&compliant_model(vehicle), &vehicle.error_bounds, phase),
-        w_max: std::f64::consts::SQRT_2,
+        h,
+        w_max,
         offset_max_pa: required.offset_max_pa,
     }
 }

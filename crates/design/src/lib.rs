@@ -28,6 +28,7 @@ use lapack_nalgebra as _;
 
 pub mod certificate;
 pub mod compliant;
+pub mod enclosing;
 pub mod iss;
 pub mod lmi;
 pub mod peak_to_peak;

@@ -23,6 +23,9 @@ pub enum StudyError {
     /// Values of a study's factors that do not go together.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The search for a worst case failed.
+    #[error("the search failed: {0}")]
+    Search(String),
     /// The simulation failed.
     #[error(transparent)]
     Plant(#[from] PlantError),

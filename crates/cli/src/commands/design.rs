@@ -17,7 +17,10 @@ use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn design(options: &Design) -> Result<(), Failure> {
-    let vehicle = Vehicle::read(&options.vehicle)?;
+    let vehicle = match &options.bounds {
+        Some(bounds) => Vehicle::read_with(&options.vehicle, bounds)?,
+        None => Vehicle::read(&options.vehicle)?,
+    };
     let phases: &[Phase] = match options.phase {
         PhaseChoice::Both => &[Phase::TorquePhase, Phase::InertiaPhase],
         PhaseChoice::Torque => &[Phase::TorquePhase],

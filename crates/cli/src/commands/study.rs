@@ -5,7 +5,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use config::Study;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use report::StudyPage;
 use report::shift_figure::observers_of;
 use report::tables::phase_name;
@@ -14,7 +13,7 @@ use study::{Campaign, Row, Summary, estimates_trace, execute};
 use trace::{ColumnKind, GrowingTable, partial_path, read_rows, units};
 
 use crate::args::{Merge, Shard, StudyOptions};
-use crate::commands::{write_text, write_trace};
+use crate::commands::{progress, write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
 
@@ -49,7 +48,7 @@ pub(crate) fn study(options: &StudyOptions) -> Result<(), Failure> {
     if next < runs.end {
         let mut table = open(&campaign, options, &header, &manifest, &runs, &mut summary, &mut next)?;
         let bar = progress(runs.end - runs.start, next - runs.start);
-        execute::<Failure>(&campaign, next..runs.end, options.threads(), |row| {
+        execute::<Failure>(&campaign, next..runs.end, options.threads.count(), |row| {
             table.append(&row.line(&campaign.layout)).map_err(|error| Failure::writing(&rows, &error))?;
             if (row.run + 1).is_multiple_of(FLUSH_EVERY) {
                 table.flush().map_err(|error| Failure::writing(&rows, &error))?;
@@ -182,17 +181,6 @@ fn check_manifest(folder: &Path, expected: &str) -> Result<(), Failure> {
     let hint =
         "the study file, its experiment or vehicle, the program or the shard changed since; choose another folder";
     Err(Failure::Input(format!("{}: belongs to another study\nhint: {hint}", path.display())))
-}
-
-fn progress(length: u64, done: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
-    // The template is a constant.
-    if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} runs  {per_sec}  {eta} left") {
-        bar.set_style(style);
-    }
-    bar.set_position(done);
-    bar.reset_eta();
-    bar
 }
 
 /// Everything that follows from the rows.

@@ -10,6 +10,8 @@ use drivetrain::{
 };
 use observer::{InputLimits, Supervisor};
 
+use toml::Spanned;
+
 use crate::check::{Check, Numbers};
 use crate::{ConfigError, Source};
 use raw::{
@@ -59,6 +61,9 @@ pub struct CompliantRequirement {
     pub kappa1_per_s: Option<f64>,
     /// Largest acceptable offset of the pressure estimate, Pa.
     pub offset_max_pa: f64,
+    /// `H` for `|w| <= 1`, normalised, if it is given and not to follow from the error bounds: a row for each output
+    /// of the phase; what is beyond them is zero.
+    pub error_matrix: Option<[[f64; 3]; 3]>,
 }
 
 /// Largest errors of what the observers are told about the car.
@@ -149,6 +154,20 @@ impl Vehicle {
     /// The file cannot be read, is not a vehicle file, or holds a value that cannot be right.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         Self::from_source(Source::read(path)?)
+    }
+
+    /// As [`Self::read`], with the values of a second file in place of those in the first; it holds any of the keys
+    /// of a vehicle file, such as what `wetclutch error-bound` writes.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_with(path: &Path, overlay: &Path) -> Result<Self, ConfigError> {
+        let source = Source::read(path)?;
+        let over = Source::read(overlay)?;
+        let mut table: toml::Table = source.parse()?;
+        merge(&mut table, over.parse()?);
+        let joint = format!("{} with {}", source.path.display(), over.path.display());
+        Self::from_source(Source { path: joint.into(), text: table.to_string() })
     }
 
     /// Checks the text of a vehicle file.
@@ -396,6 +415,18 @@ fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<D
     })
 }
 
+/// Puts the values of one table in place of those of another, table by table.
+fn merge(table: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => merge(below, above),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
 fn compliant(
     check: &Check<'_>,
     phase: &str,
@@ -406,7 +437,28 @@ fn compliant(
         settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
         kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
         offset_max_pa: number("offset_max_pa", &raw.offset_max_pa, 1e3..=10e6)?,
+        error_matrix: raw.error_matrix.as_ref().map(|rows| error_matrix(check, phase, rows)).transpose()?,
     })
+}
+
+fn error_matrix(check: &Check<'_>, phase: &str, rows: &Spanned<Vec<Numbers>>) -> Result<[[f64; 3]; 3], ConfigError> {
+    let key = format!("design.compliant.{phase}.error_matrix");
+    let outputs = if phase == "inertia_phase" { 3 } else { 2 };
+    let mut matrix = [[0.0; 3]; 3];
+    let wrong = |place: usize| {
+        check.meaning(&key, place, format!("expected {outputs} rows of up to 3 numbers, one row for each output"), None)
+    };
+    if rows.get_ref().len() != outputs {
+        return Err(wrong(rows.span().start));
+    }
+    for (row, given) in matrix.iter_mut().zip(rows.get_ref()) {
+        let values = check.numbers(&key, given, -1e6..=1e6)?;
+        if values.is_empty() || values.len() > 3 {
+            return Err(wrong(given.span().start));
+        }
+        row[..values.len()].copy_from_slice(values);
+    }
+    Ok(matrix)
 }
 
 fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, ConfigError> {

@@ -233,6 +233,7 @@ pub(super) struct RawCompliantRequirement {
     pub(super) settling_time_s: Number,
     pub(super) kappa1_per_s: Option<Number>,
     pub(super) offset_max_pa: Number,
+    pub(super) error_matrix: Option<Spanned<Vec<Numbers>>>,
 }
 
 #[derive(Deserialize)]

@@ -1,4 +1,4 @@
-//! Runs on several threads, rows in their order.
+//! Work on several threads, results in their order.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -13,13 +13,6 @@ const BLOCK: u64 = 16;
 /// number of runs.
 const AHEAD: u64 = 4;
 
-struct Shared {
-    next_block: u64,
-    due_block: u64,
-    finished: BTreeMap<u64, Result<Vec<Row>, StudyError>>,
-    stopped: bool,
-}
-
 /// Makes the runs of a range on `threads` threads and shows their rows to `sink` in the order of their numbers.
 ///
 /// # Errors
@@ -30,51 +23,100 @@ pub fn execute<E: From<StudyError>>(
     threads: usize,
     mut sink: impl FnMut(&Row) -> Result<(), E>,
 ) -> Result<(), E> {
-    let blocks = (runs.end - runs.start.min(runs.end)).div_ceil(BLOCK);
+    in_order(runs, threads, |run| campaign.row(run), |row| sink(&row?))
+}
+
+struct Shared<T> {
+    next_block: u64,
+    due_block: u64,
+    finished: BTreeMap<u64, Vec<T>>,
+    stopped: bool,
+}
+
+/// Does `work` for every number of a range on `threads` threads and shows the results to `sink` in their order.
+/// `work` must not panic.
+///
+/// # Errors
+/// What `sink` returns; the results before have been shown.
+pub fn in_order<T: Send, E>(
+    runs: Range<u64>,
+    threads: usize,
+    work: impl Fn(u64) -> T + Sync,
+    mut sink: impl FnMut(T) -> Result<(), E>,
+) -> Result<(), E> {
+    let blocks = runs.end.saturating_sub(runs.start).div_ceil(BLOCK);
     let shared = Mutex::new(Shared { next_block: 0, due_block: 0, finished: BTreeMap::new(), stopped: false });
     let changed = Condvar::new();
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
     let wait = |guard| changed.wait(guard).unwrap_or_else(PoisonError::into_inner);
     let ahead = AHEAD * threads.max(1) as u64;
+    let next_block = || {
+        let mut state = lock();
+        while !state.stopped && state.next_block < blocks && state.next_block >= state.due_block + ahead {
+            state = wait(state);
+        }
+        let block = state.next_block;
+        state.next_block += 1;
+        (!state.stopped && block < blocks).then_some(block)
+    };
+    let due = |block| {
+        let mut state = lock();
+        loop {
+            if let Some(results) = state.finished.remove(&block) {
+                state.due_block = block + 1;
+                changed.notify_all();
+                return results;
+            }
+            state = wait(state);
+        }
+    };
     std::thread::scope(|scope| {
         for _ in 0..threads.max(1) {
             scope.spawn(|| {
-                loop {
-                    let block = {
-                        let mut state = lock();
-                        while !state.stopped && state.next_block < blocks && state.next_block >= state.due_block + ahead
-                        {
-                            state = wait(state);
-                        }
-                        if state.stopped || state.next_block >= blocks {
-                            return;
-                        }
-                        state.next_block += 1;
-                        state.next_block - 1
-                    };
+                while let Some(block) = next_block() {
                     let first = runs.start + block * BLOCK;
-                    let rows = (first..(first + BLOCK).min(runs.end)).map(|run| campaign.row(run)).collect();
-                    lock().finished.insert(block, rows);
+                    let results = (first..(first + BLOCK).min(runs.end)).map(&work).collect();
+                    lock().finished.insert(block, results);
                     changed.notify_all();
                 }
             });
         }
-        let result = (0..blocks).try_for_each(|block| {
-            let rows = {
-                let mut state = lock();
-                loop {
-                    if let Some(rows) = state.finished.remove(&block) {
-                        state.due_block = block + 1;
-                        break rows;
-                    }
-                    state = wait(state);
-                }
-            };
-            changed.notify_all();
-            rows?.iter().try_for_each(&mut sink)
-        });
+        let result = (0..blocks).try_for_each(|block| due(block).into_iter().try_for_each(&mut sink));
         lock().stopped = true;
         changed.notify_all();
         result
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_and_an_error_stops_the_work() {
+        for threads in [1, 4] {
+            let mut seen = Vec::new();
+            let all = in_order(
+                3..1003,
+                threads,
+                |run| run * run,
+                |square| {
+                    seen.push(square);
+                    Ok::<(), ()>(())
+                },
+            );
+            assert!(all.is_ok() && seen == (3..1003).map(|run| run * run).collect::<Vec<u64>>());
+            let mut count = 0;
+            let stopped = in_order(
+                0..1_000_000_000,
+                threads,
+                |run| run,
+                |run| {
+                    count += 1;
+                    if run == 500 { Err("enough") } else { Ok(()) }
+                },
+            );
+            assert_eq!((stopped, count), (Err("enough"), 501));
+        }
+    }
 }

@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// Values of the factors in a run, in the order of the factors.
 pub fn factor_values(study: &Study, run: u64) -> Vec<f64> {
     let places = places(study, run);
-    study.factors.iter().zip(places).map(|(factor, place)| value(&factor.values, place)).collect()
+    study.factors.iter().zip(places).map(|(factor, place)| value_at(&factor.values, place)).collect()
 }
 
 /// Seed of a run's sensors.
@@ -73,7 +73,7 @@ fn sobol(study: &Study, run: u64, dimension: usize) -> f64 {
 }
 
 /// The value at a place between 0 and 1.
-fn value(values: &Values, place: f64) -> f64 {
+pub(crate) fn value_at(values: &Values, place: f64) -> f64 {
     match *values {
         Values::List(ref list) => {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn a_normal_factor_has_its_mean_and_deviation() {
         let normal = Values::Normal(10.0, 2.0, 3);
-        let draws: Vec<f64> = (0..1000).map(|i| value(&normal, (f64::from(i) + 0.5) / 1000.0)).collect();
+        let draws: Vec<f64> = (0..1000).map(|i| value_at(&normal, (f64::from(i) + 0.5) / 1000.0)).collect();
         let mean = draws.iter().sum::<f64>() / 1000.0;
         let deviation = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1000.0).sqrt();
         assert!((mean - 10.0).abs() < 1e-6 && (deviation - 1.973).abs() < 0.01, "{mean} {deviation}");
