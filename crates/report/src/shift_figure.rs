@@ -70,14 +70,15 @@ pub fn observers_figure(comparison: &Comparison) -> Figure {
 /// As [`observers_figure`], of a run without the rest of a comparison.
 pub fn observers_of(runs: &[ObserverRun], trace: &Trace, quality: Option<&ShiftQuality>) -> Figure {
     let t = Curves { runs, trace, quality, bound_pa: &[] };
+    let highest = t.highest_pressure().max(0.4);
     let mut panels = vec![
         panel(
             "pressure of B (MPa)",
             190.0,
             [vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)], t.pressures()].concat(),
         )
-        .within(0.0, 0.5),
-        panel("error (MPa)", 190.0, t.pressure_errors()).within(-0.14, 0.14),
+        .within(0.0, 1.25 * highest),
+        panel("error (MPa)", 190.0, t.pressure_errors()).within(-0.35 * highest, 0.35 * highest),
     ];
     let shaft = t.shaft_torques();
     if !shaft.is_empty() {
@@ -168,6 +169,14 @@ impl<'a> Curves<'a> {
                 self.signal("output", colour::PURPLE, signal::OUTPUT_SPEED, units::rpm),
             ],
         )
+    }
+
+    /// Highest true pressure until lock-up, MPa.
+    fn highest_pressure(&self) -> f64 {
+        let end_s = self.quality.map_or(f64::INFINITY, |quality| quality.lock_up_s);
+        let pressures = self.trace.get(signal::ONCOMING_PRESSURE).unwrap_or_default();
+        let samples = self.trace.time_s.iter().zip(pressures).take_while(|(time, _)| **time < end_s);
+        samples.map(|(_, &pressure)| units::mpa(pressure)).fold(0.0, f64::max)
     }
 
     /// A column of the trace, in the unit that people read.
