@@ -41,5 +41,5 @@ pub use compliant::{CompliantCertificate, CompliantDesign, compliant_observer, d
 pub use iss::{DesignError, IssRequirement, design_iss};
 pub use peak_to_peak::{PeakToPeakCertificate, design_peak_to_peak};
 pub use polytope::{Polytope, Vertex};
-pub use rigid::{RigidDesign, design_rigid, requirement, rigid_model, rigid_observer, tracker};
+pub use rigid::{RigidDesign, bounded, design_rigid, requirement, rigid_model, rigid_observer, tracker};
 pub use sliding::{design_sliding, sliding_observer};

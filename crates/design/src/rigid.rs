@@ -1,7 +1,7 @@
 //! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
 
 use config::{DesignRequirement, Vehicle};
-use observer::{Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Tracker};
+use observer::{Bounded, Budget, Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Tracker};
 use serde::Serialize;
 
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
@@ -74,6 +74,23 @@ pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
         discretisation: Discretisation::Exact,
         sample_max_s: SAMPLE_MAX_S,
     }
+}
+
+/// The observer with a guaranteed range around its estimates, from the vehicle file's error budget. The budget is of
+/// a valve that is commanded by a current; of another there is none.
+pub fn bounded<O>(vehicle: &Vehicle, observer: O) -> Bounded<f64, O> {
+    let errors = &vehicle.error_bounds;
+    let budget = Budget {
+        valve: vehicle.oncoming.valve,
+        lag_factor: errors.valve_lag_factor,
+        gain_factor: errors.valve_gain_factor,
+        delay_s: errors.valve_delay_s,
+        command: errors.current_a,
+        pressure_max_pa: errors.pressure_max_pa,
+        friction_factor: errors.friction_factor,
+        slip_rad_s: errors.slip_rad_s,
+    };
+    Bounded { observer, budget, clutch: vehicle.oncoming.clutch, limits: vehicle.limits }
 }
 
 /// Designs the gains of both phases from the vehicle file's requirements.

@@ -198,6 +198,14 @@ impl<T: Real> Table1<T> {
         &self.values[..self.axis.len]
     }
 
+    /// Smallest and largest value between two arguments, the first not above the second.
+    #[inline]
+    pub fn range_within(&self, from: T, to: T) -> (T, T) {
+        let (a, b) = (self.at(from), self.at(to));
+        let inside = self.axis().iter().zip(self.values()).filter(|(x, _)| **x > from && **x < to);
+        inside.fold((a.min(b), a.max(b)), |(low, high), (_, &y)| (low.min(y), high.max(y)))
+    }
+
     /// Smallest and largest value.
     pub fn range(&self) -> (T, T) {
         self.values().iter().fold((self.values[0], self.values[0]), |(lo, hi), &y| (lo.min(y), hi.max(y)))

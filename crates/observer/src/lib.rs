@@ -7,6 +7,7 @@
 //! **Architecture invariant:** nothing here knows the simulated plant. An estimator cannot see the truth.
 #![no_std]
 
+pub mod bound;
 pub mod compliant;
 pub mod compliant_model;
 pub mod rigid;
@@ -16,6 +17,7 @@ pub mod sliding;
 pub mod supervisor;
 pub mod tracker;
 
+pub use bound::{Bounded, Bounds, Budget, Tube};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};

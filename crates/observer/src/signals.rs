@@ -2,7 +2,7 @@
 
 use drivetrain::Real;
 
-use crate::Phase;
+use crate::{Bounds, Phase};
 
 /// One sample of what a transmission controller measures and commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +99,21 @@ pub struct Estimate<T> {
     pub phase: Phase,
     /// Whether the input could be used.
     pub health: Health,
+    /// Ranges that hold the truth as long as every error is within its budget, where the observer was given one.
+    pub bounds: Option<Bounds<T>>,
+}
+
+impl<T, O: Estimator<T>> Estimator<T> for &O {
+    type State = O::State;
+
+    fn start(&self) -> Self::State {
+        (**self).start()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T> {
+        (**self).step(state, input)
+    }
 }
 
 /// An observer: tuning in `&self`, memory in its state, one estimate for each sample.

@@ -131,6 +131,7 @@ impl<T: Real, S> Track<T, S> {
             shaft_torque_n_m,
             phase: self.tracker.supervisor.phase,
             health,
+            bounds: None,
         }
     }
 }

@@ -58,13 +58,15 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-/// A shaded range around zero.
+/// A shaded range.
 #[derive(Debug, Clone)]
 pub struct Band {
-    /// Its name, written inside it.
+    /// Its name, written below its upper end.
     pub label: String,
-    /// Points and half widths; a NaN half width is a gap.
-    pub half_width: Vec<(f64, f64)>,
+    /// Points and lower ends; NaN is a gap.
+    pub lower: Vec<(f64, f64)>,
+    /// Points and upper ends, at the same points.
+    pub upper: Vec<(f64, f64)>,
 }
 
 /// One panel.
@@ -150,13 +152,14 @@ impl Figure {
 
         let mut plots = Vec::new();
         if let Some(band) = &panel.band {
-            for piece in pieces(&visible(&band.half_width)) {
+            let ends = pieces(&visible(&band.lower)).into_iter().zip(pieces(&visible(&band.upper)));
+            for (lower, upper) in ends {
                 let clamp = |v: f64| v.clamp(low, high);
                 plots.push(Plot::Band(
                     BandPlot::new(
-                        piece.iter().map(|p| p.0),
-                        piece.iter().map(|p| clamp(-p.1)),
-                        piece.iter().map(|p| clamp(p.1)),
+                        lower.iter().map(|p| p.0),
+                        lower.iter().map(|p| clamp(p.1)),
+                        upper.iter().map(|p| clamp(p.1)),
                     )
                     .with_color(colour::BLUE)
                     .with_opacity(0.13),
@@ -230,9 +233,9 @@ impl Figure {
             scene.add(text(WIDTH - RIGHT + 7.0, label_y + 4.0, &series.label, series.colour, TextAnchor::Start));
         }
         if let Some(band) = &panel.band
-            && let Some((time, width)) = visible(&band.half_width).into_iter().rev().find(|(_, w)| w.is_finite())
+            && let Some((time, end)) = visible(&band.upper).into_iter().rev().find(|(_, end)| end.is_finite())
         {
-            let at = map_y(width.min(high)) + 14.0;
+            let at = map_y(end.min(high)) + 14.0;
             scene.add(text(self.x(time) - 6.0, at, &band.label, colour::BLUE, TextAnchor::End));
         }
     }

@@ -1,6 +1,7 @@
 //! The figures of a shift and of the drive around it.
 
 use config::ObserverKind;
+use observer::Bounds;
 use study::{Comparison, ObserverRun, ShiftQuality};
 use trace::{Trace, signal, units};
 
@@ -22,15 +23,13 @@ pub fn shift_figure(comparison: &Comparison) -> Figure {
     let bound = t.bound();
     let panels = vec![
         t.speeds(130.0),
-        panel(
-            "pressure of B (MPa)",
-            190.0,
-            [vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)], t.pressures()].concat(),
-        )
-        .within(0.0, 0.5),
+        t.pressure_panel().within(0.0, 0.5),
         Panel {
-            band: (!bound.is_empty())
-                .then(|| Band { label: "certified band of the rigid observer".into(), half_width: bound }),
+            band: (!bound.is_empty()).then(|| Band {
+                label: "certified band of the rigid observer".into(),
+                lower: bound.iter().map(|&(time, width)| (time, -width)).collect(),
+                upper: bound,
+            }),
             ..panel("error (MPa)", 150.0, t.pressure_errors()).within(-0.14, 0.14)
         },
         panel(
@@ -72,12 +71,7 @@ pub fn observers_of(runs: &[ObserverRun], trace: &Trace, quality: Option<&ShiftQ
     let t = Curves { runs, trace, quality, bound_pa: &[] };
     let highest = t.highest_pressure().max(0.4);
     let mut panels = vec![
-        panel(
-            "pressure of B (MPa)",
-            190.0,
-            [vec![t.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa)], t.pressures()].concat(),
-        )
-        .within(0.0, 1.25 * highest),
+        t.pressure_panel().within(0.0, 1.25 * highest),
         panel("error (MPa)", 190.0, t.pressure_errors()).within(-0.35 * highest, 0.35 * highest),
     ];
     let shaft = t.shaft_torques();
@@ -169,6 +163,19 @@ impl<'a> Curves<'a> {
                 self.signal("output", colour::PURPLE, signal::OUTPUT_SPEED, units::rpm),
             ],
         )
+    }
+
+    /// Pressures, the true one with its guaranteed range.
+    fn pressure_panel(&self) -> Panel {
+        let truth = self.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa);
+        let ends = |end: usize| -> Vec<(f64, f64)> {
+            self.runs.first().map_or_else(Vec::new, |run| {
+                let value = |bounds: &Option<Bounds<f64>>| bounds.map_or(f64::NAN, |b| units::mpa(b.pressure_pa[end]));
+                run.time_s.iter().zip(&run.estimates).map(|(&time, e)| (time, value(&e.bounds))).collect()
+            })
+        };
+        let band = Band { label: String::new(), lower: ends(0), upper: ends(1) };
+        Panel { band: Some(band), ..panel("pressure of B (MPa)", 190.0, [vec![truth], self.pressures()].concat()) }
     }
 
     /// Highest true pressure until lock-up, MPa.

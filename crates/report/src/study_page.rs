@@ -112,10 +112,17 @@ fn scores(summary: &Summary) -> Vec<Value> {
                 ratio_worst => (!is_open_loop).then(|| format!("{:.2}", ratio.largest())),
                 better => (!is_open_loop).then(|| format!("{:.0}", 100.0 * ratio.share_below(1.0))),
                 chatter => format!("{:.3}", mpa(chatter.quantile(0.5))),
+                covered => coverage(summary.covered(observer, i)),
+                width => pressure(summary.width(observer, i).quantile(0.5)),
             });
         }
     }
     rows
+}
+
+/// Runs whose range held the truth, of those with a range.
+fn coverage((covered, all): (u64, u64)) -> String {
+    if all == 0 { "–".to_owned() } else { format!("{covered} of {all}") }
 }
 
 /// Share of the runs whose error is smaller, for each observer.

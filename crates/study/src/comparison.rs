@@ -8,7 +8,8 @@ use trace::{Trace, TraceError, signal};
 
 use crate::observers::AnyObserver;
 use crate::sampling::{sampled, through_sensors};
-use crate::{PhaseScore, RunColumns, ShiftQuality, score, simulate_drive, true_phases};
+use crate::score::score_ranges;
+use crate::{PhaseScore, RangeScore, RunColumns, ShiftQuality, score, simulate_drive, true_phases};
 
 /// Share of the range within which a pressure error counts as settled.
 const SETTLED_SHARE: f64 = 0.05;
@@ -54,6 +55,8 @@ pub struct ObserverRun {
     pub torque: Vec<PhaseScore>,
     /// Errors of the shaft torque by phase, N m, if it estimates that.
     pub shaft: Option<Vec<PhaseScore>>,
+    /// The guaranteed ranges by phase, if there are any.
+    pub ranges: Vec<RangeScore>,
 }
 
 /// Observers on one drive, with the truth.
@@ -148,7 +151,7 @@ fn run_observer(
     observer: &AnyObserver,
     trace: &Trace,
 ) -> Result<ObserverRun, TraceError> {
-    let estimates = observer.run(&RunColumns::of(trace, vehicle)?);
+    let estimates = observer.run(vehicle, &RunColumns::of(trace, vehicle)?);
     let phases = true_phases(trace).unwrap_or_default();
     let time = &trace.time_s;
     let truth_pa = trace.require(signal::ONCOMING_PRESSURE)?;
@@ -163,6 +166,7 @@ fn run_observer(
         shaft: has_shaft.then(|| {
             score(time, &phases, shaft, SETTLED_SHAFT_N_M, |i| estimates[i].shaft_torque_n_m.unwrap_or(f64::NAN))
         }),
+        ranges: score_ranges(&phases, truth_pa, clutch, |i| estimates[i].bounds),
         truth_pa: truth_pa.to_vec(),
         time_s: trace.time_s.clone(),
         estimates,

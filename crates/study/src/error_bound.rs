@@ -226,9 +226,8 @@ impl Models {
         let with_slip = phase == Phase::InertiaPhase;
 
         let model = self.rigid.speed_model(phase, engine, turbine, slip);
-        let mut w = [0, 1].map(|k| {
-            rates[k] - model.free_rad_s2[k] - model.per_pressure_rad_s2_pa[k] * s.pressure_pa[i]
-        });
+        let mut w =
+            [0, 1].map(|k| rates[k] - model.free_rad_s2[k] - model.per_pressure_rad_s2_pa[k] * s.pressure_pa[i]);
         if !with_slip {
             w[1] = 0.0;
         }

@@ -22,6 +22,6 @@ pub use drive::{simulate_drive, simulate_shift, true_phases};
 pub use error_bound::{ErrorBound, error_bound};
 pub use observers::AnyObserver;
 pub use run::{RunColumns, estimates_trace, run};
-pub use score::{PhaseScore, ShiftQuality, score};
-pub use worst_case::{Target, WorstCase, worst_case};
+pub use score::{PhaseScore, RangeScore, ShiftQuality, score};
 pub use statements::{Chapter, Statement, Verdict, reproduce};
+pub use worst_case::{Target, WorstCase, worst_case};

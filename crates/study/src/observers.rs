@@ -3,10 +3,13 @@
 use config::{GivenGains, ObserverEntry, ObserverKind, Vehicle};
 use design::compliant::physical_gains;
 use design::{
-    DesignError, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding,
+    DesignError, bounded, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding,
     rigid_observer, sliding_observer,
 };
-use observer::{CompliantObserver, Discretisation, Estimate, Phase, RigidGains, RigidObserver, SlidingObserver};
+use drivetrain::Valve;
+use observer::{
+    CompliantObserver, Discretisation, Estimate, Estimator, Phase, RigidGains, RigidObserver, SlidingObserver,
+};
 
 use crate::{RunColumns, run};
 
@@ -83,12 +86,21 @@ impl AnyObserver {
         }
     }
 
-    /// Runs it over every sample; one estimate for each.
-    pub fn run(&self, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
+    /// Runs it over every sample; one estimate for each, with a guaranteed range where this vehicle's error budget
+    /// gives one.
+    pub fn run(&self, vehicle: &Vehicle, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
         match self {
-            Self::Rigid(observer) => run(columns, observer),
-            Self::Compliant(observer) => run(columns, observer.as_ref()),
-            Self::Sliding(observer) => run(columns, observer),
+            Self::Rigid(observer) => run_bounded(vehicle, columns, observer),
+            Self::Compliant(observer) => run_bounded(vehicle, columns, observer.as_ref()),
+            Self::Sliding(observer) => run_bounded(vehicle, columns, observer),
         }
+    }
+}
+
+fn run_bounded(vehicle: &Vehicle, columns: &RunColumns<'_>, observer: &impl Estimator<f64>) -> Vec<Estimate<f64>> {
+    match vehicle.observer_valve {
+        Valve::Proportional { .. } => run(columns, &bounded(vehicle, observer)),
+        // The budget is of a valve that is commanded by a current.
+        Valve::PulseWidth { .. } => run(columns, observer),
     }
 }

@@ -1,7 +1,7 @@
 //! The one loop that carries an observer over a trace, simulated or measured.
 
 use config::Vehicle;
-use observer::{Estimate, Estimator, Input};
+use observer::{Bounds, Estimate, Estimator, Input};
 use trace::{Trace, TraceError, signal};
 
 /// The columns of a trace that the observers read.
@@ -66,6 +66,15 @@ pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
     if estimates.iter().any(|e| e.shaft_torque_n_m.is_some()) {
         let shaft = |e: &Estimate<f64>| e.shaft_torque_n_m.unwrap_or(f64::NAN);
         trace.add(signal::SHAFT_ESTIMATE, estimates.iter().map(shaft).collect());
+    }
+    if estimates.iter().any(|e| e.bounds.is_some()) {
+        let mut bound = |name: &str, value: &dyn Fn(&Bounds<f64>) -> f64| {
+            trace.add(name, estimates.iter().map(|e| e.bounds.as_ref().map_or(f64::NAN, value)).collect());
+        };
+        bound(signal::PRESSURE_LEAST, &|bounds| bounds.pressure_pa[0]);
+        bound(signal::PRESSURE_GREATEST, &|bounds| bounds.pressure_pa[1]);
+        bound(signal::TORQUE_LEAST, &|bounds| bounds.clutch_torque_n_m[0]);
+        bound(signal::TORQUE_GREATEST, &|bounds| bounds.clutch_torque_n_m[1]);
     }
     trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().into()).collect());
     trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().into()).collect());

@@ -1,7 +1,7 @@
 //! How good an estimate and a shift were.
 
 use drivetrain::ReducedShift;
-use observer::Phase;
+use observer::{Bounds, Phase};
 use trace::{Trace, signal};
 
 use crate::true_phases;
@@ -58,6 +58,46 @@ pub fn score(
                 },
                 chatter: (variation(&at, &estimate) - variation(&at, &|i| truth[i])).max(0.0),
             }
+        })
+        .collect()
+}
+
+/// How well the guaranteed range around an estimate did in one phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RangeScore {
+    /// The phase, by the truth.
+    pub phase: Phase,
+    /// Share of the samples with the true pressure in the range.
+    pub pressure_inside: f64,
+    /// Share of the samples with the true clutch torque in the range.
+    pub torque_inside: f64,
+    /// Mean width of the range of the pressure, Pa.
+    pub width_pa: f64,
+}
+
+/// Scores of the ranges in the torque and inertia phase and after the shift; none where there is no range.
+pub fn score_ranges(
+    phases: &[Phase],
+    pressure_pa: &[f64],
+    torque_n_m: &[f64],
+    bounds: impl Fn(usize) -> Option<Bounds<f64>>,
+) -> Vec<RangeScore> {
+    [Phase::TorquePhase, Phase::InertiaPhase, Phase::AfterShift]
+        .into_iter()
+        .filter_map(|phase| {
+            let at = (0..phases.len()).filter(|&i| phases[i] == phase);
+            let ranges: Vec<(usize, Bounds<f64>)> = at.filter_map(|i| Some((i, bounds(i)?))).collect();
+            #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
+            let mean = |value: &dyn Fn(usize, &Bounds<f64>) -> f64| {
+                ranges.iter().map(|(i, bounds)| value(*i, bounds)).sum::<f64>() / ranges.len() as f64
+            };
+            let inside = |[low, high]: [f64; 2], truth: f64| f64::from(u8::from(low <= truth && truth <= high));
+            (!ranges.is_empty()).then(|| RangeScore {
+                phase,
+                pressure_inside: mean(&|i, bounds| inside(bounds.pressure_pa, pressure_pa[i])),
+                torque_inside: mean(&|i, bounds| inside(bounds.clutch_torque_n_m, torque_n_m[i])),
+                width_pa: mean(&|_, bounds| bounds.pressure_pa[1] - bounds.pressure_pa[0]),
+            })
         })
         .collect()
 }

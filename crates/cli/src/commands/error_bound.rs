@@ -44,7 +44,8 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
         for (part, size) in PARTS.iter().zip(&found.rigid_parts) {
             row(&format!("  from {part}"), size);
         }
-        let channels: &[&str] = if found.compliant_channels.len() == 3 { &["w_t", "slip", "w_w"] } else { &["w_t", "w_w"] };
+        let channels: &[&str] =
+            if found.compliant_channels.len() == 3 { &["w_t", "slip", "w_w"] } else { &["w_t", "w_w"] };
         for (name, size) in channels.iter().zip(&found.compliant_channels) {
             row(&format!("compliant, of {name}"), size);
         }

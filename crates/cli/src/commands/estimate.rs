@@ -36,7 +36,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             1e3 * observer.sample_max_s(),
         ));
     }
-    let estimates = observer.run(&columns);
+    let estimates = observer.run(&vehicle, &columns);
     let result = estimates_trace(&log.time_s, &estimates);
     match &options.output {
         Some(path) => write_trace(path, &result)?,

@@ -87,6 +87,20 @@ pub struct ErrorBounds {
     pub turbine_change_rad_s: f64,
     /// Error of the change of the slip from one sample to the next, rad/s.
     pub slip_change_rad_s: f64,
+    /// Least and greatest factor on the lag of the oncoming clutch's valve.
+    pub valve_lag_factor: [f64; 2],
+    /// Least and greatest factor on its gain.
+    pub valve_gain_factor: [f64; 2],
+    /// Its least and greatest delay, s.
+    pub valve_delay_s: [f64; 2],
+    /// Least and greatest factor on the friction of the oncoming clutch.
+    pub friction_factor: [f64; 2],
+    /// Error of a reading of the valve's current, A.
+    pub current_a: f64,
+    /// Error of a reading of the slip, rad/s, its age included.
+    pub slip_rad_s: f64,
+    /// Highest pressure that the supply can give, Pa.
+    pub pressure_max_pa: f64,
 }
 
 /// A vehicle: everything the plant, the observers and the design need to know.
@@ -463,6 +477,13 @@ fn error_matrix(check: &Check<'_>, phase: &str, rows: &Spanned<Vec<Numbers>>) ->
 
 fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, ConfigError> {
     let number = |key: &str, value, range| check.number(&format!("design.error_bounds.{key}"), value, range);
+    let range = |key: &str, values: &Numbers, allowed| {
+        let key = format!("design.error_bounds.{key}");
+        match *check.numbers(&key, values, allowed)? {
+            [least, greatest] if least <= greatest => Ok([least, greatest]),
+            _ => Err(check.meaning(&key, values.span().start, "expected [least, greatest]".to_owned(), None)),
+        }
+    };
     Ok(ErrorBounds {
         turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
         pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
@@ -473,5 +494,12 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         valve_rate_pa_s: number("valve_rate_pa_s", &raw.valve_rate_pa_s, 0.0..=1e9)?,
         turbine_change_rad_s: number("turbine_change_rad_s", &raw.turbine_change_rad_s, 0.0..=50.0)?,
         slip_change_rad_s: number("slip_change_rad_s", &raw.slip_change_rad_s, 0.0..=50.0)?,
+        valve_lag_factor: range("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
+        valve_gain_factor: range("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
+        valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
+        friction_factor: range("friction_factor", &raw.friction_factor, 0.1..=10.0)?,
+        current_a: number("current_a", &raw.current_a, 0.0..=1.0)?,
+        slip_rad_s: number("slip_rad_s", &raw.slip_rad_s, 0.0..=200.0)?,
+        pressure_max_pa: number("pressure_max_pa", &raw.pressure_max_pa, 1e5..=10e6)?,
     })
 }

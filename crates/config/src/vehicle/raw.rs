@@ -218,6 +218,13 @@ pub(super) struct RawErrorBounds {
     pub(super) valve_rate_pa_s: Number,
     pub(super) turbine_change_rad_s: Number,
     pub(super) slip_change_rad_s: Number,
+    pub(super) valve_lag_factor: Numbers,
+    pub(super) valve_gain_factor: Numbers,
+    pub(super) valve_delay_s: Numbers,
+    pub(super) friction_factor: Numbers,
+    pub(super) current_a: Number,
+    pub(super) slip_rad_s: Number,
+    pub(super) pressure_max_pa: Number,
 }
 
 #[derive(Deserialize)]

@@ -140,9 +140,8 @@ fn lsoda(powertrain: &Powertrain) -> Option<(f64, [f64; STATES])> {
 fn parameters(powertrain: &Powertrain) -> String {
     let v = &powertrain.vehicle;
     let numbers = |values: &[f64]| format!("{values:?}");
-    let row = |row: &AccelerationRow<f64>| {
-        numbers(&[row.per_turbine_torque, row.per_oncoming_torque, row.per_output_torque])
-    };
+    let row =
+        |row: &AccelerationRow<f64>| numbers(&[row.per_turbine_torque, row.per_oncoming_torque, row.per_output_torque]);
     let gear = v.shift.coefficients(Engagement::OffgoingStuck);
     let map = &v.engine.torque_n_m;
     let torque: Vec<f64> = map.rows().iter().map(|&speed| map.at(speed, INPUTS.throttle)).collect();

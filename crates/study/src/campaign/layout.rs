@@ -21,11 +21,23 @@ pub enum Metric {
     TorqueRms,
     /// RMS error of the drive-shaft torque, N m.
     ShaftRms,
+    /// Share of the samples at which the true pressure and clutch torque lie in their guaranteed ranges.
+    Coverage,
+    /// Mean width of the guaranteed range of the pressure, Pa.
+    RangeWidth,
 }
 
 impl Metric {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 5] = [Self::PressureRms, Self::PressurePeak, Self::Chatter, Self::TorqueRms, Self::ShaftRms];
+    pub const ALL: [Self; 7] = [
+        Self::PressureRms,
+        Self::PressurePeak,
+        Self::Chatter,
+        Self::TorqueRms,
+        Self::ShaftRms,
+        Self::Coverage,
+        Self::RangeWidth,
+    ];
 
     /// The end of its column's name, with the unit.
     pub fn name(self) -> &'static str {
@@ -35,6 +47,8 @@ impl Metric {
             Self::Chatter => "chatter_pa",
             Self::TorqueRms => "clutch_torque_rms_n_m",
             Self::ShaftRms => "shaft_torque_rms_n_m",
+            Self::Coverage => "range_coverage",
+            Self::RangeWidth => "range_width_pa",
         }
     }
 
@@ -43,12 +57,17 @@ impl Metric {
             Self::PressureRms | Self::PressurePeak | Self::Chatter => &run.pressure,
             Self::TorqueRms => &run.torque,
             Self::ShaftRms => run.shaft.as_ref()?,
+            Self::Coverage | Self::RangeWidth => {
+                let range = run.ranges.iter().find(|range| range.phase == phase)?;
+                let covered = range.pressure_inside.min(range.torque_inside);
+                return Some(if self == Self::Coverage { covered } else { range.width_pa });
+            }
         };
         let score = scores.iter().find(|score| score.phase == phase && score.samples > 0)?;
         Some(match self {
             Self::PressurePeak => score.peak,
             Self::Chatter => score.chatter,
-            Self::PressureRms | Self::TorqueRms | Self::ShaftRms => score.rms,
+            Self::PressureRms | Self::TorqueRms | Self::ShaftRms | Self::Coverage | Self::RangeWidth => score.rms,
         })
     }
 }

@@ -128,6 +128,8 @@ pub struct Summary {
     rms: Vec<Distribution>,
     ratios: Vec<Distribution>,
     chatter: Vec<Distribution>,
+    widths: Vec<Distribution>,
+    covered: Vec<(u64, u64)>,
     effects: Vec<Effects>,
     /// Rows of the group of a Saltelli plan that is not complete yet.
     group: Vec<Row>,
@@ -157,6 +159,8 @@ impl Summary {
             rms: vec![Distribution::default(); scores],
             ratios: vec![Distribution::default(); scores],
             chatter: vec![Distribution::default(); scores],
+            widths: vec![Distribution::default(); scores],
+            covered: vec![(0, 0); scores],
             effects: vec![effects; scores],
             group: Vec::new(),
             worst: Vec::new(),
@@ -183,6 +187,16 @@ impl Summary {
         &self.chatter[observer * PHASES.len() + phase]
     }
 
+    /// Mean width of the guaranteed range of an observer's pressure in a phase, Pa.
+    pub fn width(&self, observer: usize, phase: usize) -> &Distribution {
+        &self.widths[observer * PHASES.len() + phase]
+    }
+
+    /// Runs in which the guaranteed range of an observer held the truth throughout a phase, and runs with a range.
+    pub fn covered(&self, observer: usize, phase: usize) -> (u64, u64) {
+        self.covered[observer * PHASES.len() + phase]
+    }
+
     /// Takes the next row; rows come in the order of their numbers.
     pub fn push(&mut self, row: &Row) {
         *self.statuses.entry(row.status).or_default() += 1;
@@ -203,6 +217,13 @@ impl Summary {
                 }
                 self.rms[at].push(rms);
                 self.chatter[at].push(value(observer, Metric::Chatter));
+                let coverage = value(observer, Metric::Coverage);
+                if coverage.is_finite() {
+                    self.widths[at].push(value(observer, Metric::RangeWidth));
+                    let (covered, all) = &mut self.covered[at];
+                    *covered += u64::from(coverage >= 1.0);
+                    *all += 1;
+                }
                 if let Some(open_loop) = self.layout.open_loop {
                     self.ratios[at].push(rms / value(open_loop, Metric::PressureRms));
                 }
