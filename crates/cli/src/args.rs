@@ -85,7 +85,8 @@ pub(crate) enum Command {
     /// Run all observers over many scenarios and rank them against the open loop
     ///
     /// Runs every observer of an experiment file on every scenario table in it: at 100 Hz, behind real sensors, on the
-    /// same drives. Prints the RMS error of each in each phase, and its ratio to the open loop's.
+    /// same drives. Prints the RMS error of each in each phase, and its ratio to the open loop's; with -o, writes the same
+    /// as a page.
     #[command(verbatim_doc_comment)]
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
@@ -202,7 +203,7 @@ pub(crate) struct Estimate {
     #[arg(long)]
     pub(crate) vehicle: PathBuf,
     /// Observer
-    #[arg(long, value_enum, default_value_t = ObserverChoice::Rigid)]
+    #[arg(long, value_enum, default_value_t = ObserverChoice::Best)]
     pub(crate) observer: ObserverChoice,
     /// File for the estimate; standard output if left out
     #[arg(short, long, value_name = "OUT.csv")]
@@ -211,6 +212,8 @@ pub(crate) struct Estimate {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
+    /// The Kalman filter where the log has wheel_speed_rad_s, else peak-to-peak
+    Best,
     /// Reduced-order, rigid driveline, certified gains
     #[value(alias = "iss")]
     Rigid,
@@ -221,6 +224,16 @@ pub(crate) enum ObserverChoice {
     Compliant,
     /// Full-order sliding mode, gains from the sliding condition
     Sliding,
+    /// Kalman filter with unknown torques as states; needs wheel_speed_rad_s, gives shaft torque too
+    Kalman,
+    /// The same, linearised by the tangent
+    Extended,
+    /// Unscented Kalman filter on the same states
+    Unscented,
+    /// Super-twisting, implicit; gains from the valve's error bound
+    SuperTwisting,
+    /// The pressure that explains the last change of the speeds; needs wheel_speed_rad_s
+    Inversion,
     /// The valve model alone
     OpenLoop,
 }
@@ -239,6 +252,9 @@ pub(crate) struct Reproduce {
 pub(crate) struct Bench {
     /// Experiment file with scenario tables; the built-in experiments/bench.toml if left out
     pub(crate) experiment: Option<PathBuf>,
+    /// Folder for the page
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -18,4 +18,6 @@ pub use experiment::{
 };
 pub use source::{Kind, Source};
 pub use study::{Factor, Plan, Study, Target, Values, Varied};
-pub use vehicle::{CompliantRequirement, DesignRequirement, ErrorBounds, ShiftClutch, Uncertainty, Vehicle};
+pub use vehicle::{
+    CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty, Vehicle,
+};

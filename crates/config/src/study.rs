@@ -270,7 +270,8 @@ impl Study {
         } else {
             let source = changed(&self.experiment.source, experiment_table, of(Target::Experiment))?;
             let observers = self.experiment.observers.clone();
-            Experiment { observers, ..Experiment::from_source(source)? }
+            let sensors_told = self.experiment.sensors_told;
+            Experiment { observers, sensors_told, ..Experiment::from_source(source)? }
         };
         Ok(Varied { car, vehicle, experiment })
     }

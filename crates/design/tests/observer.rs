@@ -4,8 +4,8 @@
 
 use config::Vehicle;
 use design::{
-    compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding, rigid_observer,
-    sliding_observer,
+    bounded, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding, inversion,
+    kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
 use drivetrain::Valve;
 use observer::{Discretisation, Estimator, Health, Input, Phase, RigidGains, RigidObserver, RigidState};
@@ -114,6 +114,11 @@ proptest! {
         survives(&observer(), &samples)?;
         survives(&compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains()), &samples)?;
         survives(&sliding_observer(&vehicle, design_sliding(&vehicle)), &samples)?;
+        survives(&kalman_filter(&vehicle, None), &samples)?;
+        survives(&unscented_filter(&vehicle, None), &samples)?;
+        survives(&super_twisting(&vehicle), &samples)?;
+        survives(&inversion(&vehicle), &samples)?;
+        survives(&bounded(&vehicle, observer()), &samples)?;
     }
 }
 
@@ -274,6 +279,14 @@ fn single_precision_follows_double_precision() {
     assert_single_follows_double(&observer(), &observer().cast::<f32>(), 5.0);
     // Its gain on the wheel speed is ten times as large, and so is what rounding a speed costs.
     assert_single_follows_double(&compliant, &compliant.cast::<f32>(), 50.0);
+    // The filter differences covariances, of which single precision keeps four digits.
+    let filter = kalman_filter(&vehicle, None);
+    assert_single_follows_double(&filter, &filter.cast::<f32>(), 2e3);
+    let unscented = unscented_filter(&vehicle, None);
+    assert_single_follows_double(&unscented, &unscented.cast::<f32>(), 5e3);
+    let (twisting, inverted) = (super_twisting(&vehicle), inversion(&vehicle));
+    assert_single_follows_double(&twisting, &twisting.cast::<f32>(), 50.0);
+    assert_single_follows_double(&inverted, &inverted.cast::<f32>(), 500.0);
 }
 
 /// A speed of 340 rad/s is rounded to 3e-5 rad/s, which a gain of 1527 Pa s/rad makes 0.05 Pa a sample;

@@ -10,19 +10,27 @@
 pub mod bound;
 pub mod compliant;
 pub mod compliant_model;
+pub mod inversion;
+pub mod kalman;
 pub mod rigid;
 pub mod rigid_model;
 pub mod signals;
 pub mod sliding;
+pub mod super_twisting;
 pub mod supervisor;
 pub mod tracker;
+pub mod unscented;
 
 pub use bound::{Bounded, Bounds, Budget, Tube};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
+pub use inversion::{Inversion, InversionState};
+pub use kalman::{FilterNoise, KalmanFilter, KalmanState, Linearisation, Readings};
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
 pub use signals::{Estimate, Estimator, Health, Input, InputLimits};
 pub use sliding::{SlidingGains, SlidingObserver, SlidingSample, SlidingState};
+pub use super_twisting::{SuperTwisting, SuperTwistingState, TwistingSample};
 pub use supervisor::{Phase, Supervisor, SupervisorState};
 pub use tracker::{Discretisation, Interval, Track, Tracker, TrackerState};
+pub use unscented::UnscentedFilter;

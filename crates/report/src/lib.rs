@@ -1,5 +1,6 @@
 //! Figures and the HTML reports.
 
+pub mod bench_page;
 pub mod figure;
 pub mod map_figures;
 pub mod page;
@@ -8,6 +9,7 @@ pub mod shift_figure;
 pub mod study_page;
 pub mod tables;
 
+pub use bench_page::bench_page;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;
 pub use study_page::StudyPage;

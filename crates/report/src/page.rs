@@ -30,6 +30,7 @@ pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("scores.html", include_str!("../templates/scores.html"))?;
     environment.add_template("report.html", include_str!("../templates/report.html"))?;
     environment.add_template("reproduction.html", include_str!("../templates/reproduction.html"))?;
+    environment.add_template("bench.html", include_str!("../templates/bench.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
     Ok(environment)
 }

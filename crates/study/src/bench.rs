@@ -1,12 +1,16 @@
 //! The bench: all observers of an experiment on all its scenarios, ranked.
 
+use std::time::Instant;
+
 use config::{Experiment, Vehicle};
 use observer::Phase;
 use serde::Serialize;
 
-use crate::{Comparison, StudyError, compare};
+use crate::comparison::{observers, run_observers};
+use crate::sampling::sampled;
+use crate::{AnyObserver, ObserverRun, PhaseScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
 
-/// Errors of one observer in one scenario.
+/// How one observer did in one scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BenchCell {
     /// The observer.
@@ -15,8 +19,16 @@ pub struct BenchCell {
     pub torque_phase_rms_pa: f64,
     /// RMS error of the pressure in the inertia phase, Pa.
     pub inertia_phase_rms_pa: f64,
+    /// RMS error of the pressure over both phases, Pa.
+    pub shift_rms_pa: f64,
     /// Chatter in both phases, Pa.
     pub chatter_pa: f64,
+    /// RMS error of the drive-shaft torque over both phases, N m, if it estimates that.
+    pub shaft_rms_n_m: Option<f64>,
+    /// Share of the samples at which pressure and clutch torque lie in their guaranteed ranges, if there are any.
+    pub range_coverage: Option<f64>,
+    /// Mean width of the guaranteed range of the pressure over both phases, Pa.
+    pub range_width_pa: Option<f64>,
 }
 
 /// One scenario.
@@ -30,21 +42,33 @@ pub struct BenchRow {
     pub cells: Vec<BenchCell>,
 }
 
-/// One observer over all completed scenarios.
+/// One observer over all completed scenarios. Ratios are to the open loop's error in the same scenario and phase.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BenchSummary {
     /// The observer.
     pub observer: String,
-    /// Median over the scenarios of its torque-phase RMS over the open loop's.
+    /// Median ratio over both phases together, by which the observers are ranked.
+    pub shift_median_ratio: f64,
+    /// Median ratio in the torque phase.
     pub torque_phase_median_ratio: f64,
     /// The worst of these.
     pub torque_phase_worst_ratio: f64,
-    /// Median over the scenarios of its inertia-phase RMS over the open loop's.
+    /// Median ratio in the inertia phase.
     pub inertia_phase_median_ratio: f64,
     /// The worst of these.
     pub inertia_phase_worst_ratio: f64,
     /// Median chatter, Pa.
     pub chatter_median_pa: f64,
+    /// Median RMS error of the drive-shaft torque, N m, if it estimates that.
+    pub shaft_median_rms_n_m: Option<f64>,
+    /// The largest of these.
+    pub shaft_worst_rms_n_m: Option<f64>,
+    /// Least coverage of the guaranteed range over the scenarios.
+    pub range_least_coverage: Option<f64>,
+    /// Median width of the guaranteed range, Pa.
+    pub range_median_width_pa: Option<f64>,
+    /// Time of one step with its guaranteed range, ns, on this machine: the fastest of several runs.
+    pub step_ns: f64,
 }
 
 /// The bench's result.
@@ -52,7 +76,7 @@ pub struct BenchSummary {
 pub struct Bench {
     /// Every scenario.
     pub rows: Vec<BenchRow>,
-    /// Every observer, the one with the least inertia-phase ratio first.
+    /// Every observer, the one with the least error over the shift first.
     pub ranking: Vec<BenchSummary>,
 }
 
@@ -61,33 +85,70 @@ pub struct Bench {
 /// # Errors
 /// Simulation, design, or signals; see [`StudyError`]. A shift that is not completed is a row, not an error.
 pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMut(&str)) -> Result<Bench, StudyError> {
+    let observers = observers(vehicle, experiment)?;
     let mut rows = Vec::new();
+    let mut first_trace = None;
     for scenario in &experiment.scenarios {
         progress(&scenario.name);
-        let comparison = compare(vehicle, &experiment.with_scenario(scenario))?;
-        rows.push(row(&scenario.name, &comparison));
+        let varied = experiment.with_scenario(scenario);
+        let trace = simulate_drive(vehicle, &varied)?;
+        let runs = run_observers(vehicle, &varied, &observers, &trace)?;
+        let completed = ShiftQuality::of(&trace, &vehicle.shift).is_some();
+        let cells = runs.iter().map(cell).collect();
+        rows.push(BenchRow { scenario: scenario.name.clone(), completed, cells });
+        first_trace.get_or_insert(trace);
     }
     let open_loop = experiment.observers.iter().position(|entry| entry.kind == config::ObserverKind::OpenLoop);
-    let names = experiment.observers.iter().map(|entry| entry.name.as_str()).enumerate();
-    let mut ranking: Vec<BenchSummary> =
-        open_loop.map_or_else(Vec::new, |open| names.map(|(at, name)| summary(name, at, open, &rows)).collect());
-    ranking.sort_by(|a, b| a.inertia_phase_median_ratio.total_cmp(&b.inertia_phase_median_ratio));
+    let mut ranking = Vec::new();
+    if let (Some(open_loop), Some(trace)) = (open_loop, first_trace) {
+        for (at, (entry, observer)) in experiment.observers.iter().zip(&observers).enumerate() {
+            let samples = sampled(&trace, entry.sample_time_s);
+            let step_ns = step_ns(vehicle, observer, &RunColumns::of(&samples, vehicle)?);
+            ranking.push(BenchSummary { step_ns, ..summary(&entry.name, at, open_loop, &rows) });
+        }
+    }
+    ranking.sort_by(|a, b| a.shift_median_ratio.total_cmp(&b.shift_median_ratio));
     Ok(Bench { rows, ranking })
 }
 
-fn row(scenario: &str, comparison: &Comparison) -> BenchRow {
-    let cells = comparison.runs.iter().map(|run| {
-        let score = |phase| run.pressure_in(phase);
-        let rms = |phase| score(phase).map_or(f64::NAN, |score| score.rms);
-        let chatter = [Phase::TorquePhase, Phase::InertiaPhase].into_iter().filter_map(score).map(|s| s.chatter).sum();
-        BenchCell {
-            observer: run.entry.name.clone(),
-            torque_phase_rms_pa: rms(Phase::TorquePhase),
-            inertia_phase_rms_pa: rms(Phase::InertiaPhase),
-            chatter_pa: chatter,
-        }
-    });
-    BenchRow { scenario: scenario.to_owned(), completed: comparison.quality.is_some(), cells: cells.collect() }
+/// Runs over which the fastest step is sought.
+const TIMED_RUNS: usize = 20;
+
+/// Time of one step, ns.
+fn step_ns(vehicle: &Vehicle, observer: &AnyObserver, columns: &RunColumns<'_>) -> f64 {
+    let mut best = f64::INFINITY;
+    let mut steps = 1;
+    for _ in 0..TIMED_RUNS {
+        let began = Instant::now();
+        steps = std::hint::black_box(observer.run(vehicle, columns)).len().max(1);
+        best = best.min(began.elapsed().as_secs_f64());
+    }
+    1e9 * best / steps as f64
+}
+
+fn cell(run: &ObserverRun) -> BenchCell {
+    let both = [Phase::TorquePhase, Phase::InertiaPhase];
+    let of = |scores: &[PhaseScore]| -> Vec<PhaseScore> {
+        scores.iter().filter(|score| both.contains(&score.phase) && score.samples > 0).copied().collect()
+    };
+    let together = |scores: &[PhaseScore]| {
+        let count: f64 = scores.iter().map(|score| score.samples as f64).sum();
+        (scores.iter().map(|score| score.samples as f64 * score.rms * score.rms).sum::<f64>() / count).sqrt()
+    };
+    let pressure = of(&run.pressure);
+    let rms = |phase| pressure.iter().find(|score| score.phase == phase).map_or(f64::NAN, |score| score.rms);
+    let ranges: Vec<_> = run.ranges.iter().filter(|range| both.contains(&range.phase)).collect();
+    let coverage = ranges.iter().map(|range| range.pressure_inside.min(range.torque_inside)).reduce(f64::min);
+    BenchCell {
+        observer: run.entry.name.clone(),
+        torque_phase_rms_pa: rms(Phase::TorquePhase),
+        inertia_phase_rms_pa: rms(Phase::InertiaPhase),
+        shift_rms_pa: together(&pressure),
+        chatter_pa: pressure.iter().map(|score| score.chatter).sum(),
+        shaft_rms_n_m: run.shaft.as_ref().map(|shaft| together(&of(shaft))),
+        range_coverage: coverage,
+        range_width_pa: coverage.map(|_| ranges.iter().map(|r| r.width_pa).sum::<f64>() / ranges.len() as f64),
+    }
 }
 
 /// The observer at position `at` against the open loop at position `open`.
@@ -96,16 +157,27 @@ fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummar
     let ratios = |rms: fn(&BenchCell) -> f64| -> Vec<f64> {
         sorted(completed().map(|row| rms(&row.cells[at]) / rms(&row.cells[open])).collect())
     };
+    let some = |value: fn(&BenchCell) -> Option<f64>| -> Vec<f64> {
+        sorted(completed().filter_map(|row| value(&row.cells[at])).collect())
+    };
     let torque = ratios(|cell| cell.torque_phase_rms_pa);
     let inertia = ratios(|cell| cell.inertia_phase_rms_pa);
     let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
+    let shaft = some(|cell| cell.shaft_rms_n_m);
+    let widths = some(|cell| cell.range_width_pa);
     BenchSummary {
         observer: name.to_owned(),
+        shift_median_ratio: median(&ratios(|cell| cell.shift_rms_pa)),
         torque_phase_median_ratio: median(&torque),
         torque_phase_worst_ratio: last(&torque),
         inertia_phase_median_ratio: median(&inertia),
         inertia_phase_worst_ratio: last(&inertia),
         chatter_median_pa: median(&sorted(completed().map(|row| row.cells[at].chatter_pa).collect())),
+        shaft_median_rms_n_m: (!shaft.is_empty()).then(|| median(&shaft)),
+        shaft_worst_rms_n_m: shaft.last().copied(),
+        range_least_coverage: some(|cell| cell.range_coverage).first().copied(),
+        range_median_width_pa: (!widths.is_empty()).then(|| median(&widths)),
+        step_ns: f64::NAN,
     }
 }
 

@@ -112,7 +112,8 @@ pub fn compare(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison,
 /// # Errors
 /// There are no gains for what the vehicle file requires.
 pub fn observers(vehicle: &Vehicle, experiment: &Experiment) -> Result<Vec<AnyObserver>, DesignError> {
-    experiment.observers.iter().map(|entry| AnyObserver::of(vehicle, entry)).collect()
+    let sensors = experiment.sensors_told.as_ref();
+    experiment.observers.iter().map(|entry| AnyObserver::of(vehicle, entry, sensors)).collect()
 }
 
 /// Runs the experiment's observers over a recorded drive, each behind its sensors and at its sample time.
@@ -158,7 +159,7 @@ fn run_observer(
     let settled_pa = SETTLED_SHARE * experiment.shift.line_pressure_pa;
     let clutch = trace.require(signal::ONCOMING_TORQUE)?;
     let shaft = trace.require(signal::SHAFT_TORQUE)?;
-    let has_shaft = matches!(observer, AnyObserver::Compliant(_));
+    let has_shaft = estimates.iter().any(|estimate| estimate.shaft_torque_n_m.is_some());
     Ok(ObserverRun {
         entry: entry.clone(),
         pressure: score(time, &phases, truth_pa, settled_pa, |i| estimates[i].pressure_pa),

@@ -1,14 +1,15 @@
 //! Any of the observers, built from a vehicle and an entry of an experiment file.
 
-use config::{GivenGains, ObserverEntry, ObserverKind, Vehicle};
+use config::{GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
 use design::compliant::physical_gains;
 use design::{
     DesignError, bounded, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding,
-    rigid_observer, sliding_observer,
+    extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
 use drivetrain::Valve;
 use observer::{
-    CompliantObserver, Discretisation, Estimate, Estimator, Phase, RigidGains, RigidObserver, SlidingObserver,
+    CompliantObserver, Discretisation, Estimate, Estimator, Inversion, KalmanFilter, Phase, RigidGains, RigidObserver,
+    SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
 };
 
 use crate::{RunColumns, run};
@@ -22,14 +23,28 @@ pub enum AnyObserver {
     Compliant(Box<CompliantObserver<f64>>),
     /// Full-order sliding-mode observer.
     Sliding(SlidingObserver<f64>),
+    /// Kalman filter, statistically linearised or extended.
+    Kalman(Box<KalmanFilter<f64>>),
+    /// Unscented Kalman filter.
+    Unscented(Box<UnscentedFilter<f64>>),
+    /// Super-twisting observer.
+    SuperTwisting(Box<SuperTwisting<f64>>),
+    /// Direct inversion.
+    Inversion(Box<Inversion<f64>>),
 }
 
 impl AnyObserver {
-    /// The observer of this kind for this sample time, with designed gains and exact discretisation.
+    /// The observer of this kind for this sample time, with designed gains and exact discretisation. `sensors` are what
+    /// it is told of the sensors that it sees through, if it does.
     ///
     /// # Errors
     /// There are no gains for what the vehicle file requires.
-    pub fn designed(vehicle: &Vehicle, kind: ObserverKind, sample_time_s: f64) -> Result<Self, DesignError> {
+    pub fn designed(
+        vehicle: &Vehicle,
+        kind: ObserverKind,
+        sample_time_s: f64,
+        sensors: Option<&Sensors>,
+    ) -> Result<Self, DesignError> {
         Ok(match kind {
             ObserverKind::OpenLoop => Self::Rigid(rigid_observer(vehicle, RigidGains::open_loop())),
             ObserverKind::Rigid => Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains())),
@@ -47,6 +62,11 @@ impl AnyObserver {
             ObserverKind::Compliant => {
                 Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
             }
+            ObserverKind::Kalman => Self::Kalman(Box::new(kalman_filter(vehicle, sensors))),
+            ObserverKind::Extended => Self::Kalman(Box::new(extended_filter(vehicle, sensors))),
+            ObserverKind::Unscented => Self::Unscented(Box::new(unscented_filter(vehicle, sensors))),
+            ObserverKind::SuperTwisting => Self::SuperTwisting(Box::new(super_twisting(vehicle))),
+            ObserverKind::Inversion => Self::Inversion(Box::new(inversion(vehicle))),
             ObserverKind::Sliding => Self::Sliding(sliding_observer(vehicle, design_sliding(vehicle))),
         })
     }
@@ -55,9 +75,9 @@ impl AnyObserver {
     ///
     /// # Errors
     /// Gains are to be designed, and there are none for what the vehicle file requires.
-    pub fn of(vehicle: &Vehicle, entry: &ObserverEntry) -> Result<Self, DesignError> {
+    pub fn of(vehicle: &Vehicle, entry: &ObserverEntry, sensors: Option<&Sensors>) -> Result<Self, DesignError> {
         let observer = match entry.gains {
-            None => Self::designed(vehicle, entry.kind, entry.sample_time_s)?,
+            None => Self::designed(vehicle, entry.kind, entry.sample_time_s, sensors.filter(|_| entry.real_sensors))?,
             Some(GivenGains::Rigid(gains)) => Self::Rigid(rigid_observer(vehicle, gains)),
             Some(GivenGains::Sliding(gains)) => Self::Sliding(sliding_observer(vehicle, gains)),
             Some(GivenGains::CompliantNormalised(torque, inertia)) => {
@@ -68,22 +88,25 @@ impl AnyObserver {
     }
 
     fn with_discretisation(mut self, discretisation: Discretisation) -> Self {
-        let tracker = match &mut self {
+        self.tracker_mut().discretisation = discretisation;
+        self
+    }
+
+    fn tracker_mut(&mut self) -> &mut Tracker<f64> {
+        match self {
             Self::Rigid(observer) => &mut observer.tracker,
             Self::Compliant(observer) => &mut observer.tracker,
             Self::Sliding(observer) => &mut observer.tracker,
-        };
-        tracker.discretisation = discretisation;
-        self
+            Self::Kalman(observer) => &mut observer.tracker,
+            Self::Unscented(observer) => &mut observer.filter.tracker,
+            Self::SuperTwisting(observer) => &mut observer.tracker,
+            Self::Inversion(observer) => &mut observer.tracker,
+        }
     }
 
     /// Longest time between two samples over which the speeds correct its estimate, s.
     pub fn sample_max_s(&self) -> f64 {
-        match self {
-            Self::Rigid(observer) => observer.tracker.sample_max_s,
-            Self::Compliant(observer) => observer.tracker.sample_max_s,
-            Self::Sliding(observer) => observer.tracker.sample_max_s,
-        }
+        self.clone().tracker_mut().sample_max_s
     }
 
     /// Runs it over every sample; one estimate for each, with a guaranteed range where this vehicle's error budget
@@ -93,6 +116,10 @@ impl AnyObserver {
             Self::Rigid(observer) => run_bounded(vehicle, columns, observer),
             Self::Compliant(observer) => run_bounded(vehicle, columns, observer.as_ref()),
             Self::Sliding(observer) => run_bounded(vehicle, columns, observer),
+            Self::Kalman(observer) => run_bounded(vehicle, columns, observer.as_ref()),
+            Self::Unscented(observer) => run_bounded(vehicle, columns, observer.as_ref()),
+            Self::SuperTwisting(observer) => run_bounded(vehicle, columns, observer.as_ref()),
+            Self::Inversion(observer) => run_bounded(vehicle, columns, observer.as_ref()),
         }
     }
 }

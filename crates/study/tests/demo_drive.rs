@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 use config::{Experiment, Vehicle};
-use design::rigid_observer;
+use design::{bounded, rigid_observer};
 use observer::Phase;
 use study::{Comparison, ObserverRun, RunColumns, compare, run};
 use trace::{read_csv, signal, write_csv};
@@ -23,7 +23,7 @@ fn a_replay_of_measurable_signals_gives_the_very_same_estimate() {
     std::fs::remove_file(&path).unwrap();
     assert!(log.get(signal::ONCOMING_PRESSURE).is_none());
     let columns = RunColumns::of(&log, &vehicle).unwrap();
-    let estimates = run(&columns, &rigid_observer(&vehicle, comparison.rigid.gains()));
+    let estimates = run(&columns, &bounded(&vehicle, rigid_observer(&vehicle, comparison.rigid.gains())));
     assert_eq!(estimates, comparison.runs[0].estimates);
 }
 
@@ -32,7 +32,7 @@ fn output_speed_serves_where_the_slip_was_not_recorded() {
     let (vehicle, comparison) = comparison();
     let without = comparison.trace.filtered(|name| name != signal::ONCOMING_SLIP);
     let columns = RunColumns::of(&without, &vehicle).unwrap();
-    let estimates = run(&columns, &rigid_observer(&vehicle, comparison.rigid.gains()));
+    let estimates = run(&columns, &bounded(&vehicle, rigid_observer(&vehicle, comparison.rigid.gains())));
     for (a, b) in estimates.iter().zip(&comparison.runs[0].estimates) {
         assert!((a.pressure_pa - b.pressure_pa).abs() < 1.0);
     }

@@ -1,10 +1,12 @@
 //! `wetclutch bench`.
 
 use config::{Experiment, Vehicle};
+use report::bench_page;
 use study::bench::BenchRow;
 use trace::units;
 
 use crate::args::Bench;
+use crate::commands::{progress, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -24,7 +26,12 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
         )));
     }
     output::note(&format!("running {} observers on {all} scenarios", experiment.observers.len()));
-    let result = study::bench(&vehicle, &experiment, |_| ())?;
+    let bar = progress(all as u64, 0);
+    let result = study::bench(&vehicle, &experiment, |_| bar.inc(1))?;
+    bar.finish_and_clear();
+    if let Some(folder) = &options.output {
+        write_text(&folder.join("bench.html"), &bench_page(&result, &vehicle, &experiment)?)?;
+    }
     if options.json {
         output::line(&serde_json::to_string_pretty(&result)?)?;
         return Ok(());
@@ -36,24 +43,47 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     rows.extend(result.rows.iter().map(cells));
     output::table(1, &rows)?;
 
-    output::line("\nover the open loop's (median, worst), best in the inertia phase first\n")?;
-    let head = ["observer", "torque phase", "worst", "inertia phase", "worst", "chatter MPa"];
+    output::line("\nover the open loop's; ranked by the median over the whole shift\n")?;
+    let head = [
+        "observer",
+        "shift",
+        "torque phase",
+        "worst",
+        "inertia phase",
+        "worst",
+        "chatter MPa",
+        "shaft N m",
+        "worst",
+        "range holds",
+        "width MPa",
+        "step ns",
+    ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(result.ranking.iter().map(|s| {
         let ratio = |value: f64| format!("{value:.2}");
+        let torque = |value: Option<f64>| value.map_or_else(String::new, |n_m| format!("{n_m:.0}"));
         vec![
             s.observer.clone(),
+            ratio(s.shift_median_ratio),
             ratio(s.torque_phase_median_ratio),
             ratio(s.torque_phase_worst_ratio),
             ratio(s.inertia_phase_median_ratio),
             ratio(s.inertia_phase_worst_ratio),
             format!("{:.3}", units::mpa(s.chatter_median_pa)),
+            torque(s.shaft_median_rms_n_m),
+            torque(s.shaft_worst_rms_n_m),
+            s.range_least_coverage.map_or_else(String::new, |share| format!("{:.0} %", 100.0 * share)),
+            s.range_median_width_pa.map_or_else(String::new, |width| format!("{:.3}", units::mpa(width))),
+            format!("{:.0}", s.step_ns),
         ]
     }));
     output::table(1, &rows)?;
     let missing: Vec<&str> = result.rows.iter().filter(|row| !row.completed).map(|row| row.scenario.as_str()).collect();
     if !missing.is_empty() {
         output::note(&format!("not completed within the simulated time, and not ranked: {}", missing.join(", ")));
+    }
+    if let Some(folder) = &options.output {
+        output::line(&format!("\npage: {}", folder.join("bench.html").display()))?;
     }
     Ok(())
 }

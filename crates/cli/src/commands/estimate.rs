@@ -18,16 +18,30 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let log = read_csv(&options.log)?;
     let columns = RunColumns::of(&log, &vehicle)?;
     let kind = match options.observer {
+        ObserverChoice::Best if log.get(signal::WHEEL_SPEED).is_some() => ObserverKind::Kalman,
+        ObserverChoice::Best => ObserverKind::PeakToPeak,
         ObserverChoice::Rigid => ObserverKind::Rigid,
         ObserverChoice::PeakToPeak => ObserverKind::PeakToPeak,
         ObserverChoice::Compliant => ObserverKind::Compliant,
         ObserverChoice::Sliding => ObserverKind::Sliding,
+        ObserverChoice::Kalman => ObserverKind::Kalman,
+        ObserverChoice::Extended => ObserverKind::Extended,
+        ObserverChoice::Unscented => ObserverKind::Unscented,
+        ObserverChoice::SuperTwisting => ObserverKind::SuperTwisting,
+        ObserverChoice::Inversion => ObserverKind::Inversion,
         ObserverChoice::OpenLoop => ObserverKind::OpenLoop,
     };
-    if kind == ObserverKind::Compliant {
+    let needs_wheel = [
+        ObserverKind::Compliant,
+        ObserverKind::Kalman,
+        ObserverKind::Extended,
+        ObserverKind::Unscented,
+        ObserverKind::Inversion,
+    ];
+    if needs_wheel.contains(&kind) {
         log.require(signal::WHEEL_SPEED)?;
     }
-    let observer = AnyObserver::designed(&vehicle, kind, log.median_step_s())?;
+    let observer = AnyObserver::designed(&vehicle, kind, log.median_step_s(), None)?;
     if log.median_step_s() > observer.sample_max_s() && kind != ObserverKind::OpenLoop {
         output::note(&format!(
             "samples are {:.0} ms apart, and this observer corrects over at most {:.0} ms: the valve model alone serves\n\

@@ -124,6 +124,8 @@ pub struct Experiment {
     pub shift: ShiftCalibration,
     /// The car's sensors, if the experiment describes them.
     pub sensors: Option<Sensors>,
+    /// The sensors as the observers are told: those of the file, whatever a scenario or study makes of them.
+    pub sensors_told: Option<Sensors>,
     /// The observers to be run.
     pub observers: Vec<ObserverEntry>,
     /// Variations for the bench.
@@ -184,9 +186,11 @@ impl Experiment {
         )?;
         let has_sensors = raw.sensors.is_some();
         let observers = raw.observer.iter().map(|entry| observers::observer(&check, entry, has_sensors));
+        let sensors = raw.sensors.as_ref().map(|sensors| observers::sensors(&check, sensors)).transpose()?;
         Ok(Self {
             vehicle: PathBuf::from(raw.vehicle.get_ref()),
-            sensors: raw.sensors.as_ref().map(|sensors| observers::sensors(&check, sensors)).transpose()?,
+            sensors,
+            sensors_told: sensors,
             observers: observers.collect::<Result<_, _>>()?,
             scenarios: raw.scenario.iter().map(|raw| scenario(&check, raw)).collect::<Result<_, _>>()?,
             duration_s,

@@ -20,6 +20,16 @@ pub enum ObserverKind {
     Compliant,
     /// Full-order sliding-mode observer.
     Sliding,
+    /// Kalman filter with unknown torques as states, statistically linearised.
+    Kalman,
+    /// The same as an extended Kalman filter.
+    Extended,
+    /// Unscented Kalman filter on the same states.
+    Unscented,
+    /// Super-twisting observer with implicit discretisation.
+    SuperTwisting,
+    /// The pressure that explains the last change of the speeds.
+    Inversion,
 }
 
 /// Gains given in the file in place of designed ones.
@@ -175,6 +185,11 @@ pub(super) fn observer(
             RawKind::PeakToPeak => ObserverKind::PeakToPeak,
             RawKind::Compliant => ObserverKind::Compliant,
             RawKind::Sliding => ObserverKind::Sliding,
+            RawKind::Kalman => ObserverKind::Kalman,
+            RawKind::Extended => ObserverKind::Extended,
+            RawKind::Unscented => ObserverKind::Unscented,
+            RawKind::SuperTwisting => ObserverKind::SuperTwisting,
+            RawKind::Inversion => ObserverKind::Inversion,
         },
         sample_time_s: match &raw.sample_time_s {
             Some(value) => check.number("observer.sample_time_s", value, 1e-4..=0.2)?,

@@ -87,6 +87,11 @@ pub(super) enum RawKind {
     PeakToPeak,
     Compliant,
     Sliding,
+    Kalman,
+    Extended,
+    Unscented,
+    SuperTwisting,
+    Inversion,
 }
 
 #[derive(Deserialize, Clone, Copy, Default)]

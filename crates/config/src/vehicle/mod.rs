@@ -15,8 +15,8 @@ use toml::Spanned;
 use crate::check::{Check, Numbers};
 use crate::{ConfigError, Source};
 use raw::{
-    RawClutch, RawCompliantRequirement, RawEngineMap, RawErrorBounds, RawObserver, RawRequirement, RawUncertainty,
-    RawValve, RawVehicleFile,
+    RawClutch, RawCompliantRequirement, RawEngineMap, RawErrorBounds, RawFilter, RawObserver, RawRequirement,
+    RawUncertainty, RawValve, RawVehicleFile,
 };
 
 /// A shift clutch with the valve that fills it.
@@ -103,6 +103,23 @@ pub struct ErrorBounds {
     pub pressure_max_pa: f64,
 }
 
+/// What the Kalman filter is told beside the error bounds: how the unknown torques behave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilterSettings {
+    /// Standard deviation of the turbine torque, as a share.
+    pub turbine_share: f64,
+    /// Time after which that share is another during a shift, s.
+    pub turbine_share_s: f64,
+    /// Time for which an error of the valve model persists, s.
+    pub valve_rate_s: f64,
+    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
+    pub offgoing_n_m: f64,
+    /// Time constant with which it goes once the clutch has let go, s.
+    pub offgoing_release_s: f64,
+    /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
+    pub output_least_rad_s: f64,
+}
+
 /// A vehicle: everything the plant, the observers and the design need to know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vehicle {
@@ -146,6 +163,8 @@ pub struct Vehicle {
     pub compliant_inertia_phase: CompliantRequirement,
     /// Largest errors of what the observers are told.
     pub error_bounds: ErrorBounds,
+    /// What the Kalman filter is told.
+    pub filter: FilterSettings,
     /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
     pub shaft_settling_s: f64,
 }
@@ -249,6 +268,7 @@ impl Vehicle {
             compliant_torque_phase: compliant(&check, "torque_phase", &raw.design.compliant.torque_phase)?,
             compliant_inertia_phase: compliant(&check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
             error_bounds: error_bounds(&check, &raw.design.error_bounds)?,
+            filter: filter(&check, &raw.observer.filter)?,
             shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
             source,
         })
@@ -473,6 +493,18 @@ fn error_matrix(check: &Check<'_>, phase: &str, rows: &Spanned<Vec<Numbers>>) ->
         row[..values.len()].copy_from_slice(values);
     }
     Ok(matrix)
+}
+
+fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigError> {
+    let number = |key: &str, value, range| check.number(&format!("observer.filter.{key}"), value, range);
+    Ok(FilterSettings {
+        turbine_share: number("turbine_share", &raw.turbine_share, 1e-4..=1.0)?,
+        turbine_share_s: number("turbine_share_s", &raw.turbine_share_s, 0.01..=1e3)?,
+        valve_rate_s: number("valve_rate_s", &raw.valve_rate_s, 1e-3..=10.0)?,
+        offgoing_n_m: number("offgoing_n_m", &raw.offgoing_n_m, 0.1..=1e5)?,
+        offgoing_release_s: number("offgoing_release_s", &raw.offgoing_release_s, 1e-3..=10.0)?,
+        output_least_rad_s: number("output_least_rad_s", &raw.output_least_rad_s, 0.1..=500.0)?,
+    })
 }
 
 fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, ConfigError> {

@@ -172,6 +172,18 @@ pub(super) struct RawObserver {
     pub(super) valve: RawValve,
     pub(super) uncertainty: RawUncertainty,
     pub(super) supervisor: RawSupervisor,
+    pub(super) filter: RawFilter,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawFilter {
+    pub(super) turbine_share: Number,
+    pub(super) turbine_share_s: Number,
+    pub(super) valve_rate_s: Number,
+    pub(super) offgoing_n_m: Number,
+    pub(super) offgoing_release_s: Number,
+    pub(super) output_least_rad_s: Number,
 }
 
 #[derive(Deserialize)]

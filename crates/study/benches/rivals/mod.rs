@@ -39,6 +39,9 @@ const START: State = State {
     oncoming_pa: 0.0,
 };
 
+/// Solves the problem; nothing if the method fails.
+type Solve<'a> = &'a dyn Fn() -> Option<[f64; STATES]>;
+
 pub(crate) fn integrators(page: &mut String) {
     let powertrain = Powertrain::new(vehicle());
     let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode;
@@ -64,7 +67,7 @@ pub(crate) fn integrators(page: &mut String) {
     let radau5 = library!(ImplicitRungeKutta::radau5());
     let kvaerno = library!(DiagonallyImplicitRungeKutta::kvaerno745());
     let bdf = library!(BackwardDifferentiationFormula::adaptive());
-    let rivals: [(&str, &dyn Fn() -> Option<[f64; STATES]>); 5] = [
+    let rivals: [(&str, Solve<'_>); 5] = [
         ("wetclutch, with its events", &usual),
         ("`differential-equations`, Dormand-Prince 5(4)", &dopri5),
         ("`differential-equations`, Radau 5", &radau5),

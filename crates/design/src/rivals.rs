@@ -1,0 +1,36 @@
+//! Observers without a certificate, with the parameters that the vehicle file's error budget gives them.
+
+use config::Vehicle;
+use observer::{Inversion, Phase, SuperTwisting};
+
+use crate::compliant::compliant_model;
+use crate::rigid::{rigid_model, tracker};
+
+/// Low pass of the direct inversion, in valve time constants: it must not be slower than what it looks for.
+const SMOOTHING_SHARE: f64 = 0.5;
+
+/// The super-twisting observer of this vehicle. Its gains dominate the rate of the valve error as it shows in the
+/// acceleration, at the strongest friction.
+pub fn super_twisting(vehicle: &Vehicle) -> SuperTwisting<f64> {
+    let model = rigid_model(vehicle);
+    let rate = |phase| {
+        let [turbine, slip] = model.influence(phase, vehicle.uncertainty.friction.1);
+        turbine.hypot(slip) * vehicle.error_bounds.valve_rate_pa_s
+    };
+    let error_rate_rad_s3 = [rate(Phase::TorquePhase), rate(Phase::InertiaPhase)];
+    SuperTwisting { model, error_rate_rad_s3, tracker: tracker(vehicle) }
+}
+
+/// The direct inversion of this vehicle.
+pub fn inversion(vehicle: &Vehicle) -> Inversion<f64> {
+    let smoothing_s = match vehicle.observer_valve {
+        drivetrain::Valve::Proportional { time_constant_s, .. } => SMOOTHING_SHARE * time_constant_s,
+        drivetrain::Valve::PulseWidth { .. } => vehicle.filter.offgoing_release_s,
+    };
+    Inversion {
+        model: compliant_model(vehicle),
+        smoothing_s,
+        shaft_settling_s: vehicle.shaft_settling_s,
+        tracker: tracker(vehicle),
+    }
+}

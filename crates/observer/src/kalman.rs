@@ -1,0 +1,586 @@
+//! Extended Kalman filter on the powertrain with elastic shafts and unknown torques.
+//!
+//! States: turbine speed `w_t`, output speed `w_0`, torque `T_k` of the shafts' spring, pressure `p`, share `e` by which
+//! the turbine torque differs from the converter's maps, torque `T_ca` of the offgoing clutch.
+//!
+//! ```text
+//! dw_t/dt = C11 (1+e) T_t + C12 T_ca + C13 T_cb(p) + C14 T_s/i_df        dT_k/dt = K_s (w_0/i_df - w_w)
+//! dw_0/dt =  the output row of the same                                  dp/dt = (-p + K_cv u)/tau_cv
+//! T_s = T_k + C_s (w_0/i_df - w_w)                                       e, T_ca: random walks
+//! ```
+//!
+//! Three things set it apart from the reduced-order observers. The wheel speed drives the twist and is not an output, so
+//! mass, grade and tyre slip do not enter. The offgoing clutch's torque is a state, so the same equations hold in torque
+//! and inertia phase and no late phase detection spoils them. Before the shift, shaft torque and turbine torque are
+//! found together; an error that both share cancels in the clutch torque afterwards.
+
+use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients};
+
+use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Tracker, TrackerState};
+
+/// Time over which the acceleration of the wheels is averaged, s.
+const WHEEL_AVERAGE_S: f64 = 0.2;
+
+pub(crate) const N: usize = 6;
+const TURBINE: usize = 0;
+const OUTPUT: usize = 1;
+const SPRING: usize = 2;
+pub(crate) const PRESSURE: usize = 3;
+const SHARE: usize = 4;
+const OFFGOING: usize = 5;
+
+/// Standard deviations of what the filter does not know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilterNoise<T> {
+    /// Of a reading of the turbine speed, rad/s.
+    pub turbine_rad_s: T,
+    /// Of a reading of the output speed, rad/s.
+    pub output_rad_s: T,
+    /// Of a reading of the wheel speed, rad/s.
+    pub wheel_rad_s: T,
+    /// Of the turbine torque, as a share.
+    pub turbine_share: T,
+    /// Time after which that share is another during a shift, s.
+    pub turbine_share_s: T,
+    /// Of the rate of twist outside a shift, rad/s: it keeps the shaft torque open to what the turbine torque says.
+    pub twist_rate_rad_s: T,
+    /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
+    pub output_least_rad_s: T,
+    /// Of the rate of the pressure, Pa/s.
+    pub valve_rate_pa_s: T,
+    /// Time for which an error of that rate persists, s. The filter takes it as white noise of the same power.
+    pub valve_rate_s: T,
+    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
+    pub offgoing_n_m: T,
+    /// Time constant with which it goes once the clutch has let go, s.
+    pub offgoing_release_s: T,
+}
+
+impl<T: Real> FilterNoise<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> FilterNoise<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        FilterNoise {
+            turbine_rad_s: to(self.turbine_rad_s),
+            output_rad_s: to(self.output_rad_s),
+            wheel_rad_s: to(self.wheel_rad_s),
+            turbine_share: to(self.turbine_share),
+            turbine_share_s: to(self.turbine_share_s),
+            twist_rate_rad_s: to(self.twist_rate_rad_s),
+            output_least_rad_s: to(self.output_least_rad_s),
+            valve_rate_pa_s: to(self.valve_rate_pa_s),
+            valve_rate_s: to(self.valve_rate_s),
+            offgoing_n_m: to(self.offgoing_n_m),
+            offgoing_release_s: to(self.offgoing_release_s),
+        }
+    }
+}
+
+/// How toothed wheels are read: the angle by which a reading lags, rad. It spans several teeth, and its middle is
+/// half of them ago, as is the last tooth on average by half a pitch. Zero for a reading of the moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Readings<T> {
+    /// Of the turbine.
+    pub turbine_rad: T,
+    /// Of the output.
+    pub output_rad: T,
+    /// Of the driven wheels.
+    pub wheel_rad: T,
+}
+
+impl<T: Real> Readings<T> {
+    /// Readings of the moment.
+    pub fn ideal() -> Self {
+        Self { turbine_rad: T::zero(), output_rad: T::zero(), wheel_rad: T::zero() }
+    }
+}
+
+/// How the filter passes the kiss point, where the clutch begins to bite: the one corner in its equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linearisation {
+    /// By the tangent at the mean: the extended Kalman filter. Below the kiss point it is blind to the pressure.
+    Tangent,
+    /// By the line that fits best over the spread of the pressure, from three points (Gauss and Hermite).
+    Secant,
+}
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KalmanFilter<T> {
+    /// The powertrain.
+    pub model: CompliantModel<T>,
+    /// Coefficients while both clutches slip; a clutch that holds does so with the torque that this takes.
+    pub both: ShiftCoefficients<T>,
+    /// Coefficients after lock-up.
+    pub locked: ShiftCoefficients<T>,
+    /// How it passes the kiss point.
+    pub linearisation: Linearisation,
+    /// What it does not know.
+    pub noise: FilterNoise<T>,
+    /// How its speeds are read.
+    pub readings: Readings<T>,
+    /// Checks, valve and phase.
+    pub tracker: Tracker<T>,
+}
+
+/// Memory of a [`KalmanFilter`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KalmanState<T> {
+    tracker: TrackerState<T>,
+    /// Pressure where there is no more than the valve model, Pa.
+    valve_only_pa: T,
+    running: Option<Running<T>>,
+    clutch_torque_n_m: T,
+    shaft_torque_n_m: Option<T>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Running<T> {
+    pub(crate) mean: [T; N],
+    pub(crate) covariance: [[T; N]; N],
+    /// Accelerations of turbine and output over the last sample, rad/s^2.
+    pub(crate) rates: [T; 2],
+    /// Wheel speed through a low pass, rad/s: how far the speed is ahead of it tells the acceleration.
+    slow_wheel: T,
+    last: Input<T>,
+    acting: Phase,
+}
+
+impl<T: Real> KalmanFilter<T> {
+    /// The filter of this powertrain.
+    pub fn new(model: CompliantModel<T>, noise: FilterNoise<T>, readings: Readings<T>, tracker: Tracker<T>) -> Self {
+        let of = |engagement| model.shift.coefficients(engagement);
+        let (both, locked) = (of(Engagement::BothSlipping), of(Engagement::OncomingStuck));
+        Self { both, locked, model, linearisation: Linearisation::Secant, noise, readings, tracker }
+    }
+
+    /// Age of a reading that lags by this angle at this speed, s.
+    #[inline]
+    fn age(&self, lag_rad: T, speed_rad_s: T) -> T {
+        lag_rad / speed_rad_s.abs().max(self.noise.output_least_rad_s)
+    }
+
+    /// The same filter in another precision.
+    pub fn cast<U: Real>(&self) -> KalmanFilter<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        let Readings { turbine_rad, output_rad, wheel_rad } = self.readings;
+        let readings = Readings { turbine_rad: to(turbine_rad), output_rad: to(output_rad), wheel_rad: to(wheel_rad) };
+        KalmanFilter {
+            linearisation: self.linearisation,
+            ..KalmanFilter::new(self.model.cast(), self.noise.cast(), readings, self.tracker.cast())
+        }
+    }
+
+    /// The first estimate: the gear before the shift in balance, an empty cylinder.
+    fn begin(&self, valve_pa: T, input: &Input<T>, acting: Phase) -> Running<T> {
+        let (zero, noise) = (T::zero(), &self.noise);
+        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
+        let torque = self.model.rigid.converter.torques(input.engine_rad_s, input.turbine_rad_s).turbine_n_m;
+        let line = &self.model.rigid.driveline;
+        let held = &self.model.torque_phase.holding_offgoing;
+        let shaft = torque * self.model.shift.ratio_offgoing() * line.final_ratio;
+        let holding = held.per_turbine_torque * torque + held.per_output_torque * shaft / line.final_ratio;
+        let mut covariance = [[zero; N]; N];
+        // Starting out of balance costs a few swings of the shafts: as much as the torque itself is allowed.
+        let deviations = [
+            noise.turbine_rad_s,
+            noise.output_rad_s,
+            shaft.abs() + T::of(100.0),
+            T::of(1e3),
+            zero,
+            holding.abs() + T::of(50.0),
+        ];
+        for (i, deviation) in deviations.into_iter().enumerate() {
+            covariance[i][i] = deviation * deviation;
+        }
+        let mean = [input.turbine_rad_s, output, shaft, valve_pa, zero, holding];
+        Running { mean, covariance, rates: [zero; 2], slow_wheel: input.wheel_rad_s, last: *input, acting }
+    }
+
+    /// What the powertrain does over the interval that ends with `input`.
+    #[inline]
+    pub(crate) fn passage(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>) -> Passage<T> {
+        let (one, half) = (T::one(), T::of(0.5));
+        let (dt, last, noise) = (interval.dt_s, running.last, &self.noise);
+        let locked = running.acting == Phase::AfterShift;
+        let rigid = &self.model.rigid;
+        let (line, clutch) = (&rigid.driveline, &rigid.clutch);
+        let direction = if last.slip_rad_s < T::zero() { -one } else { one };
+
+        // The wheel's readings are as old as its teeth are apart; over that time it went on as it does on average.
+        let wheel = half * (last.wheel_rad_s + input.wheel_rad_s);
+        let slow_s = T::of(WHEEL_AVERAGE_S);
+        running.slow_wheel = running.slow_wheel + (dt / slow_s).min(one) * (wheel - running.slow_wheel);
+        let wheel_rate = (wheel - running.slow_wheel) / slow_s;
+        let wheel_rad_s = wheel + self.age(self.readings.wheel_rad, wheel) * wheel_rate;
+
+        // Shaft torque over the interval: T_k + h (w_0 + w_0+) - u w_w.
+        let (ratio, stiffness) = (line.final_ratio, line.shaft_stiffness_n_m_rad);
+        let h = (T::of(0.25) * stiffness * dt + half * line.shaft_damping_n_m_s_rad) / ratio;
+        let mut rows =
+            if locked { [self.locked.turbine, self.locked.output] } else { [self.both.turbine, self.both.output] };
+        if locked {
+            rows[0].per_offgoing_torque = T::zero();
+            rows[1].per_offgoing_torque = T::zero();
+        }
+        let shaft = [rows[0].per_output_torque / ratio, rows[1].per_output_torque / ratio];
+        let shifting = matches!(running.acting, Phase::TorquePhase | Phase::InertiaPhase);
+        let released = matches!(running.acting, Phase::InertiaPhase | Phase::AfterShift);
+        Passage {
+            interval: *interval,
+            rows,
+            shaft,
+            turbine_n_m: rigid.converter.torques(last.engine_rad_s, last.turbine_rad_s).turbine_n_m,
+            per_pressure: if locked {
+                T::zero()
+            } else {
+                direction * clutch.torque_per_force(last.slip_rad_s) * clutch.piston_area_m2
+            },
+            kiss_pa: clutch.kiss_pressure(),
+            wheel_rad_s,
+            h,
+            u: half * stiffness * dt + line.shaft_damping_n_m_s_rad,
+            turn: half * stiffness * dt / ratio,
+            twist: stiffness * dt,
+            solve: one / (one - dt * shaft[1] * h),
+            stay: if shifting { (-dt / noise.turbine_share_s).exp() } else { one },
+            keep: if released { (-dt / noise.offgoing_release_s).exp() } else { one },
+            released,
+            shifting,
+        }
+    }
+
+    /// Carries mean and covariance over the interval.
+    #[inline]
+    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>, moving: bool) {
+        let c = self.passage(running, interval, input);
+        let x = running.mean;
+        let (above, slope) = match self.linearisation {
+            Linearisation::Tangent => c.tangent(x[PRESSURE]),
+            Linearisation::Secant => c.secant(x[PRESSURE], running.covariance[PRESSURE][PRESSURE]),
+        };
+        let next = c.propagate(&x, above);
+        let f = c.derivative(slope);
+        running.rates = [(next[TURBINE] - x[TURBINE]) / interval.dt_s, (next[OUTPUT] - x[OUTPUT]) / interval.dt_s];
+        running.mean = next;
+        spread(&mut running.covariance, &f, &[interval.phi, c.stay, c.keep]);
+        for (i, variance) in self.added(&c, moving).into_iter().enumerate() {
+            running.covariance[i][i] = running.covariance[i][i] + variance;
+        }
+    }
+
+    /// Variances that an interval adds.
+    #[inline]
+    pub(crate) fn added(&self, c: &Passage<T>, moving: bool) -> [T; N] {
+        let (zero, one, noise) = (T::zero(), T::one(), &self.noise);
+        let square = |x: T| x * x;
+        let dt = c.interval.dt_s;
+        [
+            // What the model of the accelerations leaves out is small beside the readings.
+            square(T::of(0.1) * noise.turbine_rad_s),
+            square(T::of(0.1) * noise.output_rad_s),
+            square(c.twist)
+                * (square(noise.wheel_rad_s) + if c.shifting { zero } else { square(noise.twist_rate_rad_s) }),
+            if moving { T::of(2.0) * dt * noise.valve_rate_s * square(noise.valve_rate_pa_s) } else { zero },
+            if c.shifting { square(noise.turbine_share) * (one - square(c.stay)) } else { zero },
+            if c.released { zero } else { dt * square(noise.offgoing_n_m) },
+        ]
+    }
+
+    /// Outside a shift the turbine torque is what the maps say, and the shaft torque follows from it: an error of the one
+    /// is an error of the other, and no speed tells it. As a shift begins, it may show: it is let in as what it is, one
+    /// error of both.
+    #[inline]
+    fn change_phase(&self, running: &mut Running<T>, acting: Phase) {
+        let shifting = |phase| matches!(phase, Phase::TorquePhase | Phase::InertiaPhase);
+        let (before, now) = (shifting(running.acting), shifting(acting));
+        running.acting = acting;
+        let zero = T::zero();
+        if before && !now {
+            running.mean[SHARE] = zero;
+            for i in 0..N {
+                running.covariance[SHARE][i] = zero;
+                running.covariance[i][SHARE] = zero;
+            }
+        }
+        if now && !before {
+            let last = &running.last;
+            let turbine_n_m = self.model.rigid.converter.torques(last.engine_rad_s, last.turbine_rad_s).turbine_n_m;
+            let final_ratio = self.model.rigid.driveline.final_ratio;
+            let shaft = turbine_n_m * self.model.shift.ratio_offgoing() * final_ratio;
+            let held = &self.model.torque_phase.holding_offgoing;
+            let holding = held.per_turbine_torque * turbine_n_m + held.per_output_torque * shaft / final_ratio;
+            let together = [zero, zero, shaft, zero, T::one(), holding].map(|x| x * self.noise.turbine_share);
+            for (row, a) in running.covariance.iter_mut().zip(together) {
+                for (p, b) in row.iter_mut().zip(together) {
+                    *p = *p + a * b;
+                }
+            }
+        }
+    }
+
+    /// Takes one reading of one state.
+    #[inline]
+    pub(crate) fn correct(running: &mut Running<T>, state: usize, reading: T, deviation: T) {
+        let p = &mut running.covariance;
+        let column = p[state];
+        let inverse = (column[state] + deviation * deviation).recip();
+        let surprise = reading - running.mean[state];
+        for i in 0..N {
+            let gain = column[i] * inverse;
+            running.mean[i] = running.mean[i] + gain * surprise;
+            for j in i..N {
+                let value = p[i][j] - gain * column[j];
+                p[i][j] = value;
+                p[j][i] = value;
+            }
+        }
+    }
+}
+
+/// What the powertrain does over one interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Passage<T> {
+    interval: Interval<T>,
+    /// Of turbine and output.
+    rows: [AccelerationRow<T>; 2],
+    /// Acceleration of turbine and output per shaft torque.
+    shaft: [T; 2],
+    turbine_n_m: T,
+    /// Clutch torque per pressure above the kiss point.
+    per_pressure: T,
+    kiss_pa: T,
+    wheel_rad_s: T,
+    h: T,
+    u: T,
+    turn: T,
+    twist: T,
+    /// Solves the output speed at the end, on which the shaft torque depends.
+    solve: T,
+    stay: T,
+    keep: T,
+    released: bool,
+    shifting: bool,
+}
+
+impl<T: Real> Passage<T> {
+    /// Mean pressure over the interval above the kiss point, Pa; none below it.
+    #[inline]
+    pub(crate) fn above_kiss(&self, pressure_pa: T) -> T {
+        (self.interval.pressure_integral(pressure_pa) / self.interval.dt_s - self.kiss_pa).max(T::zero())
+    }
+
+    /// Pressure above the kiss point and its derivative by the pressure at the start, at the mean.
+    #[inline]
+    fn tangent(&self, pressure_pa: T) -> (T, T) {
+        let above = self.above_kiss(pressure_pa);
+        (above, if above > T::zero() { self.interval.psi / self.interval.dt_s } else { T::zero() })
+    }
+
+    /// Expectation of the pressure above the kiss point and slope of the line that fits it best.
+    #[inline]
+    fn secant(&self, pressure_pa: T, variance: T) -> (T, T) {
+        let reach = (T::of(3.0) * variance.max(T::of(1.0))).sqrt();
+        let (low, high) = (self.above_kiss(pressure_pa - reach), self.above_kiss(pressure_pa + reach));
+        let middle = self.above_kiss(pressure_pa);
+        ((T::of(4.0) * middle + low + high) / T::of(6.0), (high - low) / (reach + reach))
+    }
+
+    /// The states at the end, with this mean pressure above the kiss point.
+    #[inline]
+    pub(crate) fn propagate(&self, x: &[T; N], above_kiss_pa: T) -> [T; N] {
+        let dt = self.interval.dt_s;
+        let oncoming = self.per_pressure * above_kiss_pa;
+        let free = |row: &AccelerationRow<T>| {
+            row.per_turbine_torque * self.turbine_n_m * (T::one() + x[SHARE])
+                + row.per_oncoming_torque * oncoming
+                + row.per_offgoing_torque * x[OFFGOING]
+        };
+        let [shaft_t, shaft_o] = self.shaft;
+        let held = x[SPRING] - self.u * self.wheel_rad_s;
+        let output = self.solve
+            * ((T::one() + dt * shaft_o * self.h) * x[OUTPUT] + dt * free(&self.rows[1]) + dt * shaft_o * held);
+        let shaft = held + self.h * (x[OUTPUT] + output);
+        [
+            x[TURBINE] + dt * (free(&self.rows[0]) + shaft_t * shaft),
+            output,
+            x[SPRING] + self.turn * (x[OUTPUT] + output) - self.twist * self.wheel_rad_s,
+            self.interval.pressure(x[PRESSURE]),
+            self.stay * x[SHARE],
+            self.keep * x[OFFGOING],
+        ]
+    }
+
+    /// Derivatives of the first three states at the end by all states; the others depend on themselves alone. `slope`
+    /// is that of the mean pressure above the kiss point.
+    #[inline]
+    fn derivative(&self, slope: T) -> [[T; N]; 3] {
+        let (zero, one, dt) = (T::zero(), T::one(), self.interval.dt_s);
+        let per_pressure = self.per_pressure * slope;
+        let by = |row: &AccelerationRow<T>| {
+            [row.per_oncoming_torque * per_pressure, row.per_turbine_torque * self.turbine_n_m, row.per_offgoing_torque]
+        };
+        let [shaft_t, shaft_o] = self.shaft;
+        let mut f = [[zero; N]; 3];
+        f[OUTPUT][OUTPUT] = self.solve * (one + dt * shaft_o * self.h);
+        f[OUTPUT][SPRING] = self.solve * dt * shaft_o;
+        for (k, by) in by(&self.rows[1]).into_iter().enumerate() {
+            f[OUTPUT][PRESSURE + k] = self.solve * dt * by;
+        }
+        f[SPRING] = f[OUTPUT].map(|x| self.turn * x);
+        f[TURBINE] = f[OUTPUT].map(|x| dt * shaft_t * self.h * x);
+        f[SPRING][OUTPUT] = f[SPRING][OUTPUT] + self.turn;
+        f[SPRING][SPRING] = f[SPRING][SPRING] + one;
+        f[TURBINE][TURBINE] = one;
+        f[TURBINE][OUTPUT] = f[TURBINE][OUTPUT] + dt * shaft_t * self.h;
+        f[TURBINE][SPRING] = f[TURBINE][SPRING] + dt * shaft_t;
+        for (k, by) in by(&self.rows[0]).into_iter().enumerate() {
+            f[TURBINE][PRESSURE + k] = f[TURBINE][PRESSURE + k] + dt * by;
+        }
+        f
+    }
+}
+
+/// `P = F P F'`, where `F` has three full rows, of which only the first has the turbine speed, and three of the
+/// diagonal alone.
+#[inline]
+fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) {
+    let mut fp = [[T::zero(); N]; N];
+    for (i, row) in f.iter().enumerate() {
+        let first = if i == TURBINE { TURBINE } else { OUTPUT };
+        for (weight, p) in row.iter().zip(p.iter()).skip(first) {
+            for (sum, p) in fp[i].iter_mut().zip(p) {
+                *sum = *sum + *weight * *p;
+            }
+        }
+    }
+    for i in 3..N {
+        fp[i] = p[i].map(|p| diagonal[i - 3] * p);
+    }
+    for i in 0..N {
+        for j in i..N {
+            let value = if j < 3 {
+                fp[i].iter().zip(&f[j]).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
+            } else {
+                fp[i][j] * diagonal[j - 3]
+            };
+            p[i][j] = value;
+            p[j][i] = value;
+        }
+    }
+}
+
+impl<T: Real> Estimator<T> for KalmanFilter<T> {
+    type State = KalmanState<T>;
+
+    fn start(&self) -> KalmanState<T> {
+        KalmanState::new()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Estimate<T> {
+        self.step_by(state, input, Self::predict)
+    }
+}
+
+impl<T: Real> KalmanFilter<T> {
+    /// One sample, with the prediction of choice.
+    #[inline]
+    pub(crate) fn step_by(
+        &self,
+        state: &mut KalmanState<T>,
+        input: &Input<T>,
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool),
+    ) -> Estimate<T> {
+        let Some(mut interval) = self.tracker.begin(&mut state.tracker, input) else {
+            state.running = None;
+            return state.estimate(Health::TimeRejected);
+        };
+        if !self.tracker.limits.wheel_valid(input) {
+            interval.health = Health::SpeedsRejected;
+        }
+        state.valve_only_pa = interval.pressure(state.valve_only_pa);
+        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
+        let usable = interval.speeds_valid() && interval.short && output > self.noise.output_least_rad_s;
+        if !usable {
+            // The twist is lost over a gap; the pressure goes on by the valve model.
+            state.running = None;
+            state.shaft_torque_n_m = None;
+        }
+        if interval.speeds_valid() {
+            self.take(state, &interval, input, predict);
+        }
+        state.estimate(interval.health)
+    }
+
+    #[inline]
+    fn take(
+        &self,
+        state: &mut KalmanState<T>,
+        interval: &Interval<T>,
+        input: &Input<T>,
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool),
+    ) {
+        let (_, acting) = self.tracker.phase(&mut state.tracker, interval.dt_s, input);
+        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
+        let moving = state.tracker.valve_pressure_pa > T::of(1e3);
+        let mut running = match state.running {
+            Some(mut running) if interval.dt_s > T::zero() => {
+                predict(self, &mut running, interval, input, moving);
+                // Old readings are brought forward by the acceleration that the model has.
+                let [turbine_rate, output_rate] = running.rates;
+                let turbine = input.turbine_rad_s;
+                let turbine = turbine + self.age(self.readings.turbine_rad, turbine) * turbine_rate;
+                let output = output + self.age(self.readings.output_rad, output) * output_rate;
+                Self::correct(&mut running, TURBINE, turbine, self.noise.turbine_rad_s);
+                Self::correct(&mut running, OUTPUT, output, self.noise.output_rad_s);
+                running.mean[PRESSURE] = running.mean[PRESSURE].max(T::zero());
+                running
+            }
+            _ => self.begin(state.valve_only_pa, input, acting),
+        };
+        let sound = running.mean.iter().all(|x| x.is_finite())
+            && (0..N).all(|i| running.covariance[i][i] >= T::zero() && running.covariance[i][i].is_finite());
+        if !sound {
+            running = self.begin(state.tracker.valve_pressure_pa, input, acting);
+        }
+        running.last = *input;
+        self.change_phase(&mut running, acting);
+        state.valve_only_pa = running.mean[PRESSURE];
+        let line = &self.model.rigid.driveline;
+        let rate = line.twist_rate(running.mean[OUTPUT], input.wheel_rad_s);
+        state.shaft_torque_n_m = Some(running.mean[SPRING] + line.shaft_damping_n_m_s_rad * rate);
+        state.clutch_torque_n_m = self.model.rigid.clutch_torque(
+            acting,
+            running.mean[PRESSURE],
+            input.engine_rad_s,
+            input.turbine_rad_s,
+            input.slip_rad_s,
+        );
+        state.running = Some(running);
+    }
+}
+
+impl<T: Real> KalmanState<T> {
+    pub(crate) fn new() -> Self {
+        let zero = T::zero();
+        Self {
+            tracker: TrackerState::new(),
+            valve_only_pa: zero,
+            running: None,
+            clutch_torque_n_m: zero,
+            shaft_torque_n_m: None,
+        }
+    }
+
+    fn estimate(&self, health: Health) -> Estimate<T> {
+        Estimate {
+            pressure_pa: self.valve_only_pa,
+            clutch_torque_n_m: self.clutch_torque_n_m,
+            shaft_torque_n_m: self.shaft_torque_n_m,
+            phase: self.tracker.supervisor.phase,
+            health,
+            bounds: None,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Unscented Kalman filter on the states and noises of [`KalmanFilter`].
+//!
+//! It carries points instead of a linearisation, which serves at the kiss point, where the clutch begins to bite and
+//! the torque has a corner (S. Julier, J. Uhlmann, Unscented filtering and nonlinear estimation, Proc. IEEE 92 (2004)
+//! 401). The readings are states, so the correction is the same.
+
+use drivetrain::Real;
+
+use crate::kalman::{N, PRESSURE, Running};
+use crate::{Estimate, Estimator, Input, Interval, KalmanFilter, KalmanState};
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UnscentedFilter<T> {
+    /// Powertrain, noises, checks.
+    pub filter: KalmanFilter<T>,
+}
+
+impl<T: Real> UnscentedFilter<T> {
+    /// The same filter in another precision.
+    pub fn cast<U: Real>(&self) -> UnscentedFilter<U> {
+        UnscentedFilter { filter: self.filter.cast() }
+    }
+}
+
+impl<T: Real> Estimator<T> for UnscentedFilter<T> {
+    type State = KalmanState<T>;
+
+    fn start(&self) -> KalmanState<T> {
+        KalmanState::new()
+    }
+
+    #[inline]
+    fn step(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Estimate<T> {
+        self.filter.step_by(state, input, predict)
+    }
+}
+
+/// Carries a pair of points along each axis of the covariance over the interval. All weigh the same, and the mean has
+/// no point of its own: then no weight is negative, and the covariance stays one.
+#[inline]
+fn predict<T: Real>(
+    filter: &KalmanFilter<T>,
+    running: &mut Running<T>,
+    interval: &Interval<T>,
+    input: &Input<T>,
+    moving: bool,
+) {
+    let passage = filter.passage(running, interval, input);
+    let before = running.mean;
+    let axes = square_root(&running.covariance);
+    let (mut points, mut mean) = ([[T::zero(); N]; 2 * N], [T::zero(); N]);
+    let reach = T::of(N as f64).sqrt();
+    let weight = T::of(0.5 / N as f64);
+    for (n, point) in points.iter_mut().enumerate() {
+        let sign = if n < N { reach } else { -reach };
+        let start: [T; N] = core::array::from_fn(|i| before[i] + sign * axes[i][n % N]);
+        *point = passage.propagate(&start, passage.above_kiss(start[PRESSURE]));
+        for (mean, x) in mean.iter_mut().zip(point.iter()) {
+            *mean = *mean + weight * *x;
+        }
+    }
+    let mut covariance = [[T::zero(); N]; N];
+    for point in &points {
+        let off: [T; N] = core::array::from_fn(|i| point[i] - mean[i]);
+        for (row, a) in covariance.iter_mut().zip(off) {
+            for (sum, b) in row.iter_mut().zip(off) {
+                *sum = *sum + weight * a * b;
+            }
+        }
+    }
+    for (i, variance) in filter.added(&passage, moving).into_iter().enumerate() {
+        covariance[i][i] = covariance[i][i] + variance;
+    }
+    running.rates = [(mean[0] - before[0]) / interval.dt_s, (mean[1] - before[1]) / interval.dt_s];
+    running.mean = mean;
+    running.covariance = covariance;
+}
+
+/// Lower triangular square root; an axis that rounding has made negative is taken as none.
+#[inline]
+fn square_root<T: Real>(p: &[[T; N]; N]) -> [[T; N]; N] {
+    let zero = T::zero();
+    let mut root = [[zero; N]; N];
+    for i in 0..N {
+        for j in 0..=i {
+            let rest = p[i][j] - (0..j).fold(zero, |sum, k| sum + root[i][k] * root[j][k]);
+            root[i][j] = if i == j {
+                rest.max(zero).sqrt()
+            } else if root[j][j] > zero {
+                rest / root[j][j]
+            } else {
+                zero
+            };
+        }
+    }
+    root
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_square_root_squares_to_what_it_came_from() {
+        let lower: [[f64; N]; N] = core::array::from_fn(|i| {
+            core::array::from_fn(|j| if j <= i { 1.0 + (i * 3 + j * 5) as f64 % 7.0 } else { 0.0 })
+        });
+        let square = |m: &[[f64; N]; N]| -> [[f64; N]; N] {
+            core::array::from_fn(|i| core::array::from_fn(|j| (0..N).map(|k| m[i][k] * m[j][k]).sum()))
+        };
+        let (p, again) = (square(&lower), square(&square_root(&square(&lower))));
+        assert!(p.iter().flatten().zip(again.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-9 * a.abs().max(1.0)));
+        assert_eq!(square_root(&[[0.0; N]; N]), [[0.0; N]; N]);
+    }
+}
