@@ -299,7 +299,7 @@ impl Threads {
 pub(crate) struct ErrorBoundOptions {
     /// Study file
     pub(crate) study: PathBuf,
-    /// File for the bounds, which `design --bounds` reads; standard output if left out
+    /// File for the bounds, which `design --bounds` reads, with a page beside it; standard output if left out
     #[arg(short, long, value_name = "BOUNDS.toml")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]

@@ -184,3 +184,52 @@ fn a_factor_that_cannot_be_is_refused_before_the_first_run() {
         assert!(!study.0.join("out").exists());
     }
 }
+
+const MODEL_ERRORS: &str = r#"
+plan = "sobol"
+runs = 16
+[[factor]]
+key = "experiment.off_nominal.converter_capacity_factor"
+range = [0.85, 1.15]
+"#;
+
+#[test]
+fn error_bounds_are_found_and_read_by_the_design() {
+    let study = Study::new("bound", MODEL_ERRORS);
+    let bounds = study.path("bounds.toml");
+    let printed = done(&["error-bound", &study.file(), "-o", &bounds]);
+    assert!(printed.contains("rigid |w|") && printed.contains("turbine torque (engine, converter)"), "{printed}");
+    let page = String::from_utf8(bytes(study.path("bounds.html"))).unwrap();
+    assert!(page.contains("Inertia phase") && page.contains("error_matrix"));
+    let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
+    let with = done(&["design", vehicle, "--bounds", &bounds, "--phase", "inertia"]);
+    let without = done(&["design", vehicle, "--phase", "inertia"]);
+    assert!(without.contains("for model errors up to 1600.0 rad/s^2") && !with.contains("1600.0"), "{with}");
+}
+
+#[test]
+fn the_worst_case_is_a_study_that_can_be_run() {
+    let study = Study::new("worst", &FACTORS.replace("runs = 48", "runs = 12"));
+    let out = study.path("out");
+    let printed = done(&[
+        "worst-case",
+        &study.file(),
+        "--observer",
+        "peak-to-peak",
+        "--phase",
+        "inertia",
+        "--starts",
+        "1",
+        "--iterations",
+        "10",
+        "-o",
+        &out,
+    ]);
+    let found = printed.split("RMS error ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let case = study.path("out/worst_inertia_phase.toml");
+    let again = done(&["study", &case, "--run", "0", "-o", &study.path("again")]);
+    let row = again.lines().find(|line| line.starts_with("peak-to-peak.inertia_phase.pressure_rms_pa")).unwrap();
+    let rms = row.split(' ').nth(1).unwrap().parse::<f64>().unwrap();
+    assert!((rms / 1e6 - found).abs() < 1e-4, "{rms} {found}");
+    assert!(refused(&["worst-case", &study.file(), "--observer", "none"]).contains("its observers are peak-to-peak"));
+}

@@ -1,6 +1,7 @@
 //! Figures and the HTML reports.
 
 pub mod bench_page;
+pub mod error_bound_page;
 pub mod figure;
 pub mod map_figures;
 pub mod page;
@@ -10,6 +11,7 @@ pub mod study_page;
 pub mod tables;
 
 pub use bench_page::bench_page;
+pub use error_bound_page::error_bound_page;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;
 pub use study_page::StudyPage;

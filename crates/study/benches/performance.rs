@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 use config::{Experiment, Study, Vehicle};
 use design::rigid::design_phase;
 use design::{
-    compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding, requirement,
-    rigid_observer, sliding_observer,
+    bounded, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding, extended_filter,
+    inversion, kalman_filter, requirement, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
 use observer::{Estimator, Input, Phase, RigidGains};
 use plant::{Powertrain, Simulation};
@@ -135,12 +135,30 @@ fn steps<O: Estimator<f64>>(observer: O) -> impl FnMut() {
 
 fn observers(page: &mut String) {
     let vehicle = vehicle();
-    let names = ["open loop", "rigid", "compliant", "sliding"];
+    let names = [
+        "open loop",
+        "rigid",
+        "rigid, with its guaranteed range",
+        "compliant",
+        "sliding",
+        "super-twisting",
+        "inversion",
+        "Kalman",
+        "extended Kalman",
+        "unscented",
+    ];
+    let rigid = rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains());
     let mut jobs: Vec<Box<dyn FnMut()>> = vec![
         Box::new(steps(rigid_observer(&vehicle, RigidGains::open_loop()))),
-        Box::new(steps(rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains()))),
+        Box::new(steps(rigid)),
+        Box::new(steps(bounded(&vehicle, rigid))),
         Box::new(steps(compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains()))),
         Box::new(steps(sliding_observer(&vehicle, design_sliding(&vehicle)))),
+        Box::new(steps(super_twisting(&vehicle))),
+        Box::new(steps(inversion(&vehicle))),
+        Box::new(steps(kalman_filter(&vehicle, None))),
+        Box::new(steps(extended_filter(&vehicle, None))),
+        Box::new(steps(unscented_filter(&vehicle, None))),
     ];
     let times = fastest(SHORT, &mut jobs);
     page.push_str("\n## One step of an observer, f64\n\n| observer | time |\n|---|---|\n");

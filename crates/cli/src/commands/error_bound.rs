@@ -1,9 +1,11 @@
 //! `wetclutch error-bound`.
 
 use config::Study;
+use report::error_bound_page;
+use report::error_bound_page::named;
 use report::tables::phase_name;
 use study::campaign::PHASES;
-use study::error_bound::{PARTS, Size, error_bound as find};
+use study::error_bound as find;
 
 use crate::args::ErrorBoundOptions;
 use crate::commands::{progress, write_text};
@@ -20,6 +22,7 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     }
     if let Some(path) = &options.output {
         write_text(path, &found.toml(&study))?;
+        write_text(&path.with_extension("html"), &error_bound_page(&found, &study)?)?;
     }
     if options.json {
         output::line(&serde_json::to_string_pretty(&found)?)?;
@@ -29,30 +32,21 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     let head = ["phase", "model error, rad/s^2", "largest", "50 % of runs below", "95 %", "99 %", "settled after run"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (phase, found) in PHASES.into_iter().zip(&found.phases) {
-        let mut row = |label: &str, size: &Size| {
+        for (name, size) in named(found) {
             let [half, most, nearly_all] = size.quantiles;
             let numbers = [size.largest, half, most, nearly_all].map(|value| format!("{value:.1}"));
-            let mut cells = vec![phase_name(phase).to_owned(), label.to_owned()];
+            let mut cells = vec![phase_name(phase).to_owned(), name];
             cells.extend(numbers);
             cells.push(size.settled_after.to_string());
             rows.push(cells);
-        };
-        row("rigid |w|", &found.rigid);
-        for (name, size) in ["w_t", "slip"].iter().zip(&found.rigid_channels) {
-            row(&format!("  of {name}"), size);
-        }
-        for (part, size) in PARTS.iter().zip(&found.rigid_parts) {
-            row(&format!("  from {part}"), size);
-        }
-        let channels: &[&str] =
-            if found.compliant_channels.len() == 3 { &["w_t", "slip", "w_w"] } else { &["w_t", "w_w"] };
-        for (name, size) in channels.iter().zip(&found.compliant_channels) {
-            row(&format!("compliant, of {name}"), size);
         }
     }
     output::table(2, &rows)?;
     match &options.output {
-        Some(path) => output::line(&format!("\nbounds: {}", path.display()))?,
+        Some(path) => {
+            let page = path.with_extension("html");
+            output::line(&format!("\nbounds: {}\npage: {}", path.display(), page.display()))?;
+        }
         None => output::line(&format!("\n{}", found.toml(&study)))?,
     }
     Ok(())

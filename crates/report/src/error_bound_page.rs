@@ -1,0 +1,65 @@
+//! The page of a model-error study: how large the errors are, and what they are made of.
+
+use config::Study;
+use minijinja::{Value, context};
+use study::ErrorBound;
+use study::campaign::PHASES;
+use study::error_bound::{PARTS, PhaseErrors, Size};
+
+use crate::page::{PageError, templates};
+use crate::tables::phase_name;
+
+/// Every error of one phase with its name: the rigid model's size, channels and parts, the compliant model's channels.
+pub fn named(phase: &PhaseErrors) -> Vec<(String, &Size)> {
+    let compliant: &[&str] =
+        if phase.compliant_channels.len() == 3 { &["w_t", "slip", "w_w"] } else { &["w_t", "w_w"] };
+    let channels = ["w_t", "slip"].iter().zip(&phase.rigid_channels);
+    let mut rows = vec![("rigid |w|".to_owned(), &phase.rigid)];
+    rows.extend(channels.map(|(name, size)| (format!("  of {name}"), size)));
+    rows.extend(PARTS.iter().zip(&phase.rigid_parts).map(|(part, size)| (format!("  from {part}"), size)));
+    rows.extend(
+        compliant.iter().zip(&phase.compliant_channels).map(|(name, size)| (format!("compliant, of {name}"), size)),
+    );
+    rows
+}
+
+/// The page; it needs nothing but itself.
+///
+/// # Errors
+/// None in a released program; the tests render the template.
+pub fn error_bound_page(found: &ErrorBound, study: &Study) -> Result<String, PageError> {
+    let phases = PHASES.into_iter().zip(&found.phases).map(|(phase, errors)| {
+        let rows: Vec<Value> = named(errors)
+            .into_iter()
+            .map(|(name, size)| {
+                let numbers = [size.largest, size.quantiles[0], size.quantiles[1], size.quantiles[2]];
+                context! {
+                    name => name.trim_start(),
+                    part => name.starts_with(' '),
+                    share => format!("{:.2}", 0.6 * (size.largest / errors.rigid.largest).min(1.0)),
+                    numbers => numbers.map(|value| format!("{value:.1}")),
+                    settled => size.settled_after,
+                }
+            })
+            .collect();
+        context! { phase => phase_name(phase), runs => errors.runs, rows => rows }
+    });
+    Ok(templates()?.get_template("error_bound.html")?.render(context! {
+        name => &study.name,
+        title => &study.title,
+        version => env!("CARGO_PKG_VERSION"),
+        vehicle_name => &study.vehicle.name,
+        runs => found.runs,
+        unfinished => found.unfinished,
+        phases => phases.collect::<Vec<_>>(),
+        toml => found.toml(study),
+        factors => study.factors.iter().map(|factor| {
+            let [low, high] = factor.values.ends();
+            context! { name => &factor.name, low => low, high => high }
+        }).collect::<Vec<_>>(),
+        inputs => [&study.source, &study.experiment.source, &study.vehicle.source].map(|source| context! {
+            path => source.path.display().to_string(),
+            sha256 => source.sha256(),
+        }),
+    })?)
+}
