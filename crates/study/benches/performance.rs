@@ -197,7 +197,7 @@ fn simulation(page: &mut String) {
     page.push_str("\n## Design and simulation\n\n| what | time | aim |\n|---|---|---|\n");
     let rows = [
         ("gain design of one phase, five steps", five_steps, "1 ms"),
-        ("gain design of one phase, peak-to-peak", peak_to_peak, "1 ms"),
+        ("gain design of one phase, peak-to-peak", peak_to_peak, ""),
         ("a shift of 1.5 s from a warm state: 100 Hz controller, events, valve delays", window, "250 µs"),
         ("a launch and shift of 9.5 s, recorded every 10 ms", drive(0.01), "3 ms"),
         ("the same, recorded every 1 ms", drive(0.001), "3 ms"),
