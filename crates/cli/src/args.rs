@@ -116,6 +116,12 @@ pub(crate) enum Command {
     /// Makes the runs of a study, then goes on from the worst of them with the simplex method of Nelder and Mead.
     #[command(verbatim_doc_comment)]
     WorstCase(WorstCaseOptions),
+    /// Show what the speeds can tell about the pressure, and what each error does to it
+    ///
+    /// Takes the error bounds of a vehicle file and shows, phase by phase, what pressure each of them looks like and whether any
+    /// observer could tell it from one.
+    #[command(verbatim_doc_comment)]
+    Sensitivity(SensitivityOptions),
     /// Check a vehicle or experiment file
     ///
     /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
@@ -304,6 +310,18 @@ pub(crate) struct ErrorBoundOptions {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) threads: Threads,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SensitivityOptions {
+    /// Vehicle file; the built-in car if left out
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Folder for the page
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -26,6 +26,7 @@ fn main() -> ExitCode {
         Command::Study(options) => commands::study(&options),
         Command::Merge(options) => commands::merge(&options),
         Command::ErrorBound(options) => commands::error_bound(&options),
+        Command::Sensitivity(options) => commands::sensitivity(&options),
         Command::WorstCase(options) => commands::worst_case(&options),
         Command::Check(options) => commands::check(&options),
     };

@@ -12,6 +12,7 @@ pub mod observers;
 pub mod run;
 pub mod sampling;
 pub mod score;
+pub mod sensitivity;
 pub mod statements;
 pub mod worst_case;
 
@@ -23,5 +24,6 @@ pub use error_bound::{ErrorBound, error_bound};
 pub use observers::AnyObserver;
 pub use run::{RunColumns, estimates_trace, run};
 pub use score::{PhaseScore, RangeScore, ShiftQuality, score};
+pub use sensitivity::{PhaseSensitivity, sensitivity};
 pub use statements::{Chapter, Statement, Verdict, reproduce};
 pub use worst_case::{Target, WorstCase, worst_case};

@@ -1,0 +1,53 @@
+//! `wetclutch sensitivity`.
+
+use config::Vehicle;
+use report::sensitivity_page;
+use study::sensitivity as find;
+
+use crate::args::SensitivityOptions;
+use crate::commands::write_text;
+use crate::failure::Failure;
+use crate::output;
+
+pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
+    let vehicle = match &options.vehicle {
+        Some(path) => Vehicle::read(path)?,
+        None => Vehicle::two_speed_at()?,
+    };
+    let phases = find(&vehicle);
+    if let Some(folder) = &options.output {
+        write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &vehicle)?)?;
+    }
+    if options.json {
+        output::line(&serde_json::to_string_pretty(&phases)?)?;
+        return Ok(());
+    }
+    for phase in &phases {
+        output::line(&format!(
+            "{}, {}: {:.0} rad/s^2 per MPa\n",
+            phase.phase.replace('_', " "),
+            phase.view.name(),
+            phase.influence_rad_s2_mpa
+        ))?;
+        let head =
+            ["error", "bound", "unit", "looks like kPa", "per unit", "clutch N m per unit", "angle to the pressure"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        rows.extend(phase.effects.iter().map(|effect| {
+            vec![
+                effect.error.to_owned(),
+                format!("{:.3}", effect.bound).trim_end_matches('0').trim_end_matches('.').to_owned(),
+                effect.unit.to_owned(),
+                format!("{:.1}", 1e-3 * (effect.bound * effect.pressure_pa_per_unit).abs()),
+                format!("{:.2}", 1e-3 * effect.pressure_pa_per_unit),
+                format!("{:.2}", effect.clutch_n_m_per_unit),
+                effect.angle_deg.map_or_else(|| "one speed".to_owned(), |angle| format!("{angle:.1} deg")),
+            ]
+        }));
+        output::table(1, &rows)?;
+        output::line("")?;
+    }
+    if let Some(folder) = &options.output {
+        output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,46 @@
+//! The page of what the speeds can tell about the pressure.
+
+use config::Vehicle;
+use minijinja::{Value, context};
+use study::PhaseSensitivity;
+
+use crate::page::{PageError, templates};
+
+/// The page; it needs nothing but itself.
+///
+/// # Errors
+/// None in a released program; the tests render the template.
+pub fn sensitivity_page(phases: &[PhaseSensitivity], vehicle: &Vehicle) -> Result<String, PageError> {
+    let rows = phases.iter().map(|phase| {
+        let largest = phase.effects.iter().map(|e| (e.bound * e.pressure_pa_per_unit).abs()).fold(0.0, f64::max);
+        let effects: Vec<Value> = (phase.effects.iter())
+            .map(|effect| {
+                let pressure_pa = (effect.bound * effect.pressure_pa_per_unit).abs();
+                context! {
+                    error => effect.error,
+                    unit => effect.unit,
+                    bound => format!("{:.3}", effect.bound).trim_end_matches('0').trim_end_matches('.').to_owned(),
+                    kpa => format!("{:.1}", 1e-3 * pressure_pa),
+                    per_unit => format!("{:.2}", 1e-3 * effect.pressure_pa_per_unit),
+                    torque => format!("{:.2}", effect.clutch_n_m_per_unit),
+                    angle => effect.angle_deg.map(|angle| format!("{angle:.1}")),
+                    shade => format!("{:.2}", 0.6 * pressure_pa / largest.max(1e-9)),
+                }
+            })
+            .collect();
+        context! {
+            title => format!("{}, {}", phase.phase.replace('_', " "), phase.view.name()),
+            influence => format!("{:.0}", phase.influence_rad_s2_mpa),
+            effects => effects,
+        }
+    });
+    Ok(templates()?.get_template("sensitivity.html")?.render(context! {
+        name => "Sensitivity",
+        title => "What the speeds can tell about the pressure",
+        version => env!("CARGO_PKG_VERSION"),
+        vehicle_name => &vehicle.name,
+        phases => rows.collect::<Vec<_>>(),
+        path => vehicle.source.path.display().to_string(),
+        sha256 => vehicle.source.sha256(),
+    })?)
+}

@@ -1,0 +1,206 @@
+//! What the speeds can tell about the pressure in each phase, and what each error of the budget does to it.
+//!
+//! Near an operating point the accelerations are `dy/dt = F + G p + sum of columns times errors`. An error whose column
+//! lies along `G` looks just like a pressure: no observer on these speeds can tell the two apart, whatever its gain.
+//! What an error is worth in pressure is the least-squares answer to it, which an observer that trusts the speeds fully
+//! would give; the valve model bounds it from the other side.
+
+use config::Vehicle;
+use design::compliant::compliant_model;
+use design::rigid_model;
+use nalgebra::DVector;
+use observer::Phase;
+use serde::Serialize;
+
+use crate::campaign::PHASES;
+
+/// Which speeds and states a model has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum View {
+    /// Turbine speed (and slip), vehicle rigid behind the gearbox.
+    Rigid,
+    /// The same speeds with the shaft torque known, as the twist of the shafts tells it.
+    ShaftKnown,
+}
+
+impl View {
+    /// For tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid: turbine speed and slip",
+            Self::ShaftKnown => "with the shaft torque known",
+        }
+    }
+}
+
+/// What one error does.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorEffect {
+    /// The error.
+    pub error: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its bound in the vehicle file, in that unit.
+    pub bound: f64,
+    /// Pressure that it looks like, Pa per unit.
+    pub pressure_pa_per_unit: f64,
+    /// Clutch torque that it looks like, N m per unit.
+    pub clutch_n_m_per_unit: f64,
+    /// Angle between its column and that of the pressure, degrees; near zero no observer can tell them apart. None where
+    /// there is one speed: there everything looks like a pressure.
+    pub angle_deg: Option<f64>,
+}
+
+/// One phase seen by one model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhaseSensitivity {
+    /// The phase.
+    pub phase: &'static str,
+    /// The model.
+    pub view: View,
+    /// How strongly the accelerations answer the pressure, rad/s^2 per MPa.
+    pub influence_rad_s2_mpa: f64,
+    /// The errors.
+    pub effects: Vec<ErrorEffect>,
+}
+
+/// Pressure above the kiss point at which a friction error is weighed, Pa: that of an inertia phase at light throttle.
+const ABOVE_KISS_PA: f64 = 0.2e6;
+
+/// What the speeds can tell in each phase, by this vehicle's models and error bounds.
+pub fn sensitivity(vehicle: &Vehicle) -> Vec<PhaseSensitivity> {
+    PHASES.into_iter().flat_map(|phase| [rigid(vehicle, phase), shaft_known(vehicle, phase)]).collect()
+}
+
+/// An error: name, unit, bound, its column in the accelerations of turbine and slip.
+type Column = (&'static str, &'static str, f64, [f64; 2]);
+
+fn rigid(vehicle: &Vehicle, phase: Phase) -> PhaseSensitivity {
+    let model = rigid_model(vehicle);
+    let rows = model.coefficients(phase);
+    let (t, d, bounds) = (&rows.turbine, &rows.slip_oncoming, &vehicle.error_bounds);
+    let pressure = model.influence(phase, friction(vehicle));
+    let mut columns: Vec<Column> = vec![
+        ("turbine torque", "N m", bounds.turbine_torque_n_m, [t.per_turbine_torque, d.per_turbine_torque]),
+        (
+            "load, shaft torsion, tyre slip",
+            "N m at the output",
+            bounds.output_torque_n_m,
+            [t.per_output_torque, d.per_output_torque],
+        ),
+    ];
+    columns.extend(common(vehicle, phase, pressure, [t.per_offgoing_torque, d.per_offgoing_torque]));
+    evaluate(vehicle, phase, View::Rigid, pressure, &columns)
+}
+
+fn shaft_known(vehicle: &Vehicle, phase: Phase) -> PhaseSensitivity {
+    let model = compliant_model(vehicle);
+    let rows = match phase {
+        Phase::InertiaPhase => &model.inertia_phase,
+        _ => &model.torque_phase,
+    };
+    let (t, d, bounds) = (&rows.turbine, &rows.slip_oncoming, &vehicle.error_bounds);
+    let influence = model.influence(phase, friction(vehicle));
+    let pressure = [influence[0][1], influence[1][1]];
+    let final_ratio = vehicle.driveline.final_ratio;
+    let shaft = [t.per_output_torque / final_ratio, d.per_output_torque / final_ratio];
+    // Before the shift the shaft torque is found from the turbine torque, which makes them one error.
+    let overall = vehicle.shift.ratio_offgoing() * final_ratio;
+    let turbine = [t.per_turbine_torque, d.per_turbine_torque];
+    let both = [0, 1].map(|i| turbine[i] + shaft[i] * overall);
+    let mut columns: Vec<Column> = vec![
+        ("turbine torque that came in the shift", "N m", bounds.turbine_torque_n_m, turbine),
+        ("turbine torque that was there before", "N m", bounds.turbine_torque_n_m, both),
+        ("shaft torque, drifted in the shift", "N m", drift_n_m(vehicle), shaft),
+    ];
+    columns.extend(common(vehicle, phase, pressure, [t.per_offgoing_torque, d.per_offgoing_torque]));
+    evaluate(vehicle, phase, View::ShaftKnown, pressure, &columns)
+}
+
+/// Errors that both models have: offgoing clutch, friction, readings.
+fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2]) -> Vec<Column> {
+    let bounds = &vehicle.error_bounds;
+    let share = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
+    let mut columns: Vec<Column> = Vec::new();
+    if phase == Phase::InertiaPhase {
+        columns.push(("torque left in the offgoing clutch", "N m", OFFGOING_N_M, offgoing));
+    }
+    columns.push(("friction", "%", 100.0 * share, pressure.map(|g| 0.01 * g * ABOVE_KISS_PA)));
+    let sample_s = 0.01;
+    columns.push((
+        "reading of the turbine speed, over 10 ms",
+        "rad/s",
+        bounds.turbine_change_rad_s,
+        [1.0 / sample_s, 0.0],
+    ));
+    if phase == Phase::InertiaPhase {
+        columns.push(("reading of the slip, over 10 ms", "rad/s", bounds.slip_change_rad_s, [0.0, 1.0 / sample_s]));
+    }
+    columns
+}
+
+/// What the offgoing clutch still carries when it has let go, N m [as simulated in E1].
+const OFFGOING_N_M: f64 = 17.0;
+/// Length of a shift, s, and deviation of the difference of the two speed readings that the twist is integrated from,
+/// rad/s at the wheel.
+const SHIFT_S: f64 = 0.6;
+const TWIST_READING_RAD_S: f64 = 0.04;
+
+/// Drift of the shaft torque by integrating noisy readings over a shift at 100 Hz, one standard deviation, N m.
+fn drift_n_m(vehicle: &Vehicle) -> f64 {
+    let sample_s = 0.01;
+    vehicle.driveline.shaft_stiffness_n_m_rad * TWIST_READING_RAD_S * (SHIFT_S * sample_s).sqrt()
+}
+
+fn friction(vehicle: &Vehicle) -> f64 {
+    0.5 * (vehicle.uncertainty.friction.0 + vehicle.uncertainty.friction.1)
+}
+
+fn evaluate(vehicle: &Vehicle, phase: Phase, view: View, pressure: [f64; 2], columns: &[Column]) -> PhaseSensitivity {
+    let outputs = if phase == Phase::InertiaPhase { 2 } else { 1 };
+    let cut = |column: &[f64; 2]| DVector::from_row_slice(&column[..outputs]);
+    let g = cut(&pressure);
+    let torque_per_pa = friction(vehicle) * vehicle.oncoming.clutch.lever() * vehicle.oncoming.clutch.piston_area_m2;
+    let effects = columns.iter().map(|(error, unit, bound, column)| {
+        let column = cut(column);
+        let pressure_pa = g.dot(&column) / g.norm_squared();
+        let cosine = (g.dot(&column) / (g.norm() * column.norm())).abs().min(1.0);
+        ErrorEffect {
+            error,
+            unit,
+            bound: *bound,
+            pressure_pa_per_unit: pressure_pa,
+            clutch_n_m_per_unit: pressure_pa * torque_per_pa,
+            angle_deg: (outputs > 1).then(|| cosine.acos().to_degrees()),
+        }
+    });
+    PhaseSensitivity { phase: phase.name(), view, influence_rad_s2_mpa: 1e6 * g.norm(), effects: effects.collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn effect<'a>(phases: &'a [PhaseSensitivity], phase: Phase, view: View, error: &str) -> &'a ErrorEffect {
+        let one = phases.iter().find(|p| p.phase == phase.name() && p.view == view).unwrap();
+        one.effects.iter().find(|effect| effect.error == error).unwrap()
+    }
+
+    #[test]
+    fn the_known_facts_come_out() {
+        let phases = sensitivity(&Vehicle::two_speed_at().unwrap());
+        let influence = |phase: Phase| phases.iter().find(|p| p.phase == phase.name()).unwrap().influence_rad_s2_mpa;
+        // The rigid model is nearly blind in the torque phase.
+        assert!(influence(Phase::InertiaPhase) > 50.0 * influence(Phase::TorquePhase));
+        // In the inertia phase a turbine torque looks like 0.6 N m of clutch torque for each N m.
+        let turbine = effect(&phases, Phase::InertiaPhase, View::Rigid, "turbine torque");
+        assert!((turbine.clutch_n_m_per_unit.abs() - 0.55).abs() < 0.1 && turbine.angle_deg.unwrap() < 10.0);
+        // With the shaft torque found before the shift, an error of both cancels in the torque phase.
+        let error = "turbine torque that was there before";
+        let cancels = effect(&phases, Phase::TorquePhase, View::ShaftKnown, error);
+        let came = effect(&phases, Phase::TorquePhase, View::ShaftKnown, "turbine torque that came in the shift");
+        assert!(cancels.pressure_pa_per_unit.abs() < 1e-6 * came.pressure_pa_per_unit.abs());
+        assert!((came.clutch_n_m_per_unit.abs() - 1.0).abs() < 0.01);
+    }
+}
