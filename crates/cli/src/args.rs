@@ -156,6 +156,9 @@ pub(crate) struct Design {
     /// Observer to design for
     #[arg(long, value_enum, default_value_t = DesignChoice::Rigid)]
     pub(crate) observer: DesignChoice,
+    /// How the gains are chosen
+    #[arg(long, value_enum, default_value_t = MethodChoice::Iss)]
+    pub(crate) method: MethodChoice,
     /// Phase to design for
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
@@ -171,7 +174,7 @@ pub(crate) struct Design {
     /// Largest acceptable offset of the estimate in Pa
     #[arg(long, value_name = "PA", value_parser = positive)]
     pub(crate) offset_max: Option<f64>,
-    /// Sample time in s, for the peak-to-peak design
+    /// Sample time in s, for the discrete-time methods
     #[arg(long, value_name = "S", value_parser = positive, default_value = "0.01")]
     pub(crate) sample_time: f64,
     /// Print JSON
@@ -189,6 +192,16 @@ pub(crate) enum DesignChoice {
     Compliant,
     /// Full-order sliding mode: gains from the sliding condition, without a certificate
     Sliding,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodChoice {
+    /// The chapter's, in continuous time: the smallest gain that decays as required
+    Iss,
+    /// The same for a sample time, valve and reading errors in the bound; for the compliant observer
+    IssDiscrete,
+    /// The smallest bound on the error for a sample time, valve and reading errors included
+    PeakToPeak,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -228,6 +241,10 @@ pub(crate) enum ObserverChoice {
     PeakToPeak,
     /// Reduced-order with elastic drive shafts, certified gains; needs wheel_speed_rad_s, gives shaft torque too
     Compliant,
+    /// The same with the smallest gains for the log's sample time; open loop where no gain beats it
+    CompliantDiscrete,
+    /// The same with the smallest bound at the log's sample time; open loop where no gain beats it
+    CompliantPeakToPeak,
     /// Full-order sliding mode, gains from the sliding condition
     Sliding,
     /// Kalman filter with unknown torques as states; needs wheel_speed_rad_s, gives shaft torque too

@@ -264,12 +264,37 @@ fn design_serves_every_observer() {
 }
 
 #[test]
+fn a_discrete_design_says_when_the_open_loop_serves() {
+    let design = |more: &[&str]| wetclutch(&[&["design", VEHICLE, "--observer", "compliant"], more].concat());
+    let output = design(&["--method", "peak-to-peak", "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(json["torque_phase"]["uses_open_loop"], true);
+    assert_eq!(json["inertia_phase"]["uses_open_loop"], false);
+    let bound = |phase: &str, name: &str| json[phase][name].as_f64().unwrap();
+    assert!(bound("inertia_phase", "bound_pa") < bound("inertia_phase", "open_loop_bound_pa"));
+    assert!(bound("torque_phase", "best_gain_bound_pa") > bound("torque_phase", "open_loop_bound_pa"));
+    assert!(stdout(&design(&["--method", "iss-discrete"])).contains("open loop serves"));
+    let output = wetclutch(&["design", VEHICLE, "--method", "iss-discrete"]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn sensitivity_shows_what_cannot_be_told_apart() {
+    let folder = Folder::new("sensitivity");
+    let output = wetclutch(&["sensitivity", VEHICLE, "-o", &folder.path("out")]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stdout(&output).contains("turbine torque that was there before") && stdout(&output).contains("0.1 deg"));
+    assert!(read(folder.path("out/sensitivity.html")).contains("Inertia phase, with the shaft torque known"));
+}
+
+#[test]
 fn bench_ranks_the_observers_and_an_experiment_without_scenarios_is_told_so() {
     let output = wetclutch(&["bench", "--json"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert!(json["rows"].as_array().unwrap().len() >= 22);
-    assert_eq!(json["ranking"].as_array().unwrap().len(), 10);
+    assert_eq!(json["ranking"].as_array().unwrap().len(), 11);
     let output = wetclutch(&["bench", EXPERIMENT]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("there is no [[scenario]] to run"), "{}", stderr(&output));

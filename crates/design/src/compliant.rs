@@ -16,6 +16,7 @@ use nalgebra::DMatrix;
 use observer::{CompliantGains, CompliantModel, CompliantObserver, Phase};
 use serde::Serialize;
 
+use crate::discrete::Sampled;
 use crate::iss::{DesignError, five_steps};
 use crate::lmi::{Block, Outcome, Problem, largest_eigenvalue};
 use crate::polytope::{distinct, valve_extremes};
@@ -142,7 +143,7 @@ fn physical<R: AsRef<[f64]>>(normalised: &[R], outputs: &[usize]) -> [[f64; 3]; 
 }
 
 /// Which of `(w_t, dw, w_w)` are outputs in a phase.
-fn outputs(phase: Phase) -> &'static [usize] {
+pub(crate) fn outputs(phase: Phase) -> &'static [usize] {
     match phase {
         Phase::InertiaPhase => &[0, 1, 2],
         _ => &[0, 2],
@@ -265,6 +266,20 @@ fn vertices(vehicle: &Vehicle, phase: Phase) -> Vec<Vertex> {
         }
     }
     vertices
+}
+
+/// The error system over a sample: `Phi` and, at every vertex, `G Psi`. Only constant valves have one `Phi`; of others the
+/// slowest is taken, whose errors last longest.
+pub(crate) fn sampled_vertices(vehicle: &Vehicle, phase: Phase, sample_time_s: f64) -> Sampled {
+    let vertices = vertices(vehicle, phase);
+    let slowest = vertices.iter().map(|vertex| vertex.a22[(1, 1)]).fold(f64::NEG_INFINITY, f64::max);
+    let phi = (slowest * sample_time_s).exp();
+    let g_psi = vertices.into_iter().map(|vertex| {
+        let a = vertex.a22[(1, 1)];
+        let psi = ((a * sample_time_s).exp() - 1.0) / a;
+        (vertex.label, vertex.g * DMatrix::from_row_slice(2, 2, &[sample_time_s, 0.0, 0.0, psi]))
+    });
+    Sampled { phi: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, phi]), g_psi: g_psi.collect() }
 }
 
 /// The smallest gain for this `kappa1`. Unknowns: the two entries of alpha, then `L` by rows.

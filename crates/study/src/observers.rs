@@ -3,8 +3,9 @@
 use config::{GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
 use design::compliant::physical_gains;
 use design::{
-    DesignError, bounded, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding,
-    extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
+    DesignError, Method, bounded, compliant_observer, design_compliant, design_compliant_discrete, design_peak_to_peak,
+    design_rigid, design_sliding, extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer,
+    super_twisting, unscented_filter,
 };
 use drivetrain::Valve;
 use observer::{
@@ -59,6 +60,8 @@ impl AnyObserver {
                 observer.tracker.sample_max_s = 2.0 * sample_time_s;
                 Self::Rigid(observer)
             }
+            ObserverKind::CompliantDiscrete => Self::discrete(vehicle, Method::Iss, sample_time_s)?,
+            ObserverKind::CompliantPeakToPeak => Self::discrete(vehicle, Method::PeakToPeak, sample_time_s)?,
             ObserverKind::Compliant => {
                 Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
             }
@@ -69,6 +72,14 @@ impl AnyObserver {
             ObserverKind::Inversion => Self::Inversion(Box::new(inversion(vehicle))),
             ObserverKind::Sliding => Self::Sliding(sliding_observer(vehicle, design_sliding(vehicle))),
         })
+    }
+
+    /// The compliant observer with gains for this sample time.
+    fn discrete(vehicle: &Vehicle, method: Method, sample_time_s: f64) -> Result<Self, DesignError> {
+        let gains = design_compliant_discrete(vehicle, method, sample_time_s)?.gains();
+        let mut observer = compliant_observer(vehicle, gains);
+        observer.tracker.sample_max_s = 2.0 * sample_time_s;
+        Ok(Self::Compliant(Box::new(observer)))
     }
 
     /// The observer that an entry of an experiment file describes.

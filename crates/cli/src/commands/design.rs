@@ -2,17 +2,18 @@
 
 use config::Vehicle;
 use design::compliant::{CompliantRequirement, compliant_requirement, design_compliant_phase};
+use design::discrete::design_compliant_discrete_phase;
 use design::rigid::design_phase;
 use design::{
-    Certificate, CompliantCertificate, DesignError, IssRequirement, PeakToPeakCertificate, design_peak_to_peak,
-    design_sliding, requirement,
+    Certificate, CompliantCertificate, DesignError, DiscreteCertificate, IssRequirement, Method, PeakToPeakCertificate,
+    design_peak_to_peak, design_sliding, requirement,
 };
 use observer::Phase;
 use report::tables::phase_name;
 use serde_json::{Map, Value, json};
 use trace::units;
 
-use crate::args::{Design, DesignChoice, PhaseChoice};
+use crate::args::{Design, DesignChoice, MethodChoice, PhaseChoice};
 use crate::failure::Failure;
 use crate::output;
 
@@ -31,6 +32,20 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
     for &phase in phases {
         let failed = |error: DesignError| Failure::Work(format!("{}: {error}", phase_name(phase)));
         let (json, lines) = match options.observer {
+            DesignChoice::Rigid if options.method == MethodChoice::PeakToPeak => {
+                let certificate = design_peak_to_peak(&vehicle, phase, options.sample_time).map_err(failed)?;
+                (serde_json::to_value(&certificate)?, peak_to_peak_lines(phase, &certificate))
+            }
+            DesignChoice::Rigid if options.method == MethodChoice::IssDiscrete => {
+                let hint = "the rigid observer's discrete-time design is --method peak-to-peak";
+                return Err(Failure::Input(format!("iss-discrete is for the compliant observer\nhint: {hint}")));
+            }
+            DesignChoice::Compliant if options.method != MethodChoice::Iss => {
+                let method = if options.method == MethodChoice::PeakToPeak { Method::PeakToPeak } else { Method::Iss };
+                let certificate =
+                    design_compliant_discrete_phase(&vehicle, phase, method, options.sample_time).map_err(failed)?;
+                (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
+            }
             DesignChoice::Rigid => {
                 let required = replaced(requirement(&vehicle, phase).into(), options);
                 let certificate = design_phase(&vehicle, phase, &required).map_err(failed)?;
@@ -184,4 +199,40 @@ fn sliding(vehicle: &Vehicle, phase: Phase) -> (Value, Vec<String>) {
         String::new(),
     ];
     (json!({ "speed_rad_s2": speed, "pressure_pa_s": pressure }), lines)
+}
+
+fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String> {
+    let gain = certificate.gain_normalised.iter().map(|row| {
+        let row: Vec<String> = row.iter().map(|x| format!("{:.3}", x + 0.0)).collect();
+        format!("[{}]", row.join(", "))
+    });
+    let mpa = units::mpa;
+    let speeds = if phase == Phase::InertiaPhase { "turbine, slip and wheel speed" } else { "turbine and wheel speed" };
+    let mut lines = vec![
+        format!(
+            "{}: L = {}, normalised, rows (T_s, p) on {speeds}",
+            phase_name(phase),
+            gain.collect::<Vec<_>>().join("; ")
+        ),
+        format!(
+            "  error of the pressure ultimately below {:.4} MPa, at {} ms, by every error of the budget",
+            mpa(certificate.bound_pa),
+            1e3 * certificate.sample_time_s
+        ),
+        if certificate.uses_open_loop {
+            format!(
+                "  open loop serves: its bound is {:.4} MPa, that of the best gain {:.4} MPa",
+                mpa(certificate.open_loop_bound_pa),
+                mpa(certificate.best_gain_bound_pa)
+            )
+        } else {
+            format!("  the open loop's bound is {:.4} MPa", mpa(certificate.open_loop_bound_pa))
+        },
+        "  certificate, evaluated by eigenvalues apart from the solver, for the gain in single precision:".to_owned(),
+    ];
+    lines.extend(
+        certificate.margins.iter().map(|m| format!("    {}: least eigenvalue {:.1e}", m.label, m.least_eigenvalue)),
+    );
+    lines.push(String::new());
+    lines
 }

@@ -23,6 +23,8 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         ObserverChoice::Rigid => ObserverKind::Rigid,
         ObserverChoice::PeakToPeak => ObserverKind::PeakToPeak,
         ObserverChoice::Compliant => ObserverKind::Compliant,
+        ObserverChoice::CompliantDiscrete => ObserverKind::CompliantDiscrete,
+        ObserverChoice::CompliantPeakToPeak => ObserverKind::CompliantPeakToPeak,
         ObserverChoice::Sliding => ObserverKind::Sliding,
         ObserverChoice::Kalman => ObserverKind::Kalman,
         ObserverChoice::Extended => ObserverKind::Extended,

@@ -18,6 +18,10 @@ pub enum ObserverKind {
     PeakToPeak,
     /// Reduced-order observer with elastic drive shafts.
     Compliant,
+    /// The same observer, the smallest gains that decay as required over a sample, bound with valve and reading errors.
+    CompliantDiscrete,
+    /// The same observer, gains with the smallest bound on the sampled error of the pressure.
+    CompliantPeakToPeak,
     /// Full-order sliding-mode observer.
     Sliding,
     /// Kalman filter with unknown torques as states, statistically linearised.
@@ -184,6 +188,8 @@ pub(super) fn observer(
             RawKind::Rigid => ObserverKind::Rigid,
             RawKind::PeakToPeak => ObserverKind::PeakToPeak,
             RawKind::Compliant => ObserverKind::Compliant,
+            RawKind::CompliantDiscrete => ObserverKind::CompliantDiscrete,
+            RawKind::CompliantPeakToPeak => ObserverKind::CompliantPeakToPeak,
             RawKind::Sliding => ObserverKind::Sliding,
             RawKind::Kalman => ObserverKind::Kalman,
             RawKind::Extended => ObserverKind::Extended,

@@ -86,6 +86,8 @@ pub(super) enum RawKind {
     Rigid,
     PeakToPeak,
     Compliant,
+    CompliantDiscrete,
+    CompliantPeakToPeak,
     Sliding,
     Kalman,
     Extended,

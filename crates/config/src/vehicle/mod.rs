@@ -87,6 +87,8 @@ pub struct ErrorBounds {
     pub turbine_change_rad_s: f64,
     /// Error of the change of the slip from one sample to the next, rad/s.
     pub slip_change_rad_s: f64,
+    /// Error of the change of the wheel speed from one sample to the next, rad/s.
+    pub wheel_change_rad_s: f64,
     /// Least and greatest factor on the lag of the oncoming clutch's valve.
     pub valve_lag_factor: [f64; 2],
     /// Least and greatest factor on its gain.
@@ -526,6 +528,7 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         valve_rate_pa_s: number("valve_rate_pa_s", &raw.valve_rate_pa_s, 0.0..=1e9)?,
         turbine_change_rad_s: number("turbine_change_rad_s", &raw.turbine_change_rad_s, 0.0..=50.0)?,
         slip_change_rad_s: number("slip_change_rad_s", &raw.slip_change_rad_s, 0.0..=50.0)?,
+        wheel_change_rad_s: number("wheel_change_rad_s", &raw.wheel_change_rad_s, 0.0..=50.0)?,
         valve_lag_factor: range("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
         valve_gain_factor: range("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
         valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,

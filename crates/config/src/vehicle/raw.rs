@@ -230,6 +230,7 @@ pub(super) struct RawErrorBounds {
     pub(super) valve_rate_pa_s: Number,
     pub(super) turbine_change_rad_s: Number,
     pub(super) slip_change_rad_s: Number,
+    pub(super) wheel_change_rad_s: Number,
     pub(super) valve_lag_factor: Numbers,
     pub(super) valve_gain_factor: Numbers,
     pub(super) valve_delay_s: Numbers,
