@@ -30,7 +30,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         wheel_rad_s: deviation(|sensors| &sensors.wheel),
         turbine_share: told.turbine_share,
         turbine_share_s: told.turbine_share_s,
-        twist_rate_rad_s: 0.05,
+        twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
         valve_rate_pa_s: vehicle.error_bounds.valve_rate_pa_s / 3.0_f64.sqrt(),
         valve_rate_s: told.valve_rate_s,

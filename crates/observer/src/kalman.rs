@@ -127,8 +127,8 @@ pub struct KalmanFilter<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KalmanState<T> {
     tracker: TrackerState<T>,
-    /// Pressure where there is no more than the valve model, Pa.
-    valve_only_pa: T,
+    /// The pressure: by the filter, over a gap by the valve model, Pa.
+    pressure_pa: T,
     running: Option<Running<T>>,
     clutch_torque_n_m: T,
     shaft_torque_n_m: Option<T>,
@@ -172,7 +172,7 @@ impl<T: Real> KalmanFilter<T> {
     }
 
     /// The first estimate: the gear before the shift in balance, an empty cylinder.
-    fn begin(&self, valve_pa: T, input: &Input<T>, acting: Phase) -> Running<T> {
+    fn begin(&self, pressure_pa: T, input: &Input<T>) -> Running<T> {
         let (zero, noise) = (T::zero(), &self.noise);
         let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
         let torque = self.model.rigid.converter.torques(input.engine_rad_s, input.turbine_rad_s).turbine_n_m;
@@ -193,7 +193,9 @@ impl<T: Real> KalmanFilter<T> {
         for (i, deviation) in deviations.into_iter().enumerate() {
             covariance[i][i] = deviation * deviation;
         }
-        let mean = [input.turbine_rad_s, output, shaft, valve_pa, zero, holding];
+        let mean = [input.turbine_rad_s, output, shaft, pressure_pa, zero, holding];
+        // Whatever phase it begins in is entered from here.
+        let acting = Phase::BeforeShift;
         Running { mean, covariance, rates: [zero; 2], slow_wheel: input.wheel_rad_s, last: *input, acting }
     }
 
@@ -499,7 +501,7 @@ impl<T: Real> KalmanFilter<T> {
         if !self.tracker.limits.wheel_valid(input) {
             interval.health = Health::SpeedsRejected;
         }
-        state.valve_only_pa = interval.pressure(state.valve_only_pa);
+        state.pressure_pa = interval.pressure(state.pressure_pa);
         let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
         let usable = interval.speeds_valid() && interval.short && output > self.noise.output_least_rad_s;
         if !usable {
@@ -537,16 +539,16 @@ impl<T: Real> KalmanFilter<T> {
                 running.mean[PRESSURE] = running.mean[PRESSURE].max(T::zero());
                 running
             }
-            _ => self.begin(state.valve_only_pa, input, acting),
+            _ => self.begin(state.pressure_pa, input),
         };
         let sound = running.mean.iter().all(|x| x.is_finite())
             && (0..N).all(|i| running.covariance[i][i] >= T::zero() && running.covariance[i][i].is_finite());
         if !sound {
-            running = self.begin(state.tracker.valve_pressure_pa, input, acting);
+            running = self.begin(state.tracker.valve_pressure_pa, input);
         }
         running.last = *input;
         self.change_phase(&mut running, acting);
-        state.valve_only_pa = running.mean[PRESSURE];
+        state.pressure_pa = running.mean[PRESSURE];
         let line = &self.model.rigid.driveline;
         let rate = line.twist_rate(running.mean[OUTPUT], input.wheel_rad_s);
         state.shaft_torque_n_m = Some(running.mean[SPRING] + line.shaft_damping_n_m_s_rad * rate);
@@ -566,7 +568,7 @@ impl<T: Real> KalmanState<T> {
         let zero = T::zero();
         Self {
             tracker: TrackerState::new(),
-            valve_only_pa: zero,
+            pressure_pa: zero,
             running: None,
             clutch_torque_n_m: zero,
             shaft_torque_n_m: None,
@@ -575,7 +577,7 @@ impl<T: Real> KalmanState<T> {
 
     fn estimate(&self, health: Health) -> Estimate<T> {
         Estimate {
-            pressure_pa: self.valve_only_pa,
+            pressure_pa: self.pressure_pa,
             clutch_torque_n_m: self.clutch_torque_n_m,
             shaft_torque_n_m: self.shaft_torque_n_m,
             phase: self.tracker.supervisor.phase,

@@ -112,6 +112,8 @@ pub struct FilterSettings {
     pub turbine_share: f64,
     /// Time after which that share is another during a shift, s.
     pub turbine_share_s: f64,
+    /// Standard deviation of the rate of twist outside a shift, rad/s: how far the readings of output and wheel disagree.
+    pub twist_rate_rad_s: f64,
     /// Time for which an error of the valve model persists, s.
     pub valve_rate_s: f64,
     /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
@@ -502,6 +504,7 @@ fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigEr
     Ok(FilterSettings {
         turbine_share: number("turbine_share", &raw.turbine_share, 1e-4..=1.0)?,
         turbine_share_s: number("turbine_share_s", &raw.turbine_share_s, 0.01..=1e3)?,
+        twist_rate_rad_s: number("twist_rate_rad_s", &raw.twist_rate_rad_s, 0.0..=10.0)?,
         valve_rate_s: number("valve_rate_s", &raw.valve_rate_s, 1e-3..=10.0)?,
         offgoing_n_m: number("offgoing_n_m", &raw.offgoing_n_m, 0.1..=1e5)?,
         offgoing_release_s: number("offgoing_release_s", &raw.offgoing_release_s, 1e-3..=10.0)?,

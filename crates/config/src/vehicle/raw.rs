@@ -180,6 +180,7 @@ pub(super) struct RawObserver {
 pub(super) struct RawFilter {
     pub(super) turbine_share: Number,
     pub(super) turbine_share_s: Number,
+    pub(super) twist_rate_rad_s: Number,
     pub(super) valve_rate_s: Number,
     pub(super) offgoing_n_m: Number,
     pub(super) offgoing_release_s: Number,
