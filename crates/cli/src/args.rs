@@ -198,7 +198,7 @@ pub(crate) enum DesignChoice {
 pub(crate) enum MethodChoice {
     /// The chapter's, in continuous time: the smallest gain that decays as required
     Iss,
-    /// The same for a sample time, valve and reading errors in the bound; for the compliant observer
+    /// The same for a sample time, valve and reading errors in the bound
     IssDiscrete,
     /// The smallest bound on the error for a sample time, valve and reading errors included
     PeakToPeak,
@@ -239,6 +239,8 @@ pub(crate) enum ObserverChoice {
     /// Reduced-order, rigid driveline, gains with the smallest bound at the log's sample time; open loop where no
     /// gain beats it
     PeakToPeak,
+    /// Reduced-order, rigid driveline, the smallest gains for the log's sample time; open loop where no gain beats it
+    RigidDiscrete,
     /// Reduced-order with elastic drive shafts, certified gains; needs wheel_speed_rad_s, gives shaft torque too
     Compliant,
     /// The same with the smallest gains for the log's sample time; open loop where no gain beats it

@@ -1,4 +1,4 @@
-//! Gains of the compliant observer for a sample time, with the errors of valve and readings in the bound.
+//! Gains of the rigid and the compliant observer for a sample time, with the errors of valve and readings in the bound.
 //!
 //! With `F`, `G` and the valve frozen over a sample of length `T`, the error of the observer obeys
 //!
@@ -27,7 +27,7 @@
 
 use config::Vehicle;
 use nalgebra::DMatrix;
-use observer::{CompliantGains, Phase};
+use observer::{CompliantGains, Phase, RigidGains};
 use serde::Serialize;
 
 use crate::compliant::{
@@ -36,6 +36,8 @@ use crate::compliant::{
 };
 use crate::iss::DesignError;
 use crate::lmi::{Block, Outcome, Problem, largest_eigenvalue};
+use crate::polytope::{distinct, valve_extremes};
+use crate::rigid::{requirement, rigid_model};
 
 /// How the gain is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -47,10 +49,6 @@ pub enum Method {
     PeakToPeak,
 }
 
-/// Number of estimated states, `(T_s, p)`.
-const STATES: usize = 2;
-/// The pressure's place among them.
-const PRESSURE: usize = 1;
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;
 /// Errors are made larger by this share in the program than in the check, which leaves room for rounding.
@@ -60,12 +58,12 @@ const WORTH_A_GAIN: f64 = 0.999;
 /// Steps of the search for `lambda`; each shrinks its interval by 0.618.
 const SEARCH_STEPS: usize = 24;
 
-/// A gain of the sampled compliant observer in one phase, with the bound on its error.
+/// A gain of a sampled observer in one phase, with the bound on its error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiscreteCertificate {
     /// How it was chosen.
     pub method: Method,
-    /// `L`, normalised, rows `(T_s, p)`, as rounded to single precision; zero where the open loop serves.
+    /// `L`, normalised, rows `(T_s, p)` or `p` alone, as rounded to single precision; zero where the open loop serves.
     pub gain_normalised: Vec<Vec<f64>>,
     /// The sample time, s.
     pub sample_time_s: f64,
@@ -152,12 +150,83 @@ pub fn design_compliant_discrete_phase(
     let system = sampled_vertices(vehicle, phase, sample_time_s);
     let required = compliant_requirement(vehicle, phase);
     let errors = disturbances(vehicle, phase, sample_time_s, &required.h);
-    // The open loop leaves the pressure to the valve model alone.
-    let valve = errors.direct.row(PRESSURE).iter().map(|x| x.abs()).sum::<f64>();
-    let open_loop_bound_pa = PRESSURE_UNIT_PA * valve / (1.0 - system.phi[(PRESSURE, PRESSURE)]);
+    let rho = (-required.kappa2_per_s * sample_time_s).exp();
+    certified(vehicle, method, sample_time_s, &system, &errors, rho)
+}
+
+/// Designs the gain of the rigid observer in one phase for a sample time, by [`Method::Iss`]; its peak-to-peak design needs no
+/// ellipsoid and is [`crate::design_peak_to_peak`].
+///
+/// # Errors
+/// The solver's, see [`DesignError`].
+pub fn design_rigid_discrete_phase(
+    vehicle: &Vehicle,
+    phase: Phase,
+    sample_time_s: f64,
+) -> Result<DiscreteCertificate, DesignError> {
+    let model = rigid_model(vehicle);
+    let outputs = if phase == Phase::InertiaPhase { 2 } else { 1 };
+    let extremes = valve_extremes(&model, &vehicle.uncertainty);
+    let slowest = extremes.iter().map(|(_, a)| *a).fold(f64::NEG_INFINITY, f64::max);
+    let mut g_psi = Vec::new();
+    for (label, a) in &extremes {
+        let psi = ((a * sample_time_s).exp() - 1.0) / a;
+        for friction in distinct(vehicle.uncertainty.friction) {
+            let influence = model.influence(phase, friction);
+            let column =
+                DMatrix::from_fn(outputs, 1, |i, _| influence[i] * psi * PRESSURE_UNIT_PA / SPEED_UNITS_RAD_S[i]);
+            g_psi.push((format!("friction {friction}{label}"), column));
+        }
+    }
+    let system = Sampled { phi: DMatrix::from_element(1, 1, (slowest * sample_time_s).exp()), g_psi };
+    let required = requirement(vehicle, phase);
+    // The model error may point anywhere.
+    let h = DMatrix::from_fn(outputs, outputs, |i, j| {
+        if i == j { required.model_error_max_rad_s2 / SPEED_UNITS_RAD_S[i] } else { 0.0 }
+    });
+    let bounds = &vehicle.error_bounds;
+    let readings = [bounds.turbine_change_rad_s, bounds.slip_change_rad_s];
+    let through_gain = DMatrix::from_fn(outputs, 2 * outputs, |i, j| match j {
+        j if j < outputs => h[(i, j)] * sample_time_s,
+        j if j - outputs == i => readings[i] / SPEED_UNITS_RAD_S[i],
+        _ => 0.0,
+    });
+    let valve = bounds.valve_rate_pa_s * sample_time_s / PRESSURE_UNIT_PA;
+    let errors = Disturbances { through_gain, direct: DMatrix::from_element(1, 1, valve), h };
+    let rho = (-4.0 / required.settling_time_s * sample_time_s).exp();
+    certified(vehicle, Method::Iss, sample_time_s, &system, &errors, rho)
+}
+
+/// The rigid observer's gains for a sample time from the certificates of both phases.
+///
+/// # Errors
+/// The solver's, see [`DesignError`].
+pub fn design_rigid_discrete(vehicle: &Vehicle, sample_time_s: f64) -> Result<RigidGains<f64>, DesignError> {
+    let gain = |phase| -> Result<Vec<f64>, DesignError> {
+        let certificate = design_rigid_discrete_phase(vehicle, phase, sample_time_s)?;
+        let row = certificate.gain_normalised.into_iter().next().unwrap_or_default();
+        Ok(row.iter().zip(SPEED_UNITS_RAD_S).map(|(l, unit)| l * PRESSURE_UNIT_PA / unit).collect())
+    };
+    let (torque, inertia) = (gain(Phase::TorquePhase)?, gain(Phase::InertiaPhase)?);
+    Ok(RigidGains { torque_phase_pa_s_rad: torque[0], inertia_phase_pa_s_rad: [inertia[0], inertia[1]] })
+}
+
+/// The gain of this system by this method, with its bound, or the open loop.
+fn certified(
+    vehicle: &Vehicle,
+    method: Method,
+    sample_time_s: f64,
+    system: &Sampled,
+    errors: &Disturbances,
+    rho: f64,
+) -> Result<DiscreteCertificate, DesignError> {
+    // The open loop leaves the pressure, the last state, to the valve model alone.
+    let pressure = system.phi.nrows() - 1;
+    let valve = errors.direct.row(pressure).iter().map(|x| x.abs()).sum::<f64>();
+    let open_loop_bound_pa = PRESSURE_UNIT_PA * valve / (1.0 - system.phi[(pressure, pressure)]);
     let found = match method {
-        Method::Iss => smallest_gain(&system, &errors, (-required.kappa2_per_s * sample_time_s).exp())?,
-        Method::PeakToPeak => smallest_ellipsoid(&system, &errors)?,
+        Method::Iss => smallest_gain(system, errors, rho)?,
+        Method::PeakToPeak => smallest_ellipsoid(system, errors)?,
     };
     let (gain, bound, margins) = found;
     let best_gain_bound_pa = PRESSURE_UNIT_PA * bound;
@@ -240,12 +309,12 @@ fn solved(problem: &Problem) -> Result<Option<Vec<f64>>, DesignError> {
     }
 }
 
-/// The smallest gain with this contraction. Unknowns: the two entries of alpha, then `L` by rows.
+/// The smallest gain with this contraction. Unknowns: the entries of alpha, then `L` by rows.
 fn smallest_gain(system: &Sampled, errors: &Disturbances, rho: f64) -> Result<Found, DesignError> {
-    let outputs = errors.h.nrows();
-    let unknowns = STATES + STATES * outputs;
-    let gain = |x: &[f64]| DMatrix::from_row_slice(STATES, outputs, &x[STATES..]) * GAIN_UNIT;
-    let identity = DMatrix::identity(STATES, STATES);
+    let (states, outputs) = (system.phi.nrows(), errors.h.nrows());
+    let unknowns = states + states * outputs;
+    let gain = |x: &[f64]| DMatrix::from_row_slice(states, outputs, &x[states..]) * GAIN_UNIT;
+    let identity = DMatrix::identity(states, states);
     let contraction = |l: &DMatrix<f64>, g_psi: &DMatrix<f64>, rho: f64| {
         stacked(&(&identity * rho), &(&system.phi - l * g_psi), &(&identity * rho))
     };
@@ -254,12 +323,12 @@ fn smallest_gain(system: &Sampled, errors: &Disturbances, rho: f64) -> Result<Fo
         .collect();
     let causes = errors.h.ncols();
     blocks.push(block(unknowns, |x| {
-        let alpha = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&x[..STATES]));
+        let alpha = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&x[..states]));
         let size = gain(x) * &errors.h / GAIN_UNIT;
         stacked(&alpha, &size.transpose(), &DMatrix::identity(causes, causes))
     }));
     let mut objective = vec![0.0; unknowns];
-    objective[..STATES].fill(1.0);
+    objective[..states].fill(1.0);
     let Some(x) = solved(&Problem { objective, blocks })? else {
         return Err(DesignError::DecayUnreachable { decay_per_s: rho });
     };
@@ -307,8 +376,10 @@ fn smallest_ellipsoid(system: &Sampled, errors: &Disturbances) -> Result<Found, 
     best.ok_or(DesignError::NotCertified)
 }
 
-/// The smallest ellipsoid for this `lambda`, if there is one. Unknowns: `P` (three), `Y` by rows, `a`, `g2`.
+/// The smallest ellipsoid of the two states for this `lambda`, if there is one. Unknowns: `P` (three), `Y` by rows, `a`, `g2`.
 fn ellipsoid(system: &Sampled, errors: &Disturbances, lambda: f64) -> Result<Option<Found>, DesignError> {
+    const STATES: usize = 2;
+    const PRESSURE: usize = 1;
     let (outputs, through) = errors.through_gain.shape();
     let direct = errors.direct.ncols();
     let causes = through + direct;
@@ -372,6 +443,25 @@ mod tests {
         let reference = DMatrix::from_row_slice(2, 2, &[-1.29, 18.04, -2.70, -64.8]);
         // The reference is printed to three digits.
         assert!((&gain - &reference).component_div(&reference).abs().max() < 0.004, "{gain}");
+    }
+
+    #[test]
+    fn the_rigid_twin_contracts_and_yields_to_the_open_loop_where_it_must() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
+            let certificate = design_rigid_discrete_phase(&vehicle, phase, 0.01).unwrap();
+            assert!(certificate.margins.iter().all(|margin| margin.least_eigenvalue >= 0.0));
+            assert!(certificate.bound_pa <= certificate.open_loop_bound_pa);
+            assert!(
+                certificate.uses_open_loop
+                    == (certificate.best_gain_bound_pa >= 0.999 * certificate.open_loop_bound_pa)
+            );
+        }
+        // A valve five times as wrong is worth a gain, and that gain contracts as the settling time asks.
+        let mut poor = vehicle.clone();
+        poor.error_bounds.valve_rate_pa_s *= 5.0;
+        let certificate = design_rigid_discrete_phase(&poor, Phase::InertiaPhase, 0.01).unwrap();
+        assert!(!certificate.uses_open_loop && certificate.gain_normalised[0].iter().all(|l| *l < 0.0));
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub mod sliding;
 
 pub use certificate::{Certificate, VertexMargin};
 pub use compliant::{CompliantCertificate, CompliantDesign, compliant_observer, design_compliant};
-pub use discrete::{DiscreteCertificate, DiscreteDesign, Method, design_compliant_discrete};
+pub use discrete::{DiscreteCertificate, DiscreteDesign, Method, design_compliant_discrete, design_rigid_discrete};
 pub use iss::{DesignError, IssRequirement, design_iss};
 pub use kalman::{extended_filter, kalman_filter, unscented_filter};
 pub use peak_to_peak::{PeakToPeakCertificate, design_peak_to_peak};

@@ -4,8 +4,8 @@ use config::{GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
 use design::compliant::physical_gains;
 use design::{
     DesignError, Method, bounded, compliant_observer, design_compliant, design_compliant_discrete, design_peak_to_peak,
-    design_rigid, design_sliding, extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer,
-    super_twisting, unscented_filter,
+    design_rigid, design_rigid_discrete, design_sliding, extended_filter, inversion, kalman_filter, rigid_observer,
+    sliding_observer, super_twisting, unscented_filter,
 };
 use drivetrain::Valve;
 use observer::{
@@ -57,6 +57,11 @@ impl AnyObserver {
                 };
                 let mut observer = rigid_observer(vehicle, gains);
                 // These gains are made for this sample time, and serve over one lost sample too.
+                observer.tracker.sample_max_s = 2.0 * sample_time_s;
+                Self::Rigid(observer)
+            }
+            ObserverKind::RigidDiscrete => {
+                let mut observer = rigid_observer(vehicle, design_rigid_discrete(vehicle, sample_time_s)?);
                 observer.tracker.sample_max_s = 2.0 * sample_time_s;
                 Self::Rigid(observer)
             }

@@ -2,7 +2,7 @@
 
 use config::Vehicle;
 use design::compliant::{CompliantRequirement, compliant_requirement, design_compliant_phase};
-use design::discrete::design_compliant_discrete_phase;
+use design::discrete::{design_compliant_discrete_phase, design_rigid_discrete_phase};
 use design::rigid::design_phase;
 use design::{
     Certificate, CompliantCertificate, DesignError, DiscreteCertificate, IssRequirement, Method, PeakToPeakCertificate,
@@ -37,8 +37,8 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
                 (serde_json::to_value(&certificate)?, peak_to_peak_lines(phase, &certificate))
             }
             DesignChoice::Rigid if options.method == MethodChoice::IssDiscrete => {
-                let hint = "the rigid observer's discrete-time design is --method peak-to-peak";
-                return Err(Failure::Input(format!("iss-discrete is for the compliant observer\nhint: {hint}")));
+                let certificate = design_rigid_discrete_phase(&vehicle, phase, options.sample_time).map_err(failed)?;
+                (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
             }
             DesignChoice::Compliant if options.method != MethodChoice::Iss => {
                 let method = if options.method == MethodChoice::PeakToPeak { Method::PeakToPeak } else { Method::Iss };
@@ -207,13 +207,15 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
         format!("[{}]", row.join(", "))
     });
     let mpa = units::mpa;
-    let speeds = if phase == Phase::InertiaPhase { "turbine, slip and wheel speed" } else { "turbine and wheel speed" };
+    let has_shaft = certificate.gain_normalised.len() > 1;
+    let of = match (phase, has_shaft) {
+        (Phase::InertiaPhase, true) => "rows (T_s, p) on turbine, slip and wheel speed",
+        (_, true) => "rows (T_s, p) on turbine and wheel speed",
+        (Phase::InertiaPhase, false) => "on turbine speed and slip",
+        (_, false) => "on turbine speed",
+    };
     let mut lines = vec![
-        format!(
-            "{}: L = {}, normalised, rows (T_s, p) on {speeds}",
-            phase_name(phase),
-            gain.collect::<Vec<_>>().join("; ")
-        ),
+        format!("{}: L = {}, normalised, {of}", phase_name(phase), gain.collect::<Vec<_>>().join("; ")),
         format!(
             "  error of the pressure ultimately below {:.4} MPa, at {} ms, by every error of the budget",
             mpa(certificate.bound_pa),

@@ -22,6 +22,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         ObserverChoice::Best => ObserverKind::PeakToPeak,
         ObserverChoice::Rigid => ObserverKind::Rigid,
         ObserverChoice::PeakToPeak => ObserverKind::PeakToPeak,
+        ObserverChoice::RigidDiscrete => ObserverKind::RigidDiscrete,
         ObserverChoice::Compliant => ObserverKind::Compliant,
         ObserverChoice::CompliantDiscrete => ObserverKind::CompliantDiscrete,
         ObserverChoice::CompliantPeakToPeak => ObserverKind::CompliantPeakToPeak,

@@ -16,6 +16,8 @@ pub enum ObserverKind {
     Rigid,
     /// The same observer, gains with the smallest bound on the sampled error, valve error included.
     PeakToPeak,
+    /// The same observer, the smallest gains that decay as required over a sample, bound with valve and reading errors.
+    RigidDiscrete,
     /// Reduced-order observer with elastic drive shafts.
     Compliant,
     /// The same observer, the smallest gains that decay as required over a sample, bound with valve and reading errors.
@@ -187,6 +189,7 @@ pub(super) fn observer(
             RawKind::OpenLoop => ObserverKind::OpenLoop,
             RawKind::Rigid => ObserverKind::Rigid,
             RawKind::PeakToPeak => ObserverKind::PeakToPeak,
+            RawKind::RigidDiscrete => ObserverKind::RigidDiscrete,
             RawKind::Compliant => ObserverKind::Compliant,
             RawKind::CompliantDiscrete => ObserverKind::CompliantDiscrete,
             RawKind::CompliantPeakToPeak => ObserverKind::CompliantPeakToPeak,

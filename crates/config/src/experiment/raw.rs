@@ -85,6 +85,7 @@ pub(super) enum RawKind {
     OpenLoop,
     Rigid,
     PeakToPeak,
+    RigidDiscrete,
     Compliant,
     CompliantDiscrete,
     CompliantPeakToPeak,
