@@ -122,10 +122,10 @@ pub(crate) enum Command {
     /// observer could tell it from one.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
-    /// Check a vehicle or experiment file
+    /// Check a vehicle, experiment or study file
     ///
-    /// Checks a vehicle or experiment file and says what it describes. For an experiment the vehicle file it
-    /// names is checked too.
+    /// Checks a vehicle, experiment or study file and says what it describes. The files that it names are checked
+    /// too.
     #[command(verbatim_doc_comment)]
     Check(Check),
 }
@@ -419,7 +419,7 @@ pub(crate) struct Merge {
 
 #[derive(Debug, Args)]
 pub(crate) struct Check {
-    /// Vehicle or experiment file
+    /// Vehicle, experiment or study file
     pub(crate) file: PathBuf,
 }
 

@@ -14,6 +14,8 @@ pub enum Kind {
     Vehicle,
     /// A simulated drive.
     Experiment,
+    /// Drives with varied parameters.
+    Study,
 }
 
 /// Text of a file with its name and fingerprint.
@@ -54,16 +56,18 @@ impl Source {
     /// What the file describes, by its tables.
     ///
     /// # Errors
-    /// The text is not TOML, or neither a vehicle nor an experiment.
+    /// The text is not TOML, or neither a vehicle nor an experiment nor a study.
     pub fn kind(&self) -> Result<Kind, ConfigError> {
         let tables: toml::Table = self.parse()?;
-        match (tables.contains_key("gear_train"), tables.contains_key("shift")) {
-            (true, false) => Ok(Kind::Vehicle),
-            (false, true) => Ok(Kind::Experiment),
+        let has = |key| tables.contains_key(key);
+        match (has("gear_train"), has("shift"), has("factor")) {
+            (true, false, false) => Ok(Kind::Vehicle),
+            (false, true, false) => Ok(Kind::Experiment),
+            (false, false, true) => Ok(Kind::Study),
             _ => Err(ConfigError::Syntax {
                 path: self.path.clone(),
                 line: 1,
-                message: "neither a vehicle file (with [gear_train]) nor an experiment file (with [shift])".to_owned(),
+                message: "no vehicle file (with [gear_train]), experiment file (with [shift]) or study file (with [[factor]])".to_owned(),
             }),
         }
     }

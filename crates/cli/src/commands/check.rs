@@ -1,6 +1,6 @@
 //! `wetclutch check`.
 
-use config::{Experiment, Kind, Source, Vehicle};
+use config::{Experiment, Kind, Source, Study, Vehicle};
 
 use crate::args::Check;
 use crate::failure::Failure;
@@ -8,16 +8,44 @@ use crate::output;
 
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     let source = Source::read(&options.file)?;
-    if source.kind()? == Kind::Experiment {
-        let experiment = Experiment::from_source(source)?;
-        let vehicle = Vehicle::read(&experiment.vehicle_path())?;
-        output::line(&format!(
-            "experiment {} \"{}\": {} s, shift request at {} s",
-            experiment.name, experiment.title, experiment.duration_s, experiment.shift.request_s
-        ))?;
-        return describe(&vehicle);
+    match source.kind()? {
+        Kind::Vehicle => describe(&Vehicle::from_source(source)?),
+        Kind::Experiment => {
+            let experiment = Experiment::from_source(source)?;
+            let vehicle = Vehicle::read(&experiment.vehicle_path())?;
+            describe_experiment(&experiment)?;
+            describe(&vehicle)
+        }
+        Kind::Study => {
+            let study = Study::read(&options.file)?;
+            output::line(&format!(
+                "study {} \"{}\": {} runs ({}) over {} factors",
+                study.name,
+                study.title,
+                study.runs,
+                study.plan.name(),
+                study.factors.len()
+            ))?;
+            for factor in &study.factors {
+                let [low, high] = factor.values.ends();
+                output::line(&format!("  {} from {low} to {high} ({})", factor.name, factor.key))?;
+            }
+            describe_experiment(&study.experiment)?;
+            describe(&study.vehicle)
+        }
     }
-    describe(&Vehicle::from_source(source)?)
+}
+
+fn describe_experiment(experiment: &Experiment) -> Result<(), Failure> {
+    output::line(&format!(
+        "experiment {} \"{}\": {} s, shift request at {} s, {} observers",
+        experiment.name,
+        experiment.title,
+        experiment.duration_s,
+        experiment.shift.request_s,
+        experiment.observers.len()
+    ))?;
+    Ok(())
 }
 
 fn describe(vehicle: &Vehicle) -> Result<(), Failure> {
