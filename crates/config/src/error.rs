@@ -55,6 +55,20 @@ pub enum ConfigError {
     },
 }
 
+impl ConfigError {
+    /// What is wrong, without the place: for a text that stands in no file.
+    pub fn what(&self) -> String {
+        match self {
+            Self::Read { source, .. } => source.to_string(),
+            Self::Syntax { message, .. } => message.clone(),
+            Self::Range { key, value, allowed, hint, .. } => {
+                format!("`{key}` is {value}, expected {allowed}{}", hint_line(hint))
+            }
+            Self::Meaning { key, message, hint, .. } => format!("`{key}`: {message}{}", hint_line(hint)),
+        }
+    }
+}
+
 fn hint_line(hint: &Option<String>) -> String {
     hint.as_ref().map(|hint| format!("\nhint: {hint}")).unwrap_or_default()
 }

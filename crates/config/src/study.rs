@@ -235,12 +235,9 @@ impl Study {
         let check = Check { source: &self.source };
         for (i, factor) in self.factors.iter().enumerate() {
             for value in factor.values.ends() {
-                let values = self.factors.iter().map(|f| f.values.ends()[0]);
-                let mut values: Vec<f64> = values.collect();
-                values[i] = value;
-                self.varied(&values).map_err(|error| {
+                self.with(&[(factor, value)]).map_err(|error| {
                     let place = raw.factor.get_ref()[i].key.span().start;
-                    check.meaning(&factor.key, place, format!("does not work with {value}: {error}"), None)
+                    check.meaning(&factor.key, place, format!("does not work with {value}: {}", error.what()), None)
                 })?;
             }
         }
@@ -252,7 +249,13 @@ impl Study {
     /// # Errors
     /// A value leads out of the range of its key.
     pub fn varied(&self, values: &[f64]) -> Result<Varied, ConfigError> {
-        let of = |target| self.factors.iter().zip(values).filter(move |(factor, _)| factor.target == target);
+        let changes: Vec<(&Factor, f64)> = self.factors.iter().zip(values.iter().copied()).collect();
+        self.with(&changes)
+    }
+
+    /// The files with these factors at these values, the others as they stand in the files.
+    fn with(&self, changes: &[(&Factor, f64)]) -> Result<Varied, ConfigError> {
+        let of = |target| changes.iter().copied().filter(move |(factor, _)| factor.target == target);
         let [vehicle_table, experiment_table] = &self.tables;
         let vehicle = if of(Target::Vehicle).count() == 0 {
             Arc::clone(&self.vehicle)
@@ -411,10 +414,10 @@ fn factor(check: &Check<'_>, raw: &RawFactor) -> Result<Factor, ConfigError> {
 fn changed<'a>(
     source: &Source,
     table: &Table,
-    changes: impl Iterator<Item = (&'a Factor, &'a f64)>,
+    changes: impl Iterator<Item = (&'a Factor, f64)>,
 ) -> Result<Source, ConfigError> {
     let mut root = table.clone();
-    for (factor, &value) in changes {
+    for (factor, value) in changes {
         place_in_table(&mut root, &factor.path, factor.change, value).map_err(|message| ConfigError::Meaning {
             path: source.path.clone(),
             line: 1,

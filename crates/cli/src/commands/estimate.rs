@@ -34,6 +34,12 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         ObserverChoice::Inversion => ObserverKind::Inversion,
         ObserverChoice::OpenLoop => ObserverKind::OpenLoop,
     };
+    if options.observer == ObserverChoice::Best {
+        output::note(match kind {
+            ObserverKind::Kalman => "observer: kalman, the best where there is a wheel speed",
+            _ => "observer: peak-to-peak; with wheel_speed_rad_s in the log kalman would serve",
+        });
+    }
     let needs_wheel = [
         ObserverKind::Compliant,
         ObserverKind::Kalman,
