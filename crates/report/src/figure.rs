@@ -30,6 +30,12 @@ pub mod colour {
     pub const SKY: &str = "#3F9FD0";
     /// A seventh quantity.
     pub const GREY: &str = "#777777";
+    /// An eighth quantity.
+    pub const BROWN: &str = "#7A4A21";
+    /// A ninth quantity.
+    pub const PINK: &str = "#E0569A";
+    /// A tenth quantity.
+    pub const OLIVE: &str = "#5E6B1E";
 }
 
 const WIDTH: f64 = 900.0;

@@ -12,8 +12,17 @@ const TORQUE_PHASE: &str = "#fdf0d5";
 /// Colour of the inertia phase.
 const INERTIA_PHASE: &str = "#e3eef7";
 /// Colours of the observers in their order; the open loop has its own.
-pub(crate) const OBSERVERS: [&str; 6] =
-    [colour::BLUE, colour::GREEN, colour::ORANGE, colour::PURPLE, colour::SKY, colour::GREY];
+pub(crate) const OBSERVERS: [&str; 9] = [
+    colour::BLUE,
+    colour::GREEN,
+    colour::ORANGE,
+    colour::PURPLE,
+    colour::SKY,
+    colour::GREY,
+    colour::BROWN,
+    colour::PINK,
+    colour::OLIVE,
+];
 /// How much is shown before the load transfer and after lock-up, s.
 const MARGIN_S: f64 = 0.35;
 

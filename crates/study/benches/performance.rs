@@ -211,13 +211,17 @@ fn simulation(page: &mut String) {
     );
 }
 
+/// The line of the study file that names its observers.
+const OBSERVERS: &str = r#"observers = ["Kalman", "peak-to-peak", "rigid", "compliant", "open loop"]"#;
+
 fn campaign(runs: u64, observers: &[&str]) -> Campaign {
     let text = std::fs::read_to_string(root().join("experiments/settings.toml")).unwrap();
     let names: Vec<String> = observers.iter().map(|name| format!("{name:?}")).collect();
     let experiment = root().join("experiments/bench.toml");
     let text = text
         .replace("experiment = \"bench.toml\"", &format!("experiment = '{}'", experiment.display()))
-        .replace("runs = 2000", &format!("runs = {runs}\nobservers = [{}]", names.join(", ")));
+        .replace("runs = 2000", &format!("runs = {runs}"))
+        .replace(OBSERVERS, &format!("observers = [{}]", names.join(", ")));
     let path = std::env::temp_dir().join(format!("wetclutch-benchmark-{}.toml", std::process::id()));
     std::fs::write(&path, text).unwrap();
     let study = Study::read(&path);
