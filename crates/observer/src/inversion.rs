@@ -7,7 +7,7 @@
 
 use drivetrain::Real;
 
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Phase, Tracker, TrackerState};
+use crate::{CompliantModel, Estimate, Estimator, Health, Input, Phase, Track, Tracker};
 
 /// The inversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,11 +25,8 @@ pub struct Inversion<T> {
 /// Memory of an [`Inversion`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InversionState<T> {
-    tracker: TrackerState<T>,
-    pressure_pa: T,
-    clutch_torque_n_m: T,
+    track: Track<T, Input<T>>,
     shaft_torque_n_m: Option<T>,
-    last: Option<(Input<T>, Phase)>,
 }
 
 impl<T: Real> Inversion<T> {
@@ -69,46 +66,40 @@ impl<T: Real> Estimator<T> for Inversion<T> {
     type State = InversionState<T>;
 
     fn start(&self) -> InversionState<T> {
-        InversionState {
-            tracker: TrackerState::new(),
-            pressure_pa: T::zero(),
-            clutch_torque_n_m: T::zero(),
-            shaft_torque_n_m: None,
-            last: None,
-        }
+        InversionState { track: Track::new(), shaft_torque_n_m: None }
     }
 
     #[inline]
     fn step(&self, state: &mut InversionState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(mut interval) = self.tracker.begin(&mut state.tracker, input) else {
-            state.last = None;
+        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
+            state.track.last = None;
             state.shaft_torque_n_m = None;
-            return state.estimate(Health::TimeRejected);
+            return state.track.estimate(None, Health::TimeRejected);
         };
         if !self.tracker.limits.wheel_valid(input) {
             interval.health = Health::SpeedsRejected;
         }
         if !interval.speeds_valid() || !interval.short {
-            state.last = None;
+            state.track.last = None;
             state.shaft_torque_n_m = None;
         }
-        state.pressure_pa = interval.pressure(state.pressure_pa);
+        state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
         if interval.speeds_valid() {
             self.take(state, input);
         }
-        state.estimate(interval.health)
+        state.track.estimate(state.shaft_torque_n_m, interval.health)
     }
 }
 
 impl<T: Real> Inversion<T> {
     #[inline]
     fn take(&self, state: &mut InversionState<T>, input: &Input<T>) {
-        let (_, acting) = self.tracker.phase(&mut state.tracker, input.dt_s.max(T::zero()), input);
+        let (_, acting) = self.tracker.phase(&mut state.track.tracker, input.dt_s.max(T::zero()), input);
         let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
         let steady = self.model.steady_shaft_torque(acting, engine, turbine, input.wheel_rad_s);
         let mut shaft = state.shaft_torque_n_m.unwrap_or(steady);
         let shifting = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase);
-        if let Some((last, _)) = state.last.filter(|_| input.dt_s > T::zero()) {
+        if let Some(last) = state.track.last.filter(|_| input.dt_s > T::zero()) {
             let before = self.model.shaft_rate(last.turbine_rad_s, last.slip_rad_s, last.wheel_rad_s);
             let after = self.model.shaft_rate(turbine, slip, input.wheel_rad_s);
             let turned = T::of(0.5) * input.dt_s * (before + after);
@@ -123,32 +114,20 @@ impl<T: Real> Inversion<T> {
                 let found = clutch.pressure_for(size, slip);
                 // Below the kiss point the clutch carries nothing, and the valve model is all there is.
                 if size > T::zero() {
-                    state.pressure_pa = state.pressure_pa + share * (found - state.pressure_pa);
+                    state.track.pressure_pa = state.track.pressure_pa + share * (found - state.track.pressure_pa);
                 }
             } else {
                 let share = T::one() - (-input.dt_s / self.shaft_settling_s).exp();
                 shaft = shaft + share * (steady - shaft);
             }
         }
-        if !(state.pressure_pa.is_finite() && shaft.is_finite()) {
-            state.pressure_pa = state.tracker.valve_pressure_pa;
+        if !(state.track.pressure_pa.is_finite() && shaft.is_finite()) {
+            state.track.pressure_pa = state.track.tracker.valve_pressure_pa;
             shaft = steady;
         }
         state.shaft_torque_n_m = shaft.is_finite().then_some(shaft);
-        state.clutch_torque_n_m = self.model.rigid.clutch_torque(acting, state.pressure_pa, engine, turbine, slip);
-        state.last = Some((*input, acting));
-    }
-}
-
-impl<T: Real> InversionState<T> {
-    fn estimate(&self, health: Health) -> Estimate<T> {
-        Estimate {
-            pressure_pa: self.pressure_pa,
-            clutch_torque_n_m: self.clutch_torque_n_m,
-            shaft_torque_n_m: self.shaft_torque_n_m,
-            phase: self.tracker.supervisor.phase,
-            health,
-            bounds: None,
-        }
+        state.track.clutch_torque_n_m =
+            self.model.rigid.clutch_torque(acting, state.track.pressure_pa, engine, turbine, slip);
+        state.track.last = Some(*input);
     }
 }

@@ -16,7 +16,7 @@
 
 use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients};
 
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Tracker, TrackerState};
+use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Track, Tracker};
 
 /// Time over which the acceleration of the wheels is averaged, s.
 const WHEEL_AVERAGE_S: f64 = 0.2;
@@ -88,13 +88,6 @@ pub struct Readings<T> {
     pub wheel_rad: T,
 }
 
-impl<T: Real> Readings<T> {
-    /// Readings of the moment.
-    pub fn ideal() -> Self {
-        Self { turbine_rad: T::zero(), output_rad: T::zero(), wheel_rad: T::zero() }
-    }
-}
-
 /// How the filter passes the kiss point, where the clutch begins to bite: the one corner in its equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Linearisation {
@@ -126,16 +119,13 @@ pub struct KalmanFilter<T> {
 /// Memory of a [`KalmanFilter`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KalmanState<T> {
-    tracker: TrackerState<T>,
-    /// The pressure: by the filter, over a gap by the valve model, Pa.
-    pressure_pa: T,
-    running: Option<Running<T>>,
-    clutch_torque_n_m: T,
+    track: Track<T, Running<T>>,
     shaft_torque_n_m: Option<T>,
 }
 
+/// The filter at its last usable sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Running<T> {
+pub struct Running<T> {
     pub(crate) mean: [T; N],
     pub(crate) covariance: [[T; N]; N],
     /// Accelerations of turbine and output over the last sample, rad/s^2.
@@ -494,19 +484,19 @@ impl<T: Real> KalmanFilter<T> {
         input: &Input<T>,
         predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool),
     ) -> Estimate<T> {
-        let Some(mut interval) = self.tracker.begin(&mut state.tracker, input) else {
-            state.running = None;
+        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
+            state.track.last = None;
             return state.estimate(Health::TimeRejected);
         };
         if !self.tracker.limits.wheel_valid(input) {
             interval.health = Health::SpeedsRejected;
         }
-        state.pressure_pa = interval.pressure(state.pressure_pa);
+        state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
         let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
         let usable = interval.speeds_valid() && interval.short && output > self.noise.output_least_rad_s;
         if !usable {
             // The twist is lost over a gap; the pressure goes on by the valve model.
-            state.running = None;
+            state.track.last = None;
             state.shaft_torque_n_m = None;
         }
         if interval.speeds_valid() {
@@ -523,10 +513,10 @@ impl<T: Real> KalmanFilter<T> {
         input: &Input<T>,
         predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool),
     ) {
-        let (_, acting) = self.tracker.phase(&mut state.tracker, interval.dt_s, input);
+        let (_, acting) = self.tracker.phase(&mut state.track.tracker, interval.dt_s, input);
         let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
-        let moving = state.tracker.valve_pressure_pa > T::of(1e3);
-        let mut running = match state.running {
+        let moving = state.track.tracker.valve_pressure_pa > T::of(1e3);
+        let mut running = match state.track.last {
             Some(mut running) if interval.dt_s > T::zero() => {
                 predict(self, &mut running, interval, input, moving);
                 // Old readings are brought forward by the acceleration that the model has.
@@ -539,50 +529,36 @@ impl<T: Real> KalmanFilter<T> {
                 running.mean[PRESSURE] = running.mean[PRESSURE].max(T::zero());
                 running
             }
-            _ => self.begin(state.pressure_pa, input),
+            _ => self.begin(state.track.pressure_pa, input),
         };
         let sound = running.mean.iter().all(|x| x.is_finite())
             && (0..N).all(|i| running.covariance[i][i] >= T::zero() && running.covariance[i][i].is_finite());
         if !sound {
-            running = self.begin(state.tracker.valve_pressure_pa, input);
+            running = self.begin(state.track.tracker.valve_pressure_pa, input);
         }
         running.last = *input;
         self.change_phase(&mut running, acting);
-        state.pressure_pa = running.mean[PRESSURE];
+        state.track.pressure_pa = running.mean[PRESSURE];
         let line = &self.model.rigid.driveline;
         let rate = line.twist_rate(running.mean[OUTPUT], input.wheel_rad_s);
         state.shaft_torque_n_m = Some(running.mean[SPRING] + line.shaft_damping_n_m_s_rad * rate);
-        state.clutch_torque_n_m = self.model.rigid.clutch_torque(
+        state.track.clutch_torque_n_m = self.model.rigid.clutch_torque(
             acting,
             running.mean[PRESSURE],
             input.engine_rad_s,
             input.turbine_rad_s,
             input.slip_rad_s,
         );
-        state.running = Some(running);
+        state.track.last = Some(running);
     }
 }
 
 impl<T: Real> KalmanState<T> {
     pub(crate) fn new() -> Self {
-        let zero = T::zero();
-        Self {
-            tracker: TrackerState::new(),
-            pressure_pa: zero,
-            running: None,
-            clutch_torque_n_m: zero,
-            shaft_torque_n_m: None,
-        }
+        Self { track: Track::new(), shaft_torque_n_m: None }
     }
 
     fn estimate(&self, health: Health) -> Estimate<T> {
-        Estimate {
-            pressure_pa: self.pressure_pa,
-            clutch_torque_n_m: self.clutch_torque_n_m,
-            shaft_torque_n_m: self.shaft_torque_n_m,
-            phase: self.tracker.supervisor.phase,
-            health,
-            bounds: None,
-        }
+        self.track.estimate(self.shaft_torque_n_m, health)
     }
 }

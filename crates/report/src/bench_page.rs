@@ -5,7 +5,7 @@ use minijinja::context;
 use study::Bench;
 use trace::units::mpa;
 
-use crate::page::{PageError, templates};
+use crate::page::{PageError, origin, templates};
 
 /// The page of a bench of this experiment on this vehicle; it needs nothing but itself.
 ///
@@ -52,9 +52,6 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         observers => experiment.observers.iter().map(|entry| entry.name.clone()).collect::<Vec<_>>(),
         ranking => ranking.collect::<Vec<_>>(),
         rows => rows.collect::<Vec<_>>(),
-        inputs => [&vehicle.source, &experiment.source].map(|source| context! {
-            path => source.path.display().to_string(),
-            sha256 => source.sha256(),
-        }),
+        inputs => origin(&[&vehicle.source, &experiment.source]),
     })?)
 }

@@ -6,7 +6,7 @@ use study::ErrorBound;
 use study::campaign::PHASES;
 use study::error_bound::{PARTS, PhaseErrors, Size};
 
-use crate::page::{PageError, templates};
+use crate::page::{PageError, origin, templates};
 use crate::tables::phase_name;
 
 /// Every error of one phase with its name: the rigid model's size, channels and parts, the compliant model's channels.
@@ -57,9 +57,6 @@ pub fn error_bound_page(found: &ErrorBound, study: &Study) -> Result<String, Pag
             let [low, high] = factor.values.ends();
             context! { name => &factor.name, low => low, high => high }
         }).collect::<Vec<_>>(),
-        inputs => [&study.source, &study.experiment.source, &study.vehicle.source].map(|source| context! {
-            path => source.path.display().to_string(),
-            sha256 => source.sha256(),
-        }),
+        inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
     })?)
 }

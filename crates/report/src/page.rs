@@ -1,6 +1,6 @@
 //! The report of a comparison as one self-contained page.
 
-use config::Vehicle;
+use config::{Source, Vehicle};
 use minijinja::{Environment, Value, context};
 use observer::Phase;
 use study::Comparison;
@@ -27,6 +27,7 @@ pub struct Page {
 pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.add_template("base.html", include_str!("../templates/base.html"))?;
+    environment.add_template("origin.html", include_str!("../templates/origin.html"))?;
     environment.add_template("scores.html", include_str!("../templates/scores.html"))?;
     environment.add_template("report.html", include_str!("../templates/report.html"))?;
     environment.add_template("reproduction.html", include_str!("../templates/reproduction.html"))?;
@@ -35,6 +36,12 @@ pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("sensitivity.html", include_str!("../templates/sensitivity.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
     Ok(environment)
+}
+
+/// The files that a page follows from, for the end of the page.
+pub(crate) fn origin(sources: &[&Source]) -> Vec<Value> {
+    let one = |source: &&Source| context! { path => source.path.display().to_string(), sha256 => source.sha256() };
+    sources.iter().map(one).collect()
 }
 
 /// A figure as part of a page.
@@ -64,10 +71,7 @@ impl Page {
             certificates => rigid_certificates(comparison),
             compliant => compliant_certificates(comparison),
             quality => quality_rows(comparison),
-            inputs => [&vehicle.source, &experiment.source].map(|source| context! {
-                path => source.path.display().to_string(),
-                sha256 => source.sha256(),
-            }),
+            inputs => origin(&[&vehicle.source, &experiment.source]),
             seed => experiment.sensors.map(|sensors| sensors.seed),
         })?;
         Ok(Self { html, figures: vec![("shift.svg".into(), shift), ("drive.svg".into(), drive)] })

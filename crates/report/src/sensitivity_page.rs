@@ -4,7 +4,7 @@ use config::Vehicle;
 use minijinja::{Value, context};
 use study::PhaseSensitivity;
 
-use crate::page::{PageError, templates};
+use crate::page::{PageError, origin, templates};
 
 /// The page; it needs nothing but itself.
 ///
@@ -40,7 +40,6 @@ pub fn sensitivity_page(phases: &[PhaseSensitivity], vehicle: &Vehicle) -> Resul
         version => env!("CARGO_PKG_VERSION"),
         vehicle_name => &vehicle.name,
         phases => rows.collect::<Vec<_>>(),
-        path => vehicle.source.path.display().to_string(),
-        sha256 => vehicle.source.sha256(),
+        inputs => origin(&[&vehicle.source]),
     })?)
 }

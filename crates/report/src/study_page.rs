@@ -9,7 +9,7 @@ use study::{Row, Summary};
 use trace::units::mpa;
 
 use crate::figure::{Figure, Panel, Series};
-use crate::page::{PageError, inline, templates};
+use crate::page::{PageError, inline, origin, templates};
 use crate::shift_figure::{OBSERVERS, observer_colours, observers_of};
 use crate::tables::phase_name;
 
@@ -77,10 +77,7 @@ impl StudyPage {
             first_observer => layout.observers.first(),
             drawn_factors => DRAWN_FACTORS.min(layout.factors.len()),
             worst => worst_runs,
-            inputs => [&study.source, &study.experiment.source, &study.vehicle.source].map(|source| context! {
-                path => source.path.display().to_string(),
-                sha256 => source.sha256(),
-            }),
+            inputs => origin(&[&study.source, &study.experiment.source, &study.vehicle.source]),
         })?;
         Ok(Self { html, figures })
     }

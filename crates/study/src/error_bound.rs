@@ -155,7 +155,7 @@ fn run_errors(varied: &Varied, trace: &Trace) -> Result<[RunErrors; 2], TraceErr
     let models = Models::of(&varied.vehicle);
     let phases = true_phases(trace).unwrap_or_default();
     let mut errors = [RunErrors::default(), RunErrors::default()];
-    for (at, (phase, errors)) in PHASES.into_iter().zip(&mut errors).enumerate() {
+    for (phase, errors) in PHASES.into_iter().zip(&mut errors) {
         let mut outermost = [([0.0; 3], 0.0); DIRECTIONS];
         for i in GUARD_SAMPLES..phases.len().saturating_sub(GUARD_SAMPLES) {
             let around = &phases[i - GUARD_SAMPLES..=i + GUARD_SAMPLES];
@@ -164,7 +164,6 @@ fn run_errors(varied: &Varied, trace: &Trace) -> Result<[RunErrors; 2], TraceErr
             }
         }
         errors.outermost = outermost.iter().filter(|(_, reach)| *reach > 0.0).map(|(w, _)| *w).collect();
-        debug_assert!(at < 2);
     }
     Ok(errors)
 }

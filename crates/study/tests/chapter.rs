@@ -112,8 +112,10 @@ fn peak_to_peak_is_hardly_worse_than_open_loop_where_it_uses_it() {
     let bench = bench_with(1);
     let summary = bench.ranking.iter().find(|s| s.observer == "peak-to-peak").unwrap();
     // Its torque phase is the open loop's but for samples in which the phase is seen late or early, most of them
-    // where the sensors have three times their noise.
-    assert!(summary.torque_phase_median_ratio < 1.02, "{}", summary.torque_phase_median_ratio);
-    assert!(summary.torque_phase_worst_ratio < 1.35, "{}", summary.torque_phase_worst_ratio);
+    // where the sensors have three times their noise: that scenario, which has its own row on the page, is left out.
+    for row in bench.rows.iter().filter(|row| row.scenario != "sensor noise x 3") {
+        let rms = |name| row.cells.iter().find(|cell| cell.observer == name).unwrap().torque_phase_rms_pa;
+        assert!(rms("peak-to-peak") < 1.05 * rms("open loop"), "{}", row.scenario);
+    }
     assert!(summary.inertia_phase_median_ratio < 0.6, "{}", summary.inertia_phase_median_ratio);
 }

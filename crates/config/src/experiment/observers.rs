@@ -1,14 +1,16 @@
 //! The observers and sensors of an experiment file, checked.
 
 use observer::{Discretisation, RigidGains, SlidingGains};
+use serde::Deserialize;
 use toml::Spanned;
 
-use super::raw::{RawDiscretisation, RawGains, RawKind, RawObserver, RawSensors, RawSignals, RawSpeedSensor};
+use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSensors, RawSignals, RawSpeedSensor};
 use crate::ConfigError;
 use crate::check::Check;
 
 /// Kinds of observers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ObserverKind {
     /// The valve model alone.
     OpenLoop,
@@ -158,7 +160,7 @@ pub(super) fn observer(
     }
     let gains = match (raw.gains.as_ref(), raw.kind) {
         (None, _) => None,
-        (Some(&RawGains::Rigid { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }), RawKind::Rigid) => {
+        (Some(&RawGains::Rigid { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }), ObserverKind::Rigid) => {
             Some(GivenGains::Rigid(RigidGains { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }))
         }
         (
@@ -168,14 +170,14 @@ pub(super) fn observer(
                 inertia_speed_rad_s2,
                 inertia_pressure_pa_s,
             }),
-            RawKind::Sliding,
+            ObserverKind::Sliding,
         ) => Some(GivenGains::Sliding(SlidingGains {
             torque_speed_rad_s2,
             torque_pressure_pa_s,
             inertia_speed_rad_s2,
             inertia_pressure_pa_s,
         })),
-        (Some(&RawGains::Compliant { torque_phase_normalised, inertia_phase_normalised }), RawKind::Compliant) => {
+        (Some(&RawGains::Compliant { torque_phase_normalised, inertia_phase_normalised }), ObserverKind::Compliant) => {
             Some(GivenGains::CompliantNormalised(torque_phase_normalised, inertia_phase_normalised))
         }
         (Some(_), _) => {
@@ -185,21 +187,7 @@ pub(super) fn observer(
     };
     Ok(ObserverEntry {
         name: raw.name.clone(),
-        kind: match raw.kind {
-            RawKind::OpenLoop => ObserverKind::OpenLoop,
-            RawKind::Rigid => ObserverKind::Rigid,
-            RawKind::PeakToPeak => ObserverKind::PeakToPeak,
-            RawKind::RigidDiscrete => ObserverKind::RigidDiscrete,
-            RawKind::Compliant => ObserverKind::Compliant,
-            RawKind::CompliantDiscrete => ObserverKind::CompliantDiscrete,
-            RawKind::CompliantPeakToPeak => ObserverKind::CompliantPeakToPeak,
-            RawKind::Sliding => ObserverKind::Sliding,
-            RawKind::Kalman => ObserverKind::Kalman,
-            RawKind::Extended => ObserverKind::Extended,
-            RawKind::Unscented => ObserverKind::Unscented,
-            RawKind::SuperTwisting => ObserverKind::SuperTwisting,
-            RawKind::Inversion => ObserverKind::Inversion,
-        },
+        kind: raw.kind,
         sample_time_s: match &raw.sample_time_s {
             Some(value) => check.number("observer.sample_time_s", value, 1e-4..=0.2)?,
             None => SAMPLE_TIME_S,

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::ObserverKind;
 use crate::check::{Number, Numbers};
 
 #[derive(Deserialize)]
@@ -70,31 +71,13 @@ pub(super) struct RawCurrentSensor {
 #[serde(deny_unknown_fields)]
 pub(super) struct RawObserver {
     pub(super) name: String,
-    pub(super) kind: RawKind,
+    pub(super) kind: ObserverKind,
     pub(super) sample_time_s: Option<Number>,
     #[serde(default)]
     pub(super) discretisation: RawDiscretisation,
     #[serde(default)]
     pub(super) sensors: RawSignals,
     pub(super) gains: Option<RawGains>,
-}
-
-#[derive(Deserialize, Clone, Copy, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum RawKind {
-    OpenLoop,
-    Rigid,
-    PeakToPeak,
-    RigidDiscrete,
-    Compliant,
-    CompliantDiscrete,
-    CompliantPeakToPeak,
-    Sliding,
-    Kalman,
-    Extended,
-    Unscented,
-    SuperTwisting,
-    Inversion,
 }
 
 #[derive(Deserialize, Clone, Copy, Default)]

@@ -81,6 +81,8 @@ pub struct ErrorBounds {
     pub shaft_torque_n_m: f64,
     /// Torque at the gearbox output that the rigid model leaves out (torsion, tyre slip, grade), N m.
     pub output_torque_n_m: f64,
+    /// Torque left in the offgoing clutch when it has let go, N m.
+    pub offgoing_torque_n_m: f64,
     /// Rate of the pressure that the valve model leaves out, Pa/s.
     pub valve_rate_pa_s: f64,
     /// Error of the change of the turbine speed from one sample to the next, rad/s.
@@ -528,6 +530,7 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
         shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
         output_torque_n_m: number("output_torque_n_m", &raw.output_torque_n_m, 0.0..=50e3)?,
+        offgoing_torque_n_m: number("offgoing_torque_n_m", &raw.offgoing_torque_n_m, 0.0..=1e4)?,
         valve_rate_pa_s: number("valve_rate_pa_s", &raw.valve_rate_pa_s, 0.0..=1e9)?,
         turbine_change_rad_s: number("turbine_change_rad_s", &raw.turbine_change_rad_s, 0.0..=50.0)?,
         slip_change_rad_s: number("slip_change_rad_s", &raw.slip_change_rad_s, 0.0..=50.0)?,

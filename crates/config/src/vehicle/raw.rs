@@ -228,6 +228,7 @@ pub(super) struct RawErrorBounds {
     pub(super) grade_rad: Number,
     pub(super) shaft_torque_n_m: Number,
     pub(super) output_torque_n_m: Number,
+    pub(super) offgoing_torque_n_m: Number,
     pub(super) valve_rate_pa_s: Number,
     pub(super) turbine_change_rad_s: Number,
     pub(super) slip_change_rad_s: Number,

@@ -110,11 +110,6 @@ impl Layout {
         self.scores_at() + self.observers.len() * PHASES.len() * Metric::ALL.len()
     }
 
-    /// Position of a quality of the shift.
-    pub fn quality(&self, name: &str) -> Option<usize> {
-        QUALITY.iter().position(|&quality| quality == name).map(|at| self.factors.len() + at)
-    }
-
     /// Position of an observer's score.
     pub fn score(&self, observer: usize, phase: usize, metric: Metric) -> usize {
         let at = Metric::ALL.iter().position(|&m| m == metric).unwrap_or(0);
