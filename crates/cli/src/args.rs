@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use config::GainMethod;
+use design::Quantity;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -159,6 +161,9 @@ pub(crate) struct Design {
     /// How the gains are chosen
     #[arg(long, value_enum, default_value_t = MethodChoice::Iss)]
     pub(crate) method: MethodChoice,
+    /// What the bound of the discrete-time methods is on
+    #[arg(long, value_enum, value_name = "QUANTITY", default_value_t = QuantityChoice::ClutchTorque)]
+    pub(crate) bound_on: QuantityChoice,
     /// Phase to design for
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
@@ -186,8 +191,6 @@ pub(crate) struct Design {
 pub(crate) enum DesignChoice {
     /// Reduced-order, rigid driveline, by the chapter's five steps
     Rigid,
-    /// The same observer with the smallest bound on its sampled error, valve error included
-    PeakToPeak,
     /// Reduced-order with elastic drive shafts
     Compliant,
     /// Full-order sliding mode: gains from the sliding condition, without a certificate
@@ -198,10 +201,44 @@ pub(crate) enum DesignChoice {
 pub(crate) enum MethodChoice {
     /// The chapter's, in continuous time: the smallest gain that decays as required
     Iss,
-    /// The same for a sample time, valve and reading errors in the bound
+    /// The same for a sample time, every error of the budget in the bound; this and the next are the open loop where no gain
+    /// beats that
     IssDiscrete,
-    /// The smallest bound on the error for a sample time, valve and reading errors included
+    /// The smallest bound on the error for a sample time, every error of the budget included
     PeakToPeak,
+    /// The same with a gain that follows the friction coefficient
+    Scheduled,
+    /// The narrowest range that is carried along with the estimate
+    Interval,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QuantityChoice {
+    /// The clutch torque, which the speeds tell whatever the friction is
+    ClutchTorque,
+    /// The pressure, which a friction that is not known spoils
+    Pressure,
+}
+
+impl From<QuantityChoice> for Quantity {
+    fn from(choice: QuantityChoice) -> Self {
+        match choice {
+            QuantityChoice::ClutchTorque => Self::ClutchTorque,
+            QuantityChoice::Pressure => Self::Pressure,
+        }
+    }
+}
+
+impl From<MethodChoice> for GainMethod {
+    fn from(choice: MethodChoice) -> Self {
+        match choice {
+            MethodChoice::Iss => Self::Iss,
+            MethodChoice::IssDiscrete => Self::IssDiscrete,
+            MethodChoice::PeakToPeak => Self::PeakToPeak,
+            MethodChoice::Scheduled => Self::Scheduled,
+            MethodChoice::Interval => Self::Interval,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -224,6 +261,9 @@ pub(crate) struct Estimate {
     /// Observer
     #[arg(long, value_enum, default_value_t = ObserverChoice::Best)]
     pub(crate) observer: ObserverChoice,
+    /// How the gains of the rigid and the compliant observer are chosen [default: iss]
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<MethodChoice>,
     /// File for the estimate; standard output if left out
     #[arg(short, long, value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
@@ -231,22 +271,13 @@ pub(crate) struct Estimate {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
-    /// The Kalman filter where the log has wheel_speed_rad_s, else peak-to-peak
+    /// The Kalman filter where the log has wheel_speed_rad_s, else rigid with peak-to-peak gains
     Best,
-    /// Reduced-order, rigid driveline, certified gains
-    #[value(alias = "iss")]
+    /// Reduced-order, rigid driveline, certified gains by `--method`
     Rigid,
-    /// Reduced-order, rigid driveline, gains with the smallest bound at the log's sample time; open loop where no
-    /// gain beats it
-    PeakToPeak,
-    /// Reduced-order, rigid driveline, the smallest gains for the log's sample time; open loop where no gain beats it
-    RigidDiscrete,
-    /// Reduced-order with elastic drive shafts, certified gains; needs wheel_speed_rad_s, gives shaft torque too
+    /// Reduced-order with elastic drive shafts, certified gains by `--method`; needs wheel_speed_rad_s, gives shaft
+    /// torque too
     Compliant,
-    /// The same with the smallest gains for the log's sample time; open loop where no gain beats it
-    CompliantDiscrete,
-    /// The same with the smallest bound at the log's sample time; open loop where no gain beats it
-    CompliantPeakToPeak,
     /// Full-order sliding mode, gains from the sliding condition
     Sliding,
     /// Kalman filter with unknown torques as states; needs wheel_speed_rad_s, gives shaft torque too

@@ -192,17 +192,30 @@ fn every_observer_runs_on_a_log() {
     wetclutch(&["demo", "-o", &folder.path("demo")]);
     let log = folder.path("demo/measured.csv");
     let mut outputs = Vec::new();
-    for observer in ["rigid", "peak-to-peak", "compliant", "sliding", "open-loop"] {
-        let output = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--observer", observer]);
+    let estimate = |options: &str| {
+        let options: Vec<&str> = options.split(' ').collect();
+        wetclutch(&[&["estimate", &log, "--vehicle", VEHICLE, "--observer"], options.as_slice()].concat())
+    };
+    let mut observers: Vec<String> = ["sliding", "kalman", "super-twisting", "open-loop"].map(String::from).to_vec();
+    for method in ["iss", "iss-discrete", "peak-to-peak", "scheduled", "interval"] {
+        observers.extend(["rigid", "compliant"].map(|observer| format!("{observer} --method {method}")));
+    }
+    for observer in &observers {
+        let output = estimate(observer);
         assert!(output.status.success(), "{observer}: {}", stderr(&output));
         let text = stdout(&output);
-        assert_eq!(text.lines().next().unwrap().contains("shaft_torque_estimate_n_m"), observer == "compliant");
+        let tells_shaft = observer.starts_with("compliant") || observer == "kalman";
+        assert_eq!(text.lines().next().unwrap().contains("shaft_torque_estimate_n_m"), tells_shaft);
         assert_eq!(text.lines().count(), 9502);
         outputs.push(text);
     }
     outputs.sort();
     outputs.dedup();
-    assert_eq!(outputs.len(), 5, "five observers, five estimates");
+    // Open loop serves where no gain beats it, which at 1 ms is so for some.
+    assert!(outputs.len() >= 10, "{}", outputs.len());
+    let output = estimate("kalman --method interval");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("it goes with `--observer rigid`"), "{}", stderr(&output));
 }
 
 #[test]
@@ -256,8 +269,6 @@ fn design_serves_every_observer() {
     };
     assert!(printed("compliant").contains("offset bound 0.1769 MPa"), "{}", printed("compliant"));
     assert!(printed("sliding").contains("1923"), "{}", printed("sliding"));
-    let text = printed("peak-to-peak");
-    assert!(text.contains("torque phase: no gain has a smaller bound than open loop, which is used"), "{text}");
     let output = wetclutch(&["design", VEHICLE, "--observer", "compliant", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(json["torque_phase"]["gain_normalised"].as_array().unwrap().len(), 2);
@@ -275,8 +286,13 @@ fn a_discrete_design_says_when_the_open_loop_serves() {
     assert!(bound("inertia_phase", "bound_pa") < bound("inertia_phase", "open_loop_bound_pa"));
     assert!(bound("torque_phase", "best_gain_bound_pa") > bound("torque_phase", "open_loop_bound_pa"));
     assert!(stdout(&design(&["--method", "iss-discrete"])).contains("open loop serves"));
-    let output = wetclutch(&["design", VEHICLE, "--method", "iss-discrete"]);
-    assert!(stdout(&output).contains("normalised, on turbine speed and slip"), "{}", stdout(&output));
+    // Friction spoils the pressure and not the torque: on the pressure no gain beats the open loop by this budget.
+    let output = design(&["--method", "scheduled", "--bound-on", "pressure"]);
+    assert!(stdout(&output).contains("inertia phase: open loop serves"), "{}", stdout(&output));
+    let output = wetclutch(&["design", VEHICLE, "--method", "scheduled"]);
+    assert!(stdout(&output).contains("at friction 0.16") && stdout(&output).contains("of the clutch torque"));
+    let output = wetclutch(&["design", VEHICLE, "--method", "interval"]);
+    assert!(stdout(&output).contains("least entry"), "{}", stdout(&output));
 }
 
 #[test]
@@ -306,8 +322,10 @@ fn a_log_too_slow_for_the_gains_is_said_to_be() {
     let rows: String = (0..20).map(|i| format!("{},2000,1900,760,0.1\n", f64::from(i) * 0.1)).collect();
     let names = "time_s,engine_speed_rpm,turbine_speed_rpm,output_speed_rpm,oncoming_current_a\n";
     std::fs::write(folder.path("log.csv"), format!("{names}{rows}")).unwrap();
-    let run =
-        |observer| wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "--observer", observer]);
-    assert!(stderr(&run("rigid")).contains("samples are 100 ms apart, and this observer corrects over at most 40 ms"));
+    let run = |method| {
+        let log = folder.path("log.csv");
+        wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--observer", "rigid", "--method", method])
+    };
+    assert!(stderr(&run("iss")).contains("samples are 100 ms apart, and this observer corrects over at most 40 ms"));
     assert!(stderr(&run("peak-to-peak")).is_empty(), "{}", stderr(&run("peak-to-peak")));
 }

@@ -13,8 +13,8 @@ pub mod vehicle;
 
 pub use error::ConfigError;
 pub use experiment::{
-    CurrentSensor, Experiment, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile, Scenario, Sensors,
-    ShiftCalibration, SpeedSensor,
+    CurrentSensor, Experiment, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile, Scenario,
+    Sensors, ShiftCalibration, SpeedSensor,
 };
 pub use source::{Kind, Source};
 pub use study::{Factor, Plan, Study, Target, Values, Varied};

@@ -11,12 +11,12 @@
 //!
 //! and the remaining error is at most `|w| sqrt(lambda_max(H' L' L H)/(4 kappa1 kappa2))`, Eq. (2.81).
 
-use config::{ErrorBounds, Vehicle};
+use config::Vehicle;
 use nalgebra::DMatrix;
-use observer::{CompliantGains, CompliantModel, CompliantObserver, Phase};
+use observer::{CompliantGains, CompliantModel, CompliantObserver, Phase, Schedule};
 use serde::Serialize;
 
-use crate::discrete::Sampled;
+use crate::budget::{grade_n_m, mass_n_m};
 use crate::iss::{DesignError, five_steps};
 use crate::lmi::{Block, Outcome, Problem, largest_eigenvalue};
 use crate::polytope::{distinct, valve_extremes};
@@ -156,10 +156,13 @@ pub fn compliant_model(vehicle: &Vehicle) -> CompliantModel<f64> {
 }
 
 /// The compliant observer of this vehicle with these gains.
-pub fn compliant_observer(vehicle: &Vehicle, gains: CompliantGains<f64>) -> CompliantObserver<f64> {
+pub fn compliant_observer(
+    vehicle: &Vehicle,
+    gains: impl Into<Schedule<f64, CompliantGains<f64>>>,
+) -> CompliantObserver<f64> {
     CompliantObserver {
         model: compliant_model(vehicle),
-        gains,
+        gains: gains.into(),
         tracker: tracker(vehicle),
         shaft_settling_s: vehicle.shaft_settling_s,
     }
@@ -169,12 +172,11 @@ pub fn compliant_observer(vehicle: &Vehicle, gains: CompliantGains<f64>) -> Comp
 ///
 /// The turbine torque enters turbine and slip together, through one column. A grade acts on the vehicle
 /// with `m g R_w sin(theta)`; a mass error makes the wheel answer the shaft torque wrongly by its own share.
-pub fn error_matrix(model: &CompliantModel<f64>, bounds: &ErrorBounds, phase: Phase) -> DMatrix<f64> {
-    let road = &model.rigid.road;
-    let grade_n_m = road.mass_kg * drivetrain::road::GRAVITY_M_S2 * road.wheel_radius_m * bounds.grade_rad.sin();
-    let mass_n_m = bounds.mass_kg / road.mass_kg * bounds.shaft_torque_n_m;
-    let wheel = model.wheel_per_torque * (grade_n_m + mass_n_m) / SPEED_UNITS_RAD_S[2];
-    let turbine = |per_torque: f64, output: usize| per_torque * bounds.turbine_torque_n_m / SPEED_UNITS_RAD_S[output];
+pub fn error_matrix(vehicle: &Vehicle, phase: Phase) -> DMatrix<f64> {
+    let model = compliant_model(vehicle);
+    let wheel = model.wheel_per_torque * (grade_n_m(vehicle) + mass_n_m(vehicle)) / SPEED_UNITS_RAD_S[2];
+    let turbine_n_m = vehicle.error_bounds.turbine_torque_n_m;
+    let turbine = |per_torque: f64, output: usize| per_torque * turbine_n_m / SPEED_UNITS_RAD_S[output];
     let rows = &model.inertia_phase;
     match phase {
         Phase::InertiaPhase => DMatrix::from_row_slice(
@@ -196,18 +198,27 @@ pub fn error_matrix(model: &CompliantModel<f64>, bounds: &ErrorBounds, phase: Ph
     }
 }
 
-/// What the vehicle file requires of the compliant observer in a phase.
-pub fn compliant_requirement(vehicle: &Vehicle, phase: Phase) -> CompliantRequirement {
-    let required = match phase {
+fn required(vehicle: &Vehicle, phase: Phase) -> &config::CompliantRequirement {
+    match phase {
         Phase::InertiaPhase | Phase::AfterShift => &vehicle.compliant_inertia_phase,
         Phase::BeforeShift | Phase::TorquePhase => &vehicle.compliant_torque_phase,
-    };
-    let (h, w_max) = match &required.error_matrix {
-        None => (error_matrix(&compliant_model(vehicle), &vehicle.error_bounds, phase), std::f64::consts::SQRT_2),
-        Some(given) => {
-            let causes = (1..=3).rev().find(|&n| given.iter().any(|row| row[n - 1] != 0.0)).unwrap_or(1);
-            (DMatrix::from_fn(outputs(phase).len(), causes, |i, j| given[i][j]), 1.0)
-        }
+    }
+}
+
+/// `H` as the vehicle file gives it, if it does.
+pub(crate) fn given_error_matrix(vehicle: &Vehicle, phase: Phase) -> Option<DMatrix<f64>> {
+    required(vehicle, phase).error_matrix.as_ref().map(|given| {
+        let causes = (1..=3).rev().find(|&n| given.iter().any(|row| row[n - 1] != 0.0)).unwrap_or(1);
+        DMatrix::from_fn(outputs(phase).len(), causes, |i, j| given[i][j])
+    })
+}
+
+/// What the vehicle file requires of the compliant observer in a phase.
+pub fn compliant_requirement(vehicle: &Vehicle, phase: Phase) -> CompliantRequirement {
+    let required = required(vehicle, phase);
+    let (h, w_max) = match given_error_matrix(vehicle, phase) {
+        None => (error_matrix(vehicle, phase), std::f64::consts::SQRT_2),
+        Some(given) => (given, 1.0),
     };
     CompliantRequirement {
         kappa1_per_s: required.kappa1_per_s,
@@ -266,20 +277,6 @@ fn vertices(vehicle: &Vehicle, phase: Phase) -> Vec<Vertex> {
         }
     }
     vertices
-}
-
-/// The error system over a sample: `Phi` and, at every vertex, `G Psi`. Only constant valves have one `Phi`; of others the
-/// slowest is taken, whose errors last longest.
-pub(crate) fn sampled_vertices(vehicle: &Vehicle, phase: Phase, sample_time_s: f64) -> Sampled {
-    let vertices = vertices(vehicle, phase);
-    let slowest = vertices.iter().map(|vertex| vertex.a22[(1, 1)]).fold(f64::NEG_INFINITY, f64::max);
-    let phi = (slowest * sample_time_s).exp();
-    let g_psi = vertices.into_iter().map(|vertex| {
-        let a = vertex.a22[(1, 1)];
-        let psi = ((a * sample_time_s).exp() - 1.0) / a;
-        (vertex.label, vertex.g * DMatrix::from_row_slice(2, 2, &[sample_time_s, 0.0, 0.0, psi]))
-    });
-    Sampled { phi: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, phi]), g_psi: g_psi.collect() }
 }
 
 /// The smallest gain for this `kappa1`. Unknowns: the two entries of alpha, then `L` by rows.

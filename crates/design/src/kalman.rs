@@ -3,6 +3,7 @@
 use config::{Sensors, SpeedSensor, Vehicle};
 use observer::{FilterNoise, KalmanFilter, Linearisation, Readings, UnscentedFilter};
 
+use crate::budget::ValveErrors;
 use crate::compliant::compliant_model;
 use crate::rigid::tracker;
 
@@ -32,7 +33,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         turbine_share_s: told.turbine_share_s,
         twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
-        valve_rate_pa_s: vehicle.error_bounds.valve_rate_pa_s / 3.0_f64.sqrt(),
+        valve_rate_pa_s: ValveErrors::of(vehicle).deviation_pa_s(),
         valve_rate_s: told.valve_rate_s,
         offgoing_n_m: told.offgoing_n_m,
         offgoing_release_s: told.offgoing_release_s,

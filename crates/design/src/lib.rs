@@ -26,6 +26,7 @@
 
 use lapack_nalgebra as _;
 
+pub mod budget;
 pub mod certificate;
 pub mod compliant;
 pub mod discrete;
@@ -33,18 +34,17 @@ pub mod enclosing;
 pub mod iss;
 pub mod kalman;
 pub mod lmi;
-pub mod peak_to_peak;
 pub mod polytope;
 pub mod rigid;
 pub mod rivals;
 pub mod sliding;
 
+pub use budget::ValveErrors;
 pub use certificate::{Certificate, VertexMargin};
 pub use compliant::{CompliantCertificate, CompliantDesign, compliant_observer, design_compliant};
-pub use discrete::{DiscreteCertificate, DiscreteDesign, Method, design_compliant_discrete, design_rigid_discrete};
+pub use discrete::{DiscreteCertificate, DiscreteDesign, Model, Quantity, design_discrete, design_discrete_phase};
 pub use iss::{DesignError, IssRequirement, design_iss};
 pub use kalman::{extended_filter, kalman_filter, unscented_filter};
-pub use peak_to_peak::{PeakToPeakCertificate, design_peak_to_peak};
 pub use polytope::{Polytope, Vertex};
 pub use rigid::{RigidDesign, bounded, design_rigid, requirement, rigid_model, rigid_observer, tracker};
 pub use rivals::{inversion, super_twisting};

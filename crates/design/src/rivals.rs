@@ -3,6 +3,7 @@
 use config::Vehicle;
 use observer::{Inversion, Phase, SuperTwisting};
 
+use crate::budget::ValveErrors;
 use crate::compliant::compliant_model;
 use crate::rigid::{rigid_model, tracker};
 
@@ -13,9 +14,10 @@ const SMOOTHING_SHARE: f64 = 0.5;
 /// acceleration, at the strongest friction.
 pub fn super_twisting(vehicle: &Vehicle) -> SuperTwisting<f64> {
     let model = rigid_model(vehicle);
+    let valve_rate_pa_s = ValveErrors::of(vehicle).largest_pa_s();
     let rate = |phase| {
         let [turbine, slip] = model.influence(phase, vehicle.uncertainty.friction.1);
-        turbine.hypot(slip) * vehicle.error_bounds.valve_rate_pa_s
+        turbine.hypot(slip) * valve_rate_pa_s
     };
     let error_rate_rad_s3 = [rate(Phase::TorquePhase), rate(Phase::InertiaPhase)];
     SuperTwisting { model, error_rate_rad_s3, tracker: tracker(vehicle) }

@@ -147,9 +147,7 @@ fn chapter_compliant_torque_phase_gain_and_offset() {
 
 #[test]
 fn chapter_error_matrix_follows_from_a_turbine_torque_error_of_15_percent() {
-    let vehicle = vehicle();
-    let model = design::compliant::compliant_model(&vehicle);
-    let h = design::compliant::error_matrix(&model, &vehicle.error_bounds, Phase::TorquePhase);
+    let h = design::compliant::error_matrix(&vehicle(), Phase::TorquePhase);
     assert!((h[(0, 0)] - 2.38).abs() < 0.005, "{h}");
     // Mass and grade: 1/(m R^2) (m g R sin 5 deg + 15 % of 800 N m) / 10 rad/s.
     let expected = (1500.0 * 9.806_65 * 0.3 * 0.0873_f64.sin() + 0.15 * 800.0) / 135.0 / 10.0;

@@ -3,7 +3,8 @@
 use drivetrain::Real;
 
 use crate::compliant_model::{CompliantSpeedModel, OUTPUTS};
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Track, Tracker};
+use crate::schedule::{Mix, between};
+use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Schedule, Track, Tracker};
 
 /// Gains of the compliant observer on `(w_t, dw, w_w)`: first row for the shaft torque, N m per rad/s, second
 /// row for the pressure, Pa per rad/s. In the torque phase the slip is no output and its column is zero.
@@ -23,6 +24,25 @@ impl<T: Real> CompliantGains<T> {
     }
 }
 
+impl<T: Real> Mix<T> for CompliantGains<T> {
+    #[inline]
+    fn mixed(&self, other: &Self, share: T) -> Self {
+        let mix = |a: &[[T; OUTPUTS]; 2], b: &[[T; OUTPUTS]; 2]| {
+            let mut gain = *a;
+            for (row, other) in gain.iter_mut().zip(b) {
+                for (x, y) in row.iter_mut().zip(other) {
+                    *x = between(*x, *y, share);
+                }
+            }
+            gain
+        };
+        Self {
+            torque_phase: mix(&self.torque_phase, &other.torque_phase),
+            inertia_phase: mix(&self.inertia_phase, &other.inertia_phase),
+        }
+    }
+}
+
 /// The compliant reduced-order observer.
 ///
 /// As the rigid one, with `z = (T_s, p)`: `A22 = diag(0, -1/tau_cv)`, so that `Phi`, `Psi` and `Gam2` of the shaft
@@ -32,8 +52,8 @@ impl<T: Real> CompliantGains<T> {
 pub struct CompliantObserver<T> {
     /// The powertrain.
     pub model: CompliantModel<T>,
-    /// The gains.
-    pub gains: CompliantGains<T>,
+    /// The gains, which may follow the friction.
+    pub gains: Schedule<T, CompliantGains<T>>,
     /// Checks, valve and phase.
     pub tracker: Tracker<T>,
     /// Time in which the shaft torque leans towards its steady value outside the shift, s.
@@ -90,10 +110,10 @@ impl<T: Real> Estimator<T> for CompliantObserver<T> {
 
 impl<T: Real> CompliantObserver<T> {
     #[inline]
-    fn gains_of(&self, phase: Phase) -> Option<&[[T; OUTPUTS]; 2]> {
-        match phase {
-            Phase::TorquePhase => Some(&self.gains.torque_phase),
-            Phase::InertiaPhase => Some(&self.gains.inertia_phase),
+    fn gains_of(&self, last: &Sample<T>) -> Option<[[T; OUTPUTS]; 2]> {
+        match last.phase {
+            Phase::TorquePhase => Some(self.gains.at(last.model.friction).torque_phase),
+            Phase::InertiaPhase => Some(self.gains.at(last.model.friction).inertia_phase),
             Phase::BeforeShift | Phase::AfterShift => None,
         }
     }
@@ -107,7 +127,7 @@ impl<T: Real> CompliantObserver<T> {
         state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
         let (Some(last), Some(shaft)) = (state.track.last, state.shaft_torque_n_m) else { return };
         let mut predicted = shaft + dt * last.shaft_rate;
-        match (self.gains_of(last.phase), speeds) {
+        match (self.gains_of(&last), speeds) {
             (Some(gain), Some(speeds)) => {
                 let shaft_integral = dt * (shaft + T::of(0.5) * dt * last.shaft_rate);
                 for i in 0..OUTPUTS {
@@ -153,7 +173,7 @@ impl<T: Real> CompliantObserver<T> {
     pub fn cast<U: Real>(&self) -> CompliantObserver<U> {
         CompliantObserver {
             model: self.model.cast(),
-            gains: self.gains.cast(),
+            gains: self.gains.cast(CompliantGains::cast),
             tracker: self.tracker.cast(),
             shaft_settling_s: U::of(self.shaft_settling_s.to_f64_exact()),
         }

@@ -34,6 +34,8 @@ pub struct CompliantSpeedModel<T> {
     pub free_rad_s2: [T; OUTPUTS],
     /// `G`: acceleration per shaft torque (rad/s^2 per N m) and per pressure (rad/s^2 per Pa).
     pub influence: [[T; 2]; OUTPUTS],
+    /// Friction coefficient `mu` in both.
+    pub friction: T,
 }
 
 impl<T: Real> CompliantModel<T> {
@@ -80,7 +82,8 @@ impl<T: Real> CompliantModel<T> {
     pub fn speed_model(&self, phase: Phase, engine: T, turbine: T, slip: T, wheel: T) -> CompliantSpeedModel<T> {
         let clutch = &self.rigid.clutch;
         let direction = if slip < T::zero() { -T::one() } else { T::one() };
-        let friction = clutch.friction.at(slip.abs()) * direction;
+        let coefficient = clutch.friction.at(slip.abs());
+        let friction = coefficient * direction;
         let known = ShiftTorques {
             turbine_n_m: self.rigid.converter.torques(engine, turbine).turbine_n_m,
             offgoing_n_m: T::zero(),
@@ -96,6 +99,7 @@ impl<T: Real> CompliantModel<T> {
         CompliantSpeedModel {
             free_rad_s2: [rows.turbine.at(&known), slip_free, -self.wheel_per_torque * load],
             influence: self.influence(phase, friction),
+            friction: coefficient,
         }
     }
 

@@ -2,7 +2,8 @@
 
 use drivetrain::Real;
 
-use crate::{Estimate, Estimator, Health, Input, Interval, Phase, RigidModel, SpeedModel, Track, Tracker};
+use crate::schedule::{Mix, between};
+use crate::{Estimate, Estimator, Health, Input, Interval, Phase, RigidModel, Schedule, SpeedModel, Track, Tracker};
 
 /// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +41,18 @@ impl<T: Real> RigidGains<T> {
     }
 }
 
+impl<T: Real> Mix<T> for RigidGains<T> {
+    #[inline]
+    fn mixed(&self, other: &Self, share: T) -> Self {
+        let [turbine, slip] = self.inertia_phase_pa_s_rad;
+        let [other_turbine, other_slip] = other.inertia_phase_pa_s_rad;
+        Self {
+            torque_phase_pa_s_rad: between(self.torque_phase_pa_s_rad, other.torque_phase_pa_s_rad, share),
+            inertia_phase_pa_s_rad: [between(turbine, other_turbine, share), between(slip, other_slip, share)],
+        }
+    }
+}
+
 /// The rigid reduced-order observer.
 ///
 /// Continuous form: `eta = z^ - L y`, `d eta/dt = (A22 - L G)(eta + L y) + B2 - L F`, Eq. (2.45). With `F`,
@@ -58,8 +71,8 @@ impl<T: Real> RigidGains<T> {
 pub struct RigidObserver<T> {
     /// The powertrain.
     pub model: RigidModel<T>,
-    /// The gains.
-    pub gains: RigidGains<T>,
+    /// The gains, which may follow the friction.
+    pub gains: Schedule<T, RigidGains<T>>,
     /// Checks, valve and phase.
     pub tracker: Tracker<T>,
 }
@@ -109,10 +122,10 @@ impl<T: Real> RigidObserver<T> {
     #[inline]
     fn correction(&self, state: &RigidState<T>, interval: &Interval<T>, speeds: Option<[T; 2]>) -> T {
         let (Some(last), Some(speeds)) = (state.last, speeds) else { return T::zero() };
-        let gain = self.gains.of(last.phase);
+        let gain = self.gains.at(last.model.friction).of(last.phase);
         let pressure_integral = interval.pressure_integral(state.pressure_pa);
         let unpredicted = |i: usize| {
-            let SpeedModel { free_rad_s2: f, per_pressure_rad_s2_pa: g } = last.model;
+            let SpeedModel { free_rad_s2: f, per_pressure_rad_s2_pa: g, .. } = last.model;
             speeds[i] - last.speeds[i] - interval.dt_s * f[i] - g[i] * pressure_integral
         };
         gain[0] * unpredicted(0) + gain[1] * unpredicted(1)
@@ -134,6 +147,7 @@ impl<T: Real> RigidObserver<T> {
 
     /// The same observer in another precision.
     pub fn cast<U: Real>(&self) -> RigidObserver<U> {
-        RigidObserver { model: self.model.cast(), gains: self.gains.cast(), tracker: self.tracker.cast() }
+        let gains = self.gains.cast(RigidGains::cast);
+        RigidObserver { model: self.model.cast(), gains, tracker: self.tracker.cast() }
     }
 }

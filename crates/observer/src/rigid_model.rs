@@ -39,6 +39,8 @@ pub struct SpeedModel<T> {
     pub free_rad_s2: [T; 2],
     /// `G`: acceleration per pressure, rad/s^2/Pa.
     pub per_pressure_rad_s2_pa: [T; 2],
+    /// Friction coefficient `mu` in both.
+    pub friction: T,
 }
 
 impl<T: Real> RigidModel<T> {
@@ -108,7 +110,8 @@ impl<T: Real> RigidModel<T> {
     /// so both change sign with the slip.
     #[inline]
     pub fn speed_model(&self, phase: Phase, engine_rad_s: T, turbine_rad_s: T, slip_rad_s: T) -> SpeedModel<T> {
-        let friction = self.clutch.friction.at(slip_rad_s.abs()) * direction(slip_rad_s);
+        let coefficient = self.clutch.friction.at(slip_rad_s.abs());
+        let friction = coefficient * direction(slip_rad_s);
         let mut torques = self.known_torques(engine_rad_s, turbine_rad_s, slip_rad_s);
         torques.oncoming_n_m = -friction * self.clutch.lever() * self.clutch.return_spring_n;
         let rows = self.coefficients(phase);
@@ -119,6 +122,7 @@ impl<T: Real> RigidModel<T> {
         SpeedModel {
             free_rad_s2: [rows.turbine.at(&torques), slip],
             per_pressure_rad_s2_pa: self.influence(phase, friction),
+            friction: coefficient,
         }
     }
 

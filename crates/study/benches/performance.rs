@@ -13,11 +13,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use config::{Experiment, Study, Vehicle};
+use config::{Experiment, GainMethod, Study, Vehicle};
 use design::rigid::design_phase;
 use design::{
-    bounded, compliant_observer, design_compliant, design_peak_to_peak, design_rigid, design_sliding, extended_filter,
-    inversion, kalman_filter, requirement, rigid_observer, sliding_observer, super_twisting, unscented_filter,
+    Model, Quantity, bounded, compliant_observer, design_compliant, design_discrete_phase, design_rigid,
+    design_sliding, extended_filter, inversion, kalman_filter, requirement, rigid_observer, sliding_observer,
+    super_twisting, unscented_filter,
 };
 use observer::{Estimator, Input, Phase, RigidGains};
 use plant::{Powertrain, Simulation};
@@ -174,7 +175,17 @@ fn simulation(page: &mut String) {
         black_box(design_phase(black_box(&vehicle), Phase::InertiaPhase, &required).unwrap());
     });
     let peak_to_peak = one(|| {
-        black_box(design_peak_to_peak(black_box(&vehicle), Phase::InertiaPhase, 0.01).unwrap());
+        black_box(
+            design_discrete_phase(
+                black_box(&vehicle),
+                Model::Rigid,
+                GainMethod::PeakToPeak,
+                Quantity::ClutchTorque,
+                Phase::InertiaPhase,
+                0.01,
+            )
+            .unwrap(),
+        );
     });
     let drive = |sample_time_s: f64| {
         let experiment = Experiment { sample_time_s, ..Experiment::e1().unwrap() };

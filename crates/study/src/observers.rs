@@ -1,15 +1,14 @@
 //! Any of the observers, built from a vehicle and an entry of an experiment file.
 
-use config::{GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
+use config::{GainMethod, GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
 use design::compliant::physical_gains;
 use design::{
-    DesignError, Method, bounded, compliant_observer, design_compliant, design_compliant_discrete, design_peak_to_peak,
-    design_rigid, design_rigid_discrete, design_sliding, extended_filter, inversion, kalman_filter, rigid_observer,
-    sliding_observer, super_twisting, unscented_filter,
+    DesignError, Model, bounded, compliant_observer, design_compliant, design_discrete, design_rigid, design_sliding,
+    extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
 };
 use drivetrain::Valve;
 use observer::{
-    CompliantObserver, Discretisation, Estimate, Estimator, Inversion, KalmanFilter, Phase, RigidGains, RigidObserver,
+    CompliantObserver, Discretisation, Estimate, Estimator, Inversion, KalmanFilter, RigidGains, RigidObserver,
     SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
 };
 
@@ -43,32 +42,30 @@ impl AnyObserver {
     pub fn designed(
         vehicle: &Vehicle,
         kind: ObserverKind,
+        method: GainMethod,
         sample_time_s: f64,
         sensors: Option<&Sensors>,
     ) -> Result<Self, DesignError> {
         Ok(match kind {
             ObserverKind::OpenLoop => Self::Rigid(rigid_observer(vehicle, RigidGains::open_loop())),
-            ObserverKind::Rigid => Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains())),
-            ObserverKind::PeakToPeak => {
-                let phase = |phase| design_peak_to_peak(vehicle, phase, sample_time_s);
-                let gains = RigidGains {
-                    torque_phase_pa_s_rad: phase(Phase::TorquePhase)?.gain_pa_s_rad[0],
-                    inertia_phase_pa_s_rad: phase(Phase::InertiaPhase)?.gain_pa_s_rad,
-                };
-                let mut observer = rigid_observer(vehicle, gains);
-                // These gains are made for this sample time, and serve over one lost sample too.
-                observer.tracker.sample_max_s = 2.0 * sample_time_s;
-                Self::Rigid(observer)
+            ObserverKind::Rigid if method == GainMethod::Iss => {
+                Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains()))
             }
-            ObserverKind::RigidDiscrete => {
-                let mut observer = rigid_observer(vehicle, design_rigid_discrete(vehicle, sample_time_s)?);
-                observer.tracker.sample_max_s = 2.0 * sample_time_s;
-                Self::Rigid(observer)
-            }
-            ObserverKind::CompliantDiscrete => Self::discrete(vehicle, Method::Iss, sample_time_s)?,
-            ObserverKind::CompliantPeakToPeak => Self::discrete(vehicle, Method::PeakToPeak, sample_time_s)?,
-            ObserverKind::Compliant => {
+            ObserverKind::Compliant if method == GainMethod::Iss => {
                 Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
+            }
+            // These gains are made for a sample time, and serve over one lost sample too.
+            ObserverKind::Rigid => {
+                let design = design_discrete(vehicle, Model::Rigid, method, sample_time_s)?;
+                let mut observer = rigid_observer(vehicle, design.rigid_gains());
+                observer.tracker.sample_max_s = 2.0 * sample_time_s;
+                Self::Rigid(observer)
+            }
+            ObserverKind::Compliant => {
+                let design = design_discrete(vehicle, Model::Compliant, method, sample_time_s)?;
+                let mut observer = compliant_observer(vehicle, design.compliant_gains());
+                observer.tracker.sample_max_s = 2.0 * sample_time_s;
+                Self::Compliant(Box::new(observer))
             }
             ObserverKind::Kalman => Self::Kalman(Box::new(kalman_filter(vehicle, sensors))),
             ObserverKind::Extended => Self::Kalman(Box::new(extended_filter(vehicle, sensors))),
@@ -79,21 +76,19 @@ impl AnyObserver {
         })
     }
 
-    /// The compliant observer with gains for this sample time.
-    fn discrete(vehicle: &Vehicle, method: Method, sample_time_s: f64) -> Result<Self, DesignError> {
-        let gains = design_compliant_discrete(vehicle, method, sample_time_s)?.gains();
-        let mut observer = compliant_observer(vehicle, gains);
-        observer.tracker.sample_max_s = 2.0 * sample_time_s;
-        Ok(Self::Compliant(Box::new(observer)))
-    }
-
     /// The observer that an entry of an experiment file describes.
     ///
     /// # Errors
     /// Gains are to be designed, and there are none for what the vehicle file requires.
     pub fn of(vehicle: &Vehicle, entry: &ObserverEntry, sensors: Option<&Sensors>) -> Result<Self, DesignError> {
         let observer = match entry.gains {
-            None => Self::designed(vehicle, entry.kind, entry.sample_time_s, sensors.filter(|_| entry.real_sensors))?,
+            None => Self::designed(
+                vehicle,
+                entry.kind,
+                entry.method,
+                entry.sample_time_s,
+                sensors.filter(|_| entry.real_sensors),
+            )?,
             Some(GivenGains::Rigid(gains)) => Self::Rigid(rigid_observer(vehicle, gains)),
             Some(GivenGains::Sliding(gains)) => Self::Sliding(sliding_observer(vehicle, gains)),
             Some(GivenGains::CompliantNormalised(torque, inertia)) => {

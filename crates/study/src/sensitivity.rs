@@ -131,11 +131,11 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     columns.push((
         "reading of the turbine speed, over 10 ms",
         "rad/s",
-        bounds.turbine_change_rad_s,
+        bounds.turbine_quantum_rad_s,
         [1.0 / sample_s, 0.0],
     ));
     if phase == Phase::InertiaPhase {
-        columns.push(("reading of the slip, over 10 ms", "rad/s", bounds.slip_change_rad_s, [0.0, 1.0 / sample_s]));
+        columns.push(("reading of the slip, over 10 ms", "rad/s", bounds.slip_quantum_rad_s, [0.0, 1.0 / sample_s]));
     }
     columns
 }

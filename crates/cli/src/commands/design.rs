@@ -1,12 +1,11 @@
 //! `wetclutch design`.
 
-use config::Vehicle;
+use config::{GainMethod, Vehicle};
 use design::compliant::{CompliantRequirement, compliant_requirement, design_compliant_phase};
-use design::discrete::{design_compliant_discrete_phase, design_rigid_discrete_phase};
 use design::rigid::design_phase;
 use design::{
-    Certificate, CompliantCertificate, DesignError, DiscreteCertificate, IssRequirement, Method, PeakToPeakCertificate,
-    design_peak_to_peak, design_sliding, requirement,
+    Certificate, CompliantCertificate, DesignError, DiscreteCertificate, IssRequirement, Model, Quantity,
+    design_discrete_phase, design_sliding, requirement,
 };
 use observer::Phase;
 use report::tables::phase_name;
@@ -31,36 +30,25 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
     let mut text = Vec::new();
     for &phase in phases {
         let failed = |error: DesignError| Failure::Work(format!("{}: {error}", phase_name(phase)));
-        let (json, lines) = match options.observer {
-            DesignChoice::Rigid if options.method == MethodChoice::PeakToPeak => {
-                let certificate = design_peak_to_peak(&vehicle, phase, options.sample_time).map_err(failed)?;
-                (serde_json::to_value(&certificate)?, peak_to_peak_lines(phase, &certificate))
-            }
-            DesignChoice::Rigid if options.method == MethodChoice::IssDiscrete => {
-                let certificate = design_rigid_discrete_phase(&vehicle, phase, options.sample_time).map_err(failed)?;
-                (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
-            }
-            DesignChoice::Compliant if options.method != MethodChoice::Iss => {
-                let method = if options.method == MethodChoice::PeakToPeak { Method::PeakToPeak } else { Method::Iss };
-                let certificate =
-                    design_compliant_discrete_phase(&vehicle, phase, method, options.sample_time).map_err(failed)?;
-                (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
-            }
-            DesignChoice::Rigid => {
+        let (json, lines) = match (options.observer, options.method) {
+            (DesignChoice::Rigid, MethodChoice::Iss) => {
                 let required = replaced(requirement(&vehicle, phase).into(), options);
                 let certificate = design_phase(&vehicle, phase, &required).map_err(failed)?;
                 (serde_json::to_value(&certificate)?, rigid_lines(phase, &certificate))
             }
-            DesignChoice::Compliant => {
+            (DesignChoice::Compliant, MethodChoice::Iss) => {
                 let required = replaced_compliant(compliant_requirement(&vehicle, phase), options);
                 let certificate = design_compliant_phase(&vehicle, phase, &required).map_err(failed)?;
                 (serde_json::to_value(&certificate)?, compliant_lines(phase, &certificate))
             }
-            DesignChoice::PeakToPeak => {
-                let certificate = design_peak_to_peak(&vehicle, phase, options.sample_time).map_err(failed)?;
-                (serde_json::to_value(&certificate)?, peak_to_peak_lines(phase, &certificate))
+            (DesignChoice::Rigid | DesignChoice::Compliant, method) => {
+                let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
+                let (method, quantity) = (method.into(), options.bound_on.into());
+                let certificate = design_discrete_phase(&vehicle, model, method, quantity, phase, options.sample_time)
+                    .map_err(failed)?;
+                (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
             }
-            DesignChoice::Sliding => sliding(&vehicle, phase),
+            (DesignChoice::Sliding, _) => sliding(&vehicle, phase),
         };
         object.insert(phase.name().to_owned(), json);
         text.extend(lines);
@@ -141,35 +129,6 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate) -> Vec<Stri
     lines
 }
 
-fn peak_to_peak_lines(phase: Phase, certificate: &PeakToPeakCertificate) -> Vec<String> {
-    let [first, second] = certificate.gain_pa_s_rad;
-    let name = phase_name(phase);
-    let mut lines = vec![if certificate.open_loop {
-        format!("{name}: no gain has a smaller bound than open loop, which is used")
-    } else {
-        format!("{name}: L = ({first:.1}, {second:.1}) Pa s/rad on turbine speed and slip")
-    }];
-    lines.push(format!(
-        "  bound {:.4} MPa, open loop {:.4} MPa, at a sample time of {} s, valve error included",
-        units::mpa(certificate.bound_pa),
-        units::mpa(certificate.open_loop_bound_pa),
-        certificate.sample_time_s,
-    ));
-    lines.extend(
-        certificate
-            .contributions
-            .iter()
-            .map(|part| format!("    of which {}: {:.4} MPa", part.cause, units::mpa(part.bound_pa))),
-    );
-    lines.push("  certificate, evaluated apart from the solver for the gain in single precision:".to_owned());
-    lines.extend(
-        (certificate.vertices.iter())
-            .map(|v| format!("    {}: a sample multiplies the error by {:.4}", v.vertex.label, v.factor)),
-    );
-    lines.push(String::new());
-    lines
-}
-
 fn kappas(kappa1: f64, kappa2: f64) -> String {
     format!("  kappa1 {kappa1:.2}/s, kappa2 {kappa2:.2}/s: an initial error is gone after {:.3} s", 4.0 / kappa2)
 }
@@ -202,39 +161,57 @@ fn sliding(vehicle: &Vehicle, phase: Phase) -> (Value, Vec<String>) {
 }
 
 fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String> {
-    let gain = certificate.gain_normalised.iter().map(|row| {
-        let row: Vec<String> = row.iter().map(|x| format!("{:.3}", x + 0.0)).collect();
-        format!("[{}]", row.join(", "))
-    });
-    let mpa = units::mpa;
-    let has_shaft = certificate.gain_normalised.len() > 1;
-    let of = match (phase, has_shaft) {
-        (Phase::InertiaPhase, true) => "rows (T_s, p) on turbine, slip and wheel speed",
-        (_, true) => "rows (T_s, p) on turbine and wheel speed",
-        (Phase::InertiaPhase, false) => "on turbine speed and slip",
-        (_, false) => "on turbine speed",
+    let what = match certificate.quantity {
+        Quantity::ClutchTorque => "clutch torque",
+        Quantity::Pressure => "pressure",
     };
-    let mut lines = vec![
-        format!("{}: L = {}, normalised, {of}", phase_name(phase), gain.collect::<Vec<_>>().join("; ")),
-        format!(
-            "  error of the pressure ultimately below {:.4} MPa, at {} ms, by every error of the budget",
-            mpa(certificate.bound_pa),
-            1e3 * certificate.sample_time_s
-        ),
-        if certificate.uses_open_loop {
-            format!(
-                "  open loop serves: its bound is {:.4} MPa, that of the best gain {:.4} MPa",
-                mpa(certificate.open_loop_bound_pa),
-                mpa(certificate.best_gain_bound_pa)
-            )
-        } else {
-            format!("  the open loop's bound is {:.4} MPa", mpa(certificate.open_loop_bound_pa))
-        },
-        "  certificate, evaluated by eigenvalues apart from the solver, for the gain in single precision:".to_owned(),
-    ];
-    lines.extend(
-        certificate.margins.iter().map(|m| format!("    {}: least eigenvalue {:.1e}", m.label, m.least_eigenvalue)),
-    );
+    let size = |pascal: f64| match certificate.quantity {
+        Quantity::ClutchTorque => {
+            format!("{:.1} N m ({:.4} MPa)", units::mpa(pascal) * certificate.torque_n_m_mpa, units::mpa(pascal))
+        }
+        Quantity::Pressure => format!("{:.4} MPa", units::mpa(pascal)),
+    };
+    let of = match (phase, certificate.model) {
+        (Phase::InertiaPhase, Model::Compliant) => "rows (T_s, p) on turbine, slip and wheel speed",
+        (_, Model::Compliant) => "rows (T_s, p) on turbine and wheel speed",
+        (Phase::InertiaPhase, Model::Rigid) => "on turbine speed and slip",
+        (_, Model::Rigid) => "on turbine speed",
+    };
+    let name = phase_name(phase);
+    let mut lines = Vec::new();
+    if certificate.uses_open_loop {
+        lines.push(format!("{name}: open loop serves, no gain has a smaller bound"));
+        lines.push(format!(
+            "  error of the {what} ultimately below {}; below {} with the best gain",
+            size(certificate.open_loop_bound_pa),
+            size(certificate.best_gain_bound_pa)
+        ));
+    } else {
+        lines.push(format!("{name}: L normalised by 1000 N m, 0.1 MPa, 100 rad/s and 10 rad/s (wheel), {of}"));
+        for gain in &certificate.gains {
+            let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>().join(", ");
+            let rows = gain.normalised.iter().map(row).collect::<Vec<_>>().join("; ");
+            let at = gain.friction.map(|friction| format!(" at friction {friction}")).unwrap_or_default();
+            lines.push(format!("  L = [{rows}]{at}"));
+        }
+        lines.push(format!(
+            "  error of the {what} ultimately below {}; below {} in open loop",
+            size(certificate.bound_pa),
+            size(certificate.open_loop_bound_pa)
+        ));
+    }
+    lines.push(format!("  made of, at the worst corner, at a sample time of {} ms:", 1e3 * certificate.sample_time_s));
+    let parts = certificate.contributions.iter().filter(|part| part.bound_pa > 0.0);
+    lines.extend(parts.map(|part| format!("    {:<24} {:.5} MPa", part.cause, units::mpa(part.bound_pa))));
+    let (what, of) = match certificate.method {
+        GainMethod::Interval => ("entries", "least entry"),
+        _ => ("eigenvalues", "least eigenvalue"),
+    };
+    lines.push(format!(
+        "  certificate{}, by {what} apart from the solver, for the gain in single precision:",
+        if certificate.uses_open_loop { " of the best gain" } else { "" }
+    ));
+    lines.extend(certificate.margins.iter().map(|margin| format!("    {}: {of} {:.1e}", margin.label, margin.least)));
     lines.push(String::new());
     lines
 }

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use config::{ObserverKind, Vehicle};
+use config::{GainMethod, ObserverKind, Vehicle};
 use observer::{Estimate as Sample, Health};
 use report::tables::phase_name;
 use study::{AnyObserver, RunColumns, estimates_trace, score, true_phases};
@@ -17,15 +17,11 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let vehicle = Vehicle::read(&options.vehicle)?;
     let log = read_csv(&options.log)?;
     let columns = RunColumns::of(&log, &vehicle)?;
+    let has_wheel = log.get(signal::WHEEL_SPEED).is_some();
     let kind = match options.observer {
-        ObserverChoice::Best if log.get(signal::WHEEL_SPEED).is_some() => ObserverKind::Kalman,
-        ObserverChoice::Best => ObserverKind::PeakToPeak,
-        ObserverChoice::Rigid => ObserverKind::Rigid,
-        ObserverChoice::PeakToPeak => ObserverKind::PeakToPeak,
-        ObserverChoice::RigidDiscrete => ObserverKind::RigidDiscrete,
+        ObserverChoice::Best if has_wheel => ObserverKind::Kalman,
+        ObserverChoice::Best | ObserverChoice::Rigid => ObserverKind::Rigid,
         ObserverChoice::Compliant => ObserverKind::Compliant,
-        ObserverChoice::CompliantDiscrete => ObserverKind::CompliantDiscrete,
-        ObserverChoice::CompliantPeakToPeak => ObserverKind::CompliantPeakToPeak,
         ObserverChoice::Sliding => ObserverKind::Sliding,
         ObserverChoice::Kalman => ObserverKind::Kalman,
         ObserverChoice::Extended => ObserverKind::Extended,
@@ -34,10 +30,21 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         ObserverChoice::Inversion => ObserverKind::Inversion,
         ObserverChoice::OpenLoop => ObserverKind::OpenLoop,
     };
+    let designed = matches!(options.observer, ObserverChoice::Rigid | ObserverChoice::Compliant);
+    if options.method.is_some() && !designed {
+        return Err(Failure::Input(
+            "--method says how the gains of an observer are designed\n\
+             hint: it goes with `--observer rigid` and `--observer compliant`"
+                .to_owned(),
+        ));
+    }
+    let mut method = options.method.map_or(GainMethod::Iss, GainMethod::from);
     if options.observer == ObserverChoice::Best {
-        output::note(match kind {
-            ObserverKind::Kalman => "observer: kalman, the best where there is a wheel speed",
-            _ => "observer: peak-to-peak; with wheel_speed_rad_s in the log kalman would serve",
+        output::note(if has_wheel {
+            "observer: kalman, the best where there is a wheel speed"
+        } else {
+            method = GainMethod::PeakToPeak;
+            "observer: rigid with peak-to-peak gains; with wheel_speed_rad_s in the log kalman would serve"
         });
     }
     let needs_wheel = [
@@ -50,11 +57,11 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     if needs_wheel.contains(&kind) {
         log.require(signal::WHEEL_SPEED)?;
     }
-    let observer = AnyObserver::designed(&vehicle, kind, log.median_step_s(), None)?;
+    let observer = AnyObserver::designed(&vehicle, kind, method, log.median_step_s(), None)?;
     if log.median_step_s() > observer.sample_max_s() && kind != ObserverKind::OpenLoop {
         output::note(&format!(
             "samples are {:.0} ms apart, and this observer corrects over at most {:.0} ms: the valve model alone serves\n\
-             hint: `--observer peak-to-peak` designs its gains for the log's own sample time",
+             hint: `--observer rigid --method peak-to-peak` designs its gains for the log's own sample time",
             1e3 * log.median_step_s(),
             1e3 * observer.sample_max_s(),
         ));

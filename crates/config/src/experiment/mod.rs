@@ -11,7 +11,7 @@ use crate::check::{Check, Number};
 use crate::{ConfigError, Source, Vehicle};
 use raw::{RawExperiment, RawOffNominal, RawScenario, RawShift};
 
-pub use observers::{CurrentSensor, GivenGains, ObserverEntry, ObserverKind, Sensors, SpeedSensor};
+pub use observers::{CurrentSensor, GainMethod, GivenGains, ObserverEntry, ObserverKind, Sensors, SpeedSensor};
 
 /// A signal over time, linear between its points, held outside them.
 pub type Profile = Table1<f64>;

@@ -1,7 +1,7 @@
 //! The observers and sensors of an experiment file, checked.
 
 use observer::{Discretisation, RigidGains, SlidingGains};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSensors, RawSignals, RawSpeedSensor};
@@ -14,18 +14,10 @@ use crate::check::Check;
 pub enum ObserverKind {
     /// The valve model alone.
     OpenLoop,
-    /// Rigid reduced-order observer, gains by the chapter's five steps.
+    /// Rigid reduced-order observer.
     Rigid,
-    /// The same observer, gains with the smallest bound on the sampled error, valve error included.
-    PeakToPeak,
-    /// The same observer, the smallest gains that decay as required over a sample, bound with valve and reading errors.
-    RigidDiscrete,
     /// Reduced-order observer with elastic drive shafts.
     Compliant,
-    /// The same observer, the smallest gains that decay as required over a sample, bound with valve and reading errors.
-    CompliantDiscrete,
-    /// The same observer, gains with the smallest bound on the sampled error of the pressure.
-    CompliantPeakToPeak,
     /// Full-order sliding-mode observer.
     Sliding,
     /// Kalman filter with unknown torques as states, statistically linearised.
@@ -38,6 +30,40 @@ pub enum ObserverKind {
     SuperTwisting,
     /// The pressure that explains the last change of the speeds.
     Inversion,
+}
+
+/// How the gains of a reduced-order observer are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GainMethod {
+    /// The chapter's five steps, in continuous time: the smallest gain that decays as required.
+    #[default]
+    Iss,
+    /// The smallest gain that decays as required over a sample; the rest are for a sample time too, with every error of
+    /// the budget in their bounds, and are the open loop where no gain beats that.
+    IssDiscrete,
+    /// The smallest bound on the error of the pressure.
+    PeakToPeak,
+    /// The same with a gain that follows the friction coefficient.
+    Scheduled,
+    /// The smallest width of a range that is carried along with the estimate.
+    Interval,
+}
+
+impl GainMethod {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Iss, Self::IssDiscrete, Self::PeakToPeak, Self::Scheduled, Self::Interval];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Iss => "iss",
+            Self::IssDiscrete => "iss-discrete",
+            Self::PeakToPeak => "peak-to-peak",
+            Self::Scheduled => "scheduled",
+            Self::Interval => "interval",
+        }
+    }
 }
 
 /// Gains given in the file in place of designed ones.
@@ -62,6 +88,8 @@ pub struct ObserverEntry {
     pub name: String,
     /// What it is.
     pub kind: ObserverKind,
+    /// How its gains are chosen, if it is a reduced-order observer and they are designed.
+    pub method: GainMethod,
     /// Its sample time, s.
     pub sample_time_s: f64,
     /// How it is carried over a sample.
@@ -158,6 +186,13 @@ pub(super) fn observer(
         let hint = "add a [sensors] table, or leave `sensors` out".to_owned();
         return Err(wrong("sees real sensors, and the file describes none".to_owned(), hint));
     }
+    let method = raw.method.unwrap_or_default();
+    if raw.method.is_some()
+        && (raw.gains.is_some() || !matches!(raw.kind, ObserverKind::Rigid | ObserverKind::Compliant))
+    {
+        let hint = "leave `method` out; it says how gains of the kinds rigid and compliant are designed".to_owned();
+        return Err(wrong("has a method and no gains to design".to_owned(), hint));
+    }
     let gains = match (raw.gains.as_ref(), raw.kind) {
         (None, _) => None,
         (Some(&RawGains::Rigid { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }), ObserverKind::Rigid) => {
@@ -188,6 +223,7 @@ pub(super) fn observer(
     Ok(ObserverEntry {
         name: raw.name.clone(),
         kind: raw.kind,
+        method,
         sample_time_s: match &raw.sample_time_s {
             Some(value) => check.number("observer.sample_time_s", value, 1e-4..=0.2)?,
             None => SAMPLE_TIME_S,

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::ObserverKind;
+use super::{GainMethod, ObserverKind};
 use crate::check::{Number, Numbers};
 
 #[derive(Deserialize)]
@@ -72,6 +72,7 @@ pub(super) struct RawCurrentSensor {
 pub(super) struct RawObserver {
     pub(super) name: String,
     pub(super) kind: ObserverKind,
+    pub(super) method: Option<GainMethod>,
     pub(super) sample_time_s: Option<Number>,
     #[serde(default)]
     pub(super) discretisation: RawDiscretisation,

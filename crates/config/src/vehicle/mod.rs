@@ -71,6 +71,8 @@ pub struct CompliantRequirement {
 pub struct ErrorBounds {
     /// Turbine torque from the converter's maps, N m.
     pub turbine_torque_n_m: f64,
+    /// The same as a share of the torque.
+    pub turbine_torque_share: f64,
     /// Pressure from the valve model alone, Pa.
     pub pressure_pa: f64,
     /// Mass of the vehicle, kg.
@@ -83,14 +85,20 @@ pub struct ErrorBounds {
     pub output_torque_n_m: f64,
     /// Torque left in the offgoing clutch when it has let go, N m.
     pub offgoing_torque_n_m: f64,
-    /// Rate of the pressure that the valve model leaves out, Pa/s.
-    pub valve_rate_pa_s: f64,
     /// Error of the change of the turbine speed from one sample to the next, rad/s.
-    pub turbine_change_rad_s: f64,
+    pub turbine_quantum_rad_s: f64,
     /// Error of the change of the slip from one sample to the next, rad/s.
-    pub slip_change_rad_s: f64,
+    pub slip_quantum_rad_s: f64,
     /// Error of the change of the wheel speed from one sample to the next, rad/s.
-    pub wheel_change_rad_s: f64,
+    pub wheel_quantum_rad_s: f64,
+    /// Greatest age of a reading, s.
+    pub sampling_delay_s: f64,
+    /// Rounding of one operation in single precision, as a share.
+    pub float32_rounding: f64,
+    /// Pressure above the kiss point in a shift, at which errors of gain and friction are weighed, Pa.
+    pub shift_pressure_pa: f64,
+    /// Rate of the pressure in a shift, at which errors of lag and delay are weighed, Pa/s.
+    pub shift_ramp_pa_s: f64,
     /// Least and greatest factor on the lag of the oncoming clutch's valve.
     pub valve_lag_factor: [f64; 2],
     /// Least and greatest factor on its gain.
@@ -531,10 +539,14 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
         output_torque_n_m: number("output_torque_n_m", &raw.output_torque_n_m, 0.0..=50e3)?,
         offgoing_torque_n_m: number("offgoing_torque_n_m", &raw.offgoing_torque_n_m, 0.0..=1e4)?,
-        valve_rate_pa_s: number("valve_rate_pa_s", &raw.valve_rate_pa_s, 0.0..=1e9)?,
-        turbine_change_rad_s: number("turbine_change_rad_s", &raw.turbine_change_rad_s, 0.0..=50.0)?,
-        slip_change_rad_s: number("slip_change_rad_s", &raw.slip_change_rad_s, 0.0..=50.0)?,
-        wheel_change_rad_s: number("wheel_change_rad_s", &raw.wheel_change_rad_s, 0.0..=50.0)?,
+        turbine_torque_share: number("turbine_torque_share", &raw.turbine_torque_share, 0.0..=0.9)?,
+        turbine_quantum_rad_s: number("turbine_quantum_rad_s", &raw.turbine_quantum_rad_s, 0.0..=50.0)?,
+        slip_quantum_rad_s: number("slip_quantum_rad_s", &raw.slip_quantum_rad_s, 0.0..=50.0)?,
+        wheel_quantum_rad_s: number("wheel_quantum_rad_s", &raw.wheel_quantum_rad_s, 0.0..=50.0)?,
+        sampling_delay_s: number("sampling_delay_s", &raw.sampling_delay_s, 0.0..=0.2)?,
+        float32_rounding: number("float32_rounding", &raw.float32_rounding, 0.0..=1e-3)?,
+        shift_pressure_pa: number("shift_pressure_pa", &raw.shift_pressure_pa, 0.0..=2e6)?,
+        shift_ramp_pa_s: number("shift_ramp_pa_s", &raw.shift_ramp_pa_s, 0.0..=1e8)?,
         valve_lag_factor: range("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
         valve_gain_factor: range("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
         valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,

@@ -1,0 +1,109 @@
+//! The smallest gain that contracts as required, the discrete twin of Eq. (2.83)-(2.84):
+//!
+//! ```text
+//! min trace(alpha),  [alpha LH; * I] >= 0,  [rho I, (Phi - L G Psi)'; *, rho I] >= 0 at every vertex
+//! ```
+//!
+//! with `rho = exp(-kappa2 T)`; then ultimately `|e| <= sum of |columns| / (1 - rho)`.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::system::{Corner, ErrorSystem};
+use super::{DiscreteMargin, Found, block, least_eigenvalue, solved, stacked};
+use crate::iss::DesignError;
+use crate::lmi::{Block, Problem};
+
+/// The gain is sought in multiples of this, so that the unknowns are of order 1.
+const GAIN_UNIT: f64 = 30.0;
+
+/// Unknowns: the entries of alpha, then `L` by rows.
+pub(crate) fn smallest_gain(
+    system: &ErrorSystem,
+    rho: f64,
+    round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
+) -> Result<Found, DesignError> {
+    let (states, outputs) = (system.states(), system.h.nrows());
+    let unknowns = states + states * outputs;
+    let gain = |x: &[f64]| DMatrix::from_row_slice(states, outputs, &x[states..]) * GAIN_UNIT;
+    let identity = DMatrix::identity(states, states);
+    let contraction = |l: &DMatrix<f64>, corner: &Corner, rho: f64| {
+        stacked(&(&identity * rho), &(&corner.phi - l * &corner.g_psi), &(&identity * rho))
+    };
+    let mut blocks: Vec<Block> = (system.corners.iter())
+        .map(|corner| block(unknowns, |x| contraction(&gain(x), corner, rho * (1.0 - 1e-6))))
+        .collect();
+    let causes = system.h.ncols();
+    blocks.push(block(unknowns, |x| {
+        let alpha = DMatrix::from_diagonal(&DVector::from_row_slice(&x[..states]));
+        let size = gain(x) * &system.h / GAIN_UNIT;
+        stacked(&alpha, &size.transpose(), &DMatrix::identity(causes, causes))
+    }));
+    let mut objective = vec![0.0; unknowns];
+    objective[..states].fill(1.0);
+    let Some(x) = solved(&Problem { objective, blocks })? else {
+        return Err(DesignError::DecayUnreachable { decay_per_s: rho });
+    };
+    let gain = round(&gain(&x));
+    let margins: Vec<DiscreteMargin> = (system.corners.iter())
+        .map(|corner| DiscreteMargin {
+            label: corner.label.clone(),
+            least: least_eigenvalue(&contraction(&gain, corner, rho)),
+        })
+        .collect();
+    if margins.iter().any(|margin| margin.least < 0.0) {
+        return Err(DesignError::NotCertified);
+    }
+    let length = |columns: &DMatrix<f64>| columns.column_iter().map(|column| column.norm()).sum::<f64>();
+    let through =
+        system.corners.iter().map(|corner| length(&(&gain * system.through_gain(corner)))).fold(0.0, f64::max);
+    let bound = (through + length(&system.direct())) / (1.0 - rho);
+    Ok(Found { gains: vec![gain], bound, margins })
+}
+
+#[cfg(test)]
+mod tests {
+    use config::{GainMethod, Vehicle};
+    use observer::Phase;
+
+    use super::super::{Model, Quantity, design_discrete_phase, rounded};
+    use super::*;
+
+    #[test]
+    fn the_discrete_twin_has_the_reference_gain() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let phase = Phase::TorquePhase;
+        let mut system = ErrorSystem::of(&vehicle, Model::Compliant, Quantity::Pressure, phase, 0.01);
+        system.h = DMatrix::from_row_slice(2, 2, &[2.38, 0.0, 0.0, 0.13]);
+        let found = smallest_gain(&system, 0.67, |gain| rounded(gain, Model::Compliant, phase)).unwrap();
+        let reference = DMatrix::from_row_slice(2, 2, &[-1.29, 18.04, -2.70, -64.8]);
+        // The reference is printed to three digits.
+        let gain = &found.gains[0];
+        assert!((gain - &reference).component_div(&reference).abs().max() < 0.004, "{gain}");
+    }
+
+    #[test]
+    fn the_rigid_twin_contracts_and_yields_to_the_open_loop_where_it_must() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let design = |vehicle: &Vehicle, phase| {
+            design_discrete_phase(vehicle, Model::Rigid, GainMethod::IssDiscrete, Quantity::Pressure, phase, 0.01)
+                .unwrap()
+        };
+        assert!(design(&vehicle, Phase::TorquePhase).uses_open_loop);
+        // A valve that may be five times as late is worth a gain, and that gain contracts as the settling time asks.
+        let mut poor = vehicle.clone();
+        poor.error_bounds.valve_delay_s[1] *= 5.0;
+        let certificate = design(&poor, Phase::InertiaPhase);
+        assert!(!certificate.uses_open_loop && certificate.bound_pa < certificate.open_loop_bound_pa);
+        let rho = (-4.0 / vehicle.inertia_phase.settling_time_s * 0.01).exp();
+        let model = crate::rigid_model(&vehicle);
+        let valve = model.valve.linear(0.0);
+        let phi = (valve.a22_per_s * 0.01).exp();
+        for friction in [0.10, 0.13, 0.16] {
+            let influence = model.influence(Phase::InertiaPhase, friction);
+            let gain = &certificate.gains[0].normalised[0];
+            let per_gain = |i: usize| gain[i] * influence[i] * 1e5 / 100.0;
+            let factor = phi - (per_gain(0) + per_gain(1)) * (phi - 1.0) / valve.a22_per_s;
+            assert!(factor.abs() <= rho, "{factor} at friction {friction}");
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! The error of a sampled observer, with everything of the error budget that disturbs it.
+
+use config::Vehicle;
+use nalgebra::{DMatrix, DVector};
+use observer::Phase;
+
+use super::{Model, Quantity};
+use crate::budget::{ValveErrors, grade_n_m, mass_n_m};
+use crate::compliant::{PRESSURE_UNIT_PA, SHAFT_UNIT_N_M, SPEED_UNITS_RAD_S, compliant_model};
+use crate::compliant::{given_error_matrix, outputs as compliant_outputs};
+use crate::polytope::{distinct, valve_extremes};
+use crate::rigid::rigid_model;
+
+/// Roundings that an observer adds up in a sample, in single precision.
+const ROUNDINGS: f64 = 8.0;
+
+/// `e+ = (Phi - L G Psi) e - L (through the gain) + (direct)`, normalised as [`crate::compliant`] says.
+#[derive(Debug, Clone)]
+pub(crate) struct ErrorSystem {
+    pub(crate) corners: Vec<Corner>,
+    /// What reaches the error through the gain at any corner, in the units of the outputs.
+    through_gain: Vec<Cause>,
+    /// What reaches it past the gain, in the units of the states.
+    pub(crate) direct: Vec<Cause>,
+    /// Errors of the accelerations alone, a column for each cause: `H`.
+    pub(crate) h: DMatrix<f64>,
+}
+
+/// A corner of the polytope.
+#[derive(Debug, Clone)]
+pub(crate) struct Corner {
+    pub(crate) label: String,
+    /// Friction coefficient.
+    pub(crate) friction: f64,
+    /// Which of the valve's extremes.
+    pub(crate) valve: usize,
+    pub(crate) phi: DMatrix<f64>,
+    pub(crate) g_psi: DMatrix<f64>,
+    /// What looks like a pressure there, and reaches the error through the gain too.
+    seen: Vec<Cause>,
+}
+
+/// One error at its bound; it may have either sign.
+#[derive(Debug, Clone)]
+pub(crate) struct Cause {
+    pub(crate) name: &'static str,
+    pub(crate) column: DVector<f64>,
+}
+
+/// Which of `(w_t, dw, w_w)` are outputs.
+pub(crate) fn outputs(model: Model, phase: Phase) -> &'static [usize] {
+    match (model, phase) {
+        (Model::Compliant, _) => compliant_outputs(phase),
+        (Model::Rigid, Phase::InertiaPhase) => &[0, 1],
+        (Model::Rigid, _) => &[0],
+    }
+}
+
+/// Units of the states.
+pub(crate) fn state_units(model: Model) -> &'static [f64] {
+    match model {
+        Model::Rigid => &[PRESSURE_UNIT_PA],
+        Model::Compliant => &[SHAFT_UNIT_N_M, PRESSURE_UNIT_PA],
+    }
+}
+
+impl ErrorSystem {
+    pub(crate) fn of(vehicle: &Vehicle, model: Model, quantity: Quantity, phase: Phase, sample_time_s: f64) -> Self {
+        let mut corners = corners(vehicle, model, phase, sample_time_s);
+        for corner in &mut corners {
+            corner.seen = seen(vehicle, quantity, &corner.g_psi);
+        }
+        let outputs = outputs(model, phase);
+        let accelerations = match model {
+            Model::Rigid => rigid_errors(vehicle, phase),
+            Model::Compliant => compliant_errors(vehicle, phase),
+        };
+        let h = DMatrix::from_columns(&accelerations.iter().map(|cause| cause.column.clone()).collect::<Vec<_>>());
+        let mut through_gain: Vec<Cause> = (accelerations.into_iter())
+            .map(|Cause { name, column }| Cause { name, column: column * sample_time_s })
+            .collect();
+        let bounds = &vehicle.error_bounds;
+        let quanta = [bounds.turbine_quantum_rad_s, bounds.slip_quantum_rad_s, bounds.wheel_quantum_rad_s];
+        let rounding = ROUNDINGS * bounds.float32_rounding;
+        for (name, sizes) in
+            [("sensor quantisation", quanta), ("float32 rounding", [rounding * vehicle.limits.speed_max_rad_s; 3])]
+        {
+            for (i, &output) in outputs.iter().enumerate() {
+                let mut column = DVector::zeros(outputs.len());
+                column[i] = sizes[output] / SPEED_UNITS_RAD_S[output];
+                through_gain.push(Cause { name, column });
+            }
+        }
+        let direct = direct(vehicle, model, quantity, &corners, sample_time_s);
+        Self { corners, through_gain, direct, h }
+    }
+
+    /// States: the pressure is the last.
+    pub(crate) fn states(&self) -> usize {
+        self.corners[0].phi.nrows()
+    }
+
+    /// What reaches the error through the gain at a corner.
+    pub(crate) fn causes_through_gain<'a>(&'a self, corner: &'a Corner) -> impl Iterator<Item = &'a Cause> {
+        self.through_gain.iter().chain(&corner.seen)
+    }
+
+    /// The same as columns, as many at every corner.
+    pub(crate) fn through_gain(&self, corner: &Corner) -> DMatrix<f64> {
+        merged(self.causes_through_gain(corner))
+    }
+
+    pub(crate) fn direct(&self) -> DMatrix<f64> {
+        merged(self.direct.iter())
+    }
+}
+
+/// The columns of these causes, those of one direction made one: their errors may have any sign, so their sizes add up.
+fn merged<'a>(causes: impl Iterator<Item = &'a Cause>) -> DMatrix<f64> {
+    let mut columns: Vec<DVector<f64>> = Vec::new();
+    for Cause { column, .. } in causes.filter(|cause| cause.column.norm() > 0.0) {
+        let along = |other: &DVector<f64>| {
+            let cosine = other.dot(column) / (other.norm() * column.norm());
+            (cosine.abs() > 1.0 - 1e-12).then_some(cosine.signum())
+        };
+        match columns.iter_mut().find_map(|other| along(other).map(|sign| (other, sign))) {
+            Some((other, sign)) => *other += column * sign,
+            None => columns.push(column.clone()),
+        }
+    }
+    DMatrix::from_columns(&columns)
+}
+
+fn corners(vehicle: &Vehicle, model: Model, phase: Phase, sample_time_s: f64) -> Vec<Corner> {
+    let (rigid, compliant) = (rigid_model(vehicle), compliant_model(vehicle));
+    let (outputs, units) = (outputs(model, phase), state_units(model));
+    let mut corners = Vec::new();
+    for (valve, (valve_label, a22_per_s)) in valve_extremes(&rigid, &vehicle.uncertainty).into_iter().enumerate() {
+        let phi = (a22_per_s * sample_time_s).exp();
+        let psi = (phi - 1.0) / a22_per_s;
+        for friction in distinct(vehicle.uncertainty.friction) {
+            let (phi, held, influence) = match model {
+                Model::Rigid => {
+                    let on_speeds = rigid.influence(phase, friction);
+                    (vec![phi], vec![psi], vec![vec![on_speeds[0]], vec![on_speeds[1]]])
+                }
+                Model::Compliant => {
+                    let on_speeds = compliant.influence(phase, friction);
+                    (vec![1.0, phi], vec![sample_time_s, psi], on_speeds.iter().map(|row| row.to_vec()).collect())
+                }
+            };
+            corners.push(Corner {
+                label: format!("friction {friction}{valve_label}"),
+                friction,
+                valve,
+                phi: DMatrix::from_diagonal(&DVector::from_vec(phi)),
+                g_psi: DMatrix::from_fn(outputs.len(), units.len(), |i, j| {
+                    influence[outputs[i]][j] * held[j] * units[j] / SPEED_UNITS_RAD_S[outputs[i]]
+                }),
+                seen: Vec::new(),
+            });
+        }
+    }
+    corners
+}
+
+/// Errors of the accelerations that the rigid model has, over the units of its outputs.
+fn rigid_errors(vehicle: &Vehicle, phase: Phase) -> Vec<Cause> {
+    let model = rigid_model(vehicle);
+    let (bounds, rows) = (&vehicle.error_bounds, model.coefficients(phase));
+    let (turbine, slip) = (&rows.turbine, &rows.slip_oncoming);
+    let outputs = outputs(Model::Rigid, phase).len();
+    let cause = |name, on_turbine: f64, on_slip: f64, size: f64| Cause {
+        name,
+        column: DVector::from_fn(outputs, |i, _| [on_turbine, on_slip][i] * size / SPEED_UNITS_RAD_S[i]),
+    };
+    let load = |name, wheel_n_m: f64| {
+        cause(name, turbine.per_output_torque, slip.per_output_torque, wheel_n_m / final_ratio(vehicle))
+    };
+    let mut causes = vec![
+        cause("turbine torque", turbine.per_turbine_torque, slip.per_turbine_torque, bounds.turbine_torque_n_m),
+        load("mass", mass_n_m(vehicle)),
+        load("grade", grade_n_m(vehicle)),
+        load("shaft torsion, tyre slip", bounds.output_torque_n_m * final_ratio(vehicle)),
+    ];
+    if phase == Phase::InertiaPhase {
+        causes.push(cause(
+            "offgoing clutch",
+            turbine.per_offgoing_torque,
+            slip.per_offgoing_torque,
+            bounds.offgoing_torque_n_m,
+        ));
+    }
+    causes
+}
+
+/// The same of the compliant model; given ones of the vehicle file stand in place of turbine torque and load.
+fn compliant_errors(vehicle: &Vehicle, phase: Phase) -> Vec<Cause> {
+    let model = compliant_model(vehicle);
+    let outputs = outputs(Model::Compliant, phase);
+    let column = |on_speeds: [f64; 3]| {
+        DVector::from_fn(outputs.len(), |i, _| on_speeds[outputs[i]] / SPEED_UNITS_RAD_S[outputs[i]])
+    };
+    if let Some(given) = given_error_matrix(vehicle, phase) {
+        return given.column_iter().map(|c| Cause { name: "model error", column: c.into_owned() }).collect();
+    }
+    let bounds = &vehicle.error_bounds;
+    let rows = if phase == Phase::InertiaPhase { &model.inertia_phase } else { &model.torque_phase };
+    let (turbine, slip) = (&rows.turbine, &rows.slip_oncoming);
+    let wheel = |name, n_m: f64| Cause { name, column: column([0.0, 0.0, model.wheel_per_torque * n_m]) };
+    let gearbox = |name, on_turbine: f64, on_slip: f64, size: f64| Cause {
+        name,
+        column: column([on_turbine * size, on_slip * size, 0.0]),
+    };
+    let mut causes = vec![
+        gearbox("turbine torque", turbine.per_turbine_torque, slip.per_turbine_torque, bounds.turbine_torque_n_m),
+        wheel("mass", mass_n_m(vehicle)),
+        wheel("grade", grade_n_m(vehicle)),
+    ];
+    if phase == Phase::InertiaPhase {
+        let on = [turbine.per_offgoing_torque, slip.per_offgoing_torque];
+        causes.push(gearbox("offgoing clutch", on[0], on[1], bounds.offgoing_torque_n_m));
+    }
+    causes
+}
+
+/// Errors that look like a pressure: speeds that are old and tell what the pressure was, and, where the pressure is what
+/// counts, a friction that is not what the observer is told.
+fn seen(vehicle: &Vehicle, quantity: Quantity, g_psi: &DMatrix<f64>) -> Vec<Cause> {
+    let bounds = &vehicle.error_bounds;
+    let influence = g_psi.column(g_psi.ncols() - 1).into_owned();
+    let looks_like = |name, pascal: f64| Cause { name, column: &influence * (pascal / PRESSURE_UNIT_PA) };
+    let mut causes = vec![looks_like("sampling delay", bounds.sampling_delay_s * bounds.shift_ramp_pa_s)];
+    if quantity == Quantity::Pressure {
+        causes.push(looks_like("friction", friction_pa(vehicle)));
+    }
+    causes
+}
+
+/// Pressure that a friction error at its bound is worth in a shift, Pa.
+fn friction_pa(vehicle: &Vehicle) -> f64 {
+    let bounds = &vehicle.error_bounds;
+    let share = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
+    share * bounds.shift_pressure_pa
+}
+
+/// What the valve does otherwise than told, and what the readings make of the twist of the shafts.
+fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corners: &[Corner], sample_time_s: f64) -> Vec<Cause> {
+    let bounds = &vehicle.error_bounds;
+    let states = state_units(model).len();
+    let on = |name, state: usize, size: f64| {
+        let mut column = DVector::zeros(states);
+        column[state] = size / state_units(model)[state];
+        Cause { name, column }
+    };
+    let pressure = states - 1;
+    // An error of the rate acts for the longest through the slowest valve.
+    let longest = |phi: f64| if phi < 1.0 { (phi - 1.0) / (phi.ln() / sample_time_s) } else { sample_time_s };
+    let acts_s = corners.iter().map(|corner| longest(corner.phi[(pressure, pressure)])).fold(0.0, f64::max);
+    let valve = ValveErrors::of(vehicle);
+    let rounding = ROUNDINGS * bounds.float32_rounding;
+    let mut causes = vec![
+        on("valve lag", pressure, acts_s * valve.lag_pa_s),
+        on("valve gain", pressure, acts_s * valve.gain_pa_s),
+        on("valve delay", pressure, acts_s * valve.delay_pa_s),
+        on("float32 rounding", pressure, rounding * bounds.pressure_max_pa),
+    ];
+    if quantity == Quantity::ClutchTorque {
+        // With another friction the same pressure is another torque: the valve model is off by that share.
+        let forgets = corners.iter().map(|corner| 1.0 - corner.phi[(pressure, pressure)]).fold(0.0, f64::max);
+        causes.push(on("friction", pressure, forgets * friction_pa(vehicle)));
+    }
+    if model == Model::Compliant {
+        let overall = vehicle.shift.ratio_offgoing() * final_ratio(vehicle);
+        let twist_rad_s = bounds.wheel_quantum_rad_s + bounds.turbine_quantum_rad_s / overall;
+        let stiffness = vehicle.driveline.shaft_stiffness_n_m_rad;
+        causes.push(on("sensor quantisation", 0, stiffness * sample_time_s * twist_rad_s));
+        causes.push(on("float32 rounding", 0, rounding * bounds.shaft_torque_n_m));
+    }
+    causes
+}
+
+fn final_ratio(vehicle: &Vehicle) -> f64 {
+    vehicle.driveline.final_ratio
+}

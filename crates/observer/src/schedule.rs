@@ -1,0 +1,59 @@
+//! Gains that follow the friction coefficient.
+
+use drivetrain::Real;
+
+/// Gains that can be mixed.
+pub trait Mix<T> {
+    /// `(1 - share) self + share other`.
+    fn mixed(&self, other: &Self, share: T) -> Self;
+}
+
+/// Gains at the ends of a range of friction coefficients, linear between them and constant beyond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Schedule<T, G> {
+    /// Least and greatest friction coefficient; of a constant gain, both the same.
+    pub friction: [T; 2],
+    /// The gains there.
+    pub ends: [G; 2],
+}
+
+impl<T: Real, G: Clone> Schedule<T, G> {
+    /// The same gains at any friction.
+    pub fn constant(gains: G) -> Self {
+        Self { friction: [T::zero(); 2], ends: [gains.clone(), gains] }
+    }
+
+    /// The same schedule in another precision, with gains cast by this.
+    pub fn cast<U: Real, H>(&self, gains: impl Fn(&G) -> H) -> Schedule<U, H> {
+        Schedule {
+            friction: self.friction.map(|x| U::of(x.to_f64_exact())),
+            ends: [gains(&self.ends[0]), gains(&self.ends[1])],
+        }
+    }
+}
+
+impl<T: Real, G: Mix<T> + Copy> Schedule<T, G> {
+    /// The gains at a friction coefficient.
+    #[inline]
+    pub fn at(&self, friction: T) -> G {
+        let [least, greatest] = self.friction;
+        if greatest > least {
+            let share = ((friction - least) / (greatest - least)).max(T::zero()).min(T::one());
+            self.ends[0].mixed(&self.ends[1], share)
+        } else {
+            self.ends[0]
+        }
+    }
+}
+
+impl<T: Real, G: Clone> From<G> for Schedule<T, G> {
+    fn from(gains: G) -> Self {
+        Self::constant(gains)
+    }
+}
+
+/// `(1 - share) a + share b`.
+#[inline]
+pub(crate) fn between<T: Real>(a: T, b: T, share: T) -> T {
+    a + share * (b - a)
+}
