@@ -176,6 +176,7 @@ fn a_factor_that_cannot_be_is_refused_before_the_first_run() {
         ("car.engine.torque.torque_n_m", "range = [0.9, 1.1]", "change = \"scale\""),
         ("car.vehicle.mass_kg", "range = [2000, 1300]", "two rising numbers"),
         ("car.vehicle.mass_kg", "", "one of `values`, `range`"),
+        ("car.vehicle.mass_kg", "name = \"torque_phase_s\"\nrange = [1300, 2000]", "a column of the table of runs"),
     ];
     for (key, values, part) in cases {
         let study = Study::new("refused", &text(key, values));

@@ -162,6 +162,17 @@ struct RawNormal {
     deviation: Number,
 }
 
+/// What a calibrator asks of the shift: columns of the table of runs, in its order.
+pub const QUALITY: [&str; 7] = [
+    "torque_phase_s",
+    "inertia_phase_s",
+    "flare_rad_s",
+    "least_shaft_torque_n_m",
+    "jerk_peak_m_s3",
+    "vibration_dose_m_s175",
+    "friction_work_j",
+];
+
 /// Levels of a range in a full factorial plan, if the file does not say.
 const LEVELS: usize = 3;
 /// Most runs of a study.
@@ -197,6 +208,13 @@ impl Study {
         let at = raw.factor.span().start;
         if factors.is_empty() {
             return Err(check.meaning("factor", at, "a study needs at least one factor".to_owned(), None));
+        }
+        let own = |name: &str| QUALITY.contains(&name) || ["run", "seed", "status"].contains(&name);
+        if let Some(at) = factors.iter().position(|factor| own(&factor.name)) {
+            let message = format!("a column of the table of runs is called `{}`", factors[at].name);
+            let hint = "give the factor a `name` of its own".to_owned();
+            let place = raw.factor.get_ref()[at].key.span().start;
+            return Err(check.meaning(&factors[at].key, place, message, Some(hint)));
         }
         if let Some(twice) = (1..factors.len()).find(|&i| factors[..i].iter().any(|f| f.name == factors[i].name)) {
             let message = format!("two factors are called `{}`", factors[twice].name);

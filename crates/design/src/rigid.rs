@@ -1,7 +1,10 @@
 //! From a vehicle to the rigid observer: model, polytopes, gains, certificates.
 
 use config::{DesignRequirement, Vehicle};
-use observer::{Bounded, Budget, Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Schedule, Tracker};
+use observer::{
+    Bounded, Budget, Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Schedule, ShaftErrors, ShaftRange,
+    Tracker,
+};
 use serde::Serialize;
 
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
@@ -90,7 +93,17 @@ pub fn bounded<O>(vehicle: &Vehicle, observer: O) -> Bounded<f64, O> {
         friction_factor: errors.friction_factor,
         slip_rad_s: errors.slip_rad_s,
     };
-    Bounded { observer, budget, clutch: vehicle.oncoming.clutch, limits: vehicle.limits }
+    let shaft = ShaftErrors {
+        turbine_torque_share: errors.turbine_torque_share,
+        turbine_rad_s: errors.turbine_quantum_rad_s,
+        output_rad_s: errors.output_quantum_rad_s,
+        wheel_rad_s: errors.wheel_quantum_rad_s,
+        age_s: errors.sampling_delay_s,
+        offgoing_n_m: errors.offgoing_torque_n_m,
+        offgoing_drain_s: errors.offgoing_drain_s,
+    };
+    let shaft = ShaftRange::new(vehicle.shift, vehicle.converter, vehicle.driveline, shaft);
+    Bounded { observer, budget, clutch: vehicle.oncoming.clutch, shaft, limits: vehicle.limits }
 }
 
 /// Designs the gains of both phases from the vehicle file's requirements.

@@ -7,7 +7,7 @@
 
 use drivetrain::{Clutch, Real, ValveMaps};
 
-use crate::{Estimate, Estimator, Health, Input, InputLimits};
+use crate::{Estimate, Estimator, Health, Input, InputLimits, ShaftMemory, ShaftRange};
 
 /// Largest errors under which the range holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +37,8 @@ pub struct Bounds<T> {
     pub pressure_pa: [T; 2],
     /// Lowest and highest clutch torque while the clutch slips, N m; a locked one carries any torque up to the larger.
     pub clutch_torque_n_m: [T; 2],
+    /// Lowest and highest drive-shaft torque, N m, where the wheel speed is measured.
+    pub shaft_torque_n_m: Option<[T; 2]>,
 }
 
 /// Any observer with a guaranteed range around its estimates.
@@ -48,6 +50,8 @@ pub struct Bounded<T, O> {
     pub budget: Budget<T>,
     /// The oncoming clutch.
     pub clutch: Clutch<T>,
+    /// The drive shafts' part.
+    pub shaft: ShaftRange<T>,
     /// What counts as a measurement.
     pub limits: InputLimits<T>,
 }
@@ -206,14 +210,14 @@ fn moved<T: Real>(budget: &Budget<T>, pressure_pa: T, target_pa: T, dt_s: T, fas
 }
 
 impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {
-    type State = (O::State, Tube<T>);
+    type State = (O::State, Tube<T>, ShaftMemory<T>);
 
     fn start(&self) -> Self::State {
-        (self.observer.start(), Tube::new())
+        (self.observer.start(), Tube::new(), ShaftMemory::new())
     }
 
     #[inline]
-    fn step(&self, (state, tube): &mut Self::State, input: &Input<T>) -> Estimate<T> {
+    fn step(&self, (state, tube, shaft): &mut Self::State, input: &Input<T>) -> Estimate<T> {
         let estimate = self.observer.step(state, input);
         let budget = &self.budget;
         if estimate.health == Health::TimeRejected {
@@ -226,7 +230,14 @@ impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {
         } else {
             tube.send(budget, T::zero(), self.limits.command_max);
         }
-        Estimate { bounds: Some(self.bounds(tube, input)), ..estimate }
+        let mut bounds = self.bounds(tube, input);
+        let usable = self.limits.speeds_valid(input) && self.limits.wheel_valid(input);
+        if usable && estimate.health != Health::TimeRejected {
+            bounds.shaft_torque_n_m = self.shaft.step(shaft, estimate.phase, input, bounds.clutch_torque_n_m);
+        } else {
+            *shaft = ShaftMemory::new();
+        }
+        Estimate { bounds: Some(bounds), ..estimate }
     }
 }
 
@@ -253,7 +264,7 @@ impl<T: Real, O> Bounded<T, O> {
             true if slip > zero => [at_least, at_most],
             true => [-at_most, -at_least],
         };
-        Bounds { pressure_pa: [lower_pa, upper_pa], clutch_torque_n_m }
+        Bounds { pressure_pa: [lower_pa, upper_pa], clutch_torque_n_m, shaft_torque_n_m: None }
     }
 }
 

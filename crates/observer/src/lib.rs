@@ -15,6 +15,7 @@ pub mod kalman;
 pub mod rigid;
 pub mod rigid_model;
 pub mod schedule;
+pub mod shaft_range;
 pub mod signals;
 pub mod sliding;
 pub mod super_twisting;
@@ -30,6 +31,7 @@ pub use kalman::{FilterNoise, KalmanFilter, KalmanState, Linearisation, Readings
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
 pub use schedule::{Mix, Schedule};
+pub use shaft_range::{ShaftErrors, ShaftMemory, ShaftRange};
 pub use signals::{Estimate, Estimator, Health, Input, InputLimits};
 pub use sliding::{SlidingGains, SlidingObserver, SlidingSample, SlidingState};
 pub use super_twisting::{SuperTwisting, SuperTwistingState, TwistingSample};

@@ -138,7 +138,7 @@ fn cell(run: &ObserverRun) -> BenchCell {
     let pressure = of(&run.pressure);
     let rms = |phase| pressure.iter().find(|score| score.phase == phase).map_or(f64::NAN, |score| score.rms);
     let ranges: Vec<_> = run.ranges.iter().filter(|range| both.contains(&range.phase)).collect();
-    let coverage = ranges.iter().map(|range| range.pressure_inside.min(range.torque_inside)).reduce(f64::min);
+    let coverage = ranges.iter().map(|range| range.inside()).reduce(f64::min);
     BenchCell {
         observer: run.entry.name.clone(),
         torque_phase_rms_pa: rms(Phase::TorquePhase),

@@ -167,7 +167,7 @@ fn run_observer(
         shaft: has_shaft.then(|| {
             score(time, &phases, shaft, SETTLED_SHAFT_N_M, |i| estimates[i].shaft_torque_n_m.unwrap_or(f64::NAN))
         }),
-        ranges: score_ranges(&phases, truth_pa, clutch, |i| estimates[i].bounds),
+        ranges: score_ranges(&phases, truth_pa, clutch, shaft, |i| estimates[i].bounds),
         truth_pa: truth_pa.to_vec(),
         time_s: trace.time_s.clone(),
         estimates,

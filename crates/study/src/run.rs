@@ -75,6 +75,10 @@ pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
         bound(signal::PRESSURE_GREATEST, &|bounds| bounds.pressure_pa[1]);
         bound(signal::TORQUE_LEAST, &|bounds| bounds.clutch_torque_n_m[0]);
         bound(signal::TORQUE_GREATEST, &|bounds| bounds.clutch_torque_n_m[1]);
+        if estimates.iter().any(|e| e.bounds.is_some_and(|bounds| bounds.shaft_torque_n_m.is_some())) {
+            bound(signal::SHAFT_LEAST, &|bounds| bounds.shaft_torque_n_m.map_or(f64::NAN, |range| range[0]));
+            bound(signal::SHAFT_GREATEST, &|bounds| bounds.shaft_torque_n_m.map_or(f64::NAN, |range| range[1]));
+        }
     }
     trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().into()).collect());
     trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().into()).collect());

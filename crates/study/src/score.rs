@@ -71,8 +71,21 @@ pub struct RangeScore {
     pub pressure_inside: f64,
     /// Share of the samples with the true clutch torque in the range.
     pub torque_inside: f64,
+    /// Share of the samples with the true shaft torque in the range, of those that have one.
+    pub shaft_inside: f64,
     /// Mean width of the range of the pressure, Pa.
     pub width_pa: f64,
+    /// Mean width of the range of the clutch torque, N m.
+    pub torque_width_n_m: f64,
+    /// Mean width of the range of the shaft torque, N m; NaN without one.
+    pub shaft_width_n_m: f64,
+}
+
+impl RangeScore {
+    /// The least share of samples inside of the three.
+    pub fn inside(&self) -> f64 {
+        self.pressure_inside.min(self.torque_inside).min(self.shaft_inside)
+    }
 }
 
 /// Scores of the ranges in the torque and inertia phase and after the shift; none where there is no range.
@@ -80,6 +93,7 @@ pub fn score_ranges(
     phases: &[Phase],
     pressure_pa: &[f64],
     torque_n_m: &[f64],
+    shaft_n_m: &[f64],
     bounds: impl Fn(usize) -> Option<Bounds<f64>>,
 ) -> Vec<RangeScore> {
     [Phase::TorquePhase, Phase::InertiaPhase, Phase::AfterShift]
@@ -92,10 +106,21 @@ pub fn score_ranges(
                 ranges.iter().map(|(i, bounds)| value(*i, bounds)).sum::<f64>() / ranges.len() as f64
             };
             let inside = |[low, high]: [f64; 2], truth: f64| f64::from(u8::from(low <= truth && truth <= high));
+            let shafts = || ranges.iter().filter_map(|(i, bounds)| Some((*i, bounds.shaft_torque_n_m?)));
+            let mean_shaft = |value: &dyn Fn(usize, [f64; 2]) -> f64| {
+                shafts().map(|(i, range)| value(i, range)).sum::<f64>() / shafts().count() as f64
+            };
             (!ranges.is_empty()).then(|| RangeScore {
                 phase,
                 pressure_inside: mean(&|i, bounds| inside(bounds.pressure_pa, pressure_pa[i])),
                 torque_inside: mean(&|i, bounds| inside(bounds.clutch_torque_n_m, torque_n_m[i])),
+                shaft_inside: if shafts().count() > 0 {
+                    mean_shaft(&|i, range| inside(range, shaft_n_m[i]))
+                } else {
+                    1.0
+                },
+                torque_width_n_m: mean(&|_, bounds| bounds.clutch_torque_n_m[1] - bounds.clutch_torque_n_m[0]),
+                shaft_width_n_m: mean_shaft(&|_, range| range[1] - range[0]),
                 width_pa: mean(&|_, bounds| bounds.pressure_pa[1] - bounds.pressure_pa[0]),
             })
         })

@@ -68,6 +68,10 @@ pub const PRESSURE_GREATEST: &str = "oncoming_pressure_greatest_pa";
 pub const TORQUE_LEAST: &str = "oncoming_torque_least_n_m";
 /// Upper end of the guaranteed range of the clutch torque, N m.
 pub const TORQUE_GREATEST: &str = "oncoming_torque_greatest_n_m";
+/// Lower end of the guaranteed range of the drive-shaft torque, N m.
+pub const SHAFT_LEAST: &str = "shaft_torque_least_n_m";
+/// Upper end of the guaranteed range of the drive-shaft torque, N m.
+pub const SHAFT_GREATEST: &str = "shaft_torque_greatest_n_m";
 /// Phase as the supervisor sees it, a word.
 pub const PHASE: &str = "phase";
 /// Whether the input could be used, a word.

@@ -85,8 +85,12 @@ pub struct ErrorBounds {
     pub output_torque_n_m: f64,
     /// Torque left in the offgoing clutch when it has let go, N m.
     pub offgoing_torque_n_m: f64,
+    /// Time from its first slip until no more than that is left, s.
+    pub offgoing_drain_s: f64,
     /// Error of the change of the turbine speed from one sample to the next, rad/s.
     pub turbine_quantum_rad_s: f64,
+    /// Error of the change of the output speed from one sample to the next, rad/s.
+    pub output_quantum_rad_s: f64,
     /// Error of the change of the slip from one sample to the next, rad/s.
     pub slip_quantum_rad_s: f64,
     /// Error of the change of the wheel speed from one sample to the next, rad/s.
@@ -539,8 +543,10 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
         output_torque_n_m: number("output_torque_n_m", &raw.output_torque_n_m, 0.0..=50e3)?,
         offgoing_torque_n_m: number("offgoing_torque_n_m", &raw.offgoing_torque_n_m, 0.0..=1e4)?,
+        offgoing_drain_s: number("offgoing_drain_s", &raw.offgoing_drain_s, 0.0..=2.0)?,
         turbine_torque_share: number("turbine_torque_share", &raw.turbine_torque_share, 0.0..=0.9)?,
         turbine_quantum_rad_s: number("turbine_quantum_rad_s", &raw.turbine_quantum_rad_s, 0.0..=50.0)?,
+        output_quantum_rad_s: number("output_quantum_rad_s", &raw.output_quantum_rad_s, 0.0..=50.0)?,
         slip_quantum_rad_s: number("slip_quantum_rad_s", &raw.slip_quantum_rad_s, 0.0..=50.0)?,
         wheel_quantum_rad_s: number("wheel_quantum_rad_s", &raw.wheel_quantum_rad_s, 0.0..=50.0)?,
         sampling_delay_s: number("sampling_delay_s", &raw.sampling_delay_s, 0.0..=0.2)?,

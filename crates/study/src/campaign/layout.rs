@@ -1,5 +1,6 @@
 //! The columns of a study's table.
 
+use config::study::QUALITY;
 use config::{Experiment, ObserverKind, Study};
 use observer::Phase;
 
@@ -59,7 +60,7 @@ impl Metric {
             Self::ShaftRms => run.shaft.as_ref()?,
             Self::Coverage | Self::RangeWidth => {
                 let range = run.ranges.iter().find(|range| range.phase == phase)?;
-                let covered = range.pressure_inside.min(range.torque_inside);
+                let covered = range.inside();
                 return Some(if self == Self::Coverage { covered } else { range.width_pa });
             }
         };
@@ -71,17 +72,6 @@ impl Metric {
         })
     }
 }
-
-/// What a calibrator asks of the shift, in the order of the table.
-pub const QUALITY: [&str; 7] = [
-    "torque_phase_s",
-    "inertia_phase_s",
-    "flare_rad_s",
-    "least_shaft_torque_n_m",
-    "jerk_peak_m_s3",
-    "vibration_dose_m_s175",
-    "friction_work_j",
-];
 
 /// Where everything stands in a row of numbers: factors, shift quality, scores.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,12 +3,13 @@
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use config::study::QUALITY;
 use config::{ConfigError, Study, Varied};
 use design::DesignError;
 use plant::PlantError;
 use trace::Trace;
 
-use super::layout::{Layout, QUALITY};
+use super::layout::Layout;
 use super::plan::{factor_values, run_seed};
 use crate::comparison::{ObserverRun, observers, run_observers};
 use crate::drive::simulate_shift;
