@@ -310,7 +310,7 @@ fn bench_ranks_the_observers_and_an_experiment_without_scenarios_is_told_so() {
     assert!(output.status.success(), "{}", stderr(&output));
     let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert!(json["rows"].as_array().unwrap().len() >= 22);
-    assert_eq!(json["ranking"].as_array().unwrap().len(), 11);
+    assert_eq!(json["ranking"].as_array().unwrap().len(), 13);
     let output = wetclutch(&["bench", EXPERIMENT]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("there is no [[scenario]] to run"), "{}", stderr(&output));

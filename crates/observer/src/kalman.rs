@@ -19,7 +19,7 @@ use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients};
 use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Track, Tracker};
 
 /// Time over which the acceleration of the wheels is averaged, s.
-const WHEEL_AVERAGE_S: f64 = 0.2;
+const WHEEL_AVERAGE_S: f64 = 0.05;
 
 pub(crate) const N: usize = 6;
 const TURBINE: usize = 0;
@@ -128,8 +128,6 @@ pub struct KalmanState<T> {
 pub struct Running<T> {
     pub(crate) mean: [T; N],
     pub(crate) covariance: [[T; N]; N],
-    /// Accelerations of turbine and output over the last sample, rad/s^2.
-    pub(crate) rates: [T; 2],
     /// Wheel speed through a low pass, rad/s: how far the speed is ahead of it tells the acceleration.
     slow_wheel: T,
     last: Input<T>,
@@ -186,7 +184,7 @@ impl<T: Real> KalmanFilter<T> {
         let mean = [input.turbine_rad_s, output, shaft, pressure_pa, zero, holding];
         // Whatever phase it begins in is entered from here.
         let acting = Phase::BeforeShift;
-        Running { mean, covariance, rates: [zero; 2], slow_wheel: input.wheel_rad_s, last: *input, acting }
+        Running { mean, covariance, slow_wheel: input.wheel_rad_s, last: *input, acting }
     }
 
     /// What the powertrain does over the interval that ends with `input`.
@@ -244,7 +242,7 @@ impl<T: Real> KalmanFilter<T> {
 
     /// Carries mean and covariance over the interval.
     #[inline]
-    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>, moving: bool) {
+    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>, moving: bool) -> Start<T> {
         let c = self.passage(running, interval, input);
         let x = running.mean;
         let (above, slope) = match self.linearisation {
@@ -253,12 +251,14 @@ impl<T: Real> KalmanFilter<T> {
         };
         let next = c.propagate(&x, above);
         let f = c.derivative(slope);
-        running.rates = [(next[TURBINE] - x[TURBINE]) / interval.dt_s, (next[OUTPUT] - x[OUTPUT]) / interval.dt_s];
         running.mean = next;
-        spread(&mut running.covariance, &f, &[interval.phi, c.stay, c.keep]);
+        let p = &running.covariance;
+        let within = [[p[TURBINE][TURBINE], p[TURBINE][OUTPUT]], [p[OUTPUT][TURBINE], p[OUTPUT][OUTPUT]]];
+        let across = spread(&mut running.covariance, &f, &[interval.phi, c.stay, c.keep]);
         for (i, variance) in self.added(&c, moving).into_iter().enumerate() {
             running.covariance[i][i] = running.covariance[i][i] + variance;
         }
+        Start { mean: [x[TURBINE], x[OUTPUT]], within, across }
     }
 
     /// Variances that an interval adds.
@@ -311,23 +311,48 @@ impl<T: Real> KalmanFilter<T> {
         }
     }
 
-    /// Takes one reading of one state.
+    /// Takes the readings of turbine and output speed. They are as old as their teeth are apart, so they tell a mean of the
+    /// speeds at both ends of the interval, and what the speeds at its start have to do with the states at its end matters.
     #[inline]
-    pub(crate) fn correct(running: &mut Running<T>, state: usize, reading: T, deviation: T) {
+    fn correct(&self, running: &mut Running<T>, start: &Start<T>, interval: &Interval<T>, input: &Input<T>) {
+        let one = T::one();
+        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
+        let readings = [input.turbine_rad_s, output];
+        let lags = [self.readings.turbine_rad, self.readings.output_rad];
+        let deviations = [self.noise.turbine_rad_s, self.noise.output_rad_s];
+        let old: [T; 2] = core::array::from_fn(|k| self.age(lags[k], readings[k]) / interval.dt_s);
+        let new = old.map(|share| one - share);
         let p = &mut running.covariance;
-        let column = p[state];
-        let inverse = (column[state] + deviation * deviation).recip();
-        let surprise = reading - running.mean[state];
+        let columns: [[T; N]; 2] =
+            core::array::from_fn(|k| core::array::from_fn(|i| new[k] * p[k][i] + old[k] * start.across[i][k]));
+        let surprise: [T; 2] =
+            core::array::from_fn(|k| readings[k] - new[k] * running.mean[k] - old[k] * start.mean[k]);
+        // Covariance of the readings k and l.
+        let of = |k: usize, l: usize| new[l] * columns[k][l] + old[l] * (new[k] * start.across[k][l] + old[k] * start.within[k][l]);
+        let square = |x: T| x * x;
+        let (a, b, c) = (of(0, 0) + square(deviations[0]), of(0, 1), of(1, 1) + square(deviations[1]));
+        let inverse = (a * c - b * b).recip();
+        let (a, b, c) = (c * inverse, -b * inverse, a * inverse);
         for i in 0..N {
-            let gain = column[i] * inverse;
-            running.mean[i] = running.mean[i] + gain * surprise;
+            let gain = [a * columns[0][i] + b * columns[1][i], b * columns[0][i] + c * columns[1][i]];
+            running.mean[i] = running.mean[i] + gain[0] * surprise[0] + gain[1] * surprise[1];
             for j in i..N {
-                let value = p[i][j] - gain * column[j];
+                let value = p[i][j] - gain[0] * columns[0][j] - gain[1] * columns[1][j];
                 p[i][j] = value;
                 p[j][i] = value;
             }
         }
     }
+}
+
+/// Turbine and output speed at the start of an interval, as the states at its end have to do with them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Start<T> {
+    pub(crate) mean: [T; 2],
+    /// Their covariance.
+    pub(crate) within: [[T; 2]; 2],
+    /// Covariance of the states at the end with them.
+    pub(crate) across: [[T; 2]; N],
 }
 
 /// What the powertrain does over one interval.
@@ -434,9 +459,9 @@ impl<T: Real> Passage<T> {
 }
 
 /// `P = F P F'`, where `F` has three full rows, of which only the first has the turbine speed, and three of the
-/// diagonal alone.
+/// diagonal alone. Returns the first two columns of `F P`.
 #[inline]
-fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) {
+fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) -> [[T; 2]; N] {
     let mut fp = [[T::zero(); N]; N];
     for (i, row) in f.iter().enumerate() {
         let first = if i == TURBINE { TURBINE } else { OUTPUT };
@@ -460,6 +485,7 @@ fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) {
             p[j][i] = value;
         }
     }
+    fp.map(|row| [row[TURBINE], row[OUTPUT]])
 }
 
 impl<T: Real> Estimator<T> for KalmanFilter<T> {
@@ -482,7 +508,7 @@ impl<T: Real> KalmanFilter<T> {
         &self,
         state: &mut KalmanState<T>,
         input: &Input<T>,
-        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool),
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool) -> Start<T>,
     ) -> Estimate<T> {
         let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
             state.track.last = None;
@@ -511,21 +537,14 @@ impl<T: Real> KalmanFilter<T> {
         state: &mut KalmanState<T>,
         interval: &Interval<T>,
         input: &Input<T>,
-        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool),
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool) -> Start<T>,
     ) {
         let (_, acting) = self.tracker.phase(&mut state.track.tracker, interval.dt_s, input);
-        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
         let moving = state.track.tracker.valve_pressure_pa > T::of(1e3);
         let mut running = match state.track.last {
             Some(mut running) if interval.dt_s > T::zero() => {
-                predict(self, &mut running, interval, input, moving);
-                // Old readings are brought forward by the acceleration that the model has.
-                let [turbine_rate, output_rate] = running.rates;
-                let turbine = input.turbine_rad_s;
-                let turbine = turbine + self.age(self.readings.turbine_rad, turbine) * turbine_rate;
-                let output = output + self.age(self.readings.output_rad, output) * output_rate;
-                Self::correct(&mut running, TURBINE, turbine, self.noise.turbine_rad_s);
-                Self::correct(&mut running, OUTPUT, output, self.noise.output_rad_s);
+                let start = predict(self, &mut running, interval, input, moving);
+                self.correct(&mut running, &start, interval, input);
                 running.mean[PRESSURE] = running.mean[PRESSURE].max(T::zero());
                 running
             }

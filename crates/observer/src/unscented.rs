@@ -6,7 +6,7 @@
 
 use drivetrain::Real;
 
-use crate::kalman::{N, PRESSURE, Running};
+use crate::kalman::{N, PRESSURE, Running, Start};
 use crate::{Estimate, Estimator, Input, Interval, KalmanFilter, KalmanState};
 
 /// The filter.
@@ -45,24 +45,30 @@ fn predict<T: Real>(
     interval: &Interval<T>,
     input: &Input<T>,
     moving: bool,
-) {
+) -> Start<T> {
     let passage = filter.passage(running, interval, input);
     let before = running.mean;
     let axes = square_root(&running.covariance);
     let (mut points, mut mean) = ([[T::zero(); N]; 2 * N], [T::zero(); N]);
     let reach = T::of(N as f64).sqrt();
     let weight = T::of(0.5 / N as f64);
+    let sign = |n: usize| if n < N { reach } else { -reach };
     for (n, point) in points.iter_mut().enumerate() {
-        let sign = if n < N { reach } else { -reach };
-        let start: [T; N] = core::array::from_fn(|i| before[i] + sign * axes[i][n % N]);
+        let start: [T; N] = core::array::from_fn(|i| before[i] + sign(n) * axes[i][n % N]);
         *point = passage.propagate(&start, passage.above_kiss(start[PRESSURE]));
         for (mean, x) in mean.iter_mut().zip(point.iter()) {
             *mean = *mean + weight * *x;
         }
     }
     let mut covariance = [[T::zero(); N]; N];
-    for point in &points {
+    let mut across = [[T::zero(); 2]; N];
+    for (n, point) in points.iter().enumerate() {
         let off: [T; N] = core::array::from_fn(|i| point[i] - mean[i]);
+        for (sums, off) in across.iter_mut().zip(off) {
+            for (k, sum) in sums.iter_mut().enumerate() {
+                *sum = *sum + weight * off * sign(n) * axes[k][n % N];
+            }
+        }
         for (row, a) in covariance.iter_mut().zip(off) {
             for (sum, b) in row.iter_mut().zip(off) {
                 *sum = *sum + weight * a * b;
@@ -72,9 +78,11 @@ fn predict<T: Real>(
     for (i, variance) in filter.added(&passage, moving).into_iter().enumerate() {
         covariance[i][i] = covariance[i][i] + variance;
     }
-    running.rates = [(mean[0] - before[0]) / interval.dt_s, (mean[1] - before[1]) / interval.dt_s];
+    let p = &running.covariance;
+    let within = [[p[0][0], p[0][1]], [p[1][0], p[1][1]]];
     running.mean = mean;
     running.covariance = covariance;
+    Start { mean: [before[0], before[1]], within, across }
 }
 
 /// Lower triangular square root; an axis that rounding has made negative is taken as none.

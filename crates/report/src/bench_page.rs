@@ -24,8 +24,8 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             shaft => [s.shaft_median_rms_n_m, s.shaft_worst_rms_n_m]
                 .map(|value| value.map_or_else(|| "–".to_owned(), |n_m| format!("{n_m:.0}"))),
             coverage => s.range_least_coverage.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
-            width => s.range_median_width_pa.map_or_else(|| "–".to_owned(), pressure),
-            step => format!("{:.0}", s.step_ns),
+            over_errors => s.range_median_over_errors.map_or_else(|| "–".to_owned(), |over| format!("{over:.1}")),
+            step => [s.step_ns, s.step_with_range_ns].map(|ns| format!("{ns:.0}")),
         }
     });
     let rows = bench.rows.iter().map(|row| {
@@ -43,6 +43,14 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             }).collect::<Vec<_>>(),
         }
     });
+    let first = bench.ranking.first();
+    let widths = first.and_then(|s| {
+        Some([
+            pressure(s.range_median_width_pa?),
+            format!("{:.0}", s.torque_range_median_width_n_m?),
+            format!("{:.0}", s.shaft_range_median_width_n_m?),
+        ])
+    });
     Ok(templates()?.get_template("bench.html")?.render(context! {
         name => &experiment.name,
         title => &experiment.title,
@@ -52,6 +60,7 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         observers => experiment.observers.iter().map(|entry| entry.name.clone()).collect::<Vec<_>>(),
         ranking => ranking.collect::<Vec<_>>(),
         rows => rows.collect::<Vec<_>>(),
+        widths,
         inputs => origin(&[&vehicle.source, &experiment.source]),
     })?)
 }

@@ -3,12 +3,12 @@
 use std::time::Instant;
 
 use config::{Experiment, Vehicle};
-use observer::Phase;
+use observer::{Estimate, Phase};
 use serde::Serialize;
 
 use crate::comparison::{observers, run_observers};
 use crate::sampling::sampled;
-use crate::{AnyObserver, ObserverRun, PhaseScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
+use crate::{ObserverRun, PhaseScore, RangeScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
 
 /// How one observer did in one scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,6 +29,10 @@ pub struct BenchCell {
     pub range_coverage: Option<f64>,
     /// Mean width of the guaranteed range of the pressure over both phases, Pa.
     pub range_width_pa: Option<f64>,
+    /// The same of the clutch torque, N m.
+    pub torque_range_width_n_m: Option<f64>,
+    /// The same of the drive-shaft torque, N m.
+    pub shaft_range_width_n_m: Option<f64>,
 }
 
 /// One scenario.
@@ -65,10 +69,18 @@ pub struct BenchSummary {
     pub shaft_worst_rms_n_m: Option<f64>,
     /// Least coverage of the guaranteed range over the scenarios.
     pub range_least_coverage: Option<f64>,
-    /// Median width of the guaranteed range, Pa.
+    /// Median width of the guaranteed range of the pressure, Pa.
     pub range_median_width_pa: Option<f64>,
-    /// Time of one step with its guaranteed range, ns, on this machine: the fastest of several runs.
+    /// Median of that width over the width that holds 95 % of errors of the observer's RMS, were they normal.
+    pub range_median_over_errors: Option<f64>,
+    /// Median width of the range of the clutch torque, N m.
+    pub torque_range_median_width_n_m: Option<f64>,
+    /// Median width of the range of the drive-shaft torque, N m.
+    pub shaft_range_median_width_n_m: Option<f64>,
+    /// Time of one step, ns, on this machine: the fastest of several runs.
     pub step_ns: f64,
+    /// The same with the guaranteed range.
+    pub step_with_range_ns: f64,
 }
 
 /// The bench's result.
@@ -103,24 +115,29 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     if let (Some(open_loop), Some(trace)) = (open_loop, first_trace) {
         for (at, (entry, observer)) in experiment.observers.iter().zip(&observers).enumerate() {
             let samples = sampled(&trace, entry.sample_time_s);
-            let step_ns = step_ns(vehicle, observer, &RunColumns::of(&samples, vehicle)?);
-            ranking.push(BenchSummary { step_ns, ..summary(&entry.name, at, open_loop, &rows) });
+            let columns = RunColumns::of(&samples, vehicle)?;
+            let step_ns = fastest_ns(|| observer.run_alone(&columns));
+            let step_with_range_ns = fastest_ns(|| observer.run(vehicle, &columns));
+            ranking.push(BenchSummary { step_ns, step_with_range_ns, ..summary(&entry.name, at, open_loop, &rows) });
         }
     }
     ranking.sort_by(|a, b| a.shift_median_ratio.total_cmp(&b.shift_median_ratio));
     Ok(Bench { rows, ranking })
 }
 
+/// Width that holds 95 % of normal errors, in standard deviations.
+const ERRORS_95: f64 = 2.0 * 1.96;
+
 /// Runs over which the fastest step is sought.
 const TIMED_RUNS: usize = 20;
 
 /// Time of one step, ns.
-fn step_ns(vehicle: &Vehicle, observer: &AnyObserver, columns: &RunColumns<'_>) -> f64 {
+fn fastest_ns(run: impl Fn() -> Vec<Estimate<f64>>) -> f64 {
     let mut best = f64::INFINITY;
     let mut steps = 1;
     for _ in 0..TIMED_RUNS {
         let began = Instant::now();
-        steps = std::hint::black_box(observer.run(vehicle, columns)).len().max(1);
+        steps = std::hint::black_box(run()).len().max(1);
         best = best.min(began.elapsed().as_secs_f64());
     }
     1e9 * best / steps as f64
@@ -138,6 +155,10 @@ fn cell(run: &ObserverRun) -> BenchCell {
     let pressure = of(&run.pressure);
     let rms = |phase| pressure.iter().find(|score| score.phase == phase).map_or(f64::NAN, |score| score.rms);
     let ranges: Vec<_> = run.ranges.iter().filter(|range| both.contains(&range.phase)).collect();
+    let width = |of: fn(&RangeScore) -> f64| {
+        let mean = ranges.iter().map(|range| of(range)).sum::<f64>() / ranges.len() as f64;
+        mean.is_finite().then_some(mean)
+    };
     let coverage = ranges.iter().map(|range| range.inside()).reduce(f64::min);
     BenchCell {
         observer: run.entry.name.clone(),
@@ -147,7 +168,9 @@ fn cell(run: &ObserverRun) -> BenchCell {
         chatter_pa: pressure.iter().map(|score| score.chatter).sum(),
         shaft_rms_n_m: run.shaft.as_ref().map(|shaft| together(&of(shaft))),
         range_coverage: coverage,
-        range_width_pa: coverage.map(|_| ranges.iter().map(|r| r.width_pa).sum::<f64>() / ranges.len() as f64),
+        range_width_pa: width(|range| range.width_pa),
+        torque_range_width_n_m: width(|range| range.torque_width_n_m),
+        shaft_range_width_n_m: width(|range| range.shaft_width_n_m),
     }
 }
 
@@ -164,7 +187,7 @@ fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummar
     let inertia = ratios(|cell| cell.inertia_phase_rms_pa);
     let last = |values: &[f64]| values.last().copied().unwrap_or(f64::NAN);
     let shaft = some(|cell| cell.shaft_rms_n_m);
-    let widths = some(|cell| cell.range_width_pa);
+    let middle = |values: Vec<f64>| (!values.is_empty()).then(|| median(&values));
     BenchSummary {
         observer: name.to_owned(),
         shift_median_ratio: median(&ratios(|cell| cell.shift_rms_pa)),
@@ -176,8 +199,12 @@ fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummar
         shaft_median_rms_n_m: (!shaft.is_empty()).then(|| median(&shaft)),
         shaft_worst_rms_n_m: shaft.last().copied(),
         range_least_coverage: some(|cell| cell.range_coverage).first().copied(),
-        range_median_width_pa: (!widths.is_empty()).then(|| median(&widths)),
+        range_median_width_pa: middle(some(|cell| cell.range_width_pa)),
+        range_median_over_errors: middle(some(|cell| Some(cell.range_width_pa? / (ERRORS_95 * cell.shift_rms_pa)))),
+        torque_range_median_width_n_m: middle(some(|cell| cell.torque_range_width_n_m)),
+        shaft_range_median_width_n_m: middle(some(|cell| cell.shaft_range_width_n_m)),
         step_ns: f64::NAN,
+        step_with_range_ns: f64::NAN,
     }
 }
 

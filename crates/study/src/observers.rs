@@ -123,22 +123,35 @@ impl AnyObserver {
     /// Runs it over every sample; one estimate for each, with a guaranteed range where this vehicle's error budget
     /// gives one.
     pub fn run(&self, vehicle: &Vehicle, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
+        self.run_within(Some(vehicle), columns)
+    }
+
+    /// The same without a range.
+    pub fn run_alone(&self, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
+        self.run_within(None, columns)
+    }
+
+    fn run_within(&self, budget: Option<&Vehicle>, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
         match self {
-            Self::Rigid(observer) => run_bounded(vehicle, columns, observer),
-            Self::Compliant(observer) => run_bounded(vehicle, columns, observer.as_ref()),
-            Self::Sliding(observer) => run_bounded(vehicle, columns, observer),
-            Self::Kalman(observer) => run_bounded(vehicle, columns, observer.as_ref()),
-            Self::Unscented(observer) => run_bounded(vehicle, columns, observer.as_ref()),
-            Self::SuperTwisting(observer) => run_bounded(vehicle, columns, observer.as_ref()),
-            Self::Inversion(observer) => run_bounded(vehicle, columns, observer.as_ref()),
+            Self::Rigid(observer) => run_bounded(budget, columns, observer),
+            Self::Compliant(observer) => run_bounded(budget, columns, observer.as_ref()),
+            Self::Sliding(observer) => run_bounded(budget, columns, observer),
+            Self::Kalman(observer) => run_bounded(budget, columns, observer.as_ref()),
+            Self::Unscented(observer) => run_bounded(budget, columns, observer.as_ref()),
+            Self::SuperTwisting(observer) => run_bounded(budget, columns, observer.as_ref()),
+            Self::Inversion(observer) => run_bounded(budget, columns, observer.as_ref()),
         }
     }
 }
 
-fn run_bounded(vehicle: &Vehicle, columns: &RunColumns<'_>, observer: &impl Estimator<f64>) -> Vec<Estimate<f64>> {
-    match vehicle.observer_valve {
-        Valve::Proportional { .. } => run(columns, &bounded(vehicle, observer)),
-        // The budget is of a valve that is commanded by a current.
-        Valve::PulseWidth { .. } => run(columns, observer),
+fn run_bounded(
+    budget: Option<&Vehicle>,
+    columns: &RunColumns<'_>,
+    observer: &impl Estimator<f64>,
+) -> Vec<Estimate<f64>> {
+    // The budget is of a valve that is commanded by a current.
+    match budget.filter(|vehicle| matches!(vehicle.observer_valve, Valve::Proportional { .. })) {
+        Some(vehicle) => run(columns, &bounded(vehicle, observer)),
+        None => run(columns, observer),
     }
 }
