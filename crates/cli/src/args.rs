@@ -280,9 +280,10 @@ pub(crate) enum ObserverChoice {
     Compliant,
     /// Full-order sliding mode, gains from the sliding condition
     Sliding,
-    /// Kalman filter with unknown torques as states; needs wheel_speed_rad_s, gives shaft torque too
+    /// Kalman filter with unknown torques as states, told how old readings are; needs wheel_speed_rad_s, gives shaft
+    /// torque too
     Kalman,
-    /// The same, linearised by the tangent
+    /// The same as textbooks have it, every reading of the moment
     Extended,
     /// Unscented Kalman filter on the same states
     Unscented,

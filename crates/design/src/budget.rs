@@ -25,7 +25,7 @@ impl ValveErrors {
     /// Those of this vehicle, at the pressure and the ramp that its budget takes for a shift.
     pub fn of(vehicle: &Vehicle) -> Self {
         let (budget, real) = (&vehicle.error_bounds, &vehicle.oncoming.valve);
-        let pressure_pa = vehicle.oncoming.clutch.kiss_pressure() + budget.shift_pressure_pa;
+        let pressure_pa = shift_pressure(vehicle);
         let (told, gain) = match &vehicle.observer_valve {
             valve @ Valve::Proportional { .. } => {
                 let (mut low, mut high) = (0.0, vehicle.limits.command_max);
@@ -58,11 +58,11 @@ impl ValveErrors {
     pub fn largest_pa_s(&self) -> f64 {
         self.lag_pa_s + self.gain_pa_s + self.delay_pa_s
     }
+}
 
-    /// Standard deviation if they are independent and each bound is the edge of a uniform distribution, Pa/s.
-    pub fn deviation_pa_s(&self) -> f64 {
-        self.lag_pa_s.hypot(self.gain_pa_s).hypot(self.delay_pa_s) / 3.0_f64.sqrt()
-    }
+/// Pressure of a shift at which the budget weighs the errors, Pa.
+pub(crate) fn shift_pressure(vehicle: &Vehicle) -> f64 {
+    vehicle.oncoming.clutch.kiss_pressure() + vehicle.error_bounds.shift_pressure_pa
 }
 
 /// What a grade at its bound does at the wheels, N m.

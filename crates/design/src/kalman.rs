@@ -1,14 +1,19 @@
 //! The Kalman filters of a vehicle: what it does not know, from the error budget and the sensors.
 
 use config::{Sensors, SpeedSensor, Vehicle};
-use observer::{FilterNoise, KalmanFilter, Linearisation, Readings, UnscentedFilter};
+use observer::{FilterNoise, KalmanFilter, Readings, UnscentedFilter};
 
-use crate::budget::ValveErrors;
+use crate::budget::{ValveErrors, shift_pressure};
 use crate::compliant::compliant_model;
 use crate::rigid::tracker;
 
 /// Standard deviation of a speed reading where no sensor is described, rad/s.
 const READING_RAD_S: f64 = 0.02;
+
+/// Standard deviation of an error whose bound is the edge of a uniform distribution.
+fn deviation_of(bound: f64) -> f64 {
+    bound / 3.0_f64.sqrt()
+}
 
 /// The Kalman filter of this vehicle, for signals from these sensors; without them the readings are taken to be of the
 /// moment and nearly exact.
@@ -25,6 +30,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
             0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth
         })
     };
+    let valve = ValveErrors::of(vehicle);
     let noise = FilterNoise {
         turbine_rad_s: deviation(|sensors| &sensors.turbine),
         output_rad_s: deviation(|sensors| &sensors.output),
@@ -33,7 +39,8 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         turbine_share_s: told.turbine_share_s,
         twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
-        valve_rate_pa_s: ValveErrors::of(vehicle).deviation_pa_s(),
+        valve_moving: deviation_of(valve.lag_pa_s.hypot(valve.delay_pa_s)) / vehicle.error_bounds.shift_ramp_pa_s,
+        valve_resting_per_s: deviation_of(valve.gain_pa_s) / shift_pressure(vehicle),
         valve_rate_s: told.valve_rate_s,
         offgoing_n_m: told.offgoing_n_m,
         offgoing_release_s: told.offgoing_release_s,
@@ -46,9 +53,10 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
     KalmanFilter::new(compliant_model(vehicle), noise, readings, tracker(vehicle))
 }
 
-/// The extended Kalman filter of this vehicle, told the same.
+/// The extended Kalman filter as textbooks have it: told the same, but every reading is of the moment.
 pub fn extended_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilter<f64> {
-    KalmanFilter { linearisation: Linearisation::Tangent, ..kalman_filter(vehicle, sensors) }
+    let readings = Readings { turbine_rad: 0.0, output_rad: 0.0, wheel_rad: 0.0 };
+    KalmanFilter { readings, ..kalman_filter(vehicle, sensors) }
 }
 
 /// The unscented filter of this vehicle, told the same.

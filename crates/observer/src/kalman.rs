@@ -9,10 +9,11 @@
 //! T_s = T_k + C_s (w_0/i_df - w_w)                                       e, T_ca: random walks
 //! ```
 //!
-//! Three things set it apart from the reduced-order observers. The wheel speed drives the twist and is not an output, so
+//! Four things set it apart from the reduced-order observers. The wheel speed drives the twist and is not an output, so
 //! mass, grade and tyre slip do not enter. The offgoing clutch's torque is a state, so the same equations hold in torque
 //! and inertia phase and no late phase detection spoils them. Before the shift, shaft torque and turbine torque are
-//! found together; an error that both share cancels in the clutch torque afterwards.
+//! found together; an error that both share cancels in the clutch torque afterwards. And a reading
+//! of a toothed wheel is a few milliseconds old: it is held against the speed of that time, not against the newest.
 
 use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients};
 
@@ -46,9 +47,11 @@ pub struct FilterNoise<T> {
     pub twist_rate_rad_s: T,
     /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
     pub output_least_rad_s: T,
-    /// Of the rate of the pressure, Pa/s.
-    pub valve_rate_pa_s: T,
-    /// Time for which an error of that rate persists, s. The filter takes it as white noise of the same power.
+    /// Of the rate of the pressure while it moves, as a share of that rate: errors of lag and delay.
+    pub valve_moving: T,
+    /// The same at rest, as a share of the pressure, 1/s: an error of the gain.
+    pub valve_resting_per_s: T,
+    /// Time for which an error of the rate persists, s. The filter takes it as white noise of the same power.
     pub valve_rate_s: T,
     /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
     pub offgoing_n_m: T,
@@ -68,7 +71,8 @@ impl<T: Real> FilterNoise<T> {
             turbine_share_s: to(self.turbine_share_s),
             twist_rate_rad_s: to(self.twist_rate_rad_s),
             output_least_rad_s: to(self.output_least_rad_s),
-            valve_rate_pa_s: to(self.valve_rate_pa_s),
+            valve_moving: to(self.valve_moving),
+            valve_resting_per_s: to(self.valve_resting_per_s),
             valve_rate_s: to(self.valve_rate_s),
             offgoing_n_m: to(self.offgoing_n_m),
             offgoing_release_s: to(self.offgoing_release_s),
@@ -88,15 +92,6 @@ pub struct Readings<T> {
     pub wheel_rad: T,
 }
 
-/// How the filter passes the kiss point, where the clutch begins to bite: the one corner in its equations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Linearisation {
-    /// By the tangent at the mean: the extended Kalman filter. Below the kiss point it is blind to the pressure.
-    Tangent,
-    /// By the line that fits best over the spread of the pressure, from three points (Gauss and Hermite).
-    Secant,
-}
-
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KalmanFilter<T> {
@@ -106,8 +101,6 @@ pub struct KalmanFilter<T> {
     pub both: ShiftCoefficients<T>,
     /// Coefficients after lock-up.
     pub locked: ShiftCoefficients<T>,
-    /// How it passes the kiss point.
-    pub linearisation: Linearisation,
     /// What it does not know.
     pub noise: FilterNoise<T>,
     /// How its speeds are read.
@@ -130,6 +123,8 @@ pub struct Running<T> {
     pub(crate) covariance: [[T; N]; N],
     /// Wheel speed through a low pass, rad/s: how far the speed is ahead of it tells the acceleration.
     slow_wheel: T,
+    /// How fast the pressure moves or moved a while ago, Pa/s.
+    pub(crate) motion_pa_s: T,
     last: Input<T>,
     acting: Phase,
 }
@@ -139,7 +134,7 @@ impl<T: Real> KalmanFilter<T> {
     pub fn new(model: CompliantModel<T>, noise: FilterNoise<T>, readings: Readings<T>, tracker: Tracker<T>) -> Self {
         let of = |engagement| model.shift.coefficients(engagement);
         let (both, locked) = (of(Engagement::BothSlipping), of(Engagement::OncomingStuck));
-        Self { both, locked, model, linearisation: Linearisation::Secant, noise, readings, tracker }
+        Self { both, locked, model, noise, readings, tracker }
     }
 
     /// Age of a reading that lags by this angle at this speed, s.
@@ -153,10 +148,7 @@ impl<T: Real> KalmanFilter<T> {
         let to = |x: T| U::of(x.to_f64_exact());
         let Readings { turbine_rad, output_rad, wheel_rad } = self.readings;
         let readings = Readings { turbine_rad: to(turbine_rad), output_rad: to(output_rad), wheel_rad: to(wheel_rad) };
-        KalmanFilter {
-            linearisation: self.linearisation,
-            ..KalmanFilter::new(self.model.cast(), self.noise.cast(), readings, self.tracker.cast())
-        }
+        KalmanFilter::new(self.model.cast(), self.noise.cast(), readings, self.tracker.cast())
     }
 
     /// The first estimate: the gear before the shift in balance, an empty cylinder.
@@ -184,7 +176,7 @@ impl<T: Real> KalmanFilter<T> {
         let mean = [input.turbine_rad_s, output, shaft, pressure_pa, zero, holding];
         // Whatever phase it begins in is entered from here.
         let acting = Phase::BeforeShift;
-        Running { mean, covariance, slow_wheel: input.wheel_rad_s, last: *input, acting }
+        Running { mean, covariance, slow_wheel: input.wheel_rad_s, motion_pa_s: zero, last: *input, acting }
     }
 
     /// What the powertrain does over the interval that ends with `input`.
@@ -203,6 +195,10 @@ impl<T: Real> KalmanFilter<T> {
         running.slow_wheel = running.slow_wheel + (dt / slow_s).min(one) * (wheel - running.slow_wheel);
         let wheel_rate = (wheel - running.slow_wheel) / slow_s;
         let wheel_rad_s = wheel + self.age(self.readings.wheel_rad, wheel) * wheel_rate;
+
+        let valve = &interval.valve;
+        let rate = (valve.a22_per_s * running.mean[PRESSURE] + valve.b2_pa_s).abs();
+        running.motion_pa_s = rate.max(running.motion_pa_s * (-dt / noise.valve_rate_s).exp());
 
         // Shaft torque over the interval: T_k + h (w_0 + w_0+) - u w_w.
         let (ratio, stiffness) = (line.final_ratio, line.shaft_stiffness_n_m_rad);
@@ -242,20 +238,17 @@ impl<T: Real> KalmanFilter<T> {
 
     /// Carries mean and covariance over the interval.
     #[inline]
-    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>, moving: bool) -> Start<T> {
+    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>) -> Start<T> {
         let c = self.passage(running, interval, input);
         let x = running.mean;
-        let (above, slope) = match self.linearisation {
-            Linearisation::Tangent => c.tangent(x[PRESSURE]),
-            Linearisation::Secant => c.secant(x[PRESSURE], running.covariance[PRESSURE][PRESSURE]),
-        };
+        let (above, slope) = c.tangent(x[PRESSURE]);
         let next = c.propagate(&x, above);
         let f = c.derivative(slope);
         running.mean = next;
         let p = &running.covariance;
         let within = [[p[TURBINE][TURBINE], p[TURBINE][OUTPUT]], [p[OUTPUT][TURBINE], p[OUTPUT][OUTPUT]]];
         let across = spread(&mut running.covariance, &f, &[interval.phi, c.stay, c.keep]);
-        for (i, variance) in self.added(&c, moving).into_iter().enumerate() {
+        for (i, variance) in self.added(&c, &x, running.motion_pa_s).into_iter().enumerate() {
             running.covariance[i][i] = running.covariance[i][i] + variance;
         }
         Start { mean: [x[TURBINE], x[OUTPUT]], within, across }
@@ -263,7 +256,7 @@ impl<T: Real> KalmanFilter<T> {
 
     /// Variances that an interval adds.
     #[inline]
-    pub(crate) fn added(&self, c: &Passage<T>, moving: bool) -> [T; N] {
+    pub(crate) fn added(&self, c: &Passage<T>, x: &[T; N], motion_pa_s: T) -> [T; N] {
         let (zero, one, noise) = (T::zero(), T::one(), &self.noise);
         let square = |x: T| x * x;
         let dt = c.interval.dt_s;
@@ -273,9 +266,17 @@ impl<T: Real> KalmanFilter<T> {
             square(T::of(0.1) * noise.output_rad_s),
             square(c.twist)
                 * (square(noise.wheel_rad_s) + if c.shifting { zero } else { square(noise.twist_rate_rad_s) }),
-            if moving { T::of(2.0) * dt * noise.valve_rate_s * square(noise.valve_rate_pa_s) } else { zero },
+            T::of(2.0)
+                * dt
+                * noise.valve_rate_s
+                * (square(noise.valve_moving * motion_pa_s) + square(noise.valve_resting_per_s * x[PRESSURE])),
             if c.shifting { square(noise.turbine_share) * (one - square(c.stay)) } else { zero },
-            if c.released { zero } else { dt * square(noise.offgoing_n_m) },
+            // How fast it drains is not known: the rate may be wrong by its own size for as long as it lasts.
+            if c.released {
+                T::of(2.0) * dt / noise.offgoing_release_s * square(x[OFFGOING])
+            } else {
+                dt * square(noise.offgoing_n_m)
+            },
         ]
     }
 
@@ -394,15 +395,6 @@ impl<T: Real> Passage<T> {
         (above, if above > T::zero() { self.interval.psi / self.interval.dt_s } else { T::zero() })
     }
 
-    /// Expectation of the pressure above the kiss point and slope of the line that fits it best.
-    #[inline]
-    fn secant(&self, pressure_pa: T, variance: T) -> (T, T) {
-        let reach = (T::of(3.0) * variance.max(T::of(1.0))).sqrt();
-        let (low, high) = (self.above_kiss(pressure_pa - reach), self.above_kiss(pressure_pa + reach));
-        let middle = self.above_kiss(pressure_pa);
-        ((T::of(4.0) * middle + low + high) / T::of(6.0), (high - low) / (reach + reach))
-    }
-
     /// The states at the end, with this mean pressure above the kiss point.
     #[inline]
     pub(crate) fn propagate(&self, x: &[T; N], above_kiss_pa: T) -> [T; N] {
@@ -508,7 +500,7 @@ impl<T: Real> KalmanFilter<T> {
         &self,
         state: &mut KalmanState<T>,
         input: &Input<T>,
-        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool) -> Start<T>,
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>) -> Start<T>,
     ) -> Estimate<T> {
         let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
             state.track.last = None;
@@ -537,13 +529,12 @@ impl<T: Real> KalmanFilter<T> {
         state: &mut KalmanState<T>,
         interval: &Interval<T>,
         input: &Input<T>,
-        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>, bool) -> Start<T>,
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>) -> Start<T>,
     ) {
         let (_, acting) = self.tracker.phase(&mut state.track.tracker, interval.dt_s, input);
-        let moving = state.track.tracker.valve_pressure_pa > T::of(1e3);
         let mut running = match state.track.last {
             Some(mut running) if interval.dt_s > T::zero() => {
-                let start = predict(self, &mut running, interval, input, moving);
+                let start = predict(self, &mut running, interval, input);
                 self.correct(&mut running, &start, interval, input);
                 running.mean[PRESSURE] = running.mean[PRESSURE].max(T::zero());
                 running

@@ -27,7 +27,7 @@ pub use bound::{Bounded, Bounds, Budget, Tube};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use inversion::{Inversion, InversionState};
-pub use kalman::{FilterNoise, KalmanFilter, KalmanState, Linearisation, Readings};
+pub use kalman::{FilterNoise, KalmanFilter, KalmanState, Readings};
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
 pub use schedule::{Mix, Schedule};

@@ -44,7 +44,6 @@ fn predict<T: Real>(
     running: &mut Running<T>,
     interval: &Interval<T>,
     input: &Input<T>,
-    moving: bool,
 ) -> Start<T> {
     let passage = filter.passage(running, interval, input);
     let before = running.mean;
@@ -75,7 +74,7 @@ fn predict<T: Real>(
             }
         }
     }
-    for (i, variance) in filter.added(&passage, moving).into_iter().enumerate() {
+    for (i, variance) in filter.added(&passage, &before, running.motion_pa_s).into_iter().enumerate() {
         covariance[i][i] = covariance[i][i] + variance;
     }
     let p = &running.covariance;

@@ -24,7 +24,7 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             shaft => [s.shaft_median_rms_n_m, s.shaft_worst_rms_n_m]
                 .map(|value| value.map_or_else(|| "–".to_owned(), |n_m| format!("{n_m:.0}"))),
             coverage => s.range_least_coverage.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
-            over_errors => s.range_median_over_errors.map_or_else(|| "–".to_owned(), |over| format!("{over:.1}")),
+            over_errors => s.range_over_errors.map_or_else(|| "–".to_owned(), |over| format!("{over:.1}")),
             step => [s.step_ns, s.step_with_range_ns].map(|ns| format!("{ns:.0}")),
         }
     });

@@ -6,6 +6,7 @@ use config::{Experiment, Vehicle};
 use observer::{Estimate, Phase};
 use serde::Serialize;
 
+use crate::campaign::plan::mixed;
 use crate::comparison::{observers, run_observers};
 use crate::sampling::sampled;
 use crate::{ObserverRun, PhaseScore, RangeScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
@@ -71,8 +72,8 @@ pub struct BenchSummary {
     pub range_least_coverage: Option<f64>,
     /// Median width of the guaranteed range of the pressure, Pa.
     pub range_median_width_pa: Option<f64>,
-    /// Median of that width over the width that holds 95 % of errors of the observer's RMS, were they normal.
-    pub range_median_over_errors: Option<f64>,
+    /// Mean of that width over the width that would hold 95 % of normal errors with the observer's RMS over all scenarios.
+    pub range_over_errors: Option<f64>,
     /// Median width of the range of the clutch torque, N m.
     pub torque_range_median_width_n_m: Option<f64>,
     /// Median width of the range of the drive-shaft torque, N m.
@@ -100,9 +101,13 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     let observers = observers(vehicle, experiment)?;
     let mut rows = Vec::new();
     let mut first_trace = None;
-    for scenario in &experiment.scenarios {
+    for (number, scenario) in experiment.scenarios.iter().enumerate() {
         progress(&scenario.name);
-        let varied = experiment.with_scenario(scenario);
+        let mut varied = experiment.with_scenario(scenario);
+        // Noise of its own for each: the same in all would decide between observers that are close.
+        if let Some(sensors) = &mut varied.sensors {
+            sensors.seed = mixed(sensors.seed, number as u64);
+        }
         let trace = simulate_drive(vehicle, &varied)?;
         let runs = run_observers(vehicle, &varied, &observers, &trace)?;
         let completed = ShiftQuality::of(&trace, &vehicle.shift).is_some();
@@ -200,12 +205,22 @@ fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummar
         shaft_worst_rms_n_m: shaft.last().copied(),
         range_least_coverage: some(|cell| cell.range_coverage).first().copied(),
         range_median_width_pa: middle(some(|cell| cell.range_width_pa)),
-        range_median_over_errors: middle(some(|cell| Some(cell.range_width_pa? / (ERRORS_95 * cell.shift_rms_pa)))),
+        range_over_errors: over_errors(completed().map(|row| &row.cells[at])),
         torque_range_median_width_n_m: middle(some(|cell| cell.torque_range_width_n_m)),
         shaft_range_median_width_n_m: middle(some(|cell| cell.shaft_range_width_n_m)),
         step_ns: f64::NAN,
         step_with_range_ns: f64::NAN,
     }
+}
+
+fn over_errors<'a>(cells: impl Iterator<Item = &'a BenchCell>) -> Option<f64> {
+    let (mut widths, mut squares, mut count) = (0.0, 0.0, 0.0);
+    for cell in cells {
+        widths += cell.range_width_pa?;
+        squares += cell.shift_rms_pa * cell.shift_rms_pa;
+        count += 1.0;
+    }
+    (count > 0.0).then(|| widths / count / (ERRORS_95 * (squares / count).sqrt()))
 }
 
 fn sorted(mut values: Vec<f64>) -> Vec<f64> {

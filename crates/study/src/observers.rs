@@ -23,7 +23,7 @@ pub enum AnyObserver {
     Compliant(Box<CompliantObserver<f64>>),
     /// Full-order sliding-mode observer.
     Sliding(SlidingObserver<f64>),
-    /// Kalman filter, statistically linearised or extended.
+    /// Kalman filter.
     Kalman(Box<KalmanFilter<f64>>),
     /// Unscented Kalman filter.
     Unscented(Box<UnscentedFilter<f64>>),

@@ -80,13 +80,13 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
         output::line(&format!(
             "\nguaranteed range, the same around every observer: holds at {:.1} % of the samples\n\
              median width: pressure {:.3} MPa, clutch torque {}, shaft torque {}\n\
-             over the width that holds 95 % of {}'s errors: {:.1}; it adds {:.0} ns to a step",
+             mean width over the width that holds 95 % of {}'s errors on this bench: {:.1}; the range adds {:.0} ns to a step",
             100.0 * first.range_least_coverage.unwrap_or(f64::NAN),
             units::mpa(first.range_median_width_pa.unwrap_or(f64::NAN)),
             width(first.torque_range_median_width_n_m),
             width(first.shaft_range_median_width_n_m),
             first.observer,
-            first.range_median_over_errors.unwrap_or(f64::NAN),
+            first.range_over_errors.unwrap_or(f64::NAN),
             first.step_with_range_ns - first.step_ns,
         ))?;
     }

@@ -20,9 +20,9 @@ pub enum ObserverKind {
     Compliant,
     /// Full-order sliding-mode observer.
     Sliding,
-    /// Kalman filter with unknown torques as states, statistically linearised.
+    /// Extended Kalman filter with unknown torques as states, told how old the readings are.
     Kalman,
-    /// The same as an extended Kalman filter.
+    /// The same as textbooks have it, every reading of the moment.
     Extended,
     /// Unscented Kalman filter on the same states.
     Unscented,

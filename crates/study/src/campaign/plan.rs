@@ -111,7 +111,7 @@ fn unit(seed: u64, run: u64, factor: u64) -> f64 {
 
 /// A number that belongs to two others: the mixing function of G. Steele, D. Lea, C. Flood, Fast splittable
 /// pseudorandom number generators, OOPSLA 2014.
-fn mixed(seed: u64, of: u64) -> u64 {
+pub(crate) fn mixed(seed: u64, of: u64) -> u64 {
     let z = seed.wrapping_add(of.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
