@@ -198,7 +198,7 @@ impl<T: Real> KalmanFilter<T> {
 
         let valve = &interval.valve;
         let rate = (valve.a22_per_s * running.mean[PRESSURE] + valve.b2_pa_s).abs();
-        running.motion_pa_s = rate.max(running.motion_pa_s * (-dt / noise.valve_rate_s).exp());
+        running.motion_pa_s = rate.max(running.motion_pa_s * lasting(dt, noise.valve_rate_s));
 
         // Shaft torque over the interval: T_k + h (w_0 + w_0+) - u w_w.
         let (ratio, stiffness) = (line.final_ratio, line.shaft_stiffness_n_m_rad);
@@ -229,8 +229,8 @@ impl<T: Real> KalmanFilter<T> {
             turn: half * stiffness * dt / ratio,
             twist: stiffness * dt,
             solve: one / (one - dt * shaft[1] * h),
-            stay: if shifting { (-dt / noise.turbine_share_s).exp() } else { one },
-            keep: if released { (-dt / noise.offgoing_release_s).exp() } else { one },
+            stay: if shifting { lasting(dt, noise.turbine_share_s) } else { one },
+            keep: if released { lasting(dt, noise.offgoing_release_s) } else { one },
             released,
             shifting,
         }
@@ -329,7 +329,9 @@ impl<T: Real> KalmanFilter<T> {
         let surprise: [T; 2] =
             core::array::from_fn(|k| readings[k] - new[k] * running.mean[k] - old[k] * start.mean[k]);
         // Covariance of the readings k and l.
-        let of = |k: usize, l: usize| new[l] * columns[k][l] + old[l] * (new[k] * start.across[k][l] + old[k] * start.within[k][l]);
+        let of = |k: usize, l: usize| {
+            new[l] * columns[k][l] + old[l] * (new[k] * start.across[k][l] + old[k] * start.within[k][l])
+        };
         let square = |x: T| x * x;
         let (a, b, c) = (of(0, 0) + square(deviations[0]), of(0, 1), of(1, 1) + square(deviations[1]));
         let inverse = (a * c - b * b).recip();
@@ -448,6 +450,12 @@ impl<T: Real> Passage<T> {
         }
         f
     }
+}
+
+/// What is left after `dt_s` of a random number that lasts for a time, as implicit Euler has it.
+#[inline]
+fn lasting<T: Real>(dt_s: T, time_s: T) -> T {
+    time_s / (time_s + dt_s)
 }
 
 /// `P = F P F'`, where `F` has three full rows, of which only the first has the turbine speed, and three of the

@@ -98,7 +98,7 @@ pub struct Bench {
 /// # Errors
 /// Simulation, design, or signals; see [`StudyError`]. A shift that is not completed is a row, not an error.
 pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMut(&str)) -> Result<Bench, StudyError> {
-    let observers = observers(vehicle, experiment)?;
+    let observers = self::observers(vehicle, experiment)?;
     let mut rows = Vec::new();
     let mut first_trace = None;
     for (number, scenario) in experiment.scenarios.iter().enumerate() {
@@ -109,7 +109,11 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
             sensors.seed = mixed(sensors.seed, number as u64);
         }
         let trace = simulate_drive(vehicle, &varied)?;
-        let runs = run_observers(vehicle, &varied, &observers, &trace)?;
+        let runs = if varied.sensors_told == experiment.sensors_told {
+            run_observers(vehicle, &varied, &observers, &trace)?
+        } else {
+            run_observers(vehicle, &varied, &self::observers(vehicle, &varied)?, &trace)?
+        };
         let completed = ShiftQuality::of(&trace, &vehicle.shift).is_some();
         let cells = runs.iter().map(cell).collect();
         rows.push(BenchRow { scenario: scenario.name.clone(), completed, cells });

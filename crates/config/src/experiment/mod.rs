@@ -48,6 +48,11 @@ pub struct Scenario {
     pub sensor_delay_s: Option<f64>,
     /// Factor on the noise of all sensors.
     pub sensor_noise_factor: f64,
+    /// Tooth periods of a reading of the wheels, in place of the sensor's own. The observers are told: it is how the sensor
+    /// is made.
+    pub wheel_periods: Option<f64>,
+    /// The same of the output.
+    pub output_periods: Option<f64>,
     /// In what the car differs from the nominal one.
     pub off_nominal: OffNominal,
 }
@@ -225,6 +230,10 @@ impl Experiment {
             // The times are those of a table that was checked.
             varied.throttle = Table1::new(times, &positions).unwrap_or(self.throttle);
         }
+        for sensors in [&mut varied.sensors, &mut varied.sensors_told].into_iter().flatten() {
+            sensors.wheel.periods = scenario.wheel_periods.unwrap_or(sensors.wheel.periods);
+            sensors.output.periods = scenario.output_periods.unwrap_or(sensors.output.periods);
+        }
         if let Some(sensors) = &mut varied.sensors {
             for sensor in [&mut sensors.engine, &mut sensors.turbine, &mut sensors.output, &mut sensors.wheel] {
                 sensor.delay_s = scenario.sensor_delay_s.unwrap_or(sensor.delay_s);
@@ -286,6 +295,8 @@ fn scenario(check: &Check<'_>, raw: &RawScenario) -> Result<Scenario, ConfigErro
         throttle: optional("throttle", &raw.throttle, 0.0..=1.0)?,
         sensor_delay_s: optional("sensor_delay_s", &raw.sensor_delay_s, 0.0..=0.2)?,
         sensor_noise_factor: optional("sensor_noise_factor", &raw.sensor_noise_factor, 0.0..=100.0)?.unwrap_or(1.0),
+        wheel_periods: optional("wheel_periods", &raw.wheel_periods, 1.0..=100.0)?,
+        output_periods: optional("output_periods", &raw.output_periods, 1.0..=100.0)?,
         off_nominal: off_nominal(check, &raw.off_nominal)?,
     })
 }

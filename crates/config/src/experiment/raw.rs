@@ -33,6 +33,8 @@ pub(super) struct RawScenario {
     pub(super) throttle: Option<Number>,
     pub(super) sensor_delay_s: Option<Number>,
     pub(super) sensor_noise_factor: Option<Number>,
+    pub(super) wheel_periods: Option<Number>,
+    pub(super) output_periods: Option<Number>,
     #[serde(default)]
     pub(super) off_nominal: RawOffNominal,
 }
