@@ -61,18 +61,18 @@ impl ValveErrors {
 }
 
 /// Pressure of a shift at which the budget weighs the errors, Pa.
-pub(crate) fn shift_pressure(vehicle: &Vehicle) -> f64 {
+pub fn shift_pressure(vehicle: &Vehicle) -> f64 {
     vehicle.oncoming.clutch.kiss_pressure() + vehicle.error_bounds.shift_pressure_pa
 }
 
 /// What a grade at its bound does at the wheels, N m.
-pub(crate) fn grade_n_m(vehicle: &Vehicle) -> f64 {
+pub fn grade_n_m(vehicle: &Vehicle) -> f64 {
     let road = &vehicle.road;
     road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * vehicle.error_bounds.grade_rad.sin()
 }
 
 /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
-pub(crate) fn mass_n_m(vehicle: &Vehicle) -> f64 {
+pub fn mass_n_m(vehicle: &Vehicle) -> f64 {
     vehicle.error_bounds.mass_kg / vehicle.road.mass_kg * vehicle.error_bounds.shaft_torque_n_m
 }
 

@@ -28,6 +28,9 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             step => [s.step_ns, s.step_with_range_ns].map(|ns| format!("{ns:.0}")),
         }
     });
+    // The best first, as in the ranking.
+    let position = |name: &String| experiment.observers.iter().position(|entry| entry.name == *name);
+    let order: Vec<usize> = bench.ranking.iter().filter_map(|s| position(&s.observer)).collect();
     let rows = bench.rows.iter().map(|row| {
         let least =
             |value: fn(&study::bench::BenchCell) -> f64| row.cells.iter().map(value).fold(f64::INFINITY, f64::min);
@@ -35,7 +38,7 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         context! {
             scenario => &row.scenario,
             completed => row.completed,
-            cells => row.cells.iter().map(|c| context! {
+            cells => order.iter().filter_map(|&at| row.cells.get(at)).map(|c| context! {
                 torque => pressure(c.torque_phase_rms_pa),
                 inertia => pressure(c.inertia_phase_rms_pa),
                 torque_best => c.torque_phase_rms_pa <= torque,
@@ -57,7 +60,7 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         vehicle_name => &vehicle.name,
         version => env!("CARGO_PKG_VERSION"),
         seed => experiment.sensors.map(|sensors| sensors.seed),
-        observers => experiment.observers.iter().map(|entry| entry.name.clone()).collect::<Vec<_>>(),
+        observers => bench.ranking.iter().map(|s| s.observer.clone()).collect::<Vec<_>>(),
         ranking => ranking.collect::<Vec<_>>(),
         rows => rows.collect::<Vec<_>>(),
         widths,

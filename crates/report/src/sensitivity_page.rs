@@ -3,6 +3,7 @@
 use config::Vehicle;
 use minijinja::{Value, context};
 use study::PhaseSensitivity;
+use study::sensitivity::ValveEffect;
 
 use crate::page::{PageError, origin, templates};
 
@@ -10,7 +11,11 @@ use crate::page::{PageError, origin, templates};
 ///
 /// # Errors
 /// None in a released program; the tests render the template.
-pub fn sensitivity_page(phases: &[PhaseSensitivity], vehicle: &Vehicle) -> Result<String, PageError> {
+pub fn sensitivity_page(
+    phases: &[PhaseSensitivity],
+    valve: &[ValveEffect],
+    vehicle: &Vehicle,
+) -> Result<String, PageError> {
     let rows = phases.iter().map(|phase| {
         let largest = phase.effects.iter().map(|e| (e.bound * e.pressure_pa_per_unit).abs()).fold(0.0, f64::max);
         let effects: Vec<Value> = (phase.effects.iter())
@@ -19,7 +24,7 @@ pub fn sensitivity_page(phases: &[PhaseSensitivity], vehicle: &Vehicle) -> Resul
                 context! {
                     error => effect.error,
                     unit => effect.unit,
-                    bound => format!("{:.3}", effect.bound).trim_end_matches('0').trim_end_matches('.').to_owned(),
+                    bound => effect.bound_text(),
                     kpa => format!("{:.1}", 1e-3 * pressure_pa),
                     per_unit => format!("{:.2}", 1e-3 * effect.pressure_pa_per_unit),
                     torque => format!("{:.2}", effect.clutch_n_m_per_unit),
@@ -40,6 +45,10 @@ pub fn sensitivity_page(phases: &[PhaseSensitivity], vehicle: &Vehicle) -> Resul
         version => env!("CARGO_PKG_VERSION"),
         vehicle_name => &vehicle.name,
         phases => rows.collect::<Vec<_>>(),
+        valve => valve
+            .iter()
+            .map(|effect| context! { error => effect.error, kpa => format!("{:.1}", 1e-3 * effect.pressure_pa) })
+            .collect::<Vec<_>>(),
         inputs => origin(&[&vehicle.source]),
     })?)
 }

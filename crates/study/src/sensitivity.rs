@@ -6,6 +6,8 @@
 //! would give; the valve model bounds it from the other side.
 
 use config::Vehicle;
+use design::ValveErrors;
+use design::budget::{grade_n_m, mass_n_m};
 use design::compliant::compliant_model;
 use design::rigid_model;
 use nalgebra::DVector;
@@ -52,6 +54,16 @@ pub struct ErrorEffect {
     pub angle_deg: Option<f64>,
 }
 
+impl ErrorEffect {
+    /// The bound for people.
+    pub fn bound_text(&self) -> String {
+        if self.bound.abs() < 1e-3 {
+            return format!("{:.1e}", self.bound);
+        }
+        format!("{:.3}", self.bound).trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
+}
+
 /// One phase seen by one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhaseSensitivity {
@@ -64,9 +76,6 @@ pub struct PhaseSensitivity {
     /// The errors.
     pub effects: Vec<ErrorEffect>,
 }
-
-/// Pressure above the kiss point at which a friction error is weighed, Pa: that of an inertia phase at light throttle.
-const ABOVE_KISS_PA: f64 = 0.2e6;
 
 /// What the speeds can tell in each phase, by this vehicle's models and error bounds.
 pub fn sensitivity(vehicle: &Vehicle) -> Vec<PhaseSensitivity> {
@@ -81,15 +90,17 @@ fn rigid(vehicle: &Vehicle, phase: Phase) -> PhaseSensitivity {
     let rows = model.coefficients(phase);
     let (t, d, bounds) = (&rows.turbine, &rows.slip_oncoming, &vehicle.error_bounds);
     let pressure = model.influence(phase, friction(vehicle));
-    let mut columns: Vec<Column> = vec![
-        ("turbine torque", "N m", bounds.turbine_torque_n_m, [t.per_turbine_torque, d.per_turbine_torque]),
-        (
-            "load, shaft torsion, tyre slip",
-            "N m at the output",
-            bounds.output_torque_n_m,
-            [t.per_output_torque, d.per_output_torque],
-        ),
-    ];
+    let mut columns: Vec<Column> =
+        vec![("turbine torque", "N m", bounds.turbine_torque_n_m, [t.per_turbine_torque, d.per_turbine_torque])];
+    let output = [t.per_output_torque, d.per_output_torque];
+    let final_ratio = vehicle.driveline.final_ratio;
+    for (error, n_m) in [
+        ("mass", mass_n_m(vehicle) / final_ratio),
+        ("grade", grade_n_m(vehicle) / final_ratio),
+        ("shaft torsion, tyre slip", bounds.output_torque_n_m),
+    ] {
+        columns.push((error, "N m at the output", n_m, output));
+    }
     columns.extend(common(vehicle, phase, pressure, [t.per_offgoing_torque, d.per_offgoing_torque]));
     evaluate(vehicle, phase, View::Rigid, pressure, &columns)
 }
@@ -126,7 +137,14 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     if phase == Phase::InertiaPhase {
         columns.push(("torque left in the offgoing clutch", "N m", bounds.offgoing_torque_n_m, offgoing));
     }
-    columns.push(("friction", "%", 100.0 * share, pressure.map(|g| 0.01 * g * ABOVE_KISS_PA)));
+    columns.push(("friction", "%", 100.0 * share, pressure.map(|g| 0.01 * g * bounds.shift_pressure_pa)));
+    // Old speeds tell what the pressure was.
+    columns.push((
+        "sampling delay",
+        "ms",
+        1e3 * bounds.sampling_delay_s,
+        pressure.map(|g| 1e-3 * g * bounds.shift_ramp_pa_s),
+    ));
     let sample_s = 0.01;
     columns.push((
         "reading of the turbine speed, over 10 ms",
@@ -137,7 +155,26 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     if phase == Phase::InertiaPhase {
         columns.push(("reading of the slip, over 10 ms", "rad/s", bounds.slip_quantum_rad_s, [0.0, 1.0 / sample_s]));
     }
+    let rounding_rad_s = bounds.float32_rounding * vehicle.limits.speed_max_rad_s;
+    columns.push(("float32 rounding of a speed, over 10 ms", "rad/s", rounding_rad_s, [1.0 / sample_s, 0.0]));
     columns
+}
+
+/// What an error of the valve does to the pressure of the open loop, which an observer replaces by a share of the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ValveEffect {
+    /// The error.
+    pub error: &'static str,
+    /// Pressure by which it puts the open loop off in a shift, Pa.
+    pub pressure_pa: f64,
+}
+
+/// What the valve's errors do to the open loop, by this vehicle's budget.
+pub fn valve_alone(vehicle: &Vehicle) -> [ValveEffect; 3] {
+    let errors = ValveErrors::of(vehicle);
+    let time_constant_s = -1.0 / vehicle.observer_valve.linear(0.0).a22_per_s;
+    [("lag", errors.lag_pa_s), ("gain", errors.gain_pa_s), ("delay", errors.delay_pa_s)]
+        .map(|(error, rate_pa_s)| ValveEffect { error, pressure_pa: rate_pa_s * time_constant_s })
 }
 
 /// Length of a shift, s, and deviation of the difference of the two speed readings that the twist is integrated from,

@@ -38,9 +38,12 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     }
 
     output::line("RMS error of the pressure, MPa: torque phase / inertia phase\n")?;
-    let names = experiment.observers.iter().map(|entry| entry.name.clone());
+    // The best first, as in the ranking.
+    let position = |name: &String| experiment.observers.iter().position(|entry| entry.name == *name);
+    let order: Vec<usize> = result.ranking.iter().filter_map(|s| position(&s.observer)).collect();
+    let names = result.ranking.iter().map(|s| s.observer.clone());
     let mut rows = vec![std::iter::once("scenario".to_owned()).chain(names).collect()];
-    rows.extend(result.rows.iter().map(cells));
+    rows.extend(result.rows.iter().map(|row| cells(row, &order)));
     output::table(1, &rows)?;
 
     output::line("\nover the open loop's; ranked by the median over the whole shift\n")?;
@@ -100,9 +103,9 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     Ok(())
 }
 
-fn cells(row: &BenchRow) -> Vec<String> {
+fn cells(row: &BenchRow, order: &[usize]) -> Vec<String> {
     let cell = |torque: f64, inertia: f64| format!("{:.3} / {:.3}", units::mpa(torque), units::mpa(inertia));
-    let scores = row.cells.iter().map(|c| {
+    let scores = order.iter().filter_map(|&at| row.cells.get(at)).map(|c| {
         if row.completed { cell(c.torque_phase_rms_pa, c.inertia_phase_rms_pa) } else { "no shift".to_owned() }
     });
     std::iter::once(row.scenario.clone()).chain(scores).collect()

@@ -87,6 +87,20 @@ fn report_on(log: &Trace, estimates: &[Sample<f64>]) {
             output::note(&format!("{} of {} samples have {meaning}", count(health), estimates.len()));
         }
     }
+    let outside = |e: &&Sample<f64>| {
+        e.bounds.is_some_and(|bounds| {
+            let [least, greatest] = bounds.pressure_pa;
+            e.pressure_pa < least || e.pressure_pa > greatest
+        })
+    };
+    let count = estimates.iter().filter(outside).count();
+    // A few are as the cylinder fills, where the told valve runs ahead of the one of the maps.
+    if 100 * count > estimates.len() {
+        output::note(&format!(
+            "{count} of {} estimates lie outside the guaranteed range: the observer errs there, or the car is beyond its budget",
+            estimates.len()
+        ));
+    }
     let (Some(phases), Some(truth)) = (true_phases(log), log.get(signal::ONCOMING_PRESSURE)) else { return };
     let scores = score(&log.time_s, &phases, truth, 0.0, |i| estimates[i].pressure_pa);
     for score in scores.iter().filter(|score| score.samples > 0) {

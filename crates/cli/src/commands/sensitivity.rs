@@ -2,7 +2,9 @@
 
 use config::Vehicle;
 use report::sensitivity_page;
+use serde_json::json;
 use study::sensitivity as find;
+use study::sensitivity::{ValveEffect, valve_alone};
 
 use crate::args::SensitivityOptions;
 use crate::commands::write_text;
@@ -14,12 +16,12 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         Some(path) => Vehicle::read(path)?,
         None => Vehicle::two_speed_at()?,
     };
-    let phases = find(&vehicle);
+    let (phases, valve) = (find(&vehicle), valve_alone(&vehicle));
     if let Some(folder) = &options.output {
-        write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &vehicle)?)?;
+        write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &valve, &vehicle)?)?;
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&phases)?)?;
+        output::line(&serde_json::to_string_pretty(&json!({ "phases": phases, "valve": valve }))?)?;
         return Ok(());
     }
     for phase in &phases {
@@ -35,7 +37,7 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         rows.extend(phase.effects.iter().map(|effect| {
             vec![
                 effect.error.to_owned(),
-                format!("{:.3}", effect.bound).trim_end_matches('0').trim_end_matches('.').to_owned(),
+                effect.bound_text(),
                 effect.unit.to_owned(),
                 format!("{:.1}", 1e-3 * (effect.bound * effect.pressure_pa_per_unit).abs()),
                 format!("{:.2}", 1e-3 * effect.pressure_pa_per_unit),
@@ -46,6 +48,11 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         output::table(1, &rows)?;
         output::line("")?;
     }
+    let kpa = |effect: &ValveEffect| format!("{} {:.1} kPa", effect.error, 1e-3 * effect.pressure_pa);
+    output::line(&format!(
+        "the valve model alone is off in a shift by: {}\n",
+        valve.iter().map(kpa).collect::<Vec<_>>().join(", ")
+    ))?;
     if let Some(folder) = &options.output {
         output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
     }
