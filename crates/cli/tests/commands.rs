@@ -327,5 +327,8 @@ fn a_log_too_slow_for_the_gains_is_said_to_be() {
         wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--observer", "rigid", "--method", method])
     };
     assert!(stderr(&run("iss")).contains("samples are 100 ms apart, and this observer corrects over at most 40 ms"));
-    assert!(stderr(&run("peak-to-peak")).is_empty(), "{}", stderr(&run("peak-to-peak")));
+    let said = stderr(&run("peak-to-peak"));
+    assert!(!said.contains("samples are"), "{said}");
+    // At a small current the valve that the observers are told is beyond the budget of the maps, and that is said.
+    assert!(said.contains("lie outside the guaranteed range"), "{said}");
 }

@@ -22,6 +22,9 @@ use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase,
 /// Time over which the acceleration of the wheels is averaged, s.
 const WHEEL_AVERAGE_S: f64 = 0.05;
 
+/// Age beyond which a reading is taken to be no older, in samples.
+const OLDEST_SAMPLES: f64 = 20.0;
+
 pub(crate) const N: usize = 6;
 const TURBINE: usize = 0;
 const OUTPUT: usize = 1;
@@ -321,7 +324,9 @@ impl<T: Real> KalmanFilter<T> {
         let readings = [input.turbine_rad_s, output];
         let lags = [self.readings.turbine_rad, self.readings.output_rad];
         let deviations = [self.noise.turbine_rad_s, self.noise.output_rad_s];
-        let old: [T; 2] = core::array::from_fn(|k| self.age(lags[k], readings[k]) / interval.dt_s);
+        // An age of many samples is cut: so far back the line through both ends does not reach.
+        let old: [T; 2] =
+            core::array::from_fn(|k| (self.age(lags[k], readings[k]) / interval.dt_s).min(T::of(OLDEST_SAMPLES)));
         let new = old.map(|share| one - share);
         let p = &mut running.covariance;
         let columns: [[T; N]; 2] =

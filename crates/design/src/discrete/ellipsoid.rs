@@ -23,7 +23,7 @@ use crate::lmi::{Block, Problem};
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;
 /// Steps of the search for `lambda`; each shrinks its interval by 0.618.
-const SEARCH_STEPS: usize = 24;
+const SEARCH_STEPS: usize = 14;
 
 /// The gain, constant or following the friction, with the smallest bound on the pressure.
 pub(crate) fn smallest_ellipsoid(
