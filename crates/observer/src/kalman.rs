@@ -232,7 +232,7 @@ impl<T: Real> KalmanFilter<T> {
             turn: half * stiffness * dt / ratio,
             twist: stiffness * dt,
             solve: one / (one - dt * shaft[1] * h),
-            stay: if shifting { lasting(dt, noise.turbine_share_s) } else { one },
+            stay: if running.acting == Phase::InertiaPhase { lasting(dt, noise.turbine_share_s) } else { one },
             keep: if released { lasting(dt, noise.offgoing_release_s) } else { one },
             released,
             shifting,
@@ -273,7 +273,7 @@ impl<T: Real> KalmanFilter<T> {
                 * dt
                 * noise.valve_rate_s
                 * (square(noise.valve_moving * motion_pa_s) + square(noise.valve_resting_per_s * x[PRESSURE])),
-            if c.shifting { square(noise.turbine_share) * (one - square(c.stay)) } else { zero },
+            square(noise.turbine_share) * (one - square(c.stay)),
             // How fast it drains is not known: the rate may be wrong by its own size for as long as it lasts.
             if c.released {
                 T::of(2.0) * dt / noise.offgoing_release_s * square(x[OFFGOING])
@@ -288,7 +288,7 @@ impl<T: Real> KalmanFilter<T> {
     /// error of both.
     #[inline]
     fn change_phase(&self, running: &mut Running<T>, acting: Phase) {
-        let shifting = |phase| matches!(phase, Phase::TorquePhase | Phase::InertiaPhase);
+        let shifting = |phase| phase == Phase::InertiaPhase;
         let (before, now) = (shifting(running.acting), shifting(acting));
         running.acting = acting;
         let zero = T::zero();
