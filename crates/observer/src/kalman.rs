@@ -283,13 +283,12 @@ impl<T: Real> KalmanFilter<T> {
         ]
     }
 
-    /// Outside a shift the turbine torque is what the maps say, and the shaft torque follows from it: an error of the one
-    /// is an error of the other, and no speed tells it. As a shift begins, it may show: it is let in as what it is, one
-    /// error of both.
+    /// Before the inertia phase the turbine torque is what the maps say, and the shaft torque follows from it: an error of
+    /// the one is an error of the other, cancels in the clutch torque, and no speed tells it. Once both clutches slip it
+    /// shows: it is let in as what it is, one error of both.
     #[inline]
     fn change_phase(&self, running: &mut Running<T>, acting: Phase) {
-        let shifting = |phase| phase == Phase::InertiaPhase;
-        let (before, now) = (shifting(running.acting), shifting(acting));
+        let (before, now) = (running.acting == Phase::InertiaPhase, acting == Phase::InertiaPhase);
         running.acting = acting;
         let zero = T::zero();
         if before && !now {
@@ -304,9 +303,7 @@ impl<T: Real> KalmanFilter<T> {
             let turbine_n_m = self.model.rigid.converter.torques(last.engine_rad_s, last.turbine_rad_s).turbine_n_m;
             let final_ratio = self.model.rigid.driveline.final_ratio;
             let shaft = turbine_n_m * self.model.shift.ratio_offgoing() * final_ratio;
-            let held = &self.model.torque_phase.holding_offgoing;
-            let holding = held.per_turbine_torque * turbine_n_m + held.per_output_torque * shaft / final_ratio;
-            let together = [zero, zero, shaft, zero, T::one(), holding].map(|x| x * self.noise.turbine_share);
+            let together = [zero, zero, shaft, zero, T::one(), zero].map(|x| x * self.noise.turbine_share);
             for (row, a) in running.covariance.iter_mut().zip(together) {
                 for (p, b) in row.iter_mut().zip(together) {
                     *p = *p + a * b;
