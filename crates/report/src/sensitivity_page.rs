@@ -3,7 +3,7 @@
 use config::Vehicle;
 use minijinja::{Value, context};
 use study::PhaseSensitivity;
-use study::sensitivity::ValveEffect;
+use study::sensitivity::{ShaftEffect, ValveEffect};
 
 use crate::page::{PageError, origin, templates};
 
@@ -14,6 +14,7 @@ use crate::page::{PageError, origin, templates};
 pub fn sensitivity_page(
     phases: &[PhaseSensitivity],
     valve: &[ValveEffect],
+    shaft: &[ShaftEffect],
     vehicle: &Vehicle,
 ) -> Result<String, PageError> {
     let rows = phases.iter().map(|phase| {
@@ -48,6 +49,10 @@ pub fn sensitivity_page(
         valve => valve
             .iter()
             .map(|effect| context! { error => effect.error, kpa => format!("{:.1}", 1e-3 * effect.pressure_pa) })
+            .collect::<Vec<_>>(),
+        shaft => shaft
+            .iter()
+            .map(|effect| context! { error => effect.error, n_m => format!("{:.0}", effect.torque_n_m) })
             .collect::<Vec<_>>(),
         inputs => origin(&[&vehicle.source]),
     })?)

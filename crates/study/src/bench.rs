@@ -104,18 +104,24 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     for (number, scenario) in experiment.scenarios.iter().enumerate() {
         progress(&scenario.name);
         let mut varied = experiment.with_scenario(scenario);
-        // Noise of its own for each: the same in all would decide between observers that are close.
-        if let Some(sensors) = &mut varied.sensors {
-            sensors.seed = mixed(sensors.seed, number as u64);
-        }
         let trace = simulate_drive(vehicle, &varied)?;
-        let runs = if varied.sensors_told == experiment.sensors_told {
-            run_observers(vehicle, &varied, &observers, &trace)?
-        } else {
-            run_observers(vehicle, &varied, &self::observers(vehicle, &varied)?, &trace)?
+        let told_otherwise = match varied.sensors_told == experiment.sensors_told {
+            true => None,
+            false => Some(self::observers(vehicle, &varied)?),
         };
+        let observers = told_otherwise.as_ref().unwrap_or(&observers);
+        // One noise, the same for all, would decide between observers that are close.
+        let seed = varied.sensors.map(|sensors| mixed(sensors.seed, number as u64));
+        let mut draws = Vec::new();
+        for draw in 0..if seed.is_some() { DRAWS } else { 1 } {
+            if let (Some(sensors), Some(seed)) = (&mut varied.sensors, seed) {
+                sensors.seed = mixed(seed, draw);
+            }
+            let runs = run_observers(vehicle, &varied, observers, &trace)?;
+            draws.push(runs.iter().map(cell).collect::<Vec<BenchCell>>());
+        }
         let completed = ShiftQuality::of(&trace, &vehicle.shift).is_some();
-        let cells = runs.iter().map(cell).collect();
+        let cells = (0..experiment.observers.len()).map(|at| over(draws.iter().map(|cells| &cells[at]))).collect();
         rows.push(BenchRow { scenario: scenario.name.clone(), completed, cells });
         first_trace.get_or_insert(trace);
     }
@@ -134,6 +140,9 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     Ok(Bench { rows, ranking })
 }
 
+/// Draws of the sensors' noise in each scenario.
+const DRAWS: u64 = 5;
+
 /// Width that holds 95 % of normal errors, in standard deviations.
 const ERRORS_95: f64 = 2.0 * 1.96;
 
@@ -150,6 +159,31 @@ fn fastest_ns(run: impl Fn() -> Vec<Estimate<f64>>) -> f64 {
         best = best.min(began.elapsed().as_secs_f64());
     }
     1e9 * best / steps as f64
+}
+
+/// One observer's scores over several draws of the sensors' noise.
+fn over<'a>(draws: impl Iterator<Item = &'a BenchCell>) -> BenchCell {
+    let draws: Vec<&BenchCell> = draws.collect();
+    let mean =
+        |value: &dyn Fn(&BenchCell) -> f64| draws.iter().map(|cell| value(cell)).sum::<f64>() / draws.len() as f64;
+    let rms = |value: &dyn Fn(&BenchCell) -> f64| mean(&|cell| value(cell).powi(2)).sqrt();
+    let some = |value: fn(&BenchCell) -> Option<f64>| {
+        let values: Option<Vec<f64>> = draws.iter().map(|cell| value(cell)).collect();
+        values.filter(|values| !values.is_empty())
+    };
+    let mean_of = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    BenchCell {
+        observer: draws.first().map(|cell| cell.observer.clone()).unwrap_or_default(),
+        torque_phase_rms_pa: rms(&|cell| cell.torque_phase_rms_pa),
+        inertia_phase_rms_pa: rms(&|cell| cell.inertia_phase_rms_pa),
+        shift_rms_pa: rms(&|cell| cell.shift_rms_pa),
+        chatter_pa: mean(&|cell| cell.chatter_pa),
+        shaft_rms_n_m: some(|cell| cell.shaft_rms_n_m.map(|rms| rms * rms)).map(|squares| mean_of(squares).sqrt()),
+        range_coverage: some(|cell| cell.range_coverage).and_then(|shares| shares.into_iter().reduce(f64::min)),
+        range_width_pa: some(|cell| cell.range_width_pa).map(mean_of),
+        torque_range_width_n_m: some(|cell| cell.torque_range_width_n_m).map(mean_of),
+        shaft_range_width_n_m: some(|cell| cell.shaft_range_width_n_m).map(mean_of),
+    }
 }
 
 fn cell(run: &ObserverRun) -> BenchCell {

@@ -177,6 +177,26 @@ pub fn valve_alone(vehicle: &Vehicle) -> [ValveEffect; 3] {
         .map(|(error, rate_pa_s)| ValveEffect { error, pressure_pa: rate_pa_s * time_constant_s })
 }
 
+/// What an error does to an estimate of the shaft torque, whose level no speed tells.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShaftEffect {
+    /// The error.
+    pub error: &'static str,
+    /// Shaft torque by which it puts the estimate off, N m.
+    pub torque_n_m: f64,
+}
+
+/// What puts the shaft torque off, by this vehicle's budget: the turbine torque that it is found from before the shift, and
+/// the readings by which it is carried on.
+pub fn shaft_level(vehicle: &Vehicle) -> [ShaftEffect; 2] {
+    let overall = vehicle.shift.ratio_offgoing() * vehicle.driveline.final_ratio;
+    let before = overall * vehicle.error_bounds.turbine_torque_n_m;
+    [
+        ShaftEffect { error: "turbine torque before the shift", torque_n_m: before },
+        ShaftEffect { error: "drift of the readings over a shift, one deviation", torque_n_m: drift_n_m(vehicle) },
+    ]
+}
+
 /// Length of a shift, s, and deviation of the difference of the two speed readings that the twist is integrated from,
 /// rad/s at the wheel: 0.1 rad/s on the output over the final ratio of 3, and 0.02 rad/s on the wheel, as on the bench.
 const SHIFT_S: f64 = 0.6;

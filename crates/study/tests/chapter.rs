@@ -87,16 +87,12 @@ fn summary<'a>(bench: &'a study::Bench, name: &str) -> &'a study::bench::BenchSu
 }
 
 #[test]
-fn another_seed_gives_other_numbers_and_the_same_order() {
+fn another_seed_gives_other_numbers_and_the_same_ranking() {
     let (first, second) = (bench_with(1), bench_with(2));
     assert!(first.rows.iter().all(|row| row.completed));
     assert!(first.rows != second.rows, "other noise, other numbers");
-    // The filters, whose order among themselves is the noise's, before everything else.
-    let filters = ["Kalman", "extended Kalman", "unscented"];
-    for bench in [&first, &second] {
-        assert!(bench.ranking[..3].iter().all(|s| filters.contains(&s.observer.as_str())), "{:?}", bench.ranking);
-        assert_eq!(bench.ranking[3].observer, "inversion");
-    }
+    let names = |bench: &study::Bench| bench.ranking.iter().map(|s| s.observer.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&first), names(&second));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use config::Vehicle;
 use report::sensitivity_page;
 use serde_json::json;
 use study::sensitivity as find;
-use study::sensitivity::{ValveEffect, valve_alone};
+use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 
 use crate::args::SensitivityOptions;
 use crate::commands::write_text;
@@ -16,12 +16,12 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         Some(path) => Vehicle::read(path)?,
         None => Vehicle::two_speed_at()?,
     };
-    let (phases, valve) = (find(&vehicle), valve_alone(&vehicle));
+    let (phases, valve, shaft) = (find(&vehicle), valve_alone(&vehicle), shaft_level(&vehicle));
     if let Some(folder) = &options.output {
-        write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &valve, &vehicle)?)?;
+        write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &valve, &shaft, &vehicle)?)?;
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&json!({ "phases": phases, "valve": valve }))?)?;
+        output::line(&serde_json::to_string_pretty(&json!({ "phases": phases, "valve": valve, "shaft": shaft }))?)?;
         return Ok(());
     }
     for phase in &phases {
@@ -52,6 +52,11 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     output::line(&format!(
         "the valve model alone is off in a shift by: {}\n",
         valve.iter().map(kpa).collect::<Vec<_>>().join(", ")
+    ))?;
+    let n_m = |effect: &ShaftEffect| format!("{} {:.0} N m", effect.error, effect.torque_n_m);
+    output::line(&format!(
+        "the level of the shaft torque, which no speed tells, is off by: {}\n",
+        shaft.iter().map(n_m).collect::<Vec<_>>().join(", ")
     ))?;
     if let Some(folder) = &options.output {
         output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
