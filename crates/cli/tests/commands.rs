@@ -219,6 +219,21 @@ fn every_observer_runs_on_a_log() {
 }
 
 #[test]
+fn the_filter_can_be_told_of_the_sensors() {
+    let folder = Folder::new("sensors");
+    wetclutch(&["demo", "-o", &folder.path("demo")]);
+    let log = folder.path("demo/measured.csv");
+    let estimate = |more: &[&str]| wetclutch(&[&["estimate", &log, "--vehicle", VEHICLE], more].concat());
+    let experiments = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments");
+    let told = estimate(&["--sensors", &format!("{experiments}/bench.toml")]);
+    assert!(told.status.success(), "{}", stderr(&told));
+    assert_ne!(stdout(&told), stdout(&estimate(&[])));
+    let output = estimate(&["--sensors", &format!("{experiments}/e1.toml")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("describes no sensors"), "{}", stderr(&output));
+}
+
+#[test]
 fn the_compliant_observer_asks_for_the_wheel_speed() {
     let folder = Folder::new("wheel");
     std::fs::write(

@@ -1,8 +1,9 @@
 //! `wetclutch estimate`.
 
 use std::io::Write;
+use std::path::Path;
 
-use config::{GainMethod, ObserverKind, Vehicle};
+use config::{GainMethod, ObserverKind, Sensors, Vehicle};
 use observer::{Estimate as Sample, Health};
 use report::tables::phase_name;
 use study::{AnyObserver, RunColumns, estimates_trace, score, true_phases};
@@ -57,7 +58,8 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     if needs_wheel.contains(&kind) {
         log.require(signal::WHEEL_SPEED)?;
     }
-    let observer = AnyObserver::designed(&vehicle, kind, method, log.median_step_s(), None)?;
+    let sensors = options.sensors.as_deref().map(sensors).transpose()?;
+    let observer = AnyObserver::designed(&vehicle, kind, method, log.median_step_s(), sensors.as_ref())?;
     if log.median_step_s() > observer.sample_max_s() && kind != ObserverKind::OpenLoop {
         output::note(&format!(
             "samples are {:.0} ms apart, and this observer corrects over at most {:.0} ms: the valve model alone serves\n\
@@ -74,6 +76,16 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     }
     report_on(&log, &estimates);
     Ok(())
+}
+
+/// The sensors that a file describes.
+fn sensors(path: &Path) -> Result<Sensors, Failure> {
+    Sensors::read(path)?.ok_or_else(|| {
+        let path = path.display();
+        Failure::Input(format!(
+            "{path}: describes no sensors\nhint: add a [sensors] table, as in experiments/bench.toml"
+        ))
+    })
 }
 
 /// What a user should know about the estimate, on standard error.

@@ -1,11 +1,14 @@
 //! The observers and sensors of an experiment file, checked.
 
+use std::path::Path;
+
 use observer::{Discretisation, RigidGains, SlidingGains};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSensors, RawSignals, RawSpeedSensor};
+use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSensors, RawSensorsFile, RawSignals, RawSpeedSensor};
 use crate::ConfigError;
+use crate::Source;
 use crate::check::Check;
 
 /// Kinds of observers.
@@ -143,6 +146,18 @@ pub struct Sensors {
     pub wheel: SpeedSensor,
     /// Current of the oncoming clutch's valve.
     pub current: CurrentSensor,
+}
+
+impl Sensors {
+    /// Reads the `[sensors]` table of a file, whatever else it holds; `None` without one.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a value cannot be right.
+    pub fn read(path: &Path) -> Result<Option<Self>, ConfigError> {
+        let source = Source::read(path)?;
+        let raw: RawSensorsFile = source.parse()?;
+        raw.sensors.as_ref().map(|raw| sensors(&Check { source: &source }, raw)).transpose()
+    }
 }
 
 pub(super) fn sensors(check: &Check<'_>, raw: &RawSensors) -> Result<Sensors, ConfigError> {

@@ -39,6 +39,12 @@ pub(super) struct RawScenario {
     pub(super) off_nominal: RawOffNominal,
 }
 
+/// A file of which only the sensors are read.
+#[derive(Deserialize)]
+pub(super) struct RawSensorsFile {
+    pub(super) sensors: Option<RawSensors>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawSensors {
