@@ -264,7 +264,7 @@ pub(crate) struct Estimate {
     /// How the gains of the rigid and the compliant observer are chosen [default: iss]
     #[arg(long, value_enum)]
     pub(crate) method: Option<MethodChoice>,
-    /// File whose [sensors] table describes those of the log, such as an experiment file: the Kalman filters are told their noise and lag, and take
+    /// File whose table `sensors` describes those of the log, such as an experiment file: the Kalman filters are told their noise and lag, and take
     /// readings as nearly exact and of the moment without
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,

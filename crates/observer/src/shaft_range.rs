@@ -56,6 +56,27 @@ struct Balance<T> {
     per_clutch_torque: T,
 }
 
+/// Accelerations and turbine torque over an interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Seen<T> {
+    turbine_rad_s2: [T; 2],
+    output_rad_s2: [T; 2],
+    turbine_n_m: [T; 2],
+}
+
+impl<T: Real> Balance<T> {
+    /// Torque at the gearbox output over the interval, N m, with the clutch of the balance at this torque.
+    fn output(&self, seen: &Seen<T>, clutch_n_m: [T; 2]) -> [T; 2] {
+        let parts = [
+            scaled(seen.turbine_rad_s2, self.per_turbine_rad_s2),
+            scaled(seen.output_rad_s2, self.per_output_rad_s2),
+            scaled(seen.turbine_n_m, self.per_turbine_torque),
+            scaled(clutch_n_m, self.per_clutch_torque),
+        ];
+        parts.into_iter().fold([T::zero(); 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]])
+    }
+}
+
 /// The balance that has no torque of a clutch, of turbine and output row.
 fn without<T: Real>(rows: [&AccelerationRow<T>; 2], this: Pick<T>, other: Pick<T>) -> Balance<T> {
     let [turbine, output] = rows;
@@ -156,6 +177,7 @@ impl<T: Real> ShaftRange<T> {
         let output = widened(span.output, ahead, errors.output_rad_s);
         let wheel = widened(span.wheel, ahead, errors.wheel_rad_s);
         let twist = [line.twist_rate(output[0], wheel[1]), line.twist_rate(output[1], wheel[0])];
+        let ratio = line.final_ratio;
         let turned = twist.map(|rate| line.shaft_stiffness_n_m_rad * rate);
         let damping = twist.map(|rate| line.shaft_damping_n_m_s_rad * rate);
 
@@ -163,12 +185,13 @@ impl<T: Real> ShaftRange<T> {
             Phase::InertiaPhase | Phase::AfterShift => memory.released_s + dt,
             Phase::BeforeShift | Phase::TorquePhase => zero,
         };
-        let mut mean = self.balance(&last, input, &span, self.any_offgoing, span.clutch);
+        let seen = self.seen(&last, input, &span);
+        let mut mean = scaled(self.any_offgoing.output(&seen, span.clutch), ratio);
         // A clutch that has let go carries next to nothing, as soon as it has drained and all that is looked back on lies
         // after that.
         if memory.released_s > reach_s + errors.offgoing_drain_s {
             let offgoing = [-errors.offgoing_n_m, errors.offgoing_n_m];
-            mean = common(mean, self.balance(&last, input, &span, self.any_oncoming, offgoing));
+            mean = common(mean, scaled(self.any_oncoming.output(&seen, offgoing), ratio));
         }
         let balanced = [
             mean[0] - damping[1] + (reach_s * turned[0]).min(zero),
@@ -186,31 +209,19 @@ impl<T: Real> ShaftRange<T> {
         Some([spring[0] + damping[0], spring[1] + damping[1]])
     }
 
-    /// Shaft torque over the interval between two readings, N m, by a balance in which one clutch appears with this torque.
-    fn balance(
-        &self,
-        last: &Input<T>,
-        input: &Input<T>,
-        span: &Span<T>,
-        balance: Balance<T>,
-        clutch: [T; 2],
-    ) -> [T; 2] {
+    /// What the readings leave open between two of them.
+    fn seen(&self, last: &Input<T>, input: &Input<T>, span: &Span<T>) -> Seen<T> {
         let errors = &self.errors;
-        let Balance { per_turbine_rad_s2, per_output_rad_s2, per_turbine_torque, per_clutch_torque } = balance;
-        let turned = |change: T| change / input.dt_s;
-        let momentum = per_turbine_rad_s2 * turned(input.turbine_rad_s - last.turbine_rad_s)
-            + per_output_rad_s2 * turned(self.output(input) - self.output(last));
-        let unsure = per_turbine_rad_s2.abs() * turned(errors.turbine_rad_s)
-            + per_output_rad_s2.abs() * turned(errors.output_rad_s);
-
+        let rate = |change: T, error: T| [(change - error) / input.dt_s, (change + error) / input.dt_s];
         // The turbine torque grows with the engine speed and falls with the turbine's.
         let most = self.converter.torques(span.engine[1], span.turbine[0]).turbine_n_m;
         let least = self.converter.torques(span.engine[0], span.turbine[1]).turbine_n_m;
         let share = errors.turbine_torque_share;
-        let turbine = [least - share * least.abs(), most + share * most.abs()];
-        let (a, b) = (scaled(turbine, per_turbine_torque), scaled(clutch, per_clutch_torque));
-        let output = [momentum - unsure + a[0] + b[0], momentum + unsure + a[1] + b[1]];
-        scaled(output, self.driveline.final_ratio)
+        Seen {
+            turbine_rad_s2: rate(input.turbine_rad_s - last.turbine_rad_s, errors.turbine_rad_s),
+            output_rad_s2: rate(self.output(input) - self.output(last), errors.output_rad_s),
+            turbine_n_m: [least - share * least.abs(), most + share * most.abs()],
+        }
     }
 
     fn output(&self, input: &Input<T>) -> T {
