@@ -264,8 +264,8 @@ pub(crate) struct Estimate {
     /// How the gains of the rigid and the compliant observer are chosen [default: iss]
     #[arg(long, value_enum)]
     pub(crate) method: Option<MethodChoice>,
-    /// File whose table `sensors` describes those of the log, such as an experiment file: the Kalman filters are told their noise and lag, and take
-    /// readings as nearly exact and of the moment without
+    /// File whose table `sensors` describes those of the log, such as an experiment file: the Kalman filters are told
+    /// their noise and lag, and take readings as nearly exact and of the moment without
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
     /// File for the estimate; standard output if left out

@@ -70,9 +70,9 @@ fn ellipsoid(
     lambda: f64,
     round: &impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<Option<Found>, DesignError> {
-    let direct = system.direct();
+    let direct = &system.direct_columns;
     let (states, outputs) = (system.states(), system.h.nrows());
-    let through = system.through_gain(&system.corners[0]).ncols();
+    let through = system.corners[0].columns.ncols();
     let causes = through + direct.ncols();
     let count = 1 + pairs.iter().flat_map(|(_, terms)| terms).map(|(end, _)| *end).max().unwrap_or(0);
     let triangle = states * (states + 1) / 2;
@@ -96,8 +96,8 @@ fn ellipsoid(
         }
         let mut row = DMatrix::zeros(states, n);
         row.columns_mut(0, states).copy_from(&(p * &corner.phi - y * &corner.g_psi));
-        row.columns_mut(states, through).copy_from(&(y * system.through_gain(corner) * -inflated));
-        row.columns_mut(states + through, direct.ncols()).copy_from(&(p * &direct * inflated));
+        row.columns_mut(states, through).copy_from(&(y * &corner.columns * -inflated));
+        row.columns_mut(states + through, direct.ncols()).copy_from(&(p * direct * inflated));
         stacked(&diagonal, &row, p)
     };
     let sum = |p: &DMatrix<f64>, ys: &[DMatrix<f64>], a: &[f64], terms: &[(usize, &Corner)], lambda, inflated| {

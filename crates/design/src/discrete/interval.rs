@@ -47,8 +47,8 @@ fn interval(
     rho: f64,
     round: &impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<Option<Found>, DesignError> {
-    let direct = system.direct();
-    let through: Vec<DMatrix<f64>> = system.corners.iter().map(|corner| system.through_gain(corner)).collect();
+    let direct = &system.direct_columns;
+    let through: Vec<&DMatrix<f64>> = system.corners.iter().map(|corner| &corner.columns).collect();
     let causes = through[0].ncols();
     let (states, outputs) = (system.states(), system.h.nrows());
     let y_at = states - 1;
@@ -104,6 +104,6 @@ fn interval(
     let added = |through: &DMatrix<f64>| -> f64 {
         (0..states).map(|a| weights[a] * ((gain.row(a) * through).abs().sum() + direct.row(a).abs().sum())).sum()
     };
-    let added = through.iter().map(added).fold(0.0, f64::max);
+    let added = through.into_iter().map(added).fold(0.0, f64::max);
     Ok(Some(Found { gains: vec![gain], bound: added / (1.0 - contraction), margins }))
 }

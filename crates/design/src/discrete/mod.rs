@@ -273,7 +273,7 @@ fn contributions(system: &ErrorSystem, gains: &[DMatrix<f64>]) -> Vec<Contributi
         let gain = if corner.friction > least { gains.last() } else { gains.first() };
         let Some(gain) = gain else { return Vec::new() };
         let a = &corner.phi - gain * &corner.g_psi;
-        let through = system.causes_through_gain(corner).map(|cause| (cause.name, -gain * &cause.column));
+        let through = corner.through_gain.iter().map(|cause| (cause.name, -gain * &cause.column));
         let direct = system.direct.iter().map(|cause| (cause.name, cause.column.clone()));
         let columns: Vec<_> = through.chain(direct).collect();
         let mut sums: Vec<Contribution> = Vec::new();
@@ -394,8 +394,8 @@ mod tests {
             vehicle.error_bounds.valve_delay_s[1] = delay_s;
             let system = ErrorSystem::of(&vehicle, Model::Rigid, Quantity::ClutchTorque, phase, SAMPLE_S);
             let weak = &system.corners[0];
-            let c = system.through_gain(weak).abs().sum() / weak.g_psi[0].abs();
-            let valve = system.direct().abs().sum();
+            let c = weak.columns.abs().sum() / weak.g_psi[0].abs();
+            let valve = system.direct_columns.abs().sum();
             assert_eq!(c * (1.0 - weak.phi[0]) < valve, pays, "the closed form itself");
             let certificate = design_discrete_phase(
                 &vehicle,
@@ -418,7 +418,7 @@ mod tests {
         let bound = |gain: &DMatrix<f64>| {
             let at_corner = |corner: &system::Corner| {
                 let contraction = (corner.phi[0] - (gain * &corner.g_psi)[0]).abs();
-                let disturbed = (gain * system.through_gain(corner)).abs().sum() + system.direct().abs().sum();
+                let disturbed = (gain * &corner.columns).abs().sum() + system.direct_columns.abs().sum();
                 if contraction < 1.0 { PRESSURE_UNIT_PA * disturbed / (1.0 - contraction) } else { f64::INFINITY }
             };
             system.corners.iter().map(at_corner).fold(0.0, f64::max)
@@ -463,8 +463,7 @@ mod tests {
             let at = |share: f64| {
                 let g_psi = &system.corners[0].g_psi * (1.0 - share) + &system.corners[1].g_psi * share;
                 let gain = gain(0) * (1.0 - share) + gain(1) * share;
-                let through = system.through_gain(&system.corners[0]) * (1.0 - share)
-                    + system.through_gain(&system.corners[1]) * share;
+                let through = &system.corners[0].columns * (1.0 - share) + &system.corners[1].columns * share;
                 (&system.corners[0].phi - &gain * g_psi, -gain * through)
             };
             let mut largest = 0.0_f64;
@@ -477,7 +476,7 @@ mod tests {
                 let mut sum = 0.0;
                 for k in 0..600 {
                     let (a, b) = at(share(k));
-                    sum += (&response * b).abs().sum() + (&response * system.direct()).abs().sum();
+                    sum += (&response * b).abs().sum() + (&response * &system.direct_columns).abs().sum();
                     response *= a;
                 }
                 largest = largest.max(sum);

@@ -54,9 +54,8 @@ pub(crate) fn smallest_gain(
         return Err(DesignError::NotCertified);
     }
     let length = |columns: &DMatrix<f64>| columns.column_iter().map(|column| column.norm()).sum::<f64>();
-    let through =
-        system.corners.iter().map(|corner| length(&(&gain * system.through_gain(corner)))).fold(0.0, f64::max);
-    let bound = (through + length(&system.direct())) / (1.0 - rho);
+    let through = system.corners.iter().map(|corner| length(&(&gain * &corner.columns))).fold(0.0, f64::max);
+    let bound = (through + length(&system.direct_columns)) / (1.0 - rho);
     Ok(Found { gains: vec![gain], bound, margins })
 }
 

@@ -18,10 +18,10 @@ const ROUNDINGS: f64 = 8.0;
 #[derive(Debug, Clone)]
 pub(crate) struct ErrorSystem {
     pub(crate) corners: Vec<Corner>,
-    /// What reaches the error through the gain at any corner, in the units of the outputs.
-    through_gain: Vec<Cause>,
     /// What reaches it past the gain, in the units of the states.
     pub(crate) direct: Vec<Cause>,
+    /// The same as columns, those of one direction made one.
+    pub(crate) direct_columns: DMatrix<f64>,
     /// Errors of the accelerations alone, a column for each cause: `H`.
     pub(crate) h: DMatrix<f64>,
 }
@@ -36,8 +36,10 @@ pub(crate) struct Corner {
     pub(crate) valve: usize,
     pub(crate) phi: DMatrix<f64>,
     pub(crate) g_psi: DMatrix<f64>,
-    /// What looks like a pressure there, and reaches the error through the gain too.
-    seen: Vec<Cause>,
+    /// What reaches the error through the gain, in the units of the outputs.
+    pub(crate) through_gain: Vec<Cause>,
+    /// The same as columns, those of one direction made one; as many at every corner.
+    pub(crate) columns: DMatrix<f64>,
 }
 
 /// One error at its bound; it may have either sign.
@@ -67,9 +69,6 @@ pub(crate) fn state_units(model: Model) -> &'static [f64] {
 impl ErrorSystem {
     pub(crate) fn of(vehicle: &Vehicle, model: Model, quantity: Quantity, phase: Phase, sample_time_s: f64) -> Self {
         let mut corners = corners(vehicle, model, phase, sample_time_s);
-        for corner in &mut corners {
-            corner.seen = seen(vehicle, quantity, &corner.g_psi);
-        }
         let outputs = outputs(model, phase);
         let accelerations = match model {
             Model::Rigid => rigid_errors(vehicle, phase),
@@ -91,34 +90,24 @@ impl ErrorSystem {
                 through_gain.push(Cause { name, column });
             }
         }
+        for corner in &mut corners {
+            corner.through_gain = [through_gain.clone(), seen(vehicle, quantity, &corner.g_psi)].concat();
+            corner.columns = merged(&corner.through_gain);
+        }
         let direct = direct(vehicle, model, quantity, &corners, sample_time_s);
-        Self { corners, through_gain, direct, h }
+        Self { corners, direct_columns: merged(&direct), direct, h }
     }
 
     /// States: the pressure is the last.
     pub(crate) fn states(&self) -> usize {
         self.corners[0].phi.nrows()
     }
-
-    /// What reaches the error through the gain at a corner.
-    pub(crate) fn causes_through_gain<'a>(&'a self, corner: &'a Corner) -> impl Iterator<Item = &'a Cause> {
-        self.through_gain.iter().chain(&corner.seen)
-    }
-
-    /// The same as columns, as many at every corner.
-    pub(crate) fn through_gain(&self, corner: &Corner) -> DMatrix<f64> {
-        merged(self.causes_through_gain(corner))
-    }
-
-    pub(crate) fn direct(&self) -> DMatrix<f64> {
-        merged(self.direct.iter())
-    }
 }
 
 /// The columns of these causes, those of one direction made one: their errors may have any sign, so their sizes add up.
-fn merged<'a>(causes: impl Iterator<Item = &'a Cause>) -> DMatrix<f64> {
+fn merged(causes: &[Cause]) -> DMatrix<f64> {
     let mut columns: Vec<DVector<f64>> = Vec::new();
-    for Cause { column, .. } in causes.filter(|cause| cause.column.norm() > 0.0) {
+    for Cause { column, .. } in causes.iter().filter(|cause| cause.column.norm() > 0.0) {
         let along = |other: &DVector<f64>| {
             let cosine = other.dot(column) / (other.norm() * column.norm());
             (cosine.abs() > 1.0 - 1e-12).then_some(cosine.signum())
@@ -157,7 +146,8 @@ fn corners(vehicle: &Vehicle, model: Model, phase: Phase, sample_time_s: f64) ->
                 g_psi: DMatrix::from_fn(outputs.len(), units.len(), |i, j| {
                     influence[outputs[i]][j] * held[j] * units[j] / SPEED_UNITS_RAD_S[outputs[i]]
                 }),
-                seen: Vec::new(),
+                through_gain: Vec::new(),
+                columns: DMatrix::zeros(0, 0),
             });
         }
     }
