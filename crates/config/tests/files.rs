@@ -115,6 +115,14 @@ fn an_experiment_with_degrees_or_percent_is_told_so() {
 }
 
 #[test]
+fn a_method_goes_with_gains_that_are_designed() {
+    let error = experiment_error("kind = \"kalman\"", "kind = \"kalman\"\nmethod = \"scheduled\"");
+    assert!(error.contains("has a method and no gains to design\nhint: leave `method` out"), "{error}");
+    let unknown = experiment_error("method = \"peak-to-peak\"", "method = \"peak\"");
+    assert!(unknown.contains("unknown variant `peak`") && unknown.contains("interval"), "{unknown}");
+}
+
+#[test]
 fn files_are_told_apart_by_what_they_describe() {
     assert_eq!(Source::built_in("v", VEHICLE).kind().unwrap(), Kind::Vehicle);
     assert_eq!(Source::built_in("e", EXPERIMENT).kind().unwrap(), Kind::Experiment);

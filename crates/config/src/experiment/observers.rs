@@ -56,17 +56,6 @@ pub enum GainMethod {
 impl GainMethod {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Iss, Self::IssDiscrete, Self::PeakToPeak, Self::Scheduled, Self::Interval];
-
-    /// Its name in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Iss => "iss",
-            Self::IssDiscrete => "iss-discrete",
-            Self::PeakToPeak => "peak-to-peak",
-            Self::Scheduled => "scheduled",
-            Self::Interval => "interval",
-        }
-    }
 }
 
 /// Gains given in the file in place of designed ones.
