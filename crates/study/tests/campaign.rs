@@ -138,11 +138,13 @@ fn the_search_finds_a_case_at_least_as_bad_as_the_worst_run() {
 
 #[test]
 fn the_guaranteed_range_holds_over_the_whole_budget_and_not_beyond_it() {
+    // The range is the same around every observer; the open loop is the quickest.
+    let alone = ("observers = [\"Kalman\", \"peak-to-peak\", \"open loop\"]", "observers = [\"open loop\"]");
     let covered = |changes: &[(&str, &str)]| {
-        let summary = summary(study_of("budget.toml", changes));
+        let summary = summary(study_of("budget.toml", &[&[alone], changes].concat()));
         (0..PHASES.len()).map(|phase| summary.covered(0, phase)).collect::<Vec<_>>()
     };
-    assert_eq!(covered(&[("runs = 5000", "runs = 150")]), [(150, 150), (150, 150)]);
+    assert_eq!(covered(&[("runs = 5000", "runs = 2000")]), [(2000, 2000), (2000, 2000)]);
     // A valve with a third more gain than the budget allows leaves the range.
     let beyond = covered(&[("runs = 5000", "runs = 8"), ("range = [0.9, 1.1]", "range = [1.45, 1.5]")]);
     assert!(beyond.iter().any(|(covered, all)| covered < all), "{beyond:?}");
