@@ -161,9 +161,9 @@ pub(crate) struct Design {
     /// How the gains are chosen
     #[arg(long, value_enum, default_value_t = MethodChoice::Iss)]
     pub(crate) method: MethodChoice,
-    /// What the bound of the discrete-time methods is on
-    #[arg(long, value_enum, value_name = "QUANTITY", default_value_t = QuantityChoice::ClutchTorque)]
-    pub(crate) bound_on: QuantityChoice,
+    /// What the bound of the discrete-time methods is on [default: clutch-torque]
+    #[arg(long, value_enum, value_name = "QUANTITY")]
+    pub(crate) bound_on: Option<QuantityChoice>,
     /// Phase to design for
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
@@ -179,9 +179,9 @@ pub(crate) struct Design {
     /// Largest acceptable offset of the estimate in Pa
     #[arg(long, value_name = "PA", value_parser = positive)]
     pub(crate) offset_max: Option<f64>,
-    /// Sample time in s, for the discrete-time methods
-    #[arg(long, value_name = "S", value_parser = positive, default_value = "0.01")]
-    pub(crate) sample_time: f64,
+    /// Sample time in s, for the discrete-time methods [default: 0.01]
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(crate) sample_time: Option<f64>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -228,6 +228,8 @@ fn the_filter_can_be_told_of_the_sensors() {
     let told = estimate(&["--sensors", &format!("{experiments}/bench.toml")]);
     assert!(told.status.success(), "{}", stderr(&told));
     assert_ne!(stdout(&told), stdout(&estimate(&[])));
+    let output = estimate(&["--observer", "rigid", "--sensors", &format!("{experiments}/bench.toml")]);
+    assert!(stderr(&output).contains("--sensors is for the filters"), "{}", stderr(&output));
     let output = estimate(&["--sensors", &format!("{experiments}/e1.toml")]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("describes no sensors"), "{}", stderr(&output));
@@ -301,6 +303,11 @@ fn a_discrete_design_says_when_the_open_loop_serves() {
     assert!(bound("inertia_phase", "bound_pa") < bound("inertia_phase", "open_loop_bound_pa"));
     assert!(bound("torque_phase", "best_gain_bound_pa") > bound("torque_phase", "open_loop_bound_pa"));
     assert!(stdout(&design(&["--method", "iss-discrete"])).contains("open loop serves"));
+    for unused in [&["--bound-on", "pressure"][..], &["--method", "scheduled", "--kappa2", "40"]] {
+        let output = design(unused);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains("does not go with this observer and method"), "{}", stderr(&output));
+    }
     // Friction spoils the pressure and not the torque: on the pressure no gain beats the open loop by this budget.
     let output = design(&["--method", "scheduled", "--bound-on", "pressure"]);
     assert!(stdout(&output).contains("inertia phase: open loop serves"), "{}", stdout(&output));

@@ -282,6 +282,13 @@ fn single_precision_follows_double_precision() {
     let compliant = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     assert_single_follows_double(&observer(), &observer().cast::<f32>(), 1.0);
     assert_single_follows_double(&compliant, &compliant.cast::<f32>(), 1.0);
+    // The certificates say how much rounding may cost.
+    for method in &GainMethod::ALL[1..] {
+        let design = design_discrete(&vehicle, Model::Rigid, *method, 0.01).unwrap();
+        let observer = rigid_observer(&vehicle, design.rigid_gains());
+        let rounding = design.inertia_phase.contributions.iter().find(|part| part.cause == "float32 rounding").unwrap();
+        assert_single_follows_double(&observer, &observer.cast::<f32>(), rounding.bound_pa);
+    }
     let (twisting, inverted) = (super_twisting(&vehicle), inversion(&vehicle));
     assert_single_follows_double(&twisting, &twisting.cast::<f32>(), 1.0);
     // These trust the speeds almost fully: a rounded speed, as an acceleration over 10 ms, is a torque of some 0.01 N m

@@ -38,6 +38,23 @@ impl<T: Real> Converter<T> {
         ConverterTorques { pump_n_m, turbine_n_m: self.torque_ratio.at(speed_ratio) * pump_n_m }
     }
 
+    /// Least and greatest turbine torque with both speeds anywhere in these ranges, N m.
+    pub fn turbine_range(&self, engine_rad_s: [T; 2], turbine_rad_s: [T; 2]) -> [T; 2] {
+        let engine = engine_rad_s.map(|speed| speed.max(T::of(SLOWEST_ENGINE_RAD_S)));
+        // A quotient is greatest where the divisor is smallest, unless it is negative.
+        let least = turbine_rad_s[0] / if turbine_rad_s[0] < T::zero() { engine[0] } else { engine[1] };
+        let most = turbine_rad_s[1] / if turbine_rad_s[1] < T::zero() { engine[1] } else { engine[0] };
+        let capacity = self.capacity_n_m_s2.range_within(least, most);
+        let (lowest, highest) = self.torque_ratio.range_within(least, most);
+        let (ratios, squares) = ([lowest, highest], engine.map(|speed| speed * speed));
+        // In overrun the torque is negative, and least where its size is greatest.
+        let end = |capacity: T, drive: usize, overrun: usize| {
+            let at = if capacity < T::zero() { overrun } else { drive };
+            capacity * squares[at] * ratios[at]
+        };
+        [end(capacity.0, 0, 1), end(capacity.1, 1, 0)]
+    }
+
     /// The same converter in another precision.
     pub fn cast<U: Real>(&self) -> Converter<U> {
         Converter { capacity_n_m_s2: self.capacity_n_m_s2.cast(), torque_ratio: self.torque_ratio.cast() }
@@ -76,6 +93,27 @@ mod tests {
     fn overrun_turns_the_flow_of_torque_around() {
         let torques = converter().torques(100.0, 130.0);
         assert!(torques.pump_n_m < 0.0 && torques.turbine_n_m < 0.0);
+    }
+
+    #[test]
+    fn the_range_of_the_turbine_torque_holds_it_and_ends_at_it() {
+        for (engine, turbine) in
+            [([180.0, 220.0], [60.0, 120.0]), ([90.0, 110.0], [95.0, 130.0]), ([0.0, 5.0], [0.0, 3.0])]
+        {
+            let [low, high] = converter().turbine_range(engine, turbine);
+            let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+            for i in 0..=40 {
+                for j in 0..=40 {
+                    let between = |[a, b]: [f64; 2], k: i32| a + (b - a) * f64::from(k) / 40.0;
+                    let torque = converter().torques(between(engine, i), between(turbine, j)).turbine_n_m;
+                    (least, most) = (least.min(torque), most.max(torque));
+                }
+            }
+            assert!(low <= least && most <= high, "{low} {least} {most} {high}");
+            // Beside a stalled engine speed ratio and engine speed are hardly one from the other, and it is wider.
+            let stalled = engine[0] < 1.0;
+            assert!(stalled || high - low < 1.2 * (most - least), "{low} {least} {most} {high}");
+        }
     }
 
     #[test]

@@ -12,8 +12,8 @@
 //! Four things set it apart from the reduced-order observers. The wheel speed drives the twist and is not an output, so
 //! mass, grade and tyre slip do not enter. The offgoing clutch's torque is a state, so the same equations hold in torque
 //! and inertia phase and no late phase detection spoils them. Before the shift, shaft torque and turbine torque are
-//! found together; an error that both share cancels in the clutch torque afterwards. And a reading
-//! of a toothed wheel is a few milliseconds old: it is held against the speed of that time, not against the newest.
+//! found together; an error that both share cancels in the clutch torque afterwards. And a reading of a toothed wheel is a
+//! few milliseconds old: it is held against the speed of that time, not against the newest.
 
 use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients};
 
@@ -154,6 +154,12 @@ impl<T: Real> KalmanFilter<T> {
         KalmanFilter::new(self.model.cast(), self.noise.cast(), readings, self.tracker.cast())
     }
 
+    /// Shaft torque in balance with a turbine torque in the gear before the shift, N m.
+    #[inline]
+    fn shaft_before(&self, turbine_n_m: T) -> T {
+        turbine_n_m * self.model.shift.ratio_offgoing() * self.model.rigid.driveline.final_ratio
+    }
+
     /// The first estimate: the gear before the shift in balance, an empty cylinder.
     fn begin(&self, pressure_pa: T, input: &Input<T>) -> Running<T> {
         let (zero, noise) = (T::zero(), &self.noise);
@@ -161,7 +167,7 @@ impl<T: Real> KalmanFilter<T> {
         let torque = self.model.rigid.converter.torques(input.engine_rad_s, input.turbine_rad_s).turbine_n_m;
         let line = &self.model.rigid.driveline;
         let held = &self.model.torque_phase.holding_offgoing;
-        let shaft = torque * self.model.shift.ratio_offgoing() * line.final_ratio;
+        let shaft = self.shaft_before(torque);
         let holding = held.per_turbine_torque * torque + held.per_output_torque * shaft / line.final_ratio;
         let mut covariance = [[zero; N]; N];
         // Starting out of balance costs a few swings of the shafts: as much as the torque itself is allowed.
@@ -301,8 +307,7 @@ impl<T: Real> KalmanFilter<T> {
         if now && !before {
             let last = &running.last;
             let turbine_n_m = self.model.rigid.converter.torques(last.engine_rad_s, last.turbine_rad_s).turbine_n_m;
-            let final_ratio = self.model.rigid.driveline.final_ratio;
-            let shaft = turbine_n_m * self.model.shift.ratio_offgoing() * final_ratio;
+            let shaft = self.shaft_before(turbine_n_m);
             let together = [zero, zero, shaft, zero, T::one(), zero].map(|x| x * self.noise.turbine_share);
             for (row, a) in running.covariance.iter_mut().zip(together) {
                 for (p, b) in row.iter_mut().zip(together) {

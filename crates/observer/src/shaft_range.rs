@@ -213,9 +213,7 @@ impl<T: Real> ShaftRange<T> {
     fn seen(&self, last: &Input<T>, input: &Input<T>, span: &Span<T>) -> Seen<T> {
         let errors = &self.errors;
         let rate = |change: T, error: T| [(change - error) / input.dt_s, (change + error) / input.dt_s];
-        // The turbine torque grows with the engine speed and falls with the turbine's.
-        let most = self.converter.torques(span.engine[1], span.turbine[0]).turbine_n_m;
-        let least = self.converter.torques(span.engine[0], span.turbine[1]).turbine_n_m;
+        let [least, most] = self.converter.turbine_range(span.engine, span.turbine);
         let share = errors.turbine_torque_share;
         Seen {
             turbine_rad_s2: rate(input.turbine_rad_s - last.turbine_rad_s, errors.turbine_rad_s),

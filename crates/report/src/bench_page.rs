@@ -28,9 +28,6 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             step => [s.step_ns, s.step_with_range_ns].map(|ns| format!("{ns:.0}")),
         }
     });
-    // The best first, as in the ranking.
-    let position = |name: &String| experiment.observers.iter().position(|entry| entry.name == *name);
-    let order: Vec<usize> = bench.ranking.iter().filter_map(|s| position(&s.observer)).collect();
     let rows = bench.rows.iter().map(|row| {
         let least =
             |value: fn(&study::bench::BenchCell) -> f64| row.cells.iter().map(value).fold(f64::INFINITY, f64::min);
@@ -38,7 +35,7 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         context! {
             scenario => &row.scenario,
             completed => row.completed,
-            cells => order.iter().filter_map(|&at| row.cells.get(at)).map(|c| context! {
+            cells => row.cells.iter().map(|c| context! {
                 torque => pressure(c.torque_phase_rms_pa),
                 inertia => pressure(c.inertia_phase_rms_pa),
                 torque_best => c.torque_phase_rms_pa <= torque,

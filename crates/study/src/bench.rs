@@ -43,7 +43,7 @@ pub struct BenchRow {
     pub scenario: String,
     /// Whether the shift passed all its phases within the simulated time; if not, there is nothing to score.
     pub completed: bool,
-    /// The observers in the order of the experiment.
+    /// The observers in the order of the ranking.
     pub cells: Vec<BenchCell>,
 }
 
@@ -105,10 +105,8 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
         progress(&scenario.name);
         let mut varied = experiment.with_scenario(scenario);
         let trace = simulate_drive(vehicle, &varied)?;
-        let told_otherwise = match varied.sensors_told == experiment.sensors_told {
-            true => None,
-            false => Some(self::observers(vehicle, &varied)?),
-        };
+        let told_otherwise = varied.sensors_told != experiment.sensors_told;
+        let told_otherwise = told_otherwise.then(|| self::observers(vehicle, &varied)).transpose()?;
         let observers = told_otherwise.as_ref().unwrap_or(&observers);
         // One noise, the same for all, would decide between observers that are close.
         let seed = varied.sensors.map(|sensors| mixed(sensors.seed, number as u64));
@@ -137,6 +135,10 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
         }
     }
     ranking.sort_by(|a, b| a.shift_median_ratio.total_cmp(&b.shift_median_ratio));
+    let place = |cell: &BenchCell| ranking.iter().position(|s| s.observer == cell.observer);
+    for row in &mut rows {
+        row.cells.sort_by_key(place);
+    }
     Ok(Bench { rows, ranking })
 }
 

@@ -197,15 +197,16 @@ pub fn shaft_level(vehicle: &Vehicle) -> [ShaftEffect; 2] {
     ]
 }
 
-/// Length of a shift, s, and deviation of the difference of the two speed readings that the twist is integrated from,
-/// rad/s at the wheel: 0.1 rad/s on the output over the final ratio of 3, and 0.02 rad/s on the wheel, as on the bench.
+/// Length of a shift, s.
 const SHIFT_S: f64 = 0.6;
-const TWIST_READING_RAD_S: f64 = 0.04;
+/// Deviations of a reading in the budget's bound on a change: five of the difference of two readings.
+const QUANTUM_DEVIATIONS: f64 = 5.0 * std::f64::consts::SQRT_2;
 
 /// Drift of the shaft torque by integrating noisy readings over a shift at 100 Hz, one standard deviation, N m.
 fn drift_n_m(vehicle: &Vehicle) -> f64 {
-    let sample_s = 0.01;
-    vehicle.driveline.shaft_stiffness_n_m_rad * TWIST_READING_RAD_S * (SHIFT_S * sample_s).sqrt()
+    let (sample_s, bounds, line) = (0.01, &vehicle.error_bounds, &vehicle.driveline);
+    let twist_rad_s = (bounds.output_quantum_rad_s / line.final_ratio).hypot(bounds.wheel_quantum_rad_s);
+    line.shaft_stiffness_n_m_rad * twist_rad_s / QUANTUM_DEVIATIONS * (SHIFT_S * sample_s).sqrt()
 }
 
 fn friction(vehicle: &Vehicle) -> f64 {

@@ -38,12 +38,9 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     }
 
     output::line("RMS error of the pressure, MPa: torque phase / inertia phase\n")?;
-    // The best first, as in the ranking.
-    let position = |name: &String| experiment.observers.iter().position(|entry| entry.name == *name);
-    let order: Vec<usize> = result.ranking.iter().filter_map(|s| position(&s.observer)).collect();
     let names = result.ranking.iter().map(|s| s.observer.clone());
     let mut rows = vec![std::iter::once("scenario".to_owned()).chain(names).collect()];
-    rows.extend(result.rows.iter().map(|row| cells(row, &order)));
+    rows.extend(result.rows.iter().map(cells));
     output::table(1, &rows)?;
 
     output::line("\nover the open loop's; ranked by the median over the whole shift\n")?;
@@ -103,9 +100,9 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     Ok(())
 }
 
-fn cells(row: &BenchRow, order: &[usize]) -> Vec<String> {
+fn cells(row: &BenchRow) -> Vec<String> {
     let cell = |torque: f64, inertia: f64| format!("{:.3} / {:.3}", units::mpa(torque), units::mpa(inertia));
-    let scores = order.iter().filter_map(|&at| row.cells.get(at)).map(|c| {
+    let scores = row.cells.iter().map(|c| {
         if row.completed { cell(c.torque_phase_rms_pa, c.inertia_phase_rms_pa) } else { "no shift".to_owned() }
     });
     std::iter::once(row.scenario.clone()).chain(scores).collect()

@@ -26,6 +26,8 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
         PhaseChoice::Torque => &[Phase::TorquePhase],
         PhaseChoice::Inertia => &[Phase::InertiaPhase],
     };
+    options_apply(options)?;
+    let sample_time_s = options.sample_time.unwrap_or(SAMPLE_TIME_S);
     let mut object = Map::new();
     let mut text = Vec::new();
     for &phase in phases {
@@ -43,8 +45,8 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
             }
             (DesignChoice::Rigid | DesignChoice::Compliant, method) => {
                 let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
-                let (method, quantity) = (method.into(), options.bound_on.into());
-                let certificate = design_discrete_phase(&vehicle, model, method, quantity, phase, options.sample_time)
+                let quantity = options.bound_on.map_or(Quantity::ClutchTorque, Quantity::from);
+                let certificate = design_discrete_phase(&vehicle, model, method.into(), quantity, phase, sample_time_s)
                     .map_err(failed)?;
                 (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
             }
@@ -63,6 +65,33 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
     }
     output::line(&format!("vehicle file sha256 {}", vehicle.source.sha256()))?;
     Ok(())
+}
+
+/// Sample time of a design that is given none, s: the usual period of a transmission controller.
+const SAMPLE_TIME_S: f64 = 0.01;
+
+/// Refuses an option that the method would not look at.
+fn options_apply(options: &Design) -> Result<(), Failure> {
+    let sliding = options.observer == DesignChoice::Sliding;
+    let discrete = options.method != MethodChoice::Iss;
+    let required = [
+        ("--kappa1", options.kappa1.is_some()),
+        ("--kappa2", options.kappa2.is_some()),
+        ("--error-bound", options.error_bound.is_some()),
+        ("--offset-max", options.offset_max.is_some()),
+    ];
+    let sampled = [("--bound-on", options.bound_on.is_some()), ("--sample-time", options.sample_time.is_some())];
+    let unused = [(required.as_slice(), discrete || sliding), (sampled.as_slice(), !discrete || sliding)];
+    let unused = unused.iter().filter(|(_, not)| *not).flat_map(|(options, _)| *options);
+    let mut unused = unused.copied().chain([("--method", discrete && sliding)]);
+    match unused.find(|(_, given)| *given) {
+        None => Ok(()),
+        Some((option, _)) => Err(Failure::Input(format!(
+            "{option} does not go with this observer and method\n\
+             hint: --kappa1, --kappa2, --error-bound and --offset-max are of `--method iss`, --bound-on and --sample-time of \
+             the other methods, and sliding has none"
+        ))),
+    }
 }
 
 /// The vehicle file's requirement with what the options replace.

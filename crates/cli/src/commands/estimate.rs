@@ -42,20 +42,19 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let mut method = options.method.map_or(GainMethod::Iss, GainMethod::from);
     if options.observer == ObserverChoice::Best {
         output::note(if has_wheel {
-            "observer: kalman, the best where there is a wheel speed"
+            "observer: kalman, as there is a wheel speed"
         } else {
             method = GainMethod::PeakToPeak;
             "observer: rigid with peak-to-peak gains; with wheel_speed_rad_s in the log kalman would serve"
         });
     }
-    let needs_wheel = [
-        ObserverKind::Compliant,
-        ObserverKind::Kalman,
-        ObserverKind::Extended,
-        ObserverKind::Unscented,
-        ObserverKind::Inversion,
-    ];
-    if needs_wheel.contains(&kind) {
+    let filters = [ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented];
+    if options.sensors.is_some() && !filters.contains(&kind) {
+        return Err(Failure::Input(
+            "--sensors is for the filters\nhint: it goes with `--observer` kalman, extended and unscented".to_owned(),
+        ));
+    }
+    if filters.contains(&kind) || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
         log.require(signal::WHEEL_SPEED)?;
     }
     let sensors = options.sensors.as_deref().map(sensors).transpose()?;

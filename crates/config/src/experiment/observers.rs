@@ -45,7 +45,7 @@ pub enum GainMethod {
     /// The smallest gain that decays as required over a sample; the rest are for a sample time too, with every error of
     /// the budget in their bounds, and are the open loop where no gain beats that.
     IssDiscrete,
-    /// The smallest bound on the error of the pressure.
+    /// The smallest bound on the error.
     PeakToPeak,
     /// The same with a gain that follows the friction coefficient.
     Scheduled,

@@ -16,7 +16,7 @@
 use nalgebra::DMatrix;
 
 use super::system::{Corner, ErrorSystem};
-use super::{DiscreteMargin, Found, RESERVE, block, least_eigenvalue, search, solved, stacked};
+use super::{DiscreteMargin, Found, RESERVE, best_found, block, least_eigenvalue, solved, stacked};
 use crate::iss::DesignError;
 use crate::lmi::{Block, Problem};
 
@@ -25,23 +25,14 @@ const GAIN_UNIT: f64 = 30.0;
 /// Steps of the search for `lambda`; each shrinks its interval by 0.618.
 const SEARCH_STEPS: usize = 14;
 
-/// The gain, constant or following the friction, with the smallest bound on the pressure.
+/// The gain, constant or following the friction, with the smallest bound.
 pub(crate) fn smallest_ellipsoid(
     system: &ErrorSystem,
     scheduled: bool,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<Found, DesignError> {
     let pairs = pairs(system, scheduled);
-    let mut best: Option<Found> = None;
-    search(0.01, 0.95, SEARCH_STEPS, |lambda| {
-        let Ok(Some(found)) = ellipsoid(system, &pairs, lambda, &round) else { return f64::INFINITY };
-        let bound = found.bound;
-        if best.as_ref().is_none_or(|best| bound < best.bound) {
-            best = Some(found);
-        }
-        bound
-    });
-    best.ok_or(DesignError::NotCertified)
+    best_found(0.01, 0.95, SEARCH_STEPS, |lambda| ellipsoid(system, &pairs, lambda, &round))
 }
 
 /// Inequalities: each the sum of the matrix above over some gains at some corners.

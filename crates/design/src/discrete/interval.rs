@@ -12,7 +12,7 @@
 use nalgebra::DMatrix;
 
 use super::system::ErrorSystem;
-use super::{DiscreteMargin, Found, block, search, solved};
+use super::{DiscreteMargin, Found, best_found, block, solved};
 use crate::iss::DesignError;
 use crate::lmi::{Block, Problem};
 
@@ -28,16 +28,7 @@ pub(crate) fn narrowest_interval(
     system: &ErrorSystem,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<Found, DesignError> {
-    let mut best: Option<Found> = None;
-    search(0.0, 1.0, SEARCH_STEPS, |rho| {
-        let Ok(Some(found)) = interval(system, rho, &round) else { return f64::INFINITY };
-        let bound = found.bound;
-        if best.as_ref().is_none_or(|best| bound < best.bound) {
-            best = Some(found);
-        }
-        bound
-    });
-    best.ok_or(DesignError::NotCertified)
+    best_found(0.0, 1.0, SEARCH_STEPS, |rho| interval(system, rho, &round))
 }
 
 /// For this `rho`, if there is one. Unknowns: the weights but that of the pressure, `Y` by rows, the sizes of the entries of

@@ -19,9 +19,11 @@ const GAIN_UNIT: f64 = 30.0;
 /// Unknowns: the entries of alpha, then `L` by rows.
 pub(crate) fn smallest_gain(
     system: &ErrorSystem,
-    rho: f64,
+    kappa2_per_s: f64,
+    sample_time_s: f64,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
 ) -> Result<Found, DesignError> {
+    let rho = (-kappa2_per_s * sample_time_s).exp();
     let (states, outputs) = (system.states(), system.h.nrows());
     let unknowns = states + states * outputs;
     let gain = |x: &[f64]| DMatrix::from_row_slice(states, outputs, &x[states..]) * GAIN_UNIT;
@@ -41,7 +43,7 @@ pub(crate) fn smallest_gain(
     let mut objective = vec![0.0; unknowns];
     objective[..states].fill(1.0);
     let Some(x) = solved(&Problem { objective, blocks })? else {
-        return Err(DesignError::DecayUnreachable { decay_per_s: rho });
+        return Err(DesignError::DecayUnreachable { decay_per_s: kappa2_per_s });
     };
     let gain = round(&gain(&x));
     let margins: Vec<DiscreteMargin> = (system.corners.iter())
@@ -73,7 +75,8 @@ mod tests {
         let phase = Phase::TorquePhase;
         let mut system = ErrorSystem::of(&vehicle, Model::Compliant, Quantity::Pressure, phase, 0.01);
         system.h = DMatrix::from_row_slice(2, 2, &[2.38, 0.0, 0.0, 0.13]);
-        let found = smallest_gain(&system, 0.67, |gain| rounded(gain, Model::Compliant, phase)).unwrap();
+        let found =
+            smallest_gain(&system, -0.67_f64.ln() / 0.01, 0.01, |gain| rounded(gain, Model::Compliant, phase)).unwrap();
         let reference = DMatrix::from_row_slice(2, 2, &[-1.29, 18.04, -2.70, -64.8]);
         // The reference is printed to three digits.
         let gain = &found.gains[0];
