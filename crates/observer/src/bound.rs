@@ -1,9 +1,10 @@
 //! A guaranteed range around every estimate.
 //!
-//! The range follows from the command alone: whatever the valve does within its budget of lag, gain and delay, the
-//! pressure stays between the slowest and the fastest that the budget allows. It does not depend on the observer, so
-//! it holds for any of them, and it is the certificate's recursion for a gain of zero, with lag and gain over the
-//! operating point in place of one worst rate.
+//! The pressure's follows from the command alone: whatever the valve does within its budget of lag, gain and delay, it
+//! stays between the slowest and the fastest that the budget allows. That is the certificate's recursion for a gain of
+//! zero, with lag and gain over the operating point in place of one worst rate. The clutch torque's adds the friction, the
+//! shaft torque's is that of [`crate::shaft_range`]. Of the observer they use only the phase, which all see alike, so they
+//! hold for any of them.
 
 use drivetrain::{Clutch, Real, ValveMaps};
 
