@@ -1,32 +1,32 @@
 //! The command line.
 
 use std::fmt;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use config::GainMethod;
+use config::{GainMethod, SAMPLE_TIMES_S};
 use design::Quantity;
 
 const EXAMPLES: &str = "\
 Examples:
-  wetclutch demo                                     the whole job on the built-in car
-  wetclutch reproduce                                the source chapter's experiments, row by row
+  wetclutch demo                                     simulation, design, estimation and report for the built-in car
+  wetclutch reproduce                                the source chapter's experiments, statement by statement
   wetclutch bench                                    all observers on many drives, ranked
-  wetclutch study experiments/settings.toml -o out   two thousand shifts, their errors and what moves them
+  wetclutch study experiments/settings.toml -o out   two thousand shifts: errors and sensitivities
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
   wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
 
-Files are SI throughout and say so in their keys and column names; measured files may also use
-_rpm, _bar, _mpa, _ma, _ms, _km_h, which are converted when read.
+All files use SI units, which are part of keys and column names. Column names of measured files may also
+end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
 Exit codes: 0 done, 1 the work failed (infeasible, diverged), 2 wrong usage or input.";
 
 /// A virtual pressure sensor for the wet clutches of automatic transmissions.
 ///
-/// Estimates the hydraulic pressure in an engaging clutch from the speeds and the valve current that
-/// a car already measures, with a bound on the error.
+/// Estimates the hydraulic pressure in an engaging clutch from the speeds and the valve command that
+/// a car already has, with a bound on the error.
 #[derive(Debug, Parser)]
 #[command(version, about, after_help = EXAMPLES, arg_required_else_help = true)]
 pub(crate) struct Arguments {
@@ -44,90 +44,109 @@ pub(crate) enum Command {
     ///
     ///   report.html    the report; opens from disk, needs no network
     ///   shift.svg, drive.svg    its figures
-    ///   trace.csv      every simulated signal, the truth included
-    ///   measured.csv   only what a car measures
-    ///   estimate.csv   what the observer makes of it
+    ///   trace.csv      every simulated signal, true values included
+    ///   measured.csv   only the signals that a car measures
+    ///   estimate.csv   the output of `estimate measured.csv`
     #[command(verbatim_doc_comment)]
     Demo(Demo),
     /// Simulate an experiment and write its signals as CSV
     ///
-    /// Simulates an experiment and writes two files: NAME.csv with every signal, the truth included, and
-    /// NAME_measured.csv with only what a car measures. The same experiment gives the same bytes.
+    /// Simulates an experiment and writes two files: NAME.csv with every signal, true values included, and
+    /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
+    /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
+    /// the drive is simulated without them, or with the scenario given by --scenario.
     #[command(verbatim_doc_comment)]
     Simulate(Simulate),
     /// Design observer gains and print them with their certificate
     ///
-    /// Designs the gains of an observer by the five-step procedure: decay from the settling time,
-    /// then the smallest gain that reaches it at every vertex of the polytope, with kappa1 raised until the
-    /// bound on the remaining error is small enough. Requirements come from the vehicle file; options
-    /// replace them.
+    /// Designs the gains of an observer by the five-step procedure: the decay rate follows from the settling
+    /// time; the gain is the smallest one with this decay rate at every vertex of the polytope; kappa1 is
+    /// increased until the bound on the remaining error is small enough. Requirements come from the vehicle
+    /// file; options replace them. If no gain meets a requirement, the best certified gain is printed, with
+    /// its error bound and the settling time that would meet the requirement; the exit code is then 1.
+    ///
+    /// To use bounds on the model errors that were found by simulation:
+    ///   wetclutch error-bound experiments/error_bound.toml -o bounds.toml
+    ///   wetclutch design vehicles/two_speed_at.toml --bounds bounds.toml
     #[command(verbatim_doc_comment)]
     Design(Design),
     /// Estimate pressure and torque from a file of measured signals
     ///
     /// Runs an observer over a file of measured signals. The file needs the columns
     ///
-    ///   time_s, engine_speed_rad_s, turbine_speed_rad_s, oncoming_current_a,
+    ///   time_s, engine_speed_rad_s, turbine_speed_rad_s,
+    ///   oncoming_current_a, or oncoming_duty_percent for pulse-width-modulated valves,
     ///   oncoming_slip_rad_s or output_speed_rad_s,
-    ///   and for the compliant observer wheel_speed_rad_s
+    ///   and for some observers wheel_speed_rad_s
     ///
-    /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell is a lost sample. Where
-    /// the file also holds the true pressure (a simulated trace), the error is reported.
+    /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell or `nan` is a reading that did
+    /// not come. If the file also contains the true pressure (a simulated drive), the error is reported.
+    ///
+    /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
+    /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
+    /// appears when it contains all rows; it may be the log itself.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
-    /// Run the source chapter's experiments and set its statements beside what was measured
+    /// Run the source chapter's experiments and compare the results with its statements
     ///
-    /// Runs experiments E1 to E4 of the source chapter on the built-in car, and writes:
+    /// Runs experiments E1 to E4 of the source chapter on the built-in car, and again in the settings that the
+    /// chapter leaves open (experiments/plausible.toml). Writes
     ///
     ///   reproduction.html   statements, figures, scores; opens from disk
     ///   reproduction.md     statements and scores as Markdown
+    ///   reproduction.json   statements as numbers
     ///   e1.svg ... e4.svg, map_*.svg    the figures
     #[command(verbatim_doc_comment)]
     Reproduce(Reproduce),
     /// Run all observers over many scenarios and rank them against the open loop
     ///
-    /// Runs every observer of an experiment file on every scenario table in it: at 100 Hz, behind real sensors, on the
-    /// same drives. Prints the RMS error of each in each phase, and its ratio to the open loop's; with -o, writes the same
-    /// as a page.
+    /// Runs every observer of an experiment file on every scenario of the file. All observers get the same drives; the
+    /// built-in bench runs them at 100 Hz with real sensors. Prints the RMS error of each observer in each phase, and its
+    /// ratio to the RMS error of the open loop; with -o, also writes them as a page. experiments/field.toml is a bench of
+    /// errors of the readings: scale, delays, outliers, lost readings, channels with clocks of their own.
     #[command(verbatim_doc_comment)]
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
     ///
     /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary. Writes
     ///
-    ///   runs.csv, runs.parquet    one row for each run: factors, seed, how it ended, shift quality, scores
-    ///   study.html                distributions, what moves the error, the worst runs; opens from disk
+    ///   runs.csv, runs.parquet    one row for each run: factors, seed, status, shift quality, scores
+    ///   study.html                distributions, sensitivity of the error, worst runs; opens from disk
     ///   figures/                  its figures
     ///
-    /// The same study gives the same bytes on any number of threads, in one go or resumed, whole or in shards.
+    /// In runs.csv `inf` means that an estimate was not finite. The same study gives the same bytes on any number of
+    /// threads, in one run or resumed, whole or in shards. One process at a time writes to a folder (wetclutch.lock).
     #[command(verbatim_doc_comment)]
     Study(StudyOptions),
-    /// Put the shards of a study together
+    /// Merge the shards of a study
     ///
-    /// Puts together what `study --shard 1/N` to `study --shard N/N` wrote, to the same bytes as the study in one go.
+    /// Merges the results of `study --shard 1/N` to `study --shard N/N`. The result has the same bytes as the study
+    /// in one run.
     #[command(verbatim_doc_comment)]
     Merge(Merge),
-    /// Find by simulation how wrong the observers' models are
+    /// Find bounds on the errors of the observers' models by simulation
     ///
-    /// Runs a study and measures, at every instant of its shifts, what the rigid and the compliant model cannot explain of
-    /// the accelerations: the |w| and the H that the gain designs ask for, and what they are made of.
+    /// Runs a study and computes, at every instant of its shifts, the difference between the accelerations of the
+    /// simulated car and those of the rigid and the compliant model. The result is |w| and H, which the gain design
+    /// needs, and the part of each cause.
     #[command(verbatim_doc_comment)]
     ErrorBound(ErrorBoundOptions),
-    /// Search a study's factors for the run that hurts an observer most
+    /// Search a study's factors for the run with the largest error of an observer
     ///
-    /// Makes the runs of a study, then goes on from the worst of them with the simplex method of Nelder and Mead.
+    /// Makes the runs of a study, then continues from the worst of them with the simplex method of Nelder and Mead.
     #[command(verbatim_doc_comment)]
     WorstCase(WorstCaseOptions),
-    /// Show what the speeds can tell about the pressure, and what each error does to it
+    /// Show the effect of the pressure, and of each error, on the speeds
     ///
-    /// Takes the error bounds of a vehicle file and shows, phase by phase, what pressure each of them looks like and whether any
-    /// observer could tell it from one.
+    /// Reads the error bounds of a vehicle file. For each phase it prints the equivalent pressure error of each of them,
+    /// and whether an observer can distinguish the error from a pressure.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
     /// Check a vehicle, experiment or study file
     ///
-    /// Checks a vehicle, experiment or study file and says what it describes. The files that it names are checked
-    /// too.
+    /// Checks a vehicle, experiment or study file, and the files that it names, and prints a summary. Also checks a
+    /// bounds file for `design --bounds` and a sensors file for `estimate --sensors`. Warns of given gains that are
+    /// unstable at a vertex.
     #[command(verbatim_doc_comment)]
     Check(Check),
 }
@@ -143,6 +162,9 @@ pub(crate) struct Demo {
 pub(crate) struct Simulate {
     /// Experiment file
     pub(crate) experiment: PathBuf,
+    /// Scenario of the experiment to simulate; the files are then called NAME_SCENARIO
+    #[arg(long, value_name = "NAME")]
+    pub(crate) scenario: Option<String>,
     /// Folder for the signals
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
@@ -152,35 +174,35 @@ pub(crate) struct Simulate {
 pub(crate) struct Design {
     /// Vehicle file
     pub(crate) vehicle: PathBuf,
-    /// File whose values stand in place of the vehicle file's, such as what `error-bound` writes
+    /// File with values that replace those of the vehicle file, such as the output of `error-bound`
     #[arg(long, value_name = "BOUNDS.toml")]
     pub(crate) bounds: Option<PathBuf>,
     /// Observer to design for
     #[arg(long, value_enum, default_value_t = DesignChoice::Rigid)]
     pub(crate) observer: DesignChoice,
-    /// How the gains are chosen
+    /// Design method of the gains
     #[arg(long, value_enum, default_value_t = MethodChoice::Iss)]
     pub(crate) method: MethodChoice,
-    /// What the bound of the discrete-time methods is on [default: clutch-torque]
+    /// Quantity of the error bound in the discrete-time methods [default: clutch-torque]
     #[arg(long, value_enum, value_name = "QUANTITY")]
     pub(crate) bound_on: Option<QuantityChoice>,
     /// Phase to design for
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
-    /// kappa1 in 1/s; without it (here or in the file) it is raised step by step
-    #[arg(long, value_name = "PER_S", value_parser = positive)]
+    /// kappa1 in 1/s; if it is neither here nor in the file, it is increased step by step
+    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(0.01..=1e4))]
     pub(crate) kappa1: Option<f64>,
-    /// kappa2 in 1/s: the decay of the error; 4/kappa2 is the settling time
-    #[arg(long, value_name = "PER_S", value_parser = positive)]
+    /// kappa2 in 1/s: decay rate of the error; the settling time is 4/kappa2
+    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(0.4..=800.0))]
     pub(crate) kappa2: Option<f64>,
     /// Bound on the model error |w|: in rad/s^2 for the rigid observer, normalised for the compliant one
-    #[arg(long, value_name = "BOUND", value_parser = positive)]
+    #[arg(long, value_name = "BOUND", allow_negative_numbers = true, value_parser = within(0.0..=1e6))]
     pub(crate) error_bound: Option<f64>,
     /// Largest acceptable offset of the estimate in Pa
-    #[arg(long, value_name = "PA", value_parser = positive)]
+    #[arg(long, value_name = "PA", allow_negative_numbers = true, value_parser = within(1e3..=10e6))]
     pub(crate) offset_max: Option<f64>,
     /// Sample time in s, for the discrete-time methods [default: 0.01]
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = within(SAMPLE_TIMES_S))]
     pub(crate) sample_time: Option<f64>,
     /// Print JSON
     #[arg(long)]
@@ -199,24 +221,24 @@ pub(crate) enum DesignChoice {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum MethodChoice {
-    /// The chapter's, in continuous time: the smallest gain that decays as required
+    /// The chapter's method, in continuous time: the smallest gain with the required decay
     Iss,
-    /// The same for a sample time, every error of the budget in the bound; this and the next are the open loop where no gain
-    /// beats that
+    /// The same for a sample time, with every error of the budget in the bound; this method and the following ones use the
+    /// open loop where no gain reduces the bound
     IssDiscrete,
-    /// The smallest bound on the error for a sample time, every error of the budget included
+    /// The gain with the smallest error bound for a sample time, with every error of the budget
     PeakToPeak,
-    /// The same with a gain that follows the friction coefficient
+    /// The same, with a gain that depends on the friction coefficient
     Scheduled,
-    /// The narrowest range that is carried along with the estimate
+    /// The gain with the narrowest range that is computed together with the estimate
     Interval,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum QuantityChoice {
-    /// The clutch torque, which the speeds tell whatever the friction is
+    /// The clutch torque, on which the speeds depend directly
     ClutchTorque,
-    /// The pressure, which a friction that is not known spoils
+    /// The pressure, which follows from the speeds only with the friction coefficient
     Pressure,
 }
 
@@ -261,42 +283,44 @@ pub(crate) struct Estimate {
     /// Observer
     #[arg(long, value_enum, default_value_t = ObserverChoice::Best)]
     pub(crate) observer: ObserverChoice,
-    /// How the gains of the rigid and the compliant observer are chosen [default: iss]
+    /// Design method of the gains, for `--observer` rigid and compliant [default: iss]
     #[arg(long, value_enum)]
     pub(crate) method: Option<MethodChoice>,
-    /// File whose table `sensors` describes those of the log, such as an experiment file: the Kalman filters are told
-    /// their noise and lag, and take readings as nearly exact and of the moment without
+    /// File whose table `sensors` describes the sensors of the log, such as an experiment file. The Kalman filters use
+    /// their noise and lag; without the file they assume small noise and no lag
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// File for the estimate; standard output if left out
+    /// File for the estimate; default: standard output
     #[arg(short, long, value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ObserverChoice {
-    /// The Kalman filter where the log has wheel_speed_rad_s, else rigid with peak-to-peak gains
+    /// kalman if the log has wheel_speed_rad_s, otherwise rigid with peak-to-peak gains
     Best,
     /// Reduced-order, rigid driveline, certified gains by `--method`
     Rigid,
-    /// Reduced-order with elastic drive shafts, certified gains by `--method`; needs wheel_speed_rad_s, gives shaft
-    /// torque too
+    /// Reduced-order with elastic drive shafts, certified gains by `--method`; needs wheel_speed_rad_s, also estimates
+    /// the shaft torque
     Compliant,
     /// Full-order sliding mode, gains from the sliding condition
     Sliding,
-    /// Kalman filter with unknown torques as states, told how old readings are; needs wheel_speed_rad_s, gives shaft
-    /// torque too
+    /// Kalman filter with unknown torques, scale and delays of the readings as states; needs wheel_speed_rad_s, also
+    /// estimates the shaft torque
     Kalman,
-    /// The same as textbooks have it, every reading of the moment
+    /// Extended Kalman filter on six states in its textbook form, without sensor lag
     Extended,
-    /// Unscented Kalman filter on the same states
+    /// Unscented Kalman filter on the same six states
     Unscented,
-    /// Super-twisting, implicit; gains from the valve's error bound
+    /// Super-twisting, implicit discretisation; gains from the valve's error bound
     SuperTwisting,
-    /// The pressure that explains the last change of the speeds; needs wheel_speed_rad_s
+    /// Pressure that follows from the last change of the speeds; needs wheel_speed_rad_s
     Inversion,
     /// The valve model alone
     OpenLoop,
+    /// The valve's maps alone, with the middle of the delay budget
+    OpenLoopMaps,
 }
 
 #[derive(Debug, Args)]
@@ -307,11 +331,16 @@ pub(crate) struct Reproduce {
     /// Print the rows as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Number of settings in which the statements are tested; default and most: all of experiments/plausible.toml
+    #[arg(long, value_name = "N")]
+    pub(crate) settings: Option<u32>,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// Experiment file with scenario tables; the built-in experiments/bench.toml if left out
+    /// Experiment file with scenario tables; default: the built-in experiments/bench.toml
     pub(crate) experiment: Option<PathBuf>,
     /// Folder for the page
     #[arg(short, long, value_name = "DIR")]
@@ -328,7 +357,7 @@ pub(crate) struct StudyOptions {
     /// Folder for rows and page
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-study")]
     pub(crate) output: PathBuf,
-    /// Complete what is in the folder already
+    /// Complete the unfinished study in the folder
     #[arg(long)]
     pub(crate) resume: bool,
     /// Make only the Ith of N equal parts
@@ -336,15 +365,15 @@ pub(crate) struct StudyOptions {
     pub(crate) shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) threads: Threads,
-    /// Make this one run again, with all its signals and its figure
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["resume", "shard"])]
+    /// Make only this run again, and write all its signals and its figure
+    #[arg(long, value_name = "RUN", allow_negative_numbers = true, conflicts_with_all = ["resume", "shard"])]
     pub(crate) run: Option<u64>,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Threads {
-    /// Number of threads; as many as the machine has if left out
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Number of threads; default: as many as the machine has
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
 
@@ -360,7 +389,7 @@ impl Threads {
 pub(crate) struct ErrorBoundOptions {
     /// Study file
     pub(crate) study: PathBuf,
-    /// File for the bounds, which `design --bounds` reads, with a page beside it; standard output if left out
+    /// File for the bounds, which `design --bounds` reads; a page is written beside it. Default: standard output
     #[arg(short, long, value_name = "BOUNDS.toml")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
@@ -372,7 +401,7 @@ pub(crate) struct ErrorBoundOptions {
 
 #[derive(Debug, Args)]
 pub(crate) struct SensitivityOptions {
-    /// Vehicle file; the built-in car if left out
+    /// Vehicle file; default: the built-in car
     pub(crate) vehicle: Option<PathBuf>,
     /// Folder for the page
     #[arg(short, long, value_name = "DIR")]
@@ -386,19 +415,21 @@ pub(crate) struct SensitivityOptions {
 pub(crate) struct WorstCaseOptions {
     /// Study file
     pub(crate) study: PathBuf,
-    /// Name of the observer to hurt; the study's first if left out
+    /// Name of the observer to search against; default: the first of the study
     #[arg(long)]
     pub(crate) observer: Option<String>,
-    /// Phase in which
+    /// Phase whose RMS error is maximised
     #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
     pub(crate) phase: PhaseChoice,
-    /// How many of the study's worst runs to search from
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    /// Number of worst runs of the study to start searches from
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 4)]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub(crate) starts: u16,
-    /// Most steps of each search
-    #[arg(long, value_name = "N", default_value_t = 200)]
+    /// Maximum number of steps of each search
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 200)]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) iterations: u64,
-    /// Folder for the case as a study file and its figure
+    /// Folder for the worst case (a study file) and its figure
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-worst-case")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
@@ -448,20 +479,21 @@ pub(crate) struct Merge {
     /// Folders of all shards, in their order
     #[arg(required = true)]
     pub(crate) shards: Vec<PathBuf>,
-    /// Folder for the whole
+    /// Folder for the merged study
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Check {
-    /// Vehicle, experiment or study file
+    /// Vehicle, experiment, study, bounds or sensors file
     pub(crate) file: PathBuf,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("expected a number above 0".to_owned()),
+/// A number in this range, as a vehicle file has it.
+fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if range.contains(&value) => Ok(value),
+        _ => Err(format!("expected a number from {} to {}", range.start(), range.end())),
     }
 }

@@ -1,4 +1,4 @@
-//! How a command can fail, and what it exits with.
+//! Failures of a command, and their exit codes.
 
 use std::fmt;
 use std::io;
@@ -12,14 +12,14 @@ use report::PageError;
 use study::StudyError;
 use trace::TraceError;
 
-/// Why a command did not do its work.
+/// Why a command failed.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Wrong usage or input: exit code 2.
     Input(String),
     /// The work itself failed: exit code 1.
     Work(String),
-    /// The reader of standard output has gone: exit code 0.
+    /// The reader of standard output has closed it: exit code 0.
     BrokenPipe,
 }
 
@@ -34,7 +34,12 @@ impl Failure {
 
     /// A file that could not be written.
     pub(crate) fn writing(path: &Path, error: &io::Error) -> Self {
-        Self::Work(format!("{}: {error}", path.display()))
+        let message = format!("{}: {error}", path.display());
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self::BrokenPipe,
+            io::ErrorKind::IsADirectory => Self::Input(message),
+            _ => Self::Work(message),
+        }
     }
 }
 
@@ -42,7 +47,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Input(message) | Self::Work(message) => f.write_str(message),
-            Self::BrokenPipe => f.write_str("the reader of the output has gone"),
+            Self::BrokenPipe => f.write_str("the reader of standard output has closed it"),
         }
     }
 }
@@ -87,7 +92,7 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Config(error) => error.into(),
-            StudyError::Search(_) => Self::Work(error.to_string()),
+            StudyError::Search(_) | StudyError::Defect { .. } | StudyError::Threads(_) => Self::Work(error.to_string()),
             StudyError::Plant(error) => error.into(),
             StudyError::Design(error) => error.into(),
             StudyError::Trace(error) => error.into(),

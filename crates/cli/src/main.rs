@@ -32,7 +32,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads our output has seen enough; that is no error.
+        // The reader of standard output, such as `head`, has closed it: this is not an error.
         Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
         Err(failure) => {
             output::error(&failure.to_string());

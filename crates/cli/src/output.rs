@@ -7,10 +7,10 @@ use anstyle::{AnsiColor, Style};
 const ERROR: Style = AnsiColor::Red.on_default().bold();
 const HINT: Style = AnsiColor::Cyan.on_default();
 
-/// An error on standard error; lines that begin with `hint:` stand out.
+/// An error on standard error; `hint:` at the start of a line is coloured.
 pub(crate) fn error(message: &str) {
     let mut stderr = anstream::stderr().lock();
-    // A message that cannot be delivered has nowhere else to go.
+    // There is no other place to report that standard error cannot be written.
     let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", coloured_hints(message));
 }
 
@@ -46,4 +46,27 @@ pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
 /// A line on standard output.
 pub(crate) fn line(text: &str) -> io::Result<()> {
     writeln!(io::stdout().lock(), "{text}")
+}
+
+/// A count with commas between the thousands: 60,000,000.
+pub(crate) fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_are_separated_by_commas() {
+        assert_eq!([7, 950, 9501, 60_000_000].map(grouped), ["7", "950", "9,501", "60,000,000"]);
+    }
 }

@@ -1,16 +1,20 @@
-//! Range checks that know where in the file a value stands.
+//! Range checks with the place of the value in the file.
 
 use std::ops::RangeInclusive;
 
+use drivetrain::table::{MAX_POINTS, check_axis};
 use drivetrain::{Table1, TableError};
 use toml::Spanned;
 
+use crate::source::Layers;
 use crate::{ConfigError, Source};
 
 /// A number with its place in the file.
 pub(crate) type Number = Spanned<f64>;
 /// A list of numbers with its place in the file.
 pub(crate) type Numbers = Spanned<Vec<f64>>;
+/// A word with its place in the file.
+pub(crate) type Word = Spanned<String>;
 
 /// Units that people write by mistake: unit of the key, what was written, its size in the key's unit.
 const MISTAKEN_UNITS: &[(&str, &str, f64)] = &[
@@ -25,23 +29,37 @@ const MISTAKEN_UNITS: &[(&str, &str, f64)] = &[
     ("_pa_a", "bar/A", 1e5),
     ("_rad_s", "rpm", std::f64::consts::PI / 30.0),
     ("_m_s", "km/h", 1.0 / 3.6),
+    ("_pa_s_rad", "MPa s/rad", 1e6),
     ("_rad", "degrees", std::f64::consts::PI / 180.0),
     ("_s", "ms", 1e-3),
     ("_a", "mA", 1e-3),
     ("_kg", "t", 1e3),
     ("_n", "kN", 1e3),
     ("throttle", "%", 1e-2),
+    ("share", "%", 1e-2),
     ("position", "%", 1e-2),
     ("coefficient", "%", 1e-2),
 ];
 
-/// Checks the values of one file.
+/// Longest name, bytes: with a run's number and an ending it is still a file name.
+const LONGEST_NAME: usize = 80;
+
+/// Breakpoints of an axis are apart by at least this share of the largest value that the axis allows: what is closer is
+/// a slip of the pen, and too steep for a slope in single precision.
+const BREAKPOINTS_APART: f64 = 1e-6;
+
+/// Checks the values of a file, or of one with another laid over it.
 pub(crate) struct Check<'a> {
-    pub(crate) source: &'a Source,
+    pub(crate) layers: Layers<'a>,
 }
 
-impl Check<'_> {
-    /// The number, if it lies in the range.
+impl<'a> Check<'a> {
+    /// Checks the values of one file.
+    pub(crate) fn of(source: &'a Source) -> Self {
+        Self { layers: Layers { source, over: None } }
+    }
+
+    /// The number, if it is in the range.
     pub(crate) fn number(&self, key: &str, value: &Number, range: RangeInclusive<f64>) -> Result<f64, ConfigError> {
         self.in_range(key, *value.get_ref(), value.span().start, &range)
     }
@@ -59,38 +77,162 @@ impl Check<'_> {
         Ok(values.get_ref())
     }
 
+    /// A name that becomes part of tables, file names and pages. Spreadsheets take what begins with one of `=+-@` for a
+    /// formula.
+    pub(crate) fn name(&self, key: &str, name: &str, offset: usize) -> Result<String, ConfigError> {
+        let wrong = |what: &str| Err(self.meaning(key, offset, format!("a name must not {what}"), None));
+        match name {
+            "" => wrong("be empty"),
+            _ if name.len() > LONGEST_NAME => wrong(&format!("be longer than {LONGEST_NAME} bytes")),
+            _ if name.chars().any(char::is_control) => wrong("contain a line break, tab or other control character"),
+            _ if name.contains('"') => wrong("contain a double quote"),
+            _ if name.starts_with(['=', '+', '-', '@']) => wrong("begin with one of = + - @"),
+            _ if name.trim() != name => wrong("begin or end with a space"),
+            _ => Ok(name.to_owned()),
+        }
+    }
+
+    /// A title for people: one line of anything that can be printed.
+    pub(crate) fn title(&self, key: &str, title: &Spanned<String>) -> Result<String, ConfigError> {
+        if title.get_ref().chars().any(char::is_control) {
+            let message = "a title must not contain a line break, tab or other control character".to_owned();
+            return Err(self.meaning(key, title.span().start, message, None));
+        }
+        Ok(title.get_ref().clone())
+    }
+
+    /// The number, if it is a whole one in the range: a count of teeth, faces or periods.
+    pub(crate) fn count(&self, key: &str, value: &Number, range: RangeInclusive<f64>) -> Result<f64, ConfigError> {
+        let number = self.number(key, value, range)?;
+        if number.fract() == 0.0 {
+            return Ok(number);
+        }
+        Err(self.meaning(key, value.span().start, format!("is {number}, expected an integer"), None))
+    }
+
+    /// Least and greatest, if both lie in the range.
+    pub(crate) fn pair(
+        &self,
+        key: &str,
+        values: &Numbers,
+        range: RangeInclusive<f64>,
+    ) -> Result<[f64; 2], ConfigError> {
+        match *self.numbers(key, values, range)? {
+            [least, greatest] if least <= greatest => Ok([least, greatest]),
+            _ => Err(self.meaning(key, values.span().start, "expected [least, greatest]".to_owned(), None)),
+        }
+    }
+
+    /// As many numbers as that, if all lie in the range.
+    pub(crate) fn array<const N: usize>(
+        &self,
+        key: &str,
+        values: &Numbers,
+        range: RangeInclusive<f64>,
+    ) -> Result<[f64; N], ConfigError> {
+        let numbers = self.numbers(key, values, range)?;
+        numbers.try_into().map_err(|_| {
+            let message = format!("has {} numbers, expected {N}", numbers.len());
+            self.meaning(key, values.span().start, message, None)
+        })
+    }
+
+    /// The breakpoints of an axis: between 2 and `most` of them, rising within the range.
+    pub(crate) fn axis<'n>(
+        &self,
+        key: &str,
+        values: &'n Numbers,
+        range: RangeInclusive<f64>,
+        most: usize,
+    ) -> Result<&'n [f64], ConfigError> {
+        let apart = BREAKPOINTS_APART * range.end();
+        let points = self.numbers(key, values, range)?;
+        let wrong = |message: String| self.meaning(key, values.span().start, message, None);
+        check_axis(points, most).map_err(|error| wrong(error.to_string()))?;
+        match points.windows(2).position(|pair| pair[1] - pair[0] < apart) {
+            None => Ok(points),
+            Some(at) => Err(wrong(format!(
+                "breakpoint {} is less than {} above the breakpoint before it",
+                at + 2,
+                significant(apart)
+            ))),
+        }
+    }
+
     /// A table from two lists whose values lie in their ranges.
     pub(crate) fn table(
         &self,
         (axis_key, axis, axis_range): (&str, &Numbers, RangeInclusive<f64>),
         (key, values, range): (&str, &Numbers, RangeInclusive<f64>),
     ) -> Result<Table1<f64>, ConfigError> {
-        let axis_values = self.numbers(axis_key, axis, axis_range)?;
-        let table = Table1::new(axis_values, self.numbers(key, values, range)?);
-        table.map_err(|error| match error {
-            TableError::LengthMismatch(..) => self.meaning(key, values.span().start, error.to_string(), None),
-            _ => self.meaning(axis_key, axis.span().start, error.to_string(), None),
-        })
+        let axis = self.axis(axis_key, axis, axis_range, MAX_POINTS)?;
+        // What is left to be wrong is the number of values.
+        let wrong = |error: TableError| self.meaning(key, values.span().start, error.to_string(), None);
+        Table1::new(axis, self.numbers(key, values, range)?).map_err(wrong)
+    }
+
+    /// A number that must be there.
+    pub(crate) fn required<'n, T>(
+        &self,
+        table: &str,
+        at: usize,
+        key: &str,
+        value: Option<&'n T>,
+    ) -> Result<&'n T, ConfigError> {
+        value.ok_or_else(|| self.meaning(table, at, format!("missing `{key}`"), None))
+    }
+
+    /// Refuses names that appear twice.
+    pub(crate) fn distinct<'n>(
+        &self,
+        key: &str,
+        names: impl Iterator<Item = &'n Word> + Clone,
+    ) -> Result<(), ConfigError> {
+        let earlier = |at: usize, name: &Word| names.clone().take(at).any(|other| other.get_ref() == name.get_ref());
+        match names.clone().enumerate().find(|(at, name)| earlier(*at, name)) {
+            None => Ok(()),
+            Some((_, name)) => Err(self.meaning(
+                key,
+                name.span().start,
+                format!("two entries have the name \"{}\"", name.get_ref()),
+                None,
+            )),
+        }
+    }
+
+    /// A name that becomes part of the name of a file: it must be valid on any system, and name a file in the folder.
+    pub(crate) fn file_name(&self, key: &str, name: &Spanned<String>) -> Result<String, ConfigError> {
+        const LONGEST: usize = 80;
+        let text = name.get_ref();
+        let fits = text.chars().all(|c| c.is_alphanumeric() || " _-.".contains(c)) && text.chars().count() <= LONGEST;
+        if fits && !text.is_empty() && !text.starts_with(['.', ' ']) && !text.ends_with(['.', ' ']) {
+            return Ok(text.clone());
+        }
+        let shown: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+        Err(self.meaning(
+            key,
+            name.span().start,
+            format!("`{shown}` cannot be the name of a file"),
+            Some(format!(
+                "use letters, digits, `_` and `-`, and `.` or a space inside the name, at most {LONGEST} characters, such as E1"
+            )),
+        ))
     }
 
     /// An error about what a value means.
     pub(crate) fn meaning(&self, key: &str, offset: usize, message: String, hint: Option<String>) -> ConfigError {
-        ConfigError::Meaning {
-            path: self.source.path.clone(),
-            line: self.source.line(offset),
-            key: key.to_owned(),
-            message,
-            hint,
-        }
+        let (path, line) = self.layers.place(offset);
+        ConfigError::Meaning { path, line, key: key.to_owned(), message, hint }
     }
 
     fn in_range(&self, key: &str, value: f64, offset: usize, range: &RangeInclusive<f64>) -> Result<f64, ConfigError> {
         if range.contains(&value) {
             return Ok(value);
         }
+        let (path, line) = self.layers.place(offset);
         Err(ConfigError::Range {
-            path: self.source.path.clone(),
-            line: self.source.line(offset),
+            path,
+            line,
             key: key.to_owned(),
             value,
             allowed: format!("{} to {}", range.start(), range.end()),
@@ -99,10 +241,10 @@ impl Check<'_> {
     }
 }
 
-/// A value that misses its range by less than this factor is in the right unit, and just wrong.
+/// A value outside its range by less than this factor has the right unit.
 const WRONG_UNIT_FACTOR: f64 = 3.0;
 
-/// The unit in which the value would make sense.
+/// A hint at the unit in which the value would be in its range.
 fn unit_hint(key: &str, value: f64, range: &RangeInclusive<f64>) -> Option<String> {
     if value <= WRONG_UNIT_FACTOR * range.end() && value >= range.start() / WRONG_UNIT_FACTOR {
         return None;
@@ -116,7 +258,8 @@ fn unit_hint(key: &str, value: f64, range: &RangeInclusive<f64>) -> Option<Strin
             let right =
                 unit.trim_start_matches('_').replace("rad_s", "rad/s").replace("m_s", "m/s").replace("pa_a", "Pa/A");
             let right = match right.as_str() {
-                "throttle" | "position" | "coefficient" => "as a fraction".to_owned(),
+                "throttle" | "share" | "position" | "coefficient" => "as a fraction".to_owned(),
+                "pa_s_rad" => "Pa s/rad".to_owned(),
                 "pa" => "Pa".to_owned(),
                 "a" => "A".to_owned(),
                 "n" => "N".to_owned(),
@@ -128,7 +271,7 @@ fn unit_hint(key: &str, value: f64, range: &RangeInclusive<f64>) -> Option<Strin
 }
 
 /// A number with at most six significant digits and no trailing zeros.
-fn significant(value: f64) -> f64 {
+pub(crate) fn significant(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 

@@ -1,6 +1,9 @@
-//! What can be wrong with a file.
+//! Errors in files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use crate::Source;
+use crate::check::Check;
 
 /// Why a vehicle or experiment file was refused.
 #[derive(Debug, thiserror::Error)]
@@ -10,17 +13,17 @@ pub enum ConfigError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Not TOML, or keys that do not belong there, or a value of the wrong type.
+    /// The text is not TOML, has an unknown key, or has a value of the wrong type.
     #[error("{}:{line}: {message}", path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
         /// Line, counted from 1.
         line: usize,
-        /// What the parser said.
+        /// The message of the parser.
         message: String,
     },
     /// A number outside its range.
@@ -32,9 +35,9 @@ pub enum ConfigError {
         line: usize,
         /// The key with its tables.
         key: String,
-        /// What the file says.
+        /// The value in the file.
         value: f64,
-        /// What would be allowed.
+        /// The allowed range.
         allowed: String,
         /// A likely mistake.
         hint: Option<String>,
@@ -56,7 +59,27 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// What is wrong, without the place: for a text that stands in no file.
+    /// The file.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Read { path, .. }
+            | Self::Syntax { path, .. }
+            | Self::Range { path, .. }
+            | Self::Meaning { path, .. } => path,
+        }
+    }
+
+    /// The error of a file that another file names at this place. If the file cannot be read, the error is at that place.
+    pub(crate) fn named_by(self, by: &Source, key: &str, offset: usize) -> Self {
+        match self {
+            Self::Read { path, source } => {
+                Check::of(by).meaning(key, offset, format!("{}: {source}", path.display()), None)
+            }
+            other => other,
+        }
+    }
+
+    /// The message without the place, for a text that is not in a file.
     pub fn what(&self) -> String {
         match self {
             Self::Read { source, .. } => source.to_string(),

@@ -1,8 +1,8 @@
 //! Vehicle, experiment and study files.
 //!
-//! A file is read into raw types that mirror its keys, then checked into types that the code can use
-//! without looking again. An error names file, line, key, value and allowed range, and gives a hint
-//! where a likely mistake can be seen.
+//! A file is read into raw types that mirror its keys, then checked and converted to types that need
+//! no further checks. An error names file, line, key, value and allowed range, and gives a hint for a
+//! likely mistake.
 
 pub mod check;
 pub mod error;
@@ -13,11 +13,12 @@ pub mod vehicle;
 
 pub use error::ConfigError;
 pub use experiment::{
-    CurrentSensor, Experiment, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile, Scenario,
-    Sensors, ShiftCalibration, SpeedSensor,
+    CurrentSensor, Experiment, FastFill, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile,
+    ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
-pub use source::{Kind, Source};
-pub use study::{Factor, Plan, Study, Target, Values, Varied};
+pub use source::{Kind, Source, toml_string};
+pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty, Vehicle,
+    CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty, ValveUncertainty,
+    Vehicle,
 };

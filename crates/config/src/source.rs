@@ -1,9 +1,10 @@
-//! A configuration file as it was read.
+//! The text of a configuration file.
 
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
+use toml::de::{DeTable, DeValue, Deserializer};
 
 use crate::ConfigError;
 
@@ -16,7 +17,25 @@ pub enum Kind {
     Experiment,
     /// Drives with varied parameters.
     Study,
+    /// Values in place of some of a vehicle file's.
+    Overlay,
+    /// The sensors of a car.
+    Sensors,
 }
+
+/// A text as a TOML file holds it: in double quotes, on one line, with everything else escaped.
+pub fn toml_string(text: &str) -> String {
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        _ if c.is_control() => format!("\\u{:04x}", u32::from(c)),
+        _ => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
+}
+
+/// The tables of a vehicle file.
+const VEHICLE_TABLES: [&str; 10] =
+    ["engine", "converter", "gear_train", "clutch", "driveline", "tyre", "vehicle", "oil", "observer", "design"];
 
 /// Text of a file with its name and fingerprint.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,24 +79,95 @@ impl Source {
     pub fn kind(&self) -> Result<Kind, ConfigError> {
         let tables: toml::Table = self.parse()?;
         let has = |key| tables.contains_key(key);
+        let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
+            (false, false, false) if has("sensors") => Ok(Kind::Sensors),
+            (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
             _ => Err(ConfigError::Syntax {
                 path: self.path.clone(),
                 line: 1,
-                message: "no vehicle file (with [gear_train]), experiment file (with [shift]) or study file (with [[factor]])".to_owned(),
+                message:
+                    "expected a vehicle file (with [gear_train]), experiment file (with [shift]), study file (with \
+                          [[factor]]), sensors file (with [sensors]) or bounds file (only with tables of a vehicle \
+                          file)"
+                        .to_owned(),
             }),
         }
     }
 
     /// Reads the text into raw types.
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
-        toml::from_str(&self.text).map_err(|error| ConfigError::Syntax {
-            path: self.path.clone(),
-            line: error.span().map_or(1, |span| self.line(span.start)),
-            message: error.message().to_owned(),
-        })
+        Layers { source: self, over: None }.parse()
+    }
+}
+
+/// A file, and a second file whose values replace those of the first.
+///
+/// A place in the second file is its offset there plus the length of the first one's text.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layers<'a> {
+    pub(crate) source: &'a Source,
+    pub(crate) over: Option<&'a Source>,
+}
+
+impl Layers<'_> {
+    /// File and line of a place.
+    pub(crate) fn place(&self, offset: usize) -> (PathBuf, usize) {
+        match self.over {
+            Some(over) if offset >= self.source.text.len() => {
+                (over.path.clone(), over.line(offset - self.source.text.len()))
+            }
+            _ => (self.source.path.clone(), self.source.line(offset)),
+        }
+    }
+
+    /// Reads the text into raw types.
+    pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
+        let wrong = |error: toml::de::Error| {
+            let (path, line) = self.place(error.span().map_or(0, |span| span.start));
+            ConfigError::Syntax { path, line, message: error.message().to_owned() }
+        };
+        let mut table = DeTable::parse(&self.source.text).map_err(wrong)?;
+        // Blanks before its text put every place of the second file behind those of the first.
+        let moved = self.over.map(|over| " ".repeat(self.source.text.len()) + &over.text);
+        if let Some(moved) = &moved {
+            lay_over(table.get_mut(), DeTable::parse(moved).map_err(wrong)?.into_inner());
+        }
+        T::deserialize(Deserializer::from(table)).map_err(wrong)
+    }
+}
+
+/// Puts the values of one table in place of those of another, table by table.
+fn lay_over<'t>(below: &mut DeTable<'t>, above: DeTable<'t>) {
+    for (key, value) in above {
+        match below.get_mut(&key).map(toml::Spanned::get_mut) {
+            Some(DeValue::Table(below)) if value.get_ref().is_table() => {
+                if let DeValue::Table(above) = value.into_inner() {
+                    lay_over(below, above);
+                }
+            }
+            _ => {
+                below.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_in_a_toml_file_is_read_back_as_it_was() {
+        for text in
+            ["", "a \"b\"", "C:\\new", "it's # no = comment", "two\nlines\tand\u{7f}\u{85}", "Kupplung ü 离合器"]
+        {
+            let quoted = toml_string(text);
+            let table: toml::Table = toml::from_str(&format!("# {quoted}\ntext = {quoted}\n")).unwrap();
+            assert_eq!(table["text"].as_str(), Some(text), "{quoted}");
+        }
     }
 }

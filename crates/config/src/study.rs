@@ -1,4 +1,7 @@
-//! The study file: an experiment, what varies in it, and how the runs are chosen.
+//! The study file: an experiment, the factors that vary, and the plan of the runs.
+
+mod experiments;
+mod values;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,7 +10,10 @@ use serde::Deserialize;
 use toml::{Spanned, Table, Value};
 
 use crate::check::{Check, Number, Numbers};
-use crate::{ConfigError, Experiment, Source, Vehicle};
+use crate::{ConfigError, Experiment, ObserverEntry, Source, Vehicle};
+use experiments::{changed_experiment, experiment_table};
+
+pub use values::{Sometimes, Values};
 
 /// How the runs of a study are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -44,7 +50,7 @@ impl Plan {
 pub enum Target {
     /// The simulated car alone: its observers, their gains and its shift controller are those of the vehicle file.
     Car,
-    /// The vehicle file: the simulated car, and what observers and shift controller are told.
+    /// The vehicle file: the simulated car, and the parameters of observers and shift controller.
     Vehicle,
     /// The experiment file.
     Experiment,
@@ -61,20 +67,6 @@ pub enum Change {
     Scale,
     /// Adds to it; to every number of a list.
     Add,
-}
-
-/// The values that a factor takes.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Values {
-    /// One of these, each as often as the others.
-    List(Vec<f64>),
-    /// Any in this range, all alike; the number of levels in a full factorial plan.
-    Uniform(f64, f64, usize),
-    /// Any in this range, all alike on a logarithmic scale; the number of levels.
-    LogUniform(f64, f64, usize),
-    /// Normally distributed with this mean and standard deviation, cut off at three deviations; the number of
-    /// levels.
-    Normal(f64, f64, usize),
 }
 
 /// What varies.
@@ -107,6 +99,9 @@ pub struct Study {
     pub runs: u64,
     /// Seed of the plan and of every run's sensors.
     pub seed: u64,
+    /// How long before the shift request a run is recorded, s: in this time observers find the state of the driveline,
+    /// and the scales and delays of the sensors.
+    pub record_before_s: f64,
     /// What varies.
     pub factors: Vec<Factor>,
     /// The vehicle before any change.
@@ -121,31 +116,32 @@ pub struct Study {
 pub struct Varied {
     /// The simulated car, before the experiment's `off_nominal` differences.
     pub car: Arc<Vehicle>,
-    /// What observers and shift controller are told.
+    /// The parameters of observers and shift controller.
     pub vehicle: Arc<Vehicle>,
     /// The experiment.
     pub experiment: Experiment,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 struct RawStudy {
-    name: String,
-    title: String,
+    name: Spanned<String>,
+    title: Spanned<String>,
     experiment: Spanned<String>,
     plan: Plan,
     runs: Option<Spanned<u64>>,
     #[serde(default)]
     seed: u64,
-    observers: Option<Vec<Spanned<String>>>,
+    record_before_s: Option<Number>,
+    observers: Option<Spanned<Vec<Spanned<String>>>>,
     factor: Spanned<Vec<RawFactor>>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 struct RawFactor {
     key: Spanned<String>,
-    name: Option<String>,
+    name: Option<Spanned<String>>,
     #[serde(default)]
     change: Change,
     values: Option<Numbers>,
@@ -153,16 +149,18 @@ struct RawFactor {
     log_range: Option<Numbers>,
     normal: Option<RawNormal>,
     levels: Option<Spanned<u32>>,
+    chance: Option<Number>,
+    otherwise: Option<Number>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 struct RawNormal {
     mean: Number,
     deviation: Number,
 }
 
-/// What a calibrator asks of the shift: columns of the table of runs, in its order.
+/// Measures of shift quality: columns of the table of runs, in its order.
 pub const QUALITY: [&str; 7] = [
     "torque_phase_s",
     "inertia_phase_s",
@@ -173,10 +171,12 @@ pub const QUALITY: [&str; 7] = [
     "friction_work_j",
 ];
 
-/// Levels of a range in a full factorial plan, if the file does not say.
-const LEVELS: usize = 3;
+/// How long before the shift request a run is recorded, if the file does not say, s.
+pub const RECORD_BEFORE_S: f64 = 1.2;
 /// Most runs of a study.
 const MOST_RUNS: u64 = 1_000_000_000;
+/// Dimensions of the Sobol sequence. A Sobol plan takes one for each factor, a Saltelli plan two.
+pub const SOBOL_DIMENSIONS: usize = 256;
 
 impl Study {
     /// Reads and checks a study file, with the experiment and vehicle it names. Every factor is tried at both ends
@@ -187,57 +187,51 @@ impl Study {
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let source = Source::read(path)?;
         let raw: RawStudy = source.parse()?;
-        let check = Check { source: &source };
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-        let mut experiment = Experiment::read(&beside(raw.experiment.get_ref()))?;
-        let vehicle = Vehicle::read(&experiment.vehicle_path())?;
-        if let Some(names) = &raw.observers {
-            experiment.observers = (names.iter())
-                .map(|name| {
-                    let found = experiment.observers.iter().find(|entry| entry.name == *name.get_ref()).cloned();
-                    found.ok_or_else(|| {
-                        let present: Vec<&str> = experiment.observers.iter().map(|e| e.name.as_str()).collect();
-                        let message = format!("the experiment has no observer `{}`", name.get_ref());
-                        let hint = format!("its observers are {}", present.join(", "));
-                        check.meaning("observers", name.span().start, message, Some(hint))
-                    })
-                })
-                .collect::<Result<_, _>>()?;
-        }
+        let experiment = Experiment::read(&beside(raw.experiment.get_ref()))
+            .map_err(|error| error.named_by(&source, "experiment", raw.experiment.span().start))?;
+        let vehicle = experiment.read_vehicle()?;
+        Self::of(source, experiment, vehicle)
+    }
+
+    fn of(source: Source, mut experiment: Experiment, vehicle: Vehicle) -> Result<Self, ConfigError> {
+        let raw: RawStudy = source.parse()?;
+        let check = Check::of(&source);
+        experiment.observers = observers(&check, &raw, experiment.observers)?;
         let factors = raw.factor.get_ref().iter().map(|raw| factor(&check, raw)).collect::<Result<Vec<_>, _>>()?;
         let at = raw.factor.span().start;
         if factors.is_empty() {
             return Err(check.meaning("factor", at, "a study needs at least one factor".to_owned(), None));
         }
-        let own = |name: &str| QUALITY.contains(&name) || ["run", "seed", "status"].contains(&name);
+        let of_observer = |name: &str| experiment.observers.iter().any(|o| name.starts_with(&(o.column() + ".")));
+        let own =
+            |name: &str| QUALITY.contains(&name) || ["run", "seed", "status"].contains(&name) || of_observer(name);
         if let Some(at) = factors.iter().position(|factor| own(&factor.name)) {
-            let message = format!("a column of the table of runs is called `{}`", factors[at].name);
-            let hint = "give the factor a `name` of its own".to_owned();
+            let message = format!("`{}` is the name of another column in the table of runs", factors[at].name);
+            let hint = "give the factor another `name`".to_owned();
             let place = raw.factor.get_ref()[at].key.span().start;
             return Err(check.meaning(&factors[at].key, place, message, Some(hint)));
         }
         if let Some(twice) = (1..factors.len()).find(|&i| factors[..i].iter().any(|f| f.name == factors[i].name)) {
-            let message = format!("two factors are called `{}`", factors[twice].name);
+            let message = format!("two factors have the name `{}`", factors[twice].name);
             let place = raw.factor.get_ref()[twice].key.span().start;
             return Err(check.meaning("factor", place, message, Some("give one of them a `name`".to_owned())));
         }
         let runs = runs(&check, &raw, &factors)?;
-        let vehicle_table = vehicle.source.parse()?;
-        let mut experiment_table: Table = experiment.source.parse()?;
-        // Every run reads its files anew; what no run needs costs time.
+        enough_dimensions(&check, &raw)?;
+        let tables = [vehicle.source.parse()?, experiment_table(&experiment)?];
         experiment.scenarios.clear();
-        for unused in ["scenario", "observer"] {
-            experiment_table.remove(unused);
-        }
-        let tables = [vehicle_table, experiment_table];
         let (vehicle, experiment) = (Arc::new(vehicle), Arc::new(experiment));
         let (plan, seed) = (raw.plan, raw.seed);
+        let record_before_s = raw.record_before_s.as_ref();
+        let record_before_s = record_before_s.map(|before| check.number("record_before_s", before, 0.1..=600.0));
         let study = Self {
-            name: raw.name.clone(),
-            title: raw.title.clone(),
+            name: check.name("name", raw.name.get_ref(), raw.name.span().start)?,
+            title: check.title("title", &raw.title)?,
             plan,
             runs,
             seed,
+            record_before_s: record_before_s.unwrap_or(Ok(RECORD_BEFORE_S))?,
             factors,
             vehicle,
             experiment,
@@ -248,14 +242,19 @@ impl Study {
         Ok(study)
     }
 
-    /// A factor that names nothing, or leads to a value out of range, should not come to light in run 1234.
+    /// Finds a factor with an unknown key, or with values out of range, before the first run.
     fn try_every_factor(&self, raw: &RawStudy) -> Result<(), ConfigError> {
-        let check = Check { source: &self.source };
+        let check = Check::of(&self.source);
         for (i, factor) in self.factors.iter().enumerate() {
-            for value in factor.values.ends() {
+            for value in factor.values.trials() {
                 self.with(&[(factor, value)]).map_err(|error| {
                     let place = raw.factor.get_ref()[i].key.span().start;
-                    check.meaning(&factor.key, place, format!("does not work with {value}: {}", error.what()), None)
+                    check.meaning(
+                        &factor.key,
+                        place,
+                        format!("the value {value} of the factor is refused: {}", error.what()),
+                        None,
+                    )
                 })?;
             }
         }
@@ -265,13 +264,13 @@ impl Study {
     /// The files with these values of the factors, in their order.
     ///
     /// # Errors
-    /// A value leads out of the range of its key.
+    /// A value is outside the range of its key.
     pub fn varied(&self, values: &[f64]) -> Result<Varied, ConfigError> {
         let changes: Vec<(&Factor, f64)> = self.factors.iter().zip(values.iter().copied()).collect();
         self.with(&changes)
     }
 
-    /// The files with these factors at these values, the others as they stand in the files.
+    /// The files with these factors at these values, and all other values unchanged.
     fn with(&self, changes: &[(&Factor, f64)]) -> Result<Varied, ConfigError> {
         let of = |target| changes.iter().copied().filter(move |(factor, _)| factor.target == target);
         let [vehicle_table, experiment_table] = &self.tables;
@@ -286,23 +285,17 @@ impl Study {
             let both = of(Target::Vehicle).chain(of(Target::Car));
             Arc::new(Vehicle::from_source(changed(&self.vehicle.source, vehicle_table, both)?)?)
         };
-        let experiment = if of(Target::Experiment).count() == 0 {
-            Experiment::clone(&self.experiment)
-        } else {
-            let source = changed(&self.experiment.source, experiment_table, of(Target::Experiment))?;
-            let observers = self.experiment.observers.clone();
-            let sensors_told = self.experiment.sensors_told;
-            Experiment { observers, sensors_told, ..Experiment::from_source(source)? }
-        };
+        let experiment = changed_experiment(&self.experiment, experiment_table, of(Target::Experiment))?;
+        experiment.check_observers(&vehicle)?;
         Ok(Varied { car, vehicle, experiment })
     }
 
-    /// Whether the observers are told different things in different runs.
+    /// Whether the parameters of the observers differ between runs.
     pub fn varies_vehicle(&self) -> bool {
         self.factors.iter().any(|factor| factor.target == Target::Vehicle)
     }
 
-    /// SHA-256 of everything that the runs follow from.
+    /// SHA-256 of everything that determines the runs.
     pub fn fingerprint(&self) -> String {
         let text = [&self.source.text, &self.vehicle.source.text, &self.experiment.source.text];
         let text = text.map(String::as_str).join("\u{0}");
@@ -311,7 +304,7 @@ impl Study {
 }
 
 impl Factor {
-    /// What it does to the value in the file, as the study file writes it.
+    /// The name of the change in the study file.
     pub fn change_name(&self) -> &'static str {
         match self.change {
             Change::Set => "set",
@@ -321,33 +314,61 @@ impl Factor {
     }
 }
 
-impl Values {
-    /// Smallest and largest value.
-    pub fn ends(&self) -> [f64; 2] {
-        match self {
-            Self::List(values) => {
-                values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], &v| [lo.min(v), hi.max(v)])
-            }
-            Self::Uniform(low, high, _) | Self::LogUniform(low, high, _) => [*low, *high],
-            Self::Normal(mean, deviation, _) => [mean - 3.0 * deviation, mean + 3.0 * deviation],
-        }
+/// The observers that the study names, of those of its experiment; all of these if it names none.
+fn observers(
+    check: &Check<'_>,
+    raw: &RawStudy,
+    of_experiment: Vec<ObserverEntry>,
+) -> Result<Vec<ObserverEntry>, ConfigError> {
+    if of_experiment.is_empty() {
+        let message = "the experiment has no observer, but a study needs at least one".to_owned();
+        let hint =
+            "add a table [[observer]] to the experiment, such as name = \"open loop\", kind = \"open-loop\"".to_owned();
+        return Err(check.meaning("experiment", raw.experiment.span().start, message, Some(hint)));
     }
+    let Some(names) = &raw.observers else { return Ok(of_experiment) };
+    let present: Vec<&str> = of_experiment.iter().map(|entry| entry.name.as_str()).collect();
+    let wrong = |place: usize, message: String| {
+        let hint = format!("the observers of the experiment are {}", present.join(", "));
+        check.meaning("observers", place, message, Some(hint))
+    };
+    if names.get_ref().is_empty() {
+        return Err(wrong(names.span().start, "a study needs at least one observer".to_owned()));
+    }
+    let mut chosen: Vec<ObserverEntry> = Vec::new();
+    for name in names.get_ref() {
+        let (name, place) = (name.get_ref(), name.span().start);
+        let Some(entry) = of_experiment.iter().find(|entry| entry.name == *name) else {
+            return Err(wrong(place, format!("the experiment has no observer `{name}`")));
+        };
+        if chosen.contains(entry) {
+            return Err(wrong(place, format!("`{name}` is in the list twice")));
+        }
+        chosen.push(entry.clone());
+    }
+    Ok(chosen)
+}
 
-    /// Number of levels in a full factorial plan.
-    pub fn levels(&self) -> usize {
-        match self {
-            Self::List(values) => values.len(),
-            Self::Uniform(.., levels) | Self::LogUniform(.., levels) | Self::Normal(.., levels) => *levels,
-        }
-    }
+/// Each factor needs one dimension of the Sobol sequence, or two in a Saltelli plan.
+fn enough_dimensions(check: &Check<'_>, raw: &RawStudy) -> Result<(), ConfigError> {
+    let most = match raw.plan {
+        Plan::Sobol => SOBOL_DIMENSIONS,
+        Plan::Saltelli => SOBOL_DIMENSIONS / 2,
+        Plan::FullFactorial | Plan::LatinHypercube | Plan::Random => return Ok(()),
+    };
+    let factors = raw.factor.get_ref();
+    let Some(beyond) = factors.get(most) else { return Ok(()) };
+    let message = format!("a {} plan has at most {most} factors, but the study has {}", raw.plan.name(), factors.len());
+    let hint = "plan = \"latin-hypercube\" has no limit on the number of factors".to_owned();
+    Err(check.meaning("factor", beyond.key.span().start, message, Some(hint)))
 }
 
 fn runs(check: &Check<'_>, raw: &RawStudy, factors: &[Factor]) -> Result<u64, ConfigError> {
     let meaning = |place: usize, message: String, hint: Option<String>| check.meaning("runs", place, message, hint);
     if raw.plan == Plan::FullFactorial {
         if let Some(runs) = &raw.runs {
-            let message = "a full factorial plan has as many runs as its levels have combinations".to_owned();
-            return Err(meaning(runs.span().start, message, Some("leave `runs` out".to_owned())));
+            let message = "the number of runs of a full factorial plan follows from its levels".to_owned();
+            return Err(meaning(runs.span().start, message, Some("remove `runs`".to_owned())));
         }
         let all = factors.iter().try_fold(1_u64, |n, f| n.checked_mul(f.values.levels() as u64));
         return all.filter(|&n| n <= MOST_RUNS).ok_or_else(|| {
@@ -385,46 +406,21 @@ fn factor(check: &Check<'_>, raw: &RawFactor) -> Result<Factor, ConfigError> {
         "vehicle" => Target::Vehicle,
         "experiment" => Target::Experiment,
         _ => {
-            let hint = "`car.` changes the simulated car alone, `vehicle.` what the observers are told too, \
+            let hint = "`car.` changes only the simulated car, `vehicle.` also the parameters of the observers, \
                         `experiment.` the experiment";
-            return Err(meaning("a factor's key begins with `car.`, `vehicle.` or `experiment.`", Some(hint)));
+            return Err(meaning("the key of a factor must begin with `car.`, `vehicle.` or `experiment.`", Some(hint)));
         }
     };
-    let Some(last) = path.last() else { return Err(meaning("the key names a whole file", None)) };
-    let levels = match &raw.levels {
-        None => LEVELS,
-        Some(levels) if (2..=1000).contains(levels.get_ref()) => *levels.get_ref() as usize,
-        Some(_) => return Err(meaning("`levels` must be 2 to 1000", None)),
+    let Some(last) = path.last() else {
+        return Err(meaning("the key is a whole file, expected the key of a number", None));
     };
-    let all = f64::MIN..=f64::MAX;
-    let pair = |name: &str, numbers: &Numbers| -> Result<(f64, f64), ConfigError> {
-        match *check.numbers(name, numbers, all.clone())? {
-            [low, high] if low < high => Ok((low, high)),
-            _ => Err(check.meaning(key, numbers.span().start, format!("`{name}` is two rising numbers"), None)),
-        }
-    };
-    let values = match (&raw.values, &raw.range, &raw.log_range, &raw.normal) {
-        (Some(list), None, None, None) if !list.get_ref().is_empty() => {
-            Values::List(check.numbers("values", list, all)?.to_vec())
-        }
-        (None, Some(range), None, None) => {
-            pair("range", range).map(|(low, high)| Values::Uniform(low, high, levels))?
-        }
-        (None, None, Some(range), None) => match pair("log_range", range)? {
-            (low, high) if low > 0.0 => Values::LogUniform(low, high, levels),
-            _ => return Err(meaning("`log_range` must be above 0", None)),
-        },
-        (None, None, None, Some(normal)) => {
-            let mean = check.number("normal.mean", &normal.mean, all)?;
-            let deviation = check.number("normal.deviation", &normal.deviation, 0.0..=f64::MAX)?;
-            Values::Normal(mean, deviation, levels)
-        }
-        _ => {
-            let message = "a factor has one of `values`, `range`, `log_range` and `normal`";
-            return Err(meaning(message, Some("for example range = [0.8, 1.2]")));
-        }
-    };
-    let name = raw.name.clone().unwrap_or_else(|| last.clone());
+    let values = values::values(check, key, place, raw)?;
+    let (name, place) = raw.name.as_ref().map_or((last, place), |name| (name.get_ref(), name.span().start));
+    let name = check.name("factor.name", name, place)?;
+    if name.contains(',') {
+        let message = "the name of a factor is also the name of its column, and must not contain a comma".to_owned();
+        return Err(check.meaning("factor.name", place, message, None));
+    }
     Ok(Factor { name, key: key.clone(), target, path, change: raw.change, values })
 }
 
@@ -447,13 +443,14 @@ fn changed<'a>(
     Ok(Source { path: source.path.clone(), text: root.to_string() })
 }
 
-/// Changes the value that a path leads to. On the way missing tables are made: what must not be there is refused
-/// when the file is checked.
+/// Changes the value at a path. Missing tables are created; an unknown key is refused when the file is checked.
 fn place_in_table(table: &mut Table, path: &[String], change: Change, value: f64) -> Result<(), String> {
-    let Some((step, rest)) = path.split_first() else { return Err("that is a whole table".to_owned()) };
+    let Some((step, rest)) = path.split_first() else {
+        return Err("the key is a whole table, expected the key of a number".to_owned());
+    };
     let is_last = rest.is_empty();
     if is_last && change != Change::Set && !table.contains_key(step) {
-        return Err("there is no value to change; use `change = \"set\"`".to_owned());
+        return Err("the file has no value to change; use `change = \"set\"`".to_owned());
     }
     let missing = || if is_last { Value::Float(value) } else { Value::Table(Table::new()) };
     place(table.entry(step.clone()).or_insert_with(missing), rest, change, value)
@@ -469,7 +466,7 @@ fn place(at: &mut Value, path: &[String], change: Change, value: f64) -> Result<
             let index = found.ok_or_else(|| format!("the list has no item `{step}`; items count from 0"))?;
             place(&mut list[index], rest, change, value)
         }
-        _ => Err(format!("there is no `{step}`: what stands there is a single value")),
+        _ => Err(format!("there is no `{step}`: the key before it is a single value")),
     }
 }
 
@@ -481,13 +478,20 @@ fn apply(at: &mut Value, change: Change, value: f64) -> Result<(), String> {
     };
     match at {
         Value::Float(old) => *old = new(*old),
+        Value::Boolean(old) => {
+            *old = match (change, value) {
+                (Change::Set, 0.0) => false,
+                (Change::Set, 1.0) => true,
+                _ => return Err("a switch is 0 (off) or 1 (on)".to_owned()),
+            }
+        }
         #[expect(clippy::cast_precision_loss, reason = "a number that a person wrote")]
         Value::Integer(old) => *at = Value::Float(new(*old as f64)),
         Value::Array(list) if change != Change::Set => {
             return list.iter_mut().try_for_each(|item| apply(item, change, value));
         }
         Value::Array(_) => return Err("a list cannot be set to a number; use `change = \"scale\"`".to_owned()),
-        _ => return Err("that is no number".to_owned()),
+        _ => return Err("the value is not a number".to_owned()),
     }
     Ok(())
 }

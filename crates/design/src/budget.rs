@@ -1,11 +1,8 @@
 //! What the bounds of the vehicle file's error budget come to in the units of a design.
 
 use config::Vehicle;
-use drivetrain::Valve;
 use drivetrain::road::GRAVITY_M_S2;
-
-/// Steps of the search for the command of a shift; each halves its interval.
-const HALVINGS: usize = 50;
+use drivetrain::{ClutchValve, Valve};
 
 /// Rates of the pressure that the observers' valve model leaves out in a shift, Pa/s, each at its largest.
 ///
@@ -25,26 +22,14 @@ impl ValveErrors {
     /// Those of this vehicle, at the pressure and the ramp that its budget takes for a shift.
     pub fn of(vehicle: &Vehicle) -> Self {
         let (budget, real) = (&vehicle.error_bounds, &vehicle.oncoming.valve);
-        let pressure_pa = shift_pressure(vehicle);
-        let (told, gain) = match &vehicle.observer_valve {
-            valve @ Valve::Proportional { .. } => {
-                let (mut low, mut high) = (0.0, vehicle.limits.command_max);
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (low + high);
-                    if real.settled_pressure(middle) < pressure_pa { low = middle } else { high = middle }
-                }
-                let told = valve.linear(high);
-                let settled_pa = -told.b2_pa_s / told.a22_per_s;
-                (told, real.settled_pressure(high) / settled_pa)
-            }
-            // Its command is a duty cycle, and its gain is taken to be what the maps say.
-            valve @ Valve::PulseWidth { .. } => {
-                let (least, most) = vehicle.uncertainty.command.unwrap_or((50.0, 50.0));
-                (valve.linear(0.5 * (least + most)), 1.0)
-            }
+        let (pressure_pa, time_constant_s) = (shift_pressure(vehicle), shift_time_constant(vehicle));
+        let lag = match (&vehicle.observer_valve, real) {
+            (Valve::PulseWidth(told), ClutchValve::PulseWidth { law, .. }) => told.flow_sqrt_pa_s / law.flow_sqrt_pa_s,
+            (_, ClutchValve::Proportional(maps)) => maps.time_constant_s.at(pressure_pa) / time_constant_s,
+            (_, ClutchValve::PulseWidth { .. }) => 1.0,
         };
-        let time_constant_s = -1.0 / told.a22_per_s;
-        let lag = real.time_constant_s.at(pressure_pa) / time_constant_s;
+        let command = real.command_for(pressure_pa);
+        let gain = pressure_pa / vehicle.observer_valve.settled_pressure(command);
         let furthest =
             |factors: [f64; 2], by: f64| factors.map(|f| (f * by - 1.0).abs()).into_iter().fold(0.0, f64::max);
         Self {
@@ -57,6 +42,15 @@ impl ValveErrors {
     /// All of them at once, Pa/s.
     pub fn largest_pa_s(&self) -> f64 {
         self.lag_pa_s + self.gain_pa_s + self.delay_pa_s
+    }
+}
+
+/// Time constant of the observers' valve model in a shift, s; of a pulse-width valve, at the pressure drop that moves the
+/// pressure as fast as the budget takes for a shift.
+pub fn shift_time_constant(vehicle: &Vehicle) -> f64 {
+    match &vehicle.observer_valve {
+        Valve::Proportional { time_constant_s, .. } => *time_constant_s,
+        Valve::PulseWidth(law) => 1.0 / law.rate_per_drop(law.drop_for(vehicle.error_bounds.shift_ramp_pa_s)),
     }
 }
 
@@ -79,13 +73,17 @@ pub fn mass_n_m(vehicle: &Vehicle) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drivetrain::{Table1, ValveMaps};
 
     #[test]
     fn a_valve_that_is_what_the_observers_are_told_has_no_error() {
         let mut vehicle = Vehicle::two_speed_at().unwrap();
         let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
-        vehicle.oncoming.valve.time_constant_s = drivetrain::Table1::constant(time_constant_s);
-        vehicle.oncoming.valve.gain_pa_a = drivetrain::Table1::constant(gain_pa_a);
+        vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
+            time_constant_s: Table1::constant(time_constant_s),
+            gain_pa_a: Table1::constant(gain_pa_a),
+            delay_s: Table1::constant(0.0),
+        });
         let bounds = &mut vehicle.error_bounds;
         (bounds.valve_lag_factor, bounds.valve_gain_factor, bounds.valve_delay_s) = ([1.0; 2], [1.0; 2], [0.0; 2]);
         assert!(ValveErrors::of(&vehicle).largest_pa_s() < 1e-6);

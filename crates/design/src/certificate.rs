@@ -1,10 +1,19 @@
 //! What is promised about a gain, and the check of it that needs no solver.
 
+use config::Vehicle;
 use nalgebra::DMatrix;
+use observer::{Discretisation, Phase};
 use serde::Serialize;
 
+use crate::compliant::{PRESSURE_UNIT_PA, SPEED_UNITS_RAD_S};
+use crate::discrete::given::longest_decaying_step_s;
+use crate::discrete::system::outputs;
 use crate::lmi::largest_eigenvalue;
-use crate::{IssRequirement, Polytope, Vertex};
+use crate::{IssRequirement, Model, Polytope, Vertex};
+
+/// What every certificate holds for. With backward slip `G` changes its sign on the pressure, and the observers change that of
+/// the gain: `L G` is the same, or, with the shaft torque as a state, the same but for the sign of the pressure's error.
+pub(crate) const BOTH_DIRECTIONS: &str = "forward and backward";
 
 /// One vertex inequality of Eq. (2.50), evaluated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,6 +46,8 @@ pub struct Certificate {
     pub offset_max_pa: f64,
     /// Every vertex inequality.
     pub vertices: Vec<VertexMargin>,
+    /// Directions of slip for which it holds: with backward slip the gain on the pressure changes its sign with `G`.
+    pub slip_directions: &'static str,
     /// Iterations of the conic solver.
     pub solver_iterations: u32,
     /// SHA-256 of the vehicle file.
@@ -79,6 +90,7 @@ impl Certificate {
             offset_pa: offset_squared.max(0.0).sqrt(),
             offset_max_pa: requirement.offset_max_pa,
             vertices,
+            slip_directions: BOTH_DIRECTIONS,
             solver_iterations: 0,
             vehicle_sha256: String::new(),
         })
@@ -86,14 +98,37 @@ impl Certificate {
 
     /// Bound on the error after `elapsed_s`, Pa, if it was `initial_error_pa` at first, Eq. (2.40).
     pub fn error_bound_pa(&self, initial_error_pa: f64, elapsed_s: f64) -> f64 {
-        let remains = (-2.0 * self.kappa2_per_s * elapsed_s).exp();
-        (initial_error_pa.powi(2) * remains + self.offset_pa.powi(2) * (1.0 - remains)).sqrt()
+        error_bound(self.offset_pa, self.kappa2_per_s, initial_error_pa, elapsed_s)
+    }
+
+    /// The longest step over which the gain may correct, s: over it the error still decays with `kappa2` at every vertex.
+    pub fn longest_step_s(&self, vehicle: &Vehicle, phase: Phase, discretisation: Discretisation) -> f64 {
+        let outputs = outputs(Model::Rigid, phase);
+        let entry = |&output: &usize| self.gain_pa_s_rad[output] * SPEED_UNITS_RAD_S[output] / PRESSURE_UNIT_PA;
+        let gain = DMatrix::from_row_iterator(1, outputs.len(), outputs.iter().map(entry));
+        longest_decaying_step_s(vehicle, Model::Rigid, phase, discretisation, (&gain, self.kappa2_per_s))
+    }
+
+    /// The gain for people.
+    pub fn gain_text(&self, phase: Phase) -> String {
+        let [turbine, slip] = self.gain_pa_s_rad;
+        match phase {
+            Phase::TorquePhase => format!("L = {turbine:.1} Pa s/rad on the turbine speed"),
+            _ => format!("L = ({turbine:.1}, {slip:.1}) Pa s/rad on turbine speed and slip"),
+        }
     }
 
     /// The smallest margin of all vertices, 1/s.
     pub fn smallest_margin_per_s(&self) -> f64 {
         self.vertices.iter().map(|vertex| vertex.margin_per_s).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Bound on an error after `elapsed_s`, in its own unit, if it was `initial` at first and decays with `kappa2_per_s` to
+/// `offset`, Eq. (2.40).
+pub fn error_bound(offset: f64, kappa2_per_s: f64, initial: f64, elapsed_s: f64) -> f64 {
+    let remains = (-2.0 * kappa2_per_s * elapsed_s).exp();
+    (initial.powi(2) * remains + offset.powi(2) * (1.0 - remains)).sqrt()
 }
 
 #[cfg(test)]
@@ -122,5 +157,25 @@ mod tests {
         let certificate = Certificate::check([-4000.0, 0.0], 15.0, &REQUIREMENT, &polytope()).unwrap();
         assert!((certificate.error_bound_pa(3e5, 0.0) - 3e5).abs() < 1e-6);
         assert!((certificate.error_bound_pa(3e5, 10.0) - certificate.offset_pa).abs() < 1e-6);
+        // After 1/kappa2 the squares of both have changed by e^2.
+        let left = (-2.0_f64).exp();
+        let expected = (9e10 * left + certificate.offset_pa.powi(2) * (1.0 - left)).sqrt();
+        assert!((certificate.error_bound_pa(3e5, 1.0 / 40.0) - expected).abs() < 1e-6);
+    }
+
+    /// With `kappa1 = kappa2 = k` and no margin, a constant model error leaves `|L| w / (2 k)`: the theorem's bound itself.
+    #[test]
+    fn with_equal_kappas_a_constant_model_error_reaches_the_offset() {
+        let vertex = Vertex { label: String::new(), a22_per_s: -25.0, g_rad_s2_pa: [-0.006, -0.008] };
+        let polytope = Polytope { vertices: vec![vertex] };
+        let along = -(80.0 - 25.0) / 0.01 * (1.0 + 1e-9);
+        let gain = [0.6 * along, 0.8 * along];
+        let certificate = Certificate::check(gain, 40.0, &REQUIREMENT, &polytope).unwrap();
+        assert!((certificate.vertices[0].decay_per_s - 80.0).abs() < 1e-6);
+        let left = 5500.0 * 1600.0 / 80.0;
+        assert!((certificate.offset_pa / left - 1.0).abs() < 1e-6, "{} {left}", certificate.offset_pa);
+        // Less gain than both kappas ask for is not certified.
+        let less = gain.map(|gain| gain * (1.0 - 1e-6));
+        assert!(Certificate::check(less, 40.0, &REQUIREMENT, &polytope).is_none());
     }
 }

@@ -1,8 +1,8 @@
 //! Gains of the compliant observer, Eq. (2.83)-(2.84), in the chapter's normalised units.
 //!
 //! States are measured in 1000 N m and 0.1 MPa, speeds in 100 rad/s (turbine, slip) and 10 rad/s (wheel).
-//! The error obeys `de/dt = (A22 - L G) e - L H w`, Eq. (2.75), where `H w` collects what the errors of turbine
-//! torque, mass and grade do to the accelerations. The gain satisfies
+//! The error obeys `de/dt = (A22 - L G) e - L H w`, Eq. (2.75), where `H w` is the effect of the errors of turbine
+//! torque, mass and grade on the accelerations. The gain satisfies
 //!
 //! ```text
 //! sym(A22_i - L G_i) <= -(kappa1 + kappa2) I   at every vertex i                       (2.78), (2.83)
@@ -13,11 +13,14 @@
 
 use config::Vehicle;
 use nalgebra::DMatrix;
-use observer::{CompliantGains, CompliantModel, CompliantObserver, Phase, Schedule};
+use observer::{CompliantGains, CompliantModel, CompliantObserver, Discretisation, Phase, Schedule};
 use serde::Serialize;
 
 use crate::budget::{grade_n_m, mass_n_m};
-use crate::iss::{DesignError, five_steps};
+use crate::certificate::BOTH_DIRECTIONS;
+use crate::discrete::Model;
+use crate::discrete::given::longest_decaying_step_s;
+use crate::iss::{DesignError, OffsetMissed, five_steps, settling_time_for};
 use crate::lmi::{Block, Outcome, Problem, largest_eigenvalue};
 use crate::polytope::{distinct, valve_extremes};
 use crate::rigid::{rigid_model, tracker};
@@ -92,6 +95,8 @@ pub struct CompliantCertificate {
     pub offset_max_pa: f64,
     /// Every vertex inequality.
     pub vertices: Vec<CompliantMargin>,
+    /// Directions of slip for which it holds: with backward slip the gain on the pressure changes its sign with `G`.
+    pub slip_directions: &'static str,
     /// Iterations of the conic solver.
     pub solver_iterations: u32,
     /// SHA-256 of the vehicle file.
@@ -107,7 +112,23 @@ pub struct CompliantDesign {
     pub inertia_phase: CompliantCertificate,
 }
 
+impl CompliantCertificate {
+    /// The longest step over which the gain may correct, s: over it the normalised error still decays with `kappa2` at every
+    /// vertex.
+    pub fn longest_step_s(&self, vehicle: &Vehicle, phase: Phase, discretisation: Discretisation) -> f64 {
+        let rows = &self.gain_normalised;
+        let gain = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]);
+        longest_decaying_step_s(vehicle, Model::Compliant, phase, discretisation, (&gain, self.kappa2_per_s))
+    }
+}
+
 impl CompliantDesign {
+    /// The longest step over which the speeds may correct the estimate, s: over it the error still decays as certified.
+    pub fn longest_step_s(&self, vehicle: &Vehicle, discretisation: Discretisation) -> f64 {
+        let of = |certificate: &CompliantCertificate, phase| certificate.longest_step_s(vehicle, phase, discretisation);
+        of(&self.torque_phase, Phase::TorquePhase).min(of(&self.inertia_phase, Phase::InertiaPhase))
+    }
+
     /// The gains in physical units.
     pub fn gains(&self) -> CompliantGains<f64> {
         physical_gains(&self.torque_phase.gain_normalised, &self.inertia_phase.gain_normalised)
@@ -150,7 +171,7 @@ pub(crate) fn outputs(phase: Phase) -> &'static [usize] {
     }
 }
 
-/// The powertrain as the compliant observer of this vehicle sees it.
+/// The powertrain model of the compliant observer of this vehicle.
 pub fn compliant_model(vehicle: &Vehicle) -> CompliantModel<f64> {
     CompliantModel::new(rigid_model(vehicle), vehicle.shift)
 }
@@ -238,6 +259,16 @@ pub fn design_compliant(vehicle: &Vehicle) -> Result<CompliantDesign, DesignErro
     Ok(CompliantDesign { torque_phase: phase(Phase::TorquePhase)?, inertia_phase: phase(Phase::InertiaPhase)? })
 }
 
+/// The same with the best certified gain where the required offset cannot be had, and what is missed.
+///
+/// # Errors
+/// There is no certified gain, see [`DesignError`].
+pub fn best_compliant(vehicle: &Vehicle) -> Result<(CompliantDesign, Vec<OffsetMissed>), DesignError> {
+    let phase = |phase| best_compliant_phase(vehicle, phase, &compliant_requirement(vehicle, phase));
+    let ((torque_phase, first), (inertia_phase, second)) = (phase(Phase::TorquePhase)?, phase(Phase::InertiaPhase)?);
+    Ok((CompliantDesign { torque_phase, inertia_phase }, first.into_iter().chain(second).collect()))
+}
+
 /// Designs the gain of one phase.
 ///
 /// # Errors
@@ -247,15 +278,49 @@ pub fn design_compliant_phase(
     phase: Phase,
     requirement: &CompliantRequirement,
 ) -> Result<CompliantCertificate, DesignError> {
+    crate::iss::required(best_compliant_phase(vehicle, phase, requirement)?)
+}
+
+/// The same with the best certified gain where the required offset cannot be had, and what is missed.
+///
+/// # Errors
+/// There is no certified gain, see [`DesignError`].
+pub fn best_compliant_phase(
+    vehicle: &Vehicle,
+    phase: Phase,
+    requirement: &CompliantRequirement,
+) -> Result<(CompliantCertificate, Option<OffsetMissed>), DesignError> {
     let vertices = vertices(vehicle, phase);
-    let certificate = five_steps(
-        requirement.kappa1_per_s,
-        requirement.kappa2_per_s,
-        requirement.offset_max_pa,
-        |certificate: &CompliantCertificate| (certificate.kappa1_per_s, certificate.offset_pa),
-        |kappa1_per_s| smallest_gain(kappa1_per_s, requirement, &vertices),
-    )?;
-    Ok(CompliantCertificate { vehicle_sha256: vehicle.source.sha256(), ..certificate })
+    let design = |kappa2_per_s| {
+        let requirement = CompliantRequirement { kappa2_per_s, ..requirement.clone() };
+        five_steps(
+            requirement.kappa1_per_s,
+            requirement.kappa2_per_s,
+            requirement.offset_max_pa,
+            |certificate: &CompliantCertificate| (certificate.kappa1_per_s, certificate.offset_pa),
+            |kappa1_per_s| smallest_gain(kappa1_per_s, &requirement, &vertices),
+        )
+    };
+    let certificate = design(requirement.kappa2_per_s).map_err(|error| error.in_phase(phase))?;
+    let missed = (certificate.offset_pa > requirement.offset_max_pa).then(|| {
+        let settling_time_s = 4.0 / requirement.kappa2_per_s;
+        let offset = |kappa2_per_s| design(kappa2_per_s).ok().map(|certificate| certificate.offset_pa);
+        let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>().join(", ");
+        let rows = certificate.gain_normalised.iter().map(row).collect::<Vec<_>>().join("; ");
+        let key = format!("design.compliant.{}.offset_max_pa", phase.name());
+        OffsetMissed {
+            phase,
+            required_by: format!("`{key}` of {}", vehicle.source.path.display()),
+            required_pa: requirement.offset_max_pa,
+            settling_time_s,
+            offset_pa: certificate.offset_pa,
+            kappa1_per_s: certificate.kappa1_per_s,
+            kappa1_is_required: requirement.kappa1_per_s.is_some(),
+            gain: format!("L = [{rows}], normalised, rows (T_s, p)"),
+            reached_with_s: settling_time_for(requirement.offset_max_pa, settling_time_s, offset),
+        }
+    });
+    Ok((CompliantCertificate { vehicle_sha256: vehicle.source.sha256(), ..certificate }, missed))
 }
 
 /// `A22` and `G` at every combination of the extremes of friction and valve, Eq. (2.69), (2.70), (2.82).
@@ -279,14 +344,45 @@ fn vertices(vehicle: &Vehicle, phase: Phase) -> Vec<Vertex> {
     vertices
 }
 
-/// The smallest gain for this `kappa1`. Unknowns: the two entries of alpha, then `L` by rows.
+/// The smallest gain for this `kappa1`; of several, that with the smallest sum of squares. `trace(alpha)` leaves a direction of
+/// `L` free in the inertia phase: two causes of error act on three outputs, and `L H` does not contain the third.
 fn smallest_gain(
     kappa1_per_s: f64,
     requirement: &CompliantRequirement,
     vertices: &[Vertex],
 ) -> Result<CompliantCertificate, DesignError> {
-    let (outputs, causes) = requirement.h.shape();
+    smallest_gain_from(GAIN_UNIT, kappa1_per_s, requirement, vertices)
+}
+
+/// The same, sought at first in multiples of `gain_unit`, then in those in which the minimum is 1: the gain that is taken
+/// depends on what the minimum may grow by, which is a share of it only then.
+fn smallest_gain_from(
+    gain_unit: f64,
+    kappa1_per_s: f64,
+    requirement: &CompliantRequirement,
+    vertices: &[Vertex],
+) -> Result<CompliantCertificate, DesignError> {
     let decay_per_s = kappa1_per_s + requirement.kappa2_per_s;
+    let take = |outcome| match outcome {
+        Outcome::Solved { unknowns, iterations } => Ok((unknowns, iterations)),
+        Outcome::Infeasible => Err(DesignError::DecayUnreachable { decay_per_s }),
+        Outcome::Failed(word) => Err(DesignError::Solver(word)),
+    };
+    let at_first = program(gain_unit, decay_per_s, requirement, vertices);
+    let (unknowns, first) = take(at_first.solve())?;
+    let minimum = unknowns[0] + unknowns[1];
+    let gain_unit = if minimum > 0.0 { gain_unit * minimum.sqrt() } else { gain_unit };
+    let least = 2..unknowns.len();
+    let (unknowns, more) = take(program(gain_unit, decay_per_s, requirement, vertices).solve_least(least))?;
+    let gain = DMatrix::from_row_slice(2, requirement.h.nrows(), &unknowns[2..]) * gain_unit;
+    check(&gain, kappa1_per_s, requirement, vertices)
+        .map(|certificate| CompliantCertificate { solver_iterations: first + more, ..certificate })
+        .ok_or(DesignError::NotCertified)
+}
+
+/// Eq. (2.84) with a gain in multiples of `gain_unit`. Unknowns: the two entries of alpha, then `L` by rows.
+fn program(gain_unit: f64, decay_per_s: f64, requirement: &CompliantRequirement, vertices: &[Vertex]) -> Problem {
+    let (outputs, causes) = requirement.h.shape();
     let asked = decay_per_s * (1.0 + DECAY_RESERVE);
     let unknowns = 2 + 2 * outputs;
     let entry = |k: usize| ((k - 2) / outputs, (k - 2) % outputs);
@@ -294,7 +390,7 @@ fn smallest_gain(
     let unit_gain = |k: usize| {
         let (row, column) = entry(k);
         let mut gain = DMatrix::zeros(2, outputs);
-        gain[(row, column)] = GAIN_UNIT;
+        gain[(row, column)] = gain_unit;
         gain
     };
 
@@ -317,7 +413,7 @@ fn smallest_gain(
             if k < 2 {
                 block[(k, k)] = 1.0;
             } else {
-                let corner = unit_gain(k) * &requirement.h / GAIN_UNIT;
+                let corner = unit_gain(k) * &requirement.h / gain_unit;
                 block.view_mut((0, 2), (2, causes)).copy_from(&corner);
                 block.view_mut((2, 0), (causes, 2)).copy_from(&corner.transpose());
             }
@@ -328,16 +424,7 @@ fn smallest_gain(
 
     let mut objective = vec![0.0; unknowns];
     objective[..2].fill(1.0);
-    match (Problem { objective, blocks }).solve() {
-        Outcome::Solved { unknowns, iterations } => {
-            let gain = DMatrix::from_row_slice(2, outputs, &unknowns[2..]) * GAIN_UNIT;
-            check(&gain, kappa1_per_s, requirement, vertices)
-                .map(|certificate| CompliantCertificate { solver_iterations: iterations, ..certificate })
-                .ok_or(DesignError::NotCertified)
-        }
-        Outcome::Infeasible => Err(DesignError::DecayUnreachable { decay_per_s }),
-        Outcome::Failed(word) => Err(DesignError::Solver(word)),
-    }
+    Problem { objective, blocks }
 }
 
 /// Evaluates every inequality for this gain, without the solver; `None` if one does not hold.
@@ -376,7 +463,33 @@ fn check(
         offset_n_m: offset * SHAFT_UNIT_N_M,
         offset_max_pa: requirement.offset_max_pa,
         vertices: margins,
+        slip_directions: BOTH_DIRECTIONS,
         solver_iterations: 0,
         vehicle_sha256: String::new(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gain of the inertia phase is not unique by its cost; it must not depend on how the program is scaled.
+    #[test]
+    fn the_gain_of_least_norm_is_the_same_however_the_program_is_scaled() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let phase = Phase::InertiaPhase;
+        let (requirement, vertices) = (compliant_requirement(&vehicle, phase), vertices(&vehicle, phase));
+        let at = |unit| {
+            let certificate = smallest_gain_from(unit, 5.0, &requirement, &vertices).unwrap();
+            let rows = &certificate.gain_normalised;
+            (DMatrix::from_fn(2, 3, |i, j| rows[i][j]), certificate.offset_normalised)
+        };
+        let (gain, offset) = at(GAIN_UNIT);
+        for unit in [20.0, 37.0, 90.0] {
+            let (other, other_offset) = at(unit);
+            // Three digits of the gain: along a flat direction a share of 1e-7 of the cost moves it by its root.
+            assert!((&other - &gain).norm() < 1e-3 * gain.norm(), "{unit}: {other} {gain}");
+            assert!((other_offset / offset - 1.0).abs() < 1e-4, "{unit}: {other_offset} {offset}");
+        }
+    }
 }

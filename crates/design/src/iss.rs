@@ -10,8 +10,11 @@
 //! `(kappa1 + kappa2 + A22)/sqrt(kappa1 kappa2)`: it has its minimum at `kappa1 = kappa2 + A22`, and past
 //! that raising `kappa1` makes things worse. The loop stops there and says what can be had.
 
+use std::fmt;
+
 use config::DesignRequirement;
 use nalgebra::DMatrix;
+use observer::Phase;
 
 use crate::lmi::{Block, Outcome, Problem};
 use crate::{Certificate, Polytope};
@@ -53,39 +56,128 @@ impl From<&DesignRequirement> for IssRequirement {
 pub enum DesignError {
     /// No constant gain reaches the decay at every vertex.
     #[error(
-        "no constant gain makes the error decay with {decay_per_s:.1}/s at every vertex of the polytope\n\
-         hint: ask for a longer settling time, or narrow the ranges in [observer.uncertainty]"
+        "no constant gain gives a decay rate of {decay_per_s:.1}/s at every vertex of the polytope\n\
+         hint: use a longer settling time, or narrower ranges in [observer.uncertainty]"
     )]
     DecayUnreachable {
         /// `kappa1 + kappa2`, 1/s.
         decay_per_s: f64,
     },
-    /// Gains exist, but none keeps the offset small enough.
-    #[error(
-        "the offset bound cannot be brought below {best_pa:.0} Pa (at kappa1 = {kappa1_per_s:.2}/s), and \
-         {wanted_pa:.0} Pa are required\n\
-         hint: allow a longer settling time or a larger offset, or find a smaller bound on the model error"
-    )]
-    OffsetUnreachable {
-        /// The smallest offset bound, Pa.
-        best_pa: f64,
-        /// Where it is reached, 1/s.
-        kappa1_per_s: f64,
-        /// What was required, Pa.
-        wanted_pa: f64,
-    },
-    /// The conic solver ended without an answer.
-    #[error("the conic solver ended without an answer: {0}")]
+    /// Gains exist, but no gain meets the limit of the offset.
+    #[error(transparent)]
+    OffsetUnreachable(Box<OffsetMissed>),
+    /// The conic solver found no solution.
+    #[error("the conic solver found no solution: {0}")]
     Solver(String),
     /// The solution failed the check by eigenvalues.
-    #[error("the solver's gain does not satisfy the inequalities when they are evaluated again")]
+    #[error("the gain of the solver does not satisfy the inequalities when they are evaluated without the solver")]
     NotCertified,
+    /// One of these errors, in this phase.
+    #[error("{}: {error}", .phase.name().replace('_', " "))]
+    InPhase {
+        /// The phase.
+        phase: Phase,
+        /// What is wrong there.
+        error: Box<DesignError>,
+    },
 }
 
-/// Designs the gain for this polytope by the five steps.
+impl DesignError {
+    /// This error of the design for a phase.
+    pub(crate) fn in_phase(self, phase: Phase) -> Self {
+        match self {
+            said @ (Self::OffsetUnreachable(_) | Self::InPhase { .. }) => said,
+            error => Self::InPhase { phase, error: Box::new(error) },
+        }
+    }
+}
+
+/// A required offset that no certified gain reaches, and the best certified gain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetMissed {
+    /// The phase.
+    pub phase: Phase,
+    /// Source of the requirement: a key and its file, or an option.
+    pub required_by: String,
+    /// Required offset, Pa.
+    pub required_pa: f64,
+    /// The settling time that is required with it, s.
+    pub settling_time_s: f64,
+    /// The smallest offset that a certified gain has with that settling time, Pa.
+    pub offset_pa: f64,
+    /// Its `kappa1`, 1/s.
+    pub kappa1_per_s: f64,
+    /// Whether `kappa1` was given, so that no other value was tried.
+    pub kappa1_is_required: bool,
+    /// That gain, as text.
+    pub gain: String,
+    /// The shortest settling time with which a certified gain has the required offset, s, if there is one.
+    pub reached_with_s: Option<f64>,
+}
+
+impl core::error::Error for OffsetMissed {}
+
+impl fmt::Display for OffsetMissed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (required, offset) = (1e-6 * self.required_pa, 1e-6 * self.offset_pa);
+        let phase = self.phase.name().replace('_', " ");
+        writeln!(
+            f,
+            "{phase}: {} requires an offset of at most {required:.5} MPa; with a settling time of {:.3} s{} the smallest offset \
+             of a certified gain is {offset:.5} MPa",
+            self.required_by,
+            self.settling_time_s,
+            if self.kappa1_is_required { format!(" and kappa1 {}/s", self.kappa1_per_s) } else { String::new() },
+        )?;
+        writeln!(f, "  the best certified gain: {}, with kappa1 {:.2}/s", self.gain, self.kappa1_per_s)?;
+        match self.reached_with_s {
+            Some(time_s) => {
+                // Rounded up: the time must be long enough.
+                let time_s = (1e3 * time_s).ceil() / 1e3;
+                write!(
+                    f,
+                    "hint: use a settling time of {time_s:.3} s, which reaches {required:.5} MPa; or allow a larger offset"
+                )?;
+            }
+            None => write!(
+                f,
+                "hint: no settling time up to {LONGEST_S} s reaches {required:.5} MPa; allow a larger offset"
+            )?,
+        }
+        write!(f, ", or find a smaller bound on the model error")
+    }
+}
+
+/// Longest settling time that is tried for an offset, s; the longest that a vehicle file may require.
+const LONGEST_S: f64 = 10.0;
+/// Factor between the settling times that are tried.
+const TIME_STEP: f64 = std::f64::consts::SQRT_2;
+/// Halvings of the last step.
+const HALVINGS: usize = 6;
+
+/// The shortest settling time from `from_s` on with which `offset` (of `kappa2`, 1/s) is at most `required_pa`, s.
+pub(crate) fn settling_time_for(required_pa: f64, from_s: f64, offset: impl Fn(f64) -> Option<f64>) -> Option<f64> {
+    let reached = |time_s: f64| offset(4.0 / time_s).is_some_and(|offset_pa| offset_pa <= required_pa);
+    let (mut short, mut long) = (from_s, from_s * TIME_STEP);
+    while !reached(long.min(LONGEST_S)) {
+        if long >= LONGEST_S {
+            return None;
+        }
+        (short, long) = (long, long * TIME_STEP);
+    }
+    long = long.min(LONGEST_S);
+    for _ in 0..HALVINGS {
+        let middle = (short * long).sqrt();
+        if reached(middle) { long = middle } else { short = middle }
+    }
+    Some(long)
+}
+
+/// Designs the gain for this polytope by the five steps: the first certified one with the required offset, or, where
+/// there is none, the one with the smallest.
 ///
 /// # Errors
-/// See [`DesignError`]; each says which requirement cannot be met.
+/// See [`DesignError`]; there is no certified gain.
 pub fn design_iss(requirement: &IssRequirement, polytope: &Polytope) -> Result<Certificate, DesignError> {
     five_steps(
         requirement.kappa1_per_s,
@@ -96,8 +188,8 @@ pub fn design_iss(requirement: &IssRequirement, polytope: &Polytope) -> Result<C
     )
 }
 
-/// Steps 2 to 5: raises `kappa1` until `smallest_gain` gives an acceptable offset, or takes the one `kappa1`
-/// that is given. `measure` reads `kappa1` (1/s) and offset (Pa) of a certificate.
+/// Steps 2 to 5: raises `kappa1` until `smallest_gain` gives an acceptable offset or no smaller one, or takes the one
+/// `kappa1` that is given. `measure` reads `kappa1` (1/s) and offset (Pa) of a certificate.
 pub(crate) fn five_steps<C>(
     kappa1_per_s: Option<f64>,
     kappa2_per_s: f64,
@@ -105,26 +197,28 @@ pub(crate) fn five_steps<C>(
     measure: impl Fn(&C) -> (f64, f64),
     smallest_gain: impl Fn(f64) -> Result<C, DesignError>,
 ) -> Result<C, DesignError> {
-    let unreachable = |best: &C| {
-        let (kappa1_per_s, best_pa) = measure(best);
-        DesignError::OffsetUnreachable { best_pa, kappa1_per_s, wanted_pa: offset_max_pa }
-    };
-    let acceptable = |certificate: &C| measure(certificate).1 <= offset_max_pa;
     if let Some(kappa1_per_s) = kappa1_per_s {
-        let certificate = smallest_gain(kappa1_per_s)?;
-        return if acceptable(&certificate) { Ok(certificate) } else { Err(unreachable(&certificate)) };
+        return smallest_gain(kappa1_per_s);
     }
     let step = KAPPA1_STEP * kappa2_per_s;
     let mut best = smallest_gain(step)?;
-    while !acceptable(&best) {
-        let next = smallest_gain(measure(&best).0 + step)?;
+    while measure(&best).1 > offset_max_pa {
+        let Ok(next) = smallest_gain(measure(&best).0 + step) else { break };
         let (kappa1_per_s, offset_pa) = measure(&next);
         if offset_pa >= measure(&best).1 || kappa1_per_s > KAPPA1_MOST * kappa2_per_s {
-            return Err(unreachable(&best));
+            break;
         }
         best = next;
     }
     Ok(best)
+}
+
+/// A certified gain with what it misses as an error.
+pub(crate) fn required<C>((certificate, missed): (C, Option<OffsetMissed>)) -> Result<C, DesignError> {
+    match missed {
+        None => Ok(certificate),
+        Some(missed) => Err(DesignError::OffsetUnreachable(Box::new(missed))),
+    }
 }
 
 /// The smallest gain for this `kappa1`: `min alpha` subject to (2.50) and `[alpha L; L' I] >= 0` (2.53).

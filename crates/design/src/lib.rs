@@ -34,18 +34,25 @@ pub mod enclosing;
 pub mod iss;
 pub mod kalman;
 pub mod lmi;
+pub mod open_loop;
 pub mod polytope;
 pub mod rigid;
 pub mod rivals;
 pub mod sliding;
 
-pub use budget::ValveErrors;
-pub use certificate::{Certificate, VertexMargin};
-pub use compliant::{CompliantCertificate, CompliantDesign, compliant_observer, design_compliant};
-pub use discrete::{DiscreteCertificate, DiscreteDesign, Model, Quantity, design_discrete, design_discrete_phase};
-pub use iss::{DesignError, IssRequirement, design_iss};
-pub use kalman::{extended_filter, kalman_filter, unscented_filter};
+pub use budget::{ValveErrors, shift_time_constant};
+pub use certificate::{Certificate, VertexMargin, error_bound};
+pub use compliant::{CompliantCertificate, CompliantDesign, best_compliant, compliant_observer, design_compliant};
+pub use discrete::given::{UnstableCorner, longest_stable_step_s, longest_step_of, unstable_corners};
+pub use discrete::{
+    DiscreteCertificate, DiscreteDesign, Model, Quantity, SolverRecord, design_discrete, design_discrete_phase,
+};
+pub use iss::{DesignError, IssRequirement, OffsetMissed, design_iss};
+pub use kalman::{extended_filter, kalman_filter, open_loop_maps, unscented_filter};
+pub use open_loop::{compliant_open_loop_phases, open_loop_bound_pa, rigid_open_loop_phases};
 pub use polytope::{Polytope, Vertex};
-pub use rigid::{RigidDesign, bounded, design_rigid, requirement, rigid_model, rigid_observer, tracker};
+pub use rigid::{
+    RigidDesign, best_rigid, bounded, design_rigid, range, requirement, rigid_model, rigid_observer, tracker,
+};
 pub use rivals::{inversion, super_twisting};
 pub use sliding::{design_sliding, sliding_observer};

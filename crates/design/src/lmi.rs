@@ -4,6 +4,8 @@
 //! blocks. A block of order 1 is a linear inequality. Scale the unknowns to the order of 1: the solver's
 //! tolerance is absolute.
 
+use std::ops::Range;
+
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT, SupportedConeT::NonnegativeConeT,
@@ -58,9 +60,40 @@ pub enum Outcome {
     Failed(String),
 }
 
+/// What the minimum may grow by where the least of several solutions is taken: this share of `1 + |minimum|`. The solver finds
+/// the minimum to a tenth of it.
+pub const TIE_SLACK: f64 = 1e-7;
+
 impl Problem {
     /// Solves the problem with an interior-point method.
     pub fn solve(&self) -> Outcome {
+        self.solve_with(&vec![0.0; self.objective.len()])
+    }
+
+    /// The solution whose unknowns in `least` have the smallest sum of squares, among those that cost at most
+    /// [`TIE_SLACK`] more than the minimum. Where the minimum is not unique, this one is. If the solver gives that up, because
+    /// hardly any solution is left, a hundred times as much is allowed, twice; then the solution that it found first is taken.
+    pub fn solve_least(&self, least: Range<usize>) -> Outcome {
+        let (first, iterations) = match self.solve() {
+            Outcome::Solved { unknowns, iterations } => (unknowns, iterations),
+            ended => return ended,
+        };
+        let minimum: f64 = self.objective.iter().zip(&first).map(|(c, x)| c * x).sum();
+        let dearer: Vec<f64> = self.objective.iter().map(|c| -c).collect();
+        let squares: Vec<f64> = (0..dearer.len()).map(|k| if least.contains(&k) { 1.0 } else { 0.0 }).collect();
+        for factor in [1.0, 1e2, 1e4] {
+            let mut blocks = self.blocks.clone();
+            blocks.push(Block::linear(minimum + factor * TIE_SLACK * (1.0 + minimum.abs()), &dearer));
+            let problem = Self { objective: vec![0.0; dearer.len()], blocks };
+            if let Outcome::Solved { unknowns, iterations: more } = problem.solve_with(&squares) {
+                return Outcome::Solved { unknowns, iterations: iterations + more };
+            }
+        }
+        Outcome::Solved { unknowns: first, iterations }
+    }
+
+    /// The same with half of `squares` times the squares of the unknowns added to the objective.
+    fn solve_with(&self, squares: &[f64]) -> Outcome {
         let n = self.objective.len();
         // A linear inequality is cheaper in the cone of non-negative numbers; those come first.
         let (linear, matrix): (Vec<&Block>, Vec<&Block>) = self.blocks.iter().partition(|b| b.constant.nrows() == 1);
@@ -78,7 +111,11 @@ impl Problem {
         let columns: Vec<Vec<f64>> = (0..n).map(|k| stacked(&|block| &block.per_unknown[k])).collect();
         let rows: Vec<Vec<f64>> = (0..b.len()).map(|i| columns.iter().map(|column| -column[i]).collect()).collect();
         let a = CscMatrix::from(&rows);
-        let p = CscMatrix::zeros((n, n));
+        let p = CscMatrix::from(
+            &(0..n)
+                .map(|k| (0..n).map(|j| if j == k { squares[k] } else { 0.0 }).collect::<Vec<f64>>())
+                .collect::<Vec<_>>(),
+        );
 
         let settings = DefaultSettings { verbose: false, ..DefaultSettings::default() };
         let mut solver = match DefaultSolver::new(&p, &self.objective, &a, &b, &cones, settings) {
@@ -87,7 +124,7 @@ impl Problem {
         };
         solver.solve();
         match solver.solution.status {
-            // An answer short of the tolerance serves too: whoever asks evaluates the inequalities again.
+            // A solution of reduced accuracy is accepted too: the caller evaluates the inequalities again.
             SolverStatus::Solved | SolverStatus::AlmostSolved => {
                 Outcome::Solved { unknowns: solver.solution.x.clone(), iterations: solver.solution.iterations }
             }
@@ -124,6 +161,18 @@ mod tests {
         };
         let Outcome::Solved { unknowns, .. } = problem.solve() else { panic!("{:?}", problem.solve()) };
         assert!((unknowns[0] - largest_eigenvalue(&a)).abs() < 1e-7);
+    }
+
+    /// `x1 + x2 >= 2` at the least of `x1 + x2`: a whole line of solutions, of which `(1, 1)` is the least.
+    #[test]
+    fn of_many_solutions_the_least_is_taken() {
+        for weight in [1.0, 1e-3] {
+            let problem = Problem { objective: vec![weight; 2], blocks: vec![Block::linear(-2.0, &[1.0, 1.0])] };
+            let Outcome::Solved { unknowns, .. } = problem.solve_least(0..2) else { panic!("no solution") };
+            // The slack moves the sum by its share of a cost of `2 weight`.
+            let moved = TIE_SLACK * (1.0 + 2.0 * weight) / weight;
+            assert!(unknowns.iter().all(|x| (x - 1.0).abs() < moved + 1e-7), "{unknowns:?}");
+        }
     }
 
     #[test]

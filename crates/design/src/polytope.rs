@@ -1,6 +1,6 @@
 //! The polytope in which the observer's error dynamics lie, Eq. (2.46).
 
-use config::Uncertainty;
+use config::{Uncertainty, ValveUncertainty};
 use drivetrain::Valve;
 use observer::{Phase, RigidModel};
 use serde::Serialize;
@@ -42,18 +42,24 @@ impl Polytope {
 
 /// `A22` at the extremes of the valve, with what is extreme there.
 pub(crate) fn valve_extremes(model: &RigidModel<f64>, uncertainty: &Uncertainty) -> Vec<(String, f64)> {
-    match (model.valve, uncertainty.time_constant_s, uncertainty.command) {
-        (Valve::Proportional { gain_pa_a, .. }, Some(range), _) => (distinct(range).into_iter())
+    match (model.valve, uncertainty.valve) {
+        (Valve::Proportional { gain_pa_a, .. }, ValveUncertainty::TimeConstant(range)) => (distinct(range).into_iter())
             .map(|time_constant_s| {
                 let valve = Valve::Proportional { time_constant_s, gain_pa_a };
-                (format!(", time constant {time_constant_s} s"), valve.linear(0.0).a22_per_s)
+                (format!(", time constant {time_constant_s} s"), valve.linear(0.0, 0.0).a22_per_s)
             })
             .collect(),
-        (valve @ Valve::PulseWidth { .. }, _, Some(range)) => (distinct(range).into_iter())
-            .map(|duty| (format!(", duty cycle {duty} %"), valve.linear(duty).a22_per_s))
+        // `A22` of Remark 2.1 follows from the pressure drop alone.
+        (Valve::PulseWidth(law), ValveUncertainty::PressureDrop(range)) => (distinct(range).into_iter())
+            .map(|drop_pa| (format!(", pressure drop {} kPa", 1e-3 * drop_pa), -law.rate_per_drop(drop_pa)))
             .collect(),
-        (valve, _, _) => vec![(String::new(), valve.linear(0.0).a22_per_s)],
+        (valve, _) => vec![(String::new(), valve.linear(0.0, 0.0).a22_per_s)],
     }
+}
+
+/// The largest `A22` of the valve, 1/s, with which its own error decays slowest.
+pub(crate) fn slowest_valve(model: &RigidModel<f64>, uncertainty: &Uncertainty) -> f64 {
+    valve_extremes(model, uncertainty).into_iter().map(|(_, a22_per_s)| a22_per_s).fold(f64::NEG_INFINITY, f64::max)
 }
 
 #[expect(clippy::float_cmp, reason = "a range written as one number twice is one vertex")]

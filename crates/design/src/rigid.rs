@@ -2,11 +2,12 @@
 
 use config::{DesignRequirement, Vehicle};
 use observer::{
-    Bounded, Budget, Discretisation, Phase, RigidGains, RigidModel, RigidObserver, Schedule, ShaftErrors, ShaftRange,
-    Tracker,
+    Bounded, Budget, Discretisation, Phase, RangeEstimator, RigidGains, RigidModel, RigidObserver, Schedule,
+    ShaftErrors, ShaftRange, Tracker,
 };
 use serde::Serialize;
 
+use crate::iss::{OffsetMissed, required, settling_time_for};
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
 
 /// Certified gains of the rigid observer in both phases.
@@ -27,6 +28,12 @@ impl RigidDesign {
         }
     }
 
+    /// The longest step over which the speeds may correct the estimate, s: over it the error still decays as certified.
+    pub fn longest_step_s(&self, vehicle: &Vehicle, discretisation: Discretisation) -> f64 {
+        let of = |certificate: &Certificate, phase| certificate.longest_step_s(vehicle, phase, discretisation);
+        of(&self.torque_phase, Phase::TorquePhase).min(of(&self.inertia_phase, Phase::InertiaPhase))
+    }
+
     /// The certificate of a phase in which the observer corrects.
     pub fn of(&self, phase: Phase) -> Option<&Certificate> {
         match phase {
@@ -45,7 +52,7 @@ pub fn requirement(vehicle: &Vehicle, phase: Phase) -> &DesignRequirement {
     }
 }
 
-/// The powertrain as the rigid observer of this vehicle sees it.
+/// The powertrain model of the rigid observer of this vehicle.
 pub fn rigid_model(vehicle: &Vehicle) -> RigidModel<f64> {
     RigidModel::new(
         vehicle.shift,
@@ -63,8 +70,9 @@ pub fn rigid_observer(vehicle: &Vehicle, gains: impl Into<Schedule<f64, RigidGai
     RigidObserver { model: rigid_model(vehicle), gains: gains.into(), tracker: tracker(vehicle) }
 }
 
-/// Longest sample over which gains designed in continuous time may correct, s. The chapter's gains multiply
-/// the error by -0.85 over 0.04 s at the strong vertex of the inertia phase, and by -1.1 over 0.05 s.
+/// Longest sample over which an observer without a certificate may correct, s [chosen]: the time constant of the valve of the
+/// reference car, over which the frozen model is still a fair one. Designed gains have a limit of their own,
+/// [`RigidDesign::longest_step_s`] and the like.
 const SAMPLE_MAX_S: f64 = 0.04;
 
 /// Checks, valve and phase for the observers of this vehicle.
@@ -79,16 +87,19 @@ pub fn tracker(vehicle: &Vehicle) -> Tracker<f64> {
     }
 }
 
-/// The observer with a guaranteed range around its estimates, from the vehicle file's error budget. The budget is of
-/// a valve that is commanded by a current; of another there is none.
-pub fn bounded<O>(vehicle: &Vehicle, observer: O) -> Bounded<f64, O> {
+/// The ranges of pressure and torque, from the vehicle file's error budget.
+pub fn range(vehicle: &Vehicle) -> RangeEstimator<f64> {
     let errors = &vehicle.error_bounds;
     let budget = Budget {
         valve: vehicle.oncoming.valve,
         lag_factor: errors.valve_lag_factor,
         gain_factor: errors.valve_gain_factor,
         delay_s: errors.valve_delay_s,
-        command: errors.current_a,
+        hysteresis_pa: errors.valve_hysteresis_pa,
+        command: errors.command,
+        command_age_s: errors.command_age_s,
+        line_pressure_pa: errors.line_pressure_pa,
+        fill: errors.fill,
         pressure_max_pa: errors.pressure_max_pa,
         friction_factor: errors.friction_factor,
         slip_rad_s: errors.slip_rad_s,
@@ -98,12 +109,18 @@ pub fn bounded<O>(vehicle: &Vehicle, observer: O) -> Bounded<f64, O> {
         turbine_rad_s: errors.turbine_quantum_rad_s,
         output_rad_s: errors.output_quantum_rad_s,
         wheel_rad_s: errors.wheel_quantum_rad_s,
+        wheel_scale: errors.wheel_scale,
         age_s: errors.sampling_delay_s,
         offgoing_n_m: errors.offgoing_torque_n_m,
         offgoing_drain_s: errors.offgoing_drain_s,
     };
     let shaft = ShaftRange::new(vehicle.shift, vehicle.converter, vehicle.driveline, shaft);
-    Bounded { observer, budget, clutch: vehicle.oncoming.clutch, shaft, limits: vehicle.limits }
+    RangeEstimator { budget, clutch: vehicle.oncoming.clutch, shaft, tracker: tracker(vehicle) }
+}
+
+/// The observer with these ranges around its estimates.
+pub fn bounded<O>(vehicle: &Vehicle, observer: O) -> Bounded<f64, O> {
+    Bounded { observer, range: range(vehicle) }
 }
 
 /// Designs the gains of both phases from the vehicle file's requirements.
@@ -115,12 +132,50 @@ pub fn design_rigid(vehicle: &Vehicle) -> Result<RigidDesign, DesignError> {
     Ok(RigidDesign { torque_phase: phase(Phase::TorquePhase)?, inertia_phase: phase(Phase::InertiaPhase)? })
 }
 
+/// The same with the best certified gain where the required offset cannot be had, and what is missed.
+///
+/// # Errors
+/// There is no certified gain, see [`DesignError`].
+pub fn best_rigid(vehicle: &Vehicle) -> Result<(RigidDesign, Vec<OffsetMissed>), DesignError> {
+    let phase = |phase| best_phase(vehicle, phase, &requirement(vehicle, phase).into());
+    let ((torque_phase, first), (inertia_phase, second)) = (phase(Phase::TorquePhase)?, phase(Phase::InertiaPhase)?);
+    Ok((RigidDesign { torque_phase, inertia_phase }, first.into_iter().chain(second).collect()))
+}
+
 /// Designs the gain of one phase.
 ///
 /// # Errors
 /// The requirement that cannot be met, see [`DesignError`].
 pub fn design_phase(vehicle: &Vehicle, phase: Phase, requirement: &IssRequirement) -> Result<Certificate, DesignError> {
+    required(best_phase(vehicle, phase, requirement)?)
+}
+
+/// The same with the best certified gain where the required offset cannot be had, and what is missed.
+///
+/// # Errors
+/// There is no certified gain, see [`DesignError`].
+pub fn best_phase(
+    vehicle: &Vehicle,
+    phase: Phase,
+    requirement: &IssRequirement,
+) -> Result<(Certificate, Option<OffsetMissed>), DesignError> {
     let polytope = Polytope::of(&rigid_model(vehicle), &vehicle.uncertainty, phase);
-    let certificate = design_iss(requirement, &polytope)?;
-    Ok(Certificate { vehicle_sha256: vehicle.source.sha256(), ..certificate })
+    let design = |kappa2_per_s| design_iss(&IssRequirement { kappa2_per_s, ..*requirement }, &polytope);
+    let certificate = design(requirement.kappa2_per_s).map_err(|error| error.in_phase(phase))?;
+    let missed = (certificate.offset_pa > requirement.offset_max_pa).then(|| {
+        let settling_time_s = 4.0 / requirement.kappa2_per_s;
+        let offset = |kappa2_per_s| design(kappa2_per_s).ok().map(|certificate| certificate.offset_pa);
+        OffsetMissed {
+            phase,
+            required_by: format!("`design.{}.offset_max_pa` of {}", phase.name(), vehicle.source.path.display()),
+            required_pa: requirement.offset_max_pa,
+            settling_time_s,
+            offset_pa: certificate.offset_pa,
+            kappa1_per_s: certificate.kappa1_per_s,
+            kappa1_is_required: requirement.kappa1_per_s.is_some(),
+            gain: certificate.gain_text(phase),
+            reached_with_s: settling_time_for(requirement.offset_max_pa, settling_time_s, offset),
+        }
+    });
+    Ok((Certificate { vehicle_sha256: vehicle.source.sha256(), ..certificate }, missed))
 }

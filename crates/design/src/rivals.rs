@@ -3,7 +3,7 @@
 use config::Vehicle;
 use observer::{Inversion, Phase, SuperTwisting};
 
-use crate::budget::ValveErrors;
+use crate::budget::{ValveErrors, shift_time_constant};
 use crate::compliant::compliant_model;
 use crate::rigid::{rigid_model, tracker};
 
@@ -25,13 +25,9 @@ pub fn super_twisting(vehicle: &Vehicle) -> SuperTwisting<f64> {
 
 /// The direct inversion of this vehicle.
 pub fn inversion(vehicle: &Vehicle) -> Inversion<f64> {
-    let smoothing_s = match vehicle.observer_valve {
-        drivetrain::Valve::Proportional { time_constant_s, .. } => SMOOTHING_SHARE * time_constant_s,
-        drivetrain::Valve::PulseWidth { .. } => vehicle.filter.offgoing_release_s,
-    };
     Inversion {
         model: compliant_model(vehicle),
-        smoothing_s,
+        smoothing_s: SMOOTHING_SHARE * shift_time_constant(vehicle),
         shaft_settling_s: vehicle.shaft_settling_s,
         tracker: tracker(vehicle),
     }

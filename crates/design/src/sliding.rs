@@ -9,6 +9,7 @@ use config::Vehicle;
 use drivetrain::ShiftTorques;
 use observer::{Phase, SlidingGains, SlidingObserver};
 
+use crate::polytope::slowest_valve;
 use crate::rigid::{requirement, rigid_model, tracker};
 
 /// The sliding-mode observer of this vehicle with these gains.
@@ -44,7 +45,7 @@ fn phase_gains(vehicle: &Vehicle, phase: Phase) -> ([f64; 2], [f64; 2]) {
         speed[i] = torque_error[i] + influence[i].abs() * bounds.pressure_pa;
     }
 
-    let a22 = model.valve.linear(0.0).a22_per_s;
+    let a22 = slowest_valve(&model, &vehicle.uncertainty);
     let kappa2 = 4.0 / requirement(vehicle, phase).settling_time_s;
     // Decay that the switching must add at the weakest friction; the valve gives its own.
     let added_per_s = (kappa2 + a22).max(0.0);

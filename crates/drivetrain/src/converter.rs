@@ -77,7 +77,10 @@ mod tests {
         let stall = converter().torques(200.0, 0.0);
         assert_eq!((stall.pump_n_m, stall.turbine_n_m), (160.0, 320.0));
         let coupling = converter().torques(200.0, 180.0);
-        assert_eq!(coupling.pump_n_m, coupling.turbine_n_m);
+        assert_eq!((coupling.pump_n_m, coupling.turbine_n_m), (80.0, 80.0));
+        // Half way between them both maps are.
+        let between = converter().torques(200.0, 90.0);
+        assert!((between.pump_n_m - 120.0).abs() < 1e-9 && (between.turbine_n_m - 180.0).abs() < 1e-9);
     }
 
     #[test]

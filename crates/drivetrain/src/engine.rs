@@ -28,3 +28,18 @@ impl<T: Real> Engine<T> {
         (torque_n_m - pump_torque_n_m - self.drag_n_m_s * speed_rad_s) / self.inertia_kg_m2
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torque_less_pump_torque_and_drag_accelerates_the_inertia() {
+        let torque_n_m = Table2::new(&[0.0, 400.0], &[0.0, 1.0], &[[0.0, 200.0], [0.0, 160.0]]).unwrap();
+        let engine = Engine { inertia_kg_m2: 0.2, drag_n_m_s: 0.05, torque_n_m };
+        let torque = engine.torque(100.0, 0.5);
+        assert_eq!(torque, 95.0);
+        // (95 - 40 - 5) N m on 0.2 kg m^2.
+        assert_eq!(engine.acceleration(100.0, torque, 40.0), 250.0);
+    }
+}

@@ -1,9 +1,9 @@
 //! Any planetary gear train, described by its parts and reduced to a shift between two clutches.
 //!
-//! A gear train is a list of shafts with inertias, planetary sets that tie three shafts together and
+//! A gear train is a list of shafts with inertias, planetary sets that connect three shafts and
 //! clutches that connect two members. During a clutch-to-clutch shift all other clutches are held or
-//! open, which leaves two degrees of freedom. Here the constraints are eliminated: every shaft speed
-//! becomes a combination of turbine and output speed, and the kinetic energy a 2 x 2 form in them.
+//! open, which leaves two degrees of freedom. This module eliminates the constraints: every shaft speed
+//! is a linear combination of turbine and output speed, and the kinetic energy is a 2 x 2 quadratic form of them.
 
 use crate::ReducedShift;
 
@@ -65,7 +65,7 @@ pub enum GearTrainError {
     Dependent,
     /// A shift clutch whose slip does not depend on turbine or output speed.
     IdleClutch,
-    /// Both shift clutches see the same slip, so that releasing one cannot change the ratio.
+    /// Both shift clutches have the same slip, so that a change between them cannot change the ratio.
     SameClutch,
 }
 
@@ -76,11 +76,11 @@ impl core::fmt::Display for GearTrainError {
             Self::UnknownShaft(i) => write!(f, "there is no shaft number {}", i + 1),
             Self::DegreesOfFreedom(n) => write!(
                 f,
-                "the planetary sets and the held clutches leave {n} degrees of freedom, and a shift needs exactly 2"
+                "the planetary sets and the held clutches leave {n} degrees of freedom, but a shift needs exactly 2"
             ),
-            Self::Dependent => write!(f, "the constraints do not fix every shaft by turbine and output speed"),
-            Self::IdleClutch => write!(f, "a shift clutch whose two sides always turn alike"),
-            Self::SameClutch => write!(f, "offgoing and oncoming clutch have the same slip in every gear"),
+            Self::Dependent => write!(f, "turbine and output speed do not determine the speed of every shaft"),
+            Self::IdleClutch => write!(f, "the two sides of a shift clutch always have the same speed"),
+            Self::SameClutch => write!(f, "offgoing and oncoming clutch always have the same slip"),
         }
     }
 }
@@ -263,11 +263,30 @@ mod tests {
         let (it, ir, io, rg) = (0.06, 0.01, 0.15, 2.5);
         let d = rg * rg * it * ir + (rg - 1.0) * (rg - 1.0) * it * io + ir * io;
         let both = two_speed(io).coefficients(Engagement::BothSlipping);
-        let ring_per_offgoing = both.turbine.per_offgoing_torque - both.slip_oncoming.per_offgoing_torque;
+        let row = |r: &crate::AccelerationRow<f64>| {
+            [r.per_turbine_torque, r.per_offgoing_torque, r.per_oncoming_torque, r.per_output_torque]
+        };
+        let turbine = [
+            (rg * rg * ir + (rg - 1.0) * (rg - 1.0) * io) / d,
+            -(rg - 1.0) * io / d,
+            -rg * ((rg - 1.0) * io + rg * ir) / d,
+            -rg * ir / d,
+        ];
+        let output = [
+            rg * ir / d,
+            rg * (rg - 1.0) * it / d,
+            rg * ((rg - 1.0) * it - ir) / d,
+            -((rg - 1.0) * (rg - 1.0) * it + ir) / d,
+        ];
+        let (found_turbine, found_output, found_slip) =
+            (row(&both.turbine), row(&both.output), row(&both.slip_oncoming));
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * b.abs(), "{a} {b}");
-        near(both.turbine.per_turbine_torque, (rg * rg * ir + (rg - 1.0) * (rg - 1.0) * io) / d);
-        near(both.turbine.per_offgoing_torque, -(rg - 1.0) * io / d);
-        near(ring_per_offgoing, (rg * rg * it + io) / d);
+        for i in 0..4 {
+            near(found_turbine[i], turbine[i]);
+            near(found_output[i], output[i]);
+            // The slip of clutch B is the turbine's speed less the ring's: rg/(rg - 1) (w_t - w_0).
+            near(found_slip[i], rg / (rg - 1.0) * (turbine[i] - output[i]));
+        }
     }
 
     #[test]

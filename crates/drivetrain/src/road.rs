@@ -1,4 +1,4 @@
-//! What resists the vehicle.
+//! Road load of the vehicle.
 
 use crate::Real;
 
@@ -81,5 +81,27 @@ impl<T: Real> RoadLoad<T> {
             rolling_moment_n_m: to(self.rolling_moment_n_m),
             grade_rad: to(self.grade_rad),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rolling_and_air_resist_at_the_wheel_and_turn_with_the_motion() {
+        let road = RoadLoad {
+            mass_kg: 1500.0,
+            wheel_radius_m: 0.3,
+            front_area_m2: 2.0,
+            drag_coefficient: 0.4,
+            air_density_kg_m3: 1.25,
+            rolling_moment_n_m: 60.0,
+            grade_rad: 0.1,
+        };
+        // 60 N m + 0.5 kg/m * (0.3 m)^3 * (80 rad/s)^2; the grade has no part in it.
+        let expected = 60.0 + 0.5 * 0.027 * 6400.0;
+        assert!((road.wheel_torque(80.0_f64) - expected).abs() < 1e-9);
+        assert!((road.wheel_torque(-80.0_f64) + expected).abs() < 1e-9);
     }
 }

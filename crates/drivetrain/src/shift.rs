@@ -1,6 +1,6 @@
-//! The reduced shift: all that a plant or an observer needs to know of a gearbox.
+//! The reduced shift: the model of the gearbox for plant and observers.
 //!
-//! Whatever the gear train, during a shift between two clutches it has two degrees of freedom, turbine
+//! During a shift between two clutches, any gear train has two degrees of freedom, turbine
 //! speed `w_t` and output speed `w_0`. Its dynamics are
 //!
 //! ```text
@@ -270,6 +270,28 @@ mod tests {
         assert!((slipping.turbine.at(&same) - stuck.turbine.at(&TORQUES)).abs() < 1e-9);
         let slip_rate = shift().offgoing_slip(stuck.turbine.at(&TORQUES), stuck.output.at(&TORQUES));
         assert!(slip_rate.abs() < 1e-9);
+    }
+
+    /// Virtual power: along any motion the torques do what kinetic energy and friction take up, whichever clutches
+    /// stick. That is every equation of the set at once.
+    #[test]
+    fn the_power_of_the_torques_becomes_kinetic_energy_or_friction_in_every_engagement() {
+        let shift = shift();
+        let m = shift.mass_kg_m2;
+        for (off_stuck, on_stuck) in [(false, false), (true, false), (false, true), (true, true)] {
+            let rows = shift.coefficients(Engagement::of(off_stuck, on_stuck));
+            let (a_t, a_0) = (rows.turbine.at(&TORQUES), rows.output.at(&TORQUES));
+            let offgoing = if off_stuck { rows.holding_offgoing.at(&TORQUES) } else { TORQUES.offgoing_n_m };
+            let oncoming = if on_stuck { rows.holding_oncoming.at(&TORQUES) } else { TORQUES.oncoming_n_m };
+            for [w_t, w_0] in [[1.0, 0.0], [0.0, 1.0]] {
+                let given = TORQUES.turbine_n_m * w_t - TORQUES.output_n_m * w_0;
+                let lost = offgoing * shift.offgoing_slip(w_t, w_0) + oncoming * shift.oncoming_slip(w_t, w_0);
+                let kinetic = w_t * (m[0][0] * a_t + m[0][1] * a_0) + w_0 * (m[1][0] * a_t + m[1][1] * a_0);
+                assert!((given - lost - kinetic).abs() < 1e-9, "{off_stuck} {on_stuck}: {given} {lost} {kinetic}");
+            }
+            assert!(!off_stuck || shift.offgoing_slip(a_t, a_0).abs() < 1e-9);
+            assert!(!on_stuck || shift.oncoming_slip(a_t, a_0).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Lookup tables with linear interpolation.
 //!
-//! Outside its breakpoints a table holds its end value: a measured map says nothing beyond its edge,
-//! and a straight line drawn on from there can turn a torque negative.
+//! Outside its breakpoints a table keeps its end value: a measured map has no values there, and a linear
+//! extrapolation could give a negative torque.
 
 use crate::Real;
 
@@ -31,9 +31,9 @@ impl core::fmt::Display for TableError {
             Self::TooShort => write!(f, "a table needs at least two breakpoints"),
             Self::TooLong(max) => write!(f, "a table holds at most {max} breakpoints"),
             Self::LengthMismatch(axis, values) => {
-                write!(f, "the axis has {axis} breakpoints and the table {values} values")
+                write!(f, "the axis has {axis} breakpoints, but the table has {values} values")
             }
-            Self::NotIncreasing(at) => write!(f, "breakpoint {} is not above the one before it", at + 1),
+            Self::NotIncreasing(at) => write!(f, "breakpoint {} is not above the breakpoint before it", at + 1),
             Self::NotFinite(at) => write!(f, "number {} is not finite", at + 1),
         }
     }
@@ -46,30 +46,42 @@ const BINS: usize = 32;
 
 /// Breakpoints of one axis, strictly rising.
 ///
-/// A value is sorted into one of [`BINS`] bins of equal width, which knows the segment that its left edge
-/// lies in; from there it is a step or none to the right one. The simulation spends much of its time here.
+/// A value is sorted into one of [`BINS`] bins of equal width. Each bin has the segment of its left edge; the segment
+/// of the value is this one or one of the next. Much of the simulation's computing time is spent here.
+///
+/// Every index is bounded by the size of an array and not by `len` alone: an observer's step must hold no panic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Axis<T, const N: usize> {
+    /// Past `len` the last one again.
     points: [T; N],
     len: usize,
     first_segment: [u8; BINS],
     bins_per_unit: T,
 }
 
+/// Whether these can be the breakpoints of an axis that holds at most `most` of them.
+///
+/// # Errors
+/// Too few or too many, not rising, or not finite.
+pub fn check_axis<T: Real>(points: &[T], most: usize) -> Result<(), TableError> {
+    if points.len() < 2 {
+        return Err(TableError::TooShort);
+    }
+    if points.len() > most {
+        return Err(TableError::TooLong(most));
+    }
+    if let Some(at) = points.iter().position(|x| !x.is_finite()) {
+        return Err(TableError::NotFinite(at));
+    }
+    match points.windows(2).position(|pair| pair[1] <= pair[0]) {
+        Some(at) => Err(TableError::NotIncreasing(at + 1)),
+        None => Ok(()),
+    }
+}
+
 impl<T: Real, const N: usize> Axis<T, N> {
     fn new(points: &[T]) -> Result<Self, TableError> {
-        if points.len() < 2 {
-            return Err(TableError::TooShort);
-        }
-        if points.len() > N {
-            return Err(TableError::TooLong(N));
-        }
-        if let Some(at) = points.iter().position(|x| !x.is_finite()) {
-            return Err(TableError::NotFinite(at));
-        }
-        if let Some(at) = points.windows(2).position(|pair| pair[1] <= pair[0]) {
-            return Err(TableError::NotIncreasing(at + 1));
-        }
+        check_axis(points, N)?;
         let mut held = [T::zero(); N];
         held[..points.len()].copy_from_slice(points);
         Ok(Self::with_bins(held, points.len()))
@@ -77,8 +89,10 @@ impl<T: Real, const N: usize> Axis<T, N> {
 
     /// The axis of these points, which are known to rise.
     #[expect(clippy::cast_precision_loss, reason = "the number of bins is small")]
-    fn with_bins(points: [T; N], len: usize) -> Self {
-        let (first, span) = (points[0], points[len - 1] - points[0]);
+    fn with_bins(mut points: [T; N], len: usize) -> Self {
+        let (first, last) = (points[0], points[len - 1]);
+        points[len..].fill(last);
+        let span = last - first;
         let mut axis = Self { points, len, first_segment: [0; BINS], bins_per_unit: T::of(BINS as f64) / span };
         for (bin, segment) in axis.first_segment.iter_mut().enumerate() {
             let edge = first + span * T::of(bin as f64 / BINS as f64);
@@ -94,15 +108,15 @@ impl<T: Real, const N: usize> Axis<T, N> {
     fn segment(&self, x: T) -> usize {
         let bin = ((x - self.points[0]) * self.bins_per_unit).whole();
         let mut segment = usize::from(self.first_segment[bin.min(BINS - 1)]);
-        while segment + 2 < self.len && self.points[segment + 1] <= x {
+        while segment + 2 < self.len && self.points[(segment + 1).min(N - 1)] <= x {
             segment += 1;
         }
-        segment
+        segment.min(N - 2)
     }
 
     #[inline]
     fn clamp(&self, x: T) -> T {
-        let (first, last) = (self.points[0], self.points[self.len - 1]);
+        let (first, last) = (self.points[0], self.points[N - 1]);
         // NaN stays NaN.
         if x < first {
             first
@@ -195,14 +209,15 @@ impl<T: Real> Table1<T> {
 
     /// The values at the breakpoints.
     pub fn values(&self) -> &[T] {
-        &self.values[..self.axis.len]
+        self.values.get(..self.axis.len).unwrap_or_default()
     }
 
     /// Smallest and largest value between two arguments, the first not above the second.
     #[inline]
     pub fn range_within(&self, from: T, to: T) -> (T, T) {
         let (a, b) = (self.at(from), self.at(to));
-        let inside = self.axis().iter().zip(self.values()).filter(|(x, _)| **x > from && **x < to);
+        let points = self.axis.points.iter().zip(&self.values).take(self.axis.len);
+        let inside = points.filter(|(x, _)| **x > from && **x < to);
         inside.fold((a.min(b), a.max(b)), |(low, high), (_, &y)| (low.min(y), high.max(y)))
     }
 

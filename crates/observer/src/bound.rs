@@ -1,385 +1,299 @@
-//! A guaranteed range around every estimate.
+//! Ranges of pressure and torque, the same for every observer.
 //!
-//! The pressure's follows from the command alone: whatever the valve does within its budget of lag, gain and delay, it
-//! stays between the slowest and the fastest that the budget allows. That is the certificate's recursion for a gain of
-//! zero, with lag and gain over the operating point in place of one worst rate. The clutch torque's adds the friction, the
-//! shaft torque's is that of [`crate::shaft_range`]. Of the observer they use only the phase, which all see alike, so they
-//! hold for any of them.
+//! The range of the pressure follows from the command alone ([`crate::pressure_range`]), that of the clutch torque adds
+//! the friction. Both are guaranteed for errors within the [`Budget`]. The range of the shaft torque
+//! ([`crate::shaft_range`]) is an expected one: it also rests on the speeds between two readings. The only quantity
+//! beside readings that they use is the phase, which is the same for all observers. Therefore one [`RangeEstimator`]
+//! serves all observers of a run.
 
-use drivetrain::{Clutch, Real, ValveMaps};
+use drivetrain::{Clutch, ClutchValve, Real};
 
-use crate::{Estimate, Estimator, Health, Input, InputLimits, ShaftMemory, ShaftRange};
+use crate::fill_range::FillBudget;
+use crate::{
+    Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Sample,
+    ShaftMemory, ShaftRange, Tracker, TrackerState,
+};
 
-/// Largest errors under which the range holds.
+/// Largest errors under which the ranges of pressure and clutch torque hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget<T> {
     /// The valve as measured: lag, gain and delay over the operating point.
-    pub valve: ValveMaps<T>,
+    pub valve: ClutchValve<T>,
     /// Least and greatest factor on its lag.
     pub lag_factor: [T; 2],
     /// Least and greatest factor on its gain.
     pub gain_factor: [T; 2],
     /// Least and greatest delay, s.
     pub delay_s: [T; 2],
-    /// Error of a reading of the command, A.
+    /// Greatest half-width of its hysteresis, Pa: how far the settled pressure may be from that of the command.
+    pub hysteresis_pa: T,
+    /// Error of a reading of the command, A or %.
     pub command: T,
+    /// Greatest time between a command and the sample that first shows it, s; it counts up to the time step.
+    pub command_age_s: T,
+    /// Least and greatest line pressure, Pa: what the supply gives at most at any time.
+    pub line_pressure_pa: [T; 2],
     /// Highest pressure that the supply can give, Pa.
     pub pressure_max_pa: T,
+    /// The piston's stroke; without one the cylinder has the pressure of the valve's outlet.
+    pub fill: Option<FillBudget<T>>,
     /// Least and greatest factor on the clutch's friction.
     pub friction_factor: [T; 2],
     /// Error of a reading of the slip, rad/s.
     pub slip_rad_s: T,
 }
 
-/// Ranges that hold the truth as long as every error is within its budget.
+/// Ranges of pressure and torque at the time of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds<T> {
     /// Lowest and highest pressure, Pa.
     pub pressure_pa: [T; 2],
     /// Lowest and highest clutch torque while the clutch slips, N m; a locked one carries any torque up to the larger.
     pub clutch_torque_n_m: [T; 2],
-    /// Lowest and highest drive-shaft torque, N m, where the wheel speed is measured.
+    /// Lowest and highest expected drive-shaft torque, N m, where the wheel speed is measured.
     pub shaft_torque_n_m: Option<[T; 2]>,
 }
 
-/// Any observer with a guaranteed range around its estimates.
+/// Computes the ranges of a run, once for all observers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounded<T, O> {
-    /// The observer.
-    pub observer: O,
-    /// What the range is made from.
+pub struct RangeEstimator<T> {
+    /// What the ranges of pressure and clutch torque are made from.
     pub budget: Budget<T>,
     /// The oncoming clutch.
     pub clutch: Clutch<T>,
     /// The drive shafts' part.
     pub shaft: ShaftRange<T>,
-    /// What counts as a measurement.
-    pub limits: InputLimits<T>,
+    /// Checks of the input, and the phase.
+    pub tracker: Tracker<T>,
 }
 
-/// Commands that are remembered: enough for a delay of 30 ms at a sample time of 1 ms.
-const REMEMBERED: usize = 36;
-/// Longest time over which the lag is taken at its extreme, s; a longer sample is cut into pieces.
-const PIECE_S: f64 = 0.0101;
-/// Most pieces; beyond them each is longer, which makes the range wider and not wrong.
-const MOST_PIECES: usize = 8;
-
-/// A command that may still be on its way to the valve.
+/// Memory of a [`RangeEstimator`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Sent<T> {
-    age_s: T,
-    lowest: T,
-    highest: T,
+pub struct RangeState<T> {
+    /// The range of the pressure.
+    pub pressure: PressureRange<T>,
+    alignment: AlignmentState<T>,
+    /// For how long turbine or output speed has not been read, s.
+    unread_s: T,
+    tracker: TrackerState<T>,
+    shaft: ShaftMemory<T>,
 }
 
-/// Memory of the range.
+/// Any observer with the ranges around its estimates.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tube<T> {
-    lower_pa: T,
-    upper_pa: T,
-    /// Newest first.
-    sent: [Sent<T>; REMEMBERED],
-    count: usize,
+pub struct Bounded<T, O> {
+    /// The observer.
+    pub observer: O,
+    /// The ranges.
+    pub range: RangeEstimator<T>,
 }
 
-impl<T: Real> Tube<T> {
-    /// An empty cylinder whose valve has had no command for long.
-    pub fn new() -> Self {
-        let zero = T::zero();
-        let none = Sent { age_s: T::of(1e6), lowest: zero, highest: zero };
-        Self { lower_pa: zero, upper_pa: zero, sent: [none; REMEMBERED], count: 1 }
-    }
+/// What the ranges take of a step.
+struct Seen<T> {
+    /// Time since the step before, s; none if it is unusable.
+    dt_s: Option<T>,
+    /// Lowest and highest command that there may be.
+    command: [T; 2],
+    /// The phase, if the speeds are usable.
+    phase: Option<Phase>,
+    /// The signals at the time of the step.
+    sample: Sample<T>,
+    /// Slip of the oncoming clutch, and its largest error, rad/s.
+    slip_rad_s: Option<[T; 2]>,
+    /// Whether turbine, output and wheel speed were read in this step.
+    read: bool,
+}
 
-    /// Lowest and highest pressure, Pa.
-    pub fn pressure_pa(&self) -> [T; 2] {
-        [self.lower_pa, self.upper_pa]
-    }
-
-    /// Carries the range over `dt_s`.
-    #[inline]
-    pub fn advance(&mut self, budget: &Budget<T>, dt_s: T) {
-        let zero = T::zero();
-        if dt_s > zero {
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
-            let length_s = dt_s / T::of(pieces as f64);
-            let mut done_s = zero;
-            for _ in 0..pieces {
-                let target = self.settled(budget, done_s, done_s + length_s);
-                self.lower_pa = lower(budget, self.lower_pa, target[0], length_s);
-                self.upper_pa = upper(budget, self.upper_pa, target[1], length_s);
-                done_s = done_s + length_s;
-            }
-            for sent in &mut self.sent[..self.count] {
-                sent.age_s = sent.age_s + dt_s;
-            }
+impl<T: Real> RangeEstimator<T> {
+    /// Its memory before the first sample: everything is possible.
+    pub fn start(&self) -> RangeState<T> {
+        RangeState {
+            pressure: PressureRange::unknown(&self.budget, self.tracker.limits.command_max),
+            alignment: AlignmentState::new(),
+            unread_s: T::zero(),
+            tracker: TrackerState::new(),
+            shaft: ShaftMemory::new(),
         }
-        self.lower_pa = self.lower_pa.max(zero).min(budget.pressure_max_pa);
-        self.upper_pa = self.upper_pa.max(zero).min(budget.pressure_max_pa);
     }
 
-    /// Takes a new command between these limits.
+    /// Takes what came since the step before and returns the ranges for now. Never panics; allocates nothing.
     #[inline]
-    pub fn send(&mut self, budget: &Budget<T>, lowest: T, highest: T) {
-        // What is older than the longest delay has been replaced by what came after it.
-        let oldest = self.sent[..self.count].iter().position(|sent| sent.age_s >= budget.delay_s[1]);
-        let kept = oldest.map_or(self.count, |at| at + 1).min(REMEMBERED);
-        let full = kept == REMEMBERED;
-        if full {
-            // No room: the two oldest become one that may have been either.
-            let (last, before) = (self.sent[REMEMBERED - 1], &mut self.sent[REMEMBERED - 2]);
-            before.lowest = before.lowest.min(last.lowest);
-            before.highest = before.highest.max(last.highest);
-            before.age_s = last.age_s;
+    pub fn step(&self, state: &mut RangeState<T>, input: &Input<T>) -> Bounds<T> {
+        let limits = &self.tracker.limits;
+        let seen = self.seen(state, input);
+        match seen.dt_s {
+            Some(dt_s) => state.pressure.step(&self.budget, dt_s, seen.command, limits.command_max),
+            None => state.pressure.forget(&self.budget, limits.command_max),
         }
-        let kept = if full { REMEMBERED - 1 } else { kept };
-        self.sent.copy_within(..kept, 1);
-        self.sent[0] = Sent { age_s: T::zero(), lowest, highest };
-        self.count = kept + 1;
+        let (pressure_pa, clutch_torque_n_m) = self.pressure_and_torque(&state.pressure, seen.slip_rad_s);
+        let shaft_torque_n_m = match seen.phase {
+            Some(phase) if seen.dt_s.is_some() && seen.read => {
+                let range = self.shaft.step(&mut state.shaft, phase, &seen.sample, clutch_torque_n_m);
+                let limit = limits.shaft_torque_max_n_m;
+                range.map(|range| range.map(|torque| torque.max(-limit).min(limit)))
+            }
+            _ => {
+                state.shaft = ShaftMemory::new();
+                None
+            }
+        };
+        Bounds { pressure_pa, clutch_torque_n_m, shaft_torque_n_m }
     }
 
-    /// Everything is possible: time or command were lost.
-    pub fn forget(&mut self, budget: &Budget<T>) {
-        self.lower_pa = T::zero();
-        self.upper_pa = budget.pressure_max_pa;
-    }
-
-    /// Lowest and highest pressure at which the commands end that may be in effect from `start_s` to `end_s` from
-    /// now.
+    /// Checks the input and follows the phase. A command that is missing, or older than the step, may have been any.
     #[inline]
-    fn settled(&self, budget: &Budget<T>, start_s: T, end_s: T) -> [T; 2] {
-        let [least, most] = budget.delay_s;
-        let (mut lowest, mut highest) = (T::infinity(), T::zero());
-        for sent in &self.sent[..self.count] {
-            if sent.age_s + end_s < least {
-                continue;
+    fn seen(&self, state: &mut RangeState<T>, input: &Input<T>) -> Seen<T> {
+        let (limits, zero) = (&self.tracker.limits, T::zero());
+        let alignment = Alignment { shift: self.tracker.shift, limits: *limits };
+        let (sample, channels) = alignment.step(&mut state.alignment, input);
+        let dt_s = self.tracker.begin(&mut state.tracker, &sample).map(|interval| interval.dt_s);
+        let command = match input.command {
+            Some(reading) if limits.command_valid(reading.value) && reading.age_s <= zero => [reading.value; 2],
+            _ => [zero, limits.command_max],
+        };
+        let phase = limits.speeds_valid(&sample).then(|| match dt_s {
+            Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, &sample).0,
+            None => state.tracker.supervisor.phase,
+        });
+        let fresh = channels.turbine == ChannelHealth::Good && channels.output == ChannelHealth::Good;
+        state.unread_s = if fresh { zero } else { state.unread_s + dt_s.unwrap_or_else(T::infinity) };
+        // A slip carried on by its rate may be wrong by what it changes at most, twice: once that it does, once that it did.
+        let carried = T::one() + (state.unread_s + state.unread_s) / self.shaft.age_s();
+        let error = self.budget.slip_rad_s * if fresh { T::one() } else { carried };
+        let slip_rad_s = phase.map(|_| [sample.slip_rad_s, error]);
+        let read = fresh && channels.wheel == ChannelHealth::Good;
+        Seen { dt_s, command, phase, sample, slip_rad_s, read }
+    }
+
+    /// The ranges of pressure and clutch torque, with the slip if its reading is usable.
+    #[inline]
+    fn pressure_and_torque(&self, pressure: &PressureRange<T>, slip_rad_s: Option<[T; 2]>) -> ([T; 2], [T; 2]) {
+        let (clutch, budget, zero) = (&self.clutch, &self.budget, T::zero());
+        let [lower_pa, upper_pa] = pressure.pressure_pa(budget);
+        let [least, most] = budget.friction_factor;
+        // The sign of a slip that may be zero is not known, nor whether the clutch holds.
+        let slip = slip_rad_s.filter(|[slip, error]| slip.abs() > *error);
+        let (lowest, highest) = match slip {
+            Some([slip, error]) => clutch.friction.range_within(slip.abs() - error, slip.abs() + error),
+            None => {
+                let (lowest, highest) = clutch.friction.range();
+                (lowest.min(clutch.static_friction), highest.max(clutch.static_friction))
             }
-            lowest = lowest.min(sent.lowest);
-            highest = highest.max(sent.highest);
-            if sent.age_s + start_s >= most {
-                break;
-            }
+        };
+        let [lowest_force, highest_force] = self.clamp_force(pressure, [lower_pa, upper_pa]);
+        let at_most = most * highest * clutch.lever() * highest_force;
+        let at_least = least * lowest * clutch.lever() * lowest_force;
+        let torque = match slip {
+            None => [-at_most, at_most],
+            Some([slip, _]) if slip > zero => [at_least, at_most],
+            Some(_) => [-at_most, -at_least],
+        };
+        ([lower_pa, upper_pa], torque)
+    }
+
+    /// Least and greatest force that presses the plates together, N: none before the piston has closed the clearance.
+    #[inline]
+    fn clamp_force(&self, pressure: &PressureRange<T>, [lower_pa, upper_pa]: [T; 2]) -> [T; 2] {
+        let (clutch, zero) = (&self.clutch, T::zero());
+        let Some((fill, piston)) = self.budget.fill.as_ref().zip(pressure.piston(&self.budget)) else {
+            return [lower_pa, upper_pa].map(|pressure_pa| clutch.clamp_force(pressure_pa));
+        };
+        let [kiss, kissed] = fill.kiss_pressure_pa;
+        let force = |above_kiss: T| clutch.piston_area_m2 * above_kiss.max(zero);
+        let greatest = if piston.stroke()[1] < T::one() { zero } else { force(upper_pa - kiss) };
+        [force(lower_pa - kissed), greatest]
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> RangeEstimator<U> {
+        RangeEstimator {
+            budget: self.budget.cast(),
+            clutch: self.clutch.cast(),
+            shaft: self.shaft.cast(),
+            tracker: self.tracker.cast(),
         }
-        let zero = T::zero();
-        let low = (lowest - budget.command).max(zero);
-        let high = highest + budget.command;
-        [
-            budget.gain_factor[0] * budget.valve.settled_pressure(low),
-            budget.gain_factor[1] * budget.valve.settled_pressure(high),
-        ]
     }
-}
-
-impl<T: Real> Default for Tube<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// Highest pressure after `dt_s` from `pressure_pa` under commands that end at `target_pa` at most.
-#[inline]
-fn upper<T: Real>(budget: &Budget<T>, pressure_pa: T, target_pa: T, dt_s: T) -> T {
-    let fast = target_pa > pressure_pa;
-    moved(budget, pressure_pa, target_pa, dt_s, fast)
-}
-
-/// Lowest pressure after `dt_s` from `pressure_pa` under commands that end at `target_pa` at least.
-#[inline]
-fn lower<T: Real>(budget: &Budget<T>, pressure_pa: T, target_pa: T, dt_s: T) -> T {
-    let fast = target_pa < pressure_pa;
-    moved(budget, pressure_pa, target_pa, dt_s, fast)
-}
-
-/// Where a pressure is after `dt_s`, with the shortest lag that it can meet on its way if `fast`, else the longest.
-#[inline]
-fn moved<T: Real>(budget: &Budget<T>, pressure_pa: T, target_pa: T, dt_s: T, fast: bool) -> T {
-    let lag = |from: T, to: T| {
-        let (shortest, longest) = budget.valve.time_constant_s.range_within(from.min(to), from.max(to));
-        if fast { shortest * budget.lag_factor[0] } else { longest * budget.lag_factor[1] }
-    };
-    // It cannot get further than at its first speed, which tells what lags it meets.
-    let furthest = if fast {
-        let share = (dt_s / lag(pressure_pa, target_pa)).min(T::one());
-        pressure_pa + share * (target_pa - pressure_pa)
-    } else {
-        let (shortest, _) =
-            budget.valve.time_constant_s.range_within(pressure_pa.min(target_pa), pressure_pa.max(target_pa));
-        let share = (dt_s / (shortest * budget.lag_factor[0])).min(T::one());
-        pressure_pa + share * (target_pa - pressure_pa)
-    };
-    let left = (-dt_s / lag(pressure_pa, furthest)).exp();
-    target_pa + (pressure_pa - target_pa) * left
 }
 
 impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {
-    type State = (O::State, Tube<T>, ShaftMemory<T>);
+    type State = (O::State, RangeState<T>);
 
     fn start(&self) -> Self::State {
-        (self.observer.start(), Tube::new(), ShaftMemory::new())
+        (self.observer.start(), self.range.start())
     }
 
     #[inline]
-    fn step(&self, (state, tube, shaft): &mut Self::State, input: &Input<T>) -> Estimate<T> {
+    fn step(&self, (state, range): &mut Self::State, input: &Input<T>) -> Estimate<T> {
         let estimate = self.observer.step(state, input);
-        let budget = &self.budget;
-        if estimate.health == Health::TimeRejected {
-            tube.forget(budget);
-        } else {
-            tube.advance(budget, input.dt_s.max(T::zero()));
+        self.range.step(range, input).clip(estimate)
+    }
+}
+
+impl<T: Real> Bounds<T> {
+    /// Whether an estimate is in all of them.
+    pub fn hold(&self, estimate: &Estimate<T>) -> bool {
+        let within = |[low, high]: [T; 2], value: T| low <= value && value <= high;
+        let shaft = self.shaft_torque_n_m.zip(estimate.shaft_torque_n_m);
+        within(self.pressure_pa, estimate.pressure_pa)
+            && within(self.clutch_torque_n_m, estimate.clutch_torque_n_m)
+            && shaft.is_none_or(|(range, torque)| within(range, torque))
+    }
+
+    /// The estimate as it is, with these ranges. Its health is [`Health::OutsideRange`] if it is outside one of them, unless
+    /// it was worse before.
+    #[inline]
+    pub fn around(&self, estimate: Estimate<T>) -> Estimate<T> {
+        let found = if self.hold(&estimate) { Health::Good } else { Health::OutsideRange };
+        Estimate { bounds: Some(*self), health: estimate.health.max(found), ..estimate }
+    }
+
+    /// The estimate with its pressure and clutch torque brought into the guaranteed ranges, and with these ranges. Its
+    /// health is [`Health::LimitedToRange`] if that changed it, and [`Health::OutsideRange`] if its shaft torque, which is left
+    /// as it is, is outside the expected range; unless it was worse before.
+    #[inline]
+    pub fn clip(&self, estimate: Estimate<T>) -> Estimate<T> {
+        let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
+        let limited = Estimate {
+            pressure_pa: nearest(self.pressure_pa, estimate.pressure_pa),
+            clutch_torque_n_m: nearest(self.clutch_torque_n_m, estimate.clutch_torque_n_m),
+            bounds: Some(*self),
+            ..estimate
+        };
+        let changed =
+            limited.pressure_pa != estimate.pressure_pa || limited.clutch_torque_n_m != estimate.clutch_torque_n_m;
+        let found = match (changed, self.hold(&limited)) {
+            (true, _) => Health::LimitedToRange,
+            (false, false) => Health::OutsideRange,
+            (false, true) => Health::Good,
+        };
+        Estimate { health: limited.health.max(found), ..limited }
+    }
+}
+
+impl<T: Real> Budget<T> {
+    /// The same budget in another precision.
+    pub fn cast<U: Real>(&self) -> Budget<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        Budget {
+            valve: self.valve.cast(),
+            lag_factor: self.lag_factor.map(to),
+            gain_factor: self.gain_factor.map(to),
+            delay_s: self.delay_s.map(to),
+            hysteresis_pa: to(self.hysteresis_pa),
+            command: to(self.command),
+            command_age_s: to(self.command_age_s),
+            line_pressure_pa: self.line_pressure_pa.map(to),
+            pressure_max_pa: to(self.pressure_max_pa),
+            fill: self.fill.as_ref().map(FillBudget::cast),
+            friction_factor: self.friction_factor.map(to),
+            slip_rad_s: to(self.slip_rad_s),
         }
-        if self.limits.command_valid(input) {
-            tube.send(budget, input.command, input.command);
-        } else {
-            tube.send(budget, T::zero(), self.limits.command_max);
-        }
-        let mut bounds = self.bounds(tube, input);
-        let usable = self.limits.speeds_valid(input) && self.limits.wheel_valid(input);
-        if usable && estimate.health != Health::TimeRejected {
-            bounds.shaft_torque_n_m = self.shaft.step(shaft, estimate.phase, input, bounds.clutch_torque_n_m);
-        } else {
-            *shaft = ShaftMemory::new();
-        }
-        Estimate { bounds: Some(bounds), ..estimate }
     }
 }
 
 impl<T: Real, O> Bounded<T, O> {
-    /// The ranges of pressure and clutch torque.
-    #[inline]
-    fn bounds(&self, tube: &Tube<T>, input: &Input<T>) -> Bounds<T> {
-        let [lower_pa, upper_pa] = tube.pressure_pa();
-        let slip = input.slip_rad_s;
-        let [least, most] = self.budget.friction_factor;
-        let (clutch, zero) = (&self.clutch, T::zero());
-        let slips = self.limits.speeds_valid(input) && slip.abs() > self.budget.slip_rad_s;
-        let (lowest, highest) = if slips {
-            let (size, error) = (slip.abs(), self.budget.slip_rad_s);
-            clutch.friction.range_within(size - error, size + error)
-        } else {
-            let (lowest, highest) = clutch.friction.range();
-            (lowest.min(clutch.static_friction), highest.max(clutch.static_friction))
-        };
-        let at_most = most * highest * clutch.lever() * clutch.clamp_force(upper_pa);
-        let at_least = least * lowest * clutch.lever() * clutch.clamp_force(lower_pa);
-        let clutch_torque_n_m = match slips {
-            false => [-at_most, at_most],
-            true if slip > zero => [at_least, at_most],
-            true => [-at_most, -at_least],
-        };
-        Bounds { pressure_pa: [lower_pa, upper_pa], clutch_torque_n_m, shaft_torque_n_m: None }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    extern crate std;
-
-    use super::*;
-    use drivetrain::Table1;
-    use std::vec;
-    use std::vec::Vec;
-
-    fn budget() -> Budget<f64> {
-        Budget {
-            valve: ValveMaps {
-                time_constant_s: Table1::new(&[0.0, 1e5, 4e5, 1e6], &[0.2, 0.08, 0.035, 0.02]).unwrap(),
-                gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[0.7e6, 1.0e6, 1.1e6]).unwrap(),
-                delay_s: Table1::constant(0.01),
-            },
-            lag_factor: [0.5, 1.5],
-            gain_factor: [0.9, 1.1],
-            delay_s: [0.0, 0.03],
-            command: 0.005,
-            pressure_max_pa: 1.2e6,
-            friction_factor: [0.8, 1.2],
-            slip_rad_s: 0.6,
-        }
-    }
-
-    /// A valve within the budget, by small Euler steps, under commands held for 10 ms.
-    fn simulated(lag: f64, gain: f64, delay_ms: usize, commands: &[f64]) -> Vec<f64> {
-        let (b, mut p) = (budget(), 0.0);
-        let mut at_samples = vec![0.0];
-        for k in 0..commands.len() * 10 {
-            let command = if k < delay_ms { 0.0 } else { commands[(k - delay_ms) / 10] };
-            let settled = gain * b.valve.settled_pressure(command);
-            for _ in 0..100 {
-                p += 1e-5 * (settled - p) / (lag * b.valve.time_constant_s.at(p));
-            }
-            if (k + 1) % 10 == 0 {
-                at_samples.push(p);
-            }
-        }
-        at_samples
-    }
-
-    #[test]
-    fn every_valve_within_the_budget_stays_in_the_range() {
-        let commands: Vec<f64> = (0..60).map(|i| [0.0, 0.3, 0.12, 0.15, 0.2, 0.5, 0.9, 0.4, 0.05][i / 7]).collect();
-        let b = budget();
-        let mut tube = Tube::new();
-        let ranges: Vec<[f64; 2]> = (0..=60)
-            .map(|k| {
-                tube.advance(&b, if k == 0 { 0.0 } else { 0.01 });
-                let range = tube.pressure_pa();
-                if k < 60 {
-                    tube.send(&b, commands[k], commands[k]);
-                }
-                range
-            })
-            .collect();
-        let mut closest = f64::INFINITY;
-        for (lag, gain, delay) in
-            [(0.5, 1.1, 0), (0.5, 0.9, 0), (1.5, 1.1, 30), (1.5, 0.9, 30), (1.0, 1.0, 10), (0.5, 1.1, 30)]
-        {
-            for (p, [low, high]) in simulated(lag, gain, delay, &commands).iter().zip(&ranges) {
-                assert!(low - 1e-6 <= *p && *p <= high + 1e-6, "{p} not in {low} to {high} ({lag}, {gain}, {delay})");
-                closest = closest.min(high - p).min(p - low);
-            }
-        }
-        assert!(ranges.iter().all(|[low, high]| *low >= 0.0 && *high <= 1.2e6));
-        assert!(closest < 20e3, "the range is far wider than any of these valves: {closest}");
-    }
-
-    #[test]
-    fn a_held_command_leaves_only_the_gain_and_the_reading() {
-        let (b, mut tube) = (budget(), Tube::new());
-        for _ in 0..200 {
-            tube.send(&b, 0.3, 0.3);
-            tube.advance(&b, 0.01);
-        }
-        let settled = |command: f64, gain: f64| gain * b.valve.settled_pressure(command);
-        let [low, high] = tube.pressure_pa();
-        assert!((low - settled(0.295, 0.9)).abs() < 1.0 && (high - settled(0.305, 1.1)).abs() < 1.0, "{low} {high}");
-    }
-
-    #[test]
-    fn a_valve_outside_the_budget_leaves_the_range() {
-        let commands = [0.4; 40];
-        let b = budget();
-        let mut tube = Tube::new();
-        let mut left = false;
-        for p in simulated(1.0, 1.3, 10, &commands) {
-            let [_, high] = tube.pressure_pa();
-            left |= p > high;
-            tube.send(&b, 0.4, 0.4);
-            tube.advance(&b, 0.01);
-        }
-        assert!(left);
-    }
-
-    #[test]
-    fn more_commands_than_can_be_remembered_widen_the_range() {
-        let b = Budget { delay_s: [0.0, 0.2], ..budget() };
-        let mut tube = Tube::new();
-        for k in 0..500 {
-            let command = if k == 300 { 1.0 } else { 0.1 };
-            tube.send(&b, command, command);
-            tube.advance(&b, 0.001);
-            assert!(tube.count <= REMEMBERED);
-            // Up to 0.2 s later the large command may still act.
-            if (301..=500).contains(&k) {
-                assert!(tube.pressure_pa()[1] > 0.1e6);
-            }
-        }
+    /// The same ranges in another precision, around an observer of that precision.
+    pub fn cast<U: Real, P>(&self, observer: P) -> Bounded<U, P> {
+        Bounded { observer, range: self.range.cast() }
     }
 }

@@ -4,7 +4,7 @@ use drivetrain::Real;
 
 use crate::compliant_model::{CompliantSpeedModel, OUTPUTS};
 use crate::schedule::{Mix, between};
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Schedule, Track, Tracker};
+use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEstimator, Schedule, Track, Tracker};
 
 /// Gains of the compliant observer on `(w_t, dw, w_w)`: first row for the shaft torque, N m per rad/s, second
 /// row for the pressure, Pa per rad/s. In the torque phase the slip is no output and its column is zero.
@@ -48,6 +48,10 @@ impl<T: Real> Mix<T> for CompliantGains<T> {
 /// As the rigid one, with `z = (T_s, p)`: `A22 = diag(0, -1/tau_cv)`, so that `Phi`, `Psi` and `Gam2` of the shaft
 /// torque are `1`, `T` and `T^2/2`. Outside the shift the shaft torque follows the change of twist and leans
 /// towards its steady value, because the speeds do not show its offset.
+///
+/// `L` is designed for forward slip. With backward slip the pressure's column of `G` changes its sign, and the
+/// pressure's row of `L` with it: the error is that of forward slip with the sign of the pressure turned round, and
+/// the certificate holds for both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompliantObserver<T> {
     /// The powertrain.
@@ -63,12 +67,12 @@ pub struct CompliantObserver<T> {
 /// Memory of a [`CompliantObserver`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompliantState<T> {
-    track: Track<T, Sample<T>>,
+    track: Track<T, SpeedSample<T>>,
     shaft_torque_n_m: Option<T>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Sample<T> {
+struct SpeedSample<T> {
     phase: Phase,
     speeds: [T; OUTPUTS],
     shaft_rate: T,
@@ -76,41 +80,53 @@ struct Sample<T> {
     model: CompliantSpeedModel<T>,
 }
 
-impl<T: Real> Estimator<T> for CompliantObserver<T> {
-    type State = CompliantState<T>;
+impl<T: Real> SampleEstimator<T> for CompliantObserver<T> {
+    type SampleState = CompliantState<T>;
 
-    fn start(&self) -> CompliantState<T> {
+    fn tracker(&self) -> &Tracker<T> {
+        &self.tracker
+    }
+
+    fn start_sample(&self) -> CompliantState<T> {
         CompliantState { track: Track::new(), shaft_torque_n_m: None }
     }
 
     #[inline]
-    fn step(&self, state: &mut CompliantState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
+    fn step_sample(&self, state: &mut CompliantState<T>, sample: &Sample<T>) -> Estimate<T> {
+        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, sample) else {
             state.track.last = None;
             return state.track.estimate(state.shaft_torque_n_m, Health::TimeRejected);
         };
-        if !self.tracker.limits.wheel_valid(input) {
+        if !self.tracker.limits.wheel_valid(sample) {
             interval.health = Health::SpeedsRejected;
         }
-        let speeds = interval.speeds_valid().then_some([input.turbine_rad_s, input.slip_rad_s, input.wheel_rad_s]);
+        let speeds = interval.speeds_valid().then_some([sample.turbine_rad_s, sample.slip_rad_s, sample.wheel_rad_s]);
+        let known = state.shaft_torque_n_m.is_some();
         if !interval.short {
             // The twist is lost over a long gap, as it is unknown at the start.
             state.shaft_torque_n_m = None;
         }
-        self.advance(state, &interval, speeds);
-        state.track.recover();
-        state.shaft_torque_n_m = state.shaft_torque_n_m.filter(|torque| torque.is_finite());
-        match speeds {
-            Some(speeds) => self.observe(state, interval.dt_s, input, speeds),
+        let pressure = self.advance(state, &mut interval, speeds);
+        let mut health = state.track.settle(&self.tracker.limits, pressure);
+        // A correction that cannot be may come from a wrong reading or from a wrong twist.
+        let sound = speeds.is_none() || interval.speeds_valid();
+        state.shaft_torque_n_m =
+            state.shaft_torque_n_m.filter(|&torque| sound && self.tracker.limits.shaft_torque_possible(torque));
+        state.track.lost |= known && state.shaft_torque_n_m.is_none();
+        match speeds.filter(|_| interval.speeds_valid()) {
+            Some(speeds) => {
+                self.observe(state, interval.dt_s, sample, speeds);
+                health = health.max(state.track.restart());
+            }
             None => state.track.last = None,
         }
-        state.track.estimate(state.shaft_torque_n_m, interval.health)
+        state.track.estimate(state.shaft_torque_n_m, interval.health.max(health))
     }
 }
 
 impl<T: Real> CompliantObserver<T> {
     #[inline]
-    fn gains_of(&self, last: &Sample<T>) -> Option<[[T; OUTPUTS]; 2]> {
+    fn gains_of(&self, last: &SpeedSample<T>) -> Option<[[T; OUTPUTS]; 2]> {
         match last.phase {
             Phase::TorquePhase => Some(self.gains.at(last.model.friction).torque_phase),
             Phase::InertiaPhase => Some(self.gains.at(last.model.friction).inertia_phase),
@@ -119,17 +135,19 @@ impl<T: Real> CompliantObserver<T> {
     }
 
     /// Carries both estimates over the interval and corrects them by how far the speeds moved otherwise
-    /// than predicted.
+    /// than predicted. Returns the pressure.
     #[inline]
-    fn advance(&self, state: &mut CompliantState<T>, interval: &Interval<T>, speeds: Option<[T; OUTPUTS]>) {
+    fn advance(&self, state: &mut CompliantState<T>, interval: &mut Interval<T>, speeds: Option<[T; OUTPUTS]>) -> T {
         let dt = interval.dt_s;
-        let pressure_integral = interval.pressure_integral(state.track.pressure_pa);
-        state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
-        let (Some(last), Some(shaft)) = (state.track.last, state.shaft_torque_n_m) else { return };
+        let before = state.track.pressure_pa;
+        let mut pressure = interval.pressure(before);
+        let (Some(last), Some(shaft)) = (state.track.last, state.shaft_torque_n_m) else { return pressure };
         let mut predicted = shaft + dt * last.shaft_rate;
         match (self.gains_of(&last), speeds) {
             (Some(gain), Some(speeds)) => {
                 let shaft_integral = dt * (shaft + T::of(0.5) * dt * last.shaft_rate);
+                let pressure_integral = interval.pressure_integral(before);
+                let mut correction = [T::zero(); 2];
                 for i in 0..OUTPUTS {
                     let [per_shaft, per_pressure] = last.model.influence[i];
                     let unpredicted = speeds[i]
@@ -137,8 +155,12 @@ impl<T: Real> CompliantObserver<T> {
                         - dt * last.model.free_rad_s2[i]
                         - per_shaft * shaft_integral
                         - per_pressure * pressure_integral;
-                    predicted = predicted + gain[0][i] * unpredicted;
-                    state.track.pressure_pa = state.track.pressure_pa + gain[1][i] * unpredicted;
+                    correction[0] = correction[0] + gain[0][i] * unpredicted;
+                    correction[1] = correction[1] + gain[1][i] * unpredicted;
+                }
+                pressure = interval.corrected(pressure, last.model.direction * correction[1], &self.tracker.limits);
+                if interval.speeds_valid() {
+                    predicted = predicted + correction[0];
                 }
             }
             (None, _) => {
@@ -148,17 +170,18 @@ impl<T: Real> CompliantObserver<T> {
             (Some(_), None) => {}
         }
         state.shaft_torque_n_m = Some(predicted);
+        pressure
     }
 
-    /// Finds the phase and stores what the model says at this sample.
+    /// Finds the phase and stores the model at this sample.
     #[inline]
-    fn observe(&self, state: &mut CompliantState<T>, dt: T, input: &Input<T>, speeds: [T; OUTPUTS]) {
-        let engine = input.engine_rad_s;
+    fn observe(&self, state: &mut CompliantState<T>, dt: T, sample: &Sample<T>, speeds: [T; OUTPUTS]) {
+        let engine = sample.engine_rad_s;
         let [turbine, slip, wheel] = speeds;
-        let (_, acting) = self.tracker.phase(&mut state.track.tracker, dt, input);
+        let (_, acting) = self.tracker.phase(&mut state.track.tracker, dt, sample);
         let steady_n_m = self.model.steady_shaft_torque(acting, engine, turbine, wheel);
         state.shaft_torque_n_m = state.shaft_torque_n_m.or(Some(steady_n_m));
-        state.track.last = Some(Sample {
+        state.track.last = Some(SpeedSample {
             phase: acting,
             speeds,
             shaft_rate: self.model.shaft_rate(turbine, slip, wheel),

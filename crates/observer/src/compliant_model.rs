@@ -1,6 +1,6 @@
-//! The powertrain as the compliant observer sees it: elastic drive shafts, gripping tyres, Eq. (2.61)-(2.67).
+//! Powertrain model of the compliant observer: elastic drive shafts, tyres without slip, Eq. (2.61)-(2.67).
 
-use drivetrain::{Engagement, Real, ReducedShift, ShiftCoefficients, ShiftTorques};
+use drivetrain::{Engagement, Real, ReducedShift, ShiftCoefficients, ShiftTorques, clutch::direction};
 
 use crate::{Phase, RigidModel};
 
@@ -36,6 +36,8 @@ pub struct CompliantSpeedModel<T> {
     pub influence: [[T; 2]; OUTPUTS],
     /// Friction coefficient `mu` in both.
     pub friction: T,
+    /// Direction of the slip, 1 or -1: the pressure's part of `G` has its sign.
+    pub direction: T,
 }
 
 impl<T: Real> CompliantModel<T> {
@@ -81,8 +83,7 @@ impl<T: Real> CompliantModel<T> {
     #[inline]
     pub fn speed_model(&self, phase: Phase, engine: T, turbine: T, slip: T, wheel: T) -> CompliantSpeedModel<T> {
         let clutch = &self.rigid.clutch;
-        let direction = if slip < T::zero() { -T::one() } else { T::one() };
-        let coefficient = clutch.friction.at(slip.abs());
+        let (coefficient, direction) = (clutch.friction.at(slip.abs()), direction(slip));
         let friction = coefficient * direction;
         let known = ShiftTorques {
             turbine_n_m: self.rigid.converter.torques(engine, turbine).turbine_n_m,
@@ -100,6 +101,7 @@ impl<T: Real> CompliantModel<T> {
             free_rad_s2: [rows.turbine.at(&known), slip_free, -self.wheel_per_torque * load],
             influence: self.influence(phase, friction),
             friction: coefficient,
+            direction,
         }
     }
 

@@ -1,13 +1,12 @@
-//! Direct inversion: the pressure that explains the last change of the speeds.
+//! Direct inversion: the pressure that follows from the last change of the speeds.
 //!
 //! The turbine's and the output's momentum over a sample give the clutch torque without any observer; the pressure
-//! follows from the friction law. Nothing is carried over from sample to sample but the twist of the shafts, so an
-//! error does not last, and every reading's noise is in the estimate. A low pass of one time constant is all that is
-//! done about it.
+//! follows from the friction law. The only state is the twist of the shafts, so an error
+//! does not last, but the noise of every reading is in the estimate. A first-order low pass reduces this noise.
 
-use drivetrain::Real;
+use drivetrain::{Real, clutch::direction};
 
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Phase, Track, Tracker};
+use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEstimator, Track, Tracker};
 
 /// The inversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +24,7 @@ pub struct Inversion<T> {
 /// Memory of an [`Inversion`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InversionState<T> {
-    track: Track<T, Input<T>>,
+    track: Track<T, Sample<T>>,
     shaft_torque_n_m: Option<T>,
 }
 
@@ -34,11 +33,11 @@ impl<T: Real> Inversion<T> {
     /// momentum when turbine torque and shaft torque have had their parts. The offgoing clutch's torque is taken out by
     /// combining both rows.
     #[inline]
-    fn clutch_torque(&self, last: &Input<T>, input: &Input<T>, shaft_n_m: T) -> T {
+    fn clutch_torque(&self, last: &Sample<T>, sample: &Sample<T>, shaft_n_m: T) -> T {
         let shift = &self.model.shift;
-        let output = |x: &Input<T>| shift.output_speed(x.turbine_rad_s, x.slip_rad_s);
+        let output = |x: &Sample<T>| shift.output_speed(x.turbine_rad_s, x.slip_rad_s);
         let rates =
-            [(input.turbine_rad_s - last.turbine_rad_s) / input.dt_s, (output(input) - output(last)) / input.dt_s];
+            [(sample.turbine_rad_s - last.turbine_rad_s) / sample.dt_s, (output(sample) - output(last)) / sample.dt_s];
         let rows = &self.model.inertia_phase;
         let turbine_n_m = self.model.rigid.converter.torques(last.engine_rad_s, last.turbine_rad_s).turbine_n_m;
         let output_n_m = shaft_n_m / self.model.rigid.driveline.final_ratio;
@@ -62,72 +61,100 @@ impl<T: Real> Inversion<T> {
     }
 }
 
-impl<T: Real> Estimator<T> for Inversion<T> {
-    type State = InversionState<T>;
+impl<T: Real> SampleEstimator<T> for Inversion<T> {
+    type SampleState = InversionState<T>;
 
-    fn start(&self) -> InversionState<T> {
+    fn tracker(&self) -> &Tracker<T> {
+        &self.tracker
+    }
+
+    fn start_sample(&self) -> InversionState<T> {
         InversionState { track: Track::new(), shaft_torque_n_m: None }
     }
 
     #[inline]
-    fn step(&self, state: &mut InversionState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
-            state.track.last = None;
-            state.shaft_torque_n_m = None;
+    fn step_sample(&self, state: &mut InversionState<T>, sample: &Sample<T>) -> Estimate<T> {
+        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, sample) else {
+            state.lose();
             return state.track.estimate(None, Health::TimeRejected);
         };
-        if !self.tracker.limits.wheel_valid(input) {
+        if !self.tracker.limits.wheel_valid(sample) {
             interval.health = Health::SpeedsRejected;
         }
         if !interval.speeds_valid() || !interval.short {
-            state.track.last = None;
-            state.shaft_torque_n_m = None;
+            state.lose();
         }
-        state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
-        if interval.speeds_valid() {
-            self.take(state, input);
+        let predicted = interval.pressure(state.track.pressure_pa);
+        let (pressure, acting) = if interval.speeds_valid() {
+            let (pressure, acting) = self.take(state, &mut interval, sample, predicted);
+            (pressure, Some(acting).filter(|_| interval.speeds_valid()))
+        } else {
+            (predicted, None)
+        };
+        let mut health = state.track.settle(&self.tracker.limits, pressure);
+        match acting {
+            Some(acting) => {
+                let (engine, turbine, slip) = (sample.engine_rad_s, sample.turbine_rad_s, sample.slip_rad_s);
+                let pressure = state.track.pressure_pa;
+                state.track.clutch_torque_n_m = self.model.rigid.clutch_torque(acting, pressure, engine, turbine, slip);
+                state.track.last = Some(*sample);
+                health = health.max(state.track.restart());
+            }
+            None => state.lose(),
         }
-        state.track.estimate(state.shaft_torque_n_m, interval.health)
+        state.track.estimate(state.shaft_torque_n_m, interval.health.max(health))
+    }
+}
+
+impl<T: Real> InversionState<T> {
+    /// Forgets the twist and the sample before.
+    fn lose(&mut self) {
+        self.track.lost |= self.shaft_torque_n_m.is_some();
+        self.track.last = None;
+        self.shaft_torque_n_m = None;
     }
 }
 
 impl<T: Real> Inversion<T> {
+    /// Pressure and phase at a sample whose speeds can be used; follows the twist.
     #[inline]
-    fn take(&self, state: &mut InversionState<T>, input: &Input<T>) {
-        let (_, acting) = self.tracker.phase(&mut state.track.tracker, input.dt_s.max(T::zero()), input);
-        let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
-        let steady = self.model.steady_shaft_torque(acting, engine, turbine, input.wheel_rad_s);
+    fn take(
+        &self,
+        state: &mut InversionState<T>,
+        interval: &mut Interval<T>,
+        sample: &Sample<T>,
+        mut pressure: T,
+    ) -> (T, Phase) {
+        let dt = interval.dt_s;
+        let (_, acting) = self.tracker.phase(&mut state.track.tracker, dt, sample);
+        let (engine, turbine, slip) = (sample.engine_rad_s, sample.turbine_rad_s, sample.slip_rad_s);
+        let steady = self.model.steady_shaft_torque(acting, engine, turbine, sample.wheel_rad_s);
         let mut shaft = state.shaft_torque_n_m.unwrap_or(steady);
         let shifting = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase);
-        if let Some(last) = state.track.last.filter(|_| input.dt_s > T::zero()) {
+        if let Some(last) = state.track.last.filter(|_| dt > T::zero()) {
             let before = self.model.shaft_rate(last.turbine_rad_s, last.slip_rad_s, last.wheel_rad_s);
-            let after = self.model.shaft_rate(turbine, slip, input.wheel_rad_s);
-            let turned = T::of(0.5) * input.dt_s * (before + after);
+            let after = self.model.shaft_rate(turbine, slip, sample.wheel_rad_s);
+            let turned = T::of(0.5) * dt * (before + after);
             let mean = shaft + T::of(0.5) * turned;
             shaft = shaft + turned;
             if shifting {
-                let torque = self.clutch_torque(&last, input, mean);
-                let share = T::one() - (-input.dt_s / self.smoothing_s).exp();
-                let direction = if slip < T::zero() { -T::one() } else { T::one() };
-                let size = (direction * torque).max(T::zero());
-                let clutch = &self.model.rigid.clutch;
-                let found = clutch.pressure_for(size, slip);
+                let torque = self.clutch_torque(&last, sample, mean);
+                let share = T::one() - (-dt / self.smoothing_s).exp();
+                let size = (direction(slip) * torque).max(T::zero());
                 // Below the kiss point the clutch carries nothing, and the valve model is all there is.
                 if size > T::zero() {
-                    state.track.pressure_pa = state.track.pressure_pa + share * (found - state.track.pressure_pa);
+                    let found = self.model.rigid.clutch.pressure_for(size, slip);
+                    pressure = interval.corrected(pressure, share * (found - pressure), &self.tracker.limits);
                 }
             } else {
-                let share = T::one() - (-input.dt_s / self.shaft_settling_s).exp();
+                let share = T::one() - (-dt / self.shaft_settling_s).exp();
                 shaft = shaft + share * (steady - shaft);
             }
         }
-        if !(state.track.pressure_pa.is_finite() && shaft.is_finite()) {
-            state.track.pressure_pa = state.track.tracker.valve_pressure_pa;
-            shaft = steady;
-        }
-        state.shaft_torque_n_m = shaft.is_finite().then_some(shaft);
-        state.track.clutch_torque_n_m =
-            self.model.rigid.clutch_torque(acting, state.track.pressure_pa, engine, turbine, slip);
-        state.track.last = Some(*input);
+        // A twist that cannot be is found anew.
+        let possible = self.tracker.limits.shaft_torque_possible(shaft);
+        state.track.lost |= !possible;
+        state.shaft_torque_n_m = possible.then_some(shaft);
+        (pressure, acting)
     }
 }

@@ -4,14 +4,20 @@
 //! result is returned: `step(&self, &mut State, &Input) -> Estimate`. A step never panics; input that is
 //! not finite or out of range gives an estimate with a flag.
 //!
-//! **Architecture invariant:** nothing here knows the simulated plant. An estimator cannot see the truth.
+//! **Architecture invariant:** this crate does not depend on the simulated plant. An estimator has no access to the true
+//! values.
 #![no_std]
 
+pub mod alignment;
 pub mod bound;
+mod commands;
 pub mod compliant;
 pub mod compliant_model;
+pub mod extended;
+pub mod fill_range;
 pub mod inversion;
 pub mod kalman;
+pub mod pressure_range;
 pub mod rigid;
 pub mod rigid_model;
 pub mod schedule;
@@ -23,16 +29,22 @@ pub mod supervisor;
 pub mod tracker;
 pub mod unscented;
 
-pub use bound::{Bounded, Bounds, Budget, Tube};
+pub use alignment::{AlignedState, Alignment, AlignmentState};
+pub use bound::{Bounded, Bounds, Budget, RangeEstimator, RangeState};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};
+pub use extended::{ExtendedFilter, ExtendedState, FilterNoise, Readings};
+pub use fill_range::{FillBudget, PistonRange};
 pub use inversion::{Inversion, InversionState};
-pub use kalman::{FilterNoise, KalmanFilter, KalmanState, Readings};
+pub use kalman::{EngineNoise, KalmanFilter, KalmanState, SpeedReading, Uncertainty, ValveModel};
+pub use pressure_range::PressureRange;
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};
 pub use schedule::{Mix, Schedule};
 pub use shaft_range::{ShaftErrors, ShaftMemory, ShaftRange};
-pub use signals::{Estimate, Estimator, Health, Input, InputLimits};
+pub use signals::{
+    ChannelHealth, Channels, Estimate, Estimator, Health, Input, InputLimits, Reading, Sample, SampleEstimator,
+};
 pub use sliding::{SlidingGains, SlidingObserver, SlidingSample, SlidingState};
 pub use super_twisting::{SuperTwisting, SuperTwistingState, TwistingSample};
 pub use supervisor::{Phase, Supervisor, SupervisorState};

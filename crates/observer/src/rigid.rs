@@ -1,9 +1,11 @@
-//! The reduced-order input-to-state-stable observer with constant gains, Eq. (2.43)-(2.45).
+//! The reduced-order sample-to-state-stable observer with constant gains, Eq. (2.43)-(2.45).
 
 use drivetrain::Real;
 
 use crate::schedule::{Mix, between};
-use crate::{Estimate, Estimator, Health, Input, Interval, Phase, RigidModel, Schedule, SpeedModel, Track, Tracker};
+use crate::{
+    Estimate, Health, Interval, Phase, RigidModel, Sample, SampleEstimator, Schedule, SpeedModel, Track, Tracker,
+};
 
 /// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +22,8 @@ impl<T: Real> RigidGains<T> {
         Self { torque_phase_pa_s_rad: T::zero(), inertia_phase_pa_s_rad: [T::zero(); 2] }
     }
 
-    /// The gain that serves in a phase. Before the shift and after lock-up the speeds say nothing about
-    /// the pressure and the valve model serves alone, Eq. (2.17c).
+    /// The gain in a phase. Before the shift and after lock-up the speeds do not depend on the pressure, and the
+    /// estimate is the valve model alone, Eq. (2.17c).
     #[inline]
     pub fn of(&self, phase: Phase) -> [T; 2] {
         match phase {
@@ -67,6 +69,9 @@ impl<T: Real> Mix<T> for RigidGains<T> {
 /// stored: written this way the estimate does not jump when the gain changes with the phase, because only
 /// the change of `y` since the last sample enters, which is what setting `eta = z^ - L y` anew at a
 /// handover does.
+///
+/// `L` is designed for forward slip. With backward slip `G` changes its sign, and `L` with it: `L G` and with it the
+/// certificate do not change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidObserver<T> {
     /// The powertrain.
@@ -80,7 +85,7 @@ pub struct RigidObserver<T> {
 /// Memory of a [`RigidObserver`].
 pub type RigidState<T> = Track<T, RigidSample<T>>;
 
-/// The speeds of the last usable sample and what the model said there.
+/// The speeds of the last usable sample, and the model there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidSample<T> {
     phase: Phase,
@@ -88,31 +93,36 @@ pub struct RigidSample<T> {
     model: SpeedModel<T>,
 }
 
-impl<T: Real> Estimator<T> for RigidObserver<T> {
-    type State = RigidState<T>;
+impl<T: Real> SampleEstimator<T> for RigidObserver<T> {
+    type SampleState = RigidState<T>;
 
-    fn start(&self) -> RigidState<T> {
+    fn tracker(&self) -> &Tracker<T> {
+        &self.tracker
+    }
+
+    fn start_sample(&self) -> RigidState<T> {
         Track::new()
     }
 
     #[inline]
-    fn step(&self, state: &mut RigidState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
+    fn step_sample(&self, state: &mut RigidState<T>, sample: &Sample<T>) -> Estimate<T> {
+        let Some(mut interval) = self.tracker.begin(&mut state.tracker, sample) else {
             // What lies between the last sample and the next is not known: no sample to correct by.
             state.last = None;
             return state.estimate(None, Health::TimeRejected);
         };
         let usable = interval.speeds_valid() && interval.short;
-        let speeds = usable.then_some([input.turbine_rad_s, input.slip_rad_s]);
+        let speeds = usable.then_some([sample.turbine_rad_s, sample.slip_rad_s]);
         let correction = self.correction(state, &interval, speeds);
-        state.pressure_pa = interval.pressure(state.pressure_pa) + correction;
-        state.recover();
+        let limits = &self.tracker.limits;
+        let pressure = interval.corrected(interval.pressure(state.pressure_pa), correction, limits);
+        let settled = state.settle(limits, pressure);
         if interval.speeds_valid() {
-            self.observe(state, interval.dt_s, input);
+            self.observe(state, interval.dt_s, sample);
         } else {
             state.last = None;
         }
-        state.estimate(None, interval.health)
+        state.estimate(None, interval.health.max(settled))
     }
 }
 
@@ -128,14 +138,14 @@ impl<T: Real> RigidObserver<T> {
             let SpeedModel { free_rad_s2: f, per_pressure_rad_s2_pa: g, .. } = last.model;
             speeds[i] - last.speeds[i] - interval.dt_s * f[i] - g[i] * pressure_integral
         };
-        gain[0] * unpredicted(0) + gain[1] * unpredicted(1)
+        last.model.direction * (gain[0] * unpredicted(0) + gain[1] * unpredicted(1))
     }
 
-    /// Finds the phase and stores what the model says at this sample.
+    /// Finds the phase and stores the model at this sample.
     #[inline]
-    fn observe(&self, state: &mut RigidState<T>, dt: T, input: &Input<T>) {
-        let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
-        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
+    fn observe(&self, state: &mut RigidState<T>, dt: T, sample: &Sample<T>) {
+        let (engine, turbine, slip) = (sample.engine_rad_s, sample.turbine_rad_s, sample.slip_rad_s);
+        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, sample);
         // Outside the shift the speeds say nothing about the pressure: no sample to correct by.
         state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| RigidSample {
             phase: acting,

@@ -1,7 +1,8 @@
-//! The powertrain as the rigid observers see it: stiff shafts, gripping tyres, Eq. (2.17)-(2.26).
+//! Powertrain model of the rigid observers: rigid shafts, tyres without slip, Eq. (2.17)-(2.26).
 
 use drivetrain::{
     Clutch, Converter, Driveline, Engagement, Real, ReducedShift, RoadLoad, ShiftCoefficients, ShiftTorques, Valve,
+    clutch::direction,
 };
 
 use crate::Phase;
@@ -41,6 +42,8 @@ pub struct SpeedModel<T> {
     pub per_pressure_rad_s2_pa: [T; 2],
     /// Friction coefficient `mu` in both.
     pub friction: T,
+    /// Direction of the slip, 1 or -1: `G` has its sign.
+    pub direction: T,
 }
 
 impl<T: Real> RigidModel<T> {
@@ -110,8 +113,8 @@ impl<T: Real> RigidModel<T> {
     /// so both change sign with the slip.
     #[inline]
     pub fn speed_model(&self, phase: Phase, engine_rad_s: T, turbine_rad_s: T, slip_rad_s: T) -> SpeedModel<T> {
-        let coefficient = self.clutch.friction.at(slip_rad_s.abs());
-        let friction = coefficient * direction(slip_rad_s);
+        let (coefficient, direction) = (self.clutch.friction.at(slip_rad_s.abs()), direction(slip_rad_s));
+        let friction = coefficient * direction;
         let mut torques = self.known_torques(engine_rad_s, turbine_rad_s, slip_rad_s);
         torques.oncoming_n_m = -friction * self.clutch.lever() * self.clutch.return_spring_n;
         let rows = self.coefficients(phase);
@@ -123,6 +126,7 @@ impl<T: Real> RigidModel<T> {
             free_rad_s2: [rows.turbine.at(&torques), slip],
             per_pressure_rad_s2_pa: self.influence(phase, friction),
             friction: coefficient,
+            direction,
         }
     }
 
@@ -153,10 +157,4 @@ impl<T: Real> RigidModel<T> {
             driveline: self.driveline.cast(),
         }
     }
-}
-
-/// Sign of the slip: the direction in which the clutch drives its output side.
-#[inline]
-fn direction<T: Real>(slip_rad_s: T) -> T {
-    if slip_rad_s < T::zero() { -T::one() } else { T::one() }
 }

@@ -1,4 +1,4 @@
-//! Gains that follow the friction coefficient.
+//! Gains that depend on the friction coefficient.
 
 use drivetrain::Real;
 

@@ -1,12 +1,63 @@
-//! What goes into an observer and what comes out.
+//! Inputs and outputs of an observer.
 
-use drivetrain::Real;
+use drivetrain::{Real, ReducedShift};
 
-use crate::{Bounds, Phase};
+use crate::{Bounds, Phase, Tracker};
 
-/// One sample of what a transmission controller measures and commands.
+/// What a sensor or a controller told last, and how old it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading<T> {
+    /// The value, in the unit of its channel.
+    pub value: T,
+    /// Time from the moment it was measured until the step that takes it, s.
+    pub age_s: T,
+}
+
+impl<T: Real> Reading<T> {
+    /// A reading of the moment.
+    #[inline]
+    pub fn now(value: T) -> Self {
+        Self { value, age_s: T::zero() }
+    }
+}
+
+/// What came since the step before: of each channel the newest reading, or none. Channels may come at any rate, in any
+/// phase and in any order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Input<T> {
+    /// Time since the step before, s. Ignored in the first step.
+    pub dt_s: T,
+    /// Engine speed `w_e`, rad/s.
+    pub engine_rad_s: Option<Reading<T>>,
+    /// Turbine speed `w_t`, rad/s.
+    pub turbine_rad_s: Option<Reading<T>>,
+    /// Speed of the gearbox output `w_0`, rad/s.
+    pub output_rad_s: Option<Reading<T>>,
+    /// Speed of the driven wheels `w_w`, rad/s.
+    pub wheel_rad_s: Option<Reading<T>>,
+    /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
+    pub command: Option<Reading<T>>,
+}
+
+impl<T: Real> Input<T> {
+    /// Readings of every channel at the moment of the step.
+    pub fn of_sample(sample: &Sample<T>, shift: &ReducedShift<T>) -> Self {
+        let now = |value: T| Some(Reading::now(value));
+        Self {
+            dt_s: sample.dt_s,
+            engine_rad_s: now(sample.engine_rad_s),
+            turbine_rad_s: now(sample.turbine_rad_s),
+            output_rad_s: now(shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s)),
+            wheel_rad_s: now(sample.wheel_rad_s),
+            command: now(sample.command),
+        }
+    }
+}
+
+/// All signals at one time, as an observer with a fixed sample time needs them. A value that is not a number is not
+/// known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample<T> {
     /// Time since the sample before, s. Ignored in the first step.
     pub dt_s: T,
     /// Engine speed `w_e`, rad/s.
@@ -15,41 +66,63 @@ pub struct Input<T> {
     pub turbine_rad_s: T,
     /// Slip of the oncoming clutch `dw`, rad/s.
     pub slip_rad_s: T,
-    /// Speed of the driven wheels `w_w`, rad/s; NaN where it is not measured.
+    /// Speed of the driven wheels `w_w`, rad/s.
     pub wheel_rad_s: T,
     /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
     pub command: T,
 }
 
-/// Ranges outside which an input cannot be a measurement.
+/// Ranges outside which an input cannot be a measurement, and an estimate cannot be a pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputLimits<T> {
     /// Largest size of a speed, rad/s.
     pub speed_max_rad_s: T,
     /// Largest valve command, A or %; the smallest is zero.
     pub command_max: T,
+    /// Highest pressure that the supply can give, Pa; the lowest is zero.
+    pub pressure_max_pa: T,
+    /// Largest size of a drive-shaft torque, N m.
+    pub shaft_torque_max_n_m: T,
 }
 
 impl<T: Real> InputLimits<T> {
     /// Whether the speeds can be used.
     #[inline]
-    pub fn speeds_valid(&self, input: &Input<T>) -> bool {
+    pub fn speeds_valid(&self, sample: &Sample<T>) -> bool {
+        self.speed_valid(sample.engine_rad_s)
+            && self.speed_valid(sample.turbine_rad_s)
+            && sample.slip_rad_s.abs() <= self.speed_max_rad_s + self.speed_max_rad_s
+    }
+
+    /// Whether a speed can be one of this gearbox.
+    #[inline]
+    pub fn speed_valid(&self, speed_rad_s: T) -> bool {
         // A comparison with NaN is false, so this refuses non-finite values too.
-        input.engine_rad_s.abs() <= self.speed_max_rad_s
-            && input.turbine_rad_s.abs() <= self.speed_max_rad_s
-            && input.slip_rad_s.abs() <= self.speed_max_rad_s + self.speed_max_rad_s
+        speed_rad_s.abs() <= self.speed_max_rad_s
     }
 
     /// Whether the wheel speed can be used.
     #[inline]
-    pub fn wheel_valid(&self, input: &Input<T>) -> bool {
-        input.wheel_rad_s.abs() <= self.speed_max_rad_s
+    pub fn wheel_valid(&self, sample: &Sample<T>) -> bool {
+        self.speed_valid(sample.wheel_rad_s)
     }
 
-    /// Whether the valve command can be used.
+    /// Whether a valve command can be used.
     #[inline]
-    pub fn command_valid(&self, input: &Input<T>) -> bool {
-        input.command >= T::zero() && input.command <= self.command_max
+    pub fn command_valid(&self, command: T) -> bool {
+        command >= T::zero() && command <= self.command_max
+    }
+
+    /// Whether a drive-shaft torque is a number within its limit.
+    #[inline]
+    pub fn shaft_torque_possible(&self, torque_n_m: T) -> bool {
+        torque_n_m.abs() <= self.shaft_torque_max_n_m
+    }
+
+    /// The nearest pressure that the supply can give, Pa.
+    #[inline]
+    pub fn possible_pressure(&self, pressure_pa: T) -> T {
+        pressure_pa.max(T::zero()).min(self.pressure_max_pa)
     }
 
     /// The same limits in another precision.
@@ -57,36 +130,123 @@ impl<T: Real> InputLimits<T> {
         InputLimits {
             speed_max_rad_s: U::of(self.speed_max_rad_s.to_f64_exact()),
             command_max: U::of(self.command_max.to_f64_exact()),
+            pressure_max_pa: U::of(self.pressure_max_pa.to_f64_exact()),
+            shaft_torque_max_n_m: U::of(self.shaft_torque_max_n_m.to_f64_exact()),
         }
     }
 }
 
-/// How far an estimate can be trusted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Health of an estimate, from best to worst. If several apply, the worst one is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Health {
-    /// Every input was usable.
+    /// Every reading is usable, and the estimate is within its limits.
     Good,
-    /// A speed was unusable: the valve model alone carried the estimate over this sample.
-    SpeedsRejected,
-    /// The valve command was unusable: the last usable one was taken in its place.
+    /// A reading was refused: it is impossible, or it contradicts all the others.
+    ReadingRefused,
+    /// A channel has given no usable reading for long: the estimate is less certain.
+    ChannelLost,
+    /// The estimate is outside its range: the observer has a large error, or the car is outside its error budget.
+    OutsideRange,
+    /// The estimate was outside its guaranteed range, and is the nearest end of it.
+    LimitedToRange,
+    /// The valve command is unusable: the last usable command is used.
     CommandRejected,
-    /// The time step was unusable: the estimate is the one before.
+    /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
+    /// limit.
+    PressureLimited,
+    /// A speed is unusable: in this sample the estimate is from the valve model alone.
+    SpeedsRejected,
+    /// The observer lost its state and starts again.
+    Restarted,
+    /// The time step is unusable: the estimate is that of the sample before.
     TimeRejected,
 }
 
 impl Health {
+    /// All of them, in their order.
+    pub const ALL: [Self; 10] = [
+        Self::Good,
+        Self::ReadingRefused,
+        Self::ChannelLost,
+        Self::OutsideRange,
+        Self::LimitedToRange,
+        Self::CommandRejected,
+        Self::PressureLimited,
+        Self::SpeedsRejected,
+        Self::Restarted,
+        Self::TimeRejected,
+    ];
+
     /// A word for logs and tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Good => "good",
-            Self::SpeedsRejected => "speeds_rejected",
+            Self::ReadingRefused => "reading_refused",
+            Self::ChannelLost => "channel_lost",
+            Self::OutsideRange => "outside_range",
+            Self::LimitedToRange => "limited_to_range",
             Self::CommandRejected => "command_rejected",
+            Self::PressureLimited => "pressure_limited",
+            Self::SpeedsRejected => "speeds_rejected",
+            Self::Restarted => "restarted",
             Self::TimeRejected => "time_rejected",
         }
     }
 }
 
-/// What an observer knows after one sample.
+/// What became of a channel in one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ChannelHealth {
+    /// Its reading was taken.
+    Good,
+    /// No reading came; the channel goes on as before.
+    Absent,
+    /// Its reading was refused.
+    Refused,
+    /// It has given no usable reading for long.
+    Lost,
+}
+
+impl ChannelHealth {
+    /// A word for logs and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Absent => "absent",
+            Self::Refused => "refused",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// One of something for each channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Channels<V> {
+    /// Engine speed.
+    pub engine: V,
+    /// Turbine speed.
+    pub turbine: V,
+    /// Speed of the gearbox output.
+    pub output: V,
+    /// Speed of the driven wheels.
+    pub wheel: V,
+    /// Command of the oncoming clutch's valve.
+    pub command: V,
+}
+
+impl<V: Copy> Channels<V> {
+    /// The same for every channel.
+    pub fn all(value: V) -> Self {
+        Self { engine: value, turbine: value, output: value, wheel: value, command: value }
+    }
+
+    /// In the order of the fields.
+    pub fn each(&self) -> [V; 5] {
+        [self.engine, self.turbine, self.output, self.wheel, self.command]
+    }
+}
+
+/// Output of an observer after one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate<T> {
     /// Cylinder pressure of the oncoming clutch, Pa.
@@ -95,12 +255,27 @@ pub struct Estimate<T> {
     pub clutch_torque_n_m: T,
     /// Drive-shaft torque, N m, where the observer estimates it.
     pub shaft_torque_n_m: Option<T>,
-    /// Phase of the shift, as the supervisor sees it.
+    /// Phase of the shift according to the supervisor.
     pub phase: Phase,
-    /// Whether the input could be used.
+    /// Whether the input could be used, and whether the estimate can be believed.
     pub health: Health,
+    /// What became of the reading of each channel.
+    pub channels: Channels<ChannelHealth>,
     /// Ranges that hold the truth as long as every error is within its budget, where the observer was given one.
+    /// Guaranteed ranges of pressure and clutch torque and the expected one of the shaft torque, where they are computed.
     pub bounds: Option<Bounds<T>>,
+}
+
+/// An observer: tuning in `&self`, memory in its state, one estimate for each step.
+pub trait Estimator<T> {
+    /// What it remembers from one step to the next.
+    type State;
+
+    /// Its memory before the first step.
+    fn start(&self) -> Self::State;
+
+    /// Takes what came since the step before and returns the estimate for now. Never panics; allocates nothing.
+    fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T>;
 }
 
 impl<T, O: Estimator<T>> Estimator<T> for &O {
@@ -116,14 +291,17 @@ impl<T, O: Estimator<T>> Estimator<T> for &O {
     }
 }
 
-/// An observer: tuning in `&self`, memory in its state, one estimate for each sample.
-pub trait Estimator<T> {
+/// An observer that needs all signals at one time. As an [`Estimator`] it gets them from [`crate::Alignment`].
+pub trait SampleEstimator<T> {
     /// What it remembers from one sample to the next.
-    type State;
+    type SampleState;
+
+    /// Its checks, valve and phase.
+    fn tracker(&self) -> &Tracker<T>;
 
     /// Its memory before the first sample.
-    fn start(&self) -> Self::State;
+    fn start_sample(&self) -> Self::SampleState;
 
     /// Takes one sample and returns the estimate at its time. Never panics; allocates nothing.
-    fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T>;
+    fn step_sample(&self, state: &mut Self::SampleState, sample: &Sample<T>) -> Estimate<T>;
 }

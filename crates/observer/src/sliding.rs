@@ -1,9 +1,9 @@
-//! The full-order sliding-mode observer, held against the others: Eq. (2.55) in the inertia phase, (2.59) in
+//! The full-order sliding-mode observer, for comparison: Eq. (2.55) in the inertia phase, (2.59) in
 //! the torque phase.
 
-use drivetrain::Real;
+use drivetrain::{Real, clutch::direction};
 
-use crate::{Estimate, Estimator, Health, Input, Phase, RigidModel, SpeedModel, Track, Tracker};
+use crate::{Estimate, Health, Phase, RigidModel, Sample, SampleEstimator, SpeedModel, Track, Tracker};
 
 /// Gains of the sliding-mode observer. The pressure gains are negative where the speed falls with the
 /// pressure: in sliding the pressure error decays with `mu R N A (ks3 C13/ks1 + ...)`.
@@ -34,8 +34,8 @@ impl<T: Real> SlidingGains<T> {
 
 /// The sliding-mode observer on the rigid model.
 ///
-/// Carried over a sample by forward Euler, as the chapter did: the sign of the speed error stands still
-/// over the sample, which is where chatter comes from.
+/// Discretised by forward Euler, as in the chapter: the sign of the speed error is constant over the sample,
+/// which causes chatter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlidingObserver<T> {
     /// The powertrain.
@@ -49,7 +49,7 @@ pub struct SlidingObserver<T> {
 /// Memory of a [`SlidingObserver`].
 pub type SlidingState<T> = Track<T, SlidingSample<T>>;
 
-/// The estimated speeds at the last usable sample, their errors' signs, and what the model said there.
+/// The estimated speeds at the last usable sample, their errors' signs, and the model there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlidingSample<T> {
     phase: Phase,
@@ -60,39 +60,45 @@ pub struct SlidingSample<T> {
     model: SpeedModel<T>,
 }
 
-impl<T: Real> Estimator<T> for SlidingObserver<T> {
-    type State = SlidingState<T>;
+impl<T: Real> SampleEstimator<T> for SlidingObserver<T> {
+    type SampleState = SlidingState<T>;
 
-    fn start(&self) -> SlidingState<T> {
+    fn tracker(&self) -> &Tracker<T> {
+        &self.tracker
+    }
+
+    fn start_sample(&self) -> SlidingState<T> {
         Track::new()
     }
 
     #[inline]
-    fn step(&self, state: &mut SlidingState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
+    fn step_sample(&self, state: &mut SlidingState<T>, sample: &Sample<T>) -> Estimate<T> {
+        let Some(interval) = self.tracker.begin(&mut state.tracker, sample) else {
             state.last = None;
             return state.estimate(None, Health::TimeRejected);
         };
         let dt = interval.dt_s;
         let before = state.pressure_pa;
-        state.pressure_pa = interval.pressure(before);
+        let mut after = interval.pressure(before);
         let mut estimated = None;
         if let Some(last) = state.last.filter(|_| interval.short) {
             let (speed, pressure) = self.gains_of(last.phase);
-            state.pressure_pa = state.pressure_pa + dt * (pressure[0] * last.signs[0] + pressure[1] * last.signs[1]);
+            // The pressure moves the speeds the other way with backward slip.
+            let switched = pressure[0] * last.signs[0] + pressure[1] * last.signs[1];
+            after = after + dt * last.model.direction * switched;
             let advanced = |i: usize| {
                 let rate = last.model.free_rad_s2[i] + last.model.per_pressure_rad_s2_pa[i] * before;
                 last.estimated[i] + dt * (rate + speed[i] * last.signs[i])
             };
             estimated = Some((last.phase, [advanced(0), advanced(1)]));
         }
-        state.recover();
+        let settled = state.settle(&self.tracker.limits, after);
         if interval.speeds_valid() {
-            self.observe(state, dt, input, estimated);
+            self.observe(state, dt, sample, estimated);
         } else {
             state.last = None;
         }
-        state.estimate(None, interval.health)
+        state.estimate(None, interval.health.max(settled))
     }
 }
 
@@ -110,18 +116,18 @@ impl<T: Real> SlidingObserver<T> {
     /// Finds the phase and the signs of the speed errors. Where a phase begins, the estimated speeds
     /// begin at the measured ones.
     #[inline]
-    fn observe(&self, state: &mut SlidingState<T>, dt: T, input: &Input<T>, estimated: Option<(Phase, [T; 2])>) {
-        let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
-        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
+    fn observe(&self, state: &mut SlidingState<T>, dt: T, sample: &Sample<T>, estimated: Option<(Phase, [T; 2])>) {
+        let (engine, turbine, slip) = (sample.engine_rad_s, sample.turbine_rad_s, sample.slip_rad_s);
+        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, sample);
         let measured = [turbine, slip];
         state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| {
             let estimated = match estimated {
                 Some((phase, speeds)) if phase == acting && speeds.iter().all(|speed| speed.is_finite()) => speeds,
                 _ => measured,
             };
-            // The friction is taken at the estimated slip, as in Eq. (2.55); in the torque phase the slip
-            // is measured.
-            let slip = if acting == Phase::InertiaPhase { estimated[1] } else { slip };
+            // The friction is taken at the estimated slip, as in Eq. (2.55), but in the direction of the measured one; in
+            // the torque phase the slip is measured.
+            let slip = if acting == Phase::InertiaPhase { direction(slip) * estimated[1].abs() } else { slip };
             let sign = |i: usize| match measured[i] - estimated[i] {
                 error if error > T::zero() => T::one(),
                 error if error < T::zero() => -T::one(),

@@ -1,18 +1,18 @@
 //! Super-twisting observer with implicit discretisation.
 //!
-//! One output, the combination of turbine and slip speed on which the clutch acts most, is followed by
+//! One output, the combination of turbine and slip speed on which the clutch acts most, is estimated by
 //!
 //! ```text
 //! ds^/dt = f + g p^ + k1 |e|^(1/2) sign(e),    dp^/dt = A22 p^ + B2 + k2/g sign(e),    e = s - s^
 //! ```
 //!
-//! (A. Levant 1993). Taken at the end of the sample instead of its start, the sign becomes the solution of a scalar
-//! inclusion with a closed form, and there is nothing left to chatter at any sample time (B. Brogliato, A. Polyakov,
+//! (A. Levant 1993). If the sign is evaluated at the end of the sample instead of its start, it is the solution of a
+//! scalar inclusion with a closed form, and the estimate does not chatter at any sample time (B. Brogliato, A. Polyakov,
 //! D. Efimov, The implicit discretization of the supertwisting sliding-mode control algorithm, IEEE TAC 65 (2020) 3707).
 
 use drivetrain::Real;
 
-use crate::{Estimate, Estimator, Health, Input, Phase, RigidModel, SpeedModel, Track, Tracker};
+use crate::{Estimate, Health, Phase, RigidModel, Sample, SampleEstimator, SpeedModel, Track, Tracker};
 
 /// The observer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,28 +75,32 @@ fn implicit<T: Real>(y: T, a: T, b: T) -> (T, T) {
     (sign * root * root, sign)
 }
 
-impl<T: Real> Estimator<T> for SuperTwisting<T> {
-    type State = SuperTwistingState<T>;
+impl<T: Real> SampleEstimator<T> for SuperTwisting<T> {
+    type SampleState = SuperTwistingState<T>;
 
-    fn start(&self) -> SuperTwistingState<T> {
+    fn tracker(&self) -> &Tracker<T> {
+        &self.tracker
+    }
+
+    fn start_sample(&self) -> SuperTwistingState<T> {
         Track::new()
     }
 
     #[inline]
-    fn step(&self, state: &mut SuperTwistingState<T>, input: &Input<T>) -> Estimate<T> {
-        let Some(interval) = self.tracker.begin(&mut state.tracker, input) else {
+    fn step_sample(&self, state: &mut SuperTwistingState<T>, sample: &Sample<T>) -> Estimate<T> {
+        let Some(interval) = self.tracker.begin(&mut state.tracker, sample) else {
             state.last = None;
             return state.estimate(None, Health::TimeRejected);
         };
         let usable = interval.speeds_valid() && interval.short;
         let integral = interval.pressure_integral(state.pressure_pa);
-        state.pressure_pa = interval.pressure(state.pressure_pa);
+        let mut pressure = interval.pressure(state.pressure_pa);
         let mut estimated = None;
         if let (Some(last), true) = (state.last, usable) {
             let dt = interval.dt_s;
             let [a, b] = last.model.per_pressure_rad_s2_pa;
             let influence = (a * a + b * b).sqrt();
-            let measured = Self::output(&last.model, [input.turbine_rad_s, input.slip_rad_s]);
+            let measured = Self::output(&last.model, [sample.turbine_rad_s, sample.slip_rad_s]);
             let predicted =
                 last.estimated + dt * Self::output(&last.model, last.model.free_rad_s2) + influence * integral;
             let rate = self.error_rate(last.phase);
@@ -104,29 +108,37 @@ impl<T: Real> Estimator<T> for SuperTwisting<T> {
             // e+ = (measured - predicted) - dt k1 |e+|^(1/2) sign(e+) - dt^2 k2 sign(e+)
             let (error, sign) = implicit(measured - predicted, dt * k1, dt * dt * k2);
             if influence > T::zero() {
-                state.pressure_pa = state.pressure_pa + dt * k2 / influence * sign;
+                pressure = pressure + dt * k2 / influence * sign;
             }
-            estimated = Some((last.phase, measured - error));
+            estimated = Some((last, measured - error));
         }
-        state.recover();
+        let settled = state.settle(&self.tracker.limits, pressure);
         if interval.speeds_valid() {
-            self.observe(state, interval.dt_s, input, estimated);
+            self.observe(state, interval.dt_s, sample, estimated);
         } else {
             state.last = None;
         }
-        state.estimate(None, interval.health)
+        state.estimate(None, interval.health.max(settled))
     }
 }
 
 impl<T: Real> SuperTwisting<T> {
     #[inline]
-    fn observe(&self, state: &mut SuperTwistingState<T>, dt: T, input: &Input<T>, estimated: Option<(Phase, T)>) {
-        let (engine, turbine, slip) = (input.engine_rad_s, input.turbine_rad_s, input.slip_rad_s);
-        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, input);
+    fn observe(
+        &self,
+        state: &mut SuperTwistingState<T>,
+        dt: T,
+        sample: &Sample<T>,
+        estimated: Option<(TwistingSample<T>, T)>,
+    ) {
+        let (engine, turbine, slip) = (sample.engine_rad_s, sample.turbine_rad_s, sample.slip_rad_s);
+        let (_, acting) = self.tracker.phase(&mut state.tracker, dt, sample);
         state.last = matches!(acting, Phase::TorquePhase | Phase::InertiaPhase).then(|| {
             let model = self.model.speed_model(acting, engine, turbine, slip);
+            // With the phase or the direction of the slip the output becomes another one.
+            let same = |last: &TwistingSample<T>| last.phase == acting && last.model.direction == model.direction;
             let estimated = match estimated {
-                Some((phase, speed)) if phase == acting && speed.is_finite() => speed,
+                Some((last, speed)) if same(&last) && speed.is_finite() => speed,
                 _ => Self::output(&model, [turbine, slip]),
             };
             TwistingSample { phase: acting, model, estimated }

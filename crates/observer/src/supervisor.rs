@@ -1,4 +1,4 @@
-//! Finds the phase of the shift from what a controller knows: commands and speeds.
+//! Finds the phase of the shift from commands and measured speeds.
 
 use drivetrain::Real;
 
@@ -9,7 +9,7 @@ pub enum Phase {
     BeforeShift,
     /// Load moves from the offgoing to the oncoming clutch; the ratio has not changed.
     TorquePhase,
-    /// Both clutches slip; the turbine is pulled to its new speed.
+    /// Both clutches slip; the turbine changes to its new speed.
     InertiaPhase,
     /// The oncoming clutch is locked.
     AfterShift,
@@ -35,7 +35,7 @@ impl Phase {
 pub struct Supervisor<T> {
     /// Pressure at which the oncoming clutch starts to carry torque, Pa.
     pub kiss_pressure_pa: T,
-    /// Slip of the offgoing clutch beyond which it is taken to have let go, rad/s.
+    /// Slip of the offgoing clutch above which it counts as released, rad/s.
     pub release_slip_rad_s: T,
     /// Slip of the oncoming clutch below which it may have locked, rad/s.
     pub lock_slip_rad_s: T,
@@ -66,8 +66,8 @@ impl<T: Real> Default for SupervisorState<T> {
 }
 
 impl<T: Real> Supervisor<T> {
-    /// Updates the phase after `dt_s`. `valve_pressure_pa` is what the valve model alone makes of the
-    /// command: the phase must not depend on the estimate that depends on it.
+    /// Updates the phase after `dt_s`. `valve_pressure_pa` is the pressure of the valve model alone. The
+    /// phase must not depend on the estimate, because the estimate depends on the phase.
     #[inline]
     pub fn step(
         &self,

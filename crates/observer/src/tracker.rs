@@ -1,8 +1,8 @@
-//! What every observer does alike with a sample: checks, valve, phase.
+//! The part of a step that all observers share: checks, valve, phase.
 
-use drivetrain::{LinearValve, Real, ReducedShift, Valve};
+use drivetrain::{LinearValve, Real, ReducedShift, Valve, ValveStep};
 
-use crate::{Estimate, Health, Input, InputLimits, Phase, Supervisor, SupervisorState};
+use crate::{ChannelHealth, Channels, Estimate, Health, InputLimits, Phase, Sample, Supervisor, SupervisorState};
 
 /// How the frozen dynamics are carried over a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum Discretisation {
     Euler,
 }
 
-/// Checks input, follows the valve model and the phase.
+/// Checks sample, follows the valve model and the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracker<T> {
     /// The oncoming clutch's valve.
@@ -26,8 +26,8 @@ pub struct Tracker<T> {
     pub limits: InputLimits<T>,
     /// How the valve and the pressure are carried over a sample.
     pub discretisation: Discretisation,
-    /// Longest time between two samples over which the speeds may correct the estimate, s: the model is
-    /// frozen over it, and the gains are made for short ones. Over a longer gap the valve model serves alone.
+    /// Longest time between two samples over which the speeds may correct the estimate, s: the model is frozen over
+    /// it, and the gains are made for short ones. Over a longer gap the estimate is from the valve model alone.
     pub sample_max_s: T,
 }
 
@@ -42,20 +42,15 @@ pub struct TrackerState<T> {
     started: bool,
 }
 
-/// The time between two samples, with the valve under the command that was held over it:
-/// `z+ = phi z + psi b2`, and `psi z + gam2 b2` is the integral of `z`.
+/// The time between two samples, with the valve under the command that was held over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval<T> {
     /// Its length, s.
     pub dt_s: T,
-    /// The valve.
-    pub valve: LinearValve<T>,
-    /// `e^(A22 T)`.
-    pub phi: T,
-    /// Integral of `e^(A22 s)`, s.
-    pub psi: T,
-    /// Integral of `psi`, s^2.
-    pub gam2: T,
+    /// The valve over it: `Phi`, `Psi` and what the command adds.
+    pub valve: ValveStep<T>,
+    /// The valve at its start.
+    pub start: LinearValve<T>,
     /// What could be used of the sample at its end.
     pub health: Health,
     /// Whether it is short enough to correct the estimate by the speeds at its ends.
@@ -69,16 +64,34 @@ impl<T: Real> Interval<T> {
         self.health != Health::SpeedsRejected
     }
 
+    /// The pressure that a correction leads to; one of more than all that the supply can give comes from a wrong reading,
+    /// and the speeds are rejected.
+    #[inline]
+    pub(crate) fn corrected(&mut self, predicted_pa: T, correction_pa: T, limits: &InputLimits<T>) -> T {
+        if correction_pa.abs() <= limits.pressure_max_pa {
+            predicted_pa + correction_pa
+        } else {
+            self.health = self.health.max(Health::SpeedsRejected);
+            predicted_pa
+        }
+    }
+
     /// Pressure at its end by the valve model, Pa, Eq. (2.17c).
     #[inline]
     pub fn pressure(&self, pressure_pa: T) -> T {
-        self.phi * pressure_pa + self.psi * self.valve.b2_pa_s
+        self.valve.phi * pressure_pa + self.valve.drift_pa
+    }
+
+    /// Rate of the pressure at its start by the valve model, Pa/s.
+    #[inline]
+    pub fn start_rate(&self, pressure_pa: T) -> T {
+        self.start.a22_per_s * pressure_pa + self.start.b2_pa_s
     }
 
     /// Integral of that pressure over it, Pa s.
     #[inline]
     pub fn pressure_integral(&self, pressure_pa: T) -> T {
-        self.psi * pressure_pa + self.gam2 * self.valve.b2_pa_s
+        self.valve.psi * pressure_pa + self.valve.drift_integral_pa_s
     }
 }
 
@@ -104,22 +117,34 @@ pub struct Track<T, S> {
     pub(crate) pressure_pa: T,
     pub(crate) clutch_torque_n_m: T,
     pub(crate) last: Option<S>,
+    /// Whether the state was lost, so that the next usable sample starts again.
+    pub(crate) lost: bool,
 }
 
 impl<T: Real, S> Track<T, S> {
     /// An empty cylinder before the shift.
     pub(crate) fn new() -> Self {
         let zero = T::zero();
-        Self { tracker: TrackerState::new(), pressure_pa: zero, clutch_torque_n_m: zero, last: None }
+        Self { tracker: TrackerState::new(), pressure_pa: zero, clutch_torque_n_m: zero, last: None, lost: false }
     }
 
-    /// Goes back to the valve model if the estimate is no number any more.
+    /// Takes a pressure as the estimate, as far as the supply can give it. A pressure that is not finite is replaced
+    /// by that of the valve model, and the observer starts again.
     #[inline]
-    pub(crate) fn recover(&mut self) {
-        if !self.pressure_pa.is_finite() {
+    pub(crate) fn settle(&mut self, limits: &InputLimits<T>, pressure_pa: T) -> Health {
+        if !pressure_pa.is_finite() {
             self.pressure_pa = self.tracker.valve_pressure_pa;
             self.last = None;
+            return Health::Restarted;
         }
+        self.pressure_pa = limits.possible_pressure(pressure_pa);
+        if self.pressure_pa == pressure_pa { Health::Good } else { Health::PressureLimited }
+    }
+
+    /// Reports once that the observer starts again, if it lost its state.
+    #[inline]
+    pub(crate) fn restart(&mut self) -> Health {
+        if core::mem::take(&mut self.lost) { Health::Restarted } else { Health::Good }
     }
 
     /// The estimate as it stands.
@@ -131,6 +156,7 @@ impl<T: Real, S> Track<T, S> {
             shaft_torque_n_m,
             phase: self.tracker.supervisor.phase,
             health,
+            channels: Channels::all(ChannelHealth::Good),
             bounds: None,
         }
     }
@@ -139,46 +165,46 @@ impl<T: Real, S> Track<T, S> {
 impl<T: Real> Tracker<T> {
     /// Takes a sample: the interval that it ends, or `None` if its time step cannot be used.
     #[inline]
-    pub fn begin(&self, state: &mut TrackerState<T>, input: &Input<T>) -> Option<Interval<T>> {
-        let dt_s = if state.started { input.dt_s } else { T::zero() };
+    pub fn begin(&self, state: &mut TrackerState<T>, sample: &Sample<T>) -> Option<Interval<T>> {
+        let dt_s = if state.started { sample.dt_s } else { T::zero() };
         if !(dt_s >= T::zero() && dt_s.is_finite()) {
             return None;
         }
         state.started = true;
-        let (speeds_valid, command_valid) = (self.limits.speeds_valid(input), self.limits.command_valid(input));
+        let (speeds_valid, command_valid) =
+            (self.limits.speeds_valid(sample), self.limits.command_valid(sample.command));
         let health = match (speeds_valid, command_valid) {
             (false, _) => Health::SpeedsRejected,
             (true, false) => Health::CommandRejected,
             (true, true) => Health::Good,
         };
-        let interval = self.interval(state.command, dt_s, health);
-        state.valve_pressure_pa = interval.pressure(state.valve_pressure_pa);
+        let interval = self.interval(state, dt_s, health);
+        state.valve_pressure_pa = self.limits.possible_pressure(interval.pressure(state.valve_pressure_pa));
         if command_valid {
-            state.command = input.command;
+            state.command = sample.command;
         }
         Some(interval)
     }
 
     #[inline]
-    fn interval(&self, command: T, dt_s: T, health: Health) -> Interval<T> {
-        let valve = self.valve.linear(command);
-        let a = valve.a22_per_s;
+    fn interval(&self, state: &TrackerState<T>, dt_s: T, health: Health) -> Interval<T> {
+        // A valve that is not linear is linearised along the way of the valve model alone: the error dynamics of an
+        // observer then depend on the command and not on its own estimate.
+        let start = self.valve.linear(state.command, state.valve_pressure_pa);
         let short = dt_s <= self.sample_max_s;
-        let (phi, psi, gam2) = match self.discretisation {
-            Discretisation::Euler if short => (T::one() + a * dt_s, dt_s, T::zero()),
+        let valve = match self.discretisation {
+            Discretisation::Euler if short => start.euler_step(dt_s),
             Discretisation::Exact | Discretisation::Euler => {
-                let phi = (a * dt_s).exp();
-                let psi = (phi - T::one()) / a;
-                (phi, psi, (psi - dt_s) / a)
+                self.valve.step(state.command, state.valve_pressure_pa, dt_s)
             }
         };
-        Interval { dt_s, valve, phi, psi, gam2, health, short }
+        Interval { dt_s, valve, start, health, short }
     }
 
     /// The phase at a sample whose speeds can be used, and the phase whose equations hold there.
     #[inline]
-    pub fn phase(&self, state: &mut TrackerState<T>, dt_s: T, input: &Input<T>) -> (Phase, Phase) {
-        let (turbine, slip) = (input.turbine_rad_s, input.slip_rad_s);
+    pub fn phase(&self, state: &mut TrackerState<T>, dt_s: T, sample: &Sample<T>) -> (Phase, Phase) {
+        let (turbine, slip) = (sample.turbine_rad_s, sample.slip_rad_s);
         let output = self.shift.output_speed(turbine, slip);
         let offgoing_slip = self.shift.offgoing_slip(turbine, output);
         let phase = self.supervisor.step(&mut state.supervisor, dt_s, state.valve_pressure_pa, offgoing_slip, slip);

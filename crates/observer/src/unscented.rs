@@ -1,19 +1,19 @@
-//! Unscented Kalman filter on the states and noises of [`KalmanFilter`].
+//! Unscented Kalman filter on the states and noises of [`ExtendedFilter`].
 //!
-//! It carries points instead of a linearisation, which serves at the kiss point, where the clutch begins to bite and
-//! the torque has a corner (S. Julier, J. Uhlmann, Unscented filtering and nonlinear estimation, Proc. IEEE 92 (2004)
-//! 401). The readings are states, so the correction is the same.
+//! It propagates sigma points instead of a Jacobian. This is an advantage at the kiss point, where the derivative of
+//! the clutch torque is discontinuous (S. Julier, J. Uhlmann, Unscented filtering and nonlinear estimation, Proc.
+//! IEEE 92 (2004) 401). The readings are states, so the correction is the same.
 
 use drivetrain::Real;
 
-use crate::kalman::{N, PRESSURE, Running, Start};
-use crate::{Estimate, Estimator, Input, Interval, KalmanFilter, KalmanState};
+use crate::extended::{N, PRESSURE, Running, Start};
+use crate::{Estimate, ExtendedFilter, ExtendedState, Interval, Sample, SampleEstimator, Tracker};
 
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnscentedFilter<T> {
     /// Powertrain, noises, checks.
-    pub filter: KalmanFilter<T>,
+    pub filter: ExtendedFilter<T>,
 }
 
 impl<T: Real> UnscentedFilter<T> {
@@ -23,16 +23,20 @@ impl<T: Real> UnscentedFilter<T> {
     }
 }
 
-impl<T: Real> Estimator<T> for UnscentedFilter<T> {
-    type State = KalmanState<T>;
+impl<T: Real> SampleEstimator<T> for UnscentedFilter<T> {
+    type SampleState = ExtendedState<T>;
 
-    fn start(&self) -> KalmanState<T> {
-        KalmanState::new()
+    fn tracker(&self) -> &Tracker<T> {
+        &self.filter.tracker
+    }
+
+    fn start_sample(&self) -> ExtendedState<T> {
+        ExtendedState::new()
     }
 
     #[inline]
-    fn step(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Estimate<T> {
-        self.filter.step_by(state, input, predict)
+    fn step_sample(&self, state: &mut ExtendedState<T>, sample: &Sample<T>) -> Estimate<T> {
+        self.filter.step_by(state, sample, predict)
     }
 }
 
@@ -40,12 +44,12 @@ impl<T: Real> Estimator<T> for UnscentedFilter<T> {
 /// no point of its own: then no weight is negative, and the covariance stays one.
 #[inline]
 fn predict<T: Real>(
-    filter: &KalmanFilter<T>,
+    filter: &ExtendedFilter<T>,
     running: &mut Running<T>,
     interval: &Interval<T>,
-    input: &Input<T>,
+    sample: &Sample<T>,
 ) -> Start<T> {
-    let passage = filter.passage(running, interval, input);
+    let passage = filter.passage(running, interval, sample);
     let before = running.mean;
     let axes = square_root(&running.covariance);
     let (mut points, mut mean) = ([[T::zero(); N]; 2 * N], [T::zero(); N]);

@@ -1,12 +1,14 @@
 //! The shift controller: commands for both valves and the throttle, from measured speeds.
 //!
-//! Fill B to its kiss point, move the load from A to B in coordinated ramps, let B track a falling slip
+//! Fill B to its kiss point, by a fast fill if its piston has a stroke, move the load from A to B in coordinated ramps, let B track a falling slip
 //! with less throttle, lock it, and bring it to line pressure. The controller knows the gear train, the
-//! converter and the static characteristic of its valves (a transmission is measured at the end of the
-//! line); it does not know pressures, torques, or the delay and lag of the moment.
+//! converter and the static characteristic of its valves, which is measured at the end of production; it
+//! does not know pressures, torques, or the present delay and lag of the valves.
 
 use config::{ShiftCalibration, ShiftClutch, Vehicle};
 use drivetrain::{Engagement, ShiftCoefficients, ShiftTorques};
+
+use crate::FillPlan;
 
 /// What the controller measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,10 +26,10 @@ pub struct Measured {
 pub struct Commands {
     /// Throttle, 0 to 1.
     pub throttle: f64,
-    /// Current of the offgoing clutch's valve, A.
-    pub offgoing_a: f64,
-    /// Current of the oncoming clutch's valve, A.
-    pub oncoming_a: f64,
+    /// Command of the offgoing clutch's valve: current in A, or duty cycle in %.
+    pub offgoing: f64,
+    /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
+    pub oncoming: f64,
 }
 
 /// Stage of the shift, as the controller runs it.
@@ -61,6 +63,8 @@ pub struct ShiftController {
     vehicle: Vehicle,
     torque_phase: ShiftCoefficients<f64>,
     inertia_phase: ShiftCoefficients<f64>,
+    /// If the piston of the oncoming clutch has a stroke.
+    fill_plan: Option<FillPlan>,
     stage: Stage,
     oncoming_pa: f64,
     throttle_share: f64,
@@ -75,6 +79,8 @@ impl ShiftController {
             calibration,
             torque_phase: rigid.coefficients(Engagement::OffgoingStuck),
             inertia_phase: rigid.coefficients(Engagement::BothSlipping),
+            fill_plan: (vehicle.oncoming.has_stroke)
+                .then(|| FillPlan::new(&vehicle.oncoming, calibration.fast_fill, calibration.control_period_s)),
             vehicle: vehicle.clone(),
             stage: Stage::Before,
             oncoming_pa: 0.0,
@@ -103,12 +109,12 @@ impl ShiftController {
             }
         };
         self.oncoming_pa = oncoming_pa;
-        let current =
-            |clutch: &ShiftClutch, pressure_pa: f64| clutch.valve.current_for(pressure_pa.clamp(0.0, line_pa));
+        let command =
+            |clutch: &ShiftClutch, pressure_pa: f64| clutch.valve.command_for(pressure_pa.clamp(0.0, line_pa));
         Commands {
             throttle: driver_throttle * self.throttle_share(measured),
-            offgoing_a: current(&self.vehicle.offgoing, offgoing_pa),
-            oncoming_a: current(&self.vehicle.oncoming, oncoming_pa),
+            offgoing: command(&self.vehicle.offgoing, offgoing_pa),
+            oncoming: command(&self.vehicle.oncoming, oncoming_pa),
         }
     }
 
@@ -117,11 +123,12 @@ impl ShiftController {
         let (turbine, output) = (measured.turbine_rad_s, measured.output_rad_s);
         let oncoming_slip = self.vehicle.shift.oncoming_slip(turbine, output);
         let offgoing_slip = self.vehicle.shift.offgoing_slip(turbine, output);
+        let fill_s = self.fill_plan.map_or(c.boost_s + c.settle_s, |plan| plan.duration_s());
         // Times are sums of periods; a rounding error must not cost a whole one.
         let passed = |since_s: f64, duration_s: f64| time_s - since_s >= duration_s - 1e-9;
         self.stage = match self.stage {
             Stage::Before if passed(0.0, c.request_s) => Stage::Fill(time_s),
-            Stage::Fill(since_s) if passed(since_s, c.boost_s + c.settle_s) => Stage::TorquePhase(time_s),
+            Stage::Fill(since_s) if passed(since_s, fill_s) => Stage::TorquePhase(time_s),
             Stage::TorquePhase(_) if offgoing_slip.abs() > c.release_slip_rad_s => Stage::InertiaPhase {
                 since_s: time_s,
                 from_rad_s: oncoming_slip,
@@ -154,10 +161,10 @@ impl ShiftController {
     /// Pressures in the fill stage (offgoing, oncoming), Pa.
     fn fill(&self, elapsed_s: f64, known: &ShiftTorques<f64>) -> (f64, f64) {
         let c = &self.calibration;
-        let oncoming = if elapsed_s < c.boost_s - 1e-9 {
-            c.boost_pressure_pa
-        } else {
-            self.vehicle.oncoming.clutch.kiss_pressure()
+        let oncoming = match &self.fill_plan {
+            Some(plan) => plan.pressure(elapsed_s),
+            None if elapsed_s < c.boost_s - 1e-9 => c.boost_pressure_pa,
+            None => self.vehicle.oncoming.clutch.kiss_pressure(),
         };
         (self.holding_pressure(known, 0.0, c.fill_holding_margin), oncoming)
     }
@@ -177,7 +184,7 @@ impl ShiftController {
         let led = |clutch: &ShiftClutch, pressure: &dyn Fn(f64) -> f64| {
             let ahead = share + c.control_period_s / c.torque_phase_s;
             let rate = (pressure(ahead) - pressure(share)) / c.control_period_s;
-            pressure(share) + clutch.valve.time_constant_s.at(pressure(share)) * rate
+            pressure(share) + clutch.valve.lag(pressure(share), rate) * rate
         };
         (led(&v.offgoing, &offgoing_at), led(&v.oncoming, &oncoming_at))
     }
@@ -200,12 +207,13 @@ impl ShiftController {
         let feedforward_n_m = (rate - row.at(known)) / row.per_oncoming_torque;
         // The feedforward is led by the lag of the valve: the turbine torque rises fast when the throttle returns.
         let rate = (feedforward_n_m - before.replace(feedforward_n_m).unwrap_or(feedforward_n_m)) / c.control_period_s;
-        let lag_s = self.vehicle.oncoming.valve.time_constant_s.at(self.oncoming_pa);
+        let ShiftClutch { clutch, valve, .. } = &self.vehicle.oncoming;
+        let lag_s = valve.lag(self.oncoming_pa, rate / (clutch.torque_per_force(slip) * clutch.piston_area_m2));
         let torque_n_m = feedforward_n_m
             + lag_s * rate
             + c.proportional_n_m_s_rad * error
             + c.integral_n_m_rad * *error_integral_rad;
-        self.vehicle.oncoming.clutch.pressure_for(torque_n_m.max(0.0), slip)
+        clutch.pressure_for(torque_n_m.max(0.0), slip)
     }
 
     /// Share of the driver's throttle: reduced in the inertia phase, back before lock-up.

@@ -1,30 +1,30 @@
-//! Transport delay of a valve: commands arrive late, and never overtake one another.
+//! Transport delay of a valve, `L_cv` of Eq. (2.4): commands arrive after a delay, always in their order.
 
 use std::collections::VecDeque;
 
 /// Commands on their way to a valve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayLine {
-    arrived_a: f64,
+    arrived: f64,
     under_way: VecDeque<(f64, f64)>,
 }
 
 impl DelayLine {
-    /// A line on which this current has stood for ever.
-    pub fn new(current_a: f64) -> Self {
-        Self { arrived_a: current_a, under_way: VecDeque::new() }
+    /// A line on which this command has stood for ever.
+    pub fn new(command: f64) -> Self {
+        Self { arrived: command, under_way: VecDeque::new() }
     }
 
-    /// Sends a current at `now_s` that arrives `delay_s` later, but not before those sent earlier.
-    pub fn send(&mut self, now_s: f64, delay_s: f64, current_a: f64) {
-        let newest = self.under_way.back().map_or(self.arrived_a, |&(_, current)| current);
-        // An unchanged current arrives nowhere new; this spares the integrator a stop.
+    /// Sends a command at `now_s` that arrives `delay_s` later, but not before those sent earlier.
+    pub fn send(&mut self, now_s: f64, delay_s: f64, command: f64) {
+        let newest = self.under_way.back().map_or(self.arrived, |&(_, command)| command);
+        // An unchanged command arrives nowhere new; this spares the integrator a stop.
         #[expect(clippy::float_cmp, reason = "only the very same command may be left out")]
-        if newest == current_a {
+        if newest == command {
             return;
         }
         let after = self.under_way.back().map_or(now_s, |&(arrival, _)| arrival);
-        self.under_way.push_back((after.max(now_s + delay_s), current_a));
+        self.under_way.push_back((after.max(now_s + delay_s), command));
     }
 
     /// Time of the next arrival, s.
@@ -32,16 +32,16 @@ impl DelayLine {
         self.under_way.front().map(|&(arrival, _)| arrival)
     }
 
-    /// Current that has arrived by `now_s`, A.
+    /// Command that has arrived by `now_s`.
     pub fn arrive(&mut self, now_s: f64) -> f64 {
-        while let Some(&(arrival, current)) = self.under_way.front() {
+        while let Some(&(arrival, command)) = self.under_way.front() {
             if arrival > now_s {
                 break;
             }
-            self.arrived_a = current;
+            self.arrived = command;
             self.under_way.pop_front();
         }
-        self.arrived_a
+        self.arrived
     }
 }
 

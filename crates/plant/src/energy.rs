@@ -1,4 +1,7 @@
-//! Where the power goes: the plant's energy audit.
+//! Energy audit of the plant.
+
+use config::Vehicle;
+use drivetrain::Driveline;
 
 use crate::{Inputs, Mode, Powertrain, State};
 
@@ -30,7 +33,10 @@ impl PowerBalance {
                 ("converter", t.pump_n_m * x.engine_rad_s - t.shift.turbine_n_m * x.turbine_rad_s),
                 ("offgoing clutch", t.shift.offgoing_n_m * v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s)),
                 ("oncoming clutch", t.shift.oncoming_n_m * v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s)),
-                ("shaft damping", v.driveline.shaft_damping_n_m_s_rad * twist_rate * twist_rate),
+                (
+                    "shaft damping",
+                    (t.shaft_n_m - v.driveline.shaft_stiffness_n_m_rad * spring_twist(v, x)) * twist_rate,
+                ),
                 ("tyre slip", t.tyre_n * (rim - x.vehicle_m_s)),
                 ("rolling", v.road.rolling_moment(x.wheel_rad_s) * x.wheel_rad_s),
                 ("air", v.road.drag_force(x.vehicle_m_s) * x.vehicle_m_s),
@@ -46,7 +52,12 @@ pub fn stored_energy(powertrain: &Powertrain, x: &State) -> f64 {
     let half = |coefficient: f64, value: f64| 0.5 * coefficient * value * value;
     half(v.engine.inertia_kg_m2, x.engine_rad_s)
         + v.shift.kinetic_energy(x.turbine_rad_s, x.output_rad_s)
-        + half(v.driveline.shaft_stiffness_n_m_rad, x.twist_rad)
+        + half(v.driveline.shaft_stiffness_n_m_rad, spring_twist(v, x))
         + half(v.driveline.wheel_inertia_kg_m2, x.wheel_rad_s)
         + half(v.road.mass_kg, x.vehicle_m_s)
+}
+
+/// Twist of the springs of the shafts, rad: none in the backlash.
+fn spring_twist(vehicle: &Vehicle, x: &State) -> f64 {
+    Driveline::spring_twist(x.twist_rad, vehicle.backlash_rad).unwrap_or(0.0)
 }

@@ -1,7 +1,7 @@
 //! The hybrid integrator: smooth steps within a mode, events between modes.
 
 use crate::rosenbrock::{self, Tolerance, Trial};
-use crate::state::{STATES, State};
+use crate::state::{STATES, STATES_WITH_STROKE, State};
 use crate::{Contact, Direction, Inputs, Mode, Powertrain, Torques};
 
 /// Relative tolerance of the integration, against the size of each state.
@@ -30,14 +30,14 @@ pub enum PlantError {
         time_s: f64,
     },
     /// The clutches found no consistent mode.
-    #[error("the clutches change between sticking and slipping without end at {time_s:.4} s")]
+    #[error("the clutches change endlessly between sticking and slipping at {time_s:.4} s")]
     Chatter {
         /// When.
         time_s: f64,
     },
 }
 
-/// One accepted step, for whoever records the run.
+/// One accepted step, for recording.
 #[derive(Debug)]
 pub struct Segment<'a> {
     /// Time at the start, s.
@@ -48,14 +48,26 @@ pub struct Segment<'a> {
     pub mode: Mode,
     /// The inputs throughout.
     pub inputs: &'a Inputs,
-    trial: &'a Trial<STATES, Torques>,
+    trial: &'a dyn DenseOutput,
+}
+
+/// The state anywhere within a step.
+trait DenseOutput: std::fmt::Debug {
+    /// State at this fraction of the step.
+    fn state_at(&self, theta: f64) -> State;
+}
+
+impl<const N: usize> DenseOutput for Trial<N, Torques> {
+    fn state_at(&self, theta: f64) -> State {
+        State::from_array(self.at(theta))
+    }
 }
 
 impl Segment<'_> {
     /// State at a time within the step.
     pub fn at(&self, time_s: f64) -> State {
         let length = self.end_s - self.start_s;
-        State::from_array(self.trial.at((time_s - self.start_s) / length))
+        self.trial.state_at((time_s - self.start_s) / length)
     }
 }
 
@@ -69,22 +81,27 @@ pub struct HybridIntegrator {
     /// Discrete state.
     pub mode: Mode,
     step_s: f64,
-    tolerance: Tolerance<STATES>,
+    relative_tolerance: f64,
     /// What the last step found at its end, where that still holds.
-    known: Option<(Inputs, Rates)>,
+    known: Option<(Inputs, Rates<STATES_WITH_STROKE>)>,
 }
 
 /// The right-hand side at one state.
 #[derive(Debug, Clone, Copy)]
-struct Rates {
-    slope: [f64; STATES],
+struct Rates<const N: usize> {
+    slope: [f64; N],
     applied: Torques,
 }
 
-impl Rates {
+impl<const N: usize> Rates<N> {
     fn of(powertrain: &Powertrain, mode: Mode, state: &State, inputs: &Inputs) -> Self {
-        let (slope, applied) = powertrain.derivative_with_torques(mode, &state.to_array(), inputs);
+        let (slope, applied) = powertrain.derivative_with_torques(mode, &state.to_vector(), inputs);
         Self { slope, applied }
+    }
+
+    /// The same rates of more or fewer states.
+    fn resized<const M: usize>(&self) -> Rates<M> {
+        Rates { slope: State::from_array(self.slope).to_vector(), applied: self.applied }
     }
 }
 
@@ -116,7 +133,7 @@ impl HybridIntegrator {
             state,
             mode: Mode { offgoing, oncoming },
             step_s: 1e-4,
-            tolerance: Tolerance { relative, scale: State::SCALE },
+            relative_tolerance: relative,
             known: None,
         };
         for (clutch, slip) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(slips) {
@@ -139,34 +156,38 @@ impl HybridIntegrator {
         until_s: f64,
         record: &mut impl FnMut(&Segment<'_>),
     ) -> Result<(), PlantError> {
+        // The oil in the cylinders is integrated only where it matters.
+        if powertrain.has_stroke() {
+            self.advance_states::<STATES_WITH_STROKE, 3>(powertrain, inputs, until_s, record)
+        } else {
+            self.advance_states::<STATES, 1>(powertrain, inputs, until_s, record)
+        }
+    }
+
+    /// As [`Self::advance`], for the first `N` states with this number of stiff rows.
+    fn advance_states<const N: usize, const ROWS: usize>(
+        &mut self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        until_s: f64,
+        record: &mut impl FnMut(&Segment<'_>),
+    ) -> Result<(), PlantError> {
         // New inputs change pressures and speeds only by and by: the mode is still the right one.
-        let mut rates = match self.known.take() {
-            Some((same, rates)) if same == *inputs => rates,
+        let mut rates: Rates<N> = match self.known.take() {
+            Some((same, rates)) if same == *inputs => rates.resized(),
             _ => Rates::of(powertrain, self.mode, &self.state, inputs),
         };
         let mut changes = 0;
         while until_s - self.time_s > EVENT_TIME_S {
-            let (step_s, trial) = self.accepted_step(powertrain, inputs, &rates, until_s)?;
+            let (step_s, trial) = self.accepted_step::<N, ROWS>(powertrain, inputs, &rates, until_s)?;
             let Some(theta) = self.first_event(powertrain, inputs, &trial) else {
                 self.take(&trial, self.time_s + step_s, inputs, record);
                 rates = Rates { slope: trial.end_slope, applied: trial.end_applied };
                 changes = 0;
                 continue;
             };
-            // Step anew to the event, so that its state has the accuracy of a step and not of the interpolant.
-            let mode = self.mode;
-            let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
-            let at_end = |x: &[f64; STATES]| powertrain.derivative_with_torques(mode, x, inputs);
-            let row = powertrain.stiff_row(&self.state, rates.applied.tyre_n);
-            let to_event = rosenbrock::step(
-                &f,
-                &at_end,
-                &self.state.to_array(),
-                &rates.slope,
-                &row,
-                theta * step_s,
-                &self.tolerance,
-            );
+            // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
+            let to_event = self.trial::<N, ROWS>(powertrain, inputs, &rates, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(PlantError::Chatter { time_s: self.time_s });
@@ -176,13 +197,13 @@ impl HybridIntegrator {
             rates = Rates::of(powertrain, self.mode, &self.state, inputs);
         }
         self.time_s = until_s;
-        self.known = Some((*inputs, rates));
+        self.known = Some((*inputs, rates.resized()));
         Ok(())
     }
 
-    fn take(
+    fn take<const N: usize>(
         &mut self,
-        trial: &Trial<STATES, Torques>,
+        trial: &Trial<N, Torques>,
         end_s: f64,
         inputs: &Inputs,
         record: &mut impl FnMut(&Segment<'_>),
@@ -192,24 +213,37 @@ impl HybridIntegrator {
         self.state = State::from_array(trial.end);
     }
 
+    /// Tries a step of this length.
+    #[inline]
+    fn trial<const N: usize, const ROWS: usize>(
+        &self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        rates: &Rates<N>,
+        step_s: f64,
+    ) -> Trial<N, Torques> {
+        let mode = self.mode;
+        let f = |x: &[f64; N]| powertrain.derivative_with_torques(mode, x, inputs).0;
+        let at_end = |x: &[f64; N]| powertrain.derivative_with_torques(mode, x, inputs);
+        let rows: [_; ROWS] = powertrain.stiff_rows(&self.state, rates.applied.tyre_n);
+        let tolerance = Tolerance { relative: self.relative_tolerance, scale: State::SCALE.to_vector() };
+        rosenbrock::step(&f, &at_end, &self.state.to_vector(), &rates.slope, &rows, step_s, &tolerance)
+    }
+
     /// Finds a step length whose error is small enough; returns it with its trial.
     #[inline]
-    fn accepted_step(
+    fn accepted_step<const N: usize, const ROWS: usize>(
         &mut self,
         powertrain: &Powertrain,
         inputs: &Inputs,
-        rates: &Rates,
+        rates: &Rates<N>,
         until_s: f64,
-    ) -> Result<(f64, Trial<STATES, Torques>), PlantError> {
-        let mode = self.mode;
-        let f = |x: &[f64; STATES]| powertrain.derivative(mode, x, inputs);
-        let at_end = |x: &[f64; STATES]| powertrain.derivative_with_torques(mode, x, inputs);
-        let (x, row) = (self.state.to_array(), powertrain.stiff_row(&self.state, rates.applied.tyre_n));
+    ) -> Result<(f64, Trial<N, Torques>), PlantError> {
         loop {
             let rest = until_s - self.time_s;
             // Stretch a little rather than leave a sliver for the next step.
             let step_s = if self.step_s > 0.9 * rest { rest } else { self.step_s };
-            let trial = rosenbrock::step(&f, &at_end, &x, &rates.slope, &row, step_s, &self.tolerance);
+            let trial = self.trial::<N, ROWS>(powertrain, inputs, rates, step_s);
             let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
             if trial.error <= 1.0 {
                 // A step cut short by the end of the segment says nothing against the usual length.
@@ -225,12 +259,17 @@ impl HybridIntegrator {
     }
 
     /// Margins of offgoing and oncoming clutch, with the slack.
-    fn margins(&self, powertrain: &Powertrain, inputs: &Inputs, x: [f64; STATES]) -> [f64; 2] {
-        powertrain.margins(self.mode, &State::from_array(x), inputs).map(|margin| margin + MARGIN_SLACK)
+    fn margins(&self, powertrain: &Powertrain, inputs: &Inputs, x: &State) -> [f64; 2] {
+        powertrain.margins(self.mode, x, inputs).map(|margin| margin + MARGIN_SLACK)
     }
 
     /// Fraction of the step at which the first margin reaches zero, located on the dense output.
-    fn first_event(&self, powertrain: &Powertrain, inputs: &Inputs, trial: &Trial<STATES, Torques>) -> Option<f64> {
+    fn first_event<const N: usize>(
+        &self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        trial: &Trial<N, Torques>,
+    ) -> Option<f64> {
         let slack = |margin: f64| margin + MARGIN_SLACK;
         let end = State::from_array(trial.end);
         let at_end = powertrain.margins_under(self.mode, &end, &trial.end_applied).map(slack);
@@ -239,7 +278,7 @@ impl HybridIntegrator {
         }
         (0..2)
             .filter(|&i| at_end[i] < 0.0)
-            .map(|i| root(|theta| self.margins(powertrain, inputs, trial.at(theta))[i]))
+            .map(|i| root(|theta| self.margins(powertrain, inputs, &trial.state_at(theta))[i]))
             .min_by(f64::total_cmp)
     }
 
@@ -247,7 +286,7 @@ impl HybridIntegrator {
     fn change_mode(&mut self, powertrain: &Powertrain, inputs: &Inputs) -> Result<(), PlantError> {
         // The margin at the event is zero up to the accuracy of locating it.
         const AT_EVENT: f64 = 1e-6;
-        let margins = self.margins(powertrain, inputs, self.state.to_array());
+        let margins = self.margins(powertrain, inputs, &self.state);
         for (clutch, margin) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(margins) {
             if margin > AT_EVENT {
                 continue;
@@ -319,9 +358,10 @@ impl HybridIntegrator {
     }
 
     fn capacity(&self, powertrain: &Powertrain, clutch: ClutchId) -> f64 {
+        let [offgoing_pa, oncoming_pa] = powertrain.pressures(&self.state);
         match clutch {
-            ClutchId::Offgoing => powertrain.vehicle.offgoing.clutch.static_capacity(self.state.offgoing_pa),
-            ClutchId::Oncoming => powertrain.vehicle.oncoming.clutch.static_capacity(self.state.oncoming_pa),
+            ClutchId::Offgoing => powertrain.vehicle.offgoing.clutch.static_capacity(offgoing_pa),
+            ClutchId::Oncoming => powertrain.vehicle.oncoming.clutch.static_capacity(oncoming_pa),
         }
     }
 

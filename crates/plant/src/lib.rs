@@ -1,9 +1,9 @@
-//! The truth: a hybrid simulation of the whole powertrain through launch and shift.
+//! The simulated car: a hybrid simulation of the whole powertrain during launch and shift.
 //!
 //! Engine, converter, gear train with two shift clutches, drive shafts, tyres, vehicle and two valves
-//! make eight states. Clutches stick and slip as events: within a mode the equations are smooth, a mode
-//! ends where a slip reaches zero or a holding torque its limit, and that instant is located on the dense
-//! output of the integrator. Friction is never regularised.
+//! have eight states; where the pistons have a stroke, the oil in the two cylinders is added. Sticking and slipping of the clutches are modes. Within a mode the equations are smooth; a mode
+//! ends where a slip reaches zero or a holding torque reaches its limit. This instant is located on the dense
+//! output of the integrator. Friction is not regularised.
 //!
 //! ```
 //! use config::{Experiment, Vehicle};
@@ -20,6 +20,7 @@
 pub mod controller;
 pub mod delay;
 pub mod energy;
+pub mod fast_fill;
 pub mod hybrid;
 pub mod mode;
 pub mod powertrain;
@@ -30,6 +31,7 @@ pub mod state;
 
 pub use controller::{Commands, Measured, ShiftController, Stage};
 pub use energy::{PowerBalance, stored_energy};
+pub use fast_fill::FillPlan;
 pub use hybrid::{HybridIntegrator, PlantError, Segment};
 pub use mode::{Contact, Direction, Mode};
 pub use powertrain::{Inputs, Powertrain, Torques};

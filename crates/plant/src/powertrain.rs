@@ -1,10 +1,11 @@
 //! The equations of the powertrain, smooth within a mode.
 
-use config::Vehicle;
-use drivetrain::{Clutch, Engagement, ShiftCoefficients, ShiftTorques};
+use config::{ShiftClutch, Vehicle};
+use drivetrain::clutch::drag_torque;
+use drivetrain::{Clutch, Driveline, Engagement, ShiftCoefficients, ShiftTorques};
 
 use crate::rosenbrock::StiffRow;
-use crate::state::{STATES, State, WHEEL};
+use crate::state::{CYLINDERS, STATES, State, WHEEL};
 use crate::{Contact, Direction, Mode};
 
 /// What acts on the plant from outside, constant over a segment of the integration.
@@ -12,19 +13,19 @@ use crate::{Contact, Direction, Mode};
 pub struct Inputs {
     /// Throttle, 0 closed to 1 open.
     pub throttle: f64,
-    /// Pressure at which the current that has arrived at the offgoing clutch's valve settles, Pa.
+    /// Pressure at which the command that has arrived at the offgoing clutch's valve settles, Pa, its hysteresis included.
     pub offgoing_settled_pa: f64,
-    /// Pressure at which the current that has arrived at the oncoming clutch's valve settles, Pa.
+    /// Pressure at which the command that has arrived at the oncoming clutch's valve settles, Pa, its hysteresis included.
     pub oncoming_settled_pa: f64,
 }
 
 impl Inputs {
-    /// The inputs when these currents, A, have arrived at the valves of this vehicle.
-    pub fn arrived(vehicle: &Vehicle, throttle: f64, offgoing_a: f64, oncoming_a: f64) -> Self {
+    /// The inputs when these commands have arrived at the valves of this vehicle, without hysteresis.
+    pub fn arrived(vehicle: &Vehicle, throttle: f64, offgoing: f64, oncoming: f64) -> Self {
         Self {
             throttle,
-            offgoing_settled_pa: vehicle.offgoing.valve.settled_pressure(offgoing_a),
-            oncoming_settled_pa: vehicle.oncoming.valve.settled_pressure(oncoming_a),
+            offgoing_settled_pa: vehicle.offgoing.valve.settled_pressure(offgoing),
+            oncoming_settled_pa: vehicle.oncoming.valve.settled_pressure(oncoming),
         }
     }
 }
@@ -80,6 +81,24 @@ impl Powertrain {
         }
     }
 
+    /// Whether a piston has a stroke, so that the oil in the cylinders is part of the state.
+    #[inline]
+    pub fn has_stroke(&self) -> bool {
+        self.vehicle.offgoing.has_stroke || self.vehicle.oncoming.has_stroke
+    }
+
+    /// Pressures in the cylinders of the offgoing and the oncoming clutch, Pa.
+    #[inline]
+    pub fn pressures(&self, x: &State) -> [f64; 2] {
+        let of = |clutch: &ShiftClutch, valve_pa: f64, volume_m3: f64| {
+            if clutch.has_stroke { clutch.cylinder.pressure(volume_m3) } else { valve_pa }
+        };
+        [
+            of(&self.vehicle.offgoing, x.offgoing_valve_pa, x.offgoing_m3),
+            of(&self.vehicle.oncoming, x.oncoming_valve_pa, x.oncoming_m3),
+        ]
+    }
+
     /// Every torque at this state.
     #[inline]
     pub fn torques(&self, mode: Mode, x: &State, inputs: &Inputs) -> Torques {
@@ -107,11 +126,15 @@ impl Powertrain {
         let v = &self.vehicle;
         let converter = v.converter.torques(x.engine_rad_s, x.turbine_rad_s);
         let twist_rate = v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s);
-        let shaft_n_m = v.driveline.shaft_torque(x.twist_rad, twist_rate);
-        let friction = |contact: Contact, clutch: &Clutch<f64>, pressure_pa: f64, slip: f64| match contact {
+        let shaft_n_m = v.driveline.shaft_torque_with_backlash(x.twist_rad, twist_rate, v.backlash_rad);
+        let friction = |contact: Contact, clutch: &ShiftClutch, pressure_pa: f64, slip: f64| match contact {
             Contact::Stuck => 0.0,
-            Contact::Slipping(direction) => direction.sign() * clutch.torque_capacity(pressure_pa, slip),
+            Contact::Slipping(direction) => {
+                let torque_n_m = direction.sign() * clutch.clutch.torque_capacity(pressure_pa, slip);
+                if clutch.drag_n_m > 0.0 { torque_n_m + drag_torque(clutch.drag_n_m, slip) } else { torque_n_m }
+            }
         };
+        let [offgoing_pa, oncoming_pa] = self.pressures(x);
         let offgoing_slip = v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s);
         let oncoming_slip = v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s);
         Torques {
@@ -119,8 +142,8 @@ impl Powertrain {
             pump_n_m: converter.pump_n_m,
             shift: ShiftTorques {
                 turbine_n_m: converter.turbine_n_m,
-                offgoing_n_m: friction(mode.offgoing, &v.offgoing.clutch, x.offgoing_pa, offgoing_slip),
-                oncoming_n_m: friction(mode.oncoming, &v.oncoming.clutch, x.oncoming_pa, oncoming_slip),
+                offgoing_n_m: friction(mode.offgoing, &v.offgoing, offgoing_pa, offgoing_slip),
+                oncoming_n_m: friction(mode.oncoming, &v.oncoming, oncoming_pa, oncoming_slip),
                 output_n_m: shaft_n_m / v.driveline.final_ratio,
             },
             shaft_n_m,
@@ -128,7 +151,7 @@ impl Powertrain {
         }
     }
 
-    /// Time derivative of the state.
+    /// Time derivative of the state of a car whose pistons have no stroke.
     #[inline]
     pub fn derivative(&self, mode: Mode, x: &[f64; STATES], inputs: &Inputs) -> [f64; STATES] {
         self.derivative_with_torques(mode, x, inputs).0
@@ -136,12 +159,12 @@ impl Powertrain {
 
     /// Time derivative of the state, and the torques that make it but for the holding torques.
     #[inline]
-    pub(crate) fn derivative_with_torques(
+    pub(crate) fn derivative_with_torques<const N: usize>(
         &self,
         mode: Mode,
-        x: &[f64; STATES],
+        x: &[f64; N],
         inputs: &Inputs,
-    ) -> ([f64; STATES], Torques) {
+    ) -> ([f64; N], Torques) {
         let x = State::from_array(*x);
         let v = &self.vehicle;
         let torques = self.applied_torques(mode, &x, inputs);
@@ -153,29 +176,56 @@ impl Powertrain {
             twist_rad: v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s),
             wheel_rad_s: self.wheel_acceleration(&x, &torques),
             vehicle_m_s: self.vehicle_acceleration(&x, &torques),
-            offgoing_pa: v.offgoing.valve.pressure_rate(x.offgoing_pa, inputs.offgoing_settled_pa),
-            oncoming_pa: v.oncoming.valve.pressure_rate(x.oncoming_pa, inputs.oncoming_settled_pa),
+            offgoing_valve_pa: v.offgoing.valve.pressure_rate(x.offgoing_valve_pa, inputs.offgoing_settled_pa),
+            oncoming_valve_pa: v.oncoming.valve.pressure_rate(x.oncoming_valve_pa, inputs.oncoming_settled_pa),
+            offgoing_m3: volume_rate(&v.offgoing, x.offgoing_m3, x.offgoing_valve_pa),
+            oncoming_m3: volume_rate(&v.oncoming, x.oncoming_m3, x.oncoming_valve_pa),
         };
-        (rates.to_array(), torques)
+        (rates.to_vector(), torques)
     }
 
-    /// The wheel's equation by wheel, vehicle, output and twist: the one row that the tyre makes stiff. `tyre_n`
+    /// The equations that are stiff: that of the wheel, and with a stroke those of the oil in the cylinders, as many as
+    /// are asked for. `tyre_n` is the tyre's force at this state.
+    #[inline]
+    pub(crate) fn stiff_rows<const N: usize, const ROWS: usize>(&self, x: &State, tyre_n: f64) -> [StiffRow<N>; ROWS] {
+        let v = &self.vehicle;
+        std::array::from_fn(|row| match row {
+            0 => StiffRow { state: WHEEL, gradient: self.wheel_gradient(x, tyre_n).to_vector() },
+            1 => {
+                let (own, valve) = volume_rate_slopes(&v.offgoing, x.offgoing_m3, x.offgoing_valve_pa);
+                let gradient = State { offgoing_m3: own, offgoing_valve_pa: valve, ..State::ZERO };
+                StiffRow { state: CYLINDERS[0], gradient: gradient.to_vector() }
+            }
+            _ => {
+                let (own, valve) = volume_rate_slopes(&v.oncoming, x.oncoming_m3, x.oncoming_valve_pa);
+                let gradient = State { oncoming_m3: own, oncoming_valve_pa: valve, ..State::ZERO };
+                StiffRow { state: CYLINDERS[1], gradient: gradient.to_vector() }
+            }
+        })
+    }
+
+    /// The wheel's equation by wheel, vehicle, output and twist: the row that the tyre makes stiff. `tyre_n`
     /// is the tyre's force at this state.
     pub fn stiff_row(&self, x: &State, tyre_n: f64) -> StiffRow<STATES> {
+        StiffRow { state: WHEEL, gradient: self.wheel_gradient(x, tyre_n).to_array() }
+    }
+
+    #[inline]
+    fn wheel_gradient(&self, x: &State, tyre_n: f64) -> State {
         let (road, line) = (&self.vehicle.road, &self.vehicle.driveline);
         let radius = road.wheel_radius_m;
         let grip = self.vehicle.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s, tyre_n);
-        let gradient = State {
-            wheel_rad_s: -(radius * radius * grip + line.shaft_damping_n_m_s_rad),
-            vehicle_m_s: radius * grip,
-            output_rad_s: line.shaft_damping_n_m_s_rad / line.final_ratio,
-            twist_rad: line.shaft_stiffness_n_m_rad,
-            engine_rad_s: 0.0,
-            turbine_rad_s: 0.0,
-            offgoing_pa: 0.0,
-            oncoming_pa: 0.0,
-        };
-        StiffRow { state: WHEEL, gradient: gradient.to_array().map(|torque| torque / line.wheel_inertia_kg_m2) }
+        let in_gap = Driveline::spring_twist(x.twist_rad, self.vehicle.backlash_rad).is_none();
+        let (damping, stiffness) =
+            if in_gap { (0.0, 0.0) } else { (line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad) };
+        let by_inertia = |torque: f64| torque / line.wheel_inertia_kg_m2;
+        State {
+            wheel_rad_s: by_inertia(-(radius * radius * grip + damping)),
+            vehicle_m_s: by_inertia(radius * grip),
+            output_rad_s: by_inertia(damping / line.final_ratio),
+            twist_rad: by_inertia(stiffness),
+            ..State::ZERO
+        }
     }
 
     /// `I_w dw_w/dt = T_s - T_w - R_w F_x`, rad/s^2.
@@ -210,13 +260,26 @@ impl Powertrain {
             v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s),
         ];
         let torques = self.with_holding_torques(mode, applied).shift;
+        let [offgoing_pa, oncoming_pa] = self.pressures(x);
         let margin = |contact, slip: f64, clutch: &Clutch<f64>, pressure_pa: f64, holding: f64| match contact {
             Contact::Slipping(direction) => Direction::sign(direction) * slip,
             Contact::Stuck => clutch.static_capacity(pressure_pa) - holding.abs(),
         };
         [
-            margin(mode.offgoing, slips[0], &v.offgoing.clutch, x.offgoing_pa, torques.offgoing_n_m),
-            margin(mode.oncoming, slips[1], &v.oncoming.clutch, x.oncoming_pa, torques.oncoming_n_m),
+            margin(mode.offgoing, slips[0], &v.offgoing.clutch, offgoing_pa, torques.offgoing_n_m),
+            margin(mode.oncoming, slips[1], &v.oncoming.clutch, oncoming_pa, torques.oncoming_n_m),
         ]
     }
+}
+
+/// Rate of the oil in a clutch's cylinder, m^3/s; zero without a stroke.
+#[inline]
+fn volume_rate(clutch: &ShiftClutch, volume_m3: f64, valve_pa: f64) -> f64 {
+    if clutch.has_stroke { clutch.cylinder.volume_rate(volume_m3, valve_pa) } else { 0.0 }
+}
+
+/// Derivatives of that rate by the volume, 1/s, and by the valve's pressure, m^3/(s Pa).
+#[inline]
+fn volume_rate_slopes(clutch: &ShiftClutch, volume_m3: f64, valve_pa: f64) -> (f64, f64) {
+    if clutch.has_stroke { clutch.cylinder.volume_rate_slopes(volume_m3, valve_pa) } else { (0.0, 0.0) }
 }

@@ -1,9 +1,9 @@
 //! One step of a linearly implicit Runge-Kutta method of order 3 with its dense output.
 //!
 //! At a few metres per second the tyre couples wheel and vehicle within less than a millisecond; an
-//! explicit method would take its step from that alone. This one treats the stiff row of the equations
-//! implicitly, which costs one division, and everything else explicitly. It is a W-method: its order
-//! does not depend on how well the row is known.
+//! explicit method would take its step from that alone; so does the oil in a filled clutch cylinder. This one treats
+//! the stiff rows of the equations implicitly, which costs one division each, and everything else explicitly. It is a
+//! W-method: its order does not depend on how well the rows are known.
 //!
 //! Coefficients: ROS34PW2 of J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for partial
 //! differential algebraic equations of index 1, BIT 45 (2005) 761-787. Autonomous form: inputs are
@@ -31,7 +31,7 @@ const ERROR_WEIGHTS: [f64; 4] = [
     WEIGHTS[3] - LOWER_ORDER[3],
 ];
 
-/// The row of the Jacobian that is treated implicitly.
+/// A row of the Jacobian that is treated implicitly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StiffRow<const N: usize> {
     /// Which state's equation it is.
@@ -92,30 +92,33 @@ pub struct Tolerance<const N: usize> {
 
 /// Tries a step of length `h` from `x`, where `slope = f(x)`; `at_end` is `f` with what else is wanted at the end.
 ///
-/// The stages satisfy `(1 - h gamma J) k_i = h f(x + sum alpha_ij k_j) + h J sum gamma_ij k_j`.
+/// The stages satisfy `(1 - h gamma J) k_i = h f(x + sum alpha_ij k_j) + h J sum gamma_ij k_j`. No stiff row may depend on
+/// the state of another one: each is solved by itself.
 #[inline]
-pub fn step<const N: usize, E>(
+pub fn step<const N: usize, const ROWS: usize, E>(
     f: &impl Fn(&[f64; N]) -> [f64; N],
     at_end: &impl Fn(&[f64; N]) -> ([f64; N], E),
     x: &[f64; N],
     slope: &[f64; N],
-    row: &StiffRow<N>,
+    rows: &[StiffRow<N>; ROWS],
     h: f64,
     tolerance: &Tolerance<N>,
 ) -> Trial<N, E> {
-    let r = row.state;
-    let pivot = 1.0 / (1.0 - h * GAMMA * row.gradient[r]);
+    let pivots = rows.map(|row| 1.0 / (1.0 - h * GAMMA * row.gradient[row.state]));
     let mut k = [[0.0; N]; 4];
-    let mut row_times_k = [0.0; 4];
+    let mut rows_times_k = [[0.0; 4]; ROWS];
     for stage in 0..4 {
         let rate = if stage == 0 { *slope } else { f(&combine(x, &ALPHA[stage], &k)) };
         let mut next = rate.map(|rate| h * rate);
-        // Of (1 - h gamma J) k = next only the stiff row is not solved already.
-        let earlier: f64 = GAMMAS[stage].iter().zip(&row_times_k).map(|(gamma, row_k)| gamma * row_k).sum();
-        let known = next[r] + h * earlier;
-        next[r] = 0.0;
-        next[r] = pivot * (known + h * GAMMA * row.times(&next));
-        row_times_k[stage] = row.times(&next);
+        // Of (1 - h gamma J) k = next only the stiff rows are not solved already.
+        for ((row, pivot), row_times_k) in rows.iter().zip(&pivots).zip(&mut rows_times_k) {
+            let r = row.state;
+            let earlier: f64 = GAMMAS[stage].iter().zip(&*row_times_k).map(|(gamma, row_k)| gamma * row_k).sum();
+            let known = next[r] + h * earlier;
+            next[r] = 0.0;
+            next[r] = pivot * (known + h * GAMMA * row.times(&next));
+            row_times_k[stage] = row.times(&next);
+        }
         k[stage] = next;
     }
     let end = combine(x, &WEIGHTS, &k);
@@ -158,11 +161,11 @@ mod tests {
     }
 
     /// Error at `t = 2` of the oscillator that starts at (1, 0), and of the dense output in mid-step.
-    fn errors(steps: u32, row: &StiffRow<2>) -> (f64, f64) {
+    fn errors(steps: u32, row: StiffRow<2>) -> (f64, f64) {
         let h = 2.0 / f64::from(steps);
         let (mut x, mut dense_error) = ([1.0, 0.0], 0.0_f64);
         for n in 0..steps {
-            let trial = step(&oscillator, &alone(oscillator), &x, &oscillator(&x), row, h, &TOLERANCE);
+            let trial = step(&oscillator, &alone(oscillator), &x, &oscillator(&x), &[row], h, &TOLERANCE);
             let middle = h * (f64::from(n) + 0.5);
             dense_error = dense_error.max((trial.at(0.5)[0] - middle.cos()).abs());
             x = trial.end;
@@ -175,7 +178,7 @@ mod tests {
         let right = StiffRow { state: 1, gradient: [-1.0, 0.0] };
         let wrong = StiffRow { state: 0, gradient: [-2.0, 0.7] };
         for row in [StiffRow::none(), right, wrong] {
-            let (coarse, fine) = (errors(80, &row), errors(160, &row));
+            let (coarse, fine) = (errors(80, row), errors(160, row));
             let order = |a: f64, b: f64| (a / b).log2();
             assert!((order(coarse.0, fine.0) - 3.0).abs() < 0.2, "{}", order(coarse.0, fine.0));
             assert!((order(coarse.1, fine.1) - 3.0).abs() < 0.2, "{}", order(coarse.1, fine.1));
@@ -188,7 +191,7 @@ mod tests {
         let row = StiffRow { state: 0, gradient: [-1e5, 1e5] };
         let mut x = [3.0, 1.0];
         for _ in 0..100 {
-            x = step(&f, &alone(f), &x, &f(&x), &row, 0.02, &TOLERANCE).end;
+            x = step(&f, &alone(f), &x, &f(&x), &[row], 0.02, &TOLERANCE).end;
         }
         assert!((x[1] - (-2.0_f64).exp()).abs() < 1e-5 && (x[0] - x[1]).abs() < 1e-4, "{x:?}");
     }
@@ -196,7 +199,7 @@ mod tests {
     #[test]
     fn the_dense_output_meets_both_ends_of_the_step() {
         let x = [0.3, -0.8];
-        let trial = step(&oscillator, &alone(oscillator), &x, &oscillator(&x), &StiffRow::none(), 0.4, &TOLERANCE);
+        let trial = step(&oscillator, &alone(oscillator), &x, &oscillator(&x), &[], 0.4, &TOLERANCE);
         assert_eq!(trial.at(0.0), x);
         assert!(trial.at(1.0).iter().zip(trial.end).all(|(a, b)| (a - b).abs() < 1e-15));
     }

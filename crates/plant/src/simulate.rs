@@ -1,6 +1,7 @@
 //! One simulated drive: controller, valves, powertrain, recorder.
 
-use config::{Experiment, Vehicle};
+use config::{Experiment, Profile, ShiftClutch, Vehicle};
+use drivetrain::Play;
 
 use crate::delay::DelayLine;
 use crate::{
@@ -21,12 +22,14 @@ pub struct Sample {
     pub stage: Stage,
     /// All torques.
     pub torques: Torques,
-    /// What the controller commands: throttle and the currents before their delay.
+    /// What the controller commands: throttle and the valves' commands before their delay.
     pub commands: Commands,
     /// Slip of the offgoing clutch, rad/s.
     pub offgoing_slip_rad_s: f64,
     /// Slip of the oncoming clutch, rad/s.
     pub oncoming_slip_rad_s: f64,
+    /// Pressure of the offgoing clutch, Pa.
+    pub offgoing_pa: f64,
     /// Pressure of the oncoming clutch, Pa: what the observers look for.
     pub oncoming_pa: f64,
     /// Acceleration of the vehicle, m/s^2.
@@ -43,14 +46,15 @@ pub fn simulate(vehicle: &Vehicle, experiment: &Experiment, record: impl FnMut(&
     Simulation::new(&powertrain, vehicle, experiment)?.advance(experiment.duration_s, record)
 }
 
-/// A drive on its way: a copy of it goes on from where the original stands.
+/// A drive during its simulation; a copy continues from the same state.
 #[derive(Debug, Clone)]
 pub struct Simulation<'a> {
     powertrain: &'a Powertrain,
     experiment: &'a Experiment,
     controller: ShiftController,
     commands: Commands,
-    valves: [DelayLine; 2],
+    throttle: Profile,
+    valves: [ValveInput; 2],
     plant: HybridIntegrator,
     /// Periods of the controller that have begun.
     periods: f64,
@@ -58,7 +62,7 @@ pub struct Simulation<'a> {
 }
 
 impl<'a> Simulation<'a> {
-    /// At time zero. `nominal` is the vehicle that the shift controller knows.
+    /// At time zero. `nominal` is the vehicle of the shift controller's model.
     ///
     /// # Errors
     /// See [`PlantError`].
@@ -76,14 +80,17 @@ impl<'a> Simulation<'a> {
         experiment: &'a Experiment,
         relative_tolerance: f64,
     ) -> Result<Self, PlantError> {
-        let mut controller = ShiftController::new(nominal, experiment.shift);
+        let v = &powertrain.vehicle;
+        let mut controller = ShiftController::new(&calibrated_for(nominal, v), experiment.shift);
         let state = initial_state(powertrain, experiment);
-        let commands = controller.step(0.0, experiment.throttle.at(0.0), &measure(&state));
-        let mut valves = [DelayLine::new(commands.offgoing_a), DelayLine::new(commands.oncoming_a)];
+        let throttle = experiment.driver_throttle();
+        let commands = controller.step(0.0, throttle.at(0.0), &measure(&state));
+        let mut valves =
+            [ValveInput::new(&v.offgoing, commands.offgoing), ValveInput::new(&v.oncoming, commands.oncoming)];
         let inputs = arrived(powertrain, &mut valves, 0.0, commands.throttle);
         let plant = HybridIntegrator::with_tolerance(powertrain, 0.0, state, &inputs, relative_tolerance)?;
         let recorder = Recorder { next: 0, sample_time_s: experiment.sample_time_s, duration_s: experiment.duration_s };
-        Ok(Self { powertrain, experiment, controller, commands, valves, plant, periods: 1.0, recorder })
+        Ok(Self { powertrain, experiment, controller, commands, throttle, valves, plant, periods: 1.0, recorder })
     }
 
     /// Time reached, s.
@@ -133,7 +140,7 @@ impl<'a> Simulation<'a> {
             let end_s = (self.periods * period_s).min(until_s);
             while self.plant.time_s < end_s {
                 let inputs = arrived(self.powertrain, &mut self.valves, self.plant.time_s, self.commands.throttle);
-                let arrival = self.valves.iter().filter_map(DelayLine::next_arrival_s).fold(end_s, f64::min);
+                let arrival = self.valves.iter().filter_map(|valve| valve.line.next_arrival_s()).fold(end_s, f64::min);
                 let (powertrain, commands, recorder) = (self.powertrain, &self.commands, &mut self.recorder);
                 self.plant.advance(powertrain, &inputs, arrival, &mut |segment| {
                     on_step(segment);
@@ -144,13 +151,13 @@ impl<'a> Simulation<'a> {
         Ok(())
     }
 
-    /// The period, after this one, in which the controller may command something new. Before a shift it goes by the
-    /// clock alone: while the driver's throttle rests there is nothing to integrate up to.
+    /// The next period in which the commands of the controller may change. Before a shift they depend on the time
+    /// alone, so no step has to end while the throttle is constant.
     fn next_change(&self, period: f64) -> f64 {
         let now_s = self.plant.time_s;
         let next = period + 1.0;
         let Stage::Before = self.controller.stage() else { return next };
-        let throttle = &self.experiment.throttle;
+        let throttle = &self.throttle;
         let points = throttle.axis().iter().zip(throttle.values());
         let here = throttle.at(now_s);
         // It rests until the last point before the first one of another value.
@@ -163,19 +170,56 @@ impl<'a> Simulation<'a> {
 
     /// One step of the shift controller, whose commands set out to the valves.
     fn control(&mut self, now_s: f64) {
-        self.commands = self.controller.step(now_s, self.experiment.throttle.at(now_s), &measure(&self.plant.state));
+        self.commands = self.controller.step(now_s, self.throttle.at(now_s), &measure(&self.plant.state));
         let v = &self.powertrain.vehicle;
         let [offgoing, oncoming] = &mut self.valves;
         let commands = &self.commands;
-        offgoing.send(now_s, v.offgoing.valve.delay_s.at(commands.offgoing_a), commands.offgoing_a);
-        oncoming.send(now_s, v.oncoming.valve.delay_s.at(commands.oncoming_a), commands.oncoming_a);
+        offgoing.line.send(now_s, v.offgoing.valve.delay(commands.offgoing), commands.offgoing);
+        oncoming.line.send(now_s, v.oncoming.valve.delay(commands.oncoming), commands.oncoming);
     }
 }
 
-/// Currents that have arrived at the valves, and the throttle.
-fn arrived(powertrain: &Powertrain, valves: &mut [DelayLine; 2], time_s: f64, throttle: f64) -> Inputs {
+/// Commands that have arrived at the valves, and the throttle.
+fn arrived(powertrain: &Powertrain, valves: &mut [ValveInput; 2], time_s: f64, throttle: f64) -> Inputs {
+    let v = &powertrain.vehicle;
     let [offgoing, oncoming] = valves;
-    Inputs::arrived(&powertrain.vehicle, throttle, offgoing.arrive(time_s), oncoming.arrive(time_s))
+    Inputs {
+        throttle,
+        offgoing_settled_pa: offgoing.settled_pressure(&v.offgoing, time_s),
+        oncoming_settled_pa: oncoming.settled_pressure(&v.oncoming, time_s),
+    }
+}
+
+/// What lies between the controller and a valve's pressure: the delay of its command, then its hysteresis.
+#[derive(Debug, Clone)]
+struct ValveInput {
+    line: DelayLine,
+    play: Play<f64>,
+}
+
+impl ValveInput {
+    /// Where this command has stood for ever.
+    fn new(clutch: &ShiftClutch, command: f64) -> Self {
+        let play = Play::new(clutch.hysteresis_pa, clutch.valve.settled_pressure(command));
+        Self { line: DelayLine::new(command), play }
+    }
+
+    /// Pressure at which the command that has arrived by now settles, Pa.
+    fn settled_pressure(&mut self, clutch: &ShiftClutch, now_s: f64) -> f64 {
+        self.play.follow(clutch.valve.settled_pressure(self.line.arrive(now_s)))
+    }
+}
+
+/// The car that the shift controller is calibrated for: the nominal one with pistons that have a stroke if those of the
+/// simulated car have one, and with its oil temperature, which every controller measures.
+fn calibrated_for(nominal: &Vehicle, simulated: &Vehicle) -> Vehicle {
+    let mut vehicle = nominal.clone();
+    vehicle.oil_temperature_degc = simulated.oil_temperature_degc;
+    for (clutch, real) in [(&mut vehicle.offgoing, &simulated.offgoing), (&mut vehicle.oncoming, &simulated.oncoming)] {
+        clutch.has_stroke = real.has_stroke;
+        clutch.cylinder = clutch.cylinder.with_oil(simulated.oil_temperature_degc);
+    }
+    vehicle
 }
 
 fn measure(state: &State) -> Measured {
@@ -191,15 +235,18 @@ fn initial_state(powertrain: &Powertrain, experiment: &Experiment) -> State {
     let turbine = v.shift.ratio_offgoing() * output;
     let turbine_n_m = v.converter.torques(experiment.initial_engine_rad_s, turbine).turbine_n_m;
     let shaft_n_m = turbine_n_m * v.shift.ratio_offgoing() * v.driveline.final_ratio;
+    let line_pa = experiment.shift.line_pressure_pa;
     State {
         engine_rad_s: experiment.initial_engine_rad_s,
         turbine_rad_s: turbine,
         output_rad_s: output,
-        twist_rad: shaft_n_m / v.driveline.shaft_stiffness_n_m_rad,
+        twist_rad: shaft_n_m / v.driveline.shaft_stiffness_n_m_rad + 0.5 * v.backlash_rad * shaft_n_m.signum(),
         wheel_rad_s: wheel,
         vehicle_m_s: experiment.initial_vehicle_m_s,
-        offgoing_pa: experiment.shift.line_pressure_pa,
-        oncoming_pa: 0.0,
+        offgoing_valve_pa: line_pa,
+        oncoming_valve_pa: 0.0,
+        offgoing_m3: v.offgoing.cylinder.volume(line_pa),
+        oncoming_m3: v.oncoming.cylinder.volume(0.0),
     }
 }
 
@@ -235,6 +282,7 @@ impl Recorder {
             let state = segment.at(time_s.clamp(segment.start_s, segment.end_s));
             let torques = powertrain.torques(segment.mode, &state, segment.inputs);
             let shift = &powertrain.vehicle.shift;
+            let [offgoing_pa, oncoming_pa] = powertrain.pressures(&state);
             record(&Sample {
                 time_s,
                 state,
@@ -244,7 +292,8 @@ impl Recorder {
                 commands: *commands,
                 offgoing_slip_rad_s: shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),
                 oncoming_slip_rad_s: shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s),
-                oncoming_pa: state.oncoming_pa,
+                offgoing_pa,
+                oncoming_pa,
                 vehicle_m_s2: powertrain.vehicle_acceleration(&state, &torques),
             });
             self.next += 1;

@@ -5,6 +5,7 @@
 mod common;
 
 use common::{e1, each_step, vehicle};
+use config::Experiment;
 use plant::{PowerBalance, Powertrain, stored_energy};
 
 /// Energies of a whole drive, J.
@@ -14,19 +15,23 @@ struct Audit {
     stored: f64,
 }
 
-/// E1 uphill, with clutch B overfilled and clutch A released too late, so that every term of the balance is at work. The powers are integrated over each step of
-/// the simulation by Gauss's rule with three points on the dense output.
-fn audit() -> Audit {
-    const GAUSS: [(f64, f64); 3] =
-        [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+/// E1 uphill, with clutch B overfilled and clutch A released too late, so that every term of the balance is at work.
+fn uphill() -> Experiment {
     let mut experiment = e1();
     experiment.off_nominal.grade_rad = Some(0.03);
     experiment.shift.transfer_holding_margin = 1.4;
     experiment.shift.boost_s = 0.06;
+    experiment
+}
+
+/// The powers are integrated over each step of the simulation by Gauss's rule with three points on the dense output.
+fn audit(experiment: &Experiment) -> Audit {
+    const GAUSS: [(f64, f64); 3] =
+        [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
     let powertrain = Powertrain::new(experiment.simulated_vehicle(&vehicle()));
     let mut audit = Audit { engine: 0.0, sinks: Vec::new(), stored: 0.0 };
     let (mut first, mut last) = (None, None);
-    each_step(&powertrain, &experiment, STEP_TOLERANCE, |step| {
+    each_step(&powertrain, experiment, STEP_TOLERANCE, |step| {
         let length = step.end_s - step.start_s;
         for (at, weight) in GAUSS {
             let state = step.at(step.start_s + at * length);
@@ -59,14 +64,27 @@ impl Audit {
 
 #[test]
 fn power_in_is_stored_or_dissipated() {
-    let audit = audit();
+    let audit = audit(&uphill());
+    let missing = audit.missing("");
+    assert!(missing.abs() < TOLERANCE * audit.engine, "{missing} J of {} J are missing", audit.engine);
+}
+
+/// The accelerator is released and pressed in 1st gear, over a gap in the driveline; both clutches drag and fill.
+#[test]
+fn backlash_drag_and_stroke_neither_make_nor_lose_energy() {
+    let mut experiment = uphill();
+    experiment.off_nominal.backlash_rad = Some(0.03);
+    experiment.off_nominal.tip_out_s = Some([5.0, 5.6]);
+    experiment.off_nominal.clutch_drag_n_m = 8.0;
+    experiment.off_nominal.piston_stroke = Some(true);
+    let audit = audit(&experiment);
     let missing = audit.missing("");
     assert!(missing.abs() < TOLERANCE * audit.engine, "{missing} J of {} J are missing", audit.engine);
 }
 
 #[test]
 fn the_audit_fails_when_any_term_is_dropped() {
-    let audit = audit();
+    let audit = audit(&uphill());
     for (name, _) in &audit.sinks {
         let missing = audit.missing(name);
         assert!(missing.abs() > TOLERANCE * audit.engine, "without {name} only {missing} J are missing");

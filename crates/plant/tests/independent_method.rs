@@ -34,7 +34,7 @@ fn assert_agreement(from_s: f64, duration_s: f64) {
     let powertrain = Powertrain::new(vehicle());
     let start = at(&samples(&e1(), RELATIVE_TOLERANCE), from_s);
     let c = start.commands;
-    let inputs = Inputs::arrived(&powertrain.vehicle, c.throttle, c.offgoing_a, c.oncoming_a);
+    let inputs = Inputs::arrived(&powertrain.vehicle, c.throttle, c.offgoing, c.oncoming);
     let mut plant = HybridIntegrator::with_tolerance(&powertrain, 0.0, start.state, &inputs, TOLERANCE).unwrap();
     let mode = plant.mode;
     plant
@@ -50,7 +50,7 @@ fn assert_agreement(from_s: f64, duration_s: f64) {
     for (i, (ours, theirs)) in plant.state.to_array().iter().zip(reference).enumerate() {
         // A hundred times the tolerance of a step, for the growth of the error along the phase.
         assert!(
-            (ours - theirs).abs() < 100.0 * TOLERANCE * (State::SCALE[i] + theirs.abs()),
+            (ours - theirs).abs() < 100.0 * TOLERANCE * (State::SCALE.to_array()[i] + theirs.abs()),
             "state {i}: {ours} {theirs}"
         );
     }

@@ -41,6 +41,7 @@ fn the_shift_is_one_that_a_calibrator_would_accept() {
     // While B is filled the shaft torque must stay where it was, within a tenth.
     let steady = in_shift[0].torques.shaft_n_m;
     let filling = in_shift.iter().filter(|s| s.time_s < torque);
+    assert!(filling.clone().count() > 100, "the fill is looked at");
     assert!(filling.clone().all(|s| (s.torques.shaft_n_m / steady - 1.0).abs() < 0.1), "shuffle at the fill");
 }
 

@@ -1,54 +1,61 @@
 //! The page of the bench: the ranking, and every scenario.
 
 use config::{Experiment, Vehicle};
-use minijinja::context;
+use minijinja::{Value, context};
+use observer::Phase;
 use study::Bench;
+use study::bench::BenchCell;
+use study::campaign::PHASES;
 use trace::units::mpa;
 
 use crate::page::{PageError, origin, templates};
+use crate::tables::{coverage, number, phase_name};
 
 /// The page of a bench of this experiment on this vehicle; it needs nothing but itself.
 ///
 /// # Errors
 /// None in a released program; the tests render the template.
 pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> Result<String, PageError> {
-    let pressure = |pascal: f64| format!("{:.3}", mpa(pascal));
-    let ratio = |value: f64| format!("{value:.2}");
+    let pressure = |pascal: f64| number(mpa(pascal), 3);
+    let ratio = |value: f64| number(value, 2);
+    let optional = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
     let ranking = bench.ranking.iter().map(|s| {
         context! {
             observer => &s.observer,
+            diverged => s.diverged,
             shift => ratio(s.shift_median_ratio),
             torque => [s.torque_phase_median_ratio, s.torque_phase_worst_ratio].map(ratio),
             inertia => [s.inertia_phase_median_ratio, s.inertia_phase_worst_ratio].map(ratio),
             chatter => pressure(s.chatter_median_pa),
-            shaft => [s.shaft_median_rms_n_m, s.shaft_worst_rms_n_m]
-                .map(|value| value.map_or_else(|| "–".to_owned(), |n_m| format!("{n_m:.0}"))),
-            coverage => s.range_least_coverage.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
-            over_errors => s.range_over_errors.map_or_else(|| "–".to_owned(), |over| format!("{over:.1}")),
-            step => [s.step_ns, s.step_with_range_ns].map(|ns| format!("{ns:.0}")),
+            shaft => [s.shaft_median_rms_n_m, s.shaft_worst_rms_n_m].map(|n_m| optional(n_m, 0)),
+            coverage => s.range_least_coverage.map_or_else(|| "–".to_owned(), coverage),
+            over_errors => optional(s.range_over_errors, 1),
+            step => [s.step_ns, s.step_with_range_ns].map(|ns| number(ns, 0)),
         }
     });
-    let rows = bench.rows.iter().map(|row| {
-        let least =
-            |value: fn(&study::bench::BenchCell) -> f64| row.cells.iter().map(value).fold(f64::INFINITY, f64::min);
-        let (torque, inertia) = (least(|c| c.torque_phase_rms_pa), least(|c| c.inertia_phase_rms_pa));
-        context! {
-            scenario => &row.scenario,
-            completed => row.completed,
-            cells => row.cells.iter().map(|c| context! {
-                torque => pressure(c.torque_phase_rms_pa),
-                inertia => pressure(c.inertia_phase_rms_pa),
-                torque_best => c.torque_phase_rms_pa <= torque,
-                inertia_best => c.inertia_phase_rms_pa <= inertia,
-            }).collect::<Vec<_>>(),
-        }
+    let phases = PHASES.map(|phase| {
+        let rms = |cell: &BenchCell| match phase {
+            Phase::InertiaPhase => cell.inertia_phase_rms_pa,
+            _ => cell.torque_phase_rms_pa,
+        };
+        let rows = bench.rows.iter().map(|row| {
+            let lowest = row.cells.iter().map(rms).fold(f64::INFINITY, f64::min);
+            let cells = row.cells.iter().filter(|_| row.completed);
+            let cells: Vec<Value> =
+                cells.map(|c| context! { rms => pressure(rms(c)), best => !c.diverged && rms(c) <= lowest }).collect();
+            context! { scenario => &row.scenario, cells }
+        });
+        context! { name => phase_name(phase), rows => rows.collect::<Vec<_>>() }
     });
+    // The order of the ranking; without one, that of the experiment.
+    let observers: Vec<String> =
+        bench.rows.first().map_or_else(Vec::new, |row| row.cells.iter().map(|cell| cell.observer.clone()).collect());
     let first = bench.ranking.first();
     let widths = first.and_then(|s| {
         Some([
             pressure(s.range_median_width_pa?),
-            format!("{:.0}", s.torque_range_median_width_n_m?),
-            format!("{:.0}", s.shaft_range_median_width_n_m?),
+            number(s.torque_range_median_width_n_m?, 0),
+            number(s.shaft_range_median_width_n_m?, 0),
         ])
     });
     Ok(templates()?.get_template("bench.html")?.render(context! {
@@ -57,9 +64,10 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         vehicle_name => &vehicle.name,
         version => env!("CARGO_PKG_VERSION"),
         seed => experiment.sensors.map(|sensors| sensors.seed),
-        observers => bench.ranking.iter().map(|s| s.observer.clone()).collect::<Vec<_>>(),
+        observers,
         ranking => ranking.collect::<Vec<_>>(),
-        rows => rows.collect::<Vec<_>>(),
+        phases,
+        rows => bench.rows.len(),
         widths,
         inputs => origin(&[&vehicle.source, &experiment.source]),
     })?)

@@ -1,4 +1,4 @@
-//! The page of a model-error study: how large the errors are, and what they are made of.
+//! The page of a model-error study: how large the errors are, and their causes.
 
 use config::Study;
 use minijinja::{Value, context};
@@ -12,14 +12,13 @@ use crate::tables::phase_name;
 /// Every error of one phase with its name: the rigid model's size, channels and parts, the compliant model's channels.
 pub fn named(phase: &PhaseErrors) -> Vec<(String, &Size)> {
     let compliant: &[&str] =
-        if phase.compliant_channels.len() == 3 { &["w_t", "slip", "w_w"] } else { &["w_t", "w_w"] };
-    let channels = ["w_t", "slip"].iter().zip(&phase.rigid_channels);
-    let mut rows = vec![("rigid |w|".to_owned(), &phase.rigid)];
-    rows.extend(channels.map(|(name, size)| (format!("  of {name}"), size)));
-    rows.extend(PARTS.iter().zip(&phase.rigid_parts).map(|(part, size)| (format!("  from {part}"), size)));
-    rows.extend(
-        compliant.iter().zip(&phase.compliant_channels).map(|(name, size)| (format!("compliant, of {name}"), size)),
-    );
+        if phase.compliant_channels.len() == 3 { &["turbine", "slip", "wheel"] } else { &["turbine", "wheel"] };
+    let channels = ["turbine", "slip"].iter().zip(&phase.rigid_channels);
+    let mut rows = vec![("rigid model, |w|".to_owned(), &phase.rigid)];
+    rows.extend(channels.map(|(name, size)| (format!("  {name} acceleration"), size)));
+    rows.extend(PARTS.iter().zip(&phase.rigid_parts).map(|(part, size)| (format!("  due to {part}"), size)));
+    let channels = compliant.iter().zip(&phase.compliant_channels);
+    rows.extend(channels.map(|(name, size)| (format!("compliant model, {name} acceleration"), size)));
     rows
 }
 
@@ -36,7 +35,7 @@ pub fn error_bound_page(found: &ErrorBound, study: &Study) -> Result<String, Pag
                 context! {
                     name => name.trim_start(),
                     part => name.starts_with(' '),
-                    share => format!("{:.2}", 0.6 * (size.largest / errors.rigid.largest).min(1.0)),
+                    share => format!("{:.2}", 0.6 * (size.largest / errors.rigid.largest.max(1e-9)).min(1.0)),
                     numbers => numbers.map(|value| format!("{value:.1}")),
                     settled => size.settled_after,
                 }

@@ -1,10 +1,13 @@
 //! Figures and the HTML reports.
 
+mod axis;
 pub mod bench_page;
 pub mod error_bound_page;
 pub mod figure;
+mod legend;
 pub mod map_figures;
 pub mod page;
+pub mod palette;
 pub mod reproduction;
 pub mod sensitivity_page;
 pub mod shift_figure;

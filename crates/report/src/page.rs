@@ -73,12 +73,13 @@ impl Page {
             quality => quality_rows(comparison),
             inputs => origin(&[&vehicle.source, &experiment.source]),
             seed => experiment.sensors.map(|sensors| sensors.seed),
+            certified => comparison.runs.first().filter(|_| !comparison.bound_pa.is_empty()).map(|run| &run.entry.name),
         })?;
         Ok(Self { html, figures: vec![("shift.svg".into(), shift), ("drive.svg".into(), drive)] })
     }
 }
 
-/// `ours` against `theirs`, in words.
+/// `ours` compared with `theirs`, in words.
 pub(crate) fn change(ours: f64, theirs: f64) -> String {
     let percent = 100.0 * (ours / theirs - 1.0);
     if percent.abs() < 1.0 {
@@ -87,7 +88,7 @@ pub(crate) fn change(ours: f64, theirs: f64) -> String {
     format!("{:.0} % {} than open loop", percent.abs(), if percent < 0.0 { "lower" } else { "higher" })
 }
 
-/// What the numbers say, in sentences. Where an observer loses to the open loop, that is a sentence too.
+/// The results in sentences, also where an observer is worse than the open loop.
 pub fn findings(comparison: &Comparison) -> Vec<String> {
     let Some(open_loop) = comparison.open_loop() else { return Vec::new() };
     let observers = comparison.runs.iter().filter(|run| run.entry.kind != config::ObserverKind::OpenLoop);
@@ -108,12 +109,12 @@ pub fn findings(comparison: &Comparison) -> Vec<String> {
         let Some((share, excess)) = comparison.bound_coverage(phase) else { continue };
         let (name, observer) = (phase_name(phase), &comparison.runs[0].entry.name);
         sentences.push(if share >= 1.0 {
-            format!("In the {name} the error of {observer} stays within its certified band throughout.")
+            format!("In the {name} the error of {observer} is always within its certified band.")
         } else {
             format!(
-                "In the {name} the error of {observer} lies within its certified band {:.0} % of the time and leaves it by \
-                 up to {:.3} MPa: the certificate assumes a valve that obeys its model, and here delay, lag and gain of \
-                 the valve vary.",
+                "In the {name} the error of {observer} is within its certified band for {:.0} % of the time and outside it by \
+                 up to {:.3} MPa: the certificate assumes a valve that behaves as its model, but here delay, lag and gain \
+                 of the valve vary.",
                 100.0 * share,
                 mpa(excess),
             )

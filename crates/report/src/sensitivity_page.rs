@@ -1,4 +1,4 @@
-//! The page of what the speeds can tell about the pressure.
+//! The page of how errors of models and readings act on the estimated pressure.
 
 use config::Vehicle;
 use minijinja::{Value, context};
@@ -42,7 +42,7 @@ pub fn sensitivity_page(
     });
     Ok(templates()?.get_template("sensitivity.html")?.render(context! {
         name => "Sensitivity",
-        title => "What the speeds can tell about the pressure",
+        title => "Sensitivity of the estimated pressure to errors",
         version => env!("CARGO_PKG_VERSION"),
         vehicle_name => &vehicle.name,
         phases => rows.collect::<Vec<_>>(),

@@ -1,94 +1,40 @@
 //! The figures of a shift and of the drive around it.
 
-use config::ObserverKind;
-use observer::Bounds;
+use observer::{Bounds, Estimate};
 use study::{Comparison, ObserverRun, ShiftQuality};
 use trace::{Trace, signal, units};
 
-use crate::figure::{Band, Figure, Panel, Series, Span, colour};
+use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke, extremes};
+use crate::palette::{RANGE, main_observer, observer_strokes};
 
 /// Colour of the torque phase.
-const TORQUE_PHASE: &str = "#fdf0d5";
+const TORQUE_PHASE: &str = "#fbf0d0";
 /// Colour of the inertia phase.
-const INERTIA_PHASE: &str = "#e3eef7";
-/// Colours of the observers in their order; the open loop has its own.
-pub(crate) const OBSERVERS: [&str; 9] = [
-    colour::BLUE,
-    colour::GREEN,
-    colour::ORANGE,
-    colour::PURPLE,
-    colour::SKY,
-    colour::GREY,
-    colour::BROWN,
-    colour::PINK,
-    colour::OLIVE,
-];
-/// How much is shown before the load transfer and after lock-up, s.
-const MARGIN_S: f64 = 0.35;
+const INERTIA_PHASE: &str = "#ededed";
+/// How much is shown before the load transfer and after lock-up, over the time between them.
+const MARGIN: f64 = 0.55;
+/// Smallest range of pressures that an axis is made for, MPa.
+const LEAST_MPA: f64 = 0.01;
 
 /// Speeds, pressures, errors, torques and currents through the shift.
 pub fn shift_figure(comparison: &Comparison) -> Figure {
     let t = Curves::of(comparison);
-    let bound = t.bound();
-    let panels = vec![
-        t.speeds(130.0),
-        t.pressure_panel().within(0.0, 0.5),
-        Panel {
-            band: (!bound.is_empty()).then(|| Band {
-                label: "certified band of the rigid observer".into(),
-                lower: bound.iter().map(|&(time, width)| (time, -width)).collect(),
-                upper: bound,
-            }),
-            ..panel("error (MPa)", 150.0, t.pressure_errors()).within(-0.14, 0.14)
-        },
-        panel(
-            "torque (N m)",
-            150.0,
-            vec![
-                t.signal("clutch A", colour::PURPLE, signal::OFFGOING_TORQUE, |x| x),
-                t.signal("clutch B, true", colour::BLACK, signal::ONCOMING_TORQUE, |x| x),
-                t.clutch_torque(),
-                t.signal("turbine", colour::GREEN, signal::TURBINE_TORQUE, |x| x),
-            ],
-        ),
-        panel(
-            "shaft torque (N m)",
-            120.0,
-            [vec![t.signal("true", colour::BLACK, signal::SHAFT_TORQUE, |x| x)], t.shaft_torques()].concat(),
-        ),
-        panel(
-            "current (A), throttle",
-            120.0,
-            vec![
-                t.signal("current A", colour::PURPLE, signal::OFFGOING_CURRENT, |x| x),
-                t.signal("current B", colour::BLACK, signal::ONCOMING_CURRENT, |x| x),
-                t.signal("throttle (0–1)", colour::ORANGE, signal::THROTTLE, |x| x),
-            ],
-        )
-        .within(0.0, 1.0),
-    ];
+    let mut panels = vec![t.speeds(130.0)];
+    panels.extend(t.observers());
+    panels.push(t.commands(110.0));
     t.around_shift(panels)
 }
 
-/// Pressures and errors through the shift: what an experiment with several observers is about.
+/// Pressures, torques and errors through the shift: what an experiment with several observers is about.
 pub fn observers_figure(comparison: &Comparison) -> Figure {
-    observers_of(&comparison.runs, &comparison.trace, comparison.quality.as_ref())
+    let t = Curves::of(comparison);
+    t.around_shift(t.observers())
 }
 
 /// As [`observers_figure`], of a run without the rest of a comparison.
 pub fn observers_of(runs: &[ObserverRun], trace: &Trace, quality: Option<&ShiftQuality>) -> Figure {
     let t = Curves { runs, trace, quality, bound_pa: &[] };
-    let highest = t.highest_pressure().max(0.4);
-    let mut panels = vec![
-        t.pressure_panel().within(0.0, 1.25 * highest),
-        panel("error (MPa)", 190.0, t.pressure_errors()).within(-0.35 * highest, 0.35 * highest),
-    ];
-    let shaft = t.shaft_torques();
-    if !shaft.is_empty() {
-        let truth = t.signal("true", colour::BLACK, signal::SHAFT_TORQUE, |x| x);
-        panels.push(panel("shaft torque (N m)", 150.0, [vec![truth], shaft].concat()));
-    }
-    t.around_shift(panels)
+    t.around_shift(t.observers())
 }
 
 /// Speeds and acceleration from standstill to the end.
@@ -96,31 +42,21 @@ pub fn drive_figure(comparison: &Comparison) -> Figure {
     let t = Curves::of(comparison);
     let end = comparison.trace.time_s.last().copied().unwrap_or(1.0);
     let unnamed = |span: Span| Span { label: String::new(), ..span };
+    let vehicle = |name, unit: fn(f64) -> f64| vec![t.signal("vehicle", Stroke::SIGNAL, name, unit)];
     Figure {
         x_label: "time (s)",
         x_range: (0.0, end),
         spans: t.spans().into_iter().map(unnamed).collect(),
         panels: vec![
             t.speeds(150.0),
-            panel("vehicle (km/h)", 90.0, vec![t.signal("vehicle", colour::BLACK, signal::VEHICLE_SPEED, units::km_h)]),
-            panel("accel. (m/s²)", 90.0, vec![t.signal("vehicle", colour::BLACK, signal::VEHICLE_ACCELERATION, |x| x)]),
+            panel("speed (km/h)", 90.0, vehicle(signal::VEHICLE_SPEED, units::km_h)),
+            panel("acceleration (m/s²)", 90.0, vehicle(signal::VEHICLE_ACCELERATION, |x| x)),
         ],
     }
 }
 
 fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
-    Panel { y_label: y_label.to_owned(), height, series, band: None, y_range: None }
-}
-
-/// Colours of observers of these kinds: the open loop has its own, the others go by their place.
-pub(crate) fn observer_colours(kinds: impl Iterator<Item = ObserverKind>) -> Vec<&'static str> {
-    let mut others = OBSERVERS.iter().cycle();
-    kinds
-        .map(|kind| match kind {
-            ObserverKind::OpenLoop => colour::VERMILION,
-            _ => others.next().copied().unwrap_or(colour::GREY),
-        })
-        .collect()
+    Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
 }
 
 struct Curves<'a> {
@@ -142,13 +78,17 @@ impl<'a> Curves<'a> {
 
     /// Panels around the shift, its phases shaded.
     fn around_shift(&self, panels: Vec<Panel>) -> Figure {
-        let spans = self.spans();
-        let whole = (0.0, self.trace.time_s.last().copied().unwrap_or(1.0));
-        let x_range = match (spans.first(), spans.last()) {
-            (Some(first), Some(last)) => ((first.start - MARGIN_S).max(whole.0), (last.end + MARGIN_S).min(whole.1)),
-            _ => whole,
-        };
-        Figure { x_label: "time (s)", x_range, spans, panels }
+        Figure { x_label: "time (s)", x_range: self.shown_s(), spans: self.spans(), panels }
+    }
+
+    /// The shift and some time around it, s; the whole drive if there was none.
+    fn shown_s(&self) -> (f64, f64) {
+        let end_s = self.trace.time_s.last().copied().unwrap_or(1.0);
+        self.quality.map_or((0.0, end_s), |quality| {
+            let (from, to) = (quality.torque_phase_start_s, quality.lock_up_s);
+            let margin = MARGIN * (to - from);
+            ((from - margin).max(0.0), (to + margin).min(end_s))
+        })
     }
 
     /// Torque and inertia phase as shaded spans.
@@ -167,84 +107,160 @@ impl<'a> Curves<'a> {
             "speed (rpm)",
             height,
             vec![
-                self.signal("engine", colour::GREEN, signal::ENGINE_SPEED, units::rpm),
-                self.signal("turbine", colour::BLACK, signal::TURBINE_SPEED, units::rpm),
-                self.signal("output", colour::PURPLE, signal::OUTPUT_SPEED, units::rpm),
+                self.signal("engine", Stroke::THIRD, signal::ENGINE_SPEED, units::rpm),
+                self.signal("turbine", Stroke::SIGNAL, signal::TURBINE_SPEED, units::rpm),
+                self.signal("gearbox output", Stroke::SECOND, signal::OUTPUT_SPEED, units::rpm),
             ],
         )
     }
 
-    /// Pressures, the true one with its guaranteed range.
-    fn pressure_panel(&self) -> Panel {
-        let truth = self.signal("true", colour::BLACK, signal::ONCOMING_PRESSURE, units::mpa);
-        let ends = |end: usize| -> Vec<(f64, f64)> {
-            self.runs.first().map_or_else(Vec::new, |run| {
-                let value = |bounds: &Option<Bounds<f64>>| bounds.map_or(f64::NAN, |b| units::mpa(b.pressure_pa[end]));
-                run.time_s.iter().zip(&run.estimates).map(|(&time, e)| (time, value(&e.bounds))).collect()
-            })
-        };
-        let band = Band { label: String::new(), lower: ends(0), upper: ends(1) };
-        Panel { band: Some(band), ..panel("pressure of B (MPa)", 190.0, [vec![truth], self.pressures()].concat()) }
+    /// Pressure, its error, and both torques, as far as there are estimates.
+    fn observers(&self) -> Vec<Panel> {
+        let panels = [self.pressure(), self.pressure_error(), self.clutch_torque(), self.shaft_torque()];
+        panels.into_iter().flatten().collect()
     }
 
-    /// Highest true pressure until lock-up, MPa.
-    fn highest_pressure(&self) -> f64 {
-        let end_s = self.quality.map_or(f64::INFINITY, |quality| quality.lock_up_s);
-        let pressures = self.trace.get(signal::ONCOMING_PRESSURE).unwrap_or_default();
-        let samples = self.trace.time_s.iter().zip(pressures).take_while(|(time, _)| **time < end_s);
-        samples.map(|(_, &pressure)| units::mpa(pressure)).fold(0.0, f64::max)
+    /// Pressures, with the guaranteed range.
+    ///
+    /// The axis follows the truth until lock-up: then the pressure rises to that of the line, and none of the observers
+    /// sees it any more.
+    fn pressure(&self) -> Option<Panel> {
+        let truth = self.signal("true", Stroke::TRUTH, signal::ONCOMING_PRESSURE, units::mpa);
+        let (low, high) = self.until_lock_up(&truth)?;
+        let size = (high - low).max(LEAST_MPA);
+        Some(Panel {
+            band: self.range(|bounds| Some(bounds.pressure_pa.map(units::mpa))),
+            axis: Axis::Within(low - 0.2 * size, high + 0.3 * size),
+            ..panel(
+                "clutch pressure (MPa)",
+                215.0,
+                [vec![truth], self.estimates(|e| units::mpa(e.pressure_pa))].concat(),
+            )
+        })
+    }
+
+    /// Errors of the pressure, with the band of the rigid observer's certificate.
+    fn pressure_error(&self) -> Option<Panel> {
+        let truth = self.signal("true", Stroke::TRUTH, signal::ONCOMING_PRESSURE, units::mpa);
+        let (low, high) = self.until_lock_up(&truth)?;
+        let most = 0.5 * (high - low).max(LEAST_MPA);
+        let errors = self.of_observers(|run, i| units::mpa(run.truth_pa[i] - run.estimates[i].pressure_pa));
+        Some(Panel {
+            band: self.certified_band(),
+            axis: Axis::Within(-most, most),
+            ..panel("pressure error (MPa)", 165.0, errors)
+        })
+    }
+
+    /// Torques of the oncoming clutch, with the guaranteed range.
+    fn clutch_torque(&self) -> Option<Panel> {
+        let truth = self.signal("true", Stroke::TRUTH, signal::ONCOMING_TORQUE, |x| x);
+        let axis = self.around(&truth)?;
+        let estimates = self.estimates(|e| e.clutch_torque_n_m);
+        Some(Panel {
+            band: self.range(|bounds| Some(bounds.clutch_torque_n_m)),
+            axis,
+            ..panel("clutch torque (N\u{a0}m)", 190.0, [vec![truth], estimates].concat())
+        })
+    }
+
+    /// Torques of the drive shafts, if an observer estimates them.
+    fn shaft_torque(&self) -> Option<Panel> {
+        let truth = self.signal("true", Stroke::TRUTH, signal::SHAFT_TORQUE, |x| x);
+        let axis = self.around(&truth)?;
+        let estimates = self.estimates(|e| e.shaft_torque_n_m.unwrap_or(f64::NAN));
+        (!estimates.is_empty())
+            .then(|| Panel { axis, ..panel("shaft torque (N\u{a0}m)", 150.0, [vec![truth], estimates].concat()) })
+    }
+
+    /// An axis around the whole of a curve, with room below and above for estimates of it.
+    fn around(&self, truth: &Series) -> Option<Axis> {
+        let (low, high) = within(truth, self.shown_s())?;
+        let room = (high - low).max(1.0);
+        Some(Axis::Within(low - room, high + room))
+    }
+
+    /// Lowest and highest value of a curve until lock-up.
+    fn until_lock_up(&self, truth: &Series) -> Option<(f64, f64)> {
+        let (from, to) = self.shown_s();
+        within(truth, (from, self.quality.map_or(to, |quality| quality.lock_up_s)))
+    }
+
+    /// What the valves and the engine are commanded.
+    fn commands(&self, height: f64) -> Panel {
+        let (title, name, [oncoming, offgoing], unit) = if self.trace.get(signal::ONCOMING_DUTY).is_some() {
+            ("duty cycle, throttle", "duty cycle (0 to 1)", [signal::ONCOMING_DUTY, signal::OFFGOING_DUTY], 0.01)
+        } else {
+            ("current (A), throttle", "current", [signal::ONCOMING_CURRENT, signal::OFFGOING_CURRENT], 1.0)
+        };
+        let command =
+            |clutch, stroke, column| self.signal(&format!("{name}, {clutch} clutch"), stroke, column, |x| unit * x);
+        panel(
+            title,
+            height,
+            vec![
+                command("oncoming", Stroke::SIGNAL, oncoming),
+                command("offgoing", Stroke::SECOND, offgoing),
+                self.signal("throttle (0 to 1)", Stroke::THIRD, signal::THROTTLE, |x| x),
+            ],
+        )
     }
 
     /// A column of the trace, in the unit that people read.
-    fn signal(&self, label: &str, colour: &'static str, name: &str, unit: impl Fn(f64) -> f64) -> Series {
+    fn signal(&self, label: &str, stroke: Stroke, name: &str, unit: impl Fn(f64) -> f64) -> Series {
         let values = self.trace.get(name).unwrap_or_default();
         let points = self.trace.time_s.iter().zip(values).map(|(&t, &v)| (t, unit(v))).collect();
-        Series { label: label.to_owned(), colour, dashed: false, points }
+        Series { label: label.to_owned(), stroke, points }
     }
 
     /// A curve of each observer; those without a finite value are left out.
     fn of_observers(&self, value: impl Fn(&ObserverRun, usize) -> f64) -> Vec<Series> {
-        let colours = observer_colours(self.runs.iter().map(|run| run.entry.kind));
-        (self.runs.iter().zip(colours))
-            .map(|(run, colour)| Series {
+        let strokes = observer_strokes(self.runs.iter().map(|run| &run.entry));
+        (self.runs.iter().zip(strokes))
+            .map(|(run, stroke)| Series {
                 label: run.entry.name.clone(),
-                colour,
-                dashed: run.entry.kind == ObserverKind::OpenLoop,
+                stroke,
                 points: run.time_s.iter().enumerate().map(|(i, &t)| (t, value(run, i))).collect(),
             })
             .filter(|series| series.points.iter().any(|(_, value)| value.is_finite()))
             .collect()
     }
 
-    fn pressures(&self) -> Vec<Series> {
-        self.of_observers(|run, i| units::mpa(run.estimates[i].pressure_pa))
+    fn estimates(&self, value: impl Fn(&Estimate<f64>) -> f64) -> Vec<Series> {
+        self.of_observers(|run, i| value(&run.estimates[i]))
     }
 
-    fn pressure_errors(&self) -> Vec<Series> {
-        self.of_observers(|run, i| units::mpa(run.truth_pa[i] - run.estimates[i].pressure_pa))
+    /// The guaranteed range, as the main observer carries it, if there is one.
+    fn range(&self, of: impl Fn(&Bounds<f64>) -> Option<[f64; 2]>) -> Option<Band> {
+        let main = main_observer(self.runs.iter().map(|run| &run.entry));
+        let run = self.runs.get(main)?;
+        let ends = |end: usize| -> Vec<(f64, f64)> {
+            let value = |bounds: &Bounds<f64>| of(bounds).map_or(f64::NAN, |ends| ends[end]);
+            let estimates = run.time_s.iter().zip(&run.estimates);
+            estimates.map(|(&time, e)| (time, e.bounds.as_ref().map_or(f64::NAN, value))).collect()
+        };
+        let band = Band { label: "guaranteed range".into(), colour: RANGE, lower: ends(0), upper: ends(1) };
+        band.upper.iter().any(|(_, value)| value.is_finite()).then_some(band)
     }
 
-    fn shaft_torques(&self) -> Vec<Series> {
-        self.of_observers(|run, i| run.estimates[i].shaft_torque_n_m.unwrap_or(f64::NAN))
+    /// The bound of the certificate of the first observer, where it is the rigid one.
+    fn certified_band(&self) -> Option<Band> {
+        let run = self.runs.first().filter(|_| !self.bound_pa.is_empty())?;
+        let colour = observer_strokes(self.runs.iter().map(|run| &run.entry)).first()?.colour;
+        let ends = |sign: f64| -> Vec<(f64, f64)> {
+            let bounds = self.bound_pa.iter().map(|bound| bound.map_or(f64::NAN, |pa| sign * units::mpa(pa)));
+            run.time_s.iter().copied().zip(bounds).collect()
+        };
+        Some(Band {
+            label: format!("certified band of {}", run.entry.name),
+            colour,
+            lower: ends(-1.0),
+            upper: ends(1.0),
+        })
     }
+}
 
-    /// Clutch torque as the first observer estimates it.
-    fn clutch_torque(&self) -> Series {
-        let points = self.runs.first().map(|run| {
-            run.time_s.iter().zip(&run.estimates).map(|(&t, estimate)| (t, estimate.clutch_torque_n_m)).collect()
-        });
-        let name = self.runs.first().map_or("", |run| &run.entry.name);
-        Series {
-            label: format!("clutch B, {name}"),
-            colour: colour::BLUE,
-            dashed: false,
-            points: points.unwrap_or_default(),
-        }
-    }
-
-    fn bound(&self) -> Vec<(f64, f64)> {
-        let Some(run) = self.runs.first() else { return Vec::new() };
-        let bounds = self.bound_pa.iter().map(|bound| bound.map_or(f64::NAN, units::mpa));
-        run.time_s.iter().copied().zip(bounds).collect()
-    }
+/// Lowest and highest value of a curve over a part of the common axis.
+fn within(series: &Series, (from, to): (f64, f64)) -> Option<(f64, f64)> {
+    extremes(series.points.iter().filter(|(x, _)| (from..=to).contains(x)))
 }

@@ -1,17 +1,18 @@
 //! The page of a study: distributions, effects, the worst runs.
 
-use config::Study;
+use config::{Study, Values};
 use minijinja::{Value, context};
 use study::campaign::PHASES;
 use study::campaign::row::Run;
-use study::campaign::summary::EFFECT_BINS;
+use study::campaign::summary::{Distribution, EFFECT_BINS};
 use study::{Row, Summary};
 use trace::units::mpa;
 
-use crate::figure::{Figure, Panel, Series};
+use crate::figure::{Axis, Figure, Panel, Series};
 use crate::page::{PageError, inline, origin, templates};
-use crate::shift_figure::{OBSERVERS, observer_colours, observers_of};
-use crate::tables::phase_name;
+use crate::palette::{FAMILY, observer_strokes};
+use crate::shift_figure::observers_of;
+use crate::tables::{COMPARED_NAMES, number, phase_name};
 
 /// The page and its figures.
 #[derive(Debug, Clone)]
@@ -28,6 +29,8 @@ const CURVE_POINTS: u32 = 200;
 const DRAWN_FACTORS: usize = 6;
 /// Share of the runs that a drawn distribution reaches to.
 const DRAWN_SHARE: f64 = 0.99;
+/// Where the axis of the distributions ends if there are none, Pa.
+const NO_RUNS_REACH_PA: f64 = 1e5;
 
 impl StudyPage {
     /// The page of a study's rows. `worst` are its worst runs in full, in the order of the summary; `command` is
@@ -58,14 +61,21 @@ impl StudyPage {
             plan => study.plan.name(),
             seed => study.seed,
             factors => study.factors.iter().map(|factor| {
-                let [low, high] = factor.values.ends();
-                context! { name => &factor.name, key => &factor.key, low => short(low), high => short(high) }
+                let [low, high] = factor.values.taken().ends();
+                context! {
+                    name => &factor.name,
+                    key => &factor.key,
+                    low => short(low),
+                    high => short(high),
+                    sometimes => sometimes(&factor.values),
+                }
             }).collect::<Vec<_>>(),
             statuses => summary.statuses.iter()
                 .map(|(status, count)| context! { name => status.name().replace('_', " "), count => count })
                 .collect::<Vec<_>>(),
             scores => scores(summary),
-            has_open_loop => layout.open_loop.is_some(),
+            diverged => diverged(summary),
+            relative => relative(summary),
             errors_figure => inline(&figures[0].1),
             effects_figures => figures[1..3].iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),
             observers => &layout.observers,
@@ -74,6 +84,7 @@ impl StudyPage {
                 rows => effect_rows(summary, phase),
             }).collect::<Vec<_>>(),
             has_total => summary.effects(0, 0).iter().any(|effect| effect.total.is_some()),
+            has_sometimes => study.factors.iter().any(|factor| sometimes(&factor.values).is_some()),
             first_observer => layout.observers.first(),
             drawn_factors => DRAWN_FACTORS.min(layout.factors.len()),
             worst => worst_runs,
@@ -88,15 +99,21 @@ fn short(value: f64) -> String {
     format!("{:.3e}", value).parse::<f64>().map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
 }
 
+/// The share of the runs in which a factor is, in per cent, and its value in the others, if it is not in all of them.
+fn sometimes(values: &Values) -> Option<[String; 2]> {
+    match values {
+        Values::Sometimes(s) => Some([number(100.0 * s.chance, 0), short(s.otherwise)]),
+        Values::List(_) | Values::Uniform(..) | Values::LogUniform(..) | Values::Normal(..) => None,
+    }
+}
+
 /// One row for each phase and observer.
 fn scores(summary: &Summary) -> Vec<Value> {
     let mut rows = Vec::new();
     for (i, phase) in PHASES.into_iter().enumerate() {
         for (observer, name) in summary.layout.observers.iter().enumerate() {
-            let (rms, ratio, chatter) =
-                (summary.rms(observer, i), summary.ratio(observer, i), summary.chatter(observer, i));
-            let pressure = |pascal: f64| format!("{:.4}", mpa(pascal));
-            let is_open_loop = summary.layout.open_loop == Some(observer);
+            let (rms, chatter) = (summary.rms(observer, i), summary.chatter(observer, i));
+            let pressure = |pascal: f64| number(mpa(pascal), 4);
             rows.push(context! {
                 first => observer == 0,
                 phase => phase_name(phase),
@@ -104,17 +121,51 @@ fn scores(summary: &Summary) -> Vec<Value> {
                 median => pressure(rms.quantile(0.5)),
                 high => pressure(rms.quantile(0.95)),
                 worst => pressure(rms.largest()),
-                ratio_median => (!is_open_loop).then(|| format!("{:.2}", ratio.quantile(0.5))),
-                ratio_high => (!is_open_loop).then(|| format!("{:.2}", ratio.quantile(0.95))),
-                ratio_worst => (!is_open_loop).then(|| format!("{:.2}", ratio.largest())),
-                better => (!is_open_loop).then(|| format!("{:.0}", 100.0 * ratio.share_below(1.0))),
-                chatter => format!("{:.3}", mpa(chatter.quantile(0.5))),
+                chatter => number(mpa(chatter.quantile(0.5)), 3),
                 covered => coverage(summary.covered(observer, i)),
                 width => pressure(summary.width(observer, i).quantile(0.5)),
             });
         }
     }
     rows
+}
+
+/// The errors over those of the open loop: one row for each error, phase and observer.
+fn relative(summary: &Summary) -> Vec<Value> {
+    let mut rows = Vec::new();
+    for (compared, error) in COMPARED_NAMES.into_iter().enumerate() {
+        for (i, phase) in PHASES.into_iter().enumerate() {
+            let before = rows.len();
+            for (observer, name) in summary.layout.observers.iter().enumerate() {
+                let Some(r) = summary.relative(compared, observer, i) else { continue };
+                let ratios = [r.median, r.high, r.largest, r.high_over_high, r.worst_over_worst];
+                rows.push(context! {
+                    first => rows.len() == before,
+                    error => error,
+                    phase => phase_name(phase),
+                    observer => name,
+                    ratios => ratios.map(|ratio| number(ratio, 2)),
+                    better => format!("{:.0}", (100.0 * r.better).floor()),
+                });
+            }
+        }
+    }
+    rows
+}
+
+/// Which estimates diverged, in how many runs; nothing if none did.
+pub fn diverged(summary: &Summary) -> Option<String> {
+    let mut found = Vec::new();
+    for (observer, name) in summary.layout.observers.iter().enumerate() {
+        for (i, phase) in PHASES.into_iter().enumerate() {
+            let runs = summary.rms(observer, i);
+            if runs.diverged() > 0 {
+                let (diverged, all) = (runs.diverged(), runs.count());
+                found.push(format!("{name} in the {} of {diverged} of {all} runs", phase_name(phase)));
+            }
+        }
+    }
+    (!found.is_empty()).then(|| found.join(", "))
 }
 
 /// Runs whose range held the truth, of those with a range.
@@ -126,26 +177,35 @@ fn coverage((covered, all): (u64, u64)) -> String {
 fn distributions(summary: &Summary, study: &Study) -> Figure {
     let observers = summary.layout.observers.len();
     let all = (0..observers).flat_map(|o| (0..PHASES.len()).map(move |p| (o, p)));
-    let reach = all.map(|(o, p)| summary.rms(o, p).quantile(DRAWN_SHARE)).filter(|x| x.is_finite()).fold(1.0, f64::max);
-    let colours = observer_colours(study.experiment.observers.iter().map(|entry| entry.kind));
+    let reach = reach(all.map(|(o, p)| summary.rms(o, p)));
+    let strokes = observer_strokes(study.experiment.observers.iter());
     let panels = PHASES.into_iter().enumerate().map(|(i, phase)| {
         let series = (0..observers).map(|observer| Series {
             label: summary.layout.observers[observer].clone(),
-            colour: colours[observer],
-            dashed: summary.layout.open_loop == Some(observer),
+            stroke: strokes[observer],
             points: (0..=CURVE_POINTS)
+                .filter(|_| summary.rms(observer, i).count() > 0)
                 .map(|n| reach * f64::from(n) / f64::from(CURVE_POINTS))
                 .map(|x| (mpa(x), 100.0 * summary.rms(observer, i).share_below(x)))
                 .collect(),
         });
-        panel(&format!("{}: runs (%)", phase_name(phase)), 170.0, series.collect()).within(0.0, 100.0)
+        panel(&format!("{}: runs (%)", phase_name(phase)), 170.0, Axis::Fixed(0.0, 100.0), series.collect())
     });
     Figure {
-        x_label: "RMS error of the pressure below (MPa)",
+        x_label: "RMS error of the pressure (MPa)",
         x_range: (0.0, mpa(reach)),
         spans: Vec::new(),
         panels: panels.collect(),
     }
+}
+
+/// Where the axis of the distributions ends, Pa: it holds nearly all runs of every observer, but no error ten times as large
+/// as is usual for the best, which a diverged observer has.
+fn reach<'a>(errors: impl Iterator<Item = &'a Distribution>) -> f64 {
+    let of_one = |d: &Distribution| d.quantile(DRAWN_SHARE).min(10.0 * d.quantile(0.5));
+    let reaches: Vec<f64> = errors.map(of_one).filter(|reach| reach.is_finite() && *reach > 0.0).collect();
+    let least = reaches.iter().copied().fold(f64::INFINITY, f64::min);
+    reaches.into_iter().filter(|&reach| reach <= 10.0 * least).reduce(f64::max).unwrap_or(NO_RUNS_REACH_PA)
 }
 
 /// Mean error of the first observer over the factors that move it most, and of the open loop over the same.
@@ -159,8 +219,7 @@ fn effects_figure(summary: &Summary, phase: usize) -> Figure {
         (strongest.iter().enumerate())
             .map(|(n, &factor)| Series {
                 label: effects[factor].factor.clone(),
-                colour: OBSERVERS[n % OBSERVERS.len()],
-                dashed: false,
+                stroke: FAMILY[n % FAMILY.len()],
                 points: (effects[factor].means.iter().enumerate())
                     .filter(|(_, mean)| mean.is_finite())
                     .map(|(bin, &mean)| (100.0 * (bin as f64 + 0.5) / EFFECT_BINS as f64, mpa(mean)))
@@ -170,7 +229,14 @@ fn effects_figure(summary: &Summary, phase: usize) -> Figure {
     };
     let names = &summary.layout.observers;
     let shown = std::iter::once(0).chain(summary.layout.open_loop.filter(|&open_loop| open_loop != 0));
-    let panels = shown.map(|observer| panel(&format!("{} (MPa)", names[observer]), 150.0, curves(observer)));
+    let panels = shown.map(|observer| {
+        let curves = curves(observer);
+        let mut means: Vec<f64> = curves.iter().flat_map(|curve| &curve.points).map(|point| point.1).collect();
+        means.sort_by(f64::total_cmp);
+        // One diverged run lifts the mean of its bin out of all proportion.
+        let axis = means.get(means.len() / 2).map_or(Axis::All, |median| Axis::Within(0.0, 10.0 * median));
+        panel(&format!("{}, error (MPa)", names[observer]), 150.0, axis, curves)
+    });
     let panels: Vec<Panel> = panels.collect();
     Figure {
         x_label: "factor, from its smallest (0 %) to its largest value (100 %)",
@@ -180,16 +246,18 @@ fn effects_figure(summary: &Summary, phase: usize) -> Figure {
     }
 }
 
-fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
-    Panel { y_label: y_label.to_owned(), height, series, band: None, y_range: None }
+fn panel(y_label: &str, height: f64, axis: Axis, series: Vec<Series>) -> Panel {
+    Panel { y_label: y_label.to_owned(), height, series, band: None, axis }
 }
 
 /// Sobol indices: one row for each factor, the first order (and total) of each observer.
 fn effect_rows(summary: &Summary, phase: usize) -> Vec<Value> {
     let observers = 0..summary.layout.observers.len();
     let effects: Vec<_> = observers.map(|observer| summary.effects(observer, phase)).collect();
+    // A share that is not known has no shade.
+    let shade = |share: f64| format!("{:.2}", 0.6 * if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) });
     // A negative estimate is chance: the share is zero.
-    let percent = |share: f64| format!("{:.0}", 100.0 * share.max(0.0));
+    let percent = |share: f64| number(if share < 0.0 { 0.0 } else { 100.0 * share }, 0);
     (summary.layout.factors.iter().enumerate())
         .map(|(i, factor)| {
             let cells = effects.iter().map(|effects| {
@@ -197,7 +265,7 @@ fn effect_rows(summary: &Summary, phase: usize) -> Vec<Value> {
                 context! {
                     first => percent(effect.first_order),
                     total => effect.total.map(percent),
-                    shade => format!("{:.2}", 0.6 * effect.first_order.clamp(0.0, 1.0)),
+                    shade => shade(effect.first_order),
                 }
             });
             context! { factor => factor, cells => cells.collect::<Vec<_>>() }
@@ -211,7 +279,7 @@ fn worst_run(row: &Row, summary: &Summary, svg: &str, command: &str) -> Value {
     let errors = layout.observers.iter().enumerate().map(|(observer, name)| {
         context! {
             observer => name,
-            errors => (0..PHASES.len()).map(|phase| format!("{:.4}", mpa(rms(observer, phase)))).collect::<Vec<_>>(),
+            errors => (0..PHASES.len()).map(|phase| number(mpa(rms(observer, phase)), 4)).collect::<Vec<_>>(),
         }
     });
     let factors = layout.factors.iter().zip(&row.numbers);

@@ -3,8 +3,24 @@
 use design::{Certificate, CompliantCertificate};
 use minijinja::{Value, context};
 use observer::Phase;
+use study::campaign::COMPARED;
 use study::{Comparison, PhaseScore};
 use trace::units::mpa;
+
+/// A number with these decimals; with an exponent where it is that of a diverged observer, a dash where there is none.
+pub fn number(value: f64, decimals: usize) -> String {
+    match value.abs() {
+        size if size < 1e6 => format!("{value:.decimals$}"),
+        size if size.is_nan() => "–".to_owned(),
+        f64::INFINITY => "∞".to_owned(),
+        _ => format!("{value:.1e}"),
+    }
+}
+
+/// A share in per cent, rounded down: 100 % is all of it.
+pub fn coverage(share: f64) -> String {
+    format!("{:.1} %", (1000.0 * share).floor() / 10.0)
+}
 
 /// Name of a phase for people.
 pub fn phase_name(phase: Phase) -> &'static str {
@@ -16,14 +32,17 @@ pub fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-/// A time in ms, or a word for one that never came.
+/// Names of the errors that are compared with those of the open loop, see [`COMPARED`].
+pub const COMPARED_NAMES: [&str; COMPARED.len()] = ["pressure", "clutch torque"];
+
+/// A time in ms, if the error settled.
 fn settling(score: &PhaseScore) -> String {
-    score.settling_s.map_or_else(|| "never".to_owned(), |s| format!("{:.0}", 1e3 * s))
+    score.settling_s.map_or_else(|| "not settled".to_owned(), |s| format!("{:.0}", 1e3 * s))
 }
 
-/// Peak, RMS and mean size of a torque error.
+/// Peak, RMS and mean absolute value of a torque error.
 fn triple(score: &PhaseScore) -> String {
-    let one = |value: f64| if value < 100.0 { format!("{value:.1}") } else { format!("{value:.0}") };
+    let one = |value: f64| number(value, usize::from(value < 100.0));
     format!("{} / {} / {}", one(score.peak), one(score.rms), one(score.mean))
 }
 
@@ -33,8 +52,8 @@ pub(crate) fn score_rows(comparison: &Comparison) -> Vec<Value> {
     let phases = comparison.runs.first().map_or(0, |run| run.pressure.len());
     let cell = |pascal: f64| {
         context! {
-            mpa => format!("{:.4}", mpa(pascal)),
-            percent => format!("{:.1}", 100.0 * pascal / range_pa),
+            mpa => number(mpa(pascal), 4),
+            percent => number(100.0 * pascal / range_pa, 1),
         }
     };
     let mut rows = Vec::new();
@@ -50,7 +69,7 @@ pub(crate) fn score_rows(comparison: &Comparison) -> Vec<Value> {
                 rms => cell(pressure.rms),
                 mean => cell(pressure.mean),
                 settling_ms => settling(pressure),
-                chatter => format!("{:.3}", mpa(pressure.chatter)),
+                chatter => number(mpa(pressure.chatter), 3),
                 torque => triple(torque),
                 shaft => run.shaft.as_ref().map_or_else(|| "–".to_owned(), |shaft| triple(&shaft[phase])),
             });
@@ -114,16 +133,32 @@ fn margin(per_s: f64) -> String {
     if per_s < 0.01 { format!("{per_s:.1e}") } else { format!("{per_s:.4}") }
 }
 
-/// What a calibrator asks of the shift.
+/// How good the shift was.
 pub(crate) fn quality_rows(comparison: &Comparison) -> Option<Vec<(&'static str, String)>> {
     let q = comparison.quality.as_ref()?;
     Some(vec![
         ("torque phase", format!("{:.3} s", q.inertia_phase_start_s - q.torque_phase_start_s)),
         ("inertia phase", format!("{:.3} s", q.lock_up_s - q.inertia_phase_start_s)),
-        ("flare of the turbine", format!("{:.2} rad/s", q.flare_rad_s)),
-        ("least drive-shaft torque", format!("{:.0} N m", q.least_shaft_torque_n_m)),
-        ("jerk, peak over 20 ms", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
+        ("turbine speed flare", format!("{:.2} rad/s", q.flare_rad_s)),
+        ("lowest drive-shaft torque", format!("{:.0} N m", q.least_shaft_torque_n_m)),
+        ("peak jerk over 20 ms", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
         ("vibration dose value above 0.4 Hz", format!("{:.2} m/s^1.75", q.vibration_dose_m_s175)),
-        ("friction work in clutch B", format!("{:.1} kJ", 1e-3 * q.friction_work_j)),
+        ("friction work of the oncoming clutch", format!("{:.1} kJ", 1e-3 * q.friction_work_j)),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_of_any_size_is_short() {
+        assert_eq!([0.01234, -5.0, f64::NAN].map(|value| number(value, 3)), ["0.012", "-5.000", "–"]);
+        assert_eq!([1e9, -1e95, f64::INFINITY].map(|value| number(value, 3)), ["1.0e9", "-1.0e95", "∞"]);
+    }
+
+    #[test]
+    fn a_range_that_misses_the_truth_once_is_not_said_to_hold_it_always() {
+        assert_eq!([1.0, 0.9996, 0.5].map(coverage), ["100.0 %", "99.9 %", "50.0 %"]);
+    }
 }

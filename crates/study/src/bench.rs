@@ -2,11 +2,13 @@
 
 use std::time::Instant;
 
-use config::{Experiment, Vehicle};
+use config::{ConfigError, Experiment, ObserverKind, Vehicle};
 use observer::{Estimate, Phase};
 use serde::Serialize;
+use trace::Trace;
 
 use crate::campaign::plan::mixed;
+use crate::campaign::summary::over;
 use crate::comparison::{observers, run_observers};
 use crate::sampling::sampled;
 use crate::{ObserverRun, PhaseScore, RangeScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
@@ -22,12 +24,16 @@ pub struct BenchCell {
     pub inertia_phase_rms_pa: f64,
     /// RMS error of the pressure over both phases, Pa.
     pub shift_rms_pa: f64,
+    /// Whether the estimate diverged. Its errors are infinite then; JSON, which has no infinity, holds null for them.
+    pub diverged: bool,
     /// Chatter in both phases, Pa.
     pub chatter_pa: f64,
     /// RMS error of the drive-shaft torque over both phases, N m, if it estimates that.
     pub shaft_rms_n_m: Option<f64>,
     /// Share of the samples at which pressure and clutch torque lie in their guaranteed ranges, if there are any.
     pub range_coverage: Option<f64>,
+    /// The same of the drive-shaft torque in its expected range.
+    pub shaft_range_coverage: Option<f64>,
     /// Mean width of the guaranteed range of the pressure over both phases, Pa.
     pub range_width_pa: Option<f64>,
     /// The same of the clutch torque, N m.
@@ -52,6 +58,8 @@ pub struct BenchRow {
 pub struct BenchSummary {
     /// The observer.
     pub observer: String,
+    /// Completed scenarios in which its estimate diverged. They count as infinite; JSON holds null for that.
+    pub diverged: usize,
     /// Median ratio over both phases together, by which the observers are ranked.
     pub shift_median_ratio: f64,
     /// Median ratio in the torque phase.
@@ -70,9 +78,12 @@ pub struct BenchSummary {
     pub shaft_worst_rms_n_m: Option<f64>,
     /// Least coverage of the guaranteed range over the scenarios.
     pub range_least_coverage: Option<f64>,
+    /// The same of the expected range of the drive-shaft torque.
+    pub shaft_range_least_coverage: Option<f64>,
     /// Median width of the guaranteed range of the pressure, Pa.
     pub range_median_width_pa: Option<f64>,
-    /// Mean of that width over the width that would hold 95 % of normal errors with the observer's RMS over all scenarios.
+    /// Mean of that width over the width that would hold 95 % of normal errors with the observer's RMS over all
+    /// scenarios.
     pub range_over_errors: Option<f64>,
     /// Median width of the range of the clutch torque, N m.
     pub torque_range_median_width_n_m: Option<f64>,
@@ -93,41 +104,49 @@ pub struct Bench {
     pub ranking: Vec<BenchSummary>,
 }
 
-/// Runs every scenario of the experiment; `progress` is told each one's name before it starts.
+impl Bench {
+    /// Number of scenarios that are ranked.
+    pub fn completed(&self) -> usize {
+        self.rows.iter().filter(|row| row.completed).count()
+    }
+}
+
+/// Runs every scenario of the experiment; `progress` is called with each name before the scenario starts.
 ///
 /// # Errors
-/// Simulation, design, or signals; see [`StudyError`]. A shift that is not completed is a row, not an error.
+/// The experiment has no scenario, or no open loop to rank against; simulation, design, or signals, see [`StudyError`].
+/// A shift that is not completed is a row, not an error.
 pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMut(&str)) -> Result<Bench, StudyError> {
+    let open_loop = open_loop(experiment)?;
     let observers = self::observers(vehicle, experiment)?;
     let mut rows = Vec::new();
-    let mut first_trace = None;
+    let mut drives: Vec<(Experiment, Trace)> = Vec::new();
     for (number, scenario) in experiment.scenarios.iter().enumerate() {
         progress(&scenario.name);
         let mut varied = experiment.with_scenario(scenario);
-        let trace = simulate_drive(vehicle, &varied)?;
-        let told_otherwise = varied.sensors_told != experiment.sensors_told;
+        let trace = driven(vehicle, &varied, &mut drives)?;
+        let told_otherwise = varied.sensors_told != experiment.sensors_told || varied.observers != experiment.observers;
         let told_otherwise = told_otherwise.then(|| self::observers(vehicle, &varied)).transpose()?;
         let observers = told_otherwise.as_ref().unwrap_or(&observers);
         // One noise, the same for all, would decide between observers that are close.
         let seed = varied.sensors.map(|sensors| mixed(sensors.seed, number as u64));
         let mut draws = Vec::new();
-        for draw in 0..if seed.is_some() { DRAWS } else { 1 } {
+        for draw in 0..if seed.is_some() { experiment.draws } else { 1 } {
             if let (Some(sensors), Some(seed)) = (&mut varied.sensors, seed) {
                 sensors.seed = mixed(seed, draw);
             }
-            let runs = run_observers(vehicle, &varied, observers, &trace)?;
+            let runs = run_observers(vehicle, &varied, observers, trace)?;
             draws.push(runs.iter().map(cell).collect::<Vec<BenchCell>>());
         }
-        let completed = ShiftQuality::of(&trace, &vehicle.shift).is_some();
-        let cells = (0..experiment.observers.len()).map(|at| over(draws.iter().map(|cells| &cells[at]))).collect();
+        let completed = ShiftQuality::of(trace, &vehicle.shift).is_some();
+        let cells =
+            (0..experiment.observers.len()).map(|at| over_draws(draws.iter().map(|cells| &cells[at]))).collect();
         rows.push(BenchRow { scenario: scenario.name.clone(), completed, cells });
-        first_trace.get_or_insert(trace);
     }
-    let open_loop = experiment.observers.iter().position(|entry| entry.kind == config::ObserverKind::OpenLoop);
     let mut ranking = Vec::new();
-    if let (Some(open_loop), Some(trace)) = (open_loop, first_trace) {
+    if let Some((_, trace)) = drives.first() {
         for (at, (entry, observer)) in experiment.observers.iter().zip(&observers).enumerate() {
-            let samples = sampled(&trace, entry.sample_time_s);
+            let samples = sampled(trace, entry.sample_time_s);
             let columns = RunColumns::of(&samples, vehicle)?;
             let step_ns = fastest_ns(|| observer.run_alone(&columns));
             let step_with_range_ns = fastest_ns(|| observer.run(vehicle, &columns));
@@ -142,13 +161,56 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     Ok(Bench { rows, ranking })
 }
 
-/// Draws of the sensors' noise in each scenario.
-const DRAWS: u64 = 5;
+/// The drive of an experiment, simulated once for all scenarios that differ in their sensors alone.
+fn driven<'a>(
+    vehicle: &Vehicle,
+    experiment: &Experiment,
+    drives: &'a mut Vec<(Experiment, Trace)>,
+) -> Result<&'a Trace, StudyError> {
+    let same = |other: &Experiment| {
+        let plant = |e: &Experiment| (e.off_nominal, e.throttle, e.shift);
+        plant(other) == plant(experiment)
+    };
+    let at = match drives.iter().position(|(other, _)| same(other)) {
+        Some(at) => at,
+        None => {
+            drives.push((experiment.clone(), simulate_drive(vehicle, experiment)?));
+            drives.len() - 1
+        }
+    };
+    Ok(&drives[at].1)
+}
 
-/// Width that holds 95 % of normal errors, in standard deviations.
+/// Position of the open loop, the reference of the ranking.
+///
+/// # Errors
+/// The experiment has no scenario, or no open loop.
+pub fn open_loop(experiment: &Experiment) -> Result<usize, ConfigError> {
+    let missing = |key: &str, at: usize, message: &str| ConfigError::Meaning {
+        path: experiment.source.path.clone(),
+        line: experiment.source.line(at),
+        key: key.to_owned(),
+        message: message.to_owned(),
+        hint: Some("see experiments/bench.toml".to_owned()),
+    };
+    if experiment.scenarios.is_empty() {
+        return Err(missing("scenario", 0, "there is no [[scenario]]"));
+    }
+    let first_scenario = experiment.source.text.find("[[scenario]]").unwrap_or_default();
+    let open_loop = experiment.observers.iter().position(|entry| entry.kind == ObserverKind::OpenLoop);
+    open_loop.ok_or_else(|| {
+        missing(
+            "observer",
+            first_scenario,
+            "there is no observer of the kind \"open-loop\", which is the reference of the ranking",
+        )
+    })
+}
+
+/// Width that contains 95 % of normally distributed errors, in standard deviations.
 const ERRORS_95: f64 = 2.0 * 1.96;
 
-/// Runs over which the fastest step is sought.
+/// Number of runs; the step time is that of the fastest.
 const TIMED_RUNS: usize = 20;
 
 /// Time of one step, ns.
@@ -164,7 +226,7 @@ fn fastest_ns(run: impl Fn() -> Vec<Estimate<f64>>) -> f64 {
 }
 
 /// One observer's scores over several draws of the sensors' noise.
-fn over<'a>(draws: impl Iterator<Item = &'a BenchCell>) -> BenchCell {
+fn over_draws<'a>(draws: impl Iterator<Item = &'a BenchCell>) -> BenchCell {
     let draws: Vec<&BenchCell> = draws.collect();
     let mean =
         |value: &dyn Fn(&BenchCell) -> f64| draws.iter().map(|cell| value(cell)).sum::<f64>() / draws.len() as f64;
@@ -179,9 +241,12 @@ fn over<'a>(draws: impl Iterator<Item = &'a BenchCell>) -> BenchCell {
         torque_phase_rms_pa: rms(&|cell| cell.torque_phase_rms_pa),
         inertia_phase_rms_pa: rms(&|cell| cell.inertia_phase_rms_pa),
         shift_rms_pa: rms(&|cell| cell.shift_rms_pa),
+        diverged: draws.iter().any(|cell| cell.diverged),
         chatter_pa: mean(&|cell| cell.chatter_pa),
         shaft_rms_n_m: some(|cell| cell.shaft_rms_n_m.map(|rms| rms * rms)).map(|squares| mean_of(squares).sqrt()),
         range_coverage: some(|cell| cell.range_coverage).and_then(|shares| shares.into_iter().reduce(f64::min)),
+        shaft_range_coverage: some(|cell| cell.shaft_range_coverage)
+            .and_then(|shares| shares.into_iter().reduce(f64::min)),
         range_width_pa: some(|cell| cell.range_width_pa).map(mean_of),
         torque_range_width_n_m: some(|cell| cell.torque_range_width_n_m).map(mean_of),
         shaft_range_width_n_m: some(|cell| cell.shaft_range_width_n_m).map(mean_of),
@@ -205,14 +270,17 @@ fn cell(run: &ObserverRun) -> BenchCell {
         mean.is_finite().then_some(mean)
     };
     let coverage = ranges.iter().map(|range| range.inside()).reduce(f64::min);
+    let shift_rms_pa = together(&pressure);
     BenchCell {
         observer: run.entry.name.clone(),
         torque_phase_rms_pa: rms(Phase::TorquePhase),
         inertia_phase_rms_pa: rms(Phase::InertiaPhase),
-        shift_rms_pa: together(&pressure),
+        shift_rms_pa,
+        diverged: shift_rms_pa.is_infinite(),
         chatter_pa: pressure.iter().map(|score| score.chatter).sum(),
-        shaft_rms_n_m: run.shaft.as_ref().map(|shaft| together(&of(shaft))),
+        shaft_rms_n_m: run.shaft.as_ref().map(|shaft| together(&of(shaft))).filter(|rms| !rms.is_nan()),
         range_coverage: coverage,
+        shaft_range_coverage: ranges.iter().map(|range| range.shaft_inside).reduce(f64::min),
         range_width_pa: width(|range| range.width_pa),
         torque_range_width_n_m: width(|range| range.torque_width_n_m),
         shaft_range_width_n_m: width(|range| range.shaft_width_n_m),
@@ -223,7 +291,9 @@ fn cell(run: &ObserverRun) -> BenchCell {
 fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummary {
     let completed = || rows.iter().filter(|row| row.completed);
     let ratios = |rms: fn(&BenchCell) -> f64| -> Vec<f64> {
-        sorted(completed().map(|row| rms(&row.cells[at]) / rms(&row.cells[open])).collect())
+        let ratios = completed().map(|row| over(rms(&row.cells[at]), rms(&row.cells[open])));
+        // A phase between two samples has no score.
+        sorted(ratios.filter(|ratio| !ratio.is_nan()).collect())
     };
     let some = |value: fn(&BenchCell) -> Option<f64>| -> Vec<f64> {
         sorted(completed().filter_map(|row| value(&row.cells[at])).collect())
@@ -235,6 +305,7 @@ fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummar
     let middle = |values: Vec<f64>| (!values.is_empty()).then(|| median(&values));
     BenchSummary {
         observer: name.to_owned(),
+        diverged: completed().filter(|row| row.cells[at].diverged).count(),
         shift_median_ratio: median(&ratios(|cell| cell.shift_rms_pa)),
         torque_phase_median_ratio: median(&torque),
         torque_phase_worst_ratio: last(&torque),
@@ -244,6 +315,7 @@ fn summary(name: &str, at: usize, open: usize, rows: &[BenchRow]) -> BenchSummar
         shaft_median_rms_n_m: (!shaft.is_empty()).then(|| median(&shaft)),
         shaft_worst_rms_n_m: shaft.last().copied(),
         range_least_coverage: some(|cell| cell.range_coverage).first().copied(),
+        shaft_range_least_coverage: some(|cell| cell.shaft_range_coverage).first().copied(),
         range_median_width_pa: middle(some(|cell| cell.range_width_pa)),
         range_over_errors: over_errors(completed().map(|row| &row.cells[at])),
         torque_range_median_width_n_m: middle(some(|cell| cell.torque_range_width_n_m)),
@@ -260,7 +332,7 @@ fn over_errors<'a>(cells: impl Iterator<Item = &'a BenchCell>) -> Option<f64> {
         squares += cell.shift_rms_pa * cell.shift_rms_pa;
         count += 1.0;
     }
-    (count > 0.0).then(|| widths / count / (ERRORS_95 * (squares / count).sqrt()))
+    (count > 0.0 && squares < f64::INFINITY).then(|| widths / count / (ERRORS_95 * (squares / count).sqrt()))
 }
 
 fn sorted(mut values: Vec<f64>) -> Vec<f64> {
@@ -286,5 +358,29 @@ mod tests {
     fn the_median_of_an_even_number_lies_between_the_middle_ones() {
         assert_eq!((median(&[1.0, 2.0, 9.0]), median(&[1.0, 2.0, 4.0, 9.0])), (2.0, 3.0));
         assert!(median(&[]).is_nan());
+    }
+
+    #[test]
+    fn an_observer_that_diverges_in_one_draw_counts_as_infinitely_wrong() {
+        let cell = |rms: f64| BenchCell {
+            observer: "one".to_owned(),
+            torque_phase_rms_pa: rms,
+            inertia_phase_rms_pa: rms,
+            shift_rms_pa: rms,
+            diverged: rms.is_infinite(),
+            chatter_pa: 0.0,
+            shaft_rms_n_m: None,
+            range_coverage: None,
+            shaft_range_coverage: None,
+            range_width_pa: Some(1e5),
+            torque_range_width_n_m: None,
+            shaft_range_width_n_m: None,
+        };
+        let wild = over_draws([cell(1e3), cell(f64::INFINITY)].iter());
+        assert!(wild.diverged && wild.shift_rms_pa.is_infinite());
+        let rows = [BenchRow { scenario: "nominal".to_owned(), completed: true, cells: vec![wild, cell(1e3)] }];
+        let [wild, open] = [0, 1].map(|at| summary("", at, 1, &rows));
+        assert_eq!((wild.diverged, wild.shift_median_ratio, wild.range_over_errors), (1, f64::INFINITY, None));
+        assert_eq!((open.diverged, open.shift_median_ratio), (0, 1.0));
     }
 }

@@ -1,15 +1,16 @@
 //! Several observers on the same drive.
 
+use config::study::RECORD_BEFORE_S;
 use config::{ConfigError, Experiment, ObserverEntry, ObserverKind, Vehicle};
 use design::{CompliantDesign, DesignError, RigidDesign, design_compliant, design_rigid};
-use observer::{Estimate, Phase};
+use observer::{Bounds, Estimate, Phase};
 use plant::PlantError;
 use trace::{Trace, TraceError, signal};
 
-use crate::observers::AnyObserver;
+use crate::observers::{AnyObserver, ranges};
 use crate::sampling::{sampled, through_sensors};
-use crate::score::score_ranges;
-use crate::{PhaseScore, RangeScore, RunColumns, ShiftQuality, score, simulate_drive, true_phases};
+use crate::score::{score_ranges, size};
+use crate::{PhaseScore, RangeScore, RunColumns, ShiftQuality, score, simulate_drive, simulate_shift, true_phases};
 
 /// Share of the range within which a pressure error counts as settled.
 const SETTLED_SHARE: f64 = 0.05;
@@ -24,6 +25,17 @@ pub enum StudyError {
     /// Values of a study's factors that do not go together.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A defect of this program.
+    #[error("run {run}: {message}\nhint: this is an error in wetclutch; please report it with the files of the study")]
+    Defect {
+        /// The run in which it showed.
+        run: u64,
+        /// The message of the panic.
+        message: String,
+    },
+    /// The system gives no thread to work on.
+    #[error("no thread could be started: {0}")]
+    Threads(#[source] std::io::Error),
     /// The search for a worst case failed.
     #[error("the search failed: {0}")]
     Search(String),
@@ -87,7 +99,18 @@ pub struct Comparison {
 /// # Errors
 /// Simulation, design, or signals; see [`StudyError`].
 pub fn compare(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison, StudyError> {
-    let trace = simulate_drive(vehicle, experiment)?;
+    compare_on(simulate_drive(vehicle, experiment)?, vehicle, experiment)
+}
+
+/// The same over the shift alone.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_shift(vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison, StudyError> {
+    compare_on(simulate_shift(vehicle, vehicle, experiment, RECORD_BEFORE_S)?, vehicle, experiment)
+}
+
+fn compare_on(trace: Trace, vehicle: &Vehicle, experiment: &Experiment) -> Result<Comparison, StudyError> {
     let (rigid, compliant) = (design_rigid(vehicle)?, design_compliant(vehicle)?);
     let observers = observers(vehicle, experiment)?;
     let runs = run_observers(vehicle, experiment, &observers, &trace)?;
@@ -116,6 +139,9 @@ pub fn observers(vehicle: &Vehicle, experiment: &Experiment) -> Result<Vec<AnyOb
     experiment.observers.iter().map(|entry| AnyObserver::of(vehicle, entry, sensors)).collect()
 }
 
+/// The signals of observers with this sample time, behind sensors or not, and the ranges at every sample.
+type Seen = ((f64, bool), Trace, Vec<Bounds<f64>>);
+
 /// Runs the experiment's observers over a recorded drive, each behind its sensors and at its sample time.
 ///
 /// # Errors
@@ -126,21 +152,28 @@ pub fn run_observers(
     observers: &[AnyObserver],
     whole: &Trace,
 ) -> Result<Vec<ObserverRun>, TraceError> {
-    let mut seen: Vec<((f64, bool), Trace)> = Vec::new();
+    let mut seen: Vec<Seen> = Vec::new();
     (experiment.observers.iter().zip(observers))
         .map(|(entry, observer)| {
-            // Observers of the same sample time see the same signals.
+            // Observers of the same sample time see the same signals, and have the same ranges.
             let signals = (entry.sample_time_s, entry.real_sensors);
-            let at = seen.iter().position(|(same, _)| *same == signals).unwrap_or_else(|| {
-                let ideal = sampled(whole, entry.sample_time_s);
-                let trace = match &experiment.sensors {
-                    Some(sensors) if entry.real_sensors => through_sensors(whole, &ideal, sensors, vehicle),
-                    _ => ideal,
-                };
-                seen.push((signals, trace));
-                seen.len() - 1
-            });
-            run_observer(vehicle, experiment, entry, observer, &seen[at].1)
+            let at = seen.iter().position(|(same, ..)| *same == signals);
+            let at = match at {
+                Some(at) => at,
+                None => {
+                    let trace = match &experiment.sensors {
+                        Some(sensors) if entry.real_sensors => {
+                            through_sensors(whole, entry.sample_time_s, sensors, vehicle)
+                        }
+                        _ => sampled(whole, entry.sample_time_s),
+                    };
+                    let ranges = ranges(vehicle, &RunColumns::of(&trace, vehicle)?);
+                    seen.push((signals, trace, ranges));
+                    seen.len() - 1
+                }
+            };
+            let (_, trace, ranges) = &seen[at];
+            run_observer(vehicle, experiment, entry, observer, trace, ranges)
         })
         .collect()
 }
@@ -151,22 +184,31 @@ fn run_observer(
     entry: &ObserverEntry,
     observer: &AnyObserver,
     trace: &Trace,
+    ranges: &[Bounds<f64>],
 ) -> Result<ObserverRun, TraceError> {
-    let estimates = observer.run(vehicle, &RunColumns::of(trace, vehicle)?);
+    let mut estimates = observer.run_alone(&RunColumns::of(trace, vehicle)?);
+    for (estimate, range) in estimates.iter_mut().zip(ranges) {
+        // Observers are compared as they are: limited to the ranges, those with large errors would look better.
+        *estimate = range.around(*estimate);
+    }
     let phases = true_phases(trace).unwrap_or_default();
     let time = &trace.time_s;
     let truth_pa = trace.require(signal::ONCOMING_PRESSURE)?;
     let settled_pa = SETTLED_SHARE * experiment.shift.line_pressure_pa;
     let clutch = trace.require(signal::ONCOMING_TORQUE)?;
     let shaft = trace.require(signal::SHAFT_TORQUE)?;
-    let has_shaft = estimates.iter().any(|estimate| estimate.shaft_torque_n_m.is_some());
+    // Where an observer gives no shaft torque there is nothing to hold against the truth.
+    let shaft_estimates: Vec<f64> =
+        estimates.iter().map(|estimate| estimate.shaft_torque_n_m.unwrap_or_default()).collect();
+    let shaft_known: Vec<f64> = (estimates.iter().zip(shaft))
+        .map(|(estimate, &truth)| if estimate.shaft_torque_n_m.is_some() { truth } else { f64::NAN })
+        .collect();
+    let has_shaft = shaft_known.iter().any(|truth| !truth.is_nan());
     Ok(ObserverRun {
         entry: entry.clone(),
         pressure: score(time, &phases, truth_pa, settled_pa, |i| estimates[i].pressure_pa),
         torque: score(time, &phases, clutch, SETTLED_CLUTCH_N_M, |i| estimates[i].clutch_torque_n_m),
-        shaft: has_shaft.then(|| {
-            score(time, &phases, shaft, SETTLED_SHAFT_N_M, |i| estimates[i].shaft_torque_n_m.unwrap_or(f64::NAN))
-        }),
+        shaft: has_shaft.then(|| score(time, &phases, &shaft_known, SETTLED_SHAFT_N_M, |i| shaft_estimates[i])),
         ranges: score_ranges(&phases, truth_pa, clutch, shaft, |i| estimates[i].bounds),
         truth_pa: truth_pa.to_vec(),
         time_s: trace.time_s.clone(),
@@ -203,7 +245,7 @@ impl Comparison {
         self.runs.iter().find(|run| run.entry.name == name)
     }
 
-    /// The open loop, which every result is held against.
+    /// The open loop, with which every result is compared.
     pub fn open_loop(&self) -> Option<&ObserverRun> {
         self.runs.iter().find(|run| run.entry.kind == ObserverKind::OpenLoop)
     }
@@ -214,7 +256,7 @@ impl Comparison {
         let run = self.runs.first()?;
         let excesses: Vec<f64> = (run.estimates.iter().zip(&run.truth_pa).zip(&self.bound_pa))
             .filter(|((estimate, _), _)| estimate.phase == phase)
-            .filter_map(|((estimate, truth), bound)| bound.map(|b| (truth - estimate.pressure_pa).abs() - b))
+            .filter_map(|((estimate, truth), bound)| bound.map(|b| size(truth - estimate.pressure_pa) - b))
             .collect();
         let inside = excesses.iter().filter(|&&excess| excess <= 1e-9).count();
         #[expect(clippy::cast_precision_loss, reason = "counts of samples")]

@@ -3,57 +3,70 @@
 use config::{Experiment, Vehicle};
 use observer::Phase;
 use plant::{Contact, Mode, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
-use trace::{Trace, Word, signal};
+use trace::{Cell, Trace, Word, signal};
 
-/// Columns of a simulated trace, measurable ones first.
-const COLUMNS: &[&str] = &[
-    signal::ENGINE_SPEED,
-    signal::TURBINE_SPEED,
-    signal::OUTPUT_SPEED,
-    signal::WHEEL_SPEED,
-    signal::ONCOMING_SLIP,
-    signal::ONCOMING_CURRENT,
-    signal::OFFGOING_CURRENT,
-    signal::THROTTLE,
-    signal::ONCOMING_PRESSURE,
-    signal::OFFGOING_PRESSURE,
-    signal::ONCOMING_TORQUE,
-    signal::OFFGOING_TORQUE,
-    signal::OFFGOING_SLIP,
-    signal::ENGINE_TORQUE,
-    signal::TURBINE_TORQUE,
-    signal::SHAFT_TORQUE,
-    signal::VEHICLE_SPEED,
-    signal::VEHICLE_ACCELERATION,
-];
+use crate::ShiftSample;
+use crate::run::command_signals;
+
+/// Columns of a simulated trace.
+const COLUMNS: usize = 18;
+
+/// Their names, measurable ones first.
+fn column_names(vehicle: &Vehicle) -> [&'static str; COLUMNS] {
+    let (oncoming_command, _) = command_signals(vehicle.oncoming.valve.command_kind());
+    let (_, offgoing_command) = command_signals(vehicle.offgoing.valve.command_kind());
+    [
+        signal::ENGINE_SPEED,
+        signal::TURBINE_SPEED,
+        signal::OUTPUT_SPEED,
+        signal::WHEEL_SPEED,
+        signal::ONCOMING_SLIP,
+        oncoming_command,
+        offgoing_command,
+        signal::THROTTLE,
+        signal::ONCOMING_PRESSURE,
+        signal::OFFGOING_PRESSURE,
+        signal::ONCOMING_TORQUE,
+        signal::OFFGOING_TORQUE,
+        signal::OFFGOING_SLIP,
+        signal::ENGINE_TORQUE,
+        signal::TURBINE_TORQUE,
+        signal::SHAFT_TORQUE,
+        signal::VEHICLE_SPEED,
+        signal::VEHICLE_ACCELERATION,
+    ]
+}
 
 /// Simulates the experiment and returns what was recorded, with the true phase of the shift as words.
 ///
 /// # Errors
 /// See [`PlantError`].
 pub fn simulate_drive(vehicle: &Vehicle, experiment: &Experiment) -> Result<Trace, PlantError> {
-    let mut recording = Recording::new();
+    let mut recording = Recording::new(vehicle);
     simulate(vehicle, experiment, |sample| recording.take(sample))?;
     Ok(recording.finish())
 }
 
-/// How long before the shift request a shift is recorded, s: observers find the state of the driveline in it.
-const BEFORE_REQUEST_S: f64 = 1.2;
 /// How long after lock-up a shift is recorded, s.
 const AFTER_LOCK_UP_S: f64 = 0.6;
 /// How often a shift is looked at whether it has ended, s.
 const LOOK_S: f64 = 0.05;
 
-/// As [`simulate_drive`], but simulates `car`, while the shift controller knows `nominal`, and keeps only the
-/// shift: from a second before its request until it has ended.
+/// As [`simulate_drive`], but simulates `car`, while the shift controller's model is `nominal`, and keeps only the
+/// shift: from `before_s` seconds before its request until it has ended.
 ///
 /// # Errors
 /// See [`PlantError`].
-pub fn simulate_shift(car: &Vehicle, nominal: &Vehicle, experiment: &Experiment) -> Result<Trace, PlantError> {
+pub fn simulate_shift(
+    car: &Vehicle,
+    nominal: &Vehicle,
+    experiment: &Experiment,
+    before_s: f64,
+) -> Result<Trace, PlantError> {
     let powertrain = Powertrain::new(experiment.simulated_vehicle(car));
     let mut drive = Simulation::new(&powertrain, nominal, experiment)?;
-    drive.record_from(experiment.shift.request_s - BEFORE_REQUEST_S);
-    let mut recording = Recording::new();
+    drive.record_from(experiment.shift.request_s - before_s);
+    let mut recording = Recording::new(car);
     let mut until_s = experiment.shift.request_s;
     loop {
         drive.advance(until_s, |sample| recording.take(sample))?;
@@ -75,15 +88,16 @@ struct Recording {
 }
 
 impl Recording {
-    fn new() -> Self {
-        let mut trace = Trace::with_columns(COLUMNS);
+    fn new(vehicle: &Vehicle) -> Self {
+        let mut trace = Trace::with_columns(&column_names(vehicle));
         trace.reserve(EXPECTED_SAMPLES);
         Self { trace, phases: Vec::with_capacity(EXPECTED_SAMPLES) }
     }
 
     fn take(&mut self, sample: &Sample) {
-        self.trace.push(sample.time_s, &row(sample));
-        self.phases.push(phase(sample).name().into());
+        let row = DriveRow::of(sample);
+        self.trace.push(row.time_s, &row.values);
+        self.phases.push(row.phase.name().into());
     }
 
     fn finish(mut self) -> Trace {
@@ -92,8 +106,67 @@ impl Recording {
     }
 }
 
-/// The values of a sample in the order of [`COLUMNS`].
-fn row(sample: &Sample) -> [f64; COLUMNS.len()] {
+/// A row of a simulated trace.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveRow {
+    /// Time, s.
+    pub time_s: f64,
+    values: [f64; COLUMNS],
+    /// The true phase.
+    pub phase: Phase,
+}
+
+impl DriveRow {
+    /// The row of a sample.
+    pub fn of(sample: &Sample) -> Self {
+        Self { time_s: sample.time_s, values: values(sample), phase: phase(sample) }
+    }
+}
+
+/// Columns of a simulated trace, as rows are written into them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DriveColumns {
+    columns: Vec<(usize, &'static str)>,
+    phase: bool,
+}
+
+impl DriveColumns {
+    /// Those of this vehicle that `keep` names.
+    pub fn those(vehicle: &Vehicle, keep: impl Fn(&str) -> bool) -> Self {
+        let columns = column_names(vehicle).into_iter().enumerate().filter(|(_, name)| keep(name)).collect();
+        Self { columns, phase: keep(signal::TRUE_PHASE) }
+    }
+
+    /// Their names, without the time.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.columns.iter().map(|&(_, name)| name).chain(self.phase.then_some(signal::TRUE_PHASE))
+    }
+
+    /// What a row holds in them.
+    pub fn cells(&self, row: &DriveRow) -> impl Iterator<Item = Cell<'static>> {
+        let numbers = self.columns.iter().map(|&(i, _)| Cell::Number(row.values[i]));
+        numbers.chain(self.phase.then(|| Cell::Word(row.phase.name())))
+    }
+}
+
+impl ShiftSample {
+    /// What a shift is rated by.
+    pub fn of(sample: &Sample) -> Self {
+        Self {
+            time_s: sample.time_s,
+            phase: phase(sample),
+            turbine_rad_s: sample.state.turbine_rad_s,
+            output_rad_s: sample.state.output_rad_s,
+            oncoming_slip_rad_s: sample.oncoming_slip_rad_s,
+            oncoming_n_m: sample.torques.shift.oncoming_n_m,
+            shaft_n_m: sample.torques.shaft_n_m,
+            vehicle_m_s2: sample.vehicle_m_s2,
+        }
+    }
+}
+
+/// The values of a sample in the order of [`column_names`].
+fn values(sample: &Sample) -> [f64; COLUMNS] {
     let (state, torques) = (&sample.state, &sample.torques);
     [
         state.engine_rad_s,
@@ -101,11 +174,11 @@ fn row(sample: &Sample) -> [f64; COLUMNS.len()] {
         state.output_rad_s,
         state.wheel_rad_s,
         sample.oncoming_slip_rad_s,
-        sample.commands.oncoming_a,
-        sample.commands.offgoing_a,
+        sample.commands.oncoming,
+        sample.commands.offgoing,
         sample.commands.throttle,
         sample.oncoming_pa,
-        state.offgoing_pa,
+        sample.offgoing_pa,
         torques.shift.oncoming_n_m,
         torques.shift.offgoing_n_m,
         sample.offgoing_slip_rad_s,

@@ -1,10 +1,10 @@
-//! How wrong the observers' models of the powertrain are, found by simulation: the `|w|` and the `H` that the gain
-//! designs ask for.
+//! Errors of the observers' models of the powertrain, found by simulation: the `|w|` and the `H` that the gain design
+//! needs.
 //!
-//! `w = dy/dt - F - G z`, Eq. (2.24), with the true speeds, pressure and shaft torque: what the model cannot explain
-//! of an acceleration. Sensors do not enter.
+//! `w = dy/dt - F - G z`, Eq. (2.24), with the true speeds, pressure and shaft torque: the difference between the
+//! acceleration of the simulated car and that of the model. Errors of the sensors are not included.
 
-use config::{Study, Varied, Vehicle};
+use config::{Study, Varied, Vehicle, toml_string};
 use design::compliant::{SPEED_UNITS_RAD_S, compliant_model};
 use design::enclosing::enclosing_matrix;
 use design::rigid_model;
@@ -15,6 +15,7 @@ use trace::{Trace, TraceError, signal};
 
 use crate::campaign::{PHASES, factor_values, in_order};
 use crate::drive::simulate_shift;
+use crate::score::size as size_of;
 use crate::{StudyError, true_phases};
 
 /// What the rigid model's error is made of.
@@ -88,14 +89,17 @@ struct RunErrors {
 /// Runs the study and finds the errors; `progress` hears of each finished run.
 ///
 /// # Errors
-/// The recorded drive lacks a signal, which no study file can cause. A run that fails is counted as unfinished.
+/// The recorded drive lacks a signal, which no study file can cause. A run that fails is counted as unfinished; a defect
+/// of the program in one is an error, for a bound must hold in every run.
 pub fn error_bound(study: &Study, threads: usize, mut progress: impl FnMut()) -> Result<ErrorBound, StudyError> {
     let mut runs: [Vec<RunErrors>; 2] = [Vec::new(), Vec::new()];
     let mut unfinished = 0;
     let one = |run| -> Result<Option<[RunErrors; 2]>, StudyError> {
         let Ok(mut varied) = study.varied(&factor_values(study, run)) else { return Ok(None) };
         varied.experiment.adapt_controller();
-        let Ok(trace) = simulate_shift(&varied.car, &varied.vehicle, &varied.experiment) else { return Ok(None) };
+        let Ok(trace) = simulate_shift(&varied.car, &varied.vehicle, &varied.experiment, study.record_before_s) else {
+            return Ok(None);
+        };
         Ok(Some(run_errors(&varied, &trace)?))
     };
     in_order(0..study.runs, threads, one, |errors| -> Result<(), StudyError> {
@@ -263,7 +267,7 @@ impl Models {
         let normalised = [0, 1, 2].map(|k| w[k] / SPEED_UNITS_RAD_S[k]);
         for (n, (sample, reach)) in outermost.iter_mut().enumerate() {
             let here: f64 = direction(n).iter().zip(&normalised).map(|(d, w)| d * w).sum();
-            if here > *reach {
+            if here > *reach && here.is_finite() {
                 (*sample, *reach) = (normalised, here);
             }
         }
@@ -278,17 +282,17 @@ fn direction(n: usize) -> [f64; 3] {
 }
 
 fn keep(largest: &mut f64, value: f64) {
-    *largest = largest.max(value.abs());
+    *largest = largest.max(size_of(value));
 }
 
 impl ErrorBound {
     /// What was found, as a file that `wetclutch design --bounds` reads.
     pub fn toml(&self, study: &Study) -> String {
         let mut text = format!(
-            "# Largest model errors over {} runs of \"{}\" ({} without a whole shift), sha256 {}.\n\
+            "# Largest model errors over {} runs of {} ({} without a complete shift), sha256 {}.\n\
              # Written by `wetclutch error-bound`; read by `wetclutch design VEHICLE --bounds THIS_FILE`.\n",
             self.runs,
-            study.title,
+            toml_string(&study.title),
             self.unfinished,
             study.fingerprint(),
         );

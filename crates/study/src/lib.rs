@@ -1,14 +1,17 @@
 //! From a source of samples through observers to scores.
 //!
-//! A simulated drive and a measured log are two sources of the same [`trace::Trace`]; [`run()`] carries an
-//! observer over either, and [`score()`] holds the estimates against the truth where there is one.
+//! A simulated drive and a measured log give the same kind of samples. [`run()`] runs an observer over them, in memory or
+//! read row by row; [`score()`] compares the estimates with the true values, if there are any.
 
 pub mod bench;
 pub mod campaign;
 pub mod comparison;
 pub mod drive;
 pub mod error_bound;
+pub mod estimates;
+pub mod log;
 pub mod observers;
+pub mod passages;
 pub mod run;
 pub mod sampling;
 pub mod score;
@@ -19,11 +22,14 @@ pub mod worst_case;
 pub use bench::{Bench, bench};
 pub use campaign::{Campaign, Row, Status, Summary, execute};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
-pub use drive::{simulate_drive, simulate_shift, true_phases};
+pub use drive::{DriveColumns, DriveRow, simulate_drive, simulate_shift, true_phases};
 pub use error_bound::{ErrorBound, error_bound};
+pub use estimates::{EstimateColumns, estimates_trace};
+pub use log::{Log, LogRow};
 pub use observers::AnyObserver;
-pub use run::{RunColumns, estimates_trace, run};
-pub use score::{PhaseScore, RangeScore, ShiftQuality, score};
+pub use passages::Passages;
+pub use run::{RunColumns, Signals, run};
+pub use score::{ErrorScore, PhaseScore, RangeScore, ShiftQuality, ShiftRating, ShiftSample, score};
 pub use sensitivity::{PhaseSensitivity, sensitivity};
-pub use statements::{Chapter, Statement, Verdict, reproduce};
+pub use statements::{Chapter, Statement, reproduce};
 pub use worst_case::{Target, WorstCase, worst_case};

@@ -3,16 +3,16 @@
 use config::{GainMethod, GivenGains, ObserverEntry, ObserverKind, Sensors, Vehicle};
 use design::compliant::physical_gains;
 use design::{
-    DesignError, Model, bounded, compliant_observer, design_compliant, design_discrete, design_rigid, design_sliding,
-    extended_filter, inversion, kalman_filter, rigid_observer, sliding_observer, super_twisting, unscented_filter,
+    DesignError, Model, OffsetMissed, best_compliant, best_rigid, bounded, compliant_observer, design_discrete,
+    design_sliding, extended_filter, inversion, kalman_filter, open_loop_maps, range, rigid_observer, sliding_observer,
+    super_twisting, unscented_filter,
 };
-use drivetrain::Valve;
 use observer::{
-    CompliantObserver, Discretisation, Estimate, Estimator, Inversion, KalmanFilter, RigidGains, RigidObserver,
-    SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
+    Bounds, CompliantObserver, Discretisation, Estimate, Estimator, ExtendedFilter, Input, Inversion, KalmanFilter,
+    RigidGains, RigidObserver, SlidingObserver, SuperTwisting, Tracker, UnscentedFilter,
 };
 
-use crate::{RunColumns, run};
+use crate::{EstimateColumns, RunColumns, run};
 
 /// One of the observers.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +25,8 @@ pub enum AnyObserver {
     Sliding(SlidingObserver<f64>),
     /// Kalman filter.
     Kalman(Box<KalmanFilter<f64>>),
+    /// Extended Kalman filter in its textbook form.
+    Extended(Box<ExtendedFilter<f64>>),
     /// Unscented Kalman filter.
     Unscented(Box<UnscentedFilter<f64>>),
     /// Super-twisting observer.
@@ -34,8 +36,8 @@ pub enum AnyObserver {
 }
 
 impl AnyObserver {
-    /// The observer of this kind for this sample time, with designed gains and exact discretisation. `sensors` are what
-    /// it is told of the sensors that it sees through, if it does.
+    /// The observer of this kind for this sample time, with designed gains and exact discretisation. `sensors` are the
+    /// sensors of its signals, if they are known.
     ///
     /// # Errors
     /// There are no gains for what the vehicle file requires.
@@ -46,34 +48,63 @@ impl AnyObserver {
         sample_time_s: f64,
         sensors: Option<&Sensors>,
     ) -> Result<Self, DesignError> {
-        Ok(match kind {
+        let (observer, missed) = Self::best(vehicle, kind, method, sample_time_s, sensors)?;
+        match missed.into_iter().next() {
+            None => Ok(observer),
+            Some(missed) => Err(DesignError::OffsetUnreachable(Box::new(missed))),
+        }
+    }
+
+    /// The same with the best certified gain where a required offset cannot be had, and what is missed.
+    ///
+    /// # Errors
+    /// There is no certified gain.
+    pub fn best(
+        vehicle: &Vehicle,
+        kind: ObserverKind,
+        method: GainMethod,
+        sample_time_s: f64,
+        sensors: Option<&Sensors>,
+    ) -> Result<(Self, Vec<OffsetMissed>), DesignError> {
+        // Over a longer step than its certificate covers, an observer is its valve model.
+        let mut missed = Vec::new();
+        let observer = match kind {
             ObserverKind::OpenLoop => Self::Rigid(rigid_observer(vehicle, RigidGains::open_loop())),
             ObserverKind::Rigid if method == GainMethod::Iss => {
-                Self::Rigid(rigid_observer(vehicle, design_rigid(vehicle)?.gains()))
+                let (design, not_met) = best_rigid(vehicle)?;
+                missed = not_met;
+                let mut observer = rigid_observer(vehicle, design.gains());
+                observer.tracker.sample_max_s = design.longest_step_s(vehicle, Discretisation::Exact);
+                Self::Rigid(observer)
             }
             ObserverKind::Compliant if method == GainMethod::Iss => {
-                Self::Compliant(Box::new(compliant_observer(vehicle, design_compliant(vehicle)?.gains())))
+                let (design, not_met) = best_compliant(vehicle)?;
+                missed = not_met;
+                let mut observer = compliant_observer(vehicle, design.gains());
+                observer.tracker.sample_max_s = design.longest_step_s(vehicle, Discretisation::Exact);
+                Self::Compliant(Box::new(observer))
             }
-            // These gains are made for a sample time, and serve over one lost sample too.
             ObserverKind::Rigid => {
                 let design = design_discrete(vehicle, Model::Rigid, method, sample_time_s)?;
                 let mut observer = rigid_observer(vehicle, design.rigid_gains());
-                observer.tracker.sample_max_s = 2.0 * sample_time_s;
+                observer.tracker.sample_max_s = design.longest_step_s();
                 Self::Rigid(observer)
             }
             ObserverKind::Compliant => {
                 let design = design_discrete(vehicle, Model::Compliant, method, sample_time_s)?;
                 let mut observer = compliant_observer(vehicle, design.compliant_gains());
-                observer.tracker.sample_max_s = 2.0 * sample_time_s;
+                observer.tracker.sample_max_s = design.longest_step_s();
                 Self::Compliant(Box::new(observer))
             }
+            ObserverKind::OpenLoopMaps => Self::Kalman(Box::new(open_loop_maps(vehicle))),
             ObserverKind::Kalman => Self::Kalman(Box::new(kalman_filter(vehicle, sensors))),
-            ObserverKind::Extended => Self::Kalman(Box::new(extended_filter(vehicle, sensors))),
+            ObserverKind::Extended => Self::Extended(Box::new(extended_filter(vehicle, sensors))),
             ObserverKind::Unscented => Self::Unscented(Box::new(unscented_filter(vehicle, sensors))),
             ObserverKind::SuperTwisting => Self::SuperTwisting(Box::new(super_twisting(vehicle))),
             ObserverKind::Inversion => Self::Inversion(Box::new(inversion(vehicle))),
             ObserverKind::Sliding => Self::Sliding(sliding_observer(vehicle, design_sliding(vehicle))),
-        })
+        };
+        Ok((observer, missed))
     }
 
     /// The observer that an entry of an experiment file describes.
@@ -98,60 +129,107 @@ impl AnyObserver {
         Ok(observer.with_discretisation(entry.discretisation))
     }
 
+    /// Takes the discretisation of an observer with a fixed sample time; the Kalman filter is always exact.
     fn with_discretisation(mut self, discretisation: Discretisation) -> Self {
-        self.tracker_mut().discretisation = discretisation;
+        if let Some(tracker) = self.tracker_mut() {
+            tracker.discretisation = discretisation;
+        }
         self
     }
 
-    fn tracker_mut(&mut self) -> &mut Tracker<f64> {
+    fn tracker_mut(&mut self) -> Option<&mut Tracker<f64>> {
         match self {
-            Self::Rigid(observer) => &mut observer.tracker,
-            Self::Compliant(observer) => &mut observer.tracker,
-            Self::Sliding(observer) => &mut observer.tracker,
-            Self::Kalman(observer) => &mut observer.tracker,
-            Self::Unscented(observer) => &mut observer.filter.tracker,
-            Self::SuperTwisting(observer) => &mut observer.tracker,
-            Self::Inversion(observer) => &mut observer.tracker,
+            Self::Rigid(observer) => Some(&mut observer.tracker),
+            Self::Compliant(observer) => Some(&mut observer.tracker),
+            Self::Sliding(observer) => Some(&mut observer.tracker),
+            Self::Kalman(_) => None,
+            Self::Extended(observer) => Some(&mut observer.tracker),
+            Self::Unscented(observer) => Some(&mut observer.filter.tracker),
+            Self::SuperTwisting(observer) => Some(&mut observer.tracker),
+            Self::Inversion(observer) => Some(&mut observer.tracker),
         }
     }
 
     /// Longest time between two samples over which the speeds correct its estimate, s.
     pub fn sample_max_s(&self) -> f64 {
-        self.clone().tracker_mut().sample_max_s
+        self.clone().tracker_mut().map_or(observer::kalman::LOST_S, |tracker| tracker.sample_max_s)
+    }
+
+    /// The columns of its estimates of a log. They follow from what it can estimate, before it has estimated anything.
+    pub fn columns(&self, has_wheel_speed: bool) -> EstimateColumns {
+        let shaft = match self {
+            Self::Compliant(_) | Self::Kalman(_) | Self::Extended(_) | Self::Unscented(_) | Self::Inversion(_) => true,
+            Self::Rigid(_) | Self::Sliding(_) | Self::SuperTwisting(_) => false,
+        };
+        EstimateColumns { shaft, range: true, shaft_range: has_wheel_speed }
     }
 
     /// Runs it over every sample; one estimate for each, with a guaranteed range where this vehicle's error budget
     /// gives one.
     pub fn run(&self, vehicle: &Vehicle, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
-        self.run_within(Some(vehicle), columns)
+        self.run_in_memory(Some(vehicle), columns)
     }
 
     /// The same without a range.
     pub fn run_alone(&self, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
-        self.run_within(None, columns)
+        self.run_in_memory(None, columns)
     }
 
-    fn run_within(&self, budget: Option<&Vehicle>, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
+    fn run_in_memory(&self, budget: Option<&Vehicle>, columns: &RunColumns<'_>) -> Vec<Estimate<f64>> {
+        let samples = columns.samples();
+        let mut estimates = Vec::with_capacity(samples.len());
+        let Ok(()) = self.run_over(budget, samples, |(), estimate| {
+            estimates.push(estimate);
+            Ok(())
+        });
+        estimates
+    }
+
+    /// Runs it over samples from anywhere, see [`run()`], with a guaranteed range where the error budget of a vehicle
+    /// gives one.
+    ///
+    /// # Errors
+    /// Those of the samples and of `take`.
+    pub fn run_over<S, E>(
+        &self,
+        budget: Option<&Vehicle>,
+        samples: impl Iterator<Item = Result<(Input<f64>, S), E>>,
+        take: impl FnMut(S, Estimate<f64>) -> Result<(), E>,
+    ) -> Result<(), E> {
         match self {
-            Self::Rigid(observer) => run_bounded(budget, columns, observer),
-            Self::Compliant(observer) => run_bounded(budget, columns, observer.as_ref()),
-            Self::Sliding(observer) => run_bounded(budget, columns, observer),
-            Self::Kalman(observer) => run_bounded(budget, columns, observer.as_ref()),
-            Self::Unscented(observer) => run_bounded(budget, columns, observer.as_ref()),
-            Self::SuperTwisting(observer) => run_bounded(budget, columns, observer.as_ref()),
-            Self::Inversion(observer) => run_bounded(budget, columns, observer.as_ref()),
+            Self::Rigid(observer) => run_bounded(budget, samples, observer, take),
+            Self::Compliant(observer) => run_bounded(budget, samples, observer.as_ref(), take),
+            Self::Sliding(observer) => run_bounded(budget, samples, observer, take),
+            Self::Kalman(observer) => run_bounded(budget, samples, observer.as_ref(), take),
+            Self::Extended(observer) => run_bounded(budget, samples, observer.as_ref(), take),
+            Self::Unscented(observer) => run_bounded(budget, samples, observer.as_ref(), take),
+            Self::SuperTwisting(observer) => run_bounded(budget, samples, observer.as_ref(), take),
+            Self::Inversion(observer) => run_bounded(budget, samples, observer.as_ref(), take),
         }
     }
 }
 
-fn run_bounded(
+/// The ranges at every sample, the same for every observer.
+pub fn ranges(vehicle: &Vehicle, columns: &RunColumns<'_>) -> Vec<Bounds<f64>> {
+    let estimator = range(vehicle);
+    let mut state = estimator.start();
+    columns
+        .samples()
+        .map(|sample| {
+            let Ok((input, ())) = sample;
+            estimator.step(&mut state, &input)
+        })
+        .collect()
+}
+
+fn run_bounded<S, E>(
     budget: Option<&Vehicle>,
-    columns: &RunColumns<'_>,
+    samples: impl Iterator<Item = Result<(Input<f64>, S), E>>,
     observer: &impl Estimator<f64>,
-) -> Vec<Estimate<f64>> {
-    // The budget is of a valve that is commanded by a current.
-    match budget.filter(|vehicle| matches!(vehicle.observer_valve, Valve::Proportional { .. })) {
-        Some(vehicle) => run(columns, &bounded(vehicle, observer)),
-        None => run(columns, observer),
+    take: impl FnMut(S, Estimate<f64>) -> Result<(), E>,
+) -> Result<(), E> {
+    match budget {
+        Some(vehicle) => run(samples, &bounded(vehicle, observer), take),
+        None => run(samples, observer, take),
     }
 }

@@ -1,86 +1,176 @@
-//! The one loop that carries an observer over a trace, simulated or measured.
+//! The only loop that runs an observer over samples, simulated or measured, in memory or read row by row.
+
+use std::convert::Infallible;
 
 use config::Vehicle;
-use observer::{Bounds, Estimate, Estimator, Input};
+use drivetrain::{CommandKind, ReducedShift};
+use observer::{Estimate, Estimator, Input, Reading};
 use trace::{Trace, TraceError, signal};
 
-/// The columns of a trace that the observers read.
+/// The signals that the observers read. `C` is where one is found: the values of a column, or its place in a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Signals<C> {
+    engine_rad_s: Channel<C>,
+    turbine_rad_s: Channel<C>,
+    output: Output<C>,
+    wheel_rad_s: Option<Channel<C>>,
+    command: Channel<C>,
+    shift: ReducedShift<f64>,
+}
+
+/// A signal, with the age of its readings where there is a column of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Channel<C> {
+    value: C,
+    age_s: Option<C>,
+}
+
+impl<C: Copy> Channel<C> {
+    fn new(name: &str, value: C, find: impl Fn(&str) -> Option<C>) -> Self {
+        Self { value, age_s: signal::age_of(name).and_then(find) }
+    }
+
+    /// Its reading; a cell without a number is one that did not come.
+    #[inline]
+    fn reading<E>(&self, value: impl Fn(C) -> Result<f64, E>) -> Result<Option<Reading<f64>>, E> {
+        let read = value(self.value)?;
+        let age_s = self.age_s.map_or(Ok(0.0), value)?;
+        Ok((!read.is_nan()).then_some(Reading { value: read, age_s: if age_s.is_nan() { 0.0 } else { age_s } }))
+    }
+}
+
+/// Where the output speed comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Output<C> {
+    Speed(Channel<C>),
+    /// From turbine speed and slip of the oncoming clutch.
+    OncomingSlip(C),
+}
+
+impl<C: Copy> Signals<C> {
+    /// Chooses the columns. Where the output speed was not recorded it follows from the turbine speed and the slip of the
+    /// oncoming clutch.
+    ///
+    /// # Errors
+    /// A signal that is needed is missing.
+    pub fn choose(
+        vehicle: &Vehicle,
+        find: impl Fn(&str) -> Option<C>,
+        require: impl Fn(&str) -> Result<C, TraceError>,
+    ) -> Result<Self, TraceError> {
+        let required = |name: &str| require(name).map(|value| Channel::new(name, value, &find));
+        let command_name = command(vehicle.observer_valve.command_kind(), &find, &require)?;
+        Ok(Self {
+            turbine_rad_s: required(signal::TURBINE_SPEED)?,
+            output: match (find(signal::OUTPUT_SPEED), find(signal::ONCOMING_SLIP)) {
+                (None, Some(slip)) => Output::OncomingSlip(slip),
+                _ => Output::Speed(required(signal::OUTPUT_SPEED)?),
+            },
+            engine_rad_s: required(signal::ENGINE_SPEED)?,
+            wheel_rad_s: find(signal::WHEEL_SPEED).map(|value| Channel::new(signal::WHEEL_SPEED, value, &find)),
+            command: required(command_name)?,
+            shift: vehicle.shift,
+        })
+    }
+
+    /// Whether the wheel speed is among them.
+    pub fn has_wheel_speed(&self) -> bool {
+        self.wheel_rad_s.is_some()
+    }
+
+    /// Input of an observer, `dt_s` after the sample before.
+    ///
+    /// # Errors
+    /// What `value` meets.
+    #[inline]
+    pub fn input<E>(&self, dt_s: f64, value: impl Fn(C) -> Result<f64, E>) -> Result<Input<f64>, E> {
+        let turbine_rad_s = self.turbine_rad_s.reading(&value)?;
+        let output_rad_s = match self.output {
+            Output::Speed(output) => output.reading(&value)?,
+            Output::OncomingSlip(slip) => {
+                let slip = value(slip)?;
+                let known = turbine_rad_s.filter(|_| !slip.is_nan());
+                known.map(|turbine| Reading { value: self.shift.output_speed(turbine.value, slip), ..turbine })
+            }
+        };
+        Ok(Input {
+            dt_s,
+            engine_rad_s: self.engine_rad_s.reading(&value)?,
+            turbine_rad_s,
+            output_rad_s,
+            wheel_rad_s: self.wheel_rad_s.map_or(Ok(None), |wheel| wheel.reading(&value))?,
+            command: self.command.reading(&value)?,
+        })
+    }
+}
+
+/// The name of the signal of the oncoming clutch's command.
+fn command<C>(
+    kind: CommandKind,
+    find: impl Fn(&str) -> Option<C>,
+    require: impl Fn(&str) -> Result<C, TraceError>,
+) -> Result<&'static str, TraceError> {
+    let [(wanted, _), (other, _)] = match kind {
+        CommandKind::Current => [CommandKind::Current, CommandKind::DutyCycle],
+        CommandKind::DutyCycle => [CommandKind::DutyCycle, CommandKind::Current],
+    }
+    .map(command_signals);
+    require(wanted).map(|_| wanted).map_err(|error| match error {
+        TraceError::MissingColumn { path, .. } if find(other).is_some() => {
+            TraceError::OtherCommand { path, wanted: wanted.to_owned(), found: other.to_owned() }
+        }
+        error => error,
+    })
+}
+
+/// The signals of the commands of the oncoming and the offgoing clutch's valve.
+pub(crate) fn command_signals(kind: CommandKind) -> (&'static str, &'static str) {
+    match kind {
+        CommandKind::Current => (signal::ONCOMING_CURRENT, signal::OFFGOING_CURRENT),
+        CommandKind::DutyCycle => (signal::ONCOMING_DUTY, signal::OFFGOING_DUTY),
+    }
+}
+
+/// The signals of a trace in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunColumns<'a> {
     time_s: &'a [f64],
-    engine_rad_s: &'a [f64],
-    turbine_rad_s: &'a [f64],
-    slip_rad_s: Vec<f64>,
-    wheel_rad_s: Option<&'a [f64]>,
-    command_a: &'a [f64],
+    signals: Signals<&'a [f64]>,
 }
 
 impl<'a> RunColumns<'a> {
-    /// Finds the columns. Where the slip of the oncoming clutch was not recorded it follows from turbine
-    /// and output speed.
+    /// Finds the columns, see [`Signals::choose`].
     ///
     /// # Errors
     /// A signal that is needed is missing.
     pub fn of(trace: &'a Trace, vehicle: &Vehicle) -> Result<Self, TraceError> {
-        let turbine_rad_s = trace.require(signal::TURBINE_SPEED)?;
-        let slip_rad_s = match trace.get(signal::ONCOMING_SLIP) {
-            Some(slip) => slip.to_vec(),
-            None => {
-                let output = trace.require(signal::OUTPUT_SPEED)?;
-                turbine_rad_s.iter().zip(output).map(|(&t, &o)| vehicle.shift.oncoming_slip(t, o)).collect()
-            }
-        };
-        Ok(Self {
-            time_s: &trace.time_s,
-            engine_rad_s: trace.require(signal::ENGINE_SPEED)?,
-            turbine_rad_s,
-            slip_rad_s,
-            wheel_rad_s: trace.get(signal::WHEEL_SPEED),
-            command_a: trace.require(signal::ONCOMING_CURRENT)?,
+        let signals = Signals::choose(vehicle, |name| trace.get(name), |name| trace.require(name))?;
+        Ok(Self { time_s: &trace.time_s, signals })
+    }
+
+    /// The samples.
+    pub fn samples(&self) -> impl ExactSizeIterator<Item = Result<(Input<f64>, ()), Infallible>> {
+        (0..self.time_s.len()).map(|i| {
+            let dt_s = if i == 0 { 0.0 } else { self.time_s[i] - self.time_s[i - 1] };
+            self.signals.input(dt_s, |column| Ok(column[i])).map(|input| (input, ()))
         })
     }
-
-    fn input(&self, i: usize) -> Input<f64> {
-        Input {
-            dt_s: if i == 0 { 0.0 } else { self.time_s[i] - self.time_s[i - 1] },
-            engine_rad_s: self.engine_rad_s[i],
-            turbine_rad_s: self.turbine_rad_s[i],
-            slip_rad_s: self.slip_rad_s[i],
-            wheel_rad_s: self.wheel_rad_s.map_or(f64::NAN, |wheel| wheel[i]),
-            command: self.command_a[i],
-        }
-    }
 }
 
-/// Runs an observer over every sample; one estimate for each.
-pub fn run(columns: &RunColumns<'_>, observer: &impl Estimator<f64>) -> Vec<Estimate<f64>> {
+/// Runs an observer over samples, and gives `take` one estimate for each, with what came along with the sample. Ends at
+/// the first error.
+///
+/// # Errors
+/// Those of the samples and of `take`.
+pub fn run<S, E>(
+    samples: impl Iterator<Item = Result<(Input<f64>, S), E>>,
+    observer: &impl Estimator<f64>,
+    mut take: impl FnMut(S, Estimate<f64>) -> Result<(), E>,
+) -> Result<(), E> {
     let mut state = observer.start();
-    (0..columns.time_s.len()).map(|i| observer.step(&mut state, &columns.input(i))).collect()
-}
-
-/// Estimates as a trace of their own.
-pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
-    let mut trace = Trace { path: None, time_s: time_s.to_vec(), columns: Vec::new() };
-    trace.add(signal::PRESSURE_ESTIMATE, estimates.iter().map(|e| e.pressure_pa).collect());
-    trace.add(signal::TORQUE_ESTIMATE, estimates.iter().map(|e| e.clutch_torque_n_m).collect());
-    if estimates.iter().any(|e| e.shaft_torque_n_m.is_some()) {
-        let shaft = |e: &Estimate<f64>| e.shaft_torque_n_m.unwrap_or(f64::NAN);
-        trace.add(signal::SHAFT_ESTIMATE, estimates.iter().map(shaft).collect());
+    for sample in samples {
+        let (input, along) = sample?;
+        take(along, observer.step(&mut state, &input))?;
     }
-    if estimates.iter().any(|e| e.bounds.is_some()) {
-        let mut bound = |name: &str, value: &dyn Fn(&Bounds<f64>) -> f64| {
-            trace.add(name, estimates.iter().map(|e| e.bounds.as_ref().map_or(f64::NAN, value)).collect());
-        };
-        bound(signal::PRESSURE_LEAST, &|bounds| bounds.pressure_pa[0]);
-        bound(signal::PRESSURE_GREATEST, &|bounds| bounds.pressure_pa[1]);
-        bound(signal::TORQUE_LEAST, &|bounds| bounds.clutch_torque_n_m[0]);
-        bound(signal::TORQUE_GREATEST, &|bounds| bounds.clutch_torque_n_m[1]);
-        if estimates.iter().any(|e| e.bounds.is_some_and(|bounds| bounds.shaft_torque_n_m.is_some())) {
-            bound(signal::SHAFT_LEAST, &|bounds| bounds.shaft_torque_n_m.map_or(f64::NAN, |range| range[0]));
-            bound(signal::SHAFT_GREATEST, &|bounds| bounds.shaft_torque_n_m.map_or(f64::NAN, |range| range[1]));
-        }
-    }
-    trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().into()).collect());
-    trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().into()).collect());
-    trace
+    Ok(())
 }

@@ -1,4 +1,9 @@
-//! How good an estimate and a shift were.
+//! Scores of an estimate and of a shift.
+//!
+//! An estimate that is not finite has an infinite error: an observer that diverged must not have a better score than one
+//! that did not.
+
+use std::collections::VecDeque;
 
 use drivetrain::ReducedShift;
 use observer::{Bounds, Phase};
@@ -6,12 +11,22 @@ use trace::{Trace, signal};
 
 use crate::true_phases;
 
-/// Errors of one signal in one phase: truth minus estimate.
+/// The same number; infinity for one that is none.
+fn or_infinite(number: f64) -> f64 {
+    if number.is_nan() { f64::INFINITY } else { number }
+}
+
+/// The size of an error; infinite for one that is no number.
+pub(crate) fn size(error: f64) -> f64 {
+    or_infinite(error.abs())
+}
+
+/// Errors of one signal in one phase: truth minus estimate. All are infinite where an estimate diverged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhaseScore {
     /// The phase, by the truth.
     pub phase: Phase,
-    /// Number of samples.
+    /// Number of samples with a truth.
     pub samples: usize,
     /// Largest size.
     pub peak: f64,
@@ -25,8 +40,82 @@ pub struct PhaseScore {
     pub chatter: f64,
 }
 
-/// Scores of `estimate` against `truth` in the torque and inertia phase and after the shift. An error below
-/// `settled` counts as small.
+/// Phases that are scored.
+const SCORED: [Phase; 3] = [Phase::TorquePhase, Phase::InertiaPhase, Phase::AfterShift];
+
+/// Errors of one signal on their way to scores in the torque and inertia phase and after the shift.
+#[derive(Debug, Clone)]
+pub struct ErrorScore {
+    /// An error up to this size counts as small.
+    settled: f64,
+    phases: [Errors; SCORED.len()],
+}
+
+/// Errors in one phase so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct Errors {
+    samples: usize,
+    peak: f64,
+    sum: f64,
+    squares: f64,
+    began_s: f64,
+    small_since_s: Option<f64>,
+    /// Truth and estimate of the sample before, and how much either has moved up and down.
+    last: [f64; 2],
+    moved: [f64; 2],
+}
+
+impl ErrorScore {
+    /// No errors yet; one up to `settled` will count as small.
+    pub fn new(settled: f64) -> Self {
+        Self { settled, phases: [Errors::default(); SCORED.len()] }
+    }
+
+    /// Takes a sample; one before the shift, or without a truth (NaN), is not scored.
+    pub fn push(&mut self, time_s: f64, phase: Phase, truth: f64, estimate: f64) {
+        let Some(at) = SCORED.iter().position(|&scored| scored == phase).filter(|_| !truth.is_nan()) else { return };
+        let errors = &mut self.phases[at];
+        let error = size(truth - estimate);
+        let now = [truth, estimate];
+        if errors.samples == 0 {
+            errors.began_s = time_s;
+        } else {
+            for (moved, (now, last)) in errors.moved.iter_mut().zip(now.into_iter().zip(errors.last)) {
+                *moved += (now - last).abs();
+            }
+        }
+        errors.last = now;
+        errors.samples += 1;
+        errors.peak = errors.peak.max(error);
+        errors.sum += error;
+        errors.squares += error * error;
+        errors.small_since_s = if error <= self.settled { errors.small_since_s.or(Some(time_s)) } else { None };
+    }
+
+    /// The scores, phase by phase.
+    pub fn finish(&self) -> Vec<PhaseScore> {
+        let score = |(phase, errors): (Phase, &Errors)| {
+            #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
+            let count = errors.samples.max(1) as f64;
+            PhaseScore {
+                phase,
+                samples: errors.samples,
+                peak: errors.peak,
+                rms: (errors.squares / count).sqrt(),
+                mean: errors.sum / count,
+                settling_s: match errors.samples {
+                    0 => Some(0.0),
+                    _ => errors.small_since_s.map(|since_s| since_s - errors.began_s),
+                },
+                chatter: or_infinite(errors.moved[1] - errors.moved[0]).max(0.0),
+            }
+        };
+        SCORED.into_iter().zip(&self.phases).map(score).collect()
+    }
+}
+
+/// Scores of `estimate` against `truth` in the torque and inertia phase and after the shift. An error up to `settled`
+/// counts as small; a sample without a truth (NaN) does not count.
 pub fn score(
     time_s: &[f64],
     phases: &[Phase],
@@ -34,32 +123,11 @@ pub fn score(
     settled: f64,
     estimate: impl Fn(usize) -> f64,
 ) -> Vec<PhaseScore> {
-    let variation = |at: &[usize], value: &dyn Fn(usize) -> f64| -> f64 {
-        at.windows(2).map(|pair| (value(pair[1]) - value(pair[0])).abs()).sum()
-    };
-    [Phase::TorquePhase, Phase::InertiaPhase, Phase::AfterShift]
-        .into_iter()
-        .map(|phase| {
-            let at: Vec<usize> = (0..phases.len()).filter(|&i| phases[i] == phase).collect();
-            let errors: Vec<f64> = at.iter().map(|&i| (truth[i] - estimate(i)).abs()).collect();
-            #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
-            let count = errors.len().max(1) as f64;
-            // NaN counts as large: an estimate that is none has not settled.
-            let last_large = errors.iter().rposition(|&error| error.is_nan() || error > settled);
-            PhaseScore {
-                phase,
-                samples: errors.len(),
-                peak: errors.iter().copied().fold(0.0, f64::max),
-                rms: (errors.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
-                mean: errors.iter().sum::<f64>() / count,
-                settling_s: match last_large {
-                    None => Some(0.0),
-                    Some(last) => at.get(last + 1).map(|&i| time_s[i] - time_s[at[0]]),
-                },
-                chatter: (variation(&at, &estimate) - variation(&at, &|i| truth[i])).max(0.0),
-            }
-        })
-        .collect()
+    let mut errors = ErrorScore::new(settled);
+    for (i, &phase) in phases.iter().enumerate() {
+        errors.push(time_s[i], phase, truth[i], estimate(i));
+    }
+    errors.finish()
 }
 
 /// How well the guaranteed range around an estimate did in one phase.
@@ -82,9 +150,9 @@ pub struct RangeScore {
 }
 
 impl RangeScore {
-    /// The least share of samples inside of the three.
+    /// The least share of samples inside of the two guaranteed ranges, of pressure and clutch torque.
     pub fn inside(&self) -> f64 {
-        self.pressure_inside.min(self.torque_inside).min(self.shaft_inside)
+        self.pressure_inside.min(self.torque_inside)
     }
 }
 
@@ -96,7 +164,7 @@ pub fn score_ranges(
     shaft_n_m: &[f64],
     bounds: impl Fn(usize) -> Option<Bounds<f64>>,
 ) -> Vec<RangeScore> {
-    [Phase::TorquePhase, Phase::InertiaPhase, Phase::AfterShift]
+    SCORED
         .into_iter()
         .filter_map(|phase| {
             let at = (0..phases.len()).filter(|&i| phases[i] == phase);
@@ -106,6 +174,7 @@ pub fn score_ranges(
                 ranges.iter().map(|(i, bounds)| value(*i, bounds)).sum::<f64>() / ranges.len() as f64
             };
             let inside = |[low, high]: [f64; 2], truth: f64| f64::from(u8::from(low <= truth && truth <= high));
+            let width = |[low, high]: [f64; 2]| or_infinite(high - low);
             let shafts = || ranges.iter().filter_map(|(i, bounds)| Some((*i, bounds.shaft_torque_n_m?)));
             let mean_shaft = |value: &dyn Fn(usize, [f64; 2]) -> f64| {
                 shafts().map(|(i, range)| value(i, range)).sum::<f64>() / shafts().count() as f64
@@ -119,15 +188,15 @@ pub fn score_ranges(
                 } else {
                     1.0
                 },
-                torque_width_n_m: mean(&|_, bounds| bounds.clutch_torque_n_m[1] - bounds.clutch_torque_n_m[0]),
-                shaft_width_n_m: mean_shaft(&|_, range| range[1] - range[0]),
-                width_pa: mean(&|_, bounds| bounds.pressure_pa[1] - bounds.pressure_pa[0]),
+                torque_width_n_m: mean(&|_, bounds| width(bounds.clutch_torque_n_m)),
+                shaft_width_n_m: mean_shaft(&|_, range| width(range)),
+                width_pa: mean(&|_, bounds| width(bounds.pressure_pa)),
             })
         })
         .collect()
 }
 
-/// What a calibrator asks of a shift.
+/// Shift quality.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftQuality {
     /// Start of the load transfer, s.
@@ -158,62 +227,183 @@ const VIBRATION_FROM_HZ: f64 = 0.4;
 const FELT_BEFORE_S: f64 = 0.3;
 const FELT_AFTER_S: f64 = 0.5;
 
-impl ShiftQuality {
-    /// Rates the shift of a simulated trace; `None` if it did not pass all its phases.
-    pub fn of(trace: &Trace, shift: &ReducedShift<f64>) -> Option<Self> {
-        let phases = true_phases(trace)?;
-        let start = |phase| phases.iter().position(|&at| at == phase);
-        let torque = start(Phase::TorquePhase)?;
-        let (inertia, locked) = (start(Phase::InertiaPhase)?, start(Phase::AfterShift)?);
-        let t = &trace.time_s;
-        let (turbine, output) = (trace.get(signal::TURBINE_SPEED)?, trace.get(signal::OUTPUT_SPEED)?);
-        let shaft = trace.get(signal::SHAFT_TORQUE)?;
-        let ratio = shift.ratio_offgoing();
-        let acceleration = trace.get(signal::VEHICLE_ACCELERATION)?;
-        let (clutch, slip) = (trace.get(signal::ONCOMING_TORQUE)?, trace.get(signal::ONCOMING_SLIP)?);
-        let friction_w = |i: usize| clutch[i] * slip[i];
-        let felt = (t[torque] - FELT_BEFORE_S, t[locked] + FELT_AFTER_S);
-        Some(Self {
-            torque_phase_start_s: t[torque],
-            inertia_phase_start_s: t[inertia],
-            lock_up_s: t[locked],
-            flare_rad_s: (torque..locked).map(|i| turbine[i] - ratio * output[i]).fold(0.0, f64::max),
-            least_shaft_torque_n_m: shaft[torque..locked].iter().copied().fold(f64::INFINITY, f64::min),
-            jerk_peak_m_s3: peak_jerk(t, acceleration, felt),
-            vibration_dose_m_s175: vibration_dose(t, acceleration, felt),
-            friction_work_j: (1..=locked).map(|i| 0.5 * (friction_w(i - 1) + friction_w(i)) * (t[i] - t[i - 1])).sum(),
+/// What a shift is rated by at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftSample {
+    /// Time, s.
+    pub time_s: f64,
+    /// The true phase.
+    pub phase: Phase,
+    /// Turbine speed, rad/s.
+    pub turbine_rad_s: f64,
+    /// Gearbox output speed, rad/s.
+    pub output_rad_s: f64,
+    /// Slip of the oncoming clutch, rad/s.
+    pub oncoming_slip_rad_s: f64,
+    /// Torque of the oncoming clutch, N m.
+    pub oncoming_n_m: f64,
+    /// Drive-shaft torque, N m.
+    pub shaft_n_m: f64,
+    /// Acceleration of the vehicle, m/s^2.
+    pub vehicle_m_s2: f64,
+}
+
+/// A shift on its way to be rated: remembers no more of the drive than is felt of it at a time.
+#[derive(Debug, Clone)]
+pub struct ShiftRating {
+    ratio_offgoing: f64,
+    torque_phase_start_s: Option<f64>,
+    inertia_phase_start_s: Option<f64>,
+    lock_up_s: Option<f64>,
+    flare_rad_s: f64,
+    least_shaft_torque_n_m: f64,
+    friction_work_j: f64,
+    /// Time and friction power of the sample before.
+    last: Option<(f64, f64)>,
+    /// Times and accelerations from which the shift may be felt, before it has begun.
+    before: VecDeque<(f64, f64)>,
+    jerk: PeakJerk,
+    vibration: VibrationDose,
+}
+
+impl ShiftRating {
+    /// Nothing seen yet.
+    pub fn new(shift: &ReducedShift<f64>) -> Self {
+        Self {
+            ratio_offgoing: shift.ratio_offgoing(),
+            torque_phase_start_s: None,
+            inertia_phase_start_s: None,
+            lock_up_s: None,
+            flare_rad_s: 0.0,
+            least_shaft_torque_n_m: f64::INFINITY,
+            friction_work_j: 0.0,
+            last: None,
+            before: VecDeque::new(),
+            jerk: PeakJerk::default(),
+            vibration: VibrationDose::default(),
+        }
+    }
+
+    /// Takes the next sample.
+    pub fn push(&mut self, sample: &ShiftSample) {
+        let (time_s, friction_w) = (sample.time_s, sample.oncoming_n_m * sample.oncoming_slip_rad_s);
+        if let Some((last_s, last_w)) = self.last.filter(|_| self.lock_up_s.is_none()) {
+            self.friction_work_j += 0.5 * (last_w + friction_w) * (time_s - last_s);
+        }
+        self.last = Some((time_s, friction_w));
+        let start = match sample.phase {
+            Phase::BeforeShift => &mut None,
+            Phase::TorquePhase => &mut self.torque_phase_start_s,
+            Phase::InertiaPhase => &mut self.inertia_phase_start_s,
+            Phase::AfterShift => &mut self.lock_up_s,
+        };
+        start.get_or_insert(time_s);
+        if self.torque_phase_start_s.is_some() && self.lock_up_s.is_none() {
+            self.flare_rad_s = self.flare_rad_s.max(sample.turbine_rad_s - self.ratio_offgoing * sample.output_rad_s);
+            self.least_shaft_torque_n_m = self.least_shaft_torque_n_m.min(sample.shaft_n_m);
+        }
+        self.feel(time_s, sample.vehicle_m_s2);
+    }
+
+    /// Takes an acceleration, if it is felt as part of the shift.
+    fn feel(&mut self, time_s: f64, acceleration: f64) {
+        self.before.push_back((time_s, acceleration));
+        let from_s = self.torque_phase_start_s.unwrap_or(time_s) - FELT_BEFORE_S;
+        if self.jerk.is_unused() {
+            while self.before.front().is_some_and(|&(time_s, _)| time_s < from_s) {
+                self.before.pop_front();
+            }
+        }
+        if self.torque_phase_start_s.is_none() {
+            return;
+        }
+        let to_s = self.lock_up_s.map_or(f64::INFINITY, |lock_up_s| lock_up_s + FELT_AFTER_S);
+        for (time_s, acceleration) in self.before.drain(..).filter(|&(time_s, _)| time_s <= to_s) {
+            self.jerk.push(time_s, acceleration);
+            self.vibration.push(time_s, acceleration);
+        }
+    }
+
+    /// How the shift was; `None` if it did not pass all its phases.
+    pub fn finish(&self) -> Option<ShiftQuality> {
+        let lock_up_s = self.lock_up_s?;
+        Some(ShiftQuality {
+            torque_phase_start_s: self.torque_phase_start_s.filter(|&start_s| start_s < lock_up_s)?,
+            inertia_phase_start_s: self.inertia_phase_start_s?,
+            lock_up_s,
+            flare_rad_s: self.flare_rad_s,
+            least_shaft_torque_n_m: self.least_shaft_torque_n_m,
+            jerk_peak_m_s3: self.jerk.peak,
+            vibration_dose_m_s175: self.vibration.dose.powf(0.25),
+            friction_work_j: self.friction_work_j,
         })
     }
 }
 
-/// Largest change of the acceleration over a window, per time.
-fn peak_jerk(time_s: &[f64], acceleration: &[f64], (from_s, to_s): (f64, f64)) -> f64 {
-    let first = time_s.partition_point(|&t| t < from_s);
-    let mut end = first;
-    let mut peak = 0.0_f64;
-    for i in first..time_s.len() {
-        while end < time_s.len() && time_s[end] < time_s[i] + JERK_WINDOW_S - 1e-9 {
-            end += 1;
+impl ShiftQuality {
+    /// Rates the shift of a simulated trace; `None` if it did not pass all its phases.
+    pub fn of(trace: &Trace, shift: &ReducedShift<f64>) -> Option<Self> {
+        let phases = true_phases(trace)?;
+        let (turbine, output) = (trace.get(signal::TURBINE_SPEED)?, trace.get(signal::OUTPUT_SPEED)?);
+        let (shaft, acceleration) = (trace.get(signal::SHAFT_TORQUE)?, trace.get(signal::VEHICLE_ACCELERATION)?);
+        let (clutch, slip) = (trace.get(signal::ONCOMING_TORQUE)?, trace.get(signal::ONCOMING_SLIP)?);
+        let mut rating = ShiftRating::new(shift);
+        for (i, (&time_s, &phase)) in trace.time_s.iter().zip(&phases).enumerate() {
+            rating.push(&ShiftSample {
+                time_s,
+                phase,
+                turbine_rad_s: turbine[i],
+                output_rad_s: output[i],
+                oncoming_slip_rad_s: slip[i],
+                oncoming_n_m: clutch[i],
+                shaft_n_m: shaft[i],
+                vehicle_m_s2: acceleration[i],
+            });
         }
-        if end == time_s.len() || time_s[end] > to_s {
-            break;
-        }
-        peak = peak.max(((acceleration[end] - acceleration[i]) / (time_s[end] - time_s[i])).abs());
+        rating.finish()
     }
-    peak
 }
 
-/// Fourth root of the integral of the fourth power of the acceleration after a first-order high pass.
-fn vibration_dose(time_s: &[f64], acceleration: &[f64], (from_s, to_s): (f64, f64)) -> f64 {
-    let first = time_s.partition_point(|&t| t < from_s);
-    let Some(&begin) = acceleration.get(first) else { return 0.0 };
-    let (mut slow, mut dose) = (begin, 0.0);
-    for i in first + 1..time_s.len().min(time_s.partition_point(|&t| t <= to_s)) {
-        let dt = time_s[i] - time_s[i - 1];
-        slow += (1.0 - (-std::f64::consts::TAU * VIBRATION_FROM_HZ * dt).exp()) * (acceleration[i] - slow);
-        dose += (acceleration[i] - slow).powi(4) * dt;
+/// Largest change of the acceleration over a window, per time.
+#[derive(Debug, Clone, Default)]
+struct PeakJerk {
+    peak: f64,
+    /// Times and accelerations for which the end of the window has not come.
+    open: VecDeque<(f64, f64)>,
+}
+
+impl PeakJerk {
+    fn is_unused(&self) -> bool {
+        self.open.is_empty()
     }
-    dose.powf(0.25)
+
+    fn push(&mut self, time_s: f64, acceleration: f64) {
+        while let Some(&(from_s, from)) = self.open.front()
+            && time_s >= from_s + JERK_WINDOW_S - 1e-9
+        {
+            self.peak = self.peak.max(((acceleration - from) / (time_s - from_s)).abs());
+            self.open.pop_front();
+        }
+        self.open.push_back((time_s, acceleration));
+    }
+}
+
+/// Integral of the fourth power of the acceleration after a first-order high pass.
+#[derive(Debug, Clone, Default)]
+struct VibrationDose {
+    dose: f64,
+    /// Time of the sample before, and what the high pass takes away.
+    last: Option<(f64, f64)>,
+}
+
+impl VibrationDose {
+    fn push(&mut self, time_s: f64, acceleration: f64) {
+        let (last_s, mut slow) = self.last.unwrap_or((time_s, acceleration));
+        let dt = time_s - last_s;
+        slow += (1.0 - (-std::f64::consts::TAU * VIBRATION_FROM_HZ * dt).exp()) * (acceleration - slow);
+        self.dose += (acceleration - slow).powi(4) * dt;
+        self.last = Some((time_s, slow));
+    }
 }
 
 #[cfg(test)]
@@ -241,6 +431,20 @@ mod tests {
     }
 
     #[test]
+    fn an_estimate_that_diverged_has_infinite_scores() {
+        let phases = [Phase::InertiaPhase; 3];
+        for diverged in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let estimate = [0.0, diverged, 0.0];
+            let score = score(&[0.0, 0.1, 0.2], &phases, &[0.0; 3], 1.0, |i| estimate[i])[1];
+            let scores = [score.peak, score.rms, score.mean, score.chatter];
+            assert!(scores.iter().all(|score| *score == f64::INFINITY), "{score:?}");
+        }
+        // A truth that was not measured is nobody's fault.
+        let measured = score(&[0.0, 0.1, 0.2], &phases, &[1.0, f64::NAN, 1.0], 1.0, |_| 0.0)[1];
+        assert_eq!((measured.samples, measured.rms, measured.chatter), (2, 1.0, 0.0));
+    }
+
+    #[test]
     fn chatter_is_the_variation_that_the_truth_does_not_have() {
         let phases = [Phase::InertiaPhase; 5];
         let (truth, noisy) = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.5, 0.5, 2.5, 2.5, 4.5]);
@@ -252,16 +456,66 @@ mod tests {
     #[test]
     fn the_jerk_of_a_ramp_is_its_slope() {
         let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 1e-3).collect();
-        let ramp: Vec<f64> = time.iter().map(|t| 5.0 * t).collect();
-        assert!((peak_jerk(&time, &ramp, (0.0, 1.0)) - 5.0).abs() < 1e-9);
+        let mut jerk = PeakJerk::default();
+        time.iter().for_each(|&t| jerk.push(t, 5.0 * t));
+        assert!((jerk.peak - 5.0).abs() < 1e-9);
+        // Only the window is remembered.
+        assert_eq!(jerk.open.len(), 20);
     }
 
     #[test]
     fn a_steady_acceleration_gives_no_vibration_dose() {
-        let time: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
-        assert_eq!(vibration_dose(&time, &vec![2.0; 1000], (0.0, 1.0)), 0.0);
+        let dose = |acceleration: &dyn Fn(f64) -> f64| {
+            let mut dose = VibrationDose::default();
+            (0..1000).map(|i| f64::from(i) * 1e-3).for_each(|t| dose.push(t, acceleration(t)));
+            dose.dose.powf(0.25)
+        };
+        assert_eq!(dose(&|_| 2.0), 0.0);
         // One second of a 20 Hz sine of amplitude 1: the mean of its fourth power is 3/8.
-        let sine: Vec<f64> = time.iter().map(|t| (std::f64::consts::TAU * 20.0 * t).sin()).collect();
-        assert!((vibration_dose(&time, &sine, (0.0, 1.0)) - 0.375_f64.powf(0.25)).abs() < 0.01);
+        assert!((dose(&|t| (std::f64::consts::TAU * 20.0 * t).sin()) - 0.375_f64.powf(0.25)).abs() < 0.01);
+    }
+
+    const SHIFT: ReducedShift<f64> =
+        ReducedShift { mass_kg_m2: [[1.0, 0.0], [0.0, 1.0]], slip_offgoing: [1.0, -2.0], slip_oncoming: [1.0, -1.0] };
+
+    fn sample(time_s: f64, phase: Phase) -> ShiftSample {
+        ShiftSample {
+            time_s,
+            phase,
+            turbine_rad_s: 200.0,
+            output_rad_s: 99.0,
+            oncoming_slip_rad_s: 101.0,
+            oncoming_n_m: 10.0,
+            shaft_n_m: 50.0,
+            vehicle_m_s2: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_shift_is_rated_only_if_it_passed_its_phases_in_order() {
+        use Phase::{AfterShift, BeforeShift, InertiaPhase, TorquePhase};
+        let rated = |phases: &[Phase]| {
+            let mut rating = ShiftRating::new(&SHIFT);
+            (0..).map(f64::from).zip(phases).for_each(|(time_s, &phase)| rating.push(&sample(time_s, phase)));
+            rating.finish()
+        };
+        let quality = rated(&[BeforeShift, TorquePhase, InertiaPhase, AfterShift, AfterShift]).unwrap();
+        assert_eq!((quality.torque_phase_start_s, quality.inertia_phase_start_s, quality.lock_up_s), (1.0, 2.0, 3.0));
+        assert_eq!((quality.flare_rad_s, quality.least_shaft_torque_n_m), (2.0, 50.0));
+        // Up to lock-up, three seconds of 1010 W.
+        assert_eq!(quality.friction_work_j, 3030.0);
+        assert_eq!(rated(&[BeforeShift, TorquePhase, InertiaPhase]), None);
+        assert_eq!(rated(&[BeforeShift, InertiaPhase, AfterShift, TorquePhase]), None);
+    }
+
+    #[test]
+    fn of_a_long_drive_a_rating_remembers_what_is_felt_at_a_time() {
+        let mut rating = ShiftRating::new(&SHIFT);
+        for i in 0..10_000 {
+            let phase = if i < 5000 { Phase::BeforeShift } else { Phase::TorquePhase };
+            rating.push(&sample(f64::from(i) * 1e-3, phase));
+            // 0.3 s before the shift, or a window of 20 ms, at a millisecond; and one more, as times are rounded.
+            assert!(rating.before.len() <= 302 && rating.jerk.open.len() <= 21);
+        }
     }
 }

@@ -1,15 +1,15 @@
-//! What the speeds can tell about the pressure in each phase, and what each error of the budget does to it.
+//! The effect of the pressure, and of each error of the budget, on the speeds in each phase.
 //!
 //! Near an operating point the accelerations are `dy/dt = F + G p + sum of columns times errors`. An error whose column
-//! lies along `G` looks just like a pressure: no observer on these speeds can tell the two apart, whatever its gain.
-//! What an error is worth in pressure is the least-squares answer to it, which an observer that trusts the speeds fully
-//! would give; the valve model bounds it from the other side.
+//! is parallel to `G` has the same effect as a pressure: no observer of these speeds can distinguish them, with any gain.
+//! The equivalent pressure error is the least-squares solution, the error of an observer that uses the speeds alone. An
+//! observer that uses the valve model alone has the error of the valve model.
 
 use config::Vehicle;
-use design::ValveErrors;
 use design::budget::{grade_n_m, mass_n_m};
 use design::compliant::compliant_model;
 use design::rigid_model;
+use design::{ValveErrors, shift_time_constant};
 use nalgebra::DVector;
 use observer::Phase;
 use serde::Serialize;
@@ -22,7 +22,7 @@ use crate::campaign::PHASES;
 pub enum View {
     /// Turbine speed (and slip), vehicle rigid behind the gearbox.
     Rigid,
-    /// The same speeds with the shaft torque known, as the twist of the shafts tells it.
+    /// The same speeds with the shaft torque known from the twist of the shafts.
     ShaftKnown,
 }
 
@@ -45,12 +45,12 @@ pub struct ErrorEffect {
     pub unit: &'static str,
     /// Its bound in the vehicle file, in that unit.
     pub bound: f64,
-    /// Pressure that it looks like, Pa per unit.
+    /// Equivalent pressure error, Pa per unit.
     pub pressure_pa_per_unit: f64,
-    /// Clutch torque that it looks like, N m per unit.
+    /// Equivalent clutch torque error, N m per unit.
     pub clutch_n_m_per_unit: f64,
-    /// Angle between its column and that of the pressure, degrees; near zero no observer can tell them apart. None where
-    /// there is one speed: there everything looks like a pressure.
+    /// Angle between its column and that of the pressure, degrees; near zero no observer can distinguish them. None
+    /// if there is only one speed, where every error is equivalent to a pressure, and for an error without weight.
     pub angle_deg: Option<f64>,
 }
 
@@ -121,9 +121,9 @@ fn shaft_known(vehicle: &Vehicle, phase: Phase) -> PhaseSensitivity {
     let turbine = [t.per_turbine_torque, d.per_turbine_torque];
     let both = [0, 1].map(|i| turbine[i] + shaft[i] * overall);
     let mut columns: Vec<Column> = vec![
-        ("turbine torque that came in the shift", "N m", bounds.turbine_torque_n_m, turbine),
-        ("turbine torque that was there before", "N m", bounds.turbine_torque_n_m, both),
-        ("shaft torque, drifted in the shift", "N m", drift_n_m(vehicle), shaft),
+        ("turbine torque, error arising in the shift", "N m", bounds.turbine_torque_n_m, turbine),
+        ("turbine torque, error before the shift", "N m", bounds.turbine_torque_n_m, both),
+        ("shaft torque, drift in the shift", "N m", drift_n_m(vehicle), shaft),
     ];
     columns.extend(common(vehicle, phase, pressure, [t.per_offgoing_torque, d.per_offgoing_torque]));
     evaluate(vehicle, phase, View::ShaftKnown, pressure, &columns)
@@ -135,7 +135,7 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
     let share = bounds.friction_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max);
     let mut columns: Vec<Column> = Vec::new();
     if phase == Phase::InertiaPhase {
-        columns.push(("torque left in the offgoing clutch", "N m", bounds.offgoing_torque_n_m, offgoing));
+        columns.push(("remaining torque of the offgoing clutch", "N m", bounds.offgoing_torque_n_m, offgoing));
     }
     columns.push(("friction", "%", 100.0 * share, pressure.map(|g| 0.01 * g * bounds.shift_pressure_pa)));
     // Old speeds tell what the pressure was.
@@ -146,14 +146,9 @@ fn common(vehicle: &Vehicle, phase: Phase, pressure: [f64; 2], offgoing: [f64; 2
         pressure.map(|g| 1e-3 * g * bounds.shift_ramp_pa_s),
     ));
     let sample_s = 0.01;
-    columns.push((
-        "reading of the turbine speed, over 10 ms",
-        "rad/s",
-        bounds.turbine_quantum_rad_s,
-        [1.0 / sample_s, 0.0],
-    ));
+    columns.push(("turbine speed reading, over 10 ms", "rad/s", bounds.turbine_quantum_rad_s, [1.0 / sample_s, 0.0]));
     if phase == Phase::InertiaPhase {
-        columns.push(("reading of the slip, over 10 ms", "rad/s", bounds.slip_quantum_rad_s, [0.0, 1.0 / sample_s]));
+        columns.push(("slip reading, over 10 ms", "rad/s", bounds.slip_quantum_rad_s, [0.0, 1.0 / sample_s]));
     }
     let rounding_rad_s = bounds.float32_rounding * vehicle.limits.speed_max_rad_s;
     columns.push(("float32 rounding of a speed, over 10 ms", "rad/s", rounding_rad_s, [1.0 / sample_s, 0.0]));
@@ -172,12 +167,12 @@ pub struct ValveEffect {
 /// What the valve's errors do to the open loop, by this vehicle's budget.
 pub fn valve_alone(vehicle: &Vehicle) -> [ValveEffect; 3] {
     let errors = ValveErrors::of(vehicle);
-    let time_constant_s = -1.0 / vehicle.observer_valve.linear(0.0).a22_per_s;
+    let time_constant_s = shift_time_constant(vehicle);
     [("lag", errors.lag_pa_s), ("gain", errors.gain_pa_s), ("delay", errors.delay_pa_s)]
         .map(|(error, rate_pa_s)| ValveEffect { error, pressure_pa: rate_pa_s * time_constant_s })
 }
 
-/// What an error does to an estimate of the shaft torque, whose level no speed tells.
+/// Effect of an error on the estimate of the shaft torque, whose level does not affect the speeds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShaftEffect {
     /// The error.
@@ -186,14 +181,17 @@ pub struct ShaftEffect {
     pub torque_n_m: f64,
 }
 
-/// What puts the shaft torque off, by this vehicle's budget: the turbine torque that it is found from before the shift, and
-/// the readings by which it is carried on.
+/// What puts the shaft torque off, by this vehicle's budget: the turbine torque that it is found from before the
+/// shift, and the readings by which it is carried on.
 pub fn shaft_level(vehicle: &Vehicle) -> [ShaftEffect; 2] {
     let overall = vehicle.shift.ratio_offgoing() * vehicle.driveline.final_ratio;
     let before = overall * vehicle.error_bounds.turbine_torque_n_m;
     [
         ShaftEffect { error: "turbine torque before the shift", torque_n_m: before },
-        ShaftEffect { error: "drift of the readings over a shift, one deviation", torque_n_m: drift_n_m(vehicle) },
+        ShaftEffect {
+            error: "drift of the readings in a shift, one standard deviation",
+            torque_n_m: drift_n_m(vehicle),
+        },
     ]
 }
 
@@ -228,7 +226,7 @@ fn evaluate(vehicle: &Vehicle, phase: Phase, view: View, pressure: [f64; 2], col
             bound: *bound,
             pressure_pa_per_unit: pressure_pa,
             clutch_n_m_per_unit: pressure_pa * torque_per_pa,
-            angle_deg: (outputs > 1).then(|| cosine.acos().to_degrees()),
+            angle_deg: (outputs > 1 && column.norm() > 0.0).then(|| cosine.acos().to_degrees()),
         }
     });
     PhaseSensitivity { phase: phase.name(), view, influence_rad_s2_mpa: 1e6 * g.norm(), effects: effects.collect() }
@@ -253,9 +251,9 @@ mod tests {
         let turbine = effect(&phases, Phase::InertiaPhase, View::Rigid, "turbine torque");
         assert!((turbine.clutch_n_m_per_unit.abs() - 0.55).abs() < 0.1 && turbine.angle_deg.unwrap() < 10.0);
         // With the shaft torque found before the shift, an error of both cancels in the torque phase.
-        let error = "turbine torque that was there before";
+        let error = "turbine torque, error before the shift";
         let cancels = effect(&phases, Phase::TorquePhase, View::ShaftKnown, error);
-        let came = effect(&phases, Phase::TorquePhase, View::ShaftKnown, "turbine torque that came in the shift");
+        let came = effect(&phases, Phase::TorquePhase, View::ShaftKnown, "turbine torque, error arising in the shift");
         assert!(cancels.pressure_pa_per_unit.abs() < 1e-6 * came.pressure_pa_per_unit.abs());
         assert!((came.clutch_n_m_per_unit.abs() - 1.0).abs() < 0.01);
     }

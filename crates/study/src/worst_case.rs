@@ -1,9 +1,10 @@
-//! Searches a study's factors for the run that hurts an observer most.
+//! Searches a study's factors for the run with the largest error of an observer.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
+use config::toml_string;
 
 use crate::campaign::plan::{place_of, value_at};
 use crate::campaign::{Campaign, Metric, Row, run_seed};
@@ -52,11 +53,11 @@ impl Search<'_> {
         factors.iter().zip(places).map(|(factor, place)| value_at(&factor.values, place.clamp(0.0, 1.0))).collect()
     }
 
-    /// The score; nothing for a run without one.
+    /// The score, infinite where the observer diverged; nothing for a run without a whole shift.
     fn score(&self, row: &Row) -> f64 {
         let Target { observer, phase, metric } = self.target;
         let score = row.numbers[self.campaign.layout.score(observer, phase, metric)];
-        if row.status.is_scored() && score.is_finite() { score } else { 0.0 }
+        if row.status.is_scored() && !score.is_nan() { score } else { 0.0 }
     }
 }
 
@@ -133,6 +134,7 @@ fn from(search: &Search<'_>, start: &Row, iterations: u64) -> Result<(f64, Vec<f
         Err(other) => StudyError::Search(other.to_string()),
     };
     let solver = NelderMead::new(simplex).with_sd_tolerance(FLAT_PA).map_err(failed)?;
+    // A diverged estimate ends the search: argmin's target is a cost of minus infinity, and nothing is worse.
     let result = Executor::new(search, solver).configure(|state| state.max_iters(iterations)).run().map_err(failed)?;
     let state = result.state();
     let places = state.get_best_param().cloned().unwrap_or(origin);
@@ -140,21 +142,25 @@ fn from(search: &Search<'_>, start: &Row, iterations: u64) -> Result<(f64, Vec<f
 }
 
 impl WorstCase {
-    /// A study file of this one run, beside an experiment at this path.
+    /// A study file of this one run of the experiment at this path.
     pub fn study_file(&self, campaign: &Campaign, experiment: &str) -> String {
         let study = &campaign.study;
         let mut text = format!(
-            "# The worst case that `wetclutch worst-case` found for \"{}\".\n\nname = \"worst_case\"\ntitle = \"Worst case of \
-             {}\"\nexperiment = '{experiment}'\nplan = \"full-factorial\"\nseed = {}\n",
-            study.title, study.title, study.seed,
+            "# The worst case that `wetclutch worst-case` found for {}.\n\nname = \"worst_case\"\ntitle = {}\nexperiment = {}\n\
+             plan = \"full-factorial\"\nseed = {}\nrecord_before_s = {:?}\n",
+            toml_string(&study.title),
+            toml_string(&format!("Worst case of {}", study.title)),
+            toml_string(experiment),
+            study.seed,
+            study.record_before_s,
         );
-        let names: Vec<String> = campaign.layout.observers.iter().map(|name| format!("{name:?}")).collect();
+        let names: Vec<String> = campaign.layout.observers.iter().map(|name| toml_string(name)).collect();
         text += &format!("observers = [{}]\n", names.join(", "));
         for (factor, value) in study.factors.iter().zip(&self.row.numbers) {
             text += &format!(
-                "\n[[factor]]\nname = {:?}\nkey = {:?}\nchange = \"{}\"\nvalues = [{value:?}]\n",
-                factor.name,
-                factor.key,
+                "\n[[factor]]\nname = {}\nkey = {}\nchange = \"{}\"\nvalues = [{value:?}]\n",
+                toml_string(&factor.name),
+                toml_string(&factor.key),
                 factor.change_name(),
             );
         }

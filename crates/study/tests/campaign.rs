@@ -3,8 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-use config::{Study, Vehicle};
+use config::{Experiment, GivenGains, ObserverKind, Study, Values, Vehicle};
+use observer::RigidGains;
 use study::campaign::{Metric, PHASES, factor_values};
 use study::{Campaign, StudyError, Summary, Target, error_bound, execute, worst_case};
 
@@ -19,11 +22,14 @@ fn study_of(file: &str, changes: &[(&str, &str)]) -> Study {
         assert!(text.contains(from), "{from}");
         text = text.replace(from, to);
     }
-    for experiment in ["bench.toml", "e1.toml"] {
+    for experiment in ["bench.toml", "combined_drive.toml", "e1.toml", "field.toml"] {
         let whole = experiments().join(experiment);
         text = text.replace(&format!("experiment = \"{experiment}\""), &format!("experiment = '{}'", whole.display()));
     }
-    let path = std::env::temp_dir().join(format!("wetclutch-campaign-{}-{}", std::process::id(), text.len()));
+    // The tests of one process run at the same time: each file needs a name of its own.
+    static FILES: AtomicU32 = AtomicU32::new(0);
+    let number = FILES.fetch_add(1, Ordering::Relaxed);
+    let path = std::env::temp_dir().join(format!("wetclutch-campaign-{}-{number}.toml", std::process::id()));
     std::fs::write(&path, text).unwrap();
     let study = Study::read(&path);
     std::fs::remove_file(path).unwrap();
@@ -77,6 +83,98 @@ fn a_full_factorial_plan_makes_every_combination_once() {
     first.sort();
     first.dedup();
     assert_eq!(first.len(), 729);
+}
+
+#[test]
+fn a_factor_by_chance_is_in_its_share_of_the_runs_and_neutral_in_the_rest() {
+    for plan in ["sobol", "latin-hypercube", "random"] {
+        let study = study_of("combined.toml", &[("plan = \"sobol\"", &format!("plan = \"{plan}\""))]);
+        let runs: Vec<Vec<f64>> = (0..2000).map(|run| factor_values(&study, run)).collect();
+        for (i, factor) in study.factors.iter().enumerate() {
+            let Values::Sometimes(sometimes) = &factor.values else { continue };
+            let here: Vec<f64> = runs.iter().map(|run| run[i]).filter(|value| *value != sometimes.otherwise).collect();
+            // Five standard deviations of a binomial count: 1000 with a variance of 500.
+            assert!(here.len().abs_diff(1000) < 5 * 23, "{plan}: {} in {}", factor.name, here.len());
+            let [low, high] = sometimes.values.ends();
+            assert!(here.iter().all(|value| (low..=high).contains(value)));
+            let upper = here.iter().filter(|value| **value > 0.5 * (low + high)).count();
+            // A range of values is filled evenly; of 1, 2, 3 one third is above the middle, and of one value none.
+            let share = match factor.name.as_str() {
+                "missing_share" => 0.0,
+                "outliers" => 1.0 / 3.0,
+                _ => 0.5,
+            };
+            assert!((upper as f64 / here.len() as f64 - share).abs() < 5.0 * 0.5 / 1000.0_f64.sqrt());
+        }
+        // Two of them are together in a quarter of the runs.
+        let at = |name: &str| study.factors.iter().position(|factor| factor.name == name).unwrap();
+        let both = runs.iter().filter(|run| run[at("wheel_scale")] != 1.0 && run[at("wheel_delay_s")] != 0.0).count();
+        assert!(both.abs_diff(500) < 5 * 20, "{plan}: {both}");
+    }
+}
+
+#[test]
+fn a_factor_by_chance_has_its_neutral_value_as_one_more_level() {
+    let scale = "range = [0.98, 1.02]\nchance = 0.5\notherwise = 1.0";
+    let chance = format!("change = \"scale\"\nname = \"shaft_stiffness_factor\"\n{scale}");
+    let levels = [
+        ("change = \"scale\"\nname = \"shaft_stiffness_factor\"\nrange = [0.8, 1.2]", chance.as_str()),
+        ("plan = \"sobol\"\nruns = 2000", "plan = \"full-factorial\""),
+    ];
+    let study = study_of("settings.toml", &levels);
+    assert_eq!(study.runs, 4 * 3_u64.pow(9));
+    let mut seen: Vec<f64> = (0..12).map(|run| factor_values(&study, run)[8]).collect();
+    seen.dedup();
+    assert_eq!(seen, [1.0, 0.98, 1.0, 1.02]);
+}
+
+#[test]
+fn runs_with_errors_of_the_sensors_are_the_same_on_any_number_of_threads() {
+    let study = || study_of("combined.toml", &[("runs = 2000", "runs = 24"), ("record_before_s = 7.0", "")]);
+    let lines = |threads| {
+        let campaign = Campaign::new(study()).unwrap();
+        let mut lines = Vec::new();
+        execute::<StudyError>(&campaign, 0..24, threads, |row| {
+            lines.push(row.line(&campaign.layout));
+            Ok(())
+        })
+        .unwrap();
+        lines
+    };
+    assert_eq!(lines(1), lines(3));
+}
+
+#[test]
+fn the_errors_over_those_of_the_open_loop_are_of_runs_and_of_quantiles() {
+    let two =
+        ("observers = [\"Kalman\", \"open loop, maps\", \"open loop\"]", "observers = [\"Kalman\", \"open loop\"]");
+    let campaign = Campaign::new(study_of("combined.toml", &[two, ("runs = 2000", "runs = 200")])).unwrap();
+    let mut summary = Summary::new(&campaign.study);
+    // The open loop's error is the number of the run; the first observer's is half of it, but for the last ten runs.
+    for run in 0..200 {
+        let mut row = made_up(&campaign, run, [1.0; 2]);
+        let reference = (run + 1) as f64;
+        let factor = if run < 190 { 0.5 } else { 3.0 };
+        for (metric, share) in [(Metric::PressureRms, factor), (Metric::TorqueRms, 2.0 * factor)] {
+            row.numbers[campaign.layout.score(0, 0, metric)] = share * reference;
+            row.numbers[campaign.layout.score(1, 0, metric)] = reference;
+        }
+        summary.push(&row);
+    }
+    // Quantiles are good to half a per cent, and a ratio of two of them to one.
+    let near = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 0.011, "{value} {expected}");
+    for (compared, share) in [(0, 1.0), (1, 2.0)] {
+        let relative = summary.relative(compared, 0, 0).unwrap();
+        near(relative.median, 0.5 * share);
+        near(relative.high, 0.5 * share);
+        near(relative.largest, 3.0 * share);
+        // Of the 200 errors the ten largest are those of the last runs: 95 % of them are below half of 190.
+        near(relative.high_over_high, 0.5 * share);
+        near(relative.worst_over_worst, 3.0 * share);
+    }
+    assert!((summary.relative(0, 0, 0).unwrap().better - 0.95).abs() < 1e-12);
+    assert_eq!(summary.relative(1, 0, 0).unwrap().better, 0.0);
+    assert!(summary.relative(0, 1, 0).is_none(), "the open loop is not compared with itself");
 }
 
 #[test]
@@ -134,6 +232,84 @@ fn the_search_finds_a_case_at_least_as_bad_as_the_worst_run() {
         (low..=high).contains(value)
     };
     assert!(campaign.study.factors.iter().zip(&found.row.numbers).all(inside));
+}
+
+#[test]
+fn a_sobol_plan_goes_on_where_its_sequence_would_begin_anew() {
+    let study = study_of("settings.toml", &[("runs = 2000", "runs = 200000")]);
+    let first: Vec<Vec<f64>> = (0..64).map(|run| factor_values(&study, run)).collect();
+    for run in 65536..65600 {
+        assert!(!first.contains(&factor_values(&study, run)), "run {run} repeats another");
+    }
+}
+
+/// Every correction by such a gain is more than the supply can give, so that none is taken.
+#[test]
+fn an_observer_whose_gain_is_absurd_is_the_open_loop() {
+    let few = r#"observers = ["open loop"]"#;
+    let all = r#"observers = ["Kalman", "peak-to-peak", "rigid", "compliant", "open loop"]"#;
+    let mut study = study_of("settings.toml", &[(all, few), ("runs = 2000", "runs = 12")]);
+    let mut experiment = Experiment::clone(&study.experiment);
+    let mut entry = experiment.observers[0].clone();
+    let gains = RigidGains { torque_phase_pa_s_rad: 1e200, inertia_phase_pa_s_rad: [1e200; 2] };
+    (entry.name, entry.kind, entry.gains) = ("wild".to_owned(), ObserverKind::Rigid, Some(GivenGains::Rigid(gains)));
+    experiment.observers.insert(0, entry);
+    study.experiment = Arc::new(experiment);
+    let summary = summary(study);
+    for phase in 0..PHASES.len() {
+        assert_eq!((summary.rms(0, phase).count(), summary.rms(0, phase).diverged()), (12, 0));
+        assert_eq!(summary.ratio(0, phase).largest(), 1.0);
+    }
+}
+
+/// A row of this campaign, made up: the first observer has these RMS errors in the two phases.
+fn made_up(campaign: &Campaign, run: u64, rms: [f64; 2]) -> study::Row {
+    let mut numbers = factor_values(&campaign.study, run);
+    numbers.resize(campaign.layout.width(), 1.0);
+    for (phase, rms) in rms.into_iter().enumerate() {
+        numbers[campaign.layout.score(0, phase, Metric::PressureRms)] = rms;
+    }
+    study::Row { run, seed: study::campaign::run_seed(&campaign.study, run), status: study::Status::Ok, numbers }
+}
+
+#[test]
+fn a_row_whose_scores_do_not_go_with_its_status_is_refused() {
+    let campaign = Campaign::new(study_of("settings.toml", &[("runs = 2000", "runs = 12")])).unwrap();
+    let refused = |row: study::Row| campaign.row_of_line(row.run, &row.line(&campaign.layout)).is_err();
+    let row = made_up(&campaign, 3, [1.0; 2]);
+    assert!(!refused(row.clone()));
+    assert!(refused(study::Row { status: study::Status::Diverged, ..row }));
+    assert!(refused(made_up(&campaign, 3, [-1.0, 1.0])));
+}
+
+#[test]
+fn an_observer_that_diverges_is_worse_than_all_others() {
+    let campaign = Campaign::new(study_of("settings.toml", &[("runs = 2000", "runs = 12")])).unwrap();
+    let row = |run| made_up(&campaign, run, [f64::INFINITY; 2]);
+    // The row says it, and is read back as it was written.
+    let line = row(3).line(&campaign.layout);
+    assert_eq!(campaign.row_of_line(3, &line).unwrap().line(&campaign.layout), line);
+    // Its runs are counted, above all others.
+    let mut summary = Summary::new(&campaign.study);
+    (0..12).for_each(|run| summary.push(&row(run)));
+    for phase in 0..PHASES.len() {
+        let (wild, sound) = (summary.rms(0, phase), summary.rms(1, phase));
+        assert_eq!((wild.count(), wild.diverged(), sound.diverged()), (12, 12, 0));
+        assert_eq!((wild.quantile(0.5), wild.largest()), (f64::INFINITY, f64::INFINITY));
+        assert_eq!((summary.ratio(0, phase).largest(), summary.ratio(0, phase).share_below(1.0)), (f64::INFINITY, 0.0));
+        assert!(sound.quantile(0.95).is_finite() && summary.effects(1, phase)[0].means.iter().any(|x| x.is_finite()));
+    }
+}
+
+#[test]
+fn a_run_that_diverged_comes_first_among_the_worst() {
+    let study = study_of("settings.toml", &[("runs = 2000", "runs = 12")]);
+    let campaign = Campaign::new(study).unwrap();
+    let mut summary = Summary::new(&campaign.study);
+    let scores = [[1.0, 2.0], [9.0, 1.0], [f64::INFINITY, 1.0], [f64::NAN, 5.0], [1.0, f64::INFINITY]];
+    (0..).zip(scores).for_each(|(run, rms)| summary.push(&made_up(&campaign, run, rms)));
+    assert_eq!(summary.worst.iter().map(|row| row.run).collect::<Vec<_>>(), [2, 4, 1, 3, 0]);
+    assert_eq!((summary.rms(0, 0).count(), summary.rms(0, 0).diverged()), (4, 1));
 }
 
 #[test]

@@ -1,49 +1,343 @@
 //! Output files that appear whole or not at all.
+//!
+//! The data are written to `NAME.PID.partial` in the same folder, under an advisory lock. The file gets its name when
+//! it is complete. The lock distinguishes the partial file of a running program from the partial file of a killed
+//! one: process ids are used again, but a lock ends with its process. Only regular files are replaced. Data for a
+//! device or pipe are written directly to it; a link stays, and the file behind the link is replaced.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
 
-/// Writes a file beside its place and moves it there when it is complete. Missing folders are made.
+/// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
+#[derive(Debug)]
+pub struct WholeFile {
+    writer: BufWriter<File>,
+    /// None if the bytes are written directly.
+    replaces: Option<Replacement>,
+}
+
+#[derive(Debug)]
+struct Replacement {
+    partial: PathBuf,
+    target: PathBuf,
+}
+
+impl WholeFile {
+    /// Creates a file. Missing folders are created, and partial files of killed programs are removed.
+    ///
+    /// # Errors
+    /// The place is a folder, or cannot be written to.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let permissions = match check_target(path)? {
+            Some(there) if !there.is_file() => {
+                let file = OpenOptions::new().write(true).open(path)?;
+                return Ok(Self { writer: BufWriter::new(file), replaces: None });
+            }
+            there => there.map(|there| there.permissions()),
+        };
+        let target = behind_links(path)?;
+        let name = target
+            .file_name()
+            .ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "the path does not name a file"))?;
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        fs::create_dir_all(folder)?;
+        remove_dead(folder, name);
+        let mut partial = name.to_owned();
+        partial.push(format!(".{}.partial", std::process::id()));
+        let partial = target.with_file_name(partial);
+        let file = Self { writer: BufWriter::new(locked(&partial)?), replaces: Some(Replacement { partial, target }) };
+        if let Some(permissions) = permissions {
+            file.writer.get_ref().set_permissions(permissions)?;
+        }
+        Ok(file)
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// Writing or renaming fails; the file at the path is then unchanged.
+    pub fn finish(self) -> io::Result<()> {
+        Self::finish_all([self])
+    }
+
+    /// Gives several files their names, once all of them are on the disk.
+    ///
+    /// # Errors
+    /// Writing or renaming fails.
+    pub fn finish_all<const N: usize>(mut files: [Self; N]) -> io::Result<()> {
+        for file in &mut files {
+            file.complete()?;
+        }
+        for file in &mut files {
+            if let Some(Replacement { partial, target }) = &file.replaces {
+                fs::rename(partial, target)?;
+                file.replaces = None;
+            }
+        }
+        Ok(())
+    }
+
+    fn complete(&mut self) -> io::Result<()> {
+        self.writer.flush()?;
+        // A device or pipe has no disk to reach.
+        if self.replaces.is_some() { self.writer.get_ref().sync_all() } else { Ok(()) }
+    }
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        if let Some(replaces) = &self.replaces {
+            // The caller already reports the error that ended the writing.
+            let _ = fs::remove_file(&replaces.partial);
+        }
+    }
+}
+
+/// Writes a file, whole or not at all. Missing folders are made.
 ///
 /// # Errors
-/// Whatever writing or moving meets; the place is then as it was.
+/// Writing or renaming fails; the file at the path is then unchanged.
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder)?;
+    let mut file = WholeFile::create(path)?;
+    write(&mut file)?;
+    file.finish()
+}
+
+/// The metadata of the file at the path of an output, if there is one.
+///
+/// # Errors
+/// The path is a folder, or its metadata cannot be read.
+pub fn check_target(path: &Path) -> io::Result<Option<fs::Metadata>> {
+    let folder = || io::Error::new(ErrorKind::IsADirectory, "this is a folder\nhint: name a file in it");
+    match fs::metadata(path) {
+        Ok(there) if there.is_dir() => Err(folder()),
+        Ok(there) => Ok(Some(there)),
+        Err(_) if path.as_os_str().to_string_lossy().ends_with(std::path::is_separator) => Err(folder()),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
     }
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.partial", std::process::id()));
-    let partial = path.with_file_name(name);
-    let written = (|| {
-        let mut writer = BufWriter::new(File::create(&partial)?);
-        write(&mut writer)?;
-        writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-        fs::rename(&partial, path)
-    })();
-    if written.is_err() {
-        // The first error is the one worth telling.
-        let _ = fs::remove_file(&partial);
+}
+
+/// Links that are followed: as many as Linux does.
+const MOST_LINKS: usize = 40;
+
+/// The path behind the links. A link to a missing file gives the path of that file.
+fn behind_links(path: &Path) -> io::Result<PathBuf> {
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        match fs::symlink_metadata(&target) {
+            Ok(there) if there.is_symlink() => {
+                let link = fs::read_link(&target)?;
+                target = target.parent().map_or_else(|| link.clone(), |folder| folder.join(&link));
+            }
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ => return Ok(target),
+        }
     }
-    written
+    Err(io::Error::new(ErrorKind::InvalidInput, "too many symbolic links"))
+}
+
+/// Removes partial files of this name that no running program holds.
+fn remove_dead(folder: &Path, name: &OsStr) {
+    // A folder that cannot be listed may still be written to, and a file that is gone already needs no removing.
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if !is_file || !is_partial_of(name, &entry.file_name()) {
+            continue;
+        }
+        if let Ok(file) = File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Whether a file is called `NAME.PID.partial`.
+fn is_partial_of(name: &OsStr, file: &OsStr) -> bool {
+    let digits = (file.as_encoded_bytes().strip_prefix(name.as_encoded_bytes()))
+        .and_then(|rest| rest.strip_prefix(b"."))
+        .and_then(|rest| rest.strip_suffix(b".partial"));
+    digits.is_some_and(|digits| !digits.is_empty() && digits.iter().all(u8::is_ascii_digit))
+}
+
+/// A new file that is locked until it is closed.
+fn locked(path: &Path) -> io::Result<File> {
+    loop {
+        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => {
+                io::Error::new(ErrorKind::AlreadyExists, "another program is writing this file")
+            }
+            _ => error,
+        })?;
+        match file.try_lock() {
+            // Another program that looks for dead files can have come between.
+            Ok(()) if path.exists() => return Ok(file),
+            Ok(()) | Err(TryLockError::WouldBlock) => {}
+            // A file system without locks: nobody can take the file for dead there.
+            Err(TryLockError::Error(_)) => return Ok(file),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("wetclutch-atomic-{name}-{}", std::process::id()));
+            let _ = fs::remove_dir_all(&path);
+            fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn names(&self) -> Vec<String> {
+            let names = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+            let mut names: Vec<String> = names.collect();
+            names.sort();
+            names
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn write(path: &Path, text: &str) -> io::Result<()> {
+        write_whole(path, |w| w.write_all(text.as_bytes()))
+    }
+
     #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let folder = std::env::temp_dir().join(format!("wetclutch-atomic-{}", std::process::id()));
-        let path = folder.join("out.txt");
-        write_whole(&path, |w| w.write_all(b"old")).unwrap();
+        let folder = Folder::new("failed");
+        let path = folder.0.join("out.txt");
+        write(&path, "old").unwrap();
         let failed = write_whole(&path, |w| {
             w.write_all(b"half of the new")?;
             Err(io::Error::other("no more"))
         });
         assert!(failed.is_err());
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
-        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
-        fs::remove_dir_all(folder).unwrap();
+        assert_eq!(folder.names(), ["out.txt"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_the_file_it_leads_to_is_replaced_or_made() {
+        use std::os::unix::fs::symlink;
+        let folder = Folder::new("link");
+        let [link, chain, target, far] = ["link", "chain", "target", "far/target"].map(|name| folder.0.join(name));
+        symlink("target", &link).unwrap();
+        symlink("link", &chain).unwrap();
+        write(&link, "made").unwrap();
+        assert_eq!(fs::read_to_string(&target).unwrap(), "made");
+        write(&chain, "replaced").unwrap();
+        assert_eq!(fs::read_to_string(&target).unwrap(), "replaced");
+        fs::remove_file(&link).unwrap();
+        symlink(&far, &link).unwrap();
+        write(&link, "elsewhere").unwrap();
+        assert_eq!(fs::read_to_string(&far).unwrap(), "elsewhere");
+        assert!([&link, &chain].iter().all(|path| path.is_symlink()));
+        assert_eq!(folder.names(), ["chain", "far", "link", "target"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_in_a_circle_are_an_error() {
+        let folder = Folder::new("circle");
+        let path = folder.0.join("itself");
+        std::os::unix::fs::symlink("itself", &path).unwrap();
+        assert!(write(&path, "x").is_err());
+        assert_eq!(folder.names(), ["itself"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_written_through_and_stays() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = Folder::new("pipe");
+        let path = folder.0.join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let path = path.clone();
+            move || fs::read_to_string(path).unwrap()
+        });
+        write(&path, "through").unwrap();
+        assert_eq!(reader.join().unwrap(), "through");
+        assert!(fs::metadata(&path).unwrap().file_type().is_fifo());
+        assert_eq!(folder.names(), ["pipe"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_keeps_its_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = Folder::new("mode");
+        let path = folder.0.join("secret");
+        write(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        write(&path, "new").unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+    }
+
+    #[test]
+    fn a_folder_is_refused_before_anything_is_written() {
+        let folder = Folder::new("folder");
+        for path in [folder.0.clone(), folder.0.join("none/")] {
+            let error = WholeFile::create(&path).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::IsADirectory);
+            assert!(error.to_string().contains("hint: name a file in it"));
+        }
+        assert!(folder.names().is_empty());
+    }
+
+    #[test]
+    fn what_a_killed_program_left_goes_and_what_a_running_one_writes_stays() {
+        let folder = Folder::new("dead");
+        let path = folder.0.join("out.csv");
+        // Process 1 always runs, and it holds no lock: its id was used again.
+        let [reused, running] = ["out.csv.1.partial", "out.csv.2.partial"].map(|name| folder.0.join(name));
+        fs::write(&reused, "dead").unwrap();
+        let held = File::create(&running).unwrap();
+        held.lock().unwrap();
+        let others = ["out.csv.partial", "out.csv.x.partial", "other.csv.1.partial"];
+        for name in others {
+            fs::write(folder.0.join(name), "not ours").unwrap();
+        }
+        // One that this very process id left.
+        fs::write(folder.0.join(format!("out.csv.{}.partial", std::process::id())), "dead").unwrap();
+        write(&path, "new").unwrap();
+        assert_eq!(
+            folder.names(),
+            ["other.csv.1.partial", "out.csv", "out.csv.2.partial", "out.csv.partial", "out.csv.x.partial"]
+        );
+    }
+
+    #[test]
+    fn the_same_file_twice_at_once_is_refused() {
+        let folder = Folder::new("twice");
+        let path = folder.0.join("out.csv");
+        let first = WholeFile::create(&path).unwrap();
+        let second = WholeFile::create(&path).unwrap_err();
+        assert!(second.to_string().contains("another program is writing this file"), "{second}");
+        first.finish().unwrap();
+        assert_eq!(folder.names(), ["out.csv"]);
     }
 }

@@ -1,104 +1,299 @@
 //! Comma-separated files: one row of names with units, then one row for each time.
+//!
+//! They are read and written row by row, so that a file of any length needs the memory of one row.
 
-use std::io::{self, Write};
-use std::path::Path;
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
 
-use crate::{Column, Trace, TraceError, Values, Word, signal, units, write_whole};
+use crate::{Column, Trace, TraceError, Values, WholeFile, Word, signal, units};
 
-/// Reads a comma-separated file. The first row names the columns; `time_s` (or `time_ms`) must be among
-/// them and rise. An empty cell is a lost sample and becomes NaN; a column with other text holds words.
+/// Longest row that is read, bytes: a million columns fit in. A file without an end of line does not fill the memory.
+const LONGEST_ROW: usize = 32 << 20;
+/// Bytes that are read at once.
+const READ_AT_ONCE: usize = 64 << 10;
+
+/// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
+/// them and rise. An empty cell, or `nan`, is a reading that did not come, and becomes NaN. A column without a name is passed over.
+#[derive(Debug)]
+pub struct CsvRows {
+    path: PathBuf,
+    reader: csv::Reader<RowByRow>,
+    /// Name in SI, and the factor that brings the cells there.
+    columns: Vec<(String, f64)>,
+    time_at: usize,
+    row: csv::ByteRecord,
+    time_s: Option<f64>,
+}
+
+impl CsvRows {
+    /// Opens a file and reads the names of its columns.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no time, or two columns of the same signal.
+    pub fn open(path: &Path) -> Result<Self, TraceError> {
+        let file = File::open(path).map_err(|source| TraceError::Io { path: path.to_owned(), source })?;
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .buffer_capacity(READ_AT_ONCE)
+            .from_reader(RowByRow { file, left: LONGEST_ROW });
+        let row = csv::ByteRecord::new();
+        let mut rows = Self { path: path.to_owned(), reader, columns: Vec::new(), time_at: 0, row, time_s: None };
+        if !rows.read_row()? {
+            return Err(TraceError::Table { path: rows.path, message: "the file is empty".to_owned() });
+        }
+        let names: Vec<String> = rows.row.iter().map(|name| String::from_utf8_lossy(name).trim().to_owned()).collect();
+        rows.columns = names.iter().map(|name| units::to_si(name)).collect();
+        rows.refuse_twins(&names)?;
+        rows.time_at = rows.require(signal::TIME)?;
+        Ok(rows)
+    }
+
+    fn refuse_twins(&self, names: &[String]) -> Result<(), TraceError> {
+        let mut places: HashMap<&str, usize> = HashMap::with_capacity(names.len());
+        for (i, (name, _)) in self.columns.iter().enumerate().filter(|(_, (name, _))| !name.is_empty()) {
+            match places.entry(name) {
+                Entry::Vacant(free) => drop(free.insert(i)),
+                Entry::Occupied(earlier) => {
+                    let (j, shown) = (*earlier.get(), |i: usize| TraceError::shown(&names[i]));
+                    return Err(TraceError::Table {
+                        path: self.path.clone(),
+                        message: format!(
+                            "columns {} `{}` and {} `{}` are the same signal\nhint: remove one of them",
+                            j + 1,
+                            shown(j),
+                            i + 1,
+                            shown(i)
+                        ),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on to the next row; false where there is none.
+    ///
+    /// # Errors
+    /// The file cannot be read, a row has another length, a time does not come after the one before, or there are no
+    /// rows at all.
+    pub fn advance(&mut self) -> Result<bool, TraceError> {
+        if !self.read_row()? {
+            return match self.time_s {
+                Some(_) => Ok(false),
+                None => Err(TraceError::Table { path: self.path.clone(), message: "there are no rows".to_owned() }),
+            };
+        }
+        if self.row.len() != self.columns.len() {
+            let (cells, names) = (self.row.len(), self.columns.len());
+            return Err(self.wrong(format!("the row has {cells} cells, but the first line names {names} columns")));
+        }
+        let time_s = self.number(self.time_at)?;
+        if !time_s.is_finite() {
+            let text = self.text(self.time_at);
+            let message =
+                if text.is_empty() { "the time is missing".to_owned() } else { format!("the time is {text}") };
+            return Err(self.wrong(message));
+        }
+        if let Some(before) = self.time_s.filter(|before| time_s <= *before) {
+            return Err(self.wrong(format!("the time {time_s} s is not after the time before it, {before} s")));
+        }
+        self.time_s = Some(time_s);
+        Ok(true)
+    }
+
+    /// Time of the row, s; NaN before the first.
+    pub fn time_s(&self) -> f64 {
+        self.time_s.unwrap_or(f64::NAN)
+    }
+
+    /// Place of a column, if there is one of this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|(column, _)| column == name)
+    }
+
+    /// Place of a column.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn require(&self, name: &str) -> Result<usize, TraceError> {
+        self.find(name).ok_or_else(|| TraceError::MissingColumn {
+            path: self.path.clone(),
+            wanted: name.to_owned(),
+            present: self.columns.iter().map(|(name, _)| name.clone()).collect(),
+        })
+    }
+
+    /// The number in a column of this row, in SI; NaN where the cell is empty.
+    ///
+    /// # Errors
+    /// The cell holds something else.
+    pub fn number(&self, column: usize) -> Result<f64, TraceError> {
+        let text = self.text(column);
+        if text.is_empty() {
+            return Ok(f64::NAN);
+        }
+        let (name, factor) = &self.columns[column];
+        text.parse::<f64>().map(|number| number * factor).map_err(|_| {
+            let (name, text) = (TraceError::shown(name), TraceError::shown(&text));
+            self.wrong(format!(
+                "column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"
+            ))
+        })
+    }
+
+    /// The text in a column of this row.
+    pub fn text(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.row[column].trim_ascii())
+    }
+
+    fn read_row(&mut self) -> Result<bool, TraceError> {
+        let line = self.reader.position().line();
+        self.reader.get_mut().left = LONGEST_ROW;
+        let read = self.reader.read_byte_record(&mut self.row);
+        read.map_err(into_io).map_err(|source| match self.reader.get_ref().left {
+            0 => TraceError::Row {
+                path: self.path.clone(),
+                line,
+                message: format!(
+                    "the row that begins here is longer than {} MiB\nhint: the file is not comma-separated, or a quotation \
+                     mark is not closed",
+                    LONGEST_ROW >> 20
+                ),
+            },
+            _ => TraceError::Io { path: self.path.clone(), source },
+        })
+    }
+
+    /// An error in this row.
+    fn wrong(&self, message: String) -> TraceError {
+        let line = self.row.position().map_or(0, csv::Position::line);
+        TraceError::Row { path: self.path.clone(), line, message }
+    }
+}
+
+/// A file of which no row may be longer than what is left.
+#[derive(Debug)]
+struct RowByRow {
+    file: File,
+    left: usize,
+}
+
+impl Read for RowByRow {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let most = buffer.len().min(self.left);
+        let read = self.file.read(&mut buffer[..most])?;
+        self.left -= read;
+        Ok(read)
+    }
+}
+
+/// Reads a whole comma-separated file, see [`CsvRows`]; a column with other text than numbers holds words.
 ///
 /// # Errors
-/// The file cannot be read, has no time, a row of another length, or times that do not rise.
+/// See [`CsvRows`].
 pub fn read_csv(path: &Path) -> Result<Trace, TraceError> {
-    let io = |source| TraceError::Io { path: path.to_owned(), source };
-    let table = |message: String| TraceError::Table { path: path.to_owned(), message };
-    let file = std::fs::File::open(path).map_err(io)?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
-    let headers = reader.headers().map_err(|error| table(error.to_string()))?.clone();
-    let names: Vec<(String, f64)> = headers.iter().map(units::to_si).collect();
-    let time_at = names.iter().position(|(name, _)| name == signal::TIME).ok_or_else(|| {
-        table(format!(
-            "there is no column `time_s`\nhint: the columns are {}",
-            headers.iter().collect::<Vec<_>>().join(", ")
-        ))
-    })?;
-    if let Some((i, (name, _))) =
-        names.iter().enumerate().find(|(i, (name, _))| names[..*i].iter().any(|(earlier, _)| earlier == name))
-    {
-        return Err(table(format!("column {} repeats `{name}`", i + 1)));
-    }
-
-    let mut cells: Vec<Cells> = names.iter().map(|_| Cells::default()).collect();
-    let mut lines: Vec<u64> = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| table(error.to_string()))?;
-        lines.push(record.position().map_or(0, csv::Position::line));
-        for (cells, text) in cells.iter_mut().zip(record.iter()) {
-            cells.push(text);
+    let mut rows = CsvRows::open(path)?;
+    let named = |&i: &usize| i != rows.time_at && !rows.columns[i].0.is_empty();
+    let places: Vec<usize> = (0..rows.columns.len()).filter(named).collect();
+    let mut cells: Vec<Cells> = places.iter().map(|_| Cells::default()).collect();
+    let mut time_s = Vec::new();
+    while rows.advance()? {
+        time_s.push(rows.time_s());
+        for (cells, &place) in cells.iter_mut().zip(&places) {
+            cells.push(&rows.text(place));
         }
     }
-
-    let mut columns: Vec<Column> = (names.into_iter().zip(cells))
-        .map(|((name, factor), cells)| Column { name, values: cells.into_values(factor) })
-        .collect();
-    let Values::Numbers(time_s) = columns.remove(time_at).values else {
-        return Err(table("column `time_s` holds words".to_owned()));
+    let column = |(&place, cells): (&usize, Cells)| {
+        let (name, factor) = &rows.columns[place];
+        Column { name: name.clone(), values: cells.into_values(*factor) }
     };
-    let trace = Trace { path: Some(path.to_owned()), time_s, columns };
-    check_times(path, &trace, &lines)?;
-    Ok(trace)
+    Ok(Trace { path: Some(path.to_owned()), time_s, columns: places.iter().zip(cells).map(column).collect() })
 }
 
-fn check_times(path: &Path, trace: &Trace, lines: &[u64]) -> Result<(), TraceError> {
-    if trace.is_empty() {
-        return Err(TraceError::Table { path: path.to_owned(), message: "there are no rows".to_owned() });
-    }
-    let row = |i: usize, message: String| TraceError::Row { path: path.to_owned(), line: lines[i], message };
-    if let Some(i) = trace.time_s.iter().position(|time| !time.is_finite()) {
-        return Err(row(i, "the time is missing".to_owned()));
-    }
-    if let Some(i) = trace.time_s.windows(2).position(|pair| pair[1] <= pair[0]) {
-        let (before, time) = (trace.time_s[i], trace.time_s[i + 1]);
-        return Err(row(i + 1, format!("the time {time} s does not come after {before} s")));
-    }
-    Ok(())
-}
-
-/// Writes a comma-separated file, whole or not at all. Numbers are written so that reading gives the very
-/// same ones; NaN becomes an empty cell.
+/// Writes a trace as a comma-separated file, whole or not at all, see [`CsvWriter`].
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_csv(path: &Path, trace: &Trace) -> Result<(), TraceError> {
-    write_whole(path, |writer| write_rows(writer, trace))
-        .map_err(|source| TraceError::Io { path: path.to_owned(), source })
+pub fn write_csv(path: &Path, trace: &Trace) -> io::Result<()> {
+    let names = trace.columns.iter().map(|column| column.name.as_str());
+    let mut writer = CsvWriter::new(WholeFile::create(path)?, names)?;
+    for (i, &time_s) in trace.time_s.iter().enumerate() {
+        let cells = trace.columns.iter().map(|column| match &column.values {
+            Values::Numbers(numbers) => Cell::Number(numbers[i]),
+            Values::Words(words) => Cell::Word(&words[i]),
+        });
+        writer.row(time_s, cells)?;
+    }
+    writer.finish()?.finish()
 }
 
-/// Writes the rows of a comma-separated file.
-///
-/// # Errors
-/// What the writer meets.
-pub fn write_rows(writer: &mut dyn Write, trace: &Trace) -> io::Result<()> {
-    let mut writer = csv::Writer::from_writer(writer);
-    let names = std::iter::once(signal::TIME).chain(trace.columns.iter().map(|column| column.name.as_str()));
-    writer.write_record(names).map_err(into_io)?;
-    let number = |value: f64| if value.is_nan() { String::new() } else { value.to_string() };
-    for (i, &time_s) in trace.time_s.iter().enumerate() {
-        writer.write_field(number(time_s)).map_err(into_io)?;
-        for column in &trace.columns {
-            match &column.values {
-                Values::Numbers(numbers) => writer.write_field(number(numbers[i])),
-                Values::Words(words) => writer.write_field(words[i].as_ref()),
+/// What stands in a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cell<'a> {
+    /// A number; NaN becomes an empty cell.
+    Number(f64),
+    /// A word.
+    Word(&'a str),
+}
+
+/// Writes a comma-separated file row by row. Numbers are written so that reading gives the very same ones.
+pub struct CsvWriter<W: Write> {
+    writer: csv::Writer<W>,
+    text: String,
+}
+
+impl<W: Write> CsvWriter<W> {
+    /// Writes the names: time first, then these.
+    ///
+    /// # Errors
+    /// What the writer meets.
+    pub fn new<'a>(writer: W, names: impl IntoIterator<Item = &'a str>) -> io::Result<Self> {
+        let mut writer = csv::Writer::from_writer(writer);
+        writer.write_record(std::iter::once(signal::TIME).chain(names)).map_err(into_io)?;
+        Ok(Self { writer, text: String::new() })
+    }
+
+    /// Writes a row.
+    ///
+    /// # Errors
+    /// What the writer meets, or a row that has not one cell for each name.
+    pub fn row<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
+        for cell in std::iter::once(Cell::Number(time_s)).chain(cells) {
+            match cell {
+                Cell::Word(word) => self.writer.write_field(word),
+                Cell::Number(number) => {
+                    self.text.clear();
+                    if !number.is_nan() {
+                        // A string takes everything.
+                        let _ = write!(self.text, "{number}");
+                    }
+                    self.writer.write_field(&self.text)
+                }
             }
             .map_err(into_io)?;
         }
-        writer.write_record(None::<&[u8]>).map_err(into_io)?;
+        self.writer.write_record(None::<&[u8]>).map_err(into_io)
     }
-    writer.flush()
+
+    /// Hands back the writer, to which every row has gone.
+    ///
+    /// # Errors
+    /// What the writer meets.
+    pub fn finish(self) -> io::Result<W> {
+        self.writer.into_inner().map_err(csv::IntoInnerError::into_error)
+    }
 }
 
-/// The error of the writer below, with its kind: a broken pipe must stay one.
+/// The error of the file below, with its kind: a broken pipe must stay one.
 fn into_io(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,
@@ -182,19 +377,106 @@ mod tests {
     }
 
     #[test]
+    fn an_empty_cell_and_nan_are_readings_that_did_not_come() {
+        let text = "time_ms,wheel_speed_rpm,wheel_speed_age_ms\n0,60,0\n10,,\n20, NaN ,nan\n30,-nan,\n40,120,7\n";
+        let path = file("holes", text);
+        let (whole, mut rows) = (read_csv(&path).unwrap(), CsvRows::open(&path).unwrap());
+        for name in [signal::WHEEL_SPEED, signal::age_of(signal::WHEEL_SPEED).unwrap()] {
+            let came: Vec<bool> = whole.get(name).unwrap().iter().map(|value| !value.is_nan()).collect();
+            assert_eq!(came, [true, false, false, false, true], "{name}");
+        }
+        assert!((whole.get("wheel_speed_age_s").unwrap()[4] - 0.007).abs() < 1e-12);
+        let column = rows.require(signal::WHEEL_SPEED).unwrap();
+        for &expected in whole.get(signal::WHEEL_SPEED).unwrap() {
+            assert!(rows.advance().unwrap());
+            let number = rows.number(column).unwrap();
+            assert!(number == expected || number.is_nan() && expected.is_nan());
+        }
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
     fn a_broken_file_says_where_it_is_broken() {
-        assert_eq!(error("back", "time_s,a\n0,1\n0.2,1\n0.1,1\n"), "FILE:4: the time 0.1 s does not come after 0.2 s");
+        assert_eq!(
+            error("back", "time_s,a\n0,1\n0.2,1\n0.1,1\n"),
+            "FILE:4: the time 0.1 s is not after the time before it, 0.2 s"
+        );
         assert_eq!(error("blank", "time_s,a\n0,1\n,1\n"), "FILE:3: the time is missing");
         assert_eq!(error("none", "time_s,a\n"), "FILE: there are no rows");
         assert_eq!(error("untimed", "t,a\n0,1\n"), "FILE: there is no column `time_s`\nhint: the columns are t, a");
-        assert!(error("ragged", "time_s,a\n0,1\n1\n").contains("line: 3"));
+        assert_eq!(
+            error("ragged", "time_s,a\n0,1\n1\n"),
+            "FILE:3: the row has 1 cells, but the first line names 2 columns"
+        );
+        assert_eq!(
+            error("comma", "time_s,a\n0,1,\n"),
+            "FILE:2: the row has 3 cells, but the first line names 2 columns"
+        );
+        assert_eq!(error("empty", ""), "FILE: the file is empty");
+        assert_eq!(error("endless", "time_s,a\n0,1\n1e400,1\n"), "FILE:3: the time is 1e400");
+        assert_eq!(error("nan", "time_s,a\nNaN,1\n"), "FILE:2: the time is NaN");
+        assert_eq!(
+            error("time", "time_s,a\n0,1\nnoon,1\n"),
+            "FILE:3: column `time_s` contains `noon`, which is not a number\nhint: leave a lost sample empty"
+        );
+    }
+
+    #[test]
+    fn one_signal_in_two_columns_is_refused_by_their_places() {
+        assert_eq!(
+            error("twins", "time_s,turbine_speed_rpm,a,turbine_speed_rad_s\n0,1,1,1\n"),
+            "FILE: columns 2 `turbine_speed_rpm` and 4 `turbine_speed_rad_s` are the same signal\nhint: remove one of them"
+        );
+    }
+
+    #[test]
+    fn a_million_columns_are_read_and_the_hint_names_a_few() {
+        let names: Vec<String> = (0..1_000_000).map(|i| format!("c{i}")).collect();
+        let message = error("wide", &format!("{}\n0\n", names.join(",")));
+        assert!(message.contains("there is no column `time_s`") && message.len() < 1000, "{message}");
+        assert!(message.contains("c19 and 999980 more"), "{message}");
+    }
+
+    #[test]
+    fn what_spreadsheets_write_is_read() {
+        let path = file("spreadsheet", "\u{feff}\"time_s\",a,,\r\n\"0\", 1 ,,\r\n\r\n0.5,\"2\",x,\r\n");
+        let trace = read_csv(&path).unwrap();
+        std::fs::remove_file(path).unwrap();
+        assert_eq!((trace.time_s.as_slice(), trace.columns.len()), (&[0.0, 0.5][..], 1));
+        assert_eq!(trace.get("a").unwrap(), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn a_row_without_an_end_does_not_fill_the_memory() {
+        // An open quotation mark takes in every line that follows. What the reader holds of the row before is not
+        // counted.
+        let text = format!("time_s\n0\n\"{}", "x\n".repeat((LONGEST_ROW + READ_AT_ONCE) / 2));
+        assert!(error("quote", &text).starts_with("FILE:3: the row that begins here is longer than 32 MiB\nhint: "));
+    }
+
+    #[test]
+    fn what_is_no_text_is_named_without_harm_to_the_terminal() {
+        let path = file("binary", "");
+        std::fs::write(&path, [0x1b, b'[', b'2', b'J', 0xff, 0x00, b',', 0xfe, b'\n', 1, b',', 2]).unwrap();
+        let message = read_csv(&path).unwrap_err().to_string();
+        std::fs::remove_file(path).unwrap();
+        assert!(message.contains("there is no column `time_s`"), "{message}");
+        assert!(message.chars().all(|c| c == '\n' || !c.is_control()), "{message:?}");
+    }
+
+    #[test]
+    fn a_folder_is_no_file() {
+        assert!(matches!(read_csv(&std::env::temp_dir()), Err(TraceError::Io { .. })));
     }
 
     #[test]
     fn a_word_among_numbers_is_named_with_its_row() {
         let path = file("word", "time_s,turbine_speed_rad_s\n0,1\n1,\n2,n/a\n");
         let message = read_csv(&path).unwrap().require("turbine_speed_rad_s").unwrap_err().to_string();
-        assert!(message.contains("column `turbine_speed_rad_s` holds `n/a` (row 3), which is no number"), "{message}");
+        assert!(
+            message.contains("column `turbine_speed_rad_s` contains `n/a` (row 3), which is not a number"),
+            "{message}"
+        );
         std::fs::remove_file(path).unwrap();
     }
 
@@ -202,7 +484,7 @@ mod tests {
     fn a_missing_signal_names_the_one_that_looks_near() {
         let path = file("near", "time_s,turbine_speed\n0,1\n");
         let message = read_csv(&path).unwrap().require("turbine_speed_rad_s").unwrap_err().to_string();
-        assert!(message.contains("`turbine_speed` looks near"), "{message}");
+        assert!(message.contains("`turbine_speed` has a similar name"), "{message}");
         std::fs::remove_file(path).unwrap();
     }
 }

@@ -1,16 +1,18 @@
-//! What can be wrong with a measurement file.
+//! Errors in measurement files.
 
 use std::path::PathBuf;
 
-/// Why a trace cannot be read, written or used.
+use crate::{signal, units};
+
+/// Why a trace cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
-    /// The file cannot be read or written.
+    /// The file cannot be read.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file is not a table.
@@ -31,36 +33,72 @@ pub enum TraceError {
         /// What is wrong.
         message: String,
     },
-    /// A signal that is needed holds something else than numbers.
-    #[error("{}: column `{column}` holds `{text}` (row {row}), which is no number\nhint: leave a lost sample empty", path.display())]
+    /// A signal that is needed contains text that is not a number.
+    #[error("{}: column `{column}` contains `{text}` (row {row}), which is not a number\nhint: leave a lost sample empty", path.display())]
     NotNumbers {
         /// The file.
         path: PathBuf,
         /// The signal.
         column: String,
-        /// Row of the first cell that is no number, counted from 1 below the names.
+        /// Row of the first cell that is not a number, counted from 1 below the names.
         row: usize,
-        /// What stands there.
+        /// The text of the cell.
         text: String,
     },
-    /// A signal that is needed is not there.
+    /// The log has the other kind of valve command than the vehicle.
+    #[error(
+        "{}: the log has `{found}`, but the command of the vehicle's valve is `{wanted}`\n\
+         hint: give the vehicle file of this log, or check `kind` in its [observer.valve] and [clutch.*.valve]",
+        path.display()
+    )]
+    OtherCommand {
+        /// The file.
+        path: PathBuf,
+        /// The signal that the vehicle needs.
+        wanted: String,
+        /// The signal that the log has.
+        found: String,
+    },
+    /// A signal that is needed is missing.
     #[error("{}: there is no column `{wanted}`\nhint: {}", path.display(), column_hint(wanted, present))]
     MissingColumn {
         /// The file.
         path: PathBuf,
         /// The signal.
         wanted: String,
-        /// The columns that are there.
+        /// The columns of the file.
         present: Vec<String>,
     },
 }
 
-/// Names the column that was probably meant, or all that are there.
+impl TraceError {
+    /// A text from a file as messages show it: what cannot be printed is escaped, and a long one cut.
+    pub(crate) fn shown(text: &str) -> String {
+        const LONGEST: usize = 40;
+        let cut = if text.chars().nth(LONGEST).is_some() { "..." } else { "" };
+        text.chars().take(LONGEST).flat_map(char::escape_debug).collect::<String>() + cut
+    }
+}
+
+/// Names a column with a similar name, or all columns.
 fn column_hint(wanted: &str, present: &[String]) -> String {
-    let words = |name: &str| name.split('_').map(str::to_owned).collect::<Vec<_>>();
-    let shared = |name: &str| words(name).iter().filter(|word| words(wanted).contains(word)).count();
-    match present.iter().max_by_key(|name| shared(name)).filter(|name| shared(name) >= 2) {
-        Some(near) => format!("`{near}` looks near; rename it, with its unit as ending (_rad_s or _rpm, _a or _ma)"),
-        None => format!("the columns are {}", present.join(", ")),
+    const MOST: usize = 20;
+    // What a name is about: without its unit, and without a word that many names have.
+    let about = |name: &str| -> Vec<String> {
+        let (name, _) = units::to_si(name);
+        let plain = |word: &&str| !["rad", "s", "a", "pa", "percent", "n", "m", "speed", "current"].contains(word);
+        name.split('_').filter(plain).map(str::to_owned).collect()
+    };
+    let known = |name: &str| signal::MEASURABLE.contains(&units::to_si(name).0.as_str());
+    let wanted = about(wanted);
+    let near = |name: &&String| !known(name) && about(name).iter().any(|word| wanted.contains(word));
+    if let Some(near) = present.iter().find(near) {
+        let near = TraceError::shown(near);
+        return format!("`{near}` has a similar name; rename it, with its unit at the end (_rad_s or _rpm, _a or _ma)");
+    }
+    let names: Vec<String> = present.iter().take(MOST).map(|name| TraceError::shown(name)).collect();
+    match present.len() {
+        more if more > MOST => format!("the columns are {} and {} more", names.join(", "), more - MOST),
+        _ => format!("the columns are {}", names.join(", ")),
     }
 }

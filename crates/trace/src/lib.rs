@@ -1,8 +1,8 @@
-//! Named, unit-bearing time series and the files they live in.
+//! Time series with names and units, and their files.
 //!
 //! A trace is a time axis and columns over it. Names carry their unit (`turbine_speed_rad_s`). A file may
-//! use the units people measure in (`_rpm`, `_bar`, `_ms`); reading converts them, so that everything
-//! behind this crate is SI.
+//! use other common units (`_rpm`, `_bar`, `_ms`); they are converted when the file is read, so that all
+//! other crates use SI units.
 
 pub mod atomic;
 pub mod csv_file;
@@ -15,11 +15,11 @@ pub mod units;
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-pub use atomic::write_whole;
-pub use csv_file::{read_csv, write_csv};
+pub use atomic::{WholeFile, check_target, write_whole};
+pub use csv_file::{Cell, CsvRows, CsvWriter, read_csv, write_csv};
 pub use error::TraceError;
 pub use parquet_file::{ColumnKind, write_parquet};
-pub use rows::{GrowingTable, partial_path, read_rows};
+pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
 
 /// A word of a column; the program's own cost nothing to copy.
 pub type Word = Cow<'static, str>;
@@ -141,9 +141,7 @@ impl Trace {
 
     /// Median time between two samples, s; 10 ms where there are fewer than two.
     pub fn median_step_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied().unwrap_or(0.01)
+        median_step_s(self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect())
     }
 
     /// Number of samples.
@@ -155,4 +153,10 @@ impl Trace {
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
+}
+
+/// Median of these times between two samples, s; 10 ms where there are none.
+pub fn median_step_s(mut steps_s: Vec<f64>) -> f64 {
+    steps_s.sort_by(f64::total_cmp);
+    steps_s.get(steps_s.len() / 2).copied().unwrap_or(0.01)
 }

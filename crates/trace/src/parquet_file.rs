@@ -27,7 +27,7 @@ pub enum ColumnKind {
 /// Rows that are held in memory before they are written.
 const GROUP: usize = 4096;
 
-/// Turns a comma-separated table into a Parquet file, whole or not at all. `kind` says what a column holds.
+/// Converts a comma-separated table to a Parquet file, whole or not at all. `kind` gives the kind of each column.
 ///
 /// # Errors
 /// A file cannot be read or written, or a cell does not hold what its column should.

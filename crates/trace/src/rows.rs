@@ -1,13 +1,83 @@
-//! Tables that grow row by row over hours and survive being killed.
+//! Tables that grow row by row over hours, and can be continued after the program was killed.
 //!
-//! While it grows, a table has `.partial` behind its name. A row that was not written to its end is dropped when the
-//! table is taken up again.
+//! While it grows, a table has `.partial` at the end of its name. An incomplete last row is dropped when the table is
+//! continued.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// A comma-separated table under way.
+use crate::TraceError;
+
+/// The file that is locked.
+const LOCK: &str = "wetclutch.lock";
+
+/// A folder that one process writes to. The operating system ends the lock with the process, however that ends; the empty
+/// file stays, and means nothing.
+#[derive(Debug)]
+pub struct FolderLock {
+    _file: File,
+    /// Whether the file system has locks; where it has none, nothing keeps another process out.
+    pub is_held: bool,
+}
+
+impl FolderLock {
+    /// Locks a folder; `None` if another process has. A missing folder is made.
+    ///
+    /// # Errors
+    /// The folder cannot be made or written to.
+    pub fn take(folder: &Path) -> io::Result<Option<Self>> {
+        fs::create_dir_all(folder)?;
+        let file = OpenOptions::new().create(true).append(true).open(folder.join(LOCK))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Ok(None),
+            locked => Ok(Some(Self { _file: file, is_held: locked.is_ok() })),
+        }
+    }
+}
+
+/// What ended the rows of a table before the end of the file.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Damage {
+    /// Line, counted from 1.
+    pub line: u64,
+    /// What is wrong with it.
+    pub message: String,
+}
+
+/// Passes the rows of a table to `row` until a row is incomplete, is not text, or `row` returns an error. Returns the
+/// length of the good rows, bytes, and the error.
+fn good_rows(
+    file: File,
+    header: &str,
+    mut row: impl FnMut(&str) -> Result<(), String>,
+) -> io::Result<(u64, Option<Damage>)> {
+    let mut reader = BufReader::new(file);
+    let (mut good, mut line, mut bytes) = (0, 0, Vec::new());
+    loop {
+        line += 1;
+        bytes.clear();
+        if reader.read_until(b'\n', &mut bytes)? == 0 {
+            let missing = Damage { line, message: "the names of the columns are missing".to_owned() };
+            return Ok((good, (line == 1).then_some(missing)));
+        }
+        let text = bytes.strip_suffix(b"\n").ok_or("the line is incomplete").map(std::str::from_utf8);
+        let taken = match text {
+            Err(cut) => Err(cut.to_owned()),
+            Ok(Err(_)) => Err("the line is not UTF-8 text".to_owned()),
+            Ok(Ok(text)) if text.ends_with('\r') => Err("the line ends with CR LF, expected LF".to_owned()),
+            Ok(Ok(text)) if line > 1 => row(text),
+            Ok(Ok(text)) if text == header => Ok(()),
+            Ok(Ok(_)) => Err("the columns are not those of this study".to_owned()),
+        };
+        if let Err(message) = taken {
+            return Ok((good, Some(Damage { line, message })));
+        }
+        good += bytes.len() as u64;
+    }
+}
+
+/// A comma-separated table that is not complete.
 #[derive(Debug)]
 pub struct GrowingTable {
     path: PathBuf,
@@ -38,31 +108,29 @@ impl GrowingTable {
         Ok(Self { path: path.to_owned(), partial, writer })
     }
 
-    /// Takes up a table that was left unfinished, and shows its whole rows to `row`; a row that `row` refuses, and
-    /// what follows it, is dropped.
+    /// Continues an unfinished table, and passes its complete rows to `row`. A wrong row and all rows after it are
+    /// dropped and reported.
     ///
     /// # Errors
-    /// The file cannot be read or written, or has another header.
-    pub fn resume(path: &Path, header: &str, mut row: impl FnMut(&str) -> bool) -> io::Result<Self> {
+    /// The file cannot be read or written, or has other columns.
+    pub fn resume(
+        path: &Path,
+        header: &str,
+        row: impl FnMut(&str) -> Result<(), String>,
+    ) -> Result<(Self, Option<Damage>), TraceError> {
         let partial = partial_path(path);
-        let mut reader = BufReader::new(File::open(&partial)?);
-        let mut line = String::new();
-        reader.read_line(&mut line)?;
-        if line.trim_end() != header {
-            return Err(io::Error::new(io::ErrorKind::InvalidData, "it holds another table"));
-        }
-        let mut whole = line.len() as u64;
-        loop {
-            line.clear();
-            let length = reader.read_line(&mut line)?;
-            if length == 0 || !line.ends_with('\n') || !row(line.trim_end()) {
-                break;
+        let io = |source| TraceError::Io { path: partial.clone(), source };
+        let (good, damage) = good_rows(File::open(&partial).map_err(io)?, header, row).map_err(io)?;
+        if good == 0 {
+            if fs::metadata(&partial).map_err(io)?.len() > header.len() as u64 {
+                return Err(damaged(&partial, damage));
             }
-            whole += length as u64;
+            // Killed before the names of the columns were written.
+            return Ok((Self::create(path, header).map_err(io)?, None));
         }
-        let file = OpenOptions::new().append(true).open(&partial)?;
-        file.set_len(whole)?;
-        Ok(Self { path: path.to_owned(), partial, writer: BufWriter::new(file) })
+        let file = OpenOptions::new().append(true).open(&partial).map_err(io)?;
+        file.set_len(good).map_err(io)?;
+        Ok((Self { path: path.to_owned(), partial: partial.clone(), writer: BufWriter::new(file) }, damage))
     }
 
     /// Appends a row.
@@ -74,12 +142,18 @@ impl GrowingTable {
         self.writer.write_all(b"\n")
     }
 
-    /// Makes sure that the rows so far outlive the program.
+    /// Writes all rows so far to the file.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
+    }
+
+    /// Deletes an unfinished table that cannot be used.
+    pub fn discard(self) {
+        // What cannot be removed is overwritten by the next one.
+        let _ = fs::remove_file(&self.partial);
     }
 
     /// Gives the table its name.
@@ -93,22 +167,21 @@ impl GrowingTable {
     }
 }
 
-/// Shows the rows of a finished table to `row`, after checking its header.
+/// Passes the rows of a finished table to `row`, after checking its header.
 ///
 /// # Errors
-/// The file cannot be read, has another header, or `row` refuses a row.
-pub fn read_rows(path: &Path, header: &str, mut row: impl FnMut(&str) -> bool) -> io::Result<()> {
-    let invalid = |message: &str| io::Error::new(io::ErrorKind::InvalidData, message.to_owned());
-    let mut lines = BufReader::new(File::open(path)?).lines();
-    if lines.next().transpose()?.as_deref() != Some(header) {
-        return Err(invalid("it holds another table"));
+/// The file cannot be read, or a line is wrong; `row` returns what is wrong with a line.
+pub fn read_rows(path: &Path, header: &str, row: impl FnMut(&str) -> Result<(), String>) -> Result<(), TraceError> {
+    let io = |source| TraceError::Io { path: path.to_owned(), source };
+    match good_rows(File::open(path).map_err(io)?, header, row).map_err(io)? {
+        (_, None) => Ok(()),
+        (_, damage) => Err(damaged(path, damage)),
     }
-    for (i, line) in lines.enumerate() {
-        if !row(&line?) {
-            return Err(invalid(&format!("line {} is not the row that belongs there", i + 2)));
-        }
-    }
-    Ok(())
+}
+
+fn damaged(path: &Path, damage: Option<Damage>) -> TraceError {
+    let Damage { line, message } = damage.unwrap_or_default();
+    TraceError::Row { path: path.to_owned(), line, message }
 }
 
 #[cfg(test)]
@@ -129,14 +202,61 @@ mod tests {
         let mut seen = Vec::new();
         let resumed = GrowingTable::resume(&path, "run,x", |row| {
             seen.push(row.to_owned());
-            true
+            Ok(())
         });
-        let mut table = resumed.unwrap();
+        let (mut table, damage) = resumed.unwrap();
+        assert_eq!(damage.unwrap().line, 4);
         table.append("2,3.5").unwrap();
         table.finish().unwrap();
         assert_eq!(seen, ["0,1.5", "1,2.5"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), "run,x\n0,1.5\n1,2.5\n2,3.5\n");
-        assert!(read_rows(&path, "run,y", |_| true).is_err() && read_rows(&path, "run,x", |_| false).is_err());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// What is said about a table with these bytes, as a finished one and as one to go on with, and how it goes on.
+    fn said(name: &str, bytes: &[u8]) -> (String, String) {
+        let folder = std::env::temp_dir().join(format!("wetclutch-{name}-{}", std::process::id()));
+        let path = folder.join("runs.csv");
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(&path, bytes).unwrap();
+        fs::write(partial_path(&path), bytes).unwrap();
+        let row = |row: &str| if row.contains('x') { Err("it is odd".to_owned()) } else { Ok(()) };
+        let finished = read_rows(&path, "run,x", row).map_or_else(|error| error.to_string(), |()| "good".to_owned());
+        let resumed = GrowingTable::resume(&path, "run,x", row).map(|(table, _)| table.finish().unwrap());
+        let went_on = match resumed {
+            Ok(()) => fs::read_to_string(&path).unwrap(),
+            Err(error) => error.to_string(),
+        };
+        fs::remove_dir_all(&folder).unwrap();
+        let file = |text: String| text.replace(path.to_str().unwrap(), "FILE");
+        (file(finished), file(went_on))
+    }
+
+    #[test]
+    fn a_damaged_table_says_its_line_and_goes_on_before_it() {
+        let both = |finished: &str, went_on: &str| (finished.to_owned(), went_on.to_owned());
+        assert_eq!(said("good", b"run,x\n0,1\n"), both("good", "run,x\n0,1\n"));
+        assert_eq!(said("odd", b"run,x\n0,1\n1,x\n2,1\n"), both("FILE:3: it is odd", "run,x\n0,1\n"));
+        assert_eq!(said("cut", b"run,x\n0,1\n1,2"), both("FILE:3: the line is incomplete", "run,x\n0,1\n"));
+        assert_eq!(said("bytes", b"run,x\n0,1\n1,\xff\n"), both("FILE:3: the line is not UTF-8 text", "run,x\n0,1\n"));
+        let windows = "FILE:3: the line ends with CR LF, expected LF";
+        assert_eq!(said("windows", b"run,x\n0,1\n1,2\r\n"), both(windows, "run,x\n0,1\n"));
+        assert_eq!(said("empty", b""), both("FILE:1: the names of the columns are missing", "run,x\n"));
+        assert_eq!(said("begun", b"run,"), both("FILE:1: the line is incomplete", "run,x\n"));
+        let other = "the columns are not those of this study";
+        assert_eq!(
+            said("other", b"run,y\n0,1\n"),
+            both(&format!("FILE:1: {other}"), &format!("FILE.partial:1: {other}"))
+        );
+    }
+
+    #[test]
+    fn a_folder_is_locked_once() {
+        let folder = std::env::temp_dir().join(format!("wetclutch-lock-{}", std::process::id()));
+        let first = FolderLock::take(&folder).unwrap();
+        assert!(first.is_some() && FolderLock::take(&folder).unwrap().is_none());
+        drop(first);
+        assert!(FolderLock::take(&folder).unwrap().is_some());
         fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -16,8 +16,31 @@ pub const ONCOMING_SLIP: &str = "oncoming_slip_rad_s";
 pub const ONCOMING_CURRENT: &str = "oncoming_current_a";
 /// Commanded current of the offgoing clutch's valve, A.
 pub const OFFGOING_CURRENT: &str = "offgoing_current_a";
+/// Commanded duty cycle of the oncoming clutch's valve, %.
+pub const ONCOMING_DUTY: &str = "oncoming_duty_percent";
+/// Commanded duty cycle of the offgoing clutch's valve, %.
+pub const OFFGOING_DUTY: &str = "offgoing_duty_percent";
 /// Throttle, 0 to 1.
 pub const THROTTLE: &str = "throttle";
+
+/// The column with the age of a channel's readings: how long before its row a reading was taken, s. Without this column
+/// every reading is of the time of its row. The delay of the sensor itself is not in the age.
+pub fn age_of(channel: &str) -> Option<&'static str> {
+    AGES.iter().find(|(name, _)| *name == channel).map(|(_, age)| *age)
+}
+
+/// The channels whose readings may be older than their row, each with the column of the age.
+pub const AGES: &[(&str, &str)] = &[
+    (ENGINE_SPEED, "engine_speed_age_s"),
+    (TURBINE_SPEED, "turbine_speed_age_s"),
+    (OUTPUT_SPEED, "output_speed_age_s"),
+    (WHEEL_SPEED, "wheel_speed_age_s"),
+    (ONCOMING_CURRENT, "oncoming_current_age_s"),
+];
+
+/// What became of the reading of engine, turbine, output and wheel speed and of the oncoming clutch's command.
+pub const READINGS: [&str; 5] =
+    ["engine_reading", "turbine_reading", "output_reading", "wheel_reading", "oncoming_command_reading"];
 
 /// True pressure of the oncoming clutch, Pa.
 pub const ONCOMING_PRESSURE: &str = "oncoming_pressure_pa";
@@ -51,6 +74,8 @@ pub const MEASURABLE: &[&str] = &[
     ONCOMING_SLIP,
     ONCOMING_CURRENT,
     OFFGOING_CURRENT,
+    ONCOMING_DUTY,
+    OFFGOING_DUTY,
     THROTTLE,
 ];
 
@@ -68,11 +93,11 @@ pub const PRESSURE_GREATEST: &str = "oncoming_pressure_greatest_pa";
 pub const TORQUE_LEAST: &str = "oncoming_torque_least_n_m";
 /// Upper end of the guaranteed range of the clutch torque, N m.
 pub const TORQUE_GREATEST: &str = "oncoming_torque_greatest_n_m";
-/// Lower end of the guaranteed range of the drive-shaft torque, N m.
+/// Lower end of the expected range of the drive-shaft torque, N m.
 pub const SHAFT_LEAST: &str = "shaft_torque_least_n_m";
-/// Upper end of the guaranteed range of the drive-shaft torque, N m.
+/// Upper end of the expected range of the drive-shaft torque, N m.
 pub const SHAFT_GREATEST: &str = "shaft_torque_greatest_n_m";
-/// Phase as the supervisor sees it, a word.
+/// Phase according to the supervisor, a word.
 pub const PHASE: &str = "phase";
 /// Whether the input could be used, a word.
 pub const HEALTH: &str = "health";

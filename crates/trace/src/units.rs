@@ -1,4 +1,4 @@
-//! Units that people use, converted to SI at the edge of the program. The only place that does.
+//! Conversion of common units to and from SI. The only place with such conversions.
 
 use std::f64::consts::PI;
 
@@ -12,6 +12,8 @@ const ENDINGS: &[(&str, &str, f64)] = &[
     ("_ma", "_a", 1e-3),
     ("_km_h", "_m_s", 1.0 / 3.6),
     ("_deg", "_rad", PI / 180.0),
+    // A duty cycle is in % inside too, as in the valve's law.
+    ("_duty_percent", "_duty_percent", 1.0),
     ("_percent", "", 1e-2),
 ];
 
@@ -49,6 +51,7 @@ mod tests {
     fn names_in_other_units_become_si_names() {
         assert_eq!(to_si("turbine_speed_rpm"), ("turbine_speed_rad_s".to_owned(), PI / 30.0));
         assert_eq!(to_si("Throttle_percent"), ("throttle".to_owned(), 0.01));
+        assert_eq!(to_si("oncoming_duty_percent"), ("oncoming_duty_percent".to_owned(), 1.0));
         assert_eq!(to_si("time_ms"), ("time_s".to_owned(), 1e-3));
         assert_eq!(to_si("oncoming_current_a"), ("oncoming_current_a".to_owned(), 1.0));
     }

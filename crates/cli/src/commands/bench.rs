@@ -2,11 +2,12 @@
 
 use config::{Experiment, Vehicle};
 use report::bench_page;
-use study::bench::BenchRow;
+use report::tables::{coverage, number};
+use study::bench::{BenchRow, open_loop};
 use trace::units;
 
 use crate::args::Bench;
-use crate::commands::{progress, write_text};
+use crate::commands::{progress, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -14,17 +15,14 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     let (vehicle, experiment) = match &options.experiment {
         Some(path) => {
             let experiment = Experiment::read(path)?;
-            (Vehicle::read(&experiment.vehicle_path())?, experiment)
+            (experiment.read_vehicle()?, experiment)
         }
         None => (Vehicle::two_speed_at()?, Experiment::bench()?),
     };
+    experiment.check_size()?;
+    open_loop(&experiment)?;
+    options.output.as_deref().map(|folder| writable(folder, &["bench.html"])).transpose()?;
     let all = experiment.scenarios.len();
-    if all == 0 {
-        let path = experiment.source.path.display();
-        return Err(Failure::Input(format!(
-            "{path}: there is no [[scenario]] to run\nhint: see experiments/bench.toml"
-        )));
-    }
     output::note(&format!("running {} observers on {all} scenarios", experiment.observers.len()));
     let bar = progress(all as u64, 0);
     let result = study::bench(&vehicle, &experiment, |_| bar.inc(1))?;
@@ -37,13 +35,15 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
         return Ok(());
     }
 
-    output::line("RMS error of the pressure, MPa: torque phase / inertia phase\n")?;
-    let names = result.ranking.iter().map(|s| s.observer.clone());
+    output::line("RMS error of the pressure in the torque phase / in the inertia phase, MPa\n")?;
+    let names = result.rows.iter().take(1).flat_map(|row| row.cells.iter().map(|cell| cell.observer.clone()));
     let mut rows = vec![std::iter::once("scenario".to_owned()).chain(names).collect()];
     rows.extend(result.rows.iter().map(cells));
     output::table(1, &rows)?;
 
-    output::line("\nover the open loop's; ranked by the median over the whole shift\n")?;
+    output::line(
+        "\nRMS error relative to that of the open loop, median and worst scenario; ranked by the median over the whole shift\n",
+    )?;
     let head = [
         "observer",
         "shift",
@@ -52,14 +52,14 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
         "inertia phase",
         "worst",
         "chatter MPa",
-        "shaft N m",
+        "shaft torque N m",
         "worst",
         "step ns",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(result.ranking.iter().map(|s| {
-        let ratio = |value: f64| format!("{value:.2}");
-        let torque = |value: Option<f64>| value.map_or_else(String::new, |n_m| format!("{n_m:.0}"));
+        let ratio = |value: f64| number(value, 2);
+        let torque = |value: Option<f64>| value.map_or_else(String::new, |n_m| number(n_m, 0));
         vec![
             s.observer.clone(),
             ratio(s.shift_median_ratio),
@@ -67,7 +67,7 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
             ratio(s.torque_phase_worst_ratio),
             ratio(s.inertia_phase_median_ratio),
             ratio(s.inertia_phase_worst_ratio),
-            format!("{:.3}", units::mpa(s.chatter_median_pa)),
+            number(units::mpa(s.chatter_median_pa), 3),
             torque(s.shaft_median_rms_n_m),
             torque(s.shaft_worst_rms_n_m),
             format!("{:.0}", s.step_ns),
@@ -78,10 +78,13 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
     if let Some(first) = result.ranking.first().filter(|s| s.range_least_coverage.is_some()) {
         let width = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |n_m| format!("{n_m:.0} N m"));
         output::line(&format!(
-            "\nguaranteed range, the same around every observer: holds at {:.1} % of the samples\n\
+            "\nguaranteed range of pressure and clutch torque, the same for every observer: contains the truth at {} of\n\
+             the samples, in the worst scenario; expected range of the shaft torque: at {}\n\
              median width: pressure {:.3} MPa, clutch torque {}, shaft torque {}\n\
-             mean width over the width that holds 95 % of {}'s errors on this bench: {:.1}; the range adds {:.0} ns to a step",
-            100.0 * first.range_least_coverage.unwrap_or(f64::NAN),
+             mean width, relative to the width that contains 95 % of the errors of {}: {:.1}\n\
+             time that the range adds to a step: {:.0} ns",
+            coverage(first.range_least_coverage.unwrap_or(f64::NAN)),
+            coverage(first.shaft_range_least_coverage.unwrap_or(f64::NAN)),
             units::mpa(first.range_median_width_pa.unwrap_or(f64::NAN)),
             width(first.torque_range_median_width_n_m),
             width(first.shaft_range_median_width_n_m),
@@ -90,9 +93,18 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
             first.step_with_range_ns - first.step_ns,
         ))?;
     }
+    let diverged = result.ranking.iter().filter(|s| s.diverged > 0);
+    let diverged: Vec<String> =
+        diverged.map(|s| format!("{} in {} of {} scenarios", s.observer, s.diverged, result.completed())).collect();
+    if !diverged.is_empty() {
+        output::line(&format!("\ndiverged: {}", diverged.join(", ")))?;
+    }
     let missing: Vec<&str> = result.rows.iter().filter(|row| !row.completed).map(|row| row.scenario.as_str()).collect();
     if !missing.is_empty() {
-        output::note(&format!("not completed within the simulated time, and not ranked: {}", missing.join(", ")));
+        output::note(&format!(
+            "shift not completed within the simulated time, scenario not ranked: {}",
+            missing.join(", ")
+        ));
     }
     if let Some(folder) = &options.output {
         output::line(&format!("\npage: {}", folder.join("bench.html").display()))?;
@@ -101,7 +113,8 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
 }
 
 fn cells(row: &BenchRow) -> Vec<String> {
-    let cell = |torque: f64, inertia: f64| format!("{:.3} / {:.3}", units::mpa(torque), units::mpa(inertia));
+    let cell =
+        |torque: f64, inertia: f64| format!("{} / {}", number(units::mpa(torque), 3), number(units::mpa(inertia), 3));
     let scores = row.cells.iter().map(|c| {
         if row.completed { cell(c.torque_phase_rms_pa, c.inertia_phase_rms_pa) } else { "no shift".to_owned() }
     });

@@ -1,6 +1,9 @@
 //! `wetclutch check`.
 
-use config::{Experiment, Kind, Source, Study, Vehicle};
+use config::{Experiment, GainMethod, Kind, Sensors, Source, Study, Values, Vehicle};
+use design::{longest_step_of, unstable_corners};
+
+use report::tables::phase_name;
 
 use crate::args::Check;
 use crate::failure::Failure;
@@ -12,9 +15,29 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
         Kind::Vehicle => describe(&Vehicle::from_source(source)?),
         Kind::Experiment => {
             let experiment = Experiment::from_source(source)?;
-            let vehicle = Vehicle::read(&experiment.vehicle_path())?;
+            let vehicle = experiment.read_vehicle()?;
             describe_experiment(&experiment)?;
-            describe(&vehicle)
+            describe(&vehicle)?;
+            warn_of_gains(&experiment, &vehicle);
+            warn_of_steps(&experiment, &vehicle);
+            Ok(())
+        }
+        Kind::Overlay => {
+            Vehicle::check_overlay(&source)?;
+            let file = options.file.display();
+            output::line(&format!(
+                "values for a vehicle file, such as the output of `wetclutch error-bound`; all keys are valid in a vehicle file\n\
+                 use: wetclutch design VEHICLE --bounds {file}"
+            ))?;
+            Ok(())
+        }
+        Kind::Sensors => {
+            Sensors::read(&options.file)?;
+            let file = options.file.display();
+            output::line(&format!(
+                "sensors of a car\nuse: wetclutch estimate LOG --vehicle VEHICLE --observer kalman --sensors {file}"
+            ))?;
+            Ok(())
         }
         Kind::Study => {
             let study = Study::read(&options.file)?;
@@ -27,8 +50,14 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
                 study.factors.len()
             ))?;
             for factor in &study.factors {
-                let [low, high] = factor.values.ends();
-                output::line(&format!("  {} from {low} to {high} ({})", factor.name, factor.key))?;
+                let [low, high] = factor.values.taken().ends();
+                let sometimes = match &factor.values {
+                    Values::Sometimes(s) => {
+                        format!(", in {} % of the runs, otherwise {}", 100.0 * s.chance, s.otherwise)
+                    }
+                    _ => String::new(),
+                };
+                output::line(&format!("  {} from {low} to {high}{sometimes} ({})", factor.name, factor.key))?;
             }
             describe_experiment(&study.experiment)?;
             describe(&study.vehicle)
@@ -46,6 +75,39 @@ fn describe_experiment(experiment: &Experiment) -> Result<(), Failure> {
         experiment.observers.len()
     ))?;
     Ok(())
+}
+
+/// Warns of given gains with which an error grows. The chapter shows such gains, so this is not an error.
+fn warn_of_gains(experiment: &Experiment, vehicle: &Vehicle) {
+    for entry in &experiment.observers {
+        for corner in unstable_corners(vehicle, entry) {
+            output::note(&format!(
+                "warning: observer \"{}\", {}, {}: the gains are unstable: they multiply an error by {:.2} in each sample of {} s",
+                entry.name,
+                phase_name(corner.phase),
+                corner.label,
+                corner.factor,
+                entry.sample_time_s,
+            ));
+        }
+    }
+}
+
+/// Warns of gains of continuous time that may not correct over the sample time of their observer. Gains for a sample time may
+/// always, and a requirement that no gain meets is reported where gains are designed.
+fn warn_of_steps(experiment: &Experiment, vehicle: &Vehicle) {
+    for entry in experiment.observers.iter().filter(|entry| entry.method == GainMethod::Iss && entry.gains.is_none()) {
+        let Ok(Some(longest_s)) = longest_step_of(vehicle, entry) else { continue };
+        if entry.sample_time_s > longest_s {
+            output::note(&format!(
+                "warning: observer \"{}\": its gains are certified for steps of at most {:.1} ms, but its sample time is {:.1} ms: \
+                 the observer is the open loop\nhint: use `method = \"peak-to-peak\"`, which designs gains for the sample time",
+                entry.name,
+                1e3 * longest_s,
+                1e3 * entry.sample_time_s,
+            ));
+        }
+    }
 }
 
 fn describe(vehicle: &Vehicle) -> Result<(), Failure> {

@@ -6,17 +6,20 @@ use config::{Experiment, Vehicle};
 use report::Page;
 use report::page::findings;
 use report::tables::phase_name;
-use study::{Comparison, compare, estimates_trace};
-use trace::{signal, units};
+use study::{AnyObserver, Comparison, RunColumns, compare, estimates_trace};
+use trace::{Trace, signal, units};
 
 use crate::args::Demo;
+use crate::commands::estimate::{best, kind};
 use crate::commands::{write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
-    let (vehicle, experiment) = (Vehicle::two_speed_at()?, Experiment::e1()?);
-    output::note(&format!("simulating {} s of driving, designing and running the observers", experiment.duration_s));
+    let (vehicle, mut experiment) = (Vehicle::two_speed_at()?, Experiment::e1()?);
+    // The gains that E1 gives are the chapter's; the demo designs its own.
+    experiment.observers.retain(|entry| entry.gains.is_none());
+    output::note(&format!("simulating {} s of driving; designing and running the observers", experiment.duration_s));
     let comparison = compare(&vehicle, &experiment)?;
     let page = Page::of(&comparison, &vehicle)?;
 
@@ -25,13 +28,20 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     for (name, svg) in &page.figures {
         write_text(&folder.join(name), svg)?;
     }
-    let trace = &comparison.trace;
-    write_trace(&folder.join("trace.csv"), trace)?;
-    write_trace(&folder.join("measured.csv"), &trace.filtered(|name| signal::MEASURABLE.contains(&name)))?;
-    let rigid = &comparison.runs[0];
-    write_trace(&folder.join("estimate.csv"), &estimates_trace(&rigid.time_s, &rigid.estimates))?;
+    let measured = comparison.trace.filtered(|name| signal::MEASURABLE.contains(&name));
+    write_trace(&folder.join("trace.csv"), &comparison.trace)?;
+    write_trace(&folder.join("measured.csv"), &measured)?;
+    write_trace(&folder.join("estimate.csv"), &default_estimate(&vehicle, &measured)?)?;
 
     print(&comparison, &folder.join("report.html"))
+}
+
+/// The default output of `estimate` for measured signals with a wheel speed.
+fn default_estimate(vehicle: &Vehicle, measured: &Trace) -> Result<Trace, Failure> {
+    let (choice, method) = best(true);
+    let observer = AnyObserver::designed(vehicle, kind(choice), method.into(), measured.median_step_s(), None)?;
+    let estimates = observer.run(vehicle, &RunColumns::of(measured, vehicle)?);
+    Ok(estimates_trace(&measured.time_s, &estimates))
 }
 
 fn print(comparison: &Comparison, report: &Path) -> Result<(), Failure> {

@@ -1,13 +1,14 @@
 //! `wetclutch design`.
 
 use config::{GainMethod, Vehicle};
-use design::compliant::{CompliantRequirement, compliant_requirement, design_compliant_phase};
-use design::rigid::design_phase;
+use design::compliant::{CompliantRequirement, best_compliant_phase, compliant_requirement, physical_gains};
+use design::open_loop::is_open_loop;
+use design::rigid::best_phase;
 use design::{
-    Certificate, CompliantCertificate, DesignError, DiscreteCertificate, IssRequirement, Model, Quantity,
-    design_discrete_phase, design_sliding, requirement,
+    Certificate, CompliantCertificate, DiscreteCertificate, IssRequirement, Model, OffsetMissed, Quantity,
+    SolverRecord, design_discrete_phase, design_sliding, open_loop_bound_pa, requirement,
 };
-use observer::Phase;
+use observer::{Discretisation, Phase};
 use report::tables::phase_name;
 use serde_json::{Map, Value, json};
 use trace::units;
@@ -30,24 +31,28 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
     let sample_time_s = options.sample_time.unwrap_or(SAMPLE_TIME_S);
     let mut object = Map::new();
     let mut text = Vec::new();
+    let mut all_missed = Vec::new();
     for &phase in phases {
-        let failed = |error: DesignError| Failure::Work(format!("{}: {error}", phase_name(phase)));
         let (json, lines) = match (options.observer, options.method) {
             (DesignChoice::Rigid, MethodChoice::Iss) => {
                 let required = replaced(requirement(&vehicle, phase).into(), options);
-                let certificate = design_phase(&vehicle, phase, &required).map_err(failed)?;
-                (serde_json::to_value(&certificate)?, rigid_lines(phase, &certificate))
+                let (certificate, missed) = best_phase(&vehicle, phase, &required)?;
+                all_missed.extend(missed);
+                let use_of = UseOf::rigid(&vehicle, phase, &certificate);
+                (use_of.added_to(serde_json::to_value(&certificate)?), rigid_lines(phase, &certificate, &use_of))
             }
             (DesignChoice::Compliant, MethodChoice::Iss) => {
                 let required = replaced_compliant(compliant_requirement(&vehicle, phase), options);
-                let certificate = design_compliant_phase(&vehicle, phase, &required).map_err(failed)?;
-                (serde_json::to_value(&certificate)?, compliant_lines(phase, &certificate))
+                let (certificate, missed) = best_compliant_phase(&vehicle, phase, &required)?;
+                all_missed.extend(missed);
+                let use_of = UseOf::compliant(&vehicle, phase, &certificate);
+                (use_of.added_to(serde_json::to_value(&certificate)?), compliant_lines(phase, &certificate, &use_of))
             }
             (DesignChoice::Rigid | DesignChoice::Compliant, method) => {
                 let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
                 let quantity = options.bound_on.map_or(Quantity::ClutchTorque, Quantity::from);
-                let certificate = design_discrete_phase(&vehicle, model, method.into(), quantity, phase, sample_time_s)
-                    .map_err(failed)?;
+                let certificate =
+                    design_discrete_phase(&vehicle, model, method.into(), quantity, phase, sample_time_s)?;
                 (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
             }
             (DesignChoice::Sliding, _) => sliding(&vehicle, phase),
@@ -57,20 +62,29 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
     }
     if options.json {
         output::line(&serde_json::to_string_pretty(&object)?)?;
+    } else {
+        output::line(&format!("{} ({})\n", vehicle.name, vehicle.source.path.display()))?;
+        for line in &text {
+            output::line(line)?;
+        }
+        output::line(&format!("vehicle file sha256 {}", vehicle.source.sha256()))?;
+    }
+    if all_missed.is_empty() {
         return Ok(());
     }
-    output::line(&format!("{} ({})\n", vehicle.name, vehicle.source.path.display()))?;
-    for line in &text {
-        output::line(line)?;
-    }
-    output::line(&format!("vehicle file sha256 {}", vehicle.source.sha256()))?;
-    Ok(())
+    // The certified gain is printed, but a requirement that it does not meet is a failure.
+    let of_the_option = |missed: OffsetMissed| match options.offset_max {
+        Some(_) => OffsetMissed { required_by: "--offset-max".to_owned(), ..missed },
+        None => missed,
+    };
+    let messages = all_missed.into_iter().map(|missed| of_the_option(missed).to_string());
+    Err(Failure::Work(messages.collect::<Vec<_>>().join("\n")))
 }
 
-/// Sample time of a design that is given none, s: the usual period of a transmission controller.
+/// Default sample time of a design, s: the usual period of a transmission controller.
 const SAMPLE_TIME_S: f64 = 0.01;
 
-/// Refuses an option that the method would not look at.
+/// Refuses an option that the method does not use.
 fn options_apply(options: &Design) -> Result<(), Failure> {
     let sliding = options.observer == DesignChoice::Sliding;
     let discrete = options.method != MethodChoice::Iss;
@@ -87,14 +101,14 @@ fn options_apply(options: &Design) -> Result<(), Failure> {
     match unused.find(|(_, given)| *given) {
         None => Ok(()),
         Some((option, _)) => Err(Failure::Input(format!(
-            "{option} does not go with this observer and method\n\
-             hint: --kappa1, --kappa2, --error-bound and --offset-max are of `--method iss`, --bound-on and --sample-time of \
-             the other methods, and sliding has none"
+            "{option} has no effect with this observer and method\n\
+             hint: --kappa1, --kappa2, --error-bound and --offset-max are for `--method iss`; --bound-on and --sample-time are \
+             for the other methods; `--observer sliding` uses none of them"
         ))),
     }
 }
 
-/// The vehicle file's requirement with what the options replace.
+/// The requirement of the vehicle file, with the values of the options.
 fn replaced(required: IssRequirement, options: &Design) -> IssRequirement {
     IssRequirement {
         kappa1_per_s: options.kappa1.or(required.kappa1_per_s),
@@ -114,26 +128,86 @@ fn replaced_compliant(required: CompliantRequirement, options: &Design) -> Compl
     }
 }
 
-fn rigid_lines(phase: Phase, certificate: &Certificate) -> Vec<String> {
-    let gain = certificate.gain_pa_s_rad;
-    let gain = match phase {
-        Phase::TorquePhase => format!("L = {:.1} Pa s/rad on the turbine speed", gain[0]),
-        _ => format!("L = ({:.1}, {:.1}) Pa s/rad on turbine speed and slip", gain[0], gain[1]),
-    };
+/// What a gain of continuous time is good for.
+struct UseOf {
+    /// Whether its corrections of the pressure leave the estimate that of the open loop.
+    is_open_loop: bool,
+    /// Steady-state bound of the open loop on the clutch torque, as a pressure, with every error of the budget, Pa.
+    open_loop_bound_pa: f64,
+    /// The longest step over which it may correct, s.
+    longest_step_s: f64,
+}
+
+impl UseOf {
+    fn rigid(vehicle: &Vehicle, phase: Phase, certificate: &Certificate) -> Self {
+        let gain = &certificate.gain_pa_s_rad;
+        Self {
+            is_open_loop: is_open_loop(vehicle, Model::Rigid, phase, gain, SAMPLE_TIME_S),
+            open_loop_bound_pa: open_loop_bound_pa(vehicle, Model::Rigid, phase, SAMPLE_TIME_S),
+            longest_step_s: certificate.longest_step_s(vehicle, phase, Discretisation::Exact),
+        }
+    }
+
+    fn compliant(vehicle: &Vehicle, phase: Phase, certificate: &CompliantCertificate) -> Self {
+        let rows = &certificate.gain_normalised;
+        let gains = physical_gains(rows, rows);
+        let [_, gain] = if phase == Phase::TorquePhase { gains.torque_phase } else { gains.inertia_phase };
+        Self {
+            is_open_loop: is_open_loop(vehicle, Model::Compliant, phase, &gain, SAMPLE_TIME_S),
+            open_loop_bound_pa: open_loop_bound_pa(vehicle, Model::Compliant, phase, SAMPLE_TIME_S),
+            longest_step_s: certificate.longest_step_s(vehicle, phase, Discretisation::Exact),
+        }
+    }
+
+    fn added_to(&self, mut certificate: Value) -> Value {
+        certificate["uses_open_loop"] = json!(self.is_open_loop);
+        certificate["longest_step_s"] = json!(self.longest_step_s);
+        certificate
+    }
+
+    /// In place of a bound on the offset, which leaves out the errors of the valve, if they are all that there is.
+    fn offset_line(&self, offset: String) -> String {
+        if self.is_open_loop {
+            return format!(
+                "  the gain is the open loop: the valve alone has the required decay; steady-state bound {:.4} MPa, by the \
+                 valve errors of the budget",
+                units::mpa(self.open_loop_bound_pa)
+            );
+        }
+        offset
+    }
+
+    fn step_line(&self) -> String {
+        step_line(self.longest_step_s)
+    }
+}
+
+fn step_line(longest_step_s: f64) -> String {
+    format!(
+        "  corrects over steps of at most {:.1} ms; over longer ones the decay is not certified",
+        1e3 * longest_step_s
+    )
+}
+
+fn rigid_lines(phase: Phase, certificate: &Certificate, use_of: &UseOf) -> Vec<String> {
     let vertices = certificate.vertices.iter().map(|v| (v.vertex.label.as_str(), v.decay_per_s, v.margin_per_s));
-    let mut lines =
-        vec![format!("{}: {gain}", phase_name(phase)), kappas(certificate.kappa1_per_s, certificate.kappa2_per_s)];
-    lines.push(format!(
-        "  offset bound {:.4} MPa (required {:.4}) for model errors up to {:.1} rad/s^2 and an exact valve model",
+    let offset = format!(
+        "  offset bound {:.4} MPa ({}) for model errors up to {:.1} rad/s^2 and an exact valve model",
         units::mpa(certificate.offset_pa),
-        units::mpa(certificate.offset_max_pa),
+        required_words(certificate.offset_pa, certificate.offset_max_pa),
         certificate.model_error_max_rad_s2,
-    ));
+    );
+    let mut lines = vec![
+        format!("{}: {}", phase_name(phase), certificate.gain_text(phase)),
+        kappas(certificate.kappa1_per_s, certificate.kappa2_per_s),
+        use_of.offset_line(offset),
+        use_of.step_line(),
+    ];
     lines.extend(vertex_lines(vertices));
     lines
 }
 
-fn compliant_lines(phase: Phase, certificate: &CompliantCertificate) -> Vec<String> {
+fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &UseOf) -> Vec<String> {
     let outputs = if phase == Phase::TorquePhase { "(w_t, w_w)" } else { "(w_t, dw, w_w)" };
     let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:9.3}")).collect::<Vec<_>>().join(" ");
     let gain = &certificate.gain_normalised;
@@ -146,24 +220,31 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate) -> Vec<Stri
         format!("  shaft torque  {}", row(&gain[0])),
         format!("  pressure      {}", row(&gain[1])),
         kappas(certificate.kappa1_per_s, certificate.kappa2_per_s),
-        format!(
-            "  offset bound {:.4} MPa (required {:.4}), {:.0} N m, for |w| up to {:.2} and an exact valve model",
+        use_of.offset_line(format!(
+            "  offset bound {:.4} MPa ({}), {:.0} N m, for |w| up to {:.2} and an exact valve model",
             units::mpa(certificate.offset_pa),
-            units::mpa(certificate.offset_max_pa),
+            required_words(certificate.offset_pa, certificate.offset_max_pa),
             certificate.offset_n_m,
             certificate.w_max,
-        ),
+        )),
+        use_of.step_line(),
     ];
     lines.extend(vertex_lines(vertices));
     lines
 }
 
+fn required_words(offset_pa: f64, required_pa: f64) -> String {
+    let missed = if offset_pa > required_pa { ", not met" } else { "" };
+    format!("required {:.4}{missed}", units::mpa(required_pa))
+}
+
 fn kappas(kappa1: f64, kappa2: f64) -> String {
-    format!("  kappa1 {kappa1:.2}/s, kappa2 {kappa2:.2}/s: an initial error is gone after {:.3} s", 4.0 / kappa2)
+    format!("  kappa1 {kappa1:.2}/s, kappa2 {kappa2:.2}/s: settling time {:.3} s", 4.0 / kappa2)
 }
 
 fn vertex_lines<'a>(vertices: impl Iterator<Item = (&'a str, f64, f64)>) -> Vec<String> {
-    let mut lines = vec!["  certificate, evaluated by eigenvalues apart from the solver:".to_owned()];
+    let mut lines =
+        vec!["  certificate for forward and backward slip, evaluated by eigenvalues without the solver:".to_owned()];
     lines
         .extend(vertices.map(|(label, decay, margin)| {
             format!("    {label}: decay {decay:.4}/s, {margin:.6}/s more than required")
@@ -209,9 +290,9 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
     let name = phase_name(phase);
     let mut lines = Vec::new();
     if certificate.uses_open_loop {
-        lines.push(format!("{name}: open loop serves, no gain has a smaller bound"));
+        lines.push(format!("{name}: the gain is the open loop: no gain reduces the bound"));
         lines.push(format!(
-            "  error of the {what} ultimately below {}; below {} with the best gain",
+            "  steady-state bound on the error of the {what}: {}; with the best gain: {}",
             size(certificate.open_loop_bound_pa),
             size(certificate.best_gain_bound_pa)
         ));
@@ -224,20 +305,31 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
             lines.push(format!("  L = [{rows}]{at}"));
         }
         lines.push(format!(
-            "  error of the {what} ultimately below {}; below {} in open loop",
+            "  steady-state bound on the error of the {what}: {}; open loop: {}",
             size(certificate.bound_pa),
             size(certificate.open_loop_bound_pa)
         ));
+        lines.push(step_line(certificate.longest_step_s));
     }
-    lines.push(format!("  made of, at the worst corner, at a sample time of {} ms:", 1e3 * certificate.sample_time_s));
+    if certificate.solver.failed > 0 {
+        let SolverRecord { solved, failed } = certificate.solver;
+        lines.push(format!(
+            "  the solver failed in {failed} of {} programs of the search: a smaller bound may exist",
+            solved + failed
+        ));
+    }
+    lines.push(format!(
+        "  contributions to the bound at the worst vertex, at a sample time of {} ms:",
+        1e3 * certificate.sample_time_s
+    ));
     let parts = certificate.contributions.iter().filter(|part| part.bound_pa > 0.0);
     lines.extend(parts.map(|part| format!("    {:<24} {:.5} MPa", part.cause, units::mpa(part.bound_pa))));
     let (what, of) = match certificate.method {
-        GainMethod::Interval => ("entries", "least entry"),
-        _ => ("eigenvalues", "least eigenvalue"),
+        GainMethod::Interval => ("entries", "smallest entry"),
+        _ => ("eigenvalues", "smallest eigenvalue"),
     };
     lines.push(format!(
-        "  certificate{}, by {what} apart from the solver, for the gain in single precision:",
+        "  certificate{} for forward and backward slip, evaluated by {what} without the solver, for the gain in single precision:",
         if certificate.uses_open_loop { " of the best gain" } else { "" }
     ));
     lines.extend(certificate.margins.iter().map(|margin| format!("    {}: {of} {:.1e}", margin.label, margin.least)));

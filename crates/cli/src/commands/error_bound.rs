@@ -1,5 +1,7 @@
 //! `wetclutch error-bound`.
 
+use std::path::{Path, PathBuf};
+
 use config::Study;
 use report::error_bound_page;
 use report::error_bound_page::named;
@@ -8,27 +10,45 @@ use study::campaign::PHASES;
 use study::error_bound as find;
 
 use crate::args::ErrorBoundOptions;
-use crate::commands::{progress, write_text};
+use crate::commands::{check_output, not_an_input, progress, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
+    check_output(options.output.as_ref())?;
+    not_an_input(options.output.as_ref(), [&options.study])?;
     let study = Study::read(&options.study)?;
+    if let Some(path) = &options.output {
+        let page = path.with_extension("html");
+        if page == *path {
+            let path = path.display();
+            return Err(Failure::Input(format!(
+                "{path}: the bounds cannot have the name of their page\nhint: for example bounds.toml, whose page is bounds.html"
+            )));
+        }
+        writable(path.parent().unwrap_or(Path::new("")), &[])?;
+        check_output(page_beside(path).as_ref())?;
+    }
     let bar = progress(study.runs, 0);
     let found = find(&study, options.threads.count(), || bar.inc(1))?;
     bar.finish_and_clear();
     if found.phases.iter().any(|phase| phase.runs == 0) {
-        return Err(Failure::Work("no run had a whole shift: there is no error to measure".to_owned()));
+        return Err(Failure::Work("no run has a complete shift: there is no model error to compute".to_owned()));
+    }
+    if found.phases.iter().any(|phase| phase.rigid.largest.is_infinite()) {
+        return Err(Failure::Work("the model error has no bound: an acceleration is not finite".to_owned()));
     }
     if let Some(path) = &options.output {
         write_text(path, &found.toml(&study))?;
-        write_text(&path.with_extension("html"), &error_bound_page(&found, &study)?)?;
+        if let Some(page) = page_beside(path) {
+            write_text(&page, &error_bound_page(&found, &study)?)?;
+        }
     }
     if options.json {
         output::line(&serde_json::to_string_pretty(&found)?)?;
         return Ok(());
     }
-    output::line(&format!("{} runs, {} without a whole shift\n", found.runs, found.unfinished))?;
+    output::line(&format!("{} runs, {} without a complete shift\n", found.runs, found.unfinished))?;
     let head = ["phase", "model error, rad/s^2", "largest", "50 % of runs below", "95 %", "99 %", "settled after run"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (phase, found) in PHASES.into_iter().zip(&found.phases) {
@@ -44,10 +64,18 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     output::table(2, &rows)?;
     match &options.output {
         Some(path) => {
-            let page = path.with_extension("html");
-            output::line(&format!("\nbounds: {}\npage: {}", path.display(), page.display()))?;
+            output::line(&format!("\nbounds: {}", path.display()))?;
+            if let Some(page) = page_beside(path) {
+                output::line(&format!("page: {}", page.display()))?;
+            }
         }
         None => output::line(&format!("\n{}", found.toml(&study)))?,
     }
     Ok(())
+}
+
+/// The page beside a file of bounds; there is none beside a device or a pipe.
+fn page_beside(bounds: &Path) -> Option<PathBuf> {
+    let is_file = std::fs::metadata(bounds).map_or(true, |there| there.is_file());
+    is_file.then(|| bounds.with_extension("html"))
 }

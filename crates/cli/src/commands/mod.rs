@@ -24,7 +24,7 @@ pub(crate) use simulate::simulate;
 pub(crate) use study::{merge, study};
 pub(crate) use worst_case::worst_case;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use trace::Trace;
@@ -33,8 +33,7 @@ use crate::failure::Failure;
 
 /// Writes a trace as a comma-separated file, whole or not at all.
 fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
-    // A file that cannot be written is no fault of the input.
-    trace::write_csv(path, trace).map_err(|error| Failure::Work(error.to_string()))
+    trace::write_csv(path, trace).map_err(|error| Failure::writing(path, &error))
 }
 
 /// Writes a text file, whole or not at all.
@@ -42,7 +41,44 @@ fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
 }
 
-/// A bar on standard error with rate and time left; nothing where that is no terminal.
+/// Checks that these files can be written into a folder, before the work starts. Creates a missing folder.
+fn writable(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+    // A file that is created and dropped before it gets its name leaves nothing behind.
+    trace::WholeFile::create(&folder.join("probe")).map_err(|error| {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        Failure::writing(folder, &error)
+    })?;
+    names.iter().try_for_each(|name| check_output(Some(&folder.join(name))))
+}
+
+/// Refuses to write an output over one of the files that it is made from.
+fn not_an_input<'a>(output: Option<&PathBuf>, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+    let Some(there) = output.and_then(|output| std::fs::canonicalize(output).ok()) else { return Ok(()) };
+    match inputs.into_iter().find(|input| std::fs::canonicalize(input).is_ok_and(|input| input == there)) {
+        None => Ok(()),
+        Some(input) => Err(Failure::Input(format!(
+            "{}: the output would replace this input\nhint: choose another name after -o",
+            input.display()
+        ))),
+    }
+}
+
+/// A path as a shell takes it.
+fn shell_quoted(path: &Path) -> String {
+    let path = path.display().to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
+    // A path that begins with a dash would be read as an option.
+    let path = if path.starts_with('-') { format!("./{path}") } else { path };
+    if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', r"'\''")) }
+}
+
+/// Refuses an output that is a folder, before the work starts.
+fn check_output(path: Option<&PathBuf>) -> Result<(), Failure> {
+    let Some(path) = path else { return Ok(()) };
+    trace::check_target(path).map(drop).map_err(|error| Failure::writing(path, &error))
+}
+
+/// A bar on standard error with rate and time left; nothing if standard error is not a terminal.
 fn progress(length: u64, done: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
     // The template is a constant.

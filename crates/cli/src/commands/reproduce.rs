@@ -1,32 +1,58 @@
 //! `wetclutch reproduce`.
 
-use config::{Experiment, Vehicle};
+use config::{Experiment, Study, Vehicle};
 use report::Reproduction;
-use report::reproduction::agreeing;
+use report::reproduction::{agreeing, ours};
+use study::Chapter;
+use study::statements::Case;
 
 use crate::args::Reproduce;
-use crate::commands::write_text;
+use crate::commands::{progress, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
-    let vehicle = Vehicle::two_speed_at()?;
-    output::note("running experiments E1 to E4");
-    let chapter = study::reproduce(&vehicle, &Experiment::built_in()?)?;
-    let reproduction = Reproduction::of(&chapter, &vehicle)?;
-    let page = options.output.join("reproduction.html");
-    write_text(&page, &reproduction.html)?;
-    write_text(&options.output.join("reproduction.md"), &reproduction.markdown)?;
+    const FILES: [&str; 3] = ["reproduction.html", "reproduction.md", "reproduction.json"];
+    writable(&options.output, &FILES)?;
+    let (vehicle, study) = (Vehicle::two_speed_at()?, Study::plausible()?);
+    let settings = options.settings.map_or(study.runs, |settings| u64::from(settings).min(study.runs));
+    output::note(&format!("running experiments E1 to E4, and again in {settings} settings"));
+    let bar = progress(settings, 0);
+    let experiments = Experiment::built_in()?;
+    let chapter = study::reproduce(&vehicle, &experiments, &study, settings, options.threads.count(), || bar.inc(1))?;
+    bar.finish_and_clear();
+    let reproduction = Reproduction::of(&chapter, &vehicle, &study)?;
+    let json = format!("{:#}\n", numbers(&chapter));
+    let texts = [&reproduction.html, &reproduction.markdown, &json];
+    for (name, text) in FILES.iter().zip(texts) {
+        write_text(&options.output.join(name), text)?;
+    }
     for (name, svg) in &reproduction.figures {
         write_text(&options.output.join(name), svg)?;
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&chapter.statements)?)?;
+        output::line(json.trim_end())?;
         return Ok(());
     }
-    for s in &chapter.statements {
-        output::line(&format!("{:7} {:7} {}: {}", s.verdict.word(), s.experiment, s.claim, s.ours).replace('’', "'"))?;
+    for row in &chapter.statements {
+        let verdict = row.agrees.map_or("", |agrees| if agrees { "agrees" } else { "differs" });
+        let case = row.case.map_or_else(String::new, |case| format!(" ({})", Case::label(case)));
+        let line = format!("{verdict:7} {:7} {}{case}: {}", row.experiment, row.claim, ours(row));
+        output::line(&line.replace('’', "'").replace('−', "-"))?;
     }
-    output::line(&format!("\n{}\nreport: {}", agreeing(&chapter), page.display()))?;
+    output::line("")?;
+    for line in agreeing(&chapter) {
+        output::line(&line.replace('−', "-"))?;
+    }
+    output::line(&format!("\nreport: {}", options.output.join(FILES[0]).display()))?;
     Ok(())
+}
+
+/// The statements and the settings as numbers.
+fn numbers(chapter: &Chapter) -> serde_json::Value {
+    serde_json::json!({
+        "wetclutch": env!("CARGO_PKG_VERSION"),
+        "settings": chapter.settings,
+        "statements": chapter.statements,
+    })
 }

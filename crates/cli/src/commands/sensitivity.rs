@@ -26,13 +26,20 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     }
     for phase in &phases {
         output::line(&format!(
-            "{}, {}: {:.0} rad/s^2 per MPa\n",
+            "{}, {}: the accelerations change by {:.0} rad/s^2 per MPa\n",
             phase.phase.replace('_', " "),
             phase.view.name(),
             phase.influence_rad_s2_mpa
         ))?;
-        let head =
-            ["error", "bound", "unit", "looks like kPa", "per unit", "clutch N m per unit", "angle to the pressure"];
+        let head = [
+            "error",
+            "bound",
+            "unit",
+            "equivalent pressure error, kPa",
+            "per unit",
+            "clutch torque per unit, N m",
+            "angle to the pressure",
+        ];
         let mut rows = vec![head.map(str::to_owned).to_vec()];
         rows.extend(phase.effects.iter().map(|effect| {
             vec![
@@ -50,12 +57,12 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     }
     let kpa = |effect: &ValveEffect| format!("{} {:.1} kPa", effect.error, 1e-3 * effect.pressure_pa);
     output::line(&format!(
-        "the valve model alone is off in a shift by: {}\n",
+        "pressure error of the open loop in a shift: {}\n",
         valve.iter().map(kpa).collect::<Vec<_>>().join(", ")
     ))?;
     let n_m = |effect: &ShaftEffect| format!("{} {:.0} N m", effect.error, effect.torque_n_m);
     output::line(&format!(
-        "the level of the shaft torque, which no speed tells, is off by: {}\n",
+        "error of the level of the shaft torque, which the speeds do not show: {}\n",
         shaft.iter().map(n_m).collect::<Vec<_>>().join(", ")
     ))?;
     if let Some(folder) = &options.output {

@@ -1,24 +1,41 @@
 //! `wetclutch simulate`.
 
+use std::path::PathBuf;
+
 use config::{Experiment, Vehicle};
-use study::{ShiftQuality, simulate_drive};
-use trace::signal;
+use study::drive::{DriveColumns, DriveRow};
+use study::{ShiftRating, ShiftSample};
+use trace::{CsvWriter, WholeFile, signal};
 
 use crate::args::Simulate;
-use crate::commands::write_trace;
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     let experiment = Experiment::read(&options.experiment)?;
-    let vehicle = Vehicle::read(&experiment.vehicle_path())?;
-    let trace = simulate_drive(&vehicle, &experiment)?;
-    let name = experiment.name.to_lowercase();
-    let whole = options.output.join(format!("{name}.csv"));
-    let measured = options.output.join(format!("{name}_measured.csv"));
-    write_trace(&whole, &trace)?;
-    write_trace(&measured, &trace.filtered(|name| signal::MEASURABLE.contains(&name)))?;
-    match ShiftQuality::of(&trace, &vehicle.shift) {
+    let vehicle = experiment.read_vehicle()?;
+    let (experiment, name) = chosen(experiment, options)?;
+    let mut whole = Table::create(options.output.join(format!("{name}.csv")), &vehicle, |_| true)?;
+    let mut measured = Table::create(options.output.join(format!("{name}_measured.csv")), &vehicle, |name| {
+        signal::MEASURABLE.contains(&name)
+    })?;
+    if let Some(note) = size_note(&experiment) {
+        output::note(&note);
+    }
+    let mut rating = ShiftRating::new(&vehicle.shift);
+    let mut written = Ok(());
+    plant::simulate(&vehicle, &experiment, |sample| {
+        // After a write error the simulation continues to its end without writing: this takes seconds.
+        if written.is_ok() {
+            rating.push(&ShiftSample::of(sample));
+            let row = DriveRow::of(sample);
+            written = whole.write(&row).and_then(|()| measured.write(&row));
+        }
+    })?;
+    written?;
+    let ((whole_file, whole), (measured_file, measured)) = (whole.complete()?, measured.complete()?);
+    WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(&options.output, &error))?;
+    match rating.finish() {
         Some(quality) => output::note(&format!(
             "shift: torque phase {:.3} to {:.3} s, inertia phase to {:.3} s, flare {:.1} rad/s, jerk {:.1} m/s^3",
             quality.torque_phase_start_s,
@@ -32,4 +49,78 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     output::line(&whole.display().to_string())?;
     output::line(&measured.display().to_string())?;
     Ok(())
+}
+
+/// Some columns of the drive, written as it is simulated.
+struct Table {
+    path: PathBuf,
+    columns: DriveColumns,
+    writer: CsvWriter<WholeFile>,
+}
+
+impl Table {
+    fn create(path: PathBuf, vehicle: &Vehicle, keep: impl Fn(&str) -> bool) -> Result<Self, Failure> {
+        let columns = DriveColumns::those(vehicle, keep);
+        let writer = WholeFile::create(&path).and_then(|file| CsvWriter::new(file, columns.names()));
+        let writer = writer.map_err(|error| Failure::writing(&path, &error))?;
+        Ok(Self { path, columns, writer })
+    }
+
+    fn write(&mut self, row: &DriveRow) -> Result<(), Failure> {
+        let written = self.writer.row(row.time_s, self.columns.cells(row));
+        written.map_err(|error| Failure::writing(&self.path, &error))
+    }
+
+    /// The file, which contains every row, and its path.
+    fn complete(self) -> Result<(WholeFile, PathBuf), Failure> {
+        match self.writer.finish() {
+            Ok(file) => Ok((file, self.path)),
+            Err(error) => Err(Failure::writing(&self.path, &error)),
+        }
+    }
+}
+
+/// Bytes that a row takes in both files: those of experiment E1.
+const ROW_BYTES: f64 = 456.0;
+/// Size above which the size is printed before the simulation, bytes.
+const LARGE_BYTES: f64 = 1e9;
+
+/// The size of the files, if they will be large.
+fn size_note(experiment: &Experiment) -> Option<String> {
+    let (duration_s, step_s) = (experiment.duration_s, experiment.sample_time_s);
+    let rows = (duration_s / step_s).round();
+    let bytes = rows * ROW_BYTES;
+    (bytes > LARGE_BYTES).then(|| {
+        let giga = (1e-9 * bytes).round();
+        format!(
+            "{duration_s} s with a sample time of {step_s} s are {} rows, about {giga} GB in two files",
+            output::grouped(rows as u64)
+        )
+    })
+}
+
+/// The selected drive, and the name of its files.
+fn chosen(experiment: Experiment, options: &Simulate) -> Result<(Experiment, String), Failure> {
+    let name = experiment.name.to_lowercase();
+    let names = || experiment.scenarios.iter().map(|scenario| scenario.name.as_str()).collect::<Vec<_>>().join("\n  ");
+    let Some(wanted) = &options.scenario else {
+        if !experiment.scenarios.is_empty() {
+            output::note(&format!("simulating without a scenario; the values of `--scenario` are\n  {}", names()));
+        }
+        return Ok((experiment, name));
+    };
+    match experiment.scenarios.iter().find(|scenario| scenario.name == *wanted) {
+        Some(scenario) => {
+            // With a dot, a scenario called `measured` has files of its own.
+            Ok((experiment.with_scenario(scenario), format!("{name}.{}", scenario.file_name())))
+        }
+        None => {
+            let path = experiment.source.path.display();
+            let hint = match experiment.scenarios.is_empty() {
+                true => "the experiment has no scenarios".to_owned(),
+                false => format!("the scenarios are\n  {}", names()),
+            };
+            Err(Failure::Input(format!("{path}: there is no scenario \"{wanted}\"\nhint: {hint}")))
+        }
+    }
 }

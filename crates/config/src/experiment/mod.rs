@@ -1,41 +1,29 @@
-//! The experiment file, checked.
+//! Checked experiment files.
 
 mod observers;
+mod off_nominal;
 mod raw;
+mod sensors;
 
 use std::path::{Path, PathBuf};
 
 use drivetrain::Table1;
+use observer::Discretisation;
 
 use crate::check::{Check, Number};
 use crate::{ConfigError, Source, Vehicle};
-use raw::{RawExperiment, RawOffNominal, RawScenario, RawShift};
+use off_nominal::off_nominal;
+use raw::{RawExperiment, RawFill, RawScenario, RawShift};
 
-pub use observers::{CurrentSensor, GainMethod, GivenGains, ObserverEntry, ObserverKind, Sensors, SpeedSensor};
+pub use observers::{GainMethod, GivenGains, ObserverEntry, ObserverKind, SAMPLE_TIMES_S};
+pub use off_nominal::OffNominal;
+pub use sensors::{CurrentSensor, ReadingErrors, Sensors, SpeedSensor};
+
+/// Most samples of a drive whose signals are held in memory.
+const MOST_SAMPLES: f64 = 5e6;
 
 /// A signal over time, linear between its points, held outside them.
 pub type Profile = Table1<f64>;
-
-/// In what the simulated car differs from the one the observers were designed for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OffNominal {
-    /// Factor on the engine's torque.
-    pub engine_torque_factor: f64,
-    /// Factor on the converter's capacity.
-    pub converter_capacity_factor: f64,
-    /// Factor on the friction of the oncoming clutch.
-    pub friction_factor: f64,
-    /// Factor on the lag of both valves.
-    pub valve_lag_factor: f64,
-    /// Factor on the gain of both valves.
-    pub valve_gain_factor: f64,
-    /// Constant delay of both valves, s, if not the vehicle file's map.
-    pub valve_delay_s: Option<f64>,
-    /// Mass, kg, if not the vehicle file's.
-    pub mass_kg: Option<f64>,
-    /// Grade, rad, if not the vehicle file's.
-    pub grade_rad: Option<f64>,
-}
 
 /// A variation of an experiment, for the bench.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,13 +36,41 @@ pub struct Scenario {
     pub sensor_delay_s: Option<f64>,
     /// Factor on the noise of all sensors.
     pub sensor_noise_factor: f64,
-    /// Tooth periods of a reading of the wheels, in place of the sensor's own. The observers are told: it is how the sensor
-    /// is made.
+    /// Tooth periods of a reading of the wheels; replaces the value of the sensor. The observers use it too, because
+    /// it is a known property of the sensor.
     pub wheel_periods: Option<f64>,
     /// The same of the output.
     pub output_periods: Option<f64>,
+    /// The sensors of the file with the scenario's changes. The observers are told of none of them.
+    pub sensors: Option<Sensors>,
+    /// Time between two rows of the observers with real sensors, s, in place of their own sample time.
+    pub row_time_s: Option<f64>,
     /// In what the car differs from the nominal one.
     pub off_nominal: OffNominal,
+}
+
+impl Scenario {
+    /// Its name as part of the name of a file.
+    pub fn file_name(&self) -> String {
+        let in_a_name = |letter: char| if letter.is_alphanumeric() || letter == '-' { letter } else { '_' };
+        self.name.to_lowercase().chars().map(in_a_name).collect()
+    }
+}
+
+/// How the shift controller fills a clutch whose piston has a stroke: a pulse for most of the stroke, a ramp down to a
+/// pressure just above the kiss point, and a hold for what is left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FastFill {
+    /// Pressure of the pulse above the kiss point, Pa.
+    pub over_kiss_pa: f64,
+    /// Time added to the pulse that the model of the cylinder gives, s: what the controller has learnt.
+    pub offset_s: f64,
+    /// Time of the ramp, s.
+    pub ramp_s: f64,
+    /// Pressure of the hold above the kiss point, Pa.
+    pub stroke_over_kiss_pa: f64,
+    /// Time of the hold, s.
+    pub hold_s: f64,
 }
 
 /// Calibration of the shift controller.
@@ -76,6 +92,8 @@ pub struct ShiftCalibration {
     pub boost_s: f64,
     /// Time at the kiss point before the torque phase, s.
     pub settle_s: f64,
+    /// The fill of a clutch whose piston has a stroke, in place of the three values above.
+    pub fast_fill: FastFill,
     /// Offgoing pressure over what the gear needs, during the fill.
     pub fill_holding_margin: f64,
     /// Time of the load transfer, s.
@@ -129,12 +147,15 @@ pub struct Experiment {
     pub shift: ShiftCalibration,
     /// The car's sensors, if the experiment describes them.
     pub sensors: Option<Sensors>,
-    /// The sensors as the observers are told: those of the file, whatever a scenario or study makes of them.
+    /// The sensors of the file without their errors, which the observers assume; scenarios and studies do not change
+    /// them.
     pub sensors_told: Option<Sensors>,
     /// The observers to be run.
     pub observers: Vec<ObserverEntry>,
     /// Variations for the bench.
     pub scenarios: Vec<Scenario>,
+    /// Draws of the sensors' random numbers in each scenario of the bench.
+    pub draws: u64,
 }
 
 impl Experiment {
@@ -183,37 +204,121 @@ impl Experiment {
     /// As [`Self::read`].
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawExperiment = source.parse()?;
-        let check = Check { source: &source };
+        let check = Check::of(&source);
+        let name = check.file_name("name", &raw.name)?.to_owned();
         let duration_s = check.number("duration_s", &raw.duration_s, 0.1..=600.0)?;
+        let sample_time_s = check.number("sample_time_s", &raw.sample_time_s, 1e-5..=0.1)?;
         let throttle = check.table(
             ("throttle.time_s", &raw.throttle.time_s, 0.0..=600.0),
             ("throttle.position", &raw.throttle.position, 0.0..=1.0),
         )?;
         let has_sensors = raw.sensors.is_some();
         let observers = raw.observer.iter().map(|entry| observers::observer(&check, entry, has_sensors));
-        let sensors = raw.sensors.as_ref().map(|sensors| observers::sensors(&check, sensors)).transpose()?;
+        let observers = observers.collect::<Result<Vec<_>, _>>()?;
+        observers::distinct(&check, &raw.observer, &observers)?;
+        let sensors = raw.sensors.as_ref().map(|raw| sensors::sensors(&check, "sensors", raw, None)).transpose()?;
         Ok(Self {
             vehicle: PathBuf::from(raw.vehicle.get_ref()),
             sensors,
-            sensors_told: sensors,
-            observers: observers.collect::<Result<_, _>>()?,
-            scenarios: raw.scenario.iter().map(|raw| scenario(&check, raw)).collect::<Result<_, _>>()?,
+            sensors_told: sensors.map(Sensors::without_errors),
+            observers,
+            scenarios: scenarios(&check, &raw.scenario, sensors.as_ref(), sample_time_s, throttle.axis().len())?,
+            draws: draws(&check, raw.draws.as_ref())?,
             duration_s,
-            sample_time_s: check.number("sample_time_s", &raw.sample_time_s, 1e-5..=0.1)?,
+            sample_time_s,
             initial_engine_rad_s: check.number("initial.engine_rad_s", &raw.initial.engine_rad_s, 0.0..=1e3)?,
             initial_vehicle_m_s: check.number("initial.vehicle_m_s", &raw.initial.vehicle_m_s, 0.0..=100.0)?,
             throttle,
-            off_nominal: off_nominal(&check, &raw.off_nominal)?,
+            off_nominal: off_nominal(&check, &raw.off_nominal, throttle.axis().len())?,
             shift: shift(&check, &raw.shift, duration_s)?,
-            name: raw.name,
-            title: raw.title,
+            name,
+            title: check.title("title", &raw.title)?,
             source,
         })
     }
 
-    /// Where the vehicle file is, seen from the program.
+    /// The path of the vehicle file.
     pub fn vehicle_path(&self) -> PathBuf {
         self.source.path.parent().map_or_else(|| self.vehicle.clone(), |folder| folder.join(&self.vehicle))
+    }
+
+    /// Reads the vehicle file, and checks that its observers can run with the vehicle.
+    ///
+    /// # Errors
+    /// The vehicle file cannot be read or is wrong, or as [`Self::check_observers`].
+    pub fn read_vehicle(&self) -> Result<Vehicle, ConfigError> {
+        let vehicle = Vehicle::read(&self.vehicle_path()).map_err(|error| {
+            error.named_by(&self.source, "vehicle", self.place(|raw| Some(raw.vehicle.span().start)))
+        })?;
+        self.check_observers(&vehicle)?;
+        Ok(vehicle)
+    }
+
+    /// Checks the sample time of every observer against the recorded signals and the valve of this vehicle.
+    ///
+    /// Forward Euler multiplies an error of the pressure by `1 + A22 T`. This factor is zero for `T = tau` and
+    /// negative for a larger `T`; from `2 tau` on the error grows. With `T` up to `tau`, the error does not grow in a
+    /// lost sample, which doubles `T`.
+    ///
+    /// # Errors
+    /// The sample time of an observer with forward Euler is longer than the time constant of its valve model; or the
+    /// sample time is shorter than that of the recorded signals.
+    pub fn check_observers(&self, vehicle: &Vehicle) -> Result<(), ConfigError> {
+        let fastest_s = -1.0 / vehicle.observer_valve.linear(0.0, 0.0).a22_per_s;
+        for (entry, sample_time_s) in self.observers.iter().flat_map(|entry| self.sample_times_s(entry)) {
+            let (message, hint) = if entry.discretisation == Discretisation::Euler && sample_time_s > fastest_s {
+                let message = format!(
+                    "a sample time of {sample_time_s} s is longer than the valve's time constant of {fastest_s:.4} s: forward \
+                     Euler multiplies an error of the pressure by {:.3} in each sample",
+                    1.0 - sample_time_s / fastest_s
+                );
+                let shorter = format!("use discretisation = \"exact\", or a sample time of at most {fastest_s:.4} s");
+                (message, shorter)
+            } else if sample_time_s < self.sample_time_s * (1.0 - 1e-9) {
+                let message = format!(
+                    "a sample time of {sample_time_s} s is shorter than the {} s of the recorded signals",
+                    self.sample_time_s
+                );
+                (message, "use a longer sample time, or a shorter `sample_time_s` of the experiment".to_owned())
+            } else {
+                continue;
+            };
+            let at = self.place(|raw| {
+                let of_it = raw.observer.iter().find(|other| *other.get_ref().name.get_ref() == entry.name)?;
+                let time = of_it.get_ref().sample_time_s.as_ref().map(|time| time.span().start);
+                Some(time.unwrap_or(of_it.span().start))
+            });
+            let key = format!("observer \"{}\"", entry.name);
+            return Err(Check::of(&self.source).meaning(&key, at, message, Some(hint)));
+        }
+        Ok(())
+    }
+
+    /// The sample times of an observer: its own, and those of the scenarios' rows.
+    fn sample_times_s<'a>(&'a self, entry: &'a ObserverEntry) -> impl Iterator<Item = (&'a ObserverEntry, f64)> {
+        let rows = self.scenarios.iter().filter(|_| entry.real_sensors).filter_map(|scenario| scenario.row_time_s);
+        std::iter::once(entry.sample_time_s).chain(rows).map(move |sample_time_s| (entry, sample_time_s))
+    }
+
+    /// Checks that the signals of the whole drive fit into memory, for work that needs all of them.
+    ///
+    /// # Errors
+    /// The signals do not fit into memory.
+    pub fn check_size(&self) -> Result<(), ConfigError> {
+        let (duration_s, sample_time_s) = (self.duration_s, self.sample_time_s);
+        if duration_s / sample_time_s <= MOST_SAMPLES {
+            return Ok(());
+        }
+        let at = self.place(|raw| Some(raw.sample_time_s.span().start));
+        let message =
+            format!("{duration_s} s with a sample time of {sample_time_s} s are more than {MOST_SAMPLES} samples");
+        let hint = "use a longer sample time; `wetclutch simulate` has no such limit".to_owned();
+        Err(Check::of(&self.source).meaning("sample_time_s", at, message, Some(hint)))
+    }
+
+    /// The place of something in the file, read once more for an error.
+    fn place(&self, of: impl Fn(&RawExperiment) -> Option<usize>) -> usize {
+        self.source.parse().ok().as_ref().and_then(of).unwrap_or(0)
     }
 
     /// This experiment with the variations of a scenario, and a shift controller that has adapted to them.
@@ -230,6 +335,12 @@ impl Experiment {
             // The times are those of a table that was checked.
             varied.throttle = Table1::new(times, &positions).unwrap_or(self.throttle);
         }
+        if let (Some(sensors), Some(changed)) = (&mut varied.sensors, scenario.sensors) {
+            *sensors = Sensors { seed: sensors.seed, ..changed };
+        }
+        for entry in varied.observers.iter_mut().filter(|entry| entry.real_sensors) {
+            entry.sample_time_s = scenario.row_time_s.unwrap_or(entry.sample_time_s);
+        }
         for sensors in [&mut varied.sensors, &mut varied.sensors_told].into_iter().flatten() {
             sensors.wheel.periods = scenario.wheel_periods.unwrap_or(sensors.wheel.periods);
             sensors.output.periods = scenario.output_periods.unwrap_or(sensors.output.periods);
@@ -239,7 +350,9 @@ impl Experiment {
                 sensor.delay_s = scenario.sensor_delay_s.unwrap_or(sensor.delay_s);
                 sensor.noise_rad_s *= scenario.sensor_noise_factor;
             }
-            sensors.current.noise_a *= scenario.sensor_noise_factor;
+            if let Some(current) = &mut sensors.current {
+                current.noise_a *= scenario.sensor_noise_factor;
+            }
         }
         varied
     }
@@ -251,53 +364,68 @@ impl Experiment {
 
     /// The car that is simulated: the nominal one with the differences applied.
     pub fn simulated_vehicle(&self, nominal: &Vehicle) -> Vehicle {
-        let mut vehicle = nominal.clone();
-        let change = &self.off_nominal;
-        vehicle.engine.torque_n_m = vehicle.engine.torque_n_m.scaled(change.engine_torque_factor);
-        vehicle.converter.capacity_n_m_s2 = vehicle.converter.capacity_n_m_s2.scaled(change.converter_capacity_factor);
-        let oncoming = &mut vehicle.oncoming.clutch;
-        oncoming.friction = oncoming.friction.scaled(change.friction_factor);
-        oncoming.static_friction *= change.friction_factor;
-        for valve in [&mut vehicle.offgoing.valve, &mut vehicle.oncoming.valve] {
-            valve.time_constant_s = valve.time_constant_s.scaled(change.valve_lag_factor);
-            valve.gain_pa_a = valve.gain_pa_a.scaled(change.valve_gain_factor);
-            valve.delay_s = change.valve_delay_s.map_or(valve.delay_s, Table1::constant);
-        }
-        vehicle.road.mass_kg = change.mass_kg.unwrap_or(vehicle.road.mass_kg);
-        vehicle.road.grade_rad = change.grade_rad.unwrap_or(vehicle.road.grade_rad);
-        vehicle
+        self.off_nominal.applied_to(nominal)
+    }
+
+    /// The driver's throttle over time, with the tip-out of the differences.
+    pub fn driver_throttle(&self) -> Profile {
+        self.off_nominal.throttle(&self.throttle)
     }
 }
 
-fn off_nominal(check: &Check<'_>, raw: &RawOffNominal) -> Result<OffNominal, ConfigError> {
-    let optional = |key: &str, value: &Option<Number>, range| {
-        value.as_ref().map(|value| check.number(&format!("off_nominal.{key}"), value, range)).transpose()
-    };
-    let factor = |key: &str, value| Ok(optional(key, value, 0.1..=10.0)?.unwrap_or(1.0));
-    Ok(OffNominal {
-        engine_torque_factor: factor("engine_torque_factor", &raw.engine_torque_factor)?,
-        converter_capacity_factor: factor("converter_capacity_factor", &raw.converter_capacity_factor)?,
-        friction_factor: factor("friction_factor", &raw.friction_factor)?,
-        valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor)?,
-        valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor)?,
-        valve_delay_s: optional("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
-        mass_kg: optional("mass_kg", &raw.mass_kg, 200.0..=60e3)?,
-        grade_rad: optional("grade_rad", &raw.grade_rad, -0.4..=0.4)?,
-    })
+/// Draws of the sensors' random numbers, if the file does not say.
+const DRAWS: u64 = 5;
+
+fn draws(check: &Check<'_>, raw: Option<&Number>) -> Result<u64, ConfigError> {
+    let Some(draws) = raw else { return Ok(DRAWS) };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 1 to 1000")]
+    check.count("draws", draws, 1.0..=1000.0).map(|count| count as u64)
 }
 
-fn scenario(check: &Check<'_>, raw: &RawScenario) -> Result<Scenario, ConfigError> {
+/// The scenarios, each with files of its own.
+fn scenarios(
+    check: &Check<'_>,
+    raw: &[RawScenario],
+    sensors: Option<&Sensors>,
+    recorded_s: f64,
+    throttle_points: usize,
+) -> Result<Vec<Scenario>, ConfigError> {
+    let scenario = |raw| scenario(check, raw, sensors, recorded_s, throttle_points);
+    let scenarios = raw.iter().map(scenario).collect::<Result<Vec<_>, _>>()?;
+    let same = |i: usize| scenarios[..i].iter().find(|other| other.file_name() == scenarios[i].file_name());
+    match (0..scenarios.len()).find_map(|i| Some((i, same(i)?))) {
+        None => Ok(scenarios),
+        Some((i, other)) => {
+            let message = format!("\"{}\" and \"{}\" would have the same files", other.name, scenarios[i].name);
+            let hint = "give one of the scenarios another `name`".to_owned();
+            Err(check.meaning("scenario.name", raw[i].name.span().start, message, Some(hint)))
+        }
+    }
+}
+
+fn scenario(
+    check: &Check<'_>,
+    raw: &RawScenario,
+    sensors: Option<&Sensors>,
+    recorded_s: f64,
+    throttle_points: usize,
+) -> Result<Scenario, ConfigError> {
     let optional = |key: &str, value: &Option<Number>, range| {
         value.as_ref().map(|value| check.number(&format!("scenario.{key}"), value, range)).transpose()
     };
+    let periods = |key: &str, value: &Option<Number>| {
+        value.as_ref().map(|value| check.count(&format!("scenario.{key}"), value, 1.0..=100.0)).transpose()
+    };
     Ok(Scenario {
-        name: raw.name.clone(),
+        name: check.name("scenario.name", raw.name.get_ref(), raw.name.span().start)?,
         throttle: optional("throttle", &raw.throttle, 0.0..=1.0)?,
         sensor_delay_s: optional("sensor_delay_s", &raw.sensor_delay_s, 0.0..=0.2)?,
         sensor_noise_factor: optional("sensor_noise_factor", &raw.sensor_noise_factor, 0.0..=100.0)?.unwrap_or(1.0),
-        wheel_periods: optional("wheel_periods", &raw.wheel_periods, 1.0..=100.0)?,
-        output_periods: optional("output_periods", &raw.output_periods, 1.0..=100.0)?,
-        off_nominal: off_nominal(check, &raw.off_nominal)?,
+        wheel_periods: periods("wheel_periods", &raw.wheel_periods)?,
+        output_periods: periods("output_periods", &raw.output_periods)?,
+        sensors: raw.sensors.as_ref().map(|raw| sensors::changed(check, raw, sensors)).transpose()?,
+        row_time_s: optional("row_time_s", &raw.row_time_s, recorded_s..=*SAMPLE_TIMES_S.end())?,
+        off_nominal: off_nominal(check, &raw.off_nominal, throttle_points)?,
     })
 }
 
@@ -316,6 +444,7 @@ fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCali
         boost_pressure_pa: number("fill.boost_pressure_pa", &fill.boost_pressure_pa, 0.0..=10e6)?,
         boost_s: number("fill.boost_s", &fill.boost_s, 0.0..=2.0)?,
         settle_s: number("fill.settle_s", &fill.settle_s, 0.0..=2.0)?,
+        fast_fill: fast_fill(check, fill)?,
         fill_holding_margin: number("fill.holding_margin", &fill.holding_margin, 1.0..=5.0)?,
         torque_phase_s: number("torque_phase.duration_s", &torque.duration_s, 0.01..=5.0)?,
         transfer_holding_margin: number("torque_phase.holding_margin", &torque.holding_margin, 0.5..=5.0)?,
@@ -336,5 +465,20 @@ fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCali
         )?,
         lock_slip_rad_s: number("lock.slip_rad_s", &raw.lock.slip_rad_s, 0.1..=100.0)?,
         lock_ramp_s: number("lock.ramp_s", &raw.lock.ramp_s, 0.001..=5.0)?,
+    })
+}
+
+/// Where the file says nothing, as a production controller does [chosen].
+fn fast_fill(check: &Check<'_>, raw: &RawFill) -> Result<FastFill, ConfigError> {
+    let number = |key: &str, value: &Option<Number>, default: f64, range| match value {
+        Some(value) => check.number(&format!("shift.fill.{key}"), value, range),
+        None => Ok(default),
+    };
+    Ok(FastFill {
+        over_kiss_pa: number("fast_fill_over_kiss_pa", &raw.fast_fill_over_kiss_pa, 0.15e6, 1e3..=2e6)?,
+        offset_s: number("fast_fill_offset_s", &raw.fast_fill_offset_s, 0.0, -0.2..=0.2)?,
+        ramp_s: number("ramp_s", &raw.ramp_s, 0.06, 0.0..=1.0)?,
+        stroke_over_kiss_pa: number("stroke_over_kiss_pa", &raw.stroke_over_kiss_pa, 0.015e6, 0.0..=0.5e6)?,
+        hold_s: number("hold_s", &raw.hold_s, 0.2, 0.0..=2.0)?,
     })
 }

@@ -1,15 +1,14 @@
-//! The observers and sensors of an experiment file, checked.
+//! Checked observers of an experiment file.
 
-use std::path::Path;
+use std::ops::RangeInclusive;
 
 use observer::{Discretisation, RigidGains, SlidingGains};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSensors, RawSensorsFile, RawSignals, RawSpeedSensor};
+use super::raw::{RawDiscretisation, RawGains, RawObserver, RawSignals};
 use crate::ConfigError;
-use crate::Source;
-use crate::check::Check;
+use crate::check::{Check, Number, Numbers};
 
 /// Kinds of observers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -17,17 +16,19 @@ use crate::check::Check;
 pub enum ObserverKind {
     /// The valve model alone.
     OpenLoop,
+    /// The valve's maps alone, with the middle of the delay budget.
+    OpenLoopMaps,
     /// Rigid reduced-order observer.
     Rigid,
     /// Reduced-order observer with elastic drive shafts.
     Compliant,
     /// Full-order sliding-mode observer.
     Sliding,
-    /// Extended Kalman filter with unknown torques as states, told how old the readings are.
+    /// Kalman filter with unknown torques, scale and delays of the readings as states.
     Kalman,
-    /// The same as textbooks have it, every reading of the moment.
+    /// Extended Kalman filter on six states as textbooks have it, every reading of the moment.
     Extended,
-    /// Unscented Kalman filter on the same states.
+    /// Unscented Kalman filter on the same six states, with the lag of the readings.
     Unscented,
     /// Super-twisting observer with implicit discretisation.
     SuperTwisting,
@@ -73,6 +74,9 @@ pub enum GivenGains {
 /// Sample time of an observer that gives none, s: the usual period of a transmission controller.
 const SAMPLE_TIME_S: f64 = 0.01;
 
+/// Sample times that an observer may have, s.
+pub const SAMPLE_TIMES_S: RangeInclusive<f64> = 1e-4..=0.2;
+
 /// One observer of an experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverEntry {
@@ -86,94 +90,38 @@ pub struct ObserverEntry {
     pub sample_time_s: f64,
     /// How it is carried over a sample.
     pub discretisation: Discretisation,
-    /// Whether it sees the signals through the experiment's sensors.
+    /// Whether it gets the signals of the experiment's sensors.
     pub real_sensors: bool,
     /// Gains in place of designed ones.
     pub gains: Option<GivenGains>,
 }
 
-/// A toothed wheel read by a timer.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpeedSensor {
-    /// Teeth of the wheel.
-    pub teeth: f64,
-    /// Resolution of the timer, s.
-    pub timer_s: f64,
-    /// Tooth periods that one reading spans at least.
-    pub periods: f64,
-    /// Time between two readings on the bus, s.
-    pub sample_time_s: f64,
-    /// Age of a reading when it arrives, s.
-    pub delay_s: f64,
-    /// Standard deviation of a reading, rad/s.
-    pub noise_rad_s: f64,
-}
-
-/// A current sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CurrentSensor {
-    /// Standard deviation of a reading, A.
-    pub noise_a: f64,
-    /// Constant error, A.
-    pub offset_a: f64,
-    /// Step of the converter, A.
-    pub resolution_a: f64,
-}
-
-/// The sensors of a car.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensors {
-    /// Seed of every random number.
-    pub seed: u64,
-    /// Engine speed.
-    pub engine: SpeedSensor,
-    /// Turbine speed.
-    pub turbine: SpeedSensor,
-    /// Gearbox output speed.
-    pub output: SpeedSensor,
-    /// Driven wheel speed.
-    pub wheel: SpeedSensor,
-    /// Current of the oncoming clutch's valve.
-    pub current: CurrentSensor,
-}
-
-impl Sensors {
-    /// Reads the `[sensors]` table of a file, whatever else it holds; `None` without one.
-    ///
-    /// # Errors
-    /// The file cannot be read, or a value cannot be right.
-    pub fn read(path: &Path) -> Result<Option<Self>, ConfigError> {
-        let source = Source::read(path)?;
-        let raw: RawSensorsFile = source.parse()?;
-        raw.sensors.as_ref().map(|raw| sensors(&Check { source: &source }, raw)).transpose()
+impl ObserverEntry {
+    /// How its name begins columns and ends file names: without blanks, commas and slashes.
+    pub fn column(&self) -> String {
+        self.name.replace([' ', ',', '/', '\\'], "_")
     }
 }
 
-pub(super) fn sensors(check: &Check<'_>, raw: &RawSensors) -> Result<Sensors, ConfigError> {
-    let speed = |name: &str, raw: &RawSpeedSensor| {
-        let number = |key: &str, value, range| check.number(&format!("sensors.{name}.{key}"), value, range);
-        Ok(SpeedSensor {
-            teeth: number("teeth", &raw.teeth, 1.0..=1000.0)?,
-            timer_s: number("timer_s", &raw.timer_s, 0.0..=1e-3)?,
-            periods: number("periods", &raw.periods, 1.0..=100.0)?,
-            sample_time_s: number("sample_time_s", &raw.sample_time_s, 1e-4..=0.2)?,
-            delay_s: number("delay_s", &raw.delay_s, 0.0..=0.2)?,
-            noise_rad_s: number("noise_rad_s", &raw.noise_rad_s, 0.0..=50.0)?,
-        })
-    };
-    let current = |key: &str, value, range| check.number(&format!("sensors.current.{key}"), value, range);
-    Ok(Sensors {
-        seed: raw.seed,
-        engine: speed("engine", &raw.engine)?,
-        turbine: speed("turbine", &raw.turbine)?,
-        output: speed("output", &raw.output)?,
-        wheel: speed("wheel", &raw.wheel)?,
-        current: CurrentSensor {
-            noise_a: current("noise_a", &raw.current.noise_a, 0.0..=1.0)?,
-            offset_a: current("offset_a", &raw.current.offset_a, -1.0..=1.0)?,
-            resolution_a: current("resolution_a", &raw.current.resolution_a, 0.0..=0.5)?,
-        },
-    })
+/// No two observers may have the same columns.
+pub(super) fn distinct(
+    check: &Check<'_>,
+    raw: &[Spanned<RawObserver>],
+    observers: &[ObserverEntry],
+) -> Result<(), ConfigError> {
+    for (i, observer) in observers.iter().enumerate() {
+        if let Some(other) = observers[..i].iter().find(|other| other.column() == observer.column()) {
+            let message = if other.name == observer.name {
+                format!("two observers are called \"{}\"", observer.name)
+            } else {
+                let (other, name, column) = (&other.name, &observer.name, observer.column());
+                format!("`{other}` and `{name}` have the same column name `{column}` in tables")
+            };
+            let hint = "give one of the observers another `name`".to_owned();
+            return Err(check.meaning("observer.name", raw[i].get_ref().name.span().start, message, Some(hint)));
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn observer(
@@ -183,53 +131,26 @@ pub(super) fn observer(
 ) -> Result<ObserverEntry, ConfigError> {
     let at = raw.span().start;
     let raw = raw.get_ref();
-    let wrong =
-        |message: String, hint: String| check.meaning(&format!("observer \"{}\"", raw.name), at, message, Some(hint));
+    let name = check.name("observer.name", raw.name.get_ref(), raw.name.span().start)?;
+    let wrong = |message: String, hint: String| check.meaning(&format!("observer \"{name}\""), at, message, Some(hint));
     let real_sensors = raw.sensors == RawSignals::Real;
     if real_sensors && !has_sensors {
-        let hint = "add a [sensors] table, or leave `sensors` out".to_owned();
-        return Err(wrong("sees real sensors, and the file describes none".to_owned(), hint));
+        let hint = "add a [sensors] table, or remove `sensors`".to_owned();
+        return Err(wrong("has sensors = \"real\", but the file has no [sensors] table".to_owned(), hint));
     }
     let method = raw.method.unwrap_or_default();
     if raw.method.is_some()
         && (raw.gains.is_some() || !matches!(raw.kind, ObserverKind::Rigid | ObserverKind::Compliant))
     {
-        let hint = "leave `method` out; it says how gains of the kinds rigid and compliant are designed".to_owned();
-        return Err(wrong("has a method and no gains to design".to_owned(), hint));
+        let hint = "remove `method`; it is only for the kinds rigid and compliant without `gains`".to_owned();
+        return Err(wrong("has a `method`, but no gains are designed for it".to_owned(), hint));
     }
-    let gains = match (raw.gains.as_ref(), raw.kind) {
-        (None, _) => None,
-        (Some(&RawGains::Rigid { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }), ObserverKind::Rigid) => {
-            Some(GivenGains::Rigid(RigidGains { torque_phase_pa_s_rad, inertia_phase_pa_s_rad }))
-        }
-        (
-            Some(&RawGains::Sliding {
-                torque_speed_rad_s2,
-                torque_pressure_pa_s,
-                inertia_speed_rad_s2,
-                inertia_pressure_pa_s,
-            }),
-            ObserverKind::Sliding,
-        ) => Some(GivenGains::Sliding(SlidingGains {
-            torque_speed_rad_s2,
-            torque_pressure_pa_s,
-            inertia_speed_rad_s2,
-            inertia_pressure_pa_s,
-        })),
-        (Some(&RawGains::Compliant { torque_phase_normalised, inertia_phase_normalised }), ObserverKind::Compliant) => {
-            Some(GivenGains::CompliantNormalised(torque_phase_normalised, inertia_phase_normalised))
-        }
-        (Some(_), _) => {
-            let hint = "give the gains of its kind, or leave `gains` out to have them designed".to_owned();
-            return Err(wrong("has gains of another kind".to_owned(), hint));
-        }
-    };
+    let gains = raw.gains.as_ref().map(|raw_gains| gains(check, &name, raw.kind, raw_gains)).transpose()?;
     Ok(ObserverEntry {
-        name: raw.name.clone(),
         kind: raw.kind,
         method,
         sample_time_s: match &raw.sample_time_s {
-            Some(value) => check.number("observer.sample_time_s", value, 1e-4..=0.2)?,
+            Some(value) => check.number("observer.sample_time_s", value, SAMPLE_TIMES_S)?,
             None => SAMPLE_TIME_S,
         },
         discretisation: match raw.discretisation {
@@ -238,5 +159,70 @@ pub(super) fn observer(
         },
         real_sensors,
         gains,
+        name,
     })
+}
+
+/// The gains of an observer of this kind, and no others.
+fn gains(
+    check: &Check<'_>,
+    observer: &str,
+    kind: ObserverKind,
+    spanned: &Spanned<RawGains>,
+) -> Result<GivenGains, ConfigError> {
+    let (at, raw) = (spanned.span().start, spanned.get_ref());
+    let of = format!("observer \"{observer}\"");
+    let key = |name: &str| format!("observer.gains.{name}");
+    let number = |name: &str, value: &Option<Number>, range| {
+        check.number(&key(name), check.required(&of, at, name, value.as_ref())?, range)
+    };
+    let pair = |name: &str, value: &Option<Numbers>, range| -> Result<[f64; 2], ConfigError> {
+        check.array(&key(name), check.required(&of, at, name, value.as_ref())?, range)
+    };
+    let rigid = raw.torque_phase_pa_s_rad.is_some() || raw.inertia_phase_pa_s_rad.is_some();
+    let sliding = raw.torque_speed_rad_s2.is_some()
+        || raw.torque_pressure_pa_s.is_some()
+        || raw.inertia_speed_rad_s2.is_some()
+        || raw.inertia_pressure_pa_s.is_some();
+    let compliant = raw.torque_phase_normalised.is_some() || raw.inertia_phase_normalised.is_some();
+    match (kind, rigid, sliding, compliant) {
+        (ObserverKind::Rigid, _, false, false) => Ok(GivenGains::Rigid(RigidGains {
+            torque_phase_pa_s_rad: number("torque_phase_pa_s_rad", &raw.torque_phase_pa_s_rad, -1e8..=1e8)?,
+            inertia_phase_pa_s_rad: pair("inertia_phase_pa_s_rad", &raw.inertia_phase_pa_s_rad, -1e8..=1e8)?,
+        })),
+        (ObserverKind::Sliding, false, _, false) => Ok(GivenGains::Sliding(SlidingGains {
+            torque_speed_rad_s2: number("torque_speed_rad_s2", &raw.torque_speed_rad_s2, 0.0..=1e6)?,
+            torque_pressure_pa_s: number("torque_pressure_pa_s", &raw.torque_pressure_pa_s, -1e10..=1e10)?,
+            inertia_speed_rad_s2: pair("inertia_speed_rad_s2", &raw.inertia_speed_rad_s2, 0.0..=1e6)?,
+            inertia_pressure_pa_s: pair("inertia_pressure_pa_s", &raw.inertia_pressure_pa_s, -1e10..=1e10)?,
+        })),
+        (ObserverKind::Compliant, false, false, _) => {
+            let rows = |name: &str, value| check.required(&of, at, name, Option::as_ref(value));
+            let (torque, inertia) = ("torque_phase_normalised", "inertia_phase_normalised");
+            Ok(GivenGains::CompliantNormalised(
+                matrix(check, &key(torque), at, rows(torque, &raw.torque_phase_normalised)?)?,
+                matrix(check, &key(inertia), at, rows(inertia, &raw.inertia_phase_normalised)?)?,
+            ))
+        }
+        _ => {
+            let hint = "give the gains of this kind, or remove `gains`: the gains are then designed".to_owned();
+            Err(check.meaning(&of, at, "has gains of another kind of observer".to_owned(), Some(hint)))
+        }
+    }
+}
+
+/// A normalised gain, rows `(T_s, p)`.
+fn matrix<const N: usize>(
+    check: &Check<'_>,
+    key: &str,
+    at: usize,
+    rows: &Vec<Numbers>,
+) -> Result<[[f64; N]; 2], ConfigError> {
+    match rows.as_slice() {
+        [shaft, pressure] => {
+            let row = |row| check.array(key, row, -1e6..=1e6);
+            Ok([row(shaft)?, row(pressure)?])
+        }
+        _ => Err(check.meaning(key, at, format!("has {} rows, expected 2", rows.len()), None)),
+    }
 }

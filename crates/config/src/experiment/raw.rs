@@ -1,17 +1,18 @@
-//! What an experiment file says, key by key.
+//! The keys of an experiment file.
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::off_nominal::RawOffNominal;
 use super::{GainMethod, ObserverKind};
-use crate::check::{Number, Numbers};
+use crate::check::{Number, Numbers, Word};
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawExperiment {
-    pub(super) name: String,
-    pub(super) title: String,
-    pub(super) vehicle: Spanned<String>,
+    pub(super) name: Word,
+    pub(super) title: Word,
+    pub(super) vehicle: Word,
     pub(super) duration_s: Number,
     pub(super) sample_time_s: Number,
     pub(super) initial: RawInitial,
@@ -19,7 +20,9 @@ pub(super) struct RawExperiment {
     #[serde(default)]
     pub(super) off_nominal: RawOffNominal,
     pub(super) shift: RawShift,
-    pub(super) sensors: Option<RawSensors>,
+    pub(super) sensors: Option<Spanned<RawSensors>>,
+    /// Draws of the sensors' random numbers in each scenario.
+    pub(super) draws: Option<Number>,
     #[serde(default)]
     pub(super) observer: Vec<Spanned<RawObserver>>,
     #[serde(default)]
@@ -27,14 +30,16 @@ pub(super) struct RawExperiment {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawScenario {
-    pub(super) name: String,
+    pub(super) name: Word,
     pub(super) throttle: Option<Number>,
     pub(super) sensor_delay_s: Option<Number>,
     pub(super) sensor_noise_factor: Option<Number>,
     pub(super) wheel_periods: Option<Number>,
     pub(super) output_periods: Option<Number>,
+    pub(super) sensors: Option<Spanned<RawSensors>>,
+    pub(super) row_time_s: Option<Number>,
     #[serde(default)]
     pub(super) off_nominal: RawOffNominal,
 }
@@ -42,43 +47,63 @@ pub(super) struct RawScenario {
 /// A file of which only the sensors are read.
 #[derive(Deserialize)]
 pub(super) struct RawSensorsFile {
-    pub(super) sensors: Option<RawSensors>,
+    pub(super) sensors: Option<Spanned<RawSensors>>,
 }
 
+/// The sensors of a file, or what a scenario changes in them.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawSensors {
-    pub(super) seed: u64,
-    pub(super) engine: RawSpeedSensor,
-    pub(super) turbine: RawSpeedSensor,
-    pub(super) output: RawSpeedSensor,
-    pub(super) wheel: RawSpeedSensor,
-    pub(super) current: RawCurrentSensor,
+    pub(super) seed: Option<Spanned<u64>>,
+    pub(super) row_offset_s: Option<Number>,
+    pub(super) missing_share: Option<Number>,
+    pub(super) outliers: Option<Number>,
+    pub(super) engine: Option<Spanned<RawSpeedSensor>>,
+    pub(super) turbine: Option<Spanned<RawSpeedSensor>>,
+    pub(super) output: Option<Spanned<RawSpeedSensor>>,
+    pub(super) wheel: Option<Spanned<RawSpeedSensor>>,
+    pub(super) current: Option<Spanned<RawCurrentSensor>>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawSpeedSensor {
-    pub(super) teeth: Number,
-    pub(super) timer_s: Number,
-    pub(super) periods: Number,
-    pub(super) sample_time_s: Number,
-    pub(super) delay_s: Number,
-    pub(super) noise_rad_s: Number,
+    pub(super) teeth: Option<Number>,
+    pub(super) timer_s: Option<Number>,
+    pub(super) periods: Option<Number>,
+    pub(super) sample_time_s: Option<Number>,
+    pub(super) delay_s: Option<Number>,
+    pub(super) noise_rad_s: Option<Number>,
+    pub(super) offset_s: Option<Number>,
+    pub(super) scale: Option<Number>,
+    pub(super) missing_share: Option<Number>,
+    pub(super) burst_s: Option<Number>,
+    pub(super) frozen_s: Option<Number>,
+    pub(super) outliers: Option<Number>,
+    pub(super) outlier_rad_s: Option<Number>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawCurrentSensor {
-    pub(super) noise_a: Number,
-    pub(super) offset_a: Number,
-    pub(super) resolution_a: Number,
+    pub(super) noise_a: Option<Number>,
+    pub(super) offset_a: Option<Number>,
+    pub(super) resolution_a: Option<Number>,
+    pub(super) sample_time_s: Option<Number>,
+    pub(super) delay_s: Option<Number>,
+    pub(super) offset_s: Option<Number>,
+    pub(super) scale: Option<Number>,
+    pub(super) missing_share: Option<Number>,
+    pub(super) burst_s: Option<Number>,
+    pub(super) frozen_s: Option<Number>,
+    pub(super) outliers: Option<Number>,
+    pub(super) outlier_a: Option<Number>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawObserver {
-    pub(super) name: String,
+    pub(super) name: Word,
     pub(super) kind: ObserverKind,
     pub(super) method: Option<GainMethod>,
     pub(super) sample_time_s: Option<Number>,
@@ -86,7 +111,7 @@ pub(super) struct RawObserver {
     pub(super) discretisation: RawDiscretisation,
     #[serde(default)]
     pub(super) sensors: RawSignals,
-    pub(super) gains: Option<RawGains>,
+    pub(super) gains: Option<Spanned<RawGains>>,
 }
 
 #[derive(Deserialize, Clone, Copy, Default)]
@@ -105,54 +130,36 @@ pub(super) enum RawSignals {
     Real,
 }
 
+/// The gains of any kind. An untagged enum would lose the places of its values.
 #[derive(Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
-pub(super) enum RawGains {
-    Rigid {
-        torque_phase_pa_s_rad: f64,
-        inertia_phase_pa_s_rad: [f64; 2],
-    },
-    Sliding {
-        torque_speed_rad_s2: f64,
-        torque_pressure_pa_s: f64,
-        inertia_speed_rad_s2: [f64; 2],
-        inertia_pressure_pa_s: [f64; 2],
-    },
-    Compliant {
-        torque_phase_normalised: [[f64; 2]; 2],
-        inertia_phase_normalised: [[f64; 3]; 2],
-    },
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct RawGains {
+    pub(super) torque_phase_pa_s_rad: Option<Number>,
+    pub(super) inertia_phase_pa_s_rad: Option<Numbers>,
+    pub(super) torque_speed_rad_s2: Option<Number>,
+    pub(super) torque_pressure_pa_s: Option<Number>,
+    pub(super) inertia_speed_rad_s2: Option<Numbers>,
+    pub(super) inertia_pressure_pa_s: Option<Numbers>,
+    pub(super) torque_phase_normalised: Option<Vec<Numbers>>,
+    pub(super) inertia_phase_normalised: Option<Vec<Numbers>>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawInitial {
     pub(super) engine_rad_s: Number,
     pub(super) vehicle_m_s: Number,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawThrottle {
     pub(super) time_s: Numbers,
     pub(super) position: Numbers,
 }
 
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RawOffNominal {
-    pub(super) engine_torque_factor: Option<Number>,
-    pub(super) converter_capacity_factor: Option<Number>,
-    pub(super) friction_factor: Option<Number>,
-    pub(super) valve_lag_factor: Option<Number>,
-    pub(super) valve_gain_factor: Option<Number>,
-    pub(super) valve_delay_s: Option<Number>,
-    pub(super) mass_kg: Option<Number>,
-    pub(super) grade_rad: Option<Number>,
-}
-
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawShift {
     pub(super) request_s: Number,
     pub(super) control_period_s: Number,
@@ -166,16 +173,21 @@ pub(super) struct RawShift {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawFill {
     pub(super) boost_pressure_pa: Number,
     pub(super) boost_s: Number,
     pub(super) settle_s: Number,
     pub(super) holding_margin: Number,
+    pub(super) fast_fill_over_kiss_pa: Option<Number>,
+    pub(super) fast_fill_offset_s: Option<Number>,
+    pub(super) ramp_s: Option<Number>,
+    pub(super) stroke_over_kiss_pa: Option<Number>,
+    pub(super) hold_s: Option<Number>,
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawTorquePhase {
     pub(super) duration_s: Number,
     pub(super) holding_margin: Number,
@@ -183,7 +195,7 @@ pub(super) struct RawTorquePhase {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawInertiaPhase {
     pub(super) duration_s: Number,
     pub(super) proportional_n_m_s_rad: Number,
@@ -194,7 +206,7 @@ pub(super) struct RawInertiaPhase {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawLock {
     pub(super) slip_rad_s: Number,
     pub(super) ramp_s: Number,

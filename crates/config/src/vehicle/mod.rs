@@ -1,42 +1,65 @@
-//! The vehicle file, checked.
+//! Checked vehicle files.
 
+mod clutch;
+mod fill;
+mod fill_bounds;
 mod gear_train;
 mod raw;
+mod valves;
 
-use std::path::Path;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 
-use drivetrain::{
-    Clutch, Converter, Driveline, Engine, ReducedShift, RoadLoad, Table2, TableError, Tyre, Valve, ValveMaps,
-};
-use observer::{InputLimits, Supervisor};
+use drivetrain::{Converter, Driveline, Engine, ReducedShift, RoadLoad, Table2, TableError, Tyre, Valve};
+use observer::{FillBudget, InputLimits, Supervisor};
 
+use drivetrain::oil::WARM_OIL_DEGC;
+use drivetrain::table::{MAX_COLUMNS, MAX_POINTS};
 use toml::Spanned;
 
-use crate::check::{Check, Numbers};
+use crate::check::{Check, Number, Numbers, significant};
+use crate::source::Layers;
 use crate::{ConfigError, Source};
+pub(crate) use clutch::HYSTERESES_PA;
+pub use clutch::ShiftClutch;
 use raw::{
-    RawClutch, RawCompliantRequirement, RawEngineMap, RawErrorBounds, RawFilter, RawObserver, RawRequirement,
-    RawUncertainty, RawValve, RawVehicleFile,
+    RawCompliantRequirement, RawEngineMap, RawErrorBounds, RawFilter, RawObserver, RawRequirement, RawVehicleFile,
 };
 
-/// A shift clutch with the valve that fills it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShiftClutch {
-    /// Geometry and friction.
-    pub clutch: Clutch<f64>,
-    /// The real valve: lag, gain and delay over the operating point.
-    pub valve: ValveMaps<f64>,
-}
+/// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
+const SHAFT_OVER_TYRES: f64 = 2.0;
+
+/// Temperatures of transmission oil, degC.
+pub(crate) const OIL_TEMPERATURES_DEGC: std::ops::RangeInclusive<f64> = -40.0..=150.0;
+/// Backlash of the driveline at the wheel, rad.
+pub(crate) const BACKLASHES_RAD: std::ops::RangeInclusive<f64> = 0.0..=0.5;
+
+/// Half-width of a valve's hysteresis where the file says nothing, Pa [chosen]: trade data sheets of proportional pressure
+/// reducers give 2 to 4 % of full scale for the whole width.
+const VALVE_HYSTERESIS_PA: f64 = 10e3;
+
+/// Age of a command where the file says nothing, s [chosen]: one time step of any log at 20 Hz or more.
+const COMMAND_AGE_S: f64 = 0.05;
 
 /// Ranges of what varies in the observer's model; their corners span the polytope of Eq. (2.46).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Uncertainty {
     /// Friction coefficient of the oncoming clutch, least and greatest.
     pub friction: (f64, f64),
-    /// Time constant of a proportional valve, s, least and greatest.
-    pub time_constant_s: Option<(f64, f64)>,
-    /// Duty cycle of a pulse-width valve, %, least and greatest.
-    pub command: Option<(f64, f64)>,
+    /// What varies in the valve.
+    pub valve: ValveUncertainty,
+}
+
+/// What varies in the observers' valve model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ValveUncertainty {
+    /// Nothing.
+    None,
+    /// The time constant of a proportional valve, s, least and greatest.
+    TimeConstant((f64, f64)),
+    /// The operating points of a pulse-width valve, at which it is linearised: size of the pressure drop between its
+    /// settled pressure and the cylinder, Pa, lower and upper limit.
+    PressureDrop((f64, f64)),
 }
 
 /// What the gain design must reach in one phase.
@@ -66,7 +89,7 @@ pub struct CompliantRequirement {
     pub error_matrix: Option<[[f64; 3]; 3]>,
 }
 
-/// Largest errors of what the observers are told about the car.
+/// The error budget: bounds on the errors of the observers' model of the car.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorBounds {
     /// Turbine torque from the converter's maps, N m.
@@ -109,17 +132,35 @@ pub struct ErrorBounds {
     pub valve_gain_factor: [f64; 2],
     /// Its least and greatest delay, s.
     pub valve_delay_s: [f64; 2],
+    /// Greatest half-width of its hysteresis, Pa.
+    pub valve_hysteresis_pa: f64,
+    /// Greatest time between a command and the sample that first shows it, s.
+    pub command_age_s: f64,
+    /// Least and greatest line pressure, Pa.
+    pub line_pressure_pa: [f64; 2],
+    /// Limits of the oncoming clutch's piston stroke, if it is part of the budget.
+    pub fill: Option<FillBudget<f64>>,
     /// Least and greatest factor on the friction of the oncoming clutch.
     pub friction_factor: [f64; 2],
-    /// Error of a reading of the valve's current, A.
-    pub current_a: f64,
+    /// Error of a reading of the valve's command, A or %.
+    pub command: f64,
     /// Error of a reading of the slip, rad/s, its age included.
     pub slip_rad_s: f64,
     /// Highest pressure that the supply can give, Pa.
     pub pressure_max_pa: f64,
+    /// Error of the scale of the wheel speed, as a share: tyres that are worn, or of another size.
+    pub wheel_scale: f64,
+    /// Largest delay of the wheel speed, s.
+    pub wheel_delay_s: f64,
+    /// Largest delay of the turbine speed and of the output speed, each against the other, s.
+    pub channel_skew_s: f64,
+    /// Least and greatest factor on the stiffness of the drive shafts.
+    pub shaft_stiffness_factor: [f64; 2],
+    /// Twist over which the driveline carries no torque, rad at the wheels.
+    pub backlash_rad: f64,
 }
 
-/// What the Kalman filter is told beside the error bounds: how the unknown torques behave.
+/// The Kalman filter's model of the unknown torques, in addition to the error bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterSettings {
     /// Standard deviation of the turbine torque, as a share.
@@ -159,11 +200,15 @@ pub struct Vehicle {
     pub oncoming: ShiftClutch,
     /// Differential, drive shafts, wheels.
     pub driveline: Driveline<f64>,
+    /// Backlash between gearbox and wheels, rad at the wheel. Observers do not know it.
+    pub backlash_rad: f64,
+    /// Temperature of the oil, degC.
+    pub oil_temperature_degc: f64,
     /// The driven tyres.
     pub tyre: Tyre<f64>,
     /// Vehicle body and road.
     pub road: RoadLoad<f64>,
-    /// The oncoming clutch's valve as the observers are told.
+    /// The observers' model of the oncoming clutch's valve.
     pub observer_valve: Valve<f64>,
     /// What varies in the observers' model.
     pub uncertainty: Uncertainty,
@@ -179,9 +224,9 @@ pub struct Vehicle {
     pub compliant_torque_phase: CompliantRequirement,
     /// Requirement on the compliant observer in the inertia phase.
     pub compliant_inertia_phase: CompliantRequirement,
-    /// Largest errors of what the observers are told.
+    /// The error budget.
     pub error_bounds: ErrorBounds,
-    /// What the Kalman filter is told.
+    /// The Kalman filter's model of the unknown torques.
     pub filter: FilterSettings,
     /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
     pub shaft_settling_s: f64,
@@ -208,17 +253,30 @@ impl Vehicle {
     }
 
     /// As [`Self::read`], with the values of a second file in place of those in the first; it holds any of the keys
-    /// of a vehicle file, such as what `wetclutch error-bound` writes.
+    /// of a vehicle file, such as what `wetclutch error-bound` writes. An error names the file that its value is from.
     ///
     /// # Errors
     /// As [`Self::read`].
     pub fn read_with(path: &Path, overlay: &Path) -> Result<Self, ConfigError> {
-        let source = Source::read(path)?;
-        let over = Source::read(overlay)?;
-        let mut table: toml::Table = source.parse()?;
-        merge(&mut table, over.parse()?);
-        let joint = format!("{} with {}", source.path.display(), over.path.display());
-        Self::from_source(Source { path: joint.into(), text: table.to_string() })
+        Self::laid_over(Source::read(path)?, &Source::read(overlay)?)
+    }
+
+    fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
+        let vehicle = Self::checked(&Layers { source: &source, over: Some(over) })?;
+        let path = format!("{} with {}", source.path.display(), over.path.display());
+        Ok(Self { source: Source { path: path.into(), text: source.text + &over.text }, ..vehicle })
+    }
+
+    /// Checks a file of values for a vehicle file by laying it over the built-in vehicle. Where its values do not go with
+    /// that car's, they may go with another's, and nothing is wrong with the file.
+    ///
+    /// # Errors
+    /// The file is no TOML, or holds a key or a value that no vehicle file may have.
+    pub fn check_overlay(over: &Source) -> Result<(), ConfigError> {
+        match Self::laid_over(Self::two_speed_at()?.source, over) {
+            Err(error) if error.path() == over.path => Err(error),
+            _ => Ok(()),
+        }
     }
 
     /// Checks the text of a vehicle file.
@@ -226,10 +284,22 @@ impl Vehicle {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
-        let raw: RawVehicleFile = source.parse()?;
-        let check = Check { source: &source };
+        let vehicle = Self::checked(&Layers { source: &source, over: None })?;
+        Ok(Self { source, ..vehicle })
+    }
+
+    /// The vehicle that these files describe, whose source is left to be filled in.
+    fn checked(layers: &Layers<'_>) -> Result<Self, ConfigError> {
+        let raw: RawVehicleFile = layers.parse()?;
+        let check = Check { layers: *layers };
         let gear = gear_train::check(&check, &raw)?;
-        let (offgoing, oncoming) = (clutch(&check, &gear.offgoing, &raw)?, clutch(&check, &gear.oncoming, &raw)?);
+        let oil_temperature_degc = oil_temperature(&check, &raw)?;
+        let clutch = |name: &str| clutch::check(&check, name, &raw, oil_temperature_degc);
+        // A clutch that this shift leaves alone is checked like the others.
+        for name in raw.clutch.keys() {
+            clutch(name)?;
+        }
+        let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
         let driveline = Driveline {
             final_ratio: check.number("driveline.final_ratio", &raw.driveline.final_ratio, 0.5..=10.0)?,
             shaft_stiffness_n_m_rad: check.number(
@@ -253,7 +323,22 @@ impl Vehicle {
             slip_scale: check.number("tyre.slip_scale", &raw.tyre.slip_scale, 0.01..=0.5)?,
             floor_m_s: check.number("tyre.floor_m_s", &raw.tyre.floor_m_s, 0.1..=10.0)?,
         };
+        let error_bounds = error_bounds(&check, &raw.design.error_bounds, &oncoming, oil_temperature(&check, &raw)?)?;
+        let road = road(&check, &raw)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
+        let limits = InputLimits {
+            speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.observer.speed_max_rad_s, 100.0..=5e3)?,
+            command_max: check.number("observer.command_max", &raw.observer.command_max, 0.1..=100.0)?,
+            pressure_max_pa: error_bounds.pressure_max_pa,
+            shaft_torque_max_n_m: SHAFT_OVER_TYRES * tyre.max_force_n * road.wheel_radius_m,
+        };
+        let command_max = limits.command_max + error_bounds.command;
+        valves::clutch_can_engage(&check, &oncoming, &limits, raw.observer.command_max.span().start)?;
+        for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
+            valves::settled_pressure_rises(&check, name, &clutch.valve, &raw.clutch[name].valve, command_max)?;
+        }
+        let observer_valve = valves::observer_valve(&check, &raw.observer.valve, &oncoming.valve)?;
+        let command_kind = observer_valve.command_kind();
         let supervisor = supervisor(&check, &raw.observer, kiss_pressure_pa)?;
         Ok(Self {
             name: raw.name.clone(),
@@ -268,45 +353,45 @@ impl Vehicle {
             offgoing,
             oncoming,
             driveline,
-            tyre,
-            road: road(&check, &raw)?,
-            observer_valve: observer_valve(&check, &raw.observer.valve)?,
-            uncertainty: uncertainty(&check, &raw.observer.uncertainty)?,
-            supervisor,
-            limits: InputLimits {
-                speed_max_rad_s: check.number(
-                    "observer.speed_max_rad_s",
-                    &raw.observer.speed_max_rad_s,
-                    100.0..=5e3,
-                )?,
-                command_max: check.number("observer.command_max", &raw.observer.command_max, 0.1..=100.0)?,
+            backlash_rad: match &raw.driveline.backlash_rad {
+                Some(backlash) => check.number("driveline.backlash_rad", backlash, BACKLASHES_RAD)?,
+                None => 0.0,
             },
+            oil_temperature_degc,
+            tyre,
+            road,
+            observer_valve,
+            uncertainty: valves::uncertainty(&check, &raw.observer.uncertainty, command_kind)?,
+            supervisor,
+            limits,
             torque_phase: requirement(&check, "design.torque_phase", &raw.design.torque_phase)?,
             inertia_phase: requirement(&check, "design.inertia_phase", &raw.design.inertia_phase)?,
             compliant_torque_phase: compliant(&check, "torque_phase", &raw.design.compliant.torque_phase)?,
             compliant_inertia_phase: compliant(&check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
-            error_bounds: error_bounds(&check, &raw.design.error_bounds)?,
+            error_bounds,
             filter: filter(&check, &raw.observer.filter)?,
             shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
-            source,
+            source: Source { path: PathBuf::new(), text: String::new() },
         })
     }
 }
 
 fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, ConfigError> {
-    let throttle = check.numbers("engine.torque.throttle", &raw.throttle, 0.0..=1.0)?;
-    let speed = check.numbers("engine.torque.speed_rad_s", &raw.speed_rad_s, 0.0..=2e3)?;
+    let throttle = check.axis("engine.torque.throttle", &raw.throttle, 0.0..=1.0, MAX_COLUMNS)?;
+    let speed = check.axis("engine.torque.speed_rad_s", &raw.speed_rad_s, 0.0..=2e3, MAX_POINTS)?;
     let key = "engine.torque.torque_n_m";
     let rows = raw.torque_n_m.get_ref();
     for (i, row) in rows.iter().enumerate() {
         check.numbers(&format!("{key}[{i}]"), row, -2e3..=3e3)?;
         if row.get_ref().len() != throttle.len() {
-            let message = format!("row has {} torques, `throttle` {} positions", row.get_ref().len(), throttle.len());
+            let message =
+                format!("the row has {} torques, but `throttle` has {} positions", row.get_ref().len(), throttle.len());
             return Err(check.meaning(&format!("{key}[{i}]"), row.span().start, message, None));
         }
     }
-    let rows: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
-    Table2::new(speed, throttle, &rows).map_err(|error| {
+    let values: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
+    Table2::new(speed, throttle, &values).map_err(|error| {
+        // Axes and rows are as they must be: what is left is the number of rows.
         let message = match error {
             TableError::LengthMismatch(speeds, rows) => format!("{rows} rows of torque for {speeds} speeds"),
             other => other.to_string(),
@@ -322,75 +407,52 @@ fn converter(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Converter<f64>, 
         capacity_n_m_s2: check.table(axis(), ("converter.capacity_n_m_s2", &raw.capacity_n_m_s2, -0.1..=0.1))?,
         torque_ratio: check.table(axis(), ("converter.torque_ratio", &raw.torque_ratio, 0.5..=5.0))?,
     };
-    let creates = |&ratio: &f64| {
-        let capacity = converter.capacity_n_m_s2.at(ratio);
-        capacity * (1.0 - converter.torque_ratio.at(ratio) * ratio) < -1e-9
+    if let Some(ratio) = creating_power(&converter) {
+        let message =
+            format!("at a speed ratio of {} the turbine power is larger than the pump power", significant(ratio));
+        let hint =
+            "torque ratio times speed ratio must be below 1 in drive; in overrun the capacity must be negative".into();
+        let at = raw.capacity_n_m_s2.span().start;
+        return Err(check.meaning("converter.capacity_n_m_s2", at, message, Some(hint)));
+    }
+    let (Some(&last), Some(&capacity)) =
+        (converter.capacity_n_m_s2.axis().last(), converter.capacity_n_m_s2.values().last())
+    else {
+        return Ok(converter);
     };
-    if let Some(ratio) = raw.speed_ratio.get_ref().iter().find(|ratio| creates(ratio)) {
-        let message = format!("at a speed ratio of {ratio} the turbine gives more power than the pump takes");
-        let hint = "torque ratio times speed ratio stays below 1 in drive; in overrun the capacity is negative".into();
+    if capacity > 0.0 {
+        let message =
+            format!("is {capacity} at the last speed ratio, {last}, and would have this value in overrun too");
+        let hint = "extend the map to a speed ratio of 1 or more, with a capacity of zero or less".to_owned();
         let at = raw.capacity_n_m_s2.span().start;
         return Err(check.meaning("converter.capacity_n_m_s2", at, message, Some(hint)));
     }
     Ok(converter)
 }
 
-fn clutch(check: &Check<'_>, name: &str, raw: &RawVehicleFile) -> Result<ShiftClutch, ConfigError> {
-    let raw: &RawClutch = &raw.clutch[name];
-    let key = |field: &str| format!("clutch.{name}.{field}");
-    let table = |axis: &str, axis_raw: &Numbers, axis_max: f64, values: &str, raw: &Numbers, range| {
-        check.table((&key(axis), axis_raw, 0.0..=axis_max), (&key(values), raw, range))
+/// Places between two breakpoints at which the power of the converter is looked at.
+const LOOKED_AT: u32 = 16;
+
+/// A speed ratio at which the turbine gives more power than the pump takes, `C(lambda) (1 - t(lambda) lambda) < 0`.
+/// Between breakpoints that is a cubic polynomial, which can dip below zero where both ends are above it.
+fn creating_power(converter: &Converter<f64>) -> Option<f64> {
+    let creates = |ratio: f64| {
+        let capacity = converter.capacity_n_m_s2.at(ratio);
+        capacity * (1.0 - converter.torque_ratio.at(ratio) * ratio) < -1e-9
     };
-    let checked = ShiftClutch {
-        clutch: Clutch {
-            mean_radius_m: check.number(&key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
-            friction_faces: check.number(&key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
-            piston_area_m2: check.number(&key("piston_area_m2"), &raw.piston_area_m2, 0.001..=0.05)?,
-            return_spring_n: check.number(&key("return_spring_n"), &raw.return_spring_n, 0.0..=10e3)?,
-            static_friction: check.number(&key("static_friction"), &raw.static_friction, 0.02..=0.5)?,
-            friction: table(
-                "friction.slip_rad_s",
-                &raw.friction.slip_rad_s,
-                2e3,
-                "friction.coefficient",
-                &raw.friction.coefficient,
-                0.02..=0.5,
-            )?,
-        },
-        valve: ValveMaps {
-            time_constant_s: table(
-                "valve.lag.pressure_pa",
-                &raw.valve.lag.pressure_pa,
-                10e6,
-                "valve.lag.time_constant_s",
-                &raw.valve.lag.time_constant_s,
-                0.001..=2.0,
-            )?,
-            gain_pa_a: table(
-                "valve.gain.current_a",
-                &raw.valve.gain.current_a,
-                10.0,
-                "valve.gain.gain_pa_a",
-                &raw.valve.gain.gain_pa_a,
-                1e4..=20e6,
-            )?,
-            delay_s: table(
-                "valve.delay.current_a",
-                &raw.valve.delay.current_a,
-                10.0,
-                "valve.delay.delay_s",
-                &raw.valve.delay.delay_s,
-                0.0..=0.5,
-            )?,
-        },
+    let between = |ends: &[f64]| {
+        let (from, step) = (ends[0], (ends[1] - ends[0]) / f64::from(LOOKED_AT));
+        (0..=LOOKED_AT).map(move |i| from + step * f64::from(i)).collect::<Vec<f64>>()
     };
-    let (holding, sliding) = (checked.clutch.static_friction, checked.clutch.friction.at(0.0));
-    if holding < sliding {
-        let message = format!("is {holding}, less than the {sliding} of `friction` at zero slip");
-        let hint = "a clutch that holds less than it drags would neither stick nor slip".to_owned();
-        return Err(check.meaning(&key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
+    let axis = converter.capacity_n_m_s2.axis();
+    axis.iter().copied().chain([0.0]).chain(axis.windows(2).flat_map(between)).find(|&ratio| creates(ratio))
+}
+
+fn oil_temperature(check: &Check<'_>, raw: &RawVehicleFile) -> Result<f64, ConfigError> {
+    match &raw.oil.temperature_degc {
+        Some(temperature) => check.number("oil.temperature_degc", temperature, OIL_TEMPERATURES_DEGC),
+        None => Ok(WARM_OIL_DEGC),
     }
-    Ok(checked)
 }
 
 fn road(check: &Check<'_>, raw: &RawVehicleFile) -> Result<RoadLoad<f64>, ConfigError> {
@@ -406,49 +468,11 @@ fn road(check: &Check<'_>, raw: &RawVehicleFile) -> Result<RoadLoad<f64>, Config
     })
 }
 
-fn observer_valve(check: &Check<'_>, raw: &RawValve) -> Result<Valve<f64>, ConfigError> {
-    // A tagged enum loses the places of its values, so an error points at the table.
-    let offset = check.source.text.find("[observer.valve]").unwrap_or(0);
-    let number = |key: &str, value: f64, range| {
-        check.number(&format!("observer.valve.{key}"), &toml::Spanned::new(offset..offset, value), range)
-    };
-    Ok(match *raw {
-        RawValve::Proportional { time_constant_s, gain_pa_a } => Valve::Proportional {
-            time_constant_s: number("time_constant_s", time_constant_s, 0.001..=2.0)?,
-            gain_pa_a: number("gain_pa_a", gain_pa_a, 1e4..=20e6)?,
-        },
-        RawValve::PulseWidth { flow_sqrt_pa_s, line_pressure_pa, operating_pressure_pa } => Valve::PulseWidth {
-            flow_sqrt_pa_s: number("flow_sqrt_pa_s", flow_sqrt_pa_s, 1.0..=1e6)?,
-            line_pressure_pa: number("line_pressure_pa", line_pressure_pa, 1e5..=10e6)?,
-            operating_pressure_pa: number("operating_pressure_pa", operating_pressure_pa, 0.0..=10e6)?,
-        },
-    })
-}
-
-fn uncertainty(check: &Check<'_>, raw: &RawUncertainty) -> Result<Uncertainty, ConfigError> {
-    let pair = |key: &str, numbers: &Numbers, range| -> Result<(f64, f64), ConfigError> {
-        let key = format!("observer.uncertainty.{key}");
-        match *check.numbers(&key, numbers, range)? {
-            [least, greatest] if least <= greatest => Ok((least, greatest)),
-            _ => {
-                let message = "expected [least, greatest]".to_owned();
-                Err(check.meaning(&key, numbers.span().start, message, None))
-            }
-        }
-    };
-    let optional = |key: &str, numbers: &Option<Numbers>, range| {
-        numbers.as_ref().map(|numbers| pair(key, numbers, range)).transpose()
-    };
-    Ok(Uncertainty {
-        friction: pair("friction", &raw.friction, 0.02..=0.5)?,
-        time_constant_s: optional("time_constant_s", &raw.time_constant_s, 0.001..=2.0)?,
-        command: optional("command", &raw.command, 0.0..=100.0)?,
-    })
-}
-
 fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Result<Supervisor<f64>, ConfigError> {
     let raw = &raw.supervisor;
-    let number = |key: &str, value, range| check.number(&format!("observer.supervisor.{key}"), value, range);
+    let number = |key: &str, value: &crate::check::Number, range| {
+        check.number(&format!("observer.supervisor.{key}"), value, range)
+    };
     Ok(Supervisor {
         kiss_pressure_pa,
         release_slip_rad_s: number("release_slip_rad_s", &raw.release_slip_rad_s, 0.1..=100.0)?,
@@ -465,18 +489,6 @@ fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<D
         model_error_max_rad_s2: number("model_error_max_rad_s2", &raw.model_error_max_rad_s2, 0.0..=1e6)?,
         offset_max_pa: number("offset_max_pa", &raw.offset_max_pa, 1e3..=10e6)?,
     })
-}
-
-/// Puts the values of one table in place of those of another, table by table.
-fn merge(table: &mut toml::Table, over: toml::Table) {
-    for (key, value) in over {
-        match (table.get_mut(&key), value) {
-            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => merge(below, above),
-            (_, value) => {
-                table.insert(key, value);
-            }
-        }
-    }
 }
 
 fn compliant(
@@ -526,16 +538,53 @@ fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigEr
     })
 }
 
-fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("design.error_bounds.{key}"), value, range);
-    let range = |key: &str, values: &Numbers, allowed| {
-        let key = format!("design.error_bounds.{key}");
-        match *check.numbers(&key, values, allowed)? {
-            [least, greatest] if least <= greatest => Ok([least, greatest]),
-            _ => Err(check.meaning(&key, values.span().start, "expected [least, greatest]".to_owned(), None)),
+/// Tyres: size, wear and pressure.
+const WHEEL_SCALE: f64 = 0.02;
+/// Filter and bus of the brakes' controller.
+const WHEEL_DELAY_S: f64 = 0.03;
+/// One cycle of a bus.
+const CHANNEL_SKEW_S: f64 = 0.01;
+const SHAFT_STIFFNESS_FACTOR: [f64; 2] = [0.8, 1.2];
+const BACKLASH_RAD: f64 = 0.03;
+
+fn error_bounds(
+    check: &Check<'_>,
+    spanned: &Spanned<RawErrorBounds>,
+    oncoming: &ShiftClutch,
+    oil_degc: f64,
+) -> Result<ErrorBounds, ConfigError> {
+    let (at, raw) = (spanned.span().start, spanned.get_ref());
+    let number = |key: &str, value: &Number, range| check.number(&format!("design.error_bounds.{key}"), value, range);
+    let range =
+        |key: &str, values: &Numbers, allowed| check.pair(&format!("design.error_bounds.{key}"), values, allowed);
+    let factor = |key: &str, values: &Numbers, allowed| {
+        let factors = range(key, values, allowed)?;
+        if (factors[0]..=factors[1]).contains(&1.0) {
+            return Ok(factors);
         }
+        let key = format!("design.error_bounds.{key}");
+        let [least, greatest] = factors;
+        let message = format!(
+            "{least} to {greatest} does not contain 1: the car of this file would be outside its own error budget"
+        );
+        Err(check.meaning(&key, values.span().start, message, Some("an error of 10 % is [0.9, 1.1]".to_owned())))
     };
+    let optional = |key: &str, value: &Option<Number>, range: RangeInclusive<f64>, default: f64| match value {
+        Some(value) => number(key, value, range),
+        None => Ok(default),
+    };
+    let pressure_max_pa = number("pressure_max_pa", &raw.pressure_max_pa, 1e5..=10e6)?;
+    let line = raw.line_pressure_pa.as_ref();
+    let line_pressure_pa = line.map(|line| range("line_pressure_pa", line, 0.0..=pressure_max_pa)).transpose()?;
     Ok(ErrorBounds {
+        wheel_scale: optional("wheel_scale", &raw.wheel_scale, 0.0..=0.2, WHEEL_SCALE)?,
+        wheel_delay_s: optional("wheel_delay_s", &raw.wheel_delay_s, 0.0..=0.2, WHEEL_DELAY_S)?,
+        channel_skew_s: optional("channel_skew_s", &raw.channel_skew_s, 0.0..=0.1, CHANNEL_SKEW_S)?,
+        shaft_stiffness_factor: match &raw.shaft_stiffness_factor {
+            Some(factors) => factor("shaft_stiffness_factor", factors, 0.2..=5.0)?,
+            None => SHAFT_STIFFNESS_FACTOR,
+        },
+        backlash_rad: optional("backlash_rad", &raw.backlash_rad, 0.0..=0.2, BACKLASH_RAD)?,
         turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
         pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
         mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
@@ -553,12 +602,24 @@ fn error_bounds(check: &Check<'_>, raw: &RawErrorBounds) -> Result<ErrorBounds, 
         float32_rounding: number("float32_rounding", &raw.float32_rounding, 0.0..=1e-3)?,
         shift_pressure_pa: number("shift_pressure_pa", &raw.shift_pressure_pa, 0.0..=2e6)?,
         shift_ramp_pa_s: number("shift_ramp_pa_s", &raw.shift_ramp_pa_s, 0.0..=1e8)?,
-        valve_lag_factor: range("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
-        valve_gain_factor: range("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
+        valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
+        valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
         valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
-        friction_factor: range("friction_factor", &raw.friction_factor, 0.1..=10.0)?,
-        current_a: number("current_a", &raw.current_a, 0.0..=1.0)?,
+        valve_hysteresis_pa: match &raw.valve_hysteresis_pa {
+            Some(half_width) => {
+                number("valve_hysteresis_pa", half_width, oncoming.hysteresis_pa..=*HYSTERESES_PA.end())?
+            }
+            None => VALVE_HYSTERESIS_PA.max(oncoming.hysteresis_pa),
+        },
+        command_age_s: match &raw.command_age_s {
+            Some(age) => number("command_age_s", age, 0.0..=1.0)?,
+            None => COMMAND_AGE_S,
+        },
+        line_pressure_pa: line_pressure_pa.unwrap_or([pressure_max_pa; 2]),
+        fill: fill_bounds::bounds(check, raw.fill.as_ref(), oncoming, oil_degc)?,
+        friction_factor: factor("friction_factor", &raw.friction_factor, 0.1..=10.0)?,
+        command: valves::command_error(check, at, raw, oncoming.valve.command_kind())?,
         slip_rad_s: number("slip_rad_s", &raw.slip_rad_s, 0.0..=200.0)?,
-        pressure_max_pa: number("pressure_max_pa", &raw.pressure_max_pa, 1e5..=10e6)?,
+        pressure_max_pa,
     })
 }

@@ -2,133 +2,373 @@
 //! inequality approach to peak-to-peak gain minimization, 1996), by a line search on `lambda`:
 //!
 //! ```text
-//! [ (1-lambda) P   0          (P Phi - Y G Psi)' ]
-//! [ 0              diag(a)    (P B)'             ] >= 0 at every vertex,   sum a <= lambda,   [P C'; C g2] >= 0,   min g2
-//! [ *              *          P                  ]
+//! [ (1-lambda) Q   0          (Q A_i)'  ]
+//! [ 0              diag(a_i)  (Q B_i)'  ] >= 0 and sum a_i <= lambda g at every vertex i,   [Q C'; C g] >= 0,   min g
+//! [ *              *          Q         ]
 //! ```
 //!
-//! with `Y = P L` and `B` the columns of the errors; then ultimately `|C e| <= sqrt(g2)`. With one state and
-//! one vertex this is the exact peak-to-peak gain.
+//! with `A = Phi - L G Psi` and `B` the columns of the errors of `x = e + L n`, see [`super::system`]; then in steady state
+//! `|C x| <= g`, and `|C e| <= g + |C L| n`. The ellipsoid is `x' Q x <= g`. With one state and one vertex this is the exact
+//! peak-to-peak gain.
 //!
-//! A gain that follows the friction has `Y = b_1 Y_1 + b_2 Y_2`. With `M_ij` the matrix above for `Y_i` at the vertex `j`, it is
-//! certified between the ends if `M_11 >= 0`, `M_22 >= 0` and `M_12 + M_21 >= 0`.
+//! For a given gain that is a program in `Q`, `a` and `g`. With the gain as an unknown, `Y = Q L`, all is linear but the columns
+//! `Q (I - A) L n` of the readings and the last term. They are replaced by their tangent at the last gain found, `L0` with `Q0`
+//! and `A0`:
+//!
+//! ```text
+//! Q (I - A) L  by  (Q - Q Phi + Y G Psi) L0 + Q0 (I - A0) Q0^-1 (Y - Q L0),      L  by  L0 + Q0^-1 (Y - Q L0)
+//! ```
+//!
+//! Each solution is the next `L0`, as long as its bound, which is computed for the gain itself, falls.
+//!
+//! A gain that follows the friction is `b_1 L_1 + b_2 L_2`, as `G` is. Its columns are cubic in `b`: with `M_pqi` the matrix
+//! above for the gain `p` in `A`, the gain `q` behind it, and the vertex `i`, it is certified between the ends if the mean of all
+//! `M_pqi` with the same number of indices 2 is not negative, for each number.
 
 use nalgebra::DMatrix;
 
+use super::search::{Search, SolverRecord, least_over};
 use super::system::{Corner, ErrorSystem};
-use super::{DiscreteMargin, Found, RESERVE, best_found, block, least_eigenvalue, solved, stacked};
+use super::{
+    DiscreteMargin, Found, Norm, RESERVE, WORTH_A_GAIN, block_of, least_eigenvalue, open_loop_bound, slowest, stacked,
+};
 use crate::iss::DesignError;
 use crate::lmi::{Block, Problem};
 
 /// The gain is sought in multiples of this, so that the unknowns are of order 1.
 const GAIN_UNIT: f64 = 30.0;
-/// Steps of the search for `lambda`; each shrinks its interval by 0.618.
-const SEARCH_STEPS: usize = 14;
+/// Where the searches for `lambda` end: a factor between its last two values, at first and for the gain that was found.
+const WITHIN: [f64; 2] = [0.2, 0.02];
+/// Times that the gain is sought for a `lambda` and then the best `lambda` for the gain, at most.
+const PASSES: usize = 4;
+/// A tangent, and a pass, is the last if it reduces the bound by less than this share.
+const SETTLED: f64 = 5e-4;
+/// Part of the way to the next gain that is tried at least.
+const SHORTEST_WAY: f64 = 0.2;
 
-/// The gain, constant or following the friction, with the smallest bound.
+/// The gain, constant or following the friction, with the smallest bound, if one is certified.
 pub(crate) fn smallest_ellipsoid(
     system: &ErrorSystem,
     scheduled: bool,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
-) -> Result<Found, DesignError> {
-    let pairs = pairs(system, scheduled);
-    best_found(0.01, 0.95, SEARCH_STEPS, |lambda| ellipsoid(system, &pairs, lambda, &round))
-}
-
-/// Inequalities: each the sum of the matrix above over some gains at some corners.
-type Pairs<'a> = Vec<(String, Vec<(usize, &'a Corner)>)>;
-
-fn pairs(system: &ErrorSystem, scheduled: bool) -> Pairs<'_> {
-    let least = system.corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
-    let end = |corner: &Corner| usize::from(scheduled && corner.friction > least);
-    let mut pairs: Pairs<'_> =
-        system.corners.iter().map(|corner| (corner.label.clone(), vec![(end(corner), corner)])).collect();
-    if scheduled {
-        for (i, first) in system.corners.iter().enumerate() {
-            for second in system.corners[i + 1..].iter().filter(|second| second.valve == first.valve) {
-                let label = format!("{} with {}", first.label, second.label);
-                pairs.push((label, vec![(end(second), first), (end(first), second)]));
+) -> Result<(Option<Found>, SolverRecord), DesignError> {
+    let inequalities = inequalities(system, scheduled);
+    let ends = 1 + inequalities.iter().flat_map(|i| &i.terms).map(|term| term.gain).max().unwrap_or(0);
+    let design = Design { system, inequalities, ends };
+    let mut search = Search::default();
+    let range = [0.1 * (1.0 - slowest(system)), 0.99];
+    let mut tangent = Tangent::open_loop(system, ends);
+    // At the open loop the tangent leaves out what is of second order in the gain, so that this cost is too low.
+    let mut least_cost = f64::INFINITY;
+    let mut lambda = least_over(range, WITHIN[0], |lambda| {
+        let solution = search.solve(&design.program(lambda, &tangent, true));
+        let cost = solution.map_or(f64::INFINITY, |x| design.cost(&x));
+        least_cost = least_cost.min(cost);
+        cost
+    });
+    let mut bound = f64::INFINITY;
+    // The best lambda moves with the gain.
+    for _ in 0..PASSES {
+        let last = bound;
+        while let Some((lower, next)) = design.next(&mut search, lambda, &tangent, bound, &round) {
+            let settled = lower > bound * (1.0 - SETTLED);
+            (bound, tangent) = (lower, next);
+            if settled || least_cost >= WORTH_A_GAIN * open_loop_bound(system) {
+                break;
             }
         }
+        let within = if bound > last * (1.0 - SETTLED) { WITHIN[1] } else { WITHIN[0] };
+        lambda = least_over([lambda / 1.5, (1.5 * lambda).min(0.99)], within, |lambda| {
+            let (found, _) = design.evaluated(&mut search, lambda, tangent.gains.clone());
+            search.keep(found)
+        });
+        if within == WITHIN[1] {
+            break;
+        }
     }
-    pairs
+    search.finish()
 }
 
-/// The smallest ellipsoid for this `lambda`, if there is one. Unknowns: the upper triangle of `P`, each `Y` by rows, `a`, `g2`.
-fn ellipsoid(
-    system: &ErrorSystem,
-    pairs: &Pairs<'_>,
+/// One matrix of a mean: the gain `p` in `A`, the gain `q` behind it, the corner.
+struct Term<'a> {
+    gain: usize,
+    behind: usize,
+    corner: &'a Corner,
+}
+
+/// Matrices whose mean must not be negative.
+struct Inequality<'a> {
+    label: String,
+    terms: Vec<Term<'a>>,
+}
+
+fn inequalities(system: &ErrorSystem, scheduled: bool) -> Vec<Inequality<'_>> {
+    let corners = &system.corners;
+    let pairs = corners.iter().enumerate().flat_map(|(i, first)| {
+        corners[i + 1..].iter().filter(|second| second.valve == first.valve).map(move |second| [first, second])
+    });
+    let pairs: Vec<[&Corner; 2]> = pairs.collect();
+    if !scheduled || pairs.is_empty() {
+        let term = |corner| Term { gain: 0, behind: 0, corner };
+        return corners.iter().map(|c| Inequality { label: c.label.clone(), terms: vec![term(c)] }).collect();
+    }
+    pairs.into_iter().flat_map(|ends| (0..=3).map(move |seconds| between(ends, seconds))).collect()
+}
+
+/// All terms with this number of indices of the second end.
+fn between(ends: [&Corner; 2], seconds: usize) -> Inequality<'_> {
+    let label = match seconds {
+        0 => ends[0].label.clone(),
+        3 => ends[1].label.clone(),
+        _ => format!("{} with {}, {seconds}/3", ends[0].label, ends[1].label),
+    };
+    let all = (0..8).map(|bits| [bits & 1, bits >> 1 & 1, bits >> 2 & 1]);
+    let terms = all.filter(|indices| indices.iter().sum::<usize>() == seconds);
+    let terms = terms.map(|[gain, behind, corner]| Term { gain, behind, corner: ends[corner] }).collect();
+    Inequality { label, terms }
+}
+
+/// Gains with the ellipsoid that was found for them.
+#[derive(Clone)]
+struct Tangent {
+    gains: Vec<DMatrix<f64>>,
+    shape: DMatrix<f64>,
+    /// Its inverse.
+    inverse: DMatrix<f64>,
+}
+
+impl Tangent {
+    fn open_loop(system: &ErrorSystem, ends: usize) -> Self {
+        let states = system.states();
+        let shape = DMatrix::identity(states, states);
+        Self { gains: vec![DMatrix::zeros(states, system.h.nrows()); ends], inverse: shape.clone(), shape }
+    }
+}
+
+/// The numbers that a program or a check puts into the matrix.
+struct Point<'a> {
+    q: DMatrix<f64>,
+    ys: Vec<DMatrix<f64>>,
     lambda: f64,
-    round: &impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
-) -> Result<Option<Found>, DesignError> {
-    let direct = &system.direct_columns;
-    let (states, outputs) = (system.states(), system.h.nrows());
-    let through = system.corners[0].columns.ncols();
-    let causes = through + direct.ncols();
-    let count = 1 + pairs.iter().flat_map(|(_, terms)| terms).map(|(end, _)| *end).max().unwrap_or(0);
-    let triangle = states * (states + 1) / 2;
-    let a_at = triangle + count * states * outputs;
-    let g2_at = a_at + causes;
-    let unknowns = g2_at + 1;
-    let p = |x: &[f64]| match states {
-        1 => DMatrix::from_element(1, 1, x[0]),
-        _ => DMatrix::from_row_slice(2, 2, &[x[0], x[1], x[1], x[2]]),
-    };
-    let y = |x: &[f64], end: usize| {
-        let at = triangle + end * states * outputs;
-        DMatrix::from_row_slice(states, outputs, &x[at..at + states * outputs]) * GAIN_UNIT
-    };
-    let matrix = |p: &DMatrix<f64>, y: &DMatrix<f64>, a: &[f64], corner: &Corner, lambda: f64, inflated: f64| {
-        let n = states + causes;
+    tangent: &'a Tangent,
+    /// Factor on every error.
+    inflated: f64,
+}
+
+struct Design<'a> {
+    system: &'a ErrorSystem,
+    inequalities: Vec<Inequality<'a>>,
+    /// Number of gains.
+    ends: usize,
+}
+
+impl Design<'_> {
+    fn triangle(&self) -> usize {
+        self.system.states() * (self.system.states() + 1) / 2
+    }
+
+    /// Entries of one gain.
+    fn entries(&self) -> usize {
+        self.system.states() * self.system.h.nrows()
+    }
+
+    /// Columns of `B`.
+    fn causes(&self) -> usize {
+        let readings = self.system.readings.ncols();
+        readings * self.ends + self.system.corners[0].columns.ncols() + self.system.corners[0].direct_columns.ncols()
+    }
+
+    /// Unknowns: the upper triangle of `Q`, `a` of each inequality, `g`; of a program for a gain also each `Y` by rows and the
+    /// bound on each reading's part of the last term.
+    fn g_at(&self) -> usize {
+        self.triangle() + self.inequalities.len() * self.causes()
+    }
+
+    fn a<'x>(&self, x: &'x [f64], inequality: usize) -> &'x [f64] {
+        let at = self.triangle() + inequality * self.causes();
+        &x[at..at + self.causes()]
+    }
+
+    fn q(&self, x: &[f64]) -> DMatrix<f64> {
+        match self.system.states() {
+            1 => DMatrix::from_element(1, 1, x[0]),
+            _ => DMatrix::from_row_slice(2, 2, &[x[0], x[1], x[1], x[2]]),
+        }
+    }
+
+    fn y(&self, x: &[f64], end: usize) -> DMatrix<f64> {
+        let at = self.g_at() + 1 + end * self.entries();
+        DMatrix::from_row_slice(self.system.states(), self.system.h.nrows(), &x[at..at + self.entries()]) * GAIN_UNIT
+    }
+
+    fn point<'t>(&self, x: &[f64], lambda: f64, tangent: &'t Tangent, sought: bool) -> Point<'t> {
+        let q = self.q(x);
+        let y = |end| if sought { self.y(x, end) } else { &q * &tangent.gains[end] };
+        Point { ys: (0..self.ends).map(y).collect(), q, lambda, tangent, inflated: 1.0 + RESERVE }
+    }
+
+    /// The program for this `lambda`: for a gain that is `sought`, or for that of the tangent.
+    fn program(&self, lambda: f64, tangent: &Tangent, sought: bool) -> Problem {
+        let (states, readings, g_at) = (self.system.states(), self.system.readings.ncols(), self.g_at());
+        let t_at = g_at + 1 + self.ends * self.entries();
+        let unknowns = if sought { t_at + readings } else { g_at + 1 };
+        let mut blocks: Vec<Block> = Vec::new();
+        // The check takes the smaller lambda on both sides, which leaves room for rounding in the decay too.
+        let share = lambda * (1.0 - RESERVE) * (1.0 - 1e-6);
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        let of_y = g_at + 1..if sought { t_at } else { g_at + 1 };
+        for (i, inequality) in self.inequalities.iter().enumerate() {
+            let of_a = self.triangle() + i * self.causes()..self.triangle() + (i + 1) * self.causes();
+            let mut matrix = block_of(unknowns, (0..self.triangle()).chain(of_y.clone()), |x| {
+                self.matrix(inequality, &self.point(x, lambda, tangent, sought), self.a(x, i))
+            });
+            for (j, k) in of_a.clone().enumerate() {
+                matrix.per_unknown[k][(states + j, states + j)] = 1.0;
+            }
+            blocks.push(matrix);
+            let room = |x: &[f64]| one(share * x[g_at] - self.a(x, i).iter().sum::<f64>());
+            blocks.push(block_of(unknowns, of_a.chain([g_at]), room));
+        }
+        let mut pressure = DMatrix::zeros(1, states);
+        pressure[(0, states - 1)] = 1.0;
+        let on = (0..self.triangle()).chain([g_at]);
+        blocks.push(block_of(unknowns, on, |x| stacked(&self.q(x), &pressure, &one(x[g_at]))));
+        if sought {
+            for (end, gain) in tangent.gains.iter().enumerate() {
+                for reading in 0..readings {
+                    let last = |x: &[f64]| {
+                        let moved = gain + &tangent.inverse * (self.y(x, end) - self.q(x) * gain);
+                        (moved.row(states - 1) * self.system.readings.column(reading))[0]
+                    };
+                    for sign in [1.0, -1.0] {
+                        let room = |x: &[f64]| one(x[t_at + reading] + sign * last(x));
+                        let on = (0..self.triangle()).chain(g_at + 1..t_at).chain([t_at + reading]);
+                        blocks.push(block_of(unknowns, on, room));
+                    }
+                }
+            }
+        }
+        let mut objective = vec![0.0; unknowns];
+        objective[g_at..].fill(1.0);
+        if sought {
+            objective[g_at + 1..t_at].fill(0.0);
+        }
+        Problem { objective, blocks }
+    }
+
+    /// What a program for a gain minimises, at its solution.
+    fn cost(&self, x: &[f64]) -> f64 {
+        let g_at = self.g_at();
+        x[g_at] + x[g_at + 1 + self.ends * self.entries()..].iter().sum::<f64>()
+    }
+
+    /// The gains of a solution.
+    fn gains(&self, x: &[f64]) -> Option<Vec<DMatrix<f64>>> {
+        let inverse = self.q(x).try_inverse()?;
+        Some((0..self.ends).map(|end| &inverse * self.y(x, end)).collect())
+    }
+
+    /// The mean of the matrices of an inequality, with `a` on the diagonal.
+    fn matrix(&self, inequality: &Inequality<'_>, at: &Point<'_>, a: &[f64]) -> DMatrix<f64> {
+        let states = self.system.states();
+        let n = states + a.len();
         let mut diagonal = DMatrix::zeros(n, n);
-        diagonal.view_mut((0, 0), (states, states)).copy_from(&(p * (1.0 - lambda)));
+        diagonal.view_mut((0, 0), (states, states)).copy_from(&(&at.q * (1.0 - at.lambda)));
         for (j, a) in a.iter().enumerate() {
             diagonal[(states + j, states + j)] = *a;
         }
         let mut row = DMatrix::zeros(states, n);
-        row.columns_mut(0, states).copy_from(&(p * &corner.phi - y * &corner.g_psi));
-        row.columns_mut(states, through).copy_from(&(y * &corner.columns * -inflated));
-        row.columns_mut(states + through, direct.ncols()).copy_from(&(p * direct * inflated));
-        stacked(&diagonal, &row, p)
-    };
-    let sum = |p: &DMatrix<f64>, ys: &[DMatrix<f64>], a: &[f64], terms: &[(usize, &Corner)], lambda, inflated| {
-        let matrices = terms.iter().map(|(end, corner)| matrix(p, &ys[*end], a, corner, lambda, inflated));
-        matrices.reduce(|sum, matrix| sum + matrix).unwrap_or_default()
-    };
-    let mut blocks: Vec<Block> = (pairs.iter())
-        .map(|(_, terms)| {
-            block(unknowns, |x| {
-                let ys: Vec<_> = (0..count).map(|end| y(x, end)).collect();
-                sum(&p(x), &ys, &x[a_at..g2_at], terms, lambda, 1.0 + RESERVE)
-            })
-        })
-        .collect();
-    let mut pressure = DMatrix::zeros(1, states);
-    pressure[(0, states - 1)] = 1.0;
-    blocks.push(block(unknowns, |x| stacked(&p(x), &pressure, &DMatrix::from_element(1, 1, x[g2_at]))));
-    let mut share = vec![0.0; unknowns];
-    share[a_at..g2_at].fill(-1.0);
-    // The check takes the smaller lambda on both sides, which leaves room for rounding in the decay too.
-    let checked = lambda * (1.0 - RESERVE);
-    blocks.push(Block::linear(checked * (1.0 - 1e-6), &share));
-    let mut objective = vec![0.0; unknowns];
-    objective[g2_at] = 1.0;
-    let Some(x) = solved(&Problem { objective, blocks })? else { return Ok(None) };
+        for term in &inequality.terms {
+            row += self.row(term, at);
+        }
+        row /= inequality.terms.len() as f64;
+        stacked(&diagonal, &row, &at.q)
+    }
 
-    // From here on the solver is not believed.
-    let p = p(&x);
-    // An error that the gain does not let in has a multiplier of zero, up to the solver's tolerance.
-    let a: Vec<f64> = x[a_at..g2_at].iter().map(|a| a.max(0.0) + checked * 0.5e-6 / causes as f64).collect();
-    let Some(inverse) = p.clone().try_inverse() else { return Ok(None) };
-    let gains: Vec<DMatrix<f64>> = (0..count).map(|end| round(&(&inverse * y(&x, end)))).collect();
-    let ys: Vec<DMatrix<f64>> = gains.iter().map(|gain| &p * gain).collect();
-    let margins: Vec<DiscreteMargin> = (pairs.iter())
-        .map(|(label, terms)| DiscreteMargin {
-            label: label.clone(),
-            least: least_eigenvalue(&sum(&p, &ys, &a, terms, checked, 1.0)),
-        })
-        .collect();
-    let holds = margins.iter().all(|margin| margin.least >= 0.0) && a.iter().sum::<f64>() <= checked;
-    let bound = inverse[(states - 1, states - 1)].sqrt();
-    Ok(holds.then_some(Found { gains, bound, margins }))
+    /// `[Q A, Q B]` of one term.
+    fn row(&self, term: &Term<'_>, at: &Point<'_>) -> DMatrix<f64> {
+        let (corner, tangent, readings) = (term.corner, at.tangent, &self.system.readings);
+        let (y, behind) = (&at.ys[term.gain], &at.ys[term.behind]);
+        let q_a = &at.q * &corner.phi - y * &corner.g_psi;
+        // `Q0 A0 Q0^-1`.
+        let a0 = &tangent.shape * corner.error_dynamics(&tangent.gains[term.gain]) * &tangent.inverse;
+        let l0 = &tangent.gains[term.behind];
+        let turned = behind - &at.q * l0;
+        let of_readings = (&at.q - &q_a) * l0 + &turned - &a0 * turned;
+        let mut parts = vec![q_a.clone(), of_readings * readings * at.inflated];
+        if self.ends > 1 {
+            let across = &tangent.gains[1] - &tangent.gains[0];
+            let turned = &at.ys[1] - &at.ys[0] - &at.q * &across;
+            let stepped = q_a * across + a0 * turned;
+            parts.push(stepped * readings * (self.system.friction_step * at.inflated));
+        }
+        parts.push(y * &corner.columns * -at.inflated);
+        parts.push(&at.q * &corner.direct_columns * at.inflated);
+        let columns: Vec<_> = parts.iter().flat_map(|part| part.column_iter()).collect();
+        DMatrix::from_columns(&columns)
+    }
+
+    /// The gains of the program at this tangent, with their ellipsoid, if their bound is below `bound`; else those between.
+    fn next(
+        &self,
+        search: &mut Search,
+        lambda: f64,
+        tangent: &Tangent,
+        bound: f64,
+        round: &impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Option<(f64, Tangent)> {
+        let x = search.solve(&self.program(lambda, tangent, true))?;
+        let to = self.gains(&x)?;
+        let mut way = 1.0;
+        while way >= SHORTEST_WAY {
+            let gains = tangent.gains.iter().zip(&to).map(|(from, to)| round(&(from + (to - from) * way))).collect();
+            let (found, next) = self.evaluated(search, lambda, gains);
+            let reached = search.keep(found);
+            if reached < bound {
+                return next.map(|next| (reached, next));
+            }
+            way *= 0.5;
+        }
+        None
+    }
+
+    /// The ellipsoid of these gains for this `lambda`, if there is one, and the gains with it.
+    fn evaluated(
+        &self,
+        search: &mut Search,
+        lambda: f64,
+        gains: Vec<DMatrix<f64>>,
+    ) -> (Option<Found>, Option<Tangent>) {
+        let given = Tangent { gains, ..Tangent::open_loop(self.system, self.ends) };
+        let Some(x) = search.solve(&self.program(lambda, &given, false)) else { return (None, None) };
+
+        // From here on the solver is not believed.
+        let checked = lambda * (1.0 - RESERVE);
+        let q = self.q(&x);
+        let Some(inverse) = q.clone().try_inverse() else { return (None, None) };
+        // An error that the gain does not let in has a multiplier of zero, up to the solver's tolerance.
+        let least = x[self.g_at()].abs() * checked * 0.5e-6 / self.causes() as f64;
+        let multipliers: Vec<Vec<f64>> =
+            (0..self.inequalities.len()).map(|i| self.a(&x, i).iter().map(|a| a.max(0.0) + least).collect()).collect();
+        let sum = multipliers.iter().map(|a| a.iter().sum::<f64>()).fold(0.0, f64::max);
+        let g = sum / checked;
+        let ys = given.gains.iter().map(|gain| &q * gain).collect();
+        let point = Point { q: q.clone(), ys, lambda: checked, tangent: &given, inflated: 1.0 };
+        let margins: Vec<DiscreteMargin> = (self.inequalities.iter().zip(&multipliers))
+            .map(|(inequality, a)| DiscreteMargin {
+                label: inequality.label.clone(),
+                least: least_eigenvalue(&self.matrix(inequality, &point, a)),
+            })
+            .collect();
+        let holds = margins.iter().all(|margin| margin.least >= 0.0);
+        let last = given.gains.iter().map(|gain| self.system.last_reading(gain)).fold(0.0, f64::max);
+        let pressure = self.system.states() - 1;
+        let bound = (g * inverse[(pressure, pressure)]).sqrt() + last;
+        let contraction = (1.0 - checked).sqrt();
+        let found = holds.then(|| {
+            let norm = Norm::ellipsoid(q.clone())?;
+            Some(Found { gains: given.gains.clone(), bound, margins, norm, contraction })
+        });
+        (found.flatten(), Some(Tangent { shape: q, inverse, ..given }))
+    }
 }

@@ -3,37 +3,48 @@
 //! With `F`, `G` and the valve frozen over a sample of length `T`, the error of the observer obeys
 //!
 //! ```text
-//! e+ = (Phi - L G Psi) e - L (T H w + n) + v
+//! e+ = (Phi - L G Psi) e - L (T H w + n+ - n) + v
 //! ```
 //!
-//! for errors `w` of the accelerations, `n` of the speeds and of what they tell about the pressure, and `v` of valve and
-//! twist, each within its bound of the vehicle file. Four designs, in the normalised units of [`crate::compliant`]; each is in
-//! a file of its own:
+//! for errors `w` of the accelerations, `n` of the speed readings, and `v` of valve and twist, each within its bound of the
+//! vehicle file; `system` brings it into the form in which the readings' errors do not add up. Four designs, in the normalised units of
+//! [`crate::compliant`]; each has its own file:
 //!
-//! * [`GainMethod::IssDiscrete`], the twin of Eq. (2.83)-(2.84): the smallest gain that decays as required.
+//! * [`GainMethod::IssDiscrete`], the discrete form of Eq. (2.83)-(2.84): the smallest gain with the required decay.
 //! * [`GainMethod::PeakToPeak`]: the smallest ellipsoid that no error within the bounds can leave.
-//! * [`GainMethod::Scheduled`]: the same with a gain that follows the friction coefficient. In discrete time no derivative of
-//!   the gain enters the error.
-//! * [`GainMethod::Interval`]: an error that keeps its sign if nothing disturbs it, so that a lowest and a highest estimate can
-//!   be carried along; the gain with the smallest width.
+//! * [`GainMethod::Scheduled`]: the same with a gain that depends on the friction coefficient. In discrete time the error does not
+//!   depend on a derivative of the gain.
+//! * [`GainMethod::Interval`]: an undisturbed error keeps its sign, so that a lower and an upper limit of the estimate can be
+//!   computed with it; the gain with the smallest width.
 //!
-//! Every inequality is evaluated again, apart from the solver, for the gain as a controller has it in single precision. A gain
-//! whose bound is not below the open loop's is not shipped.
+//! Every inequality is evaluated again without the solver, for the gain in single precision as a controller stores
+//! it. If the bound of a gain is not below the bound of the open loop, the result is the open loop.
+//!
+//! A certificate is for its sample time. The speeds may correct the estimate over a longer step, after a lost sample, as long as
+//! an error still shrinks by the certified factor: [`DiscreteCertificate::longest_step_s`].
 
+mod contributions;
 mod ellipsoid;
+pub(crate) mod given;
 mod interval;
+pub(crate) mod norm;
+pub(crate) mod search;
 mod smallest_gain;
-mod system;
+pub(crate) mod system;
 
-use config::{GainMethod, Vehicle};
+use config::{GainMethod, SAMPLE_TIMES_S, Vehicle};
 use nalgebra::DMatrix;
 use observer::{CompliantGains, Phase, RigidGains, Schedule};
 use serde::Serialize;
 
+use crate::certificate::BOTH_DIRECTIONS;
 use crate::compliant::{PRESSURE_UNIT_PA, SPEED_UNITS_RAD_S, compliant_requirement};
 use crate::iss::DesignError;
-use crate::lmi::{Block, Outcome, Problem, largest_eigenvalue};
+use crate::lmi::{Block, largest_eigenvalue};
 use crate::rigid::requirement;
+use contributions::contributions;
+use norm::{Norm, longest_certified_step};
+pub use search::SolverRecord;
 use system::{ErrorSystem, outputs, state_units};
 
 /// Which of the two reduced-order observers.
@@ -46,12 +57,12 @@ pub enum Model {
     Compliant,
 }
 
-/// What a bound is on. Speeds tell a torque, and a friction that is not what the observer is told makes it another pressure;
-/// the valve model tells a pressure, and the same friction makes it another torque.
+/// Quantity of a bound. The speeds give a torque; an error of the friction then gives an error of the pressure. The valve
+/// model gives a pressure; the same error of the friction then gives an error of the torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
-    /// The clutch torque, as the pressure that gives it with the friction that the observer is told.
+    /// The clutch torque, as the pressure that gives this torque with the friction of the observer's model.
     ClutchTorque,
     /// The pressure.
     Pressure,
@@ -60,7 +71,7 @@ pub enum Quantity {
 /// Errors are made larger by this share in a program than in the check, which leaves room for rounding.
 const RESERVE: f64 = 1e-4;
 /// A bound must beat the open loop's by this factor.
-const WORTH_A_GAIN: f64 = 0.999;
+pub(crate) const WORTH_A_GAIN: f64 = 0.999;
 
 /// A gain of a sampled observer in one phase, with the bound on its error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -75,20 +86,28 @@ pub struct DiscreteCertificate {
     pub gains: Vec<GainAt>,
     /// The sample time, s.
     pub sample_time_s: f64,
-    /// Whether no gain beats the open loop, which then serves.
+    /// Whether no gain reduces the bound, so that the result is the open loop.
     pub uses_open_loop: bool,
-    /// Ultimate bound on the error, Pa.
+    /// Steady-state bound on the error, Pa.
     pub bound_pa: f64,
-    /// Ultimate bound of the best gain, Pa, whether it is used or not.
+    /// Steady-state bound of the best gain, Pa, whether it is used or not.
     pub best_gain_bound_pa: f64,
-    /// Ultimate bound of the open loop, Pa.
+    /// Steady-state bound of the open loop, Pa.
     pub open_loop_bound_pa: f64,
+    /// The longest step over which the gain multiplies an error by at most the certified factor of one sample, s, in the norm of
+    /// the certificate. Over a longer one the speeds must not correct the estimate. Of the open loop, which corrects nothing, it
+    /// is the longest sample time that an observer may have.
+    pub longest_step_s: f64,
+    /// What the solver did.
+    pub solver: SolverRecord,
     /// What the error is made of at the worst corner of the polytope, were friction and valve to stay there.
     pub contributions: Vec<Contribution>,
     /// Every inequality, evaluated; none is negative.
     pub margins: Vec<DiscreteMargin>,
     /// Clutch torque of 1 MPa at the middle of the friction's range, N m.
     pub torque_n_m_mpa: f64,
+    /// Directions of slip for which it holds: with backward slip the gain on the pressure changes its sign with `G`.
+    pub slip_directions: &'static str,
     /// SHA-256 of the vehicle file.
     pub vehicle_sha256: String,
 }
@@ -99,7 +118,7 @@ pub struct GainAt {
     /// The friction coefficient that it is for, if it follows that.
     pub friction: Option<f64>,
     /// `L`, normalised, rows `(T_s, p)` or `p` alone, of a gain that is exact in single precision in physical units; zero
-    /// where the open loop serves.
+    /// for the open loop.
     pub normalised: Vec<Vec<f64>>,
 }
 
@@ -131,13 +150,17 @@ pub struct DiscreteDesign {
 }
 
 /// What a method found: gains (one, or two at the ends of the friction), bound of the normalised pressure, inequalities.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Found {
     gains: Vec<DMatrix<f64>>,
     bound: f64,
     margins: Vec<DiscreteMargin>,
+    /// The norm in which an error shrinks, and by which factor in a sample.
+    norm: Norm,
+    contraction: f64,
 }
 
-/// Designs the gain of one phase for a sample time. By [`GainMethod::Iss`], which knows no sample time, the certificate is
+/// Designs the gain of one phase for a sample time. For [`GainMethod::Iss`], which has no sample time, the result is
 /// that of [`GainMethod::IssDiscrete`].
 ///
 /// # Errors
@@ -150,25 +173,49 @@ pub fn design_discrete_phase(
     phase: Phase,
     sample_time_s: f64,
 ) -> Result<DiscreteCertificate, DesignError> {
+    certified(vehicle, model, method, quantity, phase, sample_time_s).map_err(|error| error.in_phase(phase))
+}
+
+fn certified(
+    vehicle: &Vehicle,
+    model: Model,
+    method: GainMethod,
+    quantity: Quantity,
+    phase: Phase,
+    sample_time_s: f64,
+) -> Result<DiscreteCertificate, DesignError> {
     let system = ErrorSystem::of(vehicle, model, quantity, phase, sample_time_s);
     let round = |gain: &DMatrix<f64>| rounded(gain, model, phase);
-    let found = match method {
+    let open_loop_bound = open_loop_bound(&system);
+    let (found, solver) = match method {
+        // Nothing disturbs the valve model, and no gain can do better than that.
+        _ if open_loop_bound == 0.0 => (None, SolverRecord::default()),
         GainMethod::Iss | GainMethod::IssDiscrete => {
             let kappa2_per_s = match model {
                 Model::Rigid => 4.0 / requirement(vehicle, phase).settling_time_s,
                 Model::Compliant => compliant_requirement(vehicle, phase).kappa2_per_s,
             };
-            smallest_gain::smallest_gain(&system, kappa2_per_s, sample_time_s, round)?
+            match smallest_gain::smallest_gain(&system, kappa2_per_s, sample_time_s, round) {
+                Err(DesignError::DecayUnreachable { .. }) => (None, SolverRecord { solved: 1, failed: 0 }),
+                found => found.map(|(found, solver)| (Some(found), solver))?,
+            }
         }
         GainMethod::PeakToPeak => ellipsoid::smallest_ellipsoid(&system, false, round)?,
         GainMethod::Scheduled => ellipsoid::smallest_ellipsoid(&system, true, round)?,
         GainMethod::Interval => interval::narrowest_interval(&system, round)?,
     };
-    let open_loop_bound_pa = PRESSURE_UNIT_PA * open_loop_bound(&system);
+    // Where no gain is certified, none is the best.
+    let found = found.unwrap_or_else(|| without_a_gain(&system, method, open_loop_bound));
+    let open_loop_bound_pa = PRESSURE_UNIT_PA * open_loop_bound;
     let best_gain_bound_pa = PRESSURE_UNIT_PA * found.bound;
     let uses_open_loop = best_gain_bound_pa >= WORTH_A_GAIN * open_loop_bound_pa;
     let gains: Vec<DMatrix<f64>> =
         found.gains.iter().map(|gain| if uses_open_loop { gain * 0.0 } else { gain.clone() }).collect();
+    let case = (vehicle, model, phase, sample_time_s);
+    let longest_step_s = match uses_open_loop {
+        true => *SAMPLE_TIMES_S.end(),
+        false => longest_certified_step(case, &gains, &found.norm, found.contraction),
+    };
     let scheduled = gains.len() > 1;
     let at = |end: usize| scheduled.then(|| end_friction(vehicle, end));
     Ok(DiscreteCertificate {
@@ -188,7 +235,10 @@ pub fn design_discrete_phase(
         bound_pa: if uses_open_loop { open_loop_bound_pa } else { best_gain_bound_pa },
         best_gain_bound_pa,
         open_loop_bound_pa,
+        longest_step_s,
+        solver,
         margins: found.margins,
+        slip_directions: BOTH_DIRECTIONS,
         vehicle_sha256: vehicle.source.sha256(),
     })
 }
@@ -215,6 +265,11 @@ pub fn design_discrete(
 }
 
 impl DiscreteDesign {
+    /// The longest step over which the speeds may correct the estimate in every phase, s.
+    pub fn longest_step_s(&self) -> f64 {
+        self.torque_phase.longest_step_s.min(self.inertia_phase.longest_step_s)
+    }
+
     /// The gains of the rigid observer in physical units.
     pub fn rigid_gains(&self) -> Schedule<f64, RigidGains<f64>> {
         let of = |certificate: &DiscreteCertificate, end: usize| -> Vec<f64> {
@@ -255,64 +310,54 @@ fn end_friction(vehicle: &Vehicle, end: usize) -> f64 {
     if end == 0 { vehicle.uncertainty.friction.0 } else { vehicle.uncertainty.friction.1 }
 }
 
-/// Ultimate bound on the normalised pressure if the valve model serves alone.
-fn open_loop_bound(system: &ErrorSystem) -> f64 {
-    let pressure = system.states() - 1;
-    let valve: f64 = system.direct.iter().map(|cause| cause.column[pressure].abs()).sum();
-    let slowest = system.corners.iter().map(|corner| corner.phi[(pressure, pressure)]).fold(0.0, f64::max);
-    valve / (1.0 - slowest)
+/// What the open loop has as a gain: none. Its inequality is that of a valve that forgets: `1 - Phi` of the pressure.
+fn without_a_gain(system: &ErrorSystem, method: GainMethod, bound: f64) -> Found {
+    let (states, outputs) = (system.states(), system.h.nrows());
+    let forgets = |corner: &system::Corner| DiscreteMargin {
+        label: corner.label.clone(),
+        least: 1.0 - corner.phi[(states - 1, states - 1)],
+    };
+    let ends = if method == GainMethod::Scheduled { 2 } else { 1 };
+    Found {
+        gains: vec![DMatrix::zeros(states, outputs); ends],
+        bound,
+        margins: system.corners.iter().map(forgets).collect(),
+        norm: Norm::euclidean(states),
+        contraction: 1.0,
+    }
 }
 
-/// Samples over which a response is followed at most.
-const RESPONSE_SAMPLES: usize = 5000;
-
-/// What each cause does to the pressure at the corner where all of them together do most.
-fn contributions(system: &ErrorSystem, gains: &[DMatrix<f64>]) -> Vec<Contribution> {
-    let least = system.corners.iter().map(|corner| corner.friction).fold(f64::INFINITY, f64::min);
-    let at_corner = |corner: &system::Corner| -> Vec<Contribution> {
-        let gain = if corner.friction > least { gains.last() } else { gains.first() };
-        let Some(gain) = gain else { return Vec::new() };
-        let a = &corner.phi - gain * &corner.g_psi;
-        let through = corner.through_gain.iter().map(|cause| (cause.name, -gain * &cause.column));
-        let direct = system.direct.iter().map(|cause| (cause.name, cause.column.clone()));
-        let columns: Vec<_> = through.chain(direct).collect();
-        let mut sums: Vec<Contribution> = Vec::new();
-        for (cause, _) in &columns {
-            if !sums.iter().any(|sum| sum.cause == *cause) {
-                sums.push(Contribution { cause, bound_pa: 0.0 });
-            }
-        }
-        let mut response = DMatrix::zeros(1, system.states());
-        response[(0, system.states() - 1)] = 1.0;
-        for _ in 0..RESPONSE_SAMPLES {
-            for (cause, column) in &columns {
-                if let Some(sum) = sums.iter_mut().find(|sum| sum.cause == *cause) {
-                    sum.bound_pa += PRESSURE_UNIT_PA * (&response * column)[0].abs();
-                }
-            }
-            response *= &a;
-            if response.norm() < 1e-12 {
-                break;
-            }
-        }
-        sums
+/// Steady-state bound on the normalised pressure in open loop.
+pub(crate) fn open_loop_bound(system: &ErrorSystem) -> f64 {
+    let pressure = system.states() - 1;
+    let at_corner = |corner: &system::Corner| {
+        let valve: f64 = corner.direct.iter().map(|cause| cause.column[pressure].abs()).sum();
+        valve / (1.0 - corner.phi[(pressure, pressure)])
     };
-    let total = |sums: &Vec<Contribution>| sums.iter().map(|sum| sum.bound_pa).sum::<f64>();
-    system.corners.iter().map(at_corner).max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default()
+    system.corners.iter().map(at_corner).fold(0.0, f64::max)
+}
+
+/// The largest share of an error of the pressure that is left after a sample of the valve alone.
+pub(crate) fn slowest(system: &ErrorSystem) -> f64 {
+    let pressure = system.states() - 1;
+    system.corners.iter().map(|corner| corner.phi[(pressure, pressure)]).fold(0.0, f64::max)
 }
 
 /// A block that depends affinely on the unknowns, from a function that evaluates it.
 fn block(unknowns: usize, at: impl Fn(&[f64]) -> DMatrix<f64>) -> Block {
+    block_of(unknowns, 0..unknowns, at)
+}
+
+/// The same of a block that depends on some unknowns only.
+fn block_of(unknowns: usize, on: impl IntoIterator<Item = usize>, at: impl Fn(&[f64]) -> DMatrix<f64>) -> Block {
     let mut x = vec![0.0; unknowns];
     let constant = at(&x);
-    let per_unknown = (0..unknowns)
-        .map(|k| {
-            x[k] = 1.0;
-            let column = at(&x) - &constant;
-            x[k] = 0.0;
-            column
-        })
-        .collect();
+    let mut per_unknown = vec![DMatrix::zeros(constant.nrows(), constant.ncols()); unknowns];
+    for k in on {
+        x[k] = 1.0;
+        per_unknown[k] = at(&x) - &constant;
+        x[k] = 0.0;
+    }
     Block { constant, per_unknown }
 }
 
@@ -341,220 +386,5 @@ fn rounded(gain: &DMatrix<f64>, model: Model, phase: Phase) -> DMatrix<f64> {
     })
 }
 
-fn solved(problem: &Problem) -> Result<Option<Vec<f64>>, DesignError> {
-    match problem.solve() {
-        Outcome::Solved { unknowns, .. } => Ok(Some(unknowns)),
-        Outcome::Infeasible => Ok(None),
-        Outcome::Failed(word) => Err(DesignError::Solver(word)),
-    }
-}
-
-/// The one with the least bound, by golden sections over a parameter in which the bound has one minimum. Where there is
-/// none, or the solver gives up, the search goes elsewhere.
-fn best_found(
-    mut low: f64,
-    mut high: f64,
-    steps: usize,
-    at: impl Fn(f64) -> Result<Option<Found>, DesignError>,
-) -> Result<Found, DesignError> {
-    let mut best: Option<Found> = None;
-    let mut bound_at = |parameter: f64| {
-        let Ok(Some(found)) = at(parameter) else { return f64::INFINITY };
-        let bound = found.bound;
-        if best.as_ref().is_none_or(|best| bound < best.bound) {
-            best = Some(found);
-        }
-        bound
-    };
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let mut inner = [high - golden * (high - low), low + golden * (high - low)];
-    let mut values = inner.map(&mut bound_at);
-    for _ in 0..steps {
-        if values[0] <= values[1] {
-            high = inner[1];
-            inner = [high - golden * (high - low), inner[0]];
-            values = [bound_at(inner[0]), values[0]];
-        } else {
-            low = inner[0];
-            inner = [inner[1], low + golden * (high - low)];
-            values = [values[1], bound_at(inner[1])];
-        }
-    }
-    best.ok_or(DesignError::NotCertified)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SAMPLE_S: f64 = 0.01;
-    const METHODS: [GainMethod; 4] =
-        [GainMethod::IssDiscrete, GainMethod::PeakToPeak, GainMethod::Scheduled, GainMethod::Interval];
-
-    fn vehicle() -> Vehicle {
-        Vehicle::two_speed_at().expect("the built-in vehicle is valid")
-    }
-
-    fn inertia(method: GainMethod, model: Model) -> DiscreteCertificate {
-        let quantity = Quantity::ClutchTorque;
-        design_discrete_phase(&vehicle(), model, method, quantity, Phase::InertiaPhase, SAMPLE_S).unwrap()
-    }
-
-    /// Scalar output: `f(a) = (v + c a)/(1 - Phi + a)` with `a = L G_min Psi` is monotone, so the best is either the
-    /// open loop or the largest gain that still pays at the strong vertex.
-    #[test]
-    fn with_one_output_the_design_is_open_loop_exactly_where_the_closed_form_says() {
-        let mut vehicle = vehicle();
-        let phase = Phase::TorquePhase;
-        for (delay_s, pays) in [(0.0, false), (0.03, false), (5.0, true)] {
-            vehicle.error_bounds.valve_delay_s[1] = delay_s;
-            let system = ErrorSystem::of(&vehicle, Model::Rigid, Quantity::ClutchTorque, phase, SAMPLE_S);
-            let weak = &system.corners[0];
-            let c = weak.columns.abs().sum() / weak.g_psi[0].abs();
-            let valve = system.direct_columns.abs().sum();
-            assert_eq!(c * (1.0 - weak.phi[0]) < valve, pays, "the closed form itself");
-            let certificate = design_discrete_phase(
-                &vehicle,
-                Model::Rigid,
-                GainMethod::PeakToPeak,
-                Quantity::ClutchTorque,
-                phase,
-                SAMPLE_S,
-            )
-            .unwrap();
-            assert_eq!(certificate.uses_open_loop, !pays, "{certificate:?}");
-            assert!(certificate.bound_pa <= certificate.open_loop_bound_pa);
-        }
-    }
-
-    /// With one state the bound has a closed form, and no gain on a grid around and far from the design has a smaller one.
-    #[test]
-    fn no_gain_of_a_grid_search_beats_the_rigid_design() {
-        let system = ErrorSystem::of(&vehicle(), Model::Rigid, Quantity::ClutchTorque, Phase::InertiaPhase, SAMPLE_S);
-        let bound = |gain: &DMatrix<f64>| {
-            let at_corner = |corner: &system::Corner| {
-                let contraction = (corner.phi[0] - (gain * &corner.g_psi)[0]).abs();
-                let disturbed = (gain * &corner.columns).abs().sum() + system.direct_columns.abs().sum();
-                if contraction < 1.0 { PRESSURE_UNIT_PA * disturbed / (1.0 - contraction) } else { f64::INFINITY }
-            };
-            system.corners.iter().map(at_corner).fold(0.0, f64::max)
-        };
-        let certificate = inertia(GainMethod::PeakToPeak, Model::Rigid);
-        assert!(!certificate.uses_open_loop);
-        let designed = DMatrix::from_row_slice(1, 2, &certificate.gains[0].normalised[0]);
-        // What the reserve of the program costs, and one `lambda` for all corners.
-        assert!(certificate.bound_pa >= bound(&designed) && certificate.bound_pa < 1.003 * bound(&designed));
-        for i in -60..=60 {
-            for j in -60..=60 {
-                let gain = DMatrix::from_row_slice(1, 2, &[0.2 * f64::from(i), 0.2 * f64::from(j)]);
-                assert!(bound(&gain) >= bound(&designed) * (1.0 - 3e-3), "{gain}");
-            }
-        }
-    }
-
-    #[test]
-    fn each_method_is_as_good_as_its_freedom_allows() {
-        for model in [Model::Rigid, Model::Compliant] {
-            let [iss, peak, scheduled, interval] = METHODS.map(|method| inertia(method, model).best_gain_bound_pa);
-            assert!(scheduled < 0.99 * peak, "{model:?}: following the friction pays: {scheduled} {peak}");
-            assert!(peak < interval && interval < iss, "{model:?}: {peak} {interval} {iss}");
-        }
-    }
-
-    /// An adversary who knows the gain: friction held anywhere in its range, or elsewhere from sample to sample, and every
-    /// error at its bound with the sign that hurts most at the end.
-    #[test]
-    fn no_adversary_exceeds_the_bound() {
-        let vehicle = vehicle();
-        for (model, method) in
-            [Model::Rigid, Model::Compliant].into_iter().flat_map(|m| METHODS.map(|method| (m, method)))
-        {
-            let certificate = inertia(method, model);
-            let system = ErrorSystem::of(&vehicle, model, Quantity::ClutchTorque, Phase::InertiaPhase, SAMPLE_S);
-            let states = system.states();
-            let gain = |end: usize| {
-                let rows = &certificate.end(end).normalised;
-                DMatrix::from_fn(states, rows[0].len(), |i, j| rows[i][j])
-            };
-            let at = |share: f64| {
-                let g_psi = &system.corners[0].g_psi * (1.0 - share) + &system.corners[1].g_psi * share;
-                let gain = gain(0) * (1.0 - share) + gain(1) * share;
-                let through = &system.corners[0].columns * (1.0 - share) + &system.corners[1].columns * share;
-                (&system.corners[0].phi - &gain * g_psi, -gain * through)
-            };
-            let mut largest = 0.0_f64;
-            let held = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| vec![share]);
-            let alternating = [1, 2, 3, 7].map(|n| [vec![0.0; n], vec![1.0; n]].concat());
-            let wandering = (1..=599).map(|k| (0.618 * f64::from(k)).fract()).collect();
-            for shares in held.into_iter().chain(alternating).chain([wandering]) {
-                let mut response = DMatrix::zeros(1, states);
-                response[(0, states - 1)] = 1.0;
-                let mut sum = 0.0;
-                for k in 0..600 {
-                    let (a, b) = at(shares[k % shares.len()]);
-                    sum += (&response * b).abs().sum() + (&response * &system.direct_columns).abs().sum();
-                    response *= a;
-                }
-                largest = largest.max(sum);
-            }
-            let bound = certificate.bound_pa / PRESSURE_UNIT_PA;
-            assert!(largest <= bound * (1.0 + 1e-9), "{model:?} {method:?}: {largest} beyond {bound}");
-            let parts: f64 = certificate.contributions.iter().map(|part| part.bound_pa).sum();
-            assert!(parts <= certificate.bound_pa * (1.0 + 1e-9) && parts > 0.5 * certificate.bound_pa, "{parts}");
-        }
-    }
-
-    #[test]
-    fn an_interval_gain_keeps_the_sign_of_an_error() {
-        for model in [Model::Rigid, Model::Compliant] {
-            let certificate = inertia(GainMethod::Interval, model);
-            let system = ErrorSystem::of(&vehicle(), model, Quantity::ClutchTorque, Phase::InertiaPhase, SAMPLE_S);
-            let rows = &certificate.gains[0].normalised;
-            let gain = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]);
-            for corner in &system.corners {
-                assert!((&corner.phi - &gain * &corner.g_psi).min() >= 0.0, "{model:?} {}", corner.label);
-            }
-        }
-    }
-
-    type Change<'a> = (&'a str, &'a dyn Fn(&mut config::ErrorBounds));
-
-    #[test]
-    fn every_entry_of_the_budget_is_in_a_bound() {
-        let nominal = inertia(GainMethod::PeakToPeak, Model::Rigid);
-        let bound_with = |change: &dyn Fn(&mut config::ErrorBounds)| {
-            let mut vehicle = vehicle();
-            change(&mut vehicle.error_bounds);
-            let (model, method, quantity) = (Model::Rigid, GainMethod::PeakToPeak, Quantity::ClutchTorque);
-            let of = |phase| design_discrete_phase(&vehicle, model, method, quantity, phase, SAMPLE_S).unwrap();
-            of(Phase::InertiaPhase).best_gain_bound_pa
-        };
-        let changes: [Change<'_>; 9] = [
-            ("turbine torque", &|b| b.turbine_torque_n_m *= 2.0),
-            ("offgoing", &|b| b.offgoing_torque_n_m *= 2.0),
-            ("friction", &|b| b.friction_factor = [0.6, 1.4]),
-            ("lag", &|b| b.valve_lag_factor[1] = 2.0),
-            ("gain", &|b| b.valve_gain_factor[0] = 0.7),
-            ("delay", &|b| b.valve_delay_s[1] *= 2.0),
-            // A gain on the turbine speed alone, to which the design turns, does without the slip.
-            ("quanta", &|b| (b.turbine_quantum_rad_s, b.slip_quantum_rad_s) = (7.0, 17.0)),
-            ("sampling delay", &|b| b.sampling_delay_s *= 2.0),
-            ("float32", &|b| b.float32_rounding *= 1e3),
-        ];
-        for (name, change) in changes {
-            assert!(bound_with(change) > 1.001 * nominal.best_gain_bound_pa, "{name}");
-        }
-        // The load hardly shows in the inertia phase; it does in a gain on the wheel's speed.
-        let iss = |change: &dyn Fn(&mut config::ErrorBounds)| {
-            let mut vehicle = vehicle();
-            change(&mut vehicle.error_bounds);
-            let quantity = Quantity::ClutchTorque;
-            let (model, method, phase) = (Model::Compliant, GainMethod::IssDiscrete, Phase::TorquePhase);
-            design_discrete_phase(&vehicle, model, method, quantity, phase, SAMPLE_S).unwrap().best_gain_bound_pa
-        };
-        let base = iss(&|_| ());
-        let loads: [&dyn Fn(&mut config::ErrorBounds); 3] =
-            [&|b| b.mass_kg *= 2.0, &|b| b.grade_rad *= 2.0, &|b| b.wheel_quantum_rad_s *= 2.0];
-        assert!(loads.iter().all(|change| iss(change) > 1.001 * base));
-    }
-}
+mod tests;

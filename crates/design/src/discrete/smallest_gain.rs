@@ -1,15 +1,18 @@
-//! The smallest gain that contracts as required, the discrete twin of Eq. (2.83)-(2.84):
+//! The smallest gain with the required contraction, the discrete form of Eq. (2.83)-(2.84):
 //!
 //! ```text
 //! min trace(alpha),  [alpha LH; * I] >= 0,  [rho I, (Phi - L G Psi)'; *, rho I] >= 0 at every vertex
 //! ```
 //!
-//! with `rho = exp(-kappa2 T)`; then ultimately `|e| <= sum of |columns| / (1 - rho)`.
+//! with `rho = exp(-kappa2 T)`. Of several solutions it is the one with the smallest `|L|`: with two causes of error, three
+//! outputs leave a direction of `L` that `LH` does not contain. In steady state `|x|` of [`super::system`] is at most the sum of
+//! the lengths of all columns over `1 - |Phi - L G Psi|`, at the vertex where that is largest.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::search::{Search, SolverRecord};
 use super::system::{Corner, ErrorSystem};
-use super::{DiscreteMargin, Found, block, least_eigenvalue, solved, stacked};
+use super::{DiscreteMargin, Found, Norm, block, least_eigenvalue, stacked};
 use crate::iss::DesignError;
 use crate::lmi::{Block, Problem};
 
@@ -22,7 +25,7 @@ pub(crate) fn smallest_gain(
     kappa2_per_s: f64,
     sample_time_s: f64,
     round: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
-) -> Result<Found, DesignError> {
+) -> Result<(Found, SolverRecord), DesignError> {
     let rho = (-kappa2_per_s * sample_time_s).exp();
     let (states, outputs) = (system.states(), system.h.nrows());
     let unknowns = states + states * outputs;
@@ -42,7 +45,10 @@ pub(crate) fn smallest_gain(
     }));
     let mut objective = vec![0.0; unknowns];
     objective[..states].fill(1.0);
-    let Some(x) = solved(&Problem { objective, blocks })? else {
+    let mut search = Search::default();
+    let Some(x) = search.take((Problem { objective, blocks }).solve_least(states..unknowns)) else {
+        let (_, record) = search.finish()?;
+        debug_assert_eq!(record.failed, 0);
         return Err(DesignError::DecayUnreachable { decay_per_s: kappa2_per_s });
     };
     let gain = round(&gain(&x));
@@ -56,9 +62,16 @@ pub(crate) fn smallest_gain(
         return Err(DesignError::NotCertified);
     }
     let length = |columns: &DMatrix<f64>| columns.column_iter().map(|column| column.norm()).sum::<f64>();
-    let through = system.corners.iter().map(|corner| length(&(&gain * &corner.columns))).fold(0.0, f64::max);
-    let bound = (through + length(&system.direct_columns)) / (1.0 - rho);
-    Ok(Found { gains: vec![gain], bound, margins })
+    let norm = Norm::euclidean(states);
+    let bound_at = |corner: &Corner| {
+        let matrix = corner.error_dynamics(&gain);
+        let of_readings = (&identity - &matrix) * &gain * &system.readings;
+        let added = length(&of_readings) + length(&(&gain * &corner.columns)) + length(&corner.direct_columns);
+        added / (1.0 - norm.factor(&matrix).min(rho))
+    };
+    let bound = system.corners.iter().map(bound_at).fold(0.0, f64::max) + system.last_reading(&gain);
+    let (_, record) = search.finish()?;
+    Ok((Found { gains: vec![gain], bound, margins, norm, contraction: rho }, record))
 }
 
 #[cfg(test)]
@@ -75,7 +88,7 @@ mod tests {
         let phase = Phase::TorquePhase;
         let mut system = ErrorSystem::of(&vehicle, Model::Compliant, Quantity::Pressure, phase, 0.01);
         system.h = DMatrix::from_row_slice(2, 2, &[2.38, 0.0, 0.0, 0.13]);
-        let found =
+        let (found, _) =
             smallest_gain(&system, -0.67_f64.ln() / 0.01, 0.01, |gain| rounded(gain, Model::Compliant, phase)).unwrap();
         let reference = DMatrix::from_row_slice(2, 2, &[-1.29, 18.04, -2.70, -64.8]);
         // The reference is printed to three digits.
@@ -98,7 +111,7 @@ mod tests {
         assert!(!certificate.uses_open_loop && certificate.bound_pa < certificate.open_loop_bound_pa);
         let rho = (-4.0 / vehicle.inertia_phase.settling_time_s * 0.01).exp();
         let model = crate::rigid_model(&vehicle);
-        let valve = model.valve.linear(0.0);
+        let valve = model.valve.linear(0.0, 0.0);
         let phi = (valve.a22_per_s * 0.01).exp();
         for friction in [0.10, 0.13, 0.16] {
             let influence = model.influence(Phase::InertiaPhase, friction);

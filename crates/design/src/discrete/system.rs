@@ -1,8 +1,36 @@
-//! The error of a sampled observer, with everything of the error budget that disturbs it.
+//! The error system of a sampled observer, with all errors of the error budget as inputs.
+//!
+//! With `A = Phi - L G Psi`, errors `w` of the accelerations, `n` of the speed readings, and `v` of valve and twist, the error
+//! of the estimate obeys
+//!
+//! ```text
+//! e+ = A e - L (T H w + n+ - n) + v
+//! ```
+//!
+//! The errors of two readings enter as a difference. If each difference is bounded alone, the bound of their sum grows with
+//! the number of samples, and at a high sample rate no gain is worth its noise. But differences telescope: the sum over many
+//! samples is the difference of the last reading and the first. The change of state `x = e + L n`, which is the error of the
+//! observer's own variable `eta = z - L y` of Eq. (2.43), brings this into the bound:
+//!
+//! ```text
+//! x+ = A x + (I - A) L n - L T H w + v,    e = x - L n
+//! ```
+//!
+//! In this form `n` enters as itself, with `I - A`, which shrinks with the sample time as `1 - |A|` does. With one state and
+//! `0 <= A <= 1`, `x+` is a mean of `x` and `L n`, so that readings within `n` cause an error of at most `2 |L| n`, at any
+//! sample time; of bounded differences it is `2 |L| n/(1 - A)`.
+//!
+//! A gain that follows the friction has another value `L` at each sample, `L-` at the one before. With `x = e + L- n`
+//!
+//! ```text
+//! x+ = A x + (I - A) L n + A (L - L-) n - L T H w + v,    e = x - L- n
+//! ```
+//!
+//! so that it depends on how much the friction changes from sample to sample, see [`ErrorSystem::friction_step`].
 
 use config::Vehicle;
 use nalgebra::{DMatrix, DVector};
-use observer::Phase;
+use observer::{Discretisation, Phase};
 
 use super::{Model, Quantity};
 use crate::budget::{ValveErrors, grade_n_m, mass_n_m};
@@ -11,17 +39,19 @@ use crate::compliant::{given_error_matrix, outputs as compliant_outputs};
 use crate::polytope::{distinct, valve_extremes};
 use crate::rigid::rigid_model;
 
+/// Name of the readings' errors as a cause.
+pub(super) const READINGS: &str = "sensor quantisation";
 /// Roundings that an observer adds up in a sample, in single precision.
 const ROUNDINGS: f64 = 8.0;
 
-/// `e+ = (Phi - L G Psi) e - L (through the gain) + (direct)`, normalised as [`crate::compliant`] says.
+/// The errors of `x` above, normalised as [`crate::compliant`] says.
 #[derive(Debug, Clone)]
 pub(crate) struct ErrorSystem {
     pub(crate) corners: Vec<Corner>,
-    /// What reaches it past the gain, in the units of the states.
-    pub(crate) direct: Vec<Cause>,
-    /// The same as columns, those of one direction made one.
-    pub(crate) direct_columns: DMatrix<f64>,
+    /// The readings' errors at their bounds, a column for each output that has one.
+    pub(crate) readings: DMatrix<f64>,
+    /// Largest change of the friction coefficient of the observer's model from one sample to the next, as a share of its range.
+    pub(crate) friction_step: f64,
     /// Errors of the accelerations alone, a column for each cause: `H`.
     pub(crate) h: DMatrix<f64>,
 }
@@ -36,10 +66,14 @@ pub(crate) struct Corner {
     pub(crate) valve: usize,
     pub(crate) phi: DMatrix<f64>,
     pub(crate) g_psi: DMatrix<f64>,
-    /// What reaches the error through the gain, in the units of the outputs.
+    /// What reaches the error through the gain, in the units of the outputs; but for the readings.
     pub(crate) through_gain: Vec<Cause>,
     /// The same as columns, those of one direction made one; as many at every corner.
     pub(crate) columns: DMatrix<f64>,
+    /// What reaches it past the gain, in the units of the states.
+    pub(crate) direct: Vec<Cause>,
+    /// The same as columns.
+    pub(crate) direct_columns: DMatrix<f64>,
 }
 
 /// One error at its bound; it may have either sign.
@@ -68,7 +102,7 @@ pub(crate) fn state_units(model: Model) -> &'static [f64] {
 
 impl ErrorSystem {
     pub(crate) fn of(vehicle: &Vehicle, model: Model, quantity: Quantity, phase: Phase, sample_time_s: f64) -> Self {
-        let mut corners = corners(vehicle, model, phase, sample_time_s);
+        let mut corners = corners(vehicle, model, phase, sample_time_s, Discretisation::Exact);
         let outputs = outputs(model, phase);
         let accelerations = match model {
             Model::Rigid => rigid_errors(vehicle, phase),
@@ -78,24 +112,25 @@ impl ErrorSystem {
         let mut through_gain: Vec<Cause> = (accelerations.into_iter())
             .map(|Cause { name, column }| Cause { name, column: column * sample_time_s })
             .collect();
-        let bounds = &vehicle.error_bounds;
-        let quanta = [bounds.turbine_quantum_rad_s, bounds.slip_quantum_rad_s, bounds.wheel_quantum_rad_s];
-        let rounding = ROUNDINGS * bounds.float32_rounding;
-        for (name, sizes) in
-            [("sensor quantisation", quanta), ("float32 rounding", [rounding * vehicle.limits.speed_max_rad_s; 3])]
-        {
-            for (i, &output) in outputs.iter().enumerate() {
-                let mut column = DVector::zeros(outputs.len());
-                column[i] = sizes[output] / SPEED_UNITS_RAD_S[output];
-                through_gain.push(Cause { name, column });
-            }
-        }
+        let rounding = ROUNDINGS * vehicle.error_bounds.float32_rounding * vehicle.limits.speed_max_rad_s;
+        through_gain.extend((0..outputs.len()).map(|i| Cause {
+            name: "float32 rounding",
+            column: unit_vector(outputs.len(), i) * (rounding / SPEED_UNITS_RAD_S[outputs[i]]),
+        }));
         for corner in &mut corners {
             corner.through_gain = [through_gain.clone(), seen(vehicle, quantity, &corner.g_psi)].concat();
-            corner.columns = merged(&corner.through_gain);
+            corner.columns = merged(&corner.through_gain, outputs.len());
+            corner.direct = direct(vehicle, model, quantity, corner, sample_time_s);
+            corner.direct_columns = merged(&corner.direct, state_units(model).len());
         }
-        let direct = direct(vehicle, model, quantity, &corners, sample_time_s);
-        Self { corners, direct_columns: merged(&direct), direct, h }
+        let readings = readings(vehicle, outputs);
+        let friction_step = friction_step(vehicle, sample_time_s);
+        Self { corners, readings, friction_step, h }
+    }
+
+    /// What the last reading adds to the error of the normalised pressure: `|L| n` of `e = x - L n`.
+    pub(crate) fn last_reading(&self, gain: &DMatrix<f64>) -> f64 {
+        (gain.row(self.states() - 1) * &self.readings).abs().sum()
     }
 
     /// States: the pressure is the last.
@@ -104,8 +139,54 @@ impl ErrorSystem {
     }
 }
 
+impl Corner {
+    /// `A = Phi - L G Psi` with this gain.
+    pub(crate) fn error_dynamics(&self, gain: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.phi - gain * &self.g_psi
+    }
+}
+
+fn unit_vector(length: usize, at: usize) -> DVector<f64> {
+    DVector::from_fn(length, |i, _| if i == at { 1.0 } else { 0.0 })
+}
+
+/// Bound on the error of one reading, rad/s. The budget bounds the error of a change, which is the difference of two readings:
+/// it is kept by all readings within half of that, whatever their signs.
+fn reading_rad_s(quantum_rad_s: f64) -> f64 {
+    0.5 * quantum_rad_s
+}
+
+/// The readings' errors at their bounds, a column for each output that has one.
+fn readings(vehicle: &Vehicle, outputs: &[usize]) -> DMatrix<f64> {
+    let bounds = &vehicle.error_bounds;
+    let quanta = [bounds.turbine_quantum_rad_s, bounds.slip_quantum_rad_s, bounds.wheel_quantum_rad_s];
+    let sizes = outputs.iter().map(|&output| reading_rad_s(quanta[output]) / SPEED_UNITS_RAD_S[output]);
+    let columns: Vec<DVector<f64>> = (sizes.enumerate().filter(|(_, size)| *size > 0.0))
+        .map(|(i, size)| unit_vector(outputs.len(), i) * size)
+        .collect();
+    DMatrix::from_fn(outputs.len(), columns.len(), |i, j| columns[j][i])
+}
+
+/// Largest change of the friction coefficient of the observer's model from one sample to the next, as a share of the range
+/// that a gain follows. The coefficient follows from the reading of the slip: it changes by the slope of its map times the
+/// change of the slip, which the budget gives for the age of a reading, and the reading's own error.
+fn friction_step(vehicle: &Vehicle, sample_time_s: f64) -> f64 {
+    let (bounds, friction) = (&vehicle.error_bounds, &vehicle.oncoming.clutch.friction);
+    let (slips, coefficients) = (friction.axis(), friction.values());
+    let slopes = slips.windows(2).zip(coefficients.windows(2)).map(|(x, y)| ((y[1] - y[0]) / (x[1] - x[0])).abs());
+    let slope = slopes.fold(0.0, f64::max);
+    let (least, greatest) = vehicle.uncertainty.friction;
+    if slope == 0.0 || greatest <= least {
+        return 0.0;
+    }
+    let moved_rad_s = bounds.slip_rad_s * sample_time_s / bounds.sampling_delay_s + bounds.slip_quantum_rad_s;
+    // Without an age there is no rate: any change may come. `min` also drops what is not a number.
+    (slope * moved_rad_s / (greatest - least)).min(1.0)
+}
+
 /// The columns of these causes, those of one direction made one: their errors may have any sign, so their sizes add up.
-fn merged(causes: &[Cause]) -> DMatrix<f64> {
+/// There are none if every error is zero.
+fn merged(causes: &[Cause], rows: usize) -> DMatrix<f64> {
     let mut columns: Vec<DVector<f64>> = Vec::new();
     for Cause { column, .. } in causes.iter().filter(|cause| cause.column.norm() > 0.0) {
         let along = |other: &DVector<f64>| {
@@ -117,15 +198,25 @@ fn merged(causes: &[Cause]) -> DMatrix<f64> {
             None => columns.push(column.clone()),
         }
     }
-    DMatrix::from_columns(&columns)
+    DMatrix::from_fn(rows, columns.len(), |i, j| columns[j][i])
 }
 
-fn corners(vehicle: &Vehicle, model: Model, phase: Phase, sample_time_s: f64) -> Vec<Corner> {
+/// The corners without what disturbs them.
+pub(crate) fn corners(
+    vehicle: &Vehicle,
+    model: Model,
+    phase: Phase,
+    sample_time_s: f64,
+    discretisation: Discretisation,
+) -> Vec<Corner> {
     let (rigid, compliant) = (rigid_model(vehicle), compliant_model(vehicle));
     let (outputs, units) = (outputs(model, phase), state_units(model));
     let mut corners = Vec::new();
     for (valve, (valve_label, a22_per_s)) in valve_extremes(&rigid, &vehicle.uncertainty).into_iter().enumerate() {
-        let phi = (a22_per_s * sample_time_s).exp();
+        let phi = match discretisation {
+            Discretisation::Exact => (a22_per_s * sample_time_s).exp(),
+            Discretisation::Euler => 1.0 + a22_per_s * sample_time_s,
+        };
         let psi = (phi - 1.0) / a22_per_s;
         for friction in distinct(vehicle.uncertainty.friction) {
             let (phi, held, influence) = match model {
@@ -148,6 +239,8 @@ fn corners(vehicle: &Vehicle, model: Model, phase: Phase, sample_time_s: f64) ->
                 }),
                 through_gain: Vec::new(),
                 columns: DMatrix::zeros(0, 0),
+                direct: Vec::new(),
+                direct_columns: DMatrix::zeros(0, 0),
             });
         }
     }
@@ -214,15 +307,15 @@ fn compliant_errors(vehicle: &Vehicle, phase: Phase) -> Vec<Cause> {
     causes
 }
 
-/// Errors that look like a pressure: speeds that are old and tell what the pressure was, and, where the pressure is what
-/// counts, a friction that is not what the observer is told.
+/// Errors with the effect of a pressure: delayed speeds, which depend on an earlier pressure, and, if the quantity is the
+/// pressure, an error of the friction.
 fn seen(vehicle: &Vehicle, quantity: Quantity, g_psi: &DMatrix<f64>) -> Vec<Cause> {
     let bounds = &vehicle.error_bounds;
     let influence = g_psi.column(g_psi.ncols() - 1).into_owned();
-    let looks_like = |name, pascal: f64| Cause { name, column: &influence * (pascal / PRESSURE_UNIT_PA) };
-    let mut causes = vec![looks_like("sampling delay", bounds.sampling_delay_s * bounds.shift_ramp_pa_s)];
+    let as_pressure = |name, pascal: f64| Cause { name, column: &influence * (pascal / PRESSURE_UNIT_PA) };
+    let mut causes = vec![as_pressure("sampling delay", bounds.sampling_delay_s * bounds.shift_ramp_pa_s)];
     if quantity == Quantity::Pressure {
-        causes.push(looks_like("friction", friction_pa(vehicle)));
+        causes.push(as_pressure("friction", friction_pa(vehicle)));
     }
     causes
 }
@@ -234,8 +327,10 @@ fn friction_pa(vehicle: &Vehicle) -> f64 {
     share * bounds.shift_pressure_pa
 }
 
-/// What the valve does otherwise than told, and what the readings make of the twist of the shafts.
-fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corners: &[Corner], sample_time_s: f64) -> Vec<Cause> {
+/// Errors of the valve model at this corner, and of the twist of the shafts that follows from the readings. An error of the
+/// valve's rate, and the effect of a friction error, act for as long as this valve remembers them: the bound of the open loop
+/// does not depend on the sample time.
+fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corner: &Corner, sample_time_s: f64) -> Vec<Cause> {
     let bounds = &vehicle.error_bounds;
     let states = state_units(model).len();
     let on = |name, state: usize, size: f64| {
@@ -244,9 +339,8 @@ fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corners: &[Corner
         Cause { name, column }
     };
     let pressure = states - 1;
-    // An error of the rate acts for the longest through the slowest valve.
-    let longest = |phi: f64| if phi < 1.0 { (phi - 1.0) / (phi.ln() / sample_time_s) } else { sample_time_s };
-    let acts_s = corners.iter().map(|corner| longest(corner.phi[(pressure, pressure)])).fold(0.0, f64::max);
+    let phi = corner.phi[(pressure, pressure)];
+    let acts_s = if phi < 1.0 { (phi - 1.0) / (phi.ln() / sample_time_s) } else { sample_time_s };
     let valve = ValveErrors::of(vehicle);
     let rounding = ROUNDINGS * bounds.float32_rounding;
     let mut causes = vec![
@@ -257,14 +351,13 @@ fn direct(vehicle: &Vehicle, model: Model, quantity: Quantity, corners: &[Corner
     ];
     if quantity == Quantity::ClutchTorque {
         // With another friction the same pressure is another torque: the valve model is off by that share.
-        let forgets = corners.iter().map(|corner| 1.0 - corner.phi[(pressure, pressure)]).fold(0.0, f64::max);
-        causes.push(on("friction", pressure, forgets * friction_pa(vehicle)));
+        causes.push(on("friction", pressure, (1.0 - phi) * friction_pa(vehicle)));
     }
     if model == Model::Compliant {
-        let overall = vehicle.shift.ratio_offgoing() * final_ratio(vehicle);
-        let twist_rad_s = bounds.wheel_quantum_rad_s + bounds.turbine_quantum_rad_s / overall;
+        let output_rad_s = reading_rad_s(bounds.output_quantum_rad_s) / final_ratio(vehicle);
+        let twist_rad_s = reading_rad_s(bounds.wheel_quantum_rad_s) + output_rad_s;
         let stiffness = vehicle.driveline.shaft_stiffness_n_m_rad;
-        causes.push(on("sensor quantisation", 0, stiffness * sample_time_s * twist_rad_s));
+        causes.push(on(READINGS, 0, stiffness * sample_time_s * twist_rad_s));
         causes.push(on("float32 rounding", 0, rounding * bounds.shaft_torque_n_m));
     }
     causes

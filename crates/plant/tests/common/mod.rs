@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test uses a part of it")]
 
 use config::{Experiment, Vehicle};
-use drivetrain::{Table1, Table2};
+use drivetrain::{ClutchValve, Table1, Table2, ValveMaps};
 use plant::{Powertrain, Sample, Segment, Simulation};
 
 pub(crate) fn vehicle() -> Vehicle {
@@ -23,9 +23,11 @@ pub(crate) fn smooth_vehicle() -> Vehicle {
     for clutch in [&mut v.offgoing, &mut v.oncoming] {
         clutch.clutch.friction = Table1::constant(0.13);
         clutch.clutch.static_friction = 0.13;
-        clutch.valve.time_constant_s = Table1::constant(0.05);
-        clutch.valve.gain_pa_a = Table1::constant(1e6);
-        clutch.valve.delay_s = Table1::constant(0.01);
+        clutch.valve = ClutchValve::Proportional(ValveMaps {
+            time_constant_s: Table1::constant(0.05),
+            gain_pa_a: Table1::constant(1e6),
+            delay_s: Table1::constant(0.01),
+        });
     }
     v
 }

@@ -1,8 +1,13 @@
 //! Work on several threads, results in their order.
+//!
+//! A panic in one piece of work becomes an error: the results before it are returned, and all threads end.
 
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Condvar, Mutex, PoisonError};
+use std::thread::Builder;
 
 use super::row::{Campaign, Row};
 use crate::StudyError;
@@ -16,7 +21,7 @@ const AHEAD: u64 = 4;
 /// Makes the runs of a range on `threads` threads and shows their rows to `sink` in the order of their numbers.
 ///
 /// # Errors
-/// What a run or `sink` returns; the rows before have been shown.
+/// What a run or `sink` returns, or a defect of theirs; the rows before have been shown.
 pub fn execute<E: From<StudyError>>(
     campaign: &Campaign,
     runs: Range<u64>,
@@ -26,19 +31,21 @@ pub fn execute<E: From<StudyError>>(
     in_order(runs, threads, |run| campaign.row(run), |row| sink(&row?))
 }
 
+/// A result, or the message of the panic in its place.
+type Outcome<T> = Result<T, String>;
+
 struct Shared<T> {
     next_block: u64,
     due_block: u64,
-    finished: BTreeMap<u64, Vec<T>>,
+    finished: BTreeMap<u64, Vec<Outcome<T>>>,
     stopped: bool,
 }
 
 /// Does `work` for every number of a range on `threads` threads and shows the results to `sink` in their order.
-/// `work` must not panic.
 ///
 /// # Errors
-/// What `sink` returns; the results before have been shown.
-pub fn in_order<T: Send, E>(
+/// What `sink` returns, or [`StudyError::Defect`] where `work` or `sink` panics; the results before have been shown.
+pub fn in_order<T: Send, E: From<StudyError>>(
     runs: Range<u64>,
     threads: usize,
     work: impl Fn(u64) -> T + Sync,
@@ -49,7 +56,8 @@ pub fn in_order<T: Send, E>(
     let changed = Condvar::new();
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
     let wait = |guard| changed.wait(guard).unwrap_or_else(PoisonError::into_inner);
-    let ahead = AHEAD * threads.max(1) as u64;
+    let threads = blocks.min(threads.max(1) as u64);
+    let ahead = AHEAD * threads;
     let next_block = || {
         let mut state = lock();
         while !state.stopped && state.next_block < blocks && state.next_block >= state.due_block + ahead {
@@ -70,27 +78,101 @@ pub fn in_order<T: Send, E>(
             state = wait(state);
         }
     };
-    std::thread::scope(|scope| {
-        for _ in 0..threads.max(1) {
-            scope.spawn(|| {
-                while let Some(block) = next_block() {
-                    let first = runs.start + block * BLOCK;
-                    let results = (first..(first + BLOCK).min(runs.end)).map(&work).collect();
-                    lock().finished.insert(block, results);
-                    changed.notify_all();
-                }
-            });
+    let numbers = |block: u64| {
+        let first = runs.start + block * BLOCK;
+        first..(first + BLOCK).min(runs.end)
+    };
+    let worker = || {
+        while let Some(block) = next_block() {
+            let results = numbers(block).map(|run| catch(|| work(run))).collect();
+            lock().finished.insert(block, results);
+            changed.notify_all();
         }
-        let result = (0..blocks).try_for_each(|block| due(block).into_iter().try_for_each(&mut sink));
+    };
+    let mut show = |(run, outcome): (u64, Outcome<T>)| {
+        let defect = |message| E::from(StudyError::Defect { run, message });
+        catch(|| sink(outcome.map_err(defect)?)).map_err(defect)?
+    };
+    std::thread::scope(|scope| {
+        for started in 0..threads {
+            match Builder::new().spawn_scoped(scope, worker) {
+                Ok(_) => {}
+                Err(error) if started == 0 => return Err(StudyError::Threads(error).into()),
+                // The system has no more of them; fewer threads give the same results.
+                Err(_) => break,
+            }
+        }
+        let result = (0..blocks).try_for_each(|block| numbers(block).zip(due(block)).try_for_each(&mut show));
         lock().stopped = true;
         changed.notify_all();
         result
     })
 }
 
+/// Does something, and gives the message of a panic in it.
+fn catch<T>(work: impl FnOnce() -> T) -> Outcome<T> {
+    // What the work was at is not looked at after a panic.
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(panic.as_ref()))
+}
+
+/// The message of a panic.
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no message").to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[derive(Debug, PartialEq)]
+    struct Ended(String);
+
+    impl From<StudyError> for Ended {
+        fn from(error: StudyError) -> Self {
+            Self(error.to_string())
+        }
+    }
+
+    /// Ends of the work over 4000 runs, as many as no thread can have ahead, with the results before.
+    fn end_of(work: impl Fn(u64) -> u64 + Sync, end: u64, threads: usize) -> (Vec<u64>, Result<(), Ended>) {
+        let mut seen = Vec::new();
+        let sink = |result| {
+            assert!(result != end, "the sink is broken");
+            seen.push(result);
+            Ok(())
+        };
+        let result = in_order(0..4000, threads, work, sink);
+        (seen, result)
+    }
+
+    #[test]
+    fn a_defect_in_the_work_or_after_it_is_an_error_and_the_results_before_it_are_kept() {
+        for threads in [1, 2, 7] {
+            for broken in [0, 100, 3999] {
+                let (seen, result) = end_of(
+                    |run| {
+                        assert!(run != broken, "run {run} is broken");
+                        run
+                    },
+                    u64::MAX,
+                    threads,
+                );
+                assert!(seen.iter().copied().eq(0..broken));
+                let error = result.unwrap_err().0;
+                assert!(error.starts_with(&format!("run {broken}: run {broken} is broken")), "{error}");
+            }
+            let (seen, result) = end_of(|run| run, 100, threads);
+            assert!(seen.iter().copied().eq(0..100));
+            assert!(result.unwrap_err().0.starts_with("run 100: the sink is broken"));
+        }
+    }
+
+    #[test]
+    fn more_threads_than_a_system_has_do_the_same_work() {
+        let (seen, result) = end_of(|run| run, u64::MAX, usize::from(u16::MAX));
+        assert!(result.is_ok() && seen.iter().copied().eq(0..4000));
+    }
 
     #[test]
     fn results_come_in_order_and_an_error_stops_the_work() {
@@ -102,7 +184,7 @@ mod tests {
                 |run| run * run,
                 |square| {
                     seen.push(square);
-                    Ok::<(), ()>(())
+                    Ok::<(), Ended>(())
                 },
             );
             assert!(all.is_ok() && seen == (3..1003).map(|run| run * run).collect::<Vec<u64>>());
@@ -113,10 +195,10 @@ mod tests {
                 |run| run,
                 |run| {
                     count += 1;
-                    if run == 500 { Err("enough") } else { Ok(()) }
+                    if run == 500 { Err(Ended("enough".to_owned())) } else { Ok(()) }
                 },
             );
-            assert_eq!((stopped, count), (Err("enough"), 501));
+            assert_eq!((stopped, count), (Err(Ended("enough".to_owned())), 501));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The columns of a study's table.
 
 use config::study::QUALITY;
-use config::{Experiment, ObserverKind, Study};
+use config::{Experiment, ObserverEntry, ObserverKind, Study};
 use observer::Phase;
 
 use crate::ObserverRun;
@@ -73,13 +73,15 @@ impl Metric {
     }
 }
 
-/// Where everything stands in a row of numbers: factors, shift quality, scores.
+/// Positions in a row of numbers: factors, shift quality, scores.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Names of the factors.
     pub factors: Vec<String>,
     /// Names of the observers.
     pub observers: Vec<String>,
+    /// How their columns begin.
+    columns: Vec<String>,
     /// Position of the open loop among the observers, if it is there.
     pub open_loop: Option<usize>,
 }
@@ -91,6 +93,7 @@ impl Layout {
         Self {
             factors: study.factors.iter().map(|factor| factor.name.clone()).collect(),
             observers: experiment.observers.iter().map(|entry| entry.name.clone()).collect(),
+            columns: experiment.observers.iter().map(ObserverEntry::column).collect(),
             open_loop: experiment.observers.iter().position(|entry| entry.kind == ObserverKind::OpenLoop),
         }
     }
@@ -112,9 +115,9 @@ impl Layout {
         names.extend(self.factors.iter().cloned());
         names.push("status".to_owned());
         names.extend(QUALITY.map(str::to_owned));
-        for observer in &self.observers {
+        for observer in &self.columns {
             for phase in PHASES {
-                let start = format!("{}.{}", observer.replace([' ', ','], "_"), phase.name());
+                let start = format!("{observer}.{}", phase.name());
                 names.extend(Metric::ALL.map(|metric| format!("{start}.{}", metric.name())));
             }
         }

@@ -1,7 +1,7 @@
 //! Studies: thousands of shifts with varied parameters, one row each.
 //!
-//! A run follows from the study and its number alone. That is why runs can be made on any number of threads or
-//! machines, broken off and taken up again, and still give the same rows.
+//! The study and the number of a run determine the run. Therefore runs can be made on any number of threads or machines,
+//! stopped and resumed, and give the same rows.
 
 pub mod execute;
 pub mod layout;
@@ -13,4 +13,4 @@ pub use execute::{execute, in_order};
 pub use layout::{Layout, Metric, PHASES};
 pub use plan::{factor_values, run_seed};
 pub use row::{Campaign, Row, Run, Status};
-pub use summary::{Distribution, FactorEffect, Summary};
+pub use summary::{COMPARED, Distribution, FactorEffect, Relative, Summary};

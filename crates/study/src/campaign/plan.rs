@@ -1,8 +1,8 @@
-//! Which values the factors take in which run.
+//! The values of the factors in each run.
 //!
 //! Every plan is a function of the run's number alone: runs can be made in any order, on any thread or machine.
 
-use config::{Plan, Study, Values};
+use config::{Plan, Sometimes, Study, Values};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Values of the factors in a run, in the order of the factors.
@@ -22,7 +22,7 @@ pub fn saltelli_place(study: &Study, run: u64) -> (u64, u64) {
     (run / group, run % group)
 }
 
-/// Where each factor stands in its values, from 0 to 1; levels count by their middle.
+/// Position of each factor in its values, from 0 to 1; for levels, that of the middle of the level.
 pub(crate) fn places(study: &Study, run: u64) -> Vec<f64> {
     let count = study.factors.len();
     match study.plan {
@@ -41,7 +41,7 @@ pub(crate) fn places(study: &Study, run: u64) -> Vec<f64> {
         }
         Plan::LatinHypercube => (0..count as u64)
             .map(|i| {
-                let layer = shuffled(run, study.runs, mixed(study.seed, i));
+                let layer = shuffled(run % study.runs, study.runs, mixed(study.seed, i));
                 (as_f64(layer) + unit(study.seed, run, i)) / as_f64(study.runs)
             })
             .collect(),
@@ -59,6 +59,12 @@ pub(crate) fn places(study: &Study, run: u64) -> Vec<f64> {
 fn ends_for_levels(values: &Values, place: f64) -> f64 {
     match values {
         Values::List(_) => place,
+        Values::Sometimes(sometimes) => {
+            // The first level is the value without the factor.
+            let levels = values.levels() as f64;
+            let within = (place * levels - 1.0) / (levels - 1.0);
+            if within < 0.0 { 0.0 } else { sometimes.place_within(ends_for_levels(&sometimes.values, within)) }
+        }
         _ => {
             let levels = values.levels() as f64;
             ((place * levels - 0.5) / (levels - 1.0)).clamp(0.0, 1.0)
@@ -66,9 +72,17 @@ fn ends_for_levels(values: &Values, place: f64) -> f64 {
     }
 }
 
+/// Number of points of the Sobol sequence, after which it would repeat.
+const SOBOL_LENGTH: u64 = 1 << 16;
+
 fn sobol(study: &Study, run: u64, dimension: usize) -> f64 {
-    #[expect(clippy::cast_possible_truncation, reason = "both halves are meant; dimensions are few")]
-    let (index, dimension, seed) = (run as u32, dimension as u32, (mixed(study.seed, run >> 32) >> 32) as u32);
+    // The sequence is SOBOL_LENGTH long; another scramble of it follows.
+    let (part, index) = (run / SOBOL_LENGTH, run % SOBOL_LENGTH);
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "below the limits of the sequence; the seed's upper half is meant"
+    )]
+    let (index, dimension, seed) = (index as u32, dimension as u32, (mixed(study.seed, part) >> 32) as u32);
     f64::from(sobol_burley::sample(index, dimension, seed))
 }
 
@@ -88,10 +102,14 @@ pub(crate) fn value_at(values: &Values, place: f64) -> f64 {
             let (low, high) = (unit.cdf(-3.0), unit.cdf(3.0));
             mean + deviation * unit.inverse_cdf(low + place * (high - low)).clamp(-3.0, 3.0)
         }
+        Values::Sometimes(Sometimes { chance, otherwise, ref values }) => {
+            let rest = 1.0 - chance;
+            if place < rest { otherwise } else { value_at(values, ((place - rest) / chance).min(1.0)) }
+        }
     }
 }
 
-/// Where a value stands in its factor's values, from 0 to 1.
+/// Position of a value in its factor's values, from 0 to 1.
 pub(crate) fn place_of(values: &Values, value: f64) -> f64 {
     match values {
         Values::List(list) => {
@@ -101,6 +119,8 @@ pub(crate) fn place_of(values: &Values, value: f64) -> f64 {
         Values::Uniform(low, high, _) => (value - low) / (high - low),
         Values::LogUniform(low, high, _) => (value / low).ln() / (high / low).ln(),
         Values::Normal(mean, deviation, _) => Normal::standard().cdf((value - mean) / deviation),
+        Values::Sometimes(sometimes) if value.total_cmp(&sometimes.otherwise).is_eq() => 0.5 * (1.0 - sometimes.chance),
+        Values::Sometimes(sometimes) => sometimes.place_within(place_of(&sometimes.values, value)),
     }
 }
 
@@ -153,6 +173,11 @@ mod tests {
             seen.sort_unstable();
             assert_eq!(seen, (0..count).collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn a_study_may_have_as_many_factors_as_the_sobol_sequence_has_dimensions() {
+        assert_eq!(config::study::SOBOL_DIMENSIONS, sobol_burley::NUM_DIMENSIONS as usize);
     }
 
     #[test]

@@ -26,11 +26,11 @@ pub enum Status {
     NoLockUp,
     /// The simulation diverged.
     Diverged,
-    /// The values of the factors do not go together.
+    /// The combination of the factors' values is refused.
     Refused,
-    /// There are no gains for what the varied vehicle file requires.
+    /// No gains exist for the requirements of the varied vehicle file.
     NoGains,
-    /// A defect of this program; the message stands on standard error.
+    /// An error in this program. The other runs continue; the message is on standard error.
     Crashed,
 }
 
@@ -81,7 +81,7 @@ pub struct Row {
 pub struct Campaign {
     /// The study.
     pub study: Study,
-    /// Where everything stands in a row.
+    /// Positions in a row.
     pub layout: Layout,
     observers: Option<Vec<AnyObserver>>,
 }
@@ -134,7 +134,6 @@ impl Campaign {
     pub fn row_at(&self, run: u64, values: &[f64]) -> Result<Row, StudyError> {
         let seed = run_seed(&self.study, run);
         let mut numbers = values.to_vec();
-        // One defect must not cost a study of thousands.
         let attempt = catch_unwind(AssertUnwindSafe(|| self.full(values, seed)));
         let Ok(attempt) = attempt else {
             numbers.resize(self.layout.width(), f64::NAN);
@@ -160,6 +159,38 @@ impl Campaign {
         };
         numbers.resize(self.layout.width(), f64::NAN);
         Ok(Row { run, seed, status, numbers })
+    }
+
+    /// Reads a line of the table as the row of a run. The number of the run determines seed and factors, so a line with
+    /// other values, or in the wrong place, is refused.
+    ///
+    /// # Errors
+    /// What is wrong with the line.
+    pub fn row_of_line(&self, run: u64, line: &str) -> Result<Row, String> {
+        let row = Row::from_cells(line.split(','), &self.layout);
+        let row = row.ok_or_else(|| format!("the line is not a row of {} cells", self.layout.header().len()))?;
+        if row.run != run {
+            return Err(format!("the row is of run {}, expected run {run}", row.run));
+        }
+        let seed = run_seed(&self.study, run);
+        if row.seed != seed {
+            return Err(format!("the seed of run {run} is {}, expected {seed}", row.seed));
+        }
+        let factors = factor_values(&self.study, run).into_iter().zip(&row.numbers).zip(&self.layout.factors);
+        for ((value, &written), name) in factors {
+            if value.to_bits() != written.to_bits() {
+                return Err(format!("`{name}` of run {run} is {written}, expected {value}"));
+            }
+        }
+        if row.line(&self.layout) != line {
+            return Err("the numbers of the row have been changed".to_owned());
+        }
+        let (quality, scores) = row.numbers[self.layout.factors.len()..].split_at(QUALITY.len());
+        let is_scored = quality.iter().chain(scores).any(|number| !number.is_nan());
+        if is_scored != row.status.is_scored() || scores.iter().any(|&score| score < 0.0) {
+            return Err(format!("the scores of run {run} do not go with its status `{}`", row.status.name()));
+        }
+        Ok(row)
     }
 
     /// Makes a run and keeps all of it.
@@ -189,7 +220,8 @@ impl Campaign {
                 &designed
             }
         };
-        let trace = simulate_shift(&varied.car, &varied.vehicle, &varied.experiment).map_err(RunError::Plant)?;
+        let trace = simulate_shift(&varied.car, &varied.vehicle, &varied.experiment, self.study.record_before_s)
+            .map_err(RunError::Plant)?;
         let quality = ShiftQuality::of(&trace, &varied.vehicle.shift);
         let observers = run_observers(&varied.vehicle, &varied.experiment, ready, &trace)
             .map_err(|error| RunError::Other(error.into()))?;

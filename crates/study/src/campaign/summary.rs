@@ -1,4 +1,4 @@
-//! What a study's rows say together, gathered row by row in memory that does not grow with their number.
+//! Summary of a study's rows, computed row by row in memory that does not grow with their number.
 
 use std::collections::BTreeMap;
 
@@ -15,24 +15,31 @@ pub const EFFECT_BINS: usize = 10;
 /// How many of the worst runs are kept.
 pub const WORST: usize = 10;
 
-/// How a positive quantity is distributed.
+/// How a positive quantity is distributed. Runs in which it is infinite, because an estimate diverged, lie above all
+/// others.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Distribution {
     bins: BTreeMap<i32, u64>,
     count: u64,
+    diverged: u64,
     largest: f64,
 }
 
 impl Distribution {
+    /// Takes a value; NaN is none.
     fn push(&mut self, value: f64) {
-        if !value.is_finite() {
+        if value.is_nan() {
+            return;
+        }
+        self.count += 1;
+        self.largest = self.largest.max(value);
+        if value.is_infinite() {
+            self.diverged += 1;
             return;
         }
         #[expect(clippy::cast_possible_truncation, reason = "clamped")]
         let bin = (value.max(1e-12).log2() * BINS_PER_OCTAVE).floor().clamp(-1e6, 1e6) as i32;
         *self.bins.entry(bin).or_default() += 1;
-        self.count += 1;
-        self.largest = self.largest.max(value);
     }
 
     /// How many values there were.
@@ -40,12 +47,17 @@ impl Distribution {
         self.count
     }
 
-    /// The largest value.
-    pub fn largest(&self) -> f64 {
-        self.largest
+    /// How many of them were infinite.
+    pub fn diverged(&self) -> u64 {
+        self.diverged
     }
 
-    /// The value below which this share of the values lies; NaN without values.
+    /// The largest value; NaN without values.
+    pub fn largest(&self) -> f64 {
+        if self.count > 0 { self.largest } else { f64::NAN }
+    }
+
+    /// The quantile for this share; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = share * as_f64(self.count);
         let mut below = 0;
@@ -55,7 +67,7 @@ impl Distribution {
                 return ((f64::from(bin) + 0.5) / BINS_PER_OCTAVE).exp2().min(self.largest);
             }
         }
-        f64::NAN
+        if self.count > 0 { f64::INFINITY } else { f64::NAN }
     }
 
     /// Share of the values below a limit.
@@ -63,6 +75,11 @@ impl Distribution {
         let below: u64 = self.bins.iter().filter(|&(&bin, _)| upper_edge(bin) <= limit).map(|(_, count)| count).sum();
         as_f64(below) / as_f64(self.count.max(1))
     }
+}
+
+/// Ratio of two errors in the same run; infinite if the first one diverged.
+pub(crate) fn over(error: f64, other: f64) -> f64 {
+    if error.is_infinite() { error } else { error / other }
 }
 
 fn upper_edge(bin: i32) -> f64 {
@@ -95,7 +112,7 @@ impl Moments {
 pub struct FactorEffect {
     /// The factor.
     pub factor: String,
-    /// Mean of the score over the factor's bins from its smallest to its largest value; NaN for an empty bin.
+    /// Mean of the finite scores over the factor's bins from its smallest to its largest value; NaN for an empty bin.
     pub means: Vec<f64>,
     /// First-order Sobol index: share of the score's variance that this factor explains alone.
     pub first_order: f64,
@@ -117,16 +134,37 @@ struct Effects {
     samples: Moments,
 }
 
+/// The errors that are compared with those of the open loop.
+pub const COMPARED: [Metric; 2] = [Metric::PressureRms, Metric::TorqueRms];
+
+/// The errors of an observer over those of the open loop, in one phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Relative {
+    /// Median of the ratio within a run.
+    pub median: f64,
+    /// Its 95 % quantile.
+    pub high: f64,
+    /// The largest.
+    pub largest: f64,
+    /// 95 % quantile of the errors over the 95 % quantile of the open loop's.
+    pub high_over_high: f64,
+    /// Largest error over the largest one of the open loop.
+    pub worst_over_worst: f64,
+    /// Share of the runs in which the error is smaller.
+    pub better: f64,
+}
+
 /// What a study's rows say together.
 #[derive(Debug, Clone)]
 pub struct Summary {
     study: Study,
-    /// Where everything stands in a row.
+    /// Positions in a row.
     pub layout: Layout,
     /// How many runs ended how.
     pub statuses: BTreeMap<Status, u64>,
-    rms: Vec<Distribution>,
-    ratios: Vec<Distribution>,
+    /// Of each of [`COMPARED`].
+    errors: [Vec<Distribution>; COMPARED.len()],
+    ratios: [Vec<Distribution>; COMPARED.len()],
     chatter: Vec<Distribution>,
     widths: Vec<Distribution>,
     covered: Vec<(u64, u64)>,
@@ -134,7 +172,7 @@ pub struct Summary {
     /// Rows of the group of a Saltelli plan that is not complete yet.
     group: Vec<Row>,
     /// The runs in which the first observer has the largest RMS error of the pressure in either phase, the worst
-    /// first.
+    /// first: those in which it diverged, if there are any.
     pub worst: Vec<Row>,
 }
 
@@ -156,8 +194,8 @@ impl Summary {
             study: study.clone(),
             layout,
             statuses: BTreeMap::new(),
-            rms: vec![Distribution::default(); scores],
-            ratios: vec![Distribution::default(); scores],
+            errors: COMPARED.map(|_| vec![Distribution::default(); scores]),
+            ratios: COMPARED.map(|_| vec![Distribution::default(); scores]),
             chatter: vec![Distribution::default(); scores],
             widths: vec![Distribution::default(); scores],
             covered: vec![(0, 0); scores],
@@ -174,12 +212,29 @@ impl Summary {
 
     /// RMS error of an observer's pressure in a phase, Pa.
     pub fn rms(&self, observer: usize, phase: usize) -> &Distribution {
-        &self.rms[observer * PHASES.len() + phase]
+        &self.errors[0][observer * PHASES.len() + phase]
     }
 
     /// The same over that of the open loop in the same run.
     pub fn ratio(&self, observer: usize, phase: usize) -> &Distribution {
-        &self.ratios[observer * PHASES.len() + phase]
+        &self.ratios[0][observer * PHASES.len() + phase]
+    }
+
+    /// One of the [`COMPARED`] errors of an observer in a phase, over that of the open loop; nothing for the open loop
+    /// itself, and without one.
+    pub fn relative(&self, compared: usize, observer: usize, phase: usize) -> Option<Relative> {
+        let open_loop = self.layout.open_loop.filter(|&open_loop| open_loop != observer)?;
+        let at = |observer: usize| observer * PHASES.len() + phase;
+        let (mine, reference) = (&self.errors[compared][at(observer)], &self.errors[compared][at(open_loop)]);
+        let ratio = &self.ratios[compared][at(observer)];
+        Some(Relative {
+            median: ratio.quantile(0.5),
+            high: ratio.quantile(0.95),
+            largest: ratio.largest(),
+            high_over_high: over(mine.quantile(0.95), reference.quantile(0.95)),
+            worst_over_worst: over(mine.largest(), reference.largest()),
+            better: ratio.share_below(1.0),
+        })
     }
 
     /// Chatter of an observer in a phase, Pa.
@@ -211,23 +266,26 @@ impl Summary {
             for phase in 0..PHASES.len() {
                 let at = observer * PHASES.len() + phase;
                 let value = |observer, metric| row.numbers[self.layout.score(observer, phase, metric)];
-                let rms = value(observer, Metric::PressureRms);
-                if !rms.is_finite() {
-                    continue;
+                for (i, metric) in COMPARED.into_iter().enumerate() {
+                    let error = value(observer, metric);
+                    self.errors[i][at].push(error);
+                    if let Some(open_loop) = self.layout.open_loop {
+                        self.ratios[i][at].push(over(error, value(open_loop, metric)));
+                    }
                 }
-                self.rms[at].push(rms);
+                let rms = value(observer, Metric::PressureRms);
                 self.chatter[at].push(value(observer, Metric::Chatter));
                 let coverage = value(observer, Metric::Coverage);
-                if coverage.is_finite() {
+                if !coverage.is_nan() {
                     self.widths[at].push(value(observer, Metric::RangeWidth));
                     let (covered, all) = &mut self.covered[at];
                     *covered += u64::from(coverage >= 1.0);
                     *all += 1;
                 }
-                if let Some(open_loop) = self.layout.open_loop {
-                    self.ratios[at].push(rms / value(open_loop, Metric::PressureRms));
+                // A mean and a variance are of numbers.
+                if rms.is_finite() {
+                    self.effects[at].push(rms, &places);
                 }
-                self.effects[at].push(rms, &places);
             }
         }
         self.keep_if_among_the_worst(row);
@@ -265,6 +323,9 @@ impl Summary {
             for phase in 0..PHASES.len() {
                 let column = self.layout.score(observer, phase, Metric::PressureRms);
                 let f: Vec<f64> = self.group.iter().map(|row| row.numbers[column]).collect();
+                if f.iter().any(|score| !score.is_finite()) {
+                    continue;
+                }
                 let effects = &mut self.effects[observer * PHASES.len() + phase];
                 effects.pairs += 1.0;
                 effects.samples.push(f[0]);
@@ -337,6 +398,19 @@ mod tests {
         }
         assert_eq!(distribution.largest(), 1000.0);
         assert!((distribution.share_below(250.0) - 0.25).abs() < 0.01);
+    }
+
+    #[test]
+    fn diverged_runs_are_counted_and_lie_above_all_others() {
+        let mut distribution = Distribution::default();
+        (1..=90).for_each(|i| distribution.push(f64::from(i)));
+        (0..10).for_each(|_| distribution.push(f64::INFINITY));
+        distribution.push(f64::NAN);
+        assert_eq!((distribution.count(), distribution.diverged()), (100, 10));
+        assert!(distribution.quantile(0.9) < 91.0 && distribution.quantile(0.95) == f64::INFINITY);
+        assert!((distribution.share_below(1e9) - 0.9).abs() < 1e-12 && distribution.largest() == f64::INFINITY);
+        assert!(Distribution::default().largest().is_nan() && Distribution::default().quantile(0.5).is_nan());
+        assert_eq!([over(f64::INFINITY, f64::INFINITY), over(1.0, f64::INFINITY)], [f64::INFINITY, 0.0]);
     }
 
     #[test]

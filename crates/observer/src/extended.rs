@@ -9,15 +9,16 @@
 //! T_s = T_k + C_s (w_0/i_df - w_w)                                       e, T_ca: random walks
 //! ```
 //!
-//! Four things set it apart from the reduced-order observers. The wheel speed drives the twist and is not an output, so
-//! mass, grade and tyre slip do not enter. The offgoing clutch's torque is a state, so the same equations hold in torque
-//! and inertia phase and no late phase detection spoils them. Before the shift, shaft torque and turbine torque are
-//! found together; an error that both share cancels in the clutch torque afterwards. And a reading of a toothed wheel is a
-//! few milliseconds old: it is held against the speed of that time, not against the newest.
+//! It differs from the reduced-order observers in four points. The wheel speed is an sample of the twist and not an
+//! output, so mass, grade and tyre slip are not needed. The offgoing clutch's torque is a state, so the same
+//! equations hold in torque and inertia phase, and a late detection of the phase has no effect. Before the shift,
+//! shaft torque and turbine torque are found together; an error that both share cancels in the clutch torque
+//! afterwards. A reading of a toothed wheel is delayed by a few milliseconds: it is compared with the speed at the
+//! time of the reading, not with the newest speed.
 
-use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients};
+use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients, clutch::direction};
 
-use crate::{CompliantModel, Estimate, Estimator, Health, Input, Interval, Phase, Track, Tracker};
+use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEstimator, Track, Tracker};
 
 /// Time over which the acceleration of the wheels is averaged, s.
 const WHEEL_AVERAGE_S: f64 = 0.05;
@@ -46,7 +47,7 @@ pub struct FilterNoise<T> {
     pub turbine_share: T,
     /// Time after which that share is another during a shift, s.
     pub turbine_share_s: T,
-    /// Of the rate of twist outside a shift, rad/s: it keeps the shaft torque open to what the turbine torque says.
+    /// Of the rate of twist outside a shift, rad/s: with it the shaft torque follows the turbine torque.
     pub twist_rate_rad_s: T,
     /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
     pub output_least_rad_s: T,
@@ -97,7 +98,7 @@ pub struct Readings<T> {
 
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KalmanFilter<T> {
+pub struct ExtendedFilter<T> {
     /// The powertrain.
     pub model: CompliantModel<T>,
     /// Coefficients while both clutches slip; a clutch that holds does so with the torque that this takes.
@@ -112,9 +113,9 @@ pub struct KalmanFilter<T> {
     pub tracker: Tracker<T>,
 }
 
-/// Memory of a [`KalmanFilter`].
+/// Memory of a [`ExtendedFilter`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KalmanState<T> {
+pub struct ExtendedState<T> {
     track: Track<T, Running<T>>,
     shaft_torque_n_m: Option<T>,
 }
@@ -124,15 +125,17 @@ pub struct KalmanState<T> {
 pub struct Running<T> {
     pub(crate) mean: [T; N],
     pub(crate) covariance: [[T; N]; N],
-    /// Wheel speed through a low pass, rad/s: how far the speed is ahead of it tells the acceleration.
+    /// Low-pass filtered wheel speed, rad/s: its difference to the speed gives the acceleration.
     slow_wheel: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     pub(crate) motion_pa_s: T,
-    last: Input<T>,
+    last: Sample<T>,
     acting: Phase,
+    /// Whether it has taken a reading since it began.
+    filters: bool,
 }
 
-impl<T: Real> KalmanFilter<T> {
+impl<T: Real> ExtendedFilter<T> {
     /// The filter of this powertrain.
     pub fn new(model: CompliantModel<T>, noise: FilterNoise<T>, readings: Readings<T>, tracker: Tracker<T>) -> Self {
         let of = |engagement| model.shift.coefficients(engagement);
@@ -147,11 +150,11 @@ impl<T: Real> KalmanFilter<T> {
     }
 
     /// The same filter in another precision.
-    pub fn cast<U: Real>(&self) -> KalmanFilter<U> {
+    pub fn cast<U: Real>(&self) -> ExtendedFilter<U> {
         let to = |x: T| U::of(x.to_f64_exact());
         let Readings { turbine_rad, output_rad, wheel_rad } = self.readings;
         let readings = Readings { turbine_rad: to(turbine_rad), output_rad: to(output_rad), wheel_rad: to(wheel_rad) };
-        KalmanFilter::new(self.model.cast(), self.noise.cast(), readings, self.tracker.cast())
+        ExtendedFilter::new(self.model.cast(), self.noise.cast(), readings, self.tracker.cast())
     }
 
     /// Shaft torque in balance with a turbine torque in the gear before the shift, N m.
@@ -161,10 +164,10 @@ impl<T: Real> KalmanFilter<T> {
     }
 
     /// The first estimate: the gear before the shift in balance, an empty cylinder.
-    fn begin(&self, pressure_pa: T, input: &Input<T>) -> Running<T> {
+    fn begin(&self, pressure_pa: T, sample: &Sample<T>) -> Running<T> {
         let (zero, noise) = (T::zero(), &self.noise);
-        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
-        let torque = self.model.rigid.converter.torques(input.engine_rad_s, input.turbine_rad_s).turbine_n_m;
+        let output = self.model.shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s);
+        let torque = self.model.rigid.converter.torques(sample.engine_rad_s, sample.turbine_rad_s).turbine_n_m;
         let line = &self.model.rigid.driveline;
         let held = &self.model.torque_phase.holding_offgoing;
         let shaft = self.shaft_before(torque);
@@ -182,31 +185,30 @@ impl<T: Real> KalmanFilter<T> {
         for (i, deviation) in deviations.into_iter().enumerate() {
             covariance[i][i] = deviation * deviation;
         }
-        let mean = [input.turbine_rad_s, output, shaft, pressure_pa, zero, holding];
+        let mean = [sample.turbine_rad_s, output, shaft, pressure_pa, zero, holding];
         // Whatever phase it begins in is entered from here.
         let acting = Phase::BeforeShift;
-        Running { mean, covariance, slow_wheel: input.wheel_rad_s, motion_pa_s: zero, last: *input, acting }
+        let slow_wheel = sample.wheel_rad_s;
+        Running { mean, covariance, slow_wheel, motion_pa_s: zero, last: *sample, acting, filters: false }
     }
 
-    /// What the powertrain does over the interval that ends with `input`.
+    /// What the powertrain does over the interval that ends with `sample`.
     #[inline]
-    pub(crate) fn passage(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>) -> Passage<T> {
+    pub(crate) fn passage(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) -> Passage<T> {
         let (one, half) = (T::one(), T::of(0.5));
         let (dt, last, noise) = (interval.dt_s, running.last, &self.noise);
         let locked = running.acting == Phase::AfterShift;
         let rigid = &self.model.rigid;
         let (line, clutch) = (&rigid.driveline, &rigid.clutch);
-        let direction = if last.slip_rad_s < T::zero() { -one } else { one };
 
         // The wheel's readings are as old as its teeth are apart; over that time it went on as it does on average.
-        let wheel = half * (last.wheel_rad_s + input.wheel_rad_s);
+        let wheel = half * (last.wheel_rad_s + sample.wheel_rad_s);
         let slow_s = T::of(WHEEL_AVERAGE_S);
         running.slow_wheel = running.slow_wheel + (dt / slow_s).min(one) * (wheel - running.slow_wheel);
         let wheel_rate = (wheel - running.slow_wheel) / slow_s;
         let wheel_rad_s = wheel + self.age(self.readings.wheel_rad, wheel) * wheel_rate;
 
-        let valve = &interval.valve;
-        let rate = (valve.a22_per_s * running.mean[PRESSURE] + valve.b2_pa_s).abs();
+        let rate = interval.start_rate(running.mean[PRESSURE]).abs();
         running.motion_pa_s = rate.max(running.motion_pa_s * lasting(dt, noise.valve_rate_s));
 
         // Shaft torque over the interval: T_k + h (w_0 + w_0+) - u w_w.
@@ -229,7 +231,7 @@ impl<T: Real> KalmanFilter<T> {
             per_pressure: if locked {
                 T::zero()
             } else {
-                direction * clutch.torque_per_force(last.slip_rad_s) * clutch.piston_area_m2
+                direction(last.slip_rad_s) * clutch.torque_per_force(last.slip_rad_s) * clutch.piston_area_m2
             },
             kiss_pa: clutch.kiss_pressure(),
             wheel_rad_s,
@@ -247,8 +249,8 @@ impl<T: Real> KalmanFilter<T> {
 
     /// Carries mean and covariance over the interval.
     #[inline]
-    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, input: &Input<T>) -> Start<T> {
-        let c = self.passage(running, interval, input);
+    fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) -> Start<T> {
+        let c = self.passage(running, interval, sample);
         let x = running.mean;
         let (above, slope) = c.tangent(x[PRESSURE]);
         let next = c.propagate(&x, above);
@@ -256,7 +258,7 @@ impl<T: Real> KalmanFilter<T> {
         running.mean = next;
         let p = &running.covariance;
         let within = [[p[TURBINE][TURBINE], p[TURBINE][OUTPUT]], [p[OUTPUT][TURBINE], p[OUTPUT][OUTPUT]]];
-        let across = spread(&mut running.covariance, &f, &[interval.phi, c.stay, c.keep]);
+        let across = spread(&mut running.covariance, &f, &[interval.valve.phi, c.stay, c.keep]);
         for (i, variance) in self.added(&c, &x, running.motion_pa_s).into_iter().enumerate() {
             running.covariance[i][i] = running.covariance[i][i] + variance;
         }
@@ -289,9 +291,9 @@ impl<T: Real> KalmanFilter<T> {
         ]
     }
 
-    /// Before the inertia phase the turbine torque is what the maps say, and the shaft torque follows from it: an error of
-    /// the one is an error of the other, cancels in the clutch torque, and no speed tells it. Once both clutches slip it
-    /// shows: it is let in as what it is, one error of both.
+    /// Before the inertia phase the turbine torque is what the maps say, and the shaft torque follows from it: an
+    /// error of the one is an error of the other, cancels in the clutch torque, and no speed tells it. Once both
+    /// clutches slip it shows: it is let in as what it is, one error of both.
     #[inline]
     fn change_phase(&self, running: &mut Running<T>, acting: Phase) {
         let (before, now) = (running.acting == Phase::InertiaPhase, acting == Phase::InertiaPhase);
@@ -317,39 +319,47 @@ impl<T: Real> KalmanFilter<T> {
         }
     }
 
-    /// Takes the readings of turbine and output speed. They are as old as their teeth are apart, so they tell a mean of the
-    /// speeds at both ends of the interval, and what the speeds at its start have to do with the states at its end matters.
+    /// Takes the readings of turbine and output speed. They are as old as their teeth are apart, so each is a mean of
+    /// the speeds at both ends of the interval, and what the speeds at its start have to do with the states at its
+    /// end matters.
+    ///
+    /// One after the other: the inverse of their joint covariance cancels in single precision.
     #[inline]
-    fn correct(&self, running: &mut Running<T>, start: &Start<T>, interval: &Interval<T>, input: &Input<T>) {
+    fn correct(&self, running: &mut Running<T>, start: &mut Start<T>, interval: &Interval<T>, sample: &Sample<T>) {
         let one = T::one();
-        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
-        let readings = [input.turbine_rad_s, output];
-        let lags = [self.readings.turbine_rad, self.readings.output_rad];
-        let deviations = [self.noise.turbine_rad_s, self.noise.output_rad_s];
-        // An age of many samples is cut: so far back the line through both ends does not reach.
-        let old: [T; 2] =
-            core::array::from_fn(|k| (self.age(lags[k], readings[k]) / interval.dt_s).min(T::of(OLDEST_SAMPLES)));
-        let new = old.map(|share| one - share);
-        let p = &mut running.covariance;
-        let columns: [[T; N]; 2] =
-            core::array::from_fn(|k| core::array::from_fn(|i| new[k] * p[k][i] + old[k] * start.across[i][k]));
-        let surprise: [T; 2] =
-            core::array::from_fn(|k| readings[k] - new[k] * running.mean[k] - old[k] * start.mean[k]);
-        // Covariance of the readings k and l.
-        let of = |k: usize, l: usize| {
-            new[l] * columns[k][l] + old[l] * (new[k] * start.across[k][l] + old[k] * start.within[k][l])
-        };
-        let square = |x: T| x * x;
-        let (a, b, c) = (of(0, 0) + square(deviations[0]), of(0, 1), of(1, 1) + square(deviations[1]));
-        let inverse = (a * c - b * b).recip();
-        let (a, b, c) = (c * inverse, -b * inverse, a * inverse);
-        for i in 0..N {
-            let gain = [a * columns[0][i] + b * columns[1][i], b * columns[0][i] + c * columns[1][i]];
-            running.mean[i] = running.mean[i] + gain[0] * surprise[0] + gain[1] * surprise[1];
-            for j in i..N {
-                let value = p[i][j] - gain[0] * columns[0][j] - gain[1] * columns[1][j];
-                p[i][j] = value;
-                p[j][i] = value;
+        let output = self.model.shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s);
+        let readings = [
+            (sample.turbine_rad_s, self.readings.turbine_rad, self.noise.turbine_rad_s),
+            (output, self.readings.output_rad, self.noise.output_rad_s),
+        ];
+        for (k, (reading, lag_rad, deviation)) in readings.into_iter().enumerate() {
+            let p = &mut running.covariance;
+            // An age of many samples is cut: so far back the line through both ends does not reach.
+            let old = (self.age(lag_rad, reading) / interval.dt_s).min(T::of(OLDEST_SAMPLES));
+            let new = one - old;
+            // Covariance of the states at the end with the reading.
+            let with_reading: [T; N] = core::array::from_fn(|i| new * p[k][i] + old * start.across[i][k]);
+            let start_with_reading = |m: usize| new * start.across[k][m] + old * start.within[m][k];
+            let variance = new * with_reading[k] + old * start_with_reading(k) + deviation * deviation;
+            let per_surprise = variance.recip();
+            let surprise = (reading - new * running.mean[k] - old * start.mean[k]) * per_surprise;
+            let gain = with_reading.map(|x| x * per_surprise);
+            if k == TURBINE {
+                // What the output's reading needs of the speeds at the start.
+                let other = start_with_reading(OUTPUT);
+                start.mean[OUTPUT] = start.mean[OUTPUT] + other * surprise;
+                start.within[OUTPUT][OUTPUT] = start.within[OUTPUT][OUTPUT] - other * per_surprise * other;
+                for (across, gain) in start.across.iter_mut().zip(gain) {
+                    across[OUTPUT] = across[OUTPUT] - gain * other;
+                }
+            }
+            for i in 0..N {
+                running.mean[i] = running.mean[i] + with_reading[i] * surprise;
+                for j in i..N {
+                    let value = p[i][j] - gain[i] * with_reading[j];
+                    p[i][j] = value;
+                    p[j][i] = value;
+                }
             }
         }
     }
@@ -401,7 +411,7 @@ impl<T: Real> Passage<T> {
     #[inline]
     fn tangent(&self, pressure_pa: T) -> (T, T) {
         let above = self.above_kiss(pressure_pa);
-        (above, if above > T::zero() { self.interval.psi / self.interval.dt_s } else { T::zero() })
+        (above, if above > T::zero() { self.interval.valve.psi / self.interval.dt_s } else { T::zero() })
     }
 
     /// The states at the end, with this mean pressure above the kiss point.
@@ -495,92 +505,122 @@ fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) -> [
     fp.map(|row| [row[TURBINE], row[OUTPUT]])
 }
 
-impl<T: Real> Estimator<T> for KalmanFilter<T> {
-    type State = KalmanState<T>;
+impl<T: Real> SampleEstimator<T> for ExtendedFilter<T> {
+    type SampleState = ExtendedState<T>;
 
-    fn start(&self) -> KalmanState<T> {
-        KalmanState::new()
+    fn tracker(&self) -> &Tracker<T> {
+        &self.tracker
+    }
+
+    fn start_sample(&self) -> ExtendedState<T> {
+        ExtendedState::new()
     }
 
     #[inline]
-    fn step(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Estimate<T> {
-        self.step_by(state, input, Self::predict)
+    fn step_sample(&self, state: &mut ExtendedState<T>, sample: &Sample<T>) -> Estimate<T> {
+        self.step_by(state, sample, Self::predict)
     }
 }
 
-impl<T: Real> KalmanFilter<T> {
+impl<T: Real> ExtendedFilter<T> {
     /// One sample, with the prediction of choice.
     #[inline]
     pub(crate) fn step_by(
         &self,
-        state: &mut KalmanState<T>,
-        input: &Input<T>,
-        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>) -> Start<T>,
+        state: &mut ExtendedState<T>,
+        sample: &Sample<T>,
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Sample<T>) -> Start<T>,
     ) -> Estimate<T> {
-        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, input) else {
-            state.track.last = None;
+        let Some(mut interval) = self.tracker.begin(&mut state.track.tracker, sample) else {
+            state.lose();
             return state.estimate(Health::TimeRejected);
         };
-        if !self.tracker.limits.wheel_valid(input) {
+        if !self.tracker.limits.wheel_valid(sample) {
             interval.health = Health::SpeedsRejected;
         }
-        state.track.pressure_pa = interval.pressure(state.track.pressure_pa);
-        let output = self.model.shift.output_speed(input.turbine_rad_s, input.slip_rad_s);
+        let limits = &self.tracker.limits;
+        let mut health = state.track.settle(limits, interval.pressure(state.track.pressure_pa));
+        let output = self.model.shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s);
         let usable = interval.speeds_valid() && interval.short && output > self.noise.output_least_rad_s;
         if !usable {
             // The twist is lost over a gap; the pressure goes on by the valve model.
-            state.track.last = None;
-            state.shaft_torque_n_m = None;
+            state.lose();
         }
         if interval.speeds_valid() {
-            self.take(state, &interval, input, predict);
+            health = self.take(state, &mut interval, sample, predict);
         }
-        state.estimate(interval.health)
+        state.estimate(interval.health.max(health))
     }
 
     #[inline]
     fn take(
         &self,
-        state: &mut KalmanState<T>,
-        interval: &Interval<T>,
-        input: &Input<T>,
-        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Input<T>) -> Start<T>,
-    ) {
-        let (_, acting) = self.tracker.phase(&mut state.track.tracker, interval.dt_s, input);
+        state: &mut ExtendedState<T>,
+        interval: &mut Interval<T>,
+        sample: &Sample<T>,
+        predict: impl Fn(&Self, &mut Running<T>, &Interval<T>, &Sample<T>) -> Start<T>,
+    ) -> Health {
+        let (_, acting) = self.tracker.phase(&mut state.track.tracker, interval.dt_s, sample);
+        let limits = &self.tracker.limits;
         let mut running = match state.track.last {
             Some(mut running) if interval.dt_s > T::zero() => {
-                let start = predict(self, &mut running, interval, input);
-                self.correct(&mut running, &start, interval, input);
-                running.mean[PRESSURE] = running.mean[PRESSURE].max(T::zero());
+                let mut start = predict(self, &mut running, interval, sample);
+                let predicted = running.mean[PRESSURE];
+                self.correct(&mut running, &mut start, interval, sample);
+                running.filters = true;
+                interval.corrected(predicted, running.mean[PRESSURE] - predicted, limits);
+                if !interval.speeds_valid() {
+                    state.lose();
+                    return Health::Good;
+                }
                 running
             }
-            _ => self.begin(state.track.pressure_pa, input),
+            _ => self.begin(state.track.pressure_pa, sample),
         };
-        let sound = running.mean.iter().all(|x| x.is_finite())
-            && (0..N).all(|i| running.covariance[i][i] >= T::zero() && running.covariance[i][i].is_finite());
-        if !sound {
-            running = self.begin(state.track.tracker.valve_pressure_pa, input);
+        if !(running.is_sound() && limits.shaft_torque_possible(running.mean[SPRING])) {
+            state.track.lost = true;
+            running = self.begin(state.track.tracker.valve_pressure_pa, sample);
         }
-        running.last = *input;
+        let health = state.track.settle(limits, running.mean[PRESSURE]).max(state.track.restart());
+        running.mean[PRESSURE] = state.track.pressure_pa;
+        running.last = *sample;
         self.change_phase(&mut running, acting);
-        state.track.pressure_pa = running.mean[PRESSURE];
         let line = &self.model.rigid.driveline;
-        let rate = line.twist_rate(running.mean[OUTPUT], input.wheel_rad_s);
-        state.shaft_torque_n_m = Some(running.mean[SPRING] + line.shaft_damping_n_m_s_rad * rate);
+        let rate = line.twist_rate(running.mean[OUTPUT], sample.wheel_rad_s);
+        let shaft = running.mean[SPRING] + line.shaft_damping_n_m_s_rad * rate;
+        state.shaft_torque_n_m = Some(shaft.max(-limits.shaft_torque_max_n_m).min(limits.shaft_torque_max_n_m));
         state.track.clutch_torque_n_m = self.model.rigid.clutch_torque(
             acting,
             running.mean[PRESSURE],
-            input.engine_rad_s,
-            input.turbine_rad_s,
-            input.slip_rad_s,
+            sample.engine_rad_s,
+            sample.turbine_rad_s,
+            sample.slip_rad_s,
         );
         state.track.last = Some(running);
+        health
     }
 }
 
-impl<T: Real> KalmanState<T> {
+impl<T: Real> Running<T> {
+    /// Whether mean and covariance are numbers, and no variance is negative.
+    #[inline]
+    fn is_sound(&self) -> bool {
+        let variances = self.covariance.iter().enumerate().map(|(i, row)| row[i]);
+        self.mean.iter().all(|x| x.is_finite()) && variances.into_iter().all(|v| v >= T::zero() && v.is_finite())
+    }
+}
+
+impl<T: Real> ExtendedState<T> {
     pub(crate) fn new() -> Self {
         Self { track: Track::new(), shaft_torque_n_m: None }
+    }
+
+    /// Resets the twist and all other states from readings, except the pressure.
+    fn lose(&mut self) {
+        // At low speed every sample starts again, so no state is lost.
+        self.track.lost |= self.track.last.is_some_and(|running| running.filters);
+        self.track.last = None;
+        self.shaft_torque_n_m = None;
     }
 
     fn estimate(&self, health: Health) -> Estimate<T> {

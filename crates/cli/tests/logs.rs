@@ -1,0 +1,282 @@
+//! Logs and drives as files: whatever is read, and wherever it is written to.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
+const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
+const NAMES: &str = "time_s,engine_speed_rad_s,turbine_speed_rad_s,output_speed_rad_s,oncoming_current_a";
+
+fn wetclutch(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
+}
+
+/// Runs an observer that needs no gains.
+fn estimate(log: &str, more: &[&str]) -> Output {
+    wetclutch(&[&["estimate", log, "--vehicle", VEHICLE, "--observer", "open-loop"], more].concat())
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A log of this many rows, 10 ms apart.
+fn log(rows: usize) -> String {
+    let mut log = format!("{NAMES}\n");
+    for i in 0..rows {
+        writeln!(log, "{},200,190,76,0.1", i as f64 / 100.0).unwrap();
+    }
+    log
+}
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("wetclutch-logs-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    fn write(&self, name: &str, text: impl AsRef<[u8]>) -> String {
+        std::fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let names = std::fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    }
+
+    #[cfg(unix)]
+    fn pipe(&self, name: &str) -> String {
+        assert!(Command::new("mkfifo").arg(self.0.join(name)).status().unwrap().success());
+        self.path(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn a_log_that_is_wrong_is_refused_by_line_and_nothing_is_written() {
+    let folder = Folder::new("wrong");
+    let row = "200,190,76,0.1";
+    let cases = [
+        (String::new(), ": the file is empty"),
+        (format!("{NAMES}\n"), ": there are no rows"),
+        (format!("{NAMES}\n0,{row}\n0,{row}\n"), ":3: the time 0 s is not after the time before it, 0 s"),
+        (format!("{NAMES}\n0,{row}\ninf,{row}\n"), ":3: the time is inf"),
+        (format!("{NAMES}\n0,{row}\n1,{row},\n"), ":3: the row has 6 cells, but the first line names 5 columns"),
+        (format!("{NAMES}\n0,{row}\n1,200,n/a,76,0.1\n"), ":3: column `turbine_speed_rad_s` contains `n/a`"),
+        (format!("{}1,2\n", log(20_000)), ":20002: the row has 2 cells"),
+        (
+            format!("{NAMES},turbine_speed_rpm\n0,{row},1\n"),
+            "columns 3 `turbine_speed_rad_s` and 6 `turbine_speed_rpm`",
+        ),
+        (NAMES.replace("oncoming_current_a", "current") + "\n0,1,1,1,1\n", "there is no column `oncoming_current_a`"),
+    ];
+    for (text, message) in cases {
+        let path = folder.write("log.csv", text);
+        let output = estimate(&path, &["-o", &folder.path("out.csv")]);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(stderr(&output).contains(message), "{message}: {}", stderr(&output));
+        assert_eq!(folder.names(), ["log.csv"], "{message}");
+    }
+    assert_eq!(estimate(&folder.path(""), &[]).status.code(), Some(2), "a folder is no log");
+}
+
+#[test]
+fn a_log_as_spreadsheets_and_loggers_write_it_gives_the_same_estimate() {
+    let folder = Folder::new("dialects");
+    let plain = log(5);
+    let expected = estimate(&folder.write("plain.csv", &plain), &[]).stdout;
+    assert_eq!(expected.iter().filter(|&&byte| byte == b'\n').count(), 6);
+    let quoted: String = plain.lines().map(|line| format!("\"{}\"\n", line.replace(',', "\",\""))).collect();
+    let dialects = [
+        format!("\u{feff}{plain}"),
+        plain.replace('\n', "\r\n"),
+        plain.replace('\n', ",\n"),
+        plain.replace('\n', ",a note\n").replacen("a note", "", 1),
+        quoted,
+        plain.replace(',', " , "),
+        plain.trim_end().to_owned(),
+        plain.replace("output_speed_rad_s", "Output_Speed_rad_s"),
+    ];
+    for text in dialects {
+        let output = estimate(&folder.write("log.csv", &text), &[]);
+        assert!(output.stdout == expected, "{text}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn numbers_that_cannot_be_readings_are_lost_samples() {
+    let folder = Folder::new("numbers");
+    let rows = ["0,200,190,76,0.1", "1,inf,190,76,0.1", "2,200,1e400,76,0.1", "3,200,190,NaN,0.1", "4,200,190,76,"];
+    let output = estimate(&folder.write("log.csv", format!("{NAMES}\n{}\n", rows.join("\n"))), &[]);
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    let at = text.lines().next().unwrap().split(',').position(|name| name == "health").unwrap();
+    let health: Vec<&str> = text.lines().skip(1).map(|line| line.split(',').nth(at).unwrap()).collect();
+    // A command that did not come stands as it was.
+    assert_eq!(health, ["good", "speeds_rejected", "speeds_rejected", "speeds_rejected", "good"]);
+    assert!(!text.contains("inf") && !text.contains("NaN"), "{text}");
+    assert!(stderr(&output).contains("health: good 40.0 %, speeds_rejected 60.0 %"));
+}
+
+#[test]
+fn an_estimate_ends_with_what_was_done() {
+    let folder = Folder::new("summary");
+    assert!(wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("drive")]).status.success());
+    let (log, out) = (folder.path("drive/e1_measured.csv"), folder.path("out.csv"));
+    let output = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out]);
+    let said = stderr(&output);
+    for line in ["rows: 9,501, from 0.000 to 9.500 s", "health: good ", "observer: kalman"] {
+        assert!(said.lines().any(|said| said.starts_with(line)), "{line}: {said}");
+    }
+    // The valve maps pass the kiss point when the load transfer begins that `simulate` names.
+    assert!(said.contains("shifts: 1 (7.701 to 8.332 s)"), "{said}");
+    assert_eq!(said.lines().last().unwrap(), format!("estimate: {out}"));
+}
+
+#[test]
+fn a_log_may_be_replaced_by_its_own_estimate() {
+    let folder = Folder::new("own");
+    let path = folder.write("log.csv", log(20_000));
+    let expected = estimate(&path, &[]).stdout;
+    assert!(estimate(&path, &["-o", &path]).status.success());
+    assert!(std::fs::read(&path).unwrap() == expected);
+    assert_eq!(folder.names(), ["log.csv"]);
+}
+
+#[test]
+fn a_folder_as_output_is_refused_before_the_log_is_read() {
+    let folder = Folder::new("target");
+    let output = estimate("no-such-log.csv", &["-o", &folder.path("")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("this is a folder\nhint: name a file in it"), "{}", stderr(&output));
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_links_serve_on_both_sides() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = Folder::new("pipes");
+    let plain = folder.write("log.csv", log(20_000));
+    let expected = estimate(&plain, &[]).stdout;
+    let (from, to, link) = (folder.pipe("from"), folder.pipe("to"), folder.path("link"));
+    let feeder = std::thread::spawn({
+        let (from, text) = (from.clone(), log(20_000));
+        move || std::fs::write(from, text).unwrap()
+    });
+    let reader = std::thread::spawn({
+        let to = to.clone();
+        move || std::fs::read(to).unwrap()
+    });
+    let output = estimate(&from, &["-o", &to]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    feeder.join().unwrap();
+    assert!(reader.join().unwrap() == expected);
+    assert!([&from, &to].iter().all(|path| std::fs::metadata(path).unwrap().file_type().is_fifo()));
+
+    std::os::unix::fs::symlink("out.csv", &link).unwrap();
+    assert!(estimate(&plain, &["-o", &link]).status.success());
+    assert!(Path::new(&link).is_symlink() && std::fs::read(folder.path("out.csv")).unwrap() == expected);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_a_killed_command_leaves_goes_with_the_next_and_a_running_one_keeps_its_own() {
+    use std::io::Write as _;
+    let folder = Folder::new("killed");
+    let (pipe, out) = (folder.pipe("pipe"), folder.path("out.csv"));
+    let partials = || folder.names().into_iter().filter(|name| name.ends_with(".partial")).collect::<Vec<_>>();
+    // A command that waits for the rest of its log.
+    let begin = || {
+        let child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+            .args(["estimate", &pipe, "--vehicle", VEHICLE, "--observer", "open-loop", "-o", &out])
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut feed = std::fs::OpenOptions::new().write(true).open(&pipe).unwrap();
+        feed.write_all(log(20_000).as_bytes()).unwrap();
+        let own = format!("out.csv.{}.partial", child.id());
+        while !partials().contains(&own) {
+            std::thread::yield_now();
+        }
+        (child, feed, own)
+    };
+    let (mut killed, feed, dead) = begin();
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    drop(feed);
+    assert_eq!(partials(), [dead]);
+    let (mut running, feed, own) = begin();
+    assert_eq!(partials(), [own.as_str()], "the dead one went");
+    assert!(estimate(&folder.write("log.csv", log(3)), &["-o", &out]).status.success());
+    assert_eq!(partials(), [own], "the running one stays");
+    drop(feed);
+    assert!(running.wait().unwrap().success());
+    assert_eq!(std::fs::read_to_string(&out).unwrap().lines().count(), 20_001);
+    assert!(partials().is_empty());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said_and_is_no_fault_of_the_input() {
+    let folder = Folder::new("full");
+    let path = folder.write("log.csv", log(20_000));
+    let output = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+        .args(["estimate", &path, "--vehicle", VEHICLE, "--observer", "open-loop"])
+        .stdout(std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap())
+        .stderr(Stdio::piped())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("No space left"), "{}", stderr(&output));
+}
+
+#[test]
+fn an_experiments_name_stays_in_the_folder() {
+    let folder = Folder::new("name");
+    let text = std::fs::read_to_string(EXPERIMENT).unwrap().replace("../vehicles/two_speed_at.toml", VEHICLE);
+    let line = 1 + text.lines().position(|line| line.starts_with("name = ")).unwrap();
+    for name in ["../escaped", "/escaped", "a/b", "..", ".hidden", "", "a\\\\b", "c:x", "x\\n", &"x".repeat(81)] {
+        let path = folder.write("e.toml", text.replacen("name = \"E1\"", &format!("name = \"{name}\""), 1));
+        let output = wetclutch(&["simulate", &path, "-o", &folder.path("out")]);
+        assert_eq!(output.status.code(), Some(2), "{name}");
+        let said = stderr(&output);
+        assert!(said.contains(&format!("e.toml:{line}: `name`: ")) && said.contains("hint: use letters"), "{said}");
+        assert_eq!(folder.names(), ["e.toml"]);
+    }
+}
+
+#[test]
+fn a_drive_of_absurd_size_is_announced_before_it_is_written() {
+    use std::io::{BufRead as _, BufReader};
+    let folder = Folder::new("size");
+    let text = std::fs::read_to_string(EXPERIMENT).unwrap().replace("../vehicles/two_speed_at.toml", VEHICLE);
+    let text = text.replace("duration_s = 9.5", "duration_s = 600").replacen("= 0.001", "= 0.00001", 1);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+        .args(["simulate", &folder.write("e.toml", text), "-o", &folder.path("out")])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = String::new();
+    BufReader::new(child.stderr.take().unwrap()).read_line(&mut said).unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(said, "600 s with a sample time of 0.00001 s are 60,000,000 rows, about 27 GB in two files\n");
+}

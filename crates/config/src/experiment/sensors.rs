@@ -1,0 +1,357 @@
+//! Checked sensors of an experiment file, and what goes wrong with their readings.
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use toml::Spanned;
+
+use super::raw::{RawCurrentSensor, RawSensors, RawSensorsFile, RawSpeedSensor};
+use crate::check::{Check, Number};
+use crate::{ConfigError, Source};
+
+/// What goes wrong with the readings of a channel. Observers are not told of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadingErrors {
+    /// Factor on the reading, such as the wheel speed of a worn tyre.
+    pub scale: f64,
+    /// Share of the readings that are lost, each by chance.
+    pub missing_share: f64,
+    /// Length of one dropout at a random time in the shift, s: every reading in it is lost.
+    pub burst_s: f64,
+    /// Length of one time in the shift in which the channel repeats its last reading, s.
+    pub frozen_s: f64,
+    /// Number of single readings in the shift that are wrong.
+    pub outliers: f64,
+}
+
+impl ReadingErrors {
+    /// No error.
+    pub const NONE: Self = Self { scale: 1.0, missing_share: 0.0, burst_s: 0.0, frozen_s: 0.0, outliers: 0.0 };
+}
+
+/// A toothed wheel read by a timer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedSensor {
+    /// Teeth of the wheel.
+    pub teeth: f64,
+    /// Resolution of the timer, s.
+    pub timer_s: f64,
+    /// Tooth periods that one reading spans at least.
+    pub periods: f64,
+    /// Time between two readings on the bus, s.
+    pub sample_time_s: f64,
+    /// Time of the first reading after that of the first row, s: channels with different offsets are asynchronous.
+    pub offset_s: f64,
+    /// Age of a reading when it arrives, s.
+    pub delay_s: f64,
+    /// Standard deviation of a reading, rad/s.
+    pub noise_rad_s: f64,
+    /// What goes wrong with its readings.
+    pub errors: ReadingErrors,
+    /// Size of the error of an outlier, rad/s; its sign is random.
+    pub outlier_rad_s: f64,
+}
+
+/// A current sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurrentSensor {
+    /// Standard deviation of a reading, A.
+    pub noise_a: f64,
+    /// Constant error, A.
+    pub offset_a: f64,
+    /// Step of the converter, A.
+    pub resolution_a: f64,
+    /// Time between two readings, s; without one there is a reading in every row.
+    pub sample_time_s: Option<f64>,
+    /// Time of the first reading after that of the first row, s.
+    pub offset_s: f64,
+    /// Age of a reading when it arrives, s.
+    pub delay_s: f64,
+    /// What goes wrong with its readings.
+    pub errors: ReadingErrors,
+    /// Size of the error of an outlier, A; its sign is random.
+    pub outlier_a: f64,
+}
+
+impl CurrentSensor {
+    /// A sensor without any error: the command is known exactly, as a duty cycle is.
+    pub const EXACT: Self = Self {
+        noise_a: 0.0,
+        offset_a: 0.0,
+        resolution_a: 0.0,
+        sample_time_s: None,
+        offset_s: 0.0,
+        delay_s: 0.0,
+        errors: ReadingErrors::NONE,
+        outlier_a: OUTLIER_A,
+    };
+}
+
+/// The sensors of a car.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensors {
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Time of the rows after the ticks of the shift controller, s. The clocks of the channels are relative to the rows.
+    pub row_offset_s: f64,
+    /// Number of single readings in the shift that are wrong, each of a speed sensor drawn at random.
+    pub outliers: f64,
+    /// Engine speed.
+    pub engine: SpeedSensor,
+    /// Turbine speed.
+    pub turbine: SpeedSensor,
+    /// Gearbox output speed.
+    pub output: SpeedSensor,
+    /// Driven wheel speed.
+    pub wheel: SpeedSensor,
+    /// Current of the oncoming clutch's valve; without a sensor the command is known exactly, as a duty cycle is.
+    pub current: Option<CurrentSensor>,
+}
+
+/// Size of an outlier of a speed, rad/s, if the file does not say [chosen].
+const OUTLIER_RAD_S: f64 = 5.0;
+/// The same of a current, A [chosen].
+const OUTLIER_A: f64 = 0.1;
+/// Longest time between two readings, age and offset of a reading, s.
+const LONGEST_S: f64 = 0.2;
+
+impl Sensors {
+    /// Reads the `[sensors]` table of any file; `None` without one. The errors of the readings are left out: nobody
+    /// knows those of a log.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a value cannot be right.
+    pub fn read(path: &Path) -> Result<Option<Self>, ConfigError> {
+        let source = Source::read(path)?;
+        let raw: RawSensorsFile = source.parse()?;
+        let sensors = raw.sensors.as_ref().map(|raw| sensors(&Check::of(&source), "sensors", raw, None)).transpose()?;
+        Ok(sensors.map(Self::without_errors))
+    }
+
+    /// The same sensors whose readings have no errors: what an observer may know of them.
+    #[must_use]
+    pub fn without_errors(mut self) -> Self {
+        self.outliers = 0.0;
+        for sensor in [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.wheel] {
+            sensor.errors = ReadingErrors::NONE;
+        }
+        if let Some(current) = &mut self.current {
+            current.errors = ReadingErrors::NONE;
+        }
+        self
+    }
+}
+
+/// The numbers of one table. What the table leaves out is as in the sensors that it changes.
+struct Keys<'a> {
+    check: &'a Check<'a>,
+    table: String,
+    at: usize,
+}
+
+impl Keys<'_> {
+    /// A number, or `base` without one; without either, the file is incomplete.
+    fn number(
+        &self,
+        key: &str,
+        value: &Option<Number>,
+        base: Option<f64>,
+        range: RangeInclusive<f64>,
+    ) -> Result<f64, ConfigError> {
+        match (value, base) {
+            (Some(value), _) => self.check.number(&self.key(key), value, range),
+            (None, Some(base)) => Ok(base),
+            (None, None) => Err(self.missing(key)),
+        }
+    }
+
+    /// The same of a whole number.
+    fn count(
+        &self,
+        key: &str,
+        value: &Option<Number>,
+        base: Option<f64>,
+        range: RangeInclusive<f64>,
+    ) -> Result<f64, ConfigError> {
+        match value {
+            Some(value) => self.check.count(&self.key(key), value, range),
+            None => self.number(key, value, base, range),
+        }
+    }
+
+    /// The errors of a channel's readings; `missing_share` is that of all channels.
+    fn errors(
+        &self,
+        [scale, missing, burst, frozen, outliers]: [&Option<Number>; 5],
+        base: Option<ReadingErrors>,
+        missing_share: Option<f64>,
+    ) -> Result<ReadingErrors, ConfigError> {
+        let base = base.unwrap_or(ReadingErrors::NONE);
+        let share = missing_share.unwrap_or(base.missing_share);
+        Ok(ReadingErrors {
+            scale: self.number("scale", scale, Some(base.scale), SCALES)?,
+            missing_share: self.number("missing_share", missing, Some(share), SHARES)?,
+            burst_s: self.number("burst_s", burst, Some(base.burst_s), SPANS_S)?,
+            frozen_s: self.number("frozen_s", frozen, Some(base.frozen_s), SPANS_S)?,
+            outliers: self.count("outliers", outliers, Some(base.outliers), COUNTS)?,
+        })
+    }
+
+    fn key(&self, key: &str) -> String {
+        format!("{}.{key}", self.table)
+    }
+
+    fn missing(&self, key: &str) -> ConfigError {
+        self.check.meaning(&self.table, self.at, format!("missing `{key}`"), None)
+    }
+}
+
+/// The sensors that a table describes, or `base` with what the table changes.
+pub(super) fn sensors(
+    check: &Check<'_>,
+    table: &str,
+    raw: &Spanned<RawSensors>,
+    base: Option<&Sensors>,
+) -> Result<Sensors, ConfigError> {
+    let keys = Keys { check, table: table.to_owned(), at: raw.span().start };
+    let raw = raw.get_ref();
+    let seed = raw.seed.as_ref().map(|seed| *seed.get_ref()).or(base.map(|base| base.seed));
+    let missing_share = raw.missing_share.as_ref().map(|share| check.number(&keys.key("missing_share"), share, SHARES));
+    let missing_share = missing_share.transpose()?;
+    let speed = |name: &str, raw: &Option<Spanned<RawSpeedSensor>>, base: Option<&SpeedSensor>| {
+        let mut base = base.copied();
+        if let (Some(base), Some(share)) = (&mut base, missing_share) {
+            base.errors.missing_share = share;
+        }
+        match raw {
+            Some(raw) => speed_sensor(check, keys.key(name), raw, base, missing_share),
+            None => base.ok_or_else(|| keys.missing(name)),
+        }
+    };
+    let mut current = base.and_then(|base| base.current);
+    if let (Some(current), Some(share)) = (&mut current, missing_share) {
+        current.errors.missing_share = share;
+    }
+    if let Some(raw) = &raw.current {
+        // What a scenario changes where the file has no sensor, it changes in an exact one.
+        let base = current.or(base.map(|_| CurrentSensor::EXACT));
+        current = Some(current_sensor(check, keys.key("current"), raw, base, missing_share)?);
+    }
+    Ok(Sensors {
+        seed: seed.ok_or_else(|| keys.missing("seed"))?,
+        row_offset_s: keys.number(
+            "row_offset_s",
+            &raw.row_offset_s,
+            Some(base.map_or(0.0, |base| base.row_offset_s)),
+            0.0..=LONGEST_S,
+        )?,
+        outliers: keys.count("outliers", &raw.outliers, Some(base.map_or(0.0, |base| base.outliers)), COUNTS)?,
+        engine: speed("engine", &raw.engine, base.map(|base| &base.engine))?,
+        turbine: speed("turbine", &raw.turbine, base.map(|base| &base.turbine))?,
+        output: speed("output", &raw.output, base.map(|base| &base.output))?,
+        wheel: speed("wheel", &raw.wheel, base.map(|base| &base.wheel))?,
+        current,
+    })
+}
+
+/// The sensors of a file with the changes of a scenario.
+pub(super) fn changed(
+    check: &Check<'_>,
+    raw: &Spanned<RawSensors>,
+    of_file: Option<&Sensors>,
+) -> Result<Sensors, ConfigError> {
+    let table = "scenario.sensors";
+    let Some(of_file) = of_file else {
+        let message = "changes sensors, but the file has no [sensors] table".to_owned();
+        return Err(check.meaning(table, raw.span().start, message, Some("add a [sensors] table".to_owned())));
+    };
+    if let Some(seed) = &raw.get_ref().seed {
+        let message = "every scenario draws from the seed of the [sensors] table".to_owned();
+        let key = "scenario.sensors.seed";
+        return Err(check.meaning(key, seed.span().start, message, Some("remove `seed`".to_owned())));
+    }
+    sensors(check, table, raw, Some(of_file))
+}
+
+/// Shares of the readings.
+const SHARES: RangeInclusive<f64> = 0.0..=1.0;
+/// Numbers of outliers.
+const COUNTS: RangeInclusive<f64> = 0.0..=1000.0;
+/// Factors on a reading.
+const SCALES: RangeInclusive<f64> = 0.5..=2.0;
+/// Lengths of a dropout or a frozen signal, s.
+const SPANS_S: RangeInclusive<f64> = 0.0..=10.0;
+
+fn speed_sensor(
+    check: &Check<'_>,
+    table: String,
+    raw: &Spanned<RawSpeedSensor>,
+    base: Option<SpeedSensor>,
+    missing_share: Option<f64>,
+) -> Result<SpeedSensor, ConfigError> {
+    let keys = Keys { check, table, at: raw.span().start };
+    let raw = raw.get_ref();
+    let base_of = |value: fn(&SpeedSensor) -> f64| base.as_ref().map(value);
+    let or = |value: fn(&SpeedSensor) -> f64, default: f64| Some(base_of(value).unwrap_or(default));
+    Ok(SpeedSensor {
+        teeth: keys.count("teeth", &raw.teeth, base_of(|s| s.teeth), 1.0..=1000.0)?,
+        timer_s: keys.number("timer_s", &raw.timer_s, base_of(|s| s.timer_s), 0.0..=1e-3)?,
+        periods: keys.count("periods", &raw.periods, base_of(|s| s.periods), 1.0..=100.0)?,
+        sample_time_s: keys.number(
+            "sample_time_s",
+            &raw.sample_time_s,
+            base_of(|s| s.sample_time_s),
+            1e-4..=LONGEST_S,
+        )?,
+        offset_s: keys.number("offset_s", &raw.offset_s, or(|s| s.offset_s, 0.0), 0.0..=LONGEST_S)?,
+        delay_s: keys.number("delay_s", &raw.delay_s, base_of(|s| s.delay_s), 0.0..=LONGEST_S)?,
+        noise_rad_s: keys.number("noise_rad_s", &raw.noise_rad_s, base_of(|s| s.noise_rad_s), 0.0..=50.0)?,
+        errors: keys.errors(
+            [&raw.scale, &raw.missing_share, &raw.burst_s, &raw.frozen_s, &raw.outliers],
+            base.map(|base| base.errors),
+            missing_share,
+        )?,
+        outlier_rad_s: keys.number(
+            "outlier_rad_s",
+            &raw.outlier_rad_s,
+            or(|s| s.outlier_rad_s, OUTLIER_RAD_S),
+            0.0..=1000.0,
+        )?,
+    })
+}
+
+fn current_sensor(
+    check: &Check<'_>,
+    table: String,
+    raw: &Spanned<RawCurrentSensor>,
+    base: Option<CurrentSensor>,
+    missing_share: Option<f64>,
+) -> Result<CurrentSensor, ConfigError> {
+    let keys = Keys { check, table, at: raw.span().start };
+    let raw = raw.get_ref();
+    let base_of = |value: fn(&CurrentSensor) -> f64| base.as_ref().map(value);
+    let or = |value: fn(&CurrentSensor) -> f64, default: f64| Some(base_of(value).unwrap_or(default));
+    let sample_time_s = match &raw.sample_time_s {
+        Some(value) => Some(check.number(&keys.key("sample_time_s"), value, 1e-4..=LONGEST_S)?),
+        None => base.and_then(|base| base.sample_time_s),
+    };
+    if let (Some(offset), None) = (&raw.offset_s, sample_time_s) {
+        let message = "has no clock of its own without a `sample_time_s`".to_owned();
+        let hint = "add `sample_time_s`, or remove `offset_s`".to_owned();
+        return Err(check.meaning(&keys.key("offset_s"), offset.span().start, message, Some(hint)));
+    }
+    Ok(CurrentSensor {
+        noise_a: keys.number("noise_a", &raw.noise_a, base_of(|s| s.noise_a), 0.0..=1.0)?,
+        offset_a: keys.number("offset_a", &raw.offset_a, base_of(|s| s.offset_a), -1.0..=1.0)?,
+        resolution_a: keys.number("resolution_a", &raw.resolution_a, base_of(|s| s.resolution_a), 0.0..=0.5)?,
+        sample_time_s,
+        offset_s: keys.number("offset_s", &raw.offset_s, or(|s| s.offset_s, 0.0), 0.0..=LONGEST_S)?,
+        delay_s: keys.number("delay_s", &raw.delay_s, or(|s| s.delay_s, 0.0), 0.0..=LONGEST_S)?,
+        errors: keys.errors(
+            [&raw.scale, &raw.missing_share, &raw.burst_s, &raw.frozen_s, &raw.outliers],
+            base.map(|base| base.errors),
+            missing_share,
+        )?,
+        outlier_a: keys.number("outlier_a", &raw.outlier_a, or(|s| s.outlier_a, OUTLIER_A), 0.0..=2.0)?,
+    })
+}

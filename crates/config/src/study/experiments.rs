@@ -1,0 +1,54 @@
+//! The factors of a study in its experiment, and in others.
+
+use toml::Table;
+
+use super::{Factor, Study, Target, changed};
+use crate::{ConfigError, Experiment, Source, Vehicle};
+
+impl Study {
+    /// The study of the settings in which the source chapter's statements are tested, as it ships with the program.
+    ///
+    /// # Errors
+    /// None in a released program; the tests read this file.
+    pub fn plausible() -> Result<Self, ConfigError> {
+        let text = include_str!("../../../../experiments/plausible.toml");
+        let [.., e4] = Experiment::built_in()?;
+        Self::of(Source::built_in("experiments/plausible.toml", text), e4, Vehicle::two_speed_at()?)
+    }
+
+    /// Another experiment with these values of the study's factors. A factor of a table that this experiment does not
+    /// have, as that of sensors, changes nothing in it.
+    ///
+    /// # Errors
+    /// As [`Self::varied`].
+    pub fn varied_experiment(&self, other: &Experiment, values: &[f64]) -> Result<Experiment, ConfigError> {
+        let table = experiment_table(other)?;
+        let changes = (self.factors.iter().zip(values.iter().copied()))
+            .filter(|(factor, _)| factor.target == Target::Experiment && table.contains_key(&factor.path[0]));
+        changed_experiment(other, &table, changes)
+    }
+}
+
+/// The table of an experiment file that the runs of a study change. Every run reads it again; tables that no run needs
+/// would only take time.
+pub(super) fn experiment_table(experiment: &Experiment) -> Result<Table, ConfigError> {
+    let mut table: Table = experiment.source.parse()?;
+    for unused in ["scenario", "observer"] {
+        table.remove(unused);
+    }
+    Ok(table)
+}
+
+/// The experiment with changed values, and with the observers and what they are told of the sensors as before.
+pub(super) fn changed_experiment<'a>(
+    experiment: &Experiment,
+    table: &Table,
+    changes: impl Iterator<Item = (&'a Factor, f64)>,
+) -> Result<Experiment, ConfigError> {
+    let mut changes = changes.peekable();
+    if changes.peek().is_none() {
+        return Ok(experiment.clone());
+    }
+    let changed = Experiment::from_source(changed(&experiment.source, table, changes)?)?;
+    Ok(Experiment { observers: experiment.observers.clone(), sensors_told: experiment.sensors_told, ..changed })
+}

@@ -1,0 +1,68 @@
+//! The shift clutches of a vehicle file.
+
+use drivetrain::{Clutch, ClutchValve, Cylinder};
+
+use super::raw::{RawClutch, RawVehicleFile};
+use super::{fill, valves};
+use crate::ConfigError;
+use crate::check::Check;
+
+/// Half-widths of a valve's hysteresis, Pa.
+pub(crate) const HYSTERESES_PA: std::ops::RangeInclusive<f64> = 0.0..=0.2e6;
+/// A shift clutch with the valve that fills it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftClutch {
+    /// Geometry and friction.
+    pub clutch: Clutch<f64>,
+    /// The real valve.
+    pub valve: ClutchValve<f64>,
+    /// Half-width of the valve's hysteresis, Pa. Observers and shift controller do not know it.
+    pub hysteresis_pa: f64,
+    /// The cylinder.
+    pub cylinder: Cylinder<f64>,
+    /// Whether the piston has a stroke; if not, the pressure at the valve's outlet acts on the plates, as in the chapter.
+    pub has_stroke: bool,
+    /// Peak of the drag of the open clutch, N m.
+    pub drag_n_m: f64,
+}
+
+/// The clutch of this name, with oil of this temperature.
+pub(super) fn check(
+    check: &Check<'_>,
+    name: &str,
+    file: &RawVehicleFile,
+    oil_degc: f64,
+) -> Result<ShiftClutch, ConfigError> {
+    let raw: &RawClutch = &file.clutch[name];
+    let key = |field: &str| format!("clutch.{name}.{field}");
+    let friction = check.table(
+        (&key("friction.slip_rad_s"), &raw.friction.slip_rad_s, 0.0..=2e3),
+        (&key("friction.coefficient"), &raw.friction.coefficient, 0.02..=0.5),
+    )?;
+    let clutch = Clutch {
+        mean_radius_m: check.number(&key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
+        friction_faces: check.count(&key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
+        piston_area_m2: check.number(&key("piston_area_m2"), &raw.piston_area_m2, 0.001..=0.05)?,
+        return_spring_n: check.number(&key("return_spring_n"), &raw.return_spring_n, 0.0..=10e3)?,
+        static_friction: check.number(&key("static_friction"), &raw.static_friction, 0.02..=0.5)?,
+        friction,
+    };
+    let (holding, sliding) = (clutch.static_friction, clutch.friction.at(0.0));
+    if holding < sliding {
+        let message = format!("is {holding}, less than the value of `friction` at zero slip, {sliding}");
+        let hint = "with a smaller static friction the clutch could neither stick nor slip".to_owned();
+        return Err(check.meaning(&key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
+    }
+    let (cylinder, has_stroke) = fill::cylinder(check, name, raw, &clutch, oil_degc)?;
+    Ok(ShiftClutch {
+        clutch,
+        valve: valves::clutch_valve(check, name, &raw.valve)?,
+        hysteresis_pa: match &raw.valve.get_ref().hysteresis_pa {
+            Some(half_width) => check.number(&key("valve.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            None => 0.0,
+        },
+        cylinder,
+        has_stroke,
+        drag_n_m: 0.0,
+    })
+}

@@ -1,0 +1,206 @@
+//! Certificates of the rigid observer in simulation.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::sync::Mutex;
+
+use common::{Car, DISCRETISATION_PA, DT_S, ENGINE_RAD_S, input, over_a_sample};
+use config::{GainMethod, Vehicle};
+use design::{DiscreteDesign, Model, ValveErrors, design_discrete, design_rigid, rigid_observer};
+use observer::{Phase, SampleEstimator};
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Theorem 2.1 in simulation: from any initial error, under any error of the model within its bound.
+    #[test]
+    fn prop_the_certified_bound_holds_in_simulation(
+        inertia in any::<bool>(),
+        initial in -0.2e6..0.2e6_f64,
+        errors in prop::collection::vec((0.0..1.0_f64, 0.0..6.3_f64), 15),
+    ) {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let design = design_rigid(&vehicle).unwrap();
+        let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
+        let certificate = design.of(phase).unwrap();
+        let mut car = Car::start(phase, initial);
+        let mut held = 0;
+        for n in 0..1500_u32 {
+            let (size, angle) = errors[n as usize / 100];
+            let w = size * certificate.model_error_max_rad_s2;
+            // In the torque phase only the turbine speed is an output.
+            let w = if inertia { [w * angle.cos(), w * angle.sin()] } else { [w * angle.cos(), 0.0] };
+            let error = car.step(w);
+            if !car.in_phase {
+                break;
+            }
+            let bound = certificate.error_bound_pa(initial, f64::from(n + 1) * DT_S);
+            prop_assert!(error.abs() <= bound + DISCRETISATION_PA, "{n}: {error} Pa, bound {bound} Pa");
+            held += 1;
+        }
+        // With every error against it from the start the turbine is back in first gear, where clutch A grips, in 10 ms.
+        prop_assert!(held >= if inertia { 100 } else { 1500 }, "held for {held} samples only");
+    }
+}
+
+/// Sample times of the designs below, s.
+const SAMPLE_TIMES_S: [f64; 3] = [0.01, 0.005, 0.001];
+
+/// The rigid design by this method for one of [`SAMPLE_TIMES_S`]; each is made once.
+fn designed(method: GainMethod, sample_time: usize) -> DiscreteDesign {
+    type Designs = Mutex<Vec<((GainMethod, usize), DiscreteDesign)>>;
+    static DESIGNS: Designs = Mutex::new(Vec::new());
+    let mut designs = DESIGNS.lock().unwrap();
+    let key = (method, sample_time);
+    if let Some((_, design)) = designs.iter().find(|(of, _)| *of == key) {
+        return design.clone();
+    }
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let design = design_discrete(&vehicle, Model::Rigid, method, SAMPLE_TIMES_S[sample_time]).unwrap();
+    designs.push((key, design.clone()));
+    design
+}
+
+/// What disturbs a sample, as shares of the bounds of the budget.
+#[derive(Debug, Clone)]
+struct Disturbance {
+    turbine: f64,
+    output: f64,
+    readings: [f64; 2],
+    age: f64,
+    valve: f64,
+}
+
+fn disturbance() -> impl Strategy<Value = Disturbance> {
+    let shares = prop::array::uniform6(-1.0..1.0_f64);
+    // Now and then the worst case at once: everything at its limit.
+    (shares, any::<bool>()).prop_map(|(shares, worst)| {
+        let [turbine, output, first, second, age, valve] = shares.map(|x| if worst { x.signum() } else { x });
+        Disturbance { turbine, output, readings: [first, second], age, valve }
+    })
+}
+
+/// A car whose readings, torques and valve err within the budget, with the rigid observer on it: the sizes of the error and of
+/// what is left of the first one, after each sample.
+fn errors(
+    inertia: bool,
+    method: GainMethod,
+    sample_time: usize,
+    initial_pa: f64,
+    disturbances: &[Disturbance],
+) -> Vec<[f64; 2]> {
+    let t = SAMPLE_TIMES_S[sample_time];
+    let vehicle = Vehicle::two_speed_at().unwrap();
+    let bounds = vehicle.error_bounds;
+    let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
+    let observer = rigid_observer(&vehicle, designed(method, sample_time).rigid_gains());
+    let model = observer.model;
+    // In the inertia phase far from lock-up, in the torque phase in first gear.
+    let (command, mut speeds) = (0.25, if inertia { [340.0, 300.0] } else { [360.0, 360.0] });
+    let mut state = observer.start_sample();
+    for dt in [0.0, 10.0, 1e-9] {
+        observer.step_sample(&mut state, &input(dt, speeds[0], speeds[1], command));
+    }
+    let start = observer.step_sample(&mut state, &input(1e-9, speeds[0], speeds[1], command));
+    assert_eq!(start.phase, phase);
+    let mut pressure = start.pressure_pa + initial_pa;
+    let valve = model.valve.linear(command, pressure);
+    let (phi, psi, gam2) = over_a_sample(valve.a22_per_s, t);
+    let valve_pa_s = ValveErrors::of(&vehicle).largest_pa_s() - 0.2 * bounds.shift_pressure_pa * valve.a22_per_s;
+    // The budget bounds the error of a change; half of it bounds that of each reading.
+    let reading_rad_s = [0.5 * bounds.turbine_quantum_rad_s, 0.5 * bounds.slip_quantum_rad_s];
+    let (mut measured, mut left, mut errors) = (speeds, initial_pa.abs(), Vec::new());
+    for d in disturbances {
+        let rows = model.coefficients(phase);
+        let torques = drivetrain::ShiftTorques {
+            turbine_n_m: d.turbine * bounds.turbine_torque_n_m,
+            output_n_m: d.output * bounds.output_torque_n_m,
+            offgoing_n_m: if inertia { d.output * bounds.offgoing_torque_n_m } else { 0.0 },
+            ..Default::default()
+        };
+        let w = [rows.turbine.at(&torques), rows.slip_oncoming.at(&torques)];
+        let m = model.speed_model(phase, ENGINE_RAD_S, measured[0], measured[1]);
+        // The speeds tell what the pressure was a while ago.
+        let old = d.age * bounds.sampling_delay_s * bounds.shift_ramp_pa_s;
+        let integral = psi * (pressure + old) + gam2 * valve.b2_pa_s;
+        let gain = observer.gains.at(m.friction).of(phase);
+        let factor = phi - (0..2).map(|i| gain[i] * m.per_pressure_rad_s2_pa[i] * psi).sum::<f64>();
+        for i in 0..2 {
+            speeds[i] += t * (m.free_rad_s2[i] + w[i]) + m.per_pressure_rad_s2_pa[i] * integral;
+            measured[i] = speeds[i] + d.readings[i] * reading_rad_s[i];
+        }
+        if !inertia {
+            (speeds[1], measured[1]) = (speeds[0], measured[0]);
+        }
+        pressure = phi * pressure + psi * valve.b2_pa_s + d.valve * psi * valve_pa_s;
+        let estimate = observer.step_sample(&mut state, &input(t, measured[0], measured[1], command));
+        if estimate.phase != phase || measured[1] < 20.0 {
+            break;
+        }
+        left *= factor.abs();
+        errors.push([(pressure - estimate.pressure_pa).abs(), left]);
+    }
+    errors
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    /// The certificates for a sample time in simulation: whatever torques, readings and valve do within their bounds, the
+    /// error stays below what is left of the first one and the certified bound.
+    #[test]
+    fn prop_the_sampled_bound_holds_in_simulation(
+        inertia in any::<bool>(),
+        method in prop::sample::select(GainMethod::ALL[1..].to_vec()),
+        sample_time in 0..SAMPLE_TIMES_S.len(),
+        initial_pa in -0.2e6..0.2e6_f64,
+        disturbances in prop::collection::vec(disturbance(), 60),
+    ) {
+        let design = designed(method, sample_time);
+        let certificate = if inertia { &design.inertia_phase } else { &design.torque_phase };
+        let errors = errors(inertia, method, sample_time, initial_pa, &disturbances);
+        for &[error, left] in &errors {
+            // One pascal for rounding.
+            prop_assert!(error <= left + certificate.bound_pa + 1.0, "{error} > {left} + {}", certificate.bound_pa);
+        }
+        // With every error at its limit and of the worst sign the inertia phase is over after 7 samples of 10 ms.
+        let least = if inertia { (0.07 / SAMPLE_TIMES_S[sample_time]) as usize } else { 60 };
+        prop_assert!(errors.len() >= least.min(60), "held for {} samples only", errors.len());
+    }
+}
+
+/// Readings that turn from one end of their bound to the other at every sample, with and without all the rest at its limit.
+#[test]
+fn the_sampled_bound_holds_with_the_worst_noise() {
+    for (sample_time, every) in (0..SAMPLE_TIMES_S.len()).flat_map(|t| [1, 2, 5].map(|every| (t, every))) {
+        for (rest, sign) in [(0.0, 1.0), (1.0, 1.0), (1.0, -1.0)] {
+            let disturbances = (0..60).map(|n| {
+                let reading = if (n / every) % 2 == 0 { sign } else { -sign };
+                Disturbance { turbine: rest, output: rest, readings: [reading; 2], age: -rest, valve: -rest }
+            });
+            let disturbances: Vec<_> = disturbances.collect();
+            let bound = designed(GainMethod::PeakToPeak, sample_time).inertia_phase.bound_pa;
+            let errors = errors(true, GainMethod::PeakToPeak, sample_time, 0.0, &disturbances);
+            let largest = errors.iter().map(|[error, _]| *error).fold(0.0, f64::max);
+            assert!(errors.len() >= 7 && largest <= bound + 1.0, "{sample_time} {every}: {largest} {bound}");
+        }
+    }
+}
+
+#[test]
+fn without_model_error_the_estimate_decays_at_least_with_kappa2() {
+    for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let kappa2 = design_rigid(&vehicle).unwrap().of(phase).unwrap().kappa2_per_s;
+        let mut car = Car::start(phase, 0.1e6);
+        for n in 1..=1000 {
+            let bound = 0.1e6 * (-kappa2 * f64::from(n) * DT_S).exp();
+            let error = car.step([0.0; 2]);
+            assert!(car.in_phase, "{n}");
+            assert!(error.abs() <= bound + DISCRETISATION_PA, "{n}: {error} Pa, bound {bound} Pa");
+        }
+    }
+}

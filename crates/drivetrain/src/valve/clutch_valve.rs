@@ -1,0 +1,125 @@
+//! The valve of the real car, of either kind.
+
+use crate::valve::{CommandKind, LinearValve, PulseWidth, ValveMaps, ValveStep};
+use crate::{Real, Table1};
+
+/// The valve that fills a clutch of the real car: what the plant simulates, the shift controller is calibrated for, and the
+/// range of an estimate is made from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ClutchValve<T> {
+    /// Commanded by a current, A; its maps as measured.
+    Proportional(ValveMaps<T>),
+    /// Commanded by a duty cycle, %.
+    PulseWidth {
+        /// How the pressure follows the duty cycle.
+        law: PulseWidth<T>,
+        /// Delay over the commanded duty cycle: s over %.
+        delay_s: Table1<T>,
+    },
+}
+
+impl<T: Real> ClutchValve<T> {
+    /// What its command is.
+    pub fn command_kind(&self) -> CommandKind {
+        match self {
+            Self::Proportional(_) => CommandKind::Current,
+            Self::PulseWidth { .. } => CommandKind::DutyCycle,
+        }
+    }
+
+    /// Rate of the cylinder pressure, Pa/s, where `settled_pa` is the [`Self::settled_pressure`] of the command that has
+    /// arrived.
+    #[inline]
+    pub fn pressure_rate(&self, pressure_pa: T, settled_pa: T) -> T {
+        match self {
+            Self::Proportional(maps) => maps.pressure_rate(pressure_pa, settled_pa),
+            Self::PulseWidth { law, .. } => law.pressure_rate(pressure_pa, settled_pa),
+        }
+    }
+
+    /// Pressure that a constant command ends at, Pa.
+    #[inline]
+    pub fn settled_pressure(&self, command: T) -> T {
+        match self {
+            Self::Proportional(maps) => maps.settled_pressure(command),
+            Self::PulseWidth { law, .. } => law.settled_pressure(command),
+        }
+    }
+
+    /// Command that ends at `pressure_pa`: the inverse of [`Self::settled_pressure`].
+    pub fn command_for(&self, pressure_pa: T) -> T {
+        match self {
+            Self::Proportional(maps) => maps.current_for(pressure_pa),
+            Self::PulseWidth { law, .. } => law.duty_for(pressure_pa),
+        }
+    }
+
+    /// Time by which a pressure that moves at `rate_pa_s` lags behind its settled value, s.
+    pub fn lag(&self, pressure_pa: T, rate_pa_s: T) -> T {
+        match self {
+            Self::Proportional(maps) => maps.time_constant_s.at(pressure_pa),
+            Self::PulseWidth { law, .. } => law.lag(rate_pa_s),
+        }
+    }
+
+    /// Delay of a command, s.
+    #[inline]
+    pub fn delay(&self, command: T) -> T {
+        match self {
+            Self::Proportional(maps) => maps.delay_s.at(command),
+            Self::PulseWidth { delay_s, .. } => delay_s.at(command),
+        }
+    }
+
+    /// Over `dt_s` on the way from `pressure_pa` to `settled_pa`, with the lag at `pressure_pa`; of a pulse-width valve
+    /// linearised along its own way.
+    #[inline]
+    pub fn step(&self, settled_pa: T, pressure_pa: T, dt_s: T) -> ValveStep<T> {
+        match self {
+            Self::Proportional(maps) => {
+                let a22_per_s = -maps.time_constant_s.at(pressure_pa).recip();
+                LinearValve { a22_per_s, b2_pa_s: -a22_per_s * settled_pa }.step(dt_s)
+            }
+            Self::PulseWidth { law, .. } => law.step(law.duty_for(settled_pa), pressure_pa, dt_s),
+        }
+    }
+
+    /// Where a pressure is after `dt_s` on its way to `settled_pa`, at the furthest or at the nearest that a factor on its
+    /// lag between the two of `lag_factor` allows.
+    #[inline]
+    pub fn moved(&self, pressure_pa: T, settled_pa: T, dt_s: T, lag_factor: [T; 2], furthest: bool) -> T {
+        match self {
+            Self::Proportional(maps) => maps.moved(pressure_pa, settled_pa, dt_s, lag_factor, furthest),
+            Self::PulseWidth { law, .. } => {
+                let factor = if furthest { lag_factor[0] } else { lag_factor[1] };
+                law.slowed(factor).moved(pressure_pa, settled_pa, dt_s)
+            }
+        }
+    }
+
+    /// The valve with its lag, its gain multiplied by these factors, and a constant delay in place of its own if there
+    /// is one.
+    #[must_use]
+    pub fn changed(self, lag_factor: T, gain_factor: T, delay_s: Option<T>) -> Self {
+        let delay = |own: Table1<T>| delay_s.map_or(own, Table1::constant);
+        match self {
+            Self::Proportional(maps) => Self::Proportional(ValveMaps {
+                time_constant_s: maps.time_constant_s.scaled(lag_factor),
+                gain_pa_a: maps.gain_pa_a.scaled(gain_factor),
+                delay_s: delay(maps.delay_s),
+            }),
+            Self::PulseWidth { law, delay_s } => {
+                let mut law = law.slowed(lag_factor);
+                law.line_pressure_pa = law.line_pressure_pa * gain_factor;
+                Self::PulseWidth { law, delay_s: delay(delay_s) }
+            }
+        }
+    }
+    /// The same valve in another precision.
+    pub fn cast<U: Real>(&self) -> ClutchValve<U> {
+        match self {
+            Self::Proportional(maps) => ClutchValve::Proportional(maps.cast()),
+            Self::PulseWidth { law, delay_s } => ClutchValve::PulseWidth { law: law.cast(), delay_s: delay_s.cast() },
+        }
+    }
+}

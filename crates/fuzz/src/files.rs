@@ -1,0 +1,75 @@
+//! The readers of files, and what a command does next with a file that they take.
+
+use std::fs;
+use std::path::PathBuf;
+
+use config::{Experiment, Study, Vehicle};
+use design::{design_compliant, design_rigid};
+use study::campaign::{factor_values, run_seed};
+use study::{Row, RunColumns, simulate_shift};
+use trace::{ColumnKind, GrowingTable, partial_path, read_csv, read_rows, write_csv, write_parquet};
+
+use crate::{Depth, Fuzzer, samples};
+
+/// Drives longer than this are not simulated, s.
+const LONGEST_DRIVE_S: f64 = 20.0;
+
+/// Writes the input under this name in the fuzzer's folder.
+fn written(fuzzer: &Fuzzer, name: &str, input: &[u8]) -> PathBuf {
+    let path = fuzzer.folder.join(name);
+    fs::write(&path, input).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    path
+}
+
+pub(crate) fn vehicle(fuzzer: &Fuzzer, input: &[u8]) {
+    let Ok(vehicle) = Vehicle::read(&written(fuzzer, "vehicles/input", input)) else { return };
+    samples::drive_all(&vehicle);
+    if fuzzer.depth == Depth::Long {
+        // Requirements that cannot be met are an error, which is well.
+        let _ = (design_rigid(&vehicle), design_compliant(&vehicle));
+    }
+}
+
+pub(crate) fn experiment(fuzzer: &Fuzzer, input: &[u8]) {
+    let Ok(experiment) = Experiment::read(&written(fuzzer, "experiments/input", input)) else { return };
+    if fuzzer.depth == Depth::Long && experiment.duration_s <= LONGEST_DRIVE_S {
+        let car = experiment.simulated_vehicle(&fuzzer.vehicle);
+        let _ = simulate_shift(&car, &fuzzer.vehicle, &experiment, config::study::RECORD_BEFORE_S);
+    }
+}
+
+pub(crate) fn study(fuzzer: &Fuzzer, input: &[u8]) {
+    let Ok(study) = Study::read(&written(fuzzer, "experiments/input", input)) else { return };
+    for run in [0, study.runs / 2, study.runs - 1] {
+        let _ = (study.varied(&factor_values(&study, run)), run_seed(&study, run));
+    }
+}
+
+pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
+    let Ok(trace) = read_csv(&written(fuzzer, "input", input)) else { return };
+    let _ = trace.median_step_s();
+    if let Ok(columns) = RunColumns::of(&trace, &fuzzer.vehicle) {
+        for observer in &fuzzer.observers {
+            observer.run(&fuzzer.vehicle, &columns);
+        }
+    }
+    let _ = write_csv(&fuzzer.folder.join("output"), &trace);
+}
+
+pub(crate) fn table(fuzzer: &Fuzzer, input: &[u8]) {
+    let path = written(fuzzer, "input", input);
+    let header = fuzzer.layout.header().join(",");
+    let row = |line: &str| {
+        Row::from_cells(line.split(','), &fuzzer.layout).map(drop).ok_or_else(|| "no row of a study".to_owned())
+    };
+    let _ = read_rows(&path, &header, row);
+    let kind = |name: &str| match name {
+        "run" | "seed" => ColumnKind::Whole,
+        "status" => ColumnKind::Word,
+        _ => ColumnKind::Number,
+    };
+    let _ = write_parquet(&path, &fuzzer.folder.join("output"), kind);
+    let table = fuzzer.folder.join("growing");
+    written(fuzzer, &partial_path(&table).to_string_lossy(), input);
+    let _ = GrowingTable::resume(&table, &header, row);
+}

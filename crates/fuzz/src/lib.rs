@@ -1,0 +1,189 @@
+//! Broken files for every reader, and broken samples for every observer.
+//!
+//! A case is a target and a number; its input follows from them alone, so that it can be made again on any machine.
+//! A reader may refuse an input; an accepted input is used as the commands would use it. A panic is a finding.
+//!
+//! `cargo test` makes the first few hundred cases of each target. `cargo run --release -p fuzz -- --seconds 600` goes on
+//! for longer; it prints each finding and writes its input, which `--replay` takes. An input that was a finding goes to
+//! `corpus/`: the test tries each of those files as it is, and mutates them too.
+
+pub mod files;
+pub mod mutate;
+pub mod samples;
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::{env, fs, panic};
+
+use config::{GainMethod, Study, Vehicle};
+use rand_pcg::Pcg64Mcg;
+use study::AnyObserver;
+use study::campaign::{Layout, Row, Status};
+
+/// What an input is given to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// The reader of vehicle files.
+    Vehicle,
+    /// The reader of experiment files.
+    Experiment,
+    /// The reader of study files.
+    Study,
+    /// The reader of logs.
+    Log,
+    /// The readers of a study's table, finished or not, and its conversion to Parquet.
+    Table,
+    /// The `step` of every observer.
+    Step,
+}
+
+impl Target {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Vehicle, Self::Experiment, Self::Study, Self::Log, Self::Table, Self::Step];
+
+    /// Its name on the command line, and the folder of its corpus.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vehicle => "vehicle",
+            Self::Experiment => "experiment",
+            Self::Study => "study",
+            Self::Log => "log",
+            Self::Table => "table",
+            Self::Step => "step",
+        }
+    }
+}
+
+/// How much is tried with each input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Depth {
+    /// What takes milliseconds without optimisation.
+    Short,
+    /// All gains are designed, and the drive of an experiment is simulated.
+    Long,
+}
+
+/// Everything that the targets need.
+#[derive(Debug)]
+pub struct Fuzzer {
+    depth: Depth,
+    /// A folder of its own, with the project's vehicle and experiment files in it.
+    folder: PathBuf,
+    vehicle: Vehicle,
+    observers: Vec<AnyObserver>,
+    layout: Layout,
+}
+
+impl Fuzzer {
+    /// Makes the observers ready, and a folder for the inputs.
+    ///
+    /// # Errors
+    /// The project's own files are not as they should be, or the folder cannot be written.
+    pub fn new(depth: Depth) -> Result<Self, Box<dyn Error>> {
+        static MADE: AtomicUsize = AtomicUsize::new(0);
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let folder = env::temp_dir().join(format!("wetclutch-fuzz-{}-{number}", std::process::id()));
+        for name in ["vehicles", "experiments"] {
+            fs::create_dir_all(folder.join(name))?;
+            for entry in fs::read_dir(project().join(name))? {
+                let path = entry?.path();
+                fs::copy(&path, folder.join(name).join(path.file_name().unwrap_or_default()))?;
+            }
+        }
+        let vehicle = Vehicle::two_speed_at()?;
+        let methods = if depth == Depth::Long { &GainMethod::ALL[..] } else { &[GainMethod::Iss] };
+        let observers = samples::observers(&vehicle, methods)?;
+        let layout = Layout::of(&Study::read(&folder.join("experiments/settings.toml"))?);
+        Ok(Self { depth, folder, vehicle, observers, layout })
+    }
+
+    /// The input of a case.
+    pub fn input(&self, target: Target, case: u64) -> Vec<u8> {
+        let mut random = mutate::Random::new(Pcg64Mcg::new(u128::from(case) << 64 | (target as u128) << 1 | 1));
+        if target == Target::Step {
+            return samples::input(&mut random);
+        }
+        let seeds = self.seeds(target);
+        let seed = &seeds[random.below(seeds.len())];
+        mutate::mutated(seed, &mut random)
+    }
+
+    /// Gives an input to a target.
+    ///
+    /// # Panics
+    /// On a defect of the project.
+    pub fn run(&self, target: Target, input: &[u8]) {
+        match target {
+            Target::Vehicle => files::vehicle(self, input),
+            Target::Experiment => files::experiment(self, input),
+            Target::Study => files::study(self, input),
+            Target::Log => files::log(self, input),
+            Target::Table => files::table(self, input),
+            Target::Step => samples::step_all(&self.vehicle, &self.observers, input),
+        }
+    }
+
+    /// Gives an input to a target; `false` if it panicked.
+    pub fn survives(&self, target: Target, input: &[u8]) -> bool {
+        panic::catch_unwind(panic::AssertUnwindSafe(|| self.run(target, input))).is_ok()
+    }
+
+    /// The inputs that are kept for a target.
+    pub fn corpus(target: Target) -> Vec<Vec<u8>> {
+        texts(&[project().join("crates/fuzz/corpus").join(target.name())])
+    }
+
+    /// The inputs that the cases of a target are made from: its corpus and the project's own files.
+    fn seeds(&self, target: Target) -> Vec<Vec<u8>> {
+        let mut seeds = Self::corpus(target);
+        let experiments = self.folder.join("experiments");
+        match target {
+            Target::Vehicle => seeds.extend(texts(&[self.folder.join("vehicles")])),
+            Target::Experiment => {
+                seeds.extend(["bench", "e1", "e4"].map(|name| text(&experiments.join(name).with_extension("toml"))));
+            }
+            Target::Study => seeds.extend(
+                ["settings", "budget", "error_bound"].map(|name| text(&experiments.join(name).with_extension("toml"))),
+            ),
+            Target::Table => seeds.push(self.table()),
+            Target::Log | Target::Step => {}
+        }
+        seeds
+    }
+
+    /// A small table of runs.
+    fn table(&self) -> Vec<u8> {
+        let mut text = self.layout.header().join(",");
+        for (run, status) in [(0, Status::Ok), (1, Status::NoLockUp), (2, Status::TieUp)] {
+            let numbers = vec![if status.is_scored() { 0.25 } else { f64::NAN }; self.layout.width()];
+            text.push('\n');
+            text += &Row { run, seed: 7 + run, status, numbers }.line(&self.layout);
+        }
+        text.push('\n');
+        text.into_bytes()
+    }
+}
+
+impl Drop for Fuzzer {
+    fn drop(&mut self) {
+        // A folder that stays behind harms nothing.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+fn project() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn text(path: &std::path::Path) -> Vec<u8> {
+    fs::read(path).unwrap_or_default()
+}
+
+/// The files in these folders, in the order of their names; none in a folder that is not there.
+fn texts(folders: &[PathBuf]) -> Vec<Vec<u8>> {
+    let entries = folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    paths.sort();
+    paths.iter().map(|path| text(path)).collect()
+}

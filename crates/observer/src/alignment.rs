@@ -1,0 +1,175 @@
+//! All signals at one time, from readings that come when they come.
+
+use drivetrain::{Real, ReducedShift};
+
+use crate::{
+    ChannelHealth, Channels, CompliantObserver, Estimate, Estimator, ExtendedFilter, Health, Input, InputLimits,
+    Inversion, Reading, RigidObserver, Sample, SampleEstimator, SlidingObserver, SuperTwisting, UnscentedFilter,
+};
+
+/// For how long a speed that does not come is carried on by its last change, s.
+const CARRIED_S: f64 = 0.05;
+
+/// The newest readings of a speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Speed<T> {
+    last: Option<Reading<T>>,
+    /// How fast it changed between the last two readings, rad/s^2.
+    rate: T,
+}
+
+/// Memory of an [`Alignment`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlignmentState<T> {
+    engine: Speed<T>,
+    turbine: Speed<T>,
+    output: Speed<T>,
+    wheel: Speed<T>,
+    command: Option<T>,
+}
+
+/// Brings all channels to the time of the step: a speed of which no reading came, or an old one, is carried on by a line
+/// through its last two readings for up to 50 ms \[chosen\]. A command stands until the next one.
+///
+/// Readings of the moment pass unchanged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment<T> {
+    /// Kinematics of the shift.
+    pub shift: ReducedShift<T>,
+    /// What counts as a measurement.
+    pub limits: InputLimits<T>,
+}
+
+impl<T: Real> AlignmentState<T> {
+    /// Nothing has come yet.
+    pub fn new() -> Self {
+        let none = Speed { last: None, rate: T::zero() };
+        Self { engine: none, turbine: none, output: none, wheel: none, command: None }
+    }
+}
+
+impl<T: Real> Default for AlignmentState<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Speed<T> {
+    /// Takes what came of it, `dt_s` after the step before. Returns its value now, NaN if there is none.
+    #[inline]
+    fn take(&mut self, dt_s: T, reading: Option<Reading<T>>, limits: &InputLimits<T>) -> (T, ChannelHealth) {
+        let last = self.last.map(|last| Reading { age_s: last.age_s + dt_s, ..last });
+        self.last = last;
+        let mut health = ChannelHealth::Absent;
+        if let Some(reading) = reading {
+            // A reading from before the last one came too late to tell anything.
+            let newer = last.is_none_or(|last| reading.age_s <= last.age_s);
+            let usable = limits.speed_valid(reading.value) && reading.age_s >= T::zero() && newer;
+            health = if usable { ChannelHealth::Good } else { ChannelHealth::Refused };
+            if usable {
+                self.rate = match last {
+                    Some(last) if last.age_s > reading.age_s && last.age_s - reading.age_s <= T::of(CARRIED_S) => {
+                        (reading.value - last.value) / (last.age_s - reading.age_s)
+                    }
+                    _ => T::zero(),
+                };
+                self.last = Some(reading);
+            }
+        }
+        match self.last {
+            Some(last) if last.age_s <= T::zero() => (last.value, health),
+            Some(last) if last.age_s <= T::of(CARRIED_S) => (last.value + last.age_s * self.rate, health),
+            // A refused reading says more than that there is none.
+            _ if health == ChannelHealth::Refused => (T::nan(), health),
+            _ => (T::nan(), ChannelHealth::Lost),
+        }
+    }
+}
+
+impl<T: Real> Alignment<T> {
+    /// All signals at the time of a step, and what became of each channel.
+    #[inline]
+    pub fn step(&self, state: &mut AlignmentState<T>, input: &Input<T>) -> (Sample<T>, Channels<ChannelHealth>) {
+        let zero = T::zero();
+        let possible = input.dt_s >= zero && input.dt_s.is_finite();
+        let dt_s = if possible { input.dt_s } else { T::infinity() };
+        let limits = &self.limits;
+        let (engine_rad_s, engine) = state.engine.take(dt_s, input.engine_rad_s, limits);
+        let (turbine_rad_s, turbine) = state.turbine.take(dt_s, input.turbine_rad_s, limits);
+        let (output_rad_s, output) = state.output.take(dt_s, input.output_rad_s, limits);
+        let (wheel_rad_s, wheel) = state.wheel.take(dt_s, input.wheel_rad_s, limits);
+        let command = match input.command {
+            Some(reading) if limits.command_valid(reading.value) => {
+                state.command = Some(reading.value);
+                ChannelHealth::Good
+            }
+            Some(_) => ChannelHealth::Refused,
+            None if state.command.is_some() => ChannelHealth::Absent,
+            None => ChannelHealth::Lost,
+        };
+        let refused = input.command.map(|reading| reading.value).filter(|_| command == ChannelHealth::Refused);
+        let sample = Sample {
+            dt_s: input.dt_s,
+            engine_rad_s,
+            turbine_rad_s,
+            slip_rad_s: self.shift.oncoming_slip(turbine_rad_s, output_rad_s),
+            wheel_rad_s,
+            command: refused.or(state.command).unwrap_or_else(T::nan),
+        };
+        (sample, Channels { engine, turbine, output, wheel, command })
+    }
+}
+
+/// Memory of a [`SampleEstimator`] that is used as an [`Estimator`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlignedState<T, S> {
+    alignment: AlignmentState<T>,
+    observer: S,
+}
+
+impl<T: Real> Alignment<T> {
+    /// A step of an observer that needs all signals at one time.
+    #[inline]
+    fn step_observer<O: SampleEstimator<T>>(
+        observer: &O,
+        state: &mut AlignedState<T, O::SampleState>,
+        input: &Input<T>,
+    ) -> Estimate<T> {
+        let tracker = observer.tracker();
+        let alignment = Self { shift: tracker.shift, limits: tracker.limits };
+        let (sample, channels) = alignment.step(&mut state.alignment, input);
+        let mut estimate = observer.step_sample(&mut state.observer, &sample);
+        estimate.channels = channels;
+        if channels.each().contains(&ChannelHealth::Refused) {
+            estimate.health = estimate.health.max(Health::ReadingRefused);
+        }
+        estimate
+    }
+}
+
+macro_rules! estimators {
+    ($($observer:ident),*) => {$(
+        impl<T: Real> Estimator<T> for $observer<T> {
+            type State = AlignedState<T, <Self as SampleEstimator<T>>::SampleState>;
+
+            fn start(&self) -> Self::State {
+                AlignedState { alignment: AlignmentState::new(), observer: self.start_sample() }
+            }
+
+            #[inline]
+            fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T> {
+                Alignment::step_observer(self, state, input)
+            }
+        }
+    )*};
+}
+
+estimators!(
+    RigidObserver,
+    CompliantObserver,
+    SlidingObserver,
+    ExtendedFilter,
+    UnscentedFilter,
+    SuperTwisting,
+    Inversion
+);

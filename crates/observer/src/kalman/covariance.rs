@@ -1,0 +1,167 @@
+//! The covariance of the states and of the speeds at an earlier time.
+
+use drivetrain::Real;
+
+use super::powertrain::{COLUMNS, LAWS};
+use super::{GAIN, N, OFFGOING, PRESSURE, SHARE};
+
+/// Covariance of the states, of the states with the three speeds at an earlier time, and of those.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Covariance<T> {
+    pub(super) states: [[T; N]; N],
+    pub(super) across: [[T; 3]; N],
+    pub(super) within: [[T; 3]; 3],
+}
+
+/// A scalar measurement: covariance of the states and of the earlier speeds with it, and its variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured<T> {
+    pub(super) states: [T; N],
+    pub(super) earlier: [T; 3],
+    pub(super) variance: T,
+}
+
+impl<T: Real> Covariance<T> {
+    /// Independent states with these standard deviations.
+    pub(super) fn of(deviations: [T; N]) -> Self {
+        let mut states = [[T::zero(); N]; N];
+        for (i, deviation) in deviations.into_iter().enumerate() {
+            states[i][i] = deviation * deviation;
+        }
+        let mut covariance = Self { states, across: [[T::zero(); 3]; N], within: [[T::zero(); 3]; 3] };
+        covariance.remember();
+        covariance
+    }
+
+    /// The speeds of now become the earlier ones.
+    #[inline]
+    pub(super) fn remember(&mut self) {
+        for (across, row) in self.across.iter_mut().zip(&self.states) {
+            *across = [row[0], row[1], row[2]];
+        }
+        self.within = [self.across[0], self.across[1], self.across[2]];
+    }
+
+    /// `P = F P F'`: the first states have a full row each over the first columns, two others fade, the rest stands.
+    #[inline]
+    pub(super) fn spread(&mut self, f: &[[T; COLUMNS]; LAWS], stay: T, keep: T) {
+        let p = &mut self.states;
+        let mut fp = [[T::zero(); N]; LAWS];
+        let mut across = [[T::zero(); 3]; LAWS];
+        for (i, row) in f.iter().enumerate() {
+            if i == PRESSURE {
+                for j in 0..N {
+                    fp[i][j] = row[PRESSURE] * p[PRESSURE][j] + row[GAIN] * p[GAIN][j];
+                }
+                for (sum, (p, g)) in across[i].iter_mut().zip(self.across[PRESSURE].iter().zip(&self.across[GAIN])) {
+                    *sum = row[PRESSURE] * *p + row[GAIN] * *g;
+                }
+                continue;
+            }
+            for (c, weight) in row.iter().enumerate() {
+                for j in 0..N {
+                    fp[i][j] = fp[i][j] + *weight * p[c][j];
+                }
+                for (sum, p) in across[i].iter_mut().zip(&self.across[c]) {
+                    *sum = *sum + *weight * *p;
+                }
+            }
+        }
+        self.across[..LAWS].copy_from_slice(&across);
+        for m in 0..3 {
+            self.across[SHARE][m] = stay * self.across[SHARE][m];
+            self.across[OFFGOING][m] = keep * self.across[OFFGOING][m];
+        }
+        // The states without a law of their own, among each other.
+        for (fading, left) in [(SHARE, stay), (OFFGOING, keep)] {
+            for row in p.iter_mut().skip(LAWS) {
+                row[fading] = left * row[fading];
+            }
+            for x in p[fading].iter_mut().skip(LAWS) {
+                *x = left * *x;
+            }
+        }
+        for i in 0..LAWS {
+            for j in i..LAWS {
+                let value = if j == PRESSURE {
+                    fp[i][PRESSURE] * f[j][PRESSURE] + fp[i][GAIN] * f[j][GAIN]
+                } else {
+                    (0..COLUMNS).fold(T::zero(), |sum, c| sum + fp[i][c] * f[j][c])
+                };
+                p[i][j] = value;
+                p[j][i] = value;
+            }
+            for j in LAWS..N {
+                let value = match j {
+                    SHARE => stay * fp[i][j],
+                    OFFGOING => keep * fp[i][j],
+                    _ => fp[i][j],
+                };
+                p[i][j] = value;
+                p[j][i] = value;
+            }
+        }
+    }
+
+    /// Adds to the variance of a state.
+    #[inline]
+    pub(super) fn add(&mut self, state: usize, variance: T) {
+        self.states[state][state] = self.states[state][state] + variance;
+    }
+
+    /// Makes a state independent of all others, with this standard deviation.
+    pub(super) fn renew(&mut self, state: usize, deviation: T) {
+        for i in 0..N {
+            self.states[i][state] = T::zero();
+            self.states[state][i] = T::zero();
+        }
+        self.across[state] = [T::zero(); 3];
+        self.states[state][state] = deviation * deviation;
+    }
+
+    /// Corrects for a measurement by Joseph's form, which holds for any gain: `P - K S' - S K' + K V K'`. The gain of
+    /// the states that are `considered` is zero: their uncertainty is accounted for and stays.
+    #[inline]
+    pub(super) fn correct(&mut self, measured: &Measured<T>, considered: [bool; N]) -> ([T; N], [T; 3]) {
+        let per_variance = measured.variance.recip();
+        let mut gain = measured.states.map(|with| with * per_variance);
+        for (gain, considered) in gain.iter_mut().zip(considered) {
+            if considered {
+                *gain = T::zero();
+            }
+        }
+        let earlier = measured.earlier.map(|with| with * per_variance);
+        let half_variance = T::of(0.5) * measured.variance;
+        // K w' + w K' with w = K V/2 - S.
+        let weight: [T; N] = core::array::from_fn(|i| half_variance * gain[i] - measured.states[i]);
+        let earlier_weight: [T; 3] = core::array::from_fn(|m| half_variance * earlier[m] - measured.earlier[m]);
+        for i in 0..N {
+            for j in i..N {
+                let value = self.states[i][j] + (gain[i] * weight[j] + weight[i] * gain[j]);
+                self.states[i][j] = value;
+                self.states[j][i] = value;
+            }
+            for m in 0..3 {
+                self.across[i][m] = self.across[i][m] + (gain[i] * earlier_weight[m] + weight[i] * earlier[m]);
+            }
+        }
+        for l in 0..3 {
+            for m in 0..3 {
+                self.within[l][m] =
+                    self.within[l][m] + (earlier[l] * earlier_weight[m] + earlier_weight[l] * earlier[m]);
+            }
+        }
+        (gain, earlier)
+    }
+
+    /// The covariance of some states.
+    pub(super) fn block<const K: usize>(&self, states: [usize; K]) -> [[T; K]; K] {
+        states.map(|i| states.map(|j| self.states[i][j]))
+    }
+
+    /// Whether all of it are numbers, and no variance is negative.
+    #[inline]
+    pub(super) fn is_sound(&self) -> bool {
+        self.states.iter().enumerate().all(|(i, row)| row[i] >= T::zero() && row[i].is_finite())
+    }
+}

@@ -1,0 +1,155 @@
+//! The engine's speed at any time, from its readings: a filter of speed and acceleration.
+
+use drivetrain::Real;
+
+use super::gate::{Gate, Verdict};
+
+/// What the engine's filter knows beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EngineNoise<T> {
+    /// Standard deviation of a reading, rad/s.
+    pub reading_rad_s: T,
+    /// How the acceleration changes: random walk, rad/s^2 per root second.
+    pub acceleration_walk: T,
+    /// Largest size of an acceleration, rad/s^2.
+    pub acceleration_max_rad_s2: T,
+}
+
+/// Memory of the engine's filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Engine<T> {
+    /// Speed, rad/s, and acceleration, rad/s^2.
+    mean: [T; 2],
+    /// Variances of both, and their covariance.
+    speed_variance: T,
+    covariance: T,
+    acceleration_variance: T,
+    gate: Gate,
+    /// Time since the last reading that was taken, s.
+    pub(crate) silent_s: T,
+}
+
+impl<T: Real> Engine<T> {
+    /// Begins with a reading.
+    pub(crate) fn new(speed_rad_s: T, noise: &EngineNoise<T>) -> Self {
+        let zero = T::zero();
+        Self {
+            mean: [speed_rad_s, zero],
+            speed_variance: noise.reading_rad_s * noise.reading_rad_s,
+            covariance: zero,
+            acceleration_variance: noise.acceleration_max_rad_s2 * noise.acceleration_max_rad_s2,
+            gate: Gate::new(),
+            silent_s: zero,
+        }
+    }
+
+    /// Speed a time ago, rad/s.
+    #[inline]
+    pub(crate) fn speed_before(&self, time_s: T) -> T {
+        self.mean[0] - time_s * self.mean[1]
+    }
+
+    /// Variance of the speed now, (rad/s)^2.
+    #[inline]
+    pub(crate) fn variance(&self) -> T {
+        self.speed_variance
+    }
+
+    /// Lets time pass.
+    #[inline]
+    pub(crate) fn predict(&mut self, noise: &EngineNoise<T>, dt_s: T) {
+        let walk = noise.acceleration_walk * noise.acceleration_walk * dt_s;
+        let limit = noise.acceleration_max_rad_s2;
+        self.mean[0] = self.mean[0] + dt_s * self.mean[1];
+        // Without readings an acceleration does not last for ever.
+        self.mean[1] =
+            self.mean[1].max(-limit).min(limit) * if self.silent_s > T::of(0.05) { T::of(0.5) } else { T::one() };
+        self.speed_variance = self.speed_variance
+            + dt_s * (T::of(2.0) * self.covariance + dt_s * self.acceleration_variance)
+            + walk * dt_s * dt_s / T::of(3.0);
+        self.covariance = self.covariance + dt_s * self.acceleration_variance + T::of(0.5) * walk * dt_s;
+        self.acceleration_variance = (self.acceleration_variance + walk).min(limit * limit);
+        self.silent_s = self.silent_s + dt_s;
+    }
+
+    /// Takes a reading that was measured `age_s` ago.
+    #[inline]
+    pub(crate) fn take(&mut self, noise: &EngineNoise<T>, speed_rad_s: T, age_s: T) -> Verdict {
+        let surprise = speed_rad_s - self.speed_before(age_s);
+        let reading = noise.reading_rad_s * noise.reading_rad_s;
+        let with_reading = |engine: &Self| {
+            [
+                engine.speed_variance - age_s * engine.covariance,
+                engine.covariance - age_s * engine.acceleration_variance,
+            ]
+        };
+        let total = |with: [T; 2]| (with[0] - age_s * with[1]).max(T::zero()) + reading;
+        let mut with = with_reading(self);
+        let verdict = self.gate.judge(surprise, total(with));
+        match verdict {
+            Verdict::Refused => return verdict,
+            Verdict::Jumped => {
+                self.speed_variance = self.speed_variance + surprise * surprise;
+                with = with_reading(self);
+            }
+            Verdict::Taken => {}
+        }
+        let variance = total(with);
+        let gain = with.map(|with| with / variance);
+        self.mean = [self.mean[0] + gain[0] * surprise, self.mean[1] + gain[1] * surprise];
+        self.speed_variance = (self.speed_variance - gain[0] * with[0]).max(T::zero());
+        self.covariance = self.covariance - gain[0] * with[1];
+        self.acceleration_variance = (self.acceleration_variance - gain[1] * with[1]).max(T::zero());
+        self.silent_s = T::zero();
+        verdict
+    }
+
+    /// Whether all of it are numbers.
+    pub(crate) fn is_sound(&self) -> bool {
+        let [speed, acceleration] = self.mean;
+        [speed, acceleration, self.speed_variance, self.covariance, self.acceleration_variance]
+            .into_iter()
+            .all(|x| x.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE: EngineNoise<f64> =
+        EngineNoise { reading_rad_s: 0.1, acceleration_walk: 1300.0, acceleration_max_rad_s2: 2000.0 };
+
+    #[test]
+    fn a_steady_acceleration_is_found_through_old_readings() {
+        let mut engine = Engine::new(100.0, &NOISE);
+        for k in 1..=40 {
+            engine.predict(&NOISE, 0.01);
+            // 150 rad/s^2, read 4 ms late.
+            engine.take(&NOISE, 100.0 + 150.0 * (0.01 * f64::from(k) - 0.004), 0.004);
+        }
+        assert!((engine.speed_before(0.0) - 160.0).abs() < 0.05, "{engine:?}");
+        assert!((engine.speed_before(0.01) - 158.5).abs() < 0.05, "{engine:?}");
+    }
+
+    #[test]
+    fn one_wrong_reading_is_refused_and_a_jump_is_believed() {
+        let mut engine = Engine::new(100.0, &NOISE);
+        let mut step = |speed: f64| {
+            engine.predict(&NOISE, 0.01);
+            (engine.take(&NOISE, speed, 0.0), engine.mean[0])
+        };
+        for _ in 0..30 {
+            step(100.0);
+        }
+        let (verdict, speed) = step(900.0);
+        assert!(verdict == Verdict::Refused && (speed - 100.0).abs() < 0.1);
+        assert_eq!(step(100.0).0, Verdict::Taken);
+        for _ in 0..10 {
+            step(100.0);
+        }
+        assert_eq!(step(200.0).0, Verdict::Refused);
+        let (verdict, speed) = step(200.0);
+        assert!(verdict == Verdict::Jumped && (speed - 200.0).abs() < 1.0, "{speed}");
+    }
+}

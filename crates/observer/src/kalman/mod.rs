@@ -1,0 +1,591 @@
+//! Kalman filter of the powertrain with elastic shafts, unknown torques, and sensors that are not exact.
+//!
+//! | state | law | meaning |
+//! |---|---|---|
+//! | `w_t`, `w_0`, `w_w` | momentum | speeds of turbine, output and driven wheels, rad/s |
+//! | `T_k` | `K_s (w_0/i_df - w_w)` | torque of the shafts' spring, N m |
+//! | `p` | the valve's maps, times `1 + g` | pressure of the oncoming clutch, Pa |
+//! | `e` | fades in seconds | share by which the turbine torque differs from the converter's maps |
+//! | `T_ca` | random walk; once released it fades | torque of the offgoing clutch, N m |
+//! | `T_L` | random walk | all that the wheels' equation leaves out: road, grade, mass, tyre slip, N m |
+//! | `f`, `g` | constant | share by which the friction and the valve's gain differ from their maps |
+//! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
+//!
+//! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
+//! with the speed at the time at which it was measured, which lies between two steps or before both. Before the shift
+//! the gear ratio ties turbine to output speed: with it, scale and delays are found. They, friction and gain are
+//! kept from shift to shift.
+//!
+//! A reading that contradicts all the others is refused once; one that goes on to do so is believed. The share `e` is
+//! only corrected while both clutches slip (a consider state, S. F. Schmidt 1966): before, an error that shaft
+//! and turbine torque share cancels in the clutch torque, and no speed shows it.
+//!
+//! The covariance is corrected in Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain and stays positive
+//! in single precision.
+
+mod covariance;
+mod engine;
+mod gate;
+mod phases;
+mod powertrain;
+mod predict;
+mod readings;
+mod valve_model;
+
+use drivetrain::{Engagement, Real, ShiftCoefficients};
+
+use crate::{
+    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, Phase, Supervisor,
+    SupervisorState,
+};
+use covariance::Covariance;
+use engine::Engine;
+use gate::Gate;
+use valve_model::Commands;
+
+pub use engine::EngineNoise;
+pub use valve_model::ValveModel;
+
+const N: usize = 13;
+const TURBINE: usize = 0;
+const OUTPUT: usize = 1;
+const WHEEL: usize = 2;
+const SPRING: usize = 3;
+const PRESSURE: usize = 4;
+const SHARE: usize = 5;
+const OFFGOING: usize = 6;
+const LOAD: usize = 7;
+const FRICTION: usize = 8;
+const GAIN: usize = 9;
+const SCALE: usize = 10;
+const DELAY: usize = 11;
+const SKEW: usize = 12;
+
+/// What the filter learns and keeps from shift to shift.
+const LEARNT: [usize; 5] = [FRICTION, GAIN, SCALE, DELAY, SKEW];
+
+/// Time without any speed after which the filter begins anew, s.
+pub const LOST_S: f64 = 0.25;
+/// Longest time that is predicted at once, s; a longer one is cut.
+const PIECE_S: f64 = 0.0125;
+/// How old the first readings may be, s.
+const FIRST_S: f64 = 0.05;
+
+/// How a toothed wheel is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedReading<T> {
+    /// Standard deviation of a reading, rad/s.
+    pub deviation_rad_s: T,
+    /// Angle by which a reading lags, rad: it spans several teeth, and its middle is half of them ago. Zero for a
+    /// reading of the moment.
+    pub lag_rad: T,
+    /// Angle between two teeth, rad: the last one passed up to that long ago.
+    pub pitch_rad: T,
+    /// Delay that is known, s.
+    pub delay_s: T,
+}
+
+/// What the filter does not know: standard deviations, and limits from the error budget.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncertainty<T> {
+    /// Of the turbine torque, as a share.
+    pub turbine_share: T,
+    /// Time after which that share is another, s.
+    pub turbine_share_s: T,
+    /// Of the shafts' stiffness, as a share.
+    pub stiffness_share: T,
+    /// Torque that the shafts gain over the backlash, N m: while their torque is smaller they may carry none.
+    pub backlash_n_m: T,
+    /// Of the rate of the pressure, as a share of it: errors of lag and delay.
+    pub valve_share: T,
+    /// Of the valve's gain, as a share.
+    pub valve_gain: T,
+    /// Time for which an error of a rate persists, s. The filter takes it as white noise of the same power.
+    pub rate_s: T,
+    /// Of the friction, as a share.
+    pub friction: T,
+    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
+    pub offgoing_n_m: T,
+    /// Time constant with which it goes once the clutch has let go, s.
+    pub offgoing_release_s: T,
+    /// How fast the load of the wheels changes in a shift, N m per root second.
+    pub load_shifting_n_m: T,
+    /// The same in a gear.
+    pub load_in_gear_n_m: T,
+    /// Of the scale of the wheel speed.
+    pub wheel_scale: T,
+    /// Least and greatest delay of the wheel speed against the earlier one of turbine and output, s.
+    pub wheel_delay_s: [T; 2],
+    /// Largest delay of output and turbine against each other, s.
+    pub skew_s: T,
+    /// How well a scale can be known at best: the standard deviation stays above it.
+    pub scale_least: T,
+    /// The same of a delay, s.
+    pub delay_least_s: T,
+    /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
+    pub output_least_rad_s: T,
+}
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KalmanFilter<T> {
+    /// The powertrain.
+    pub model: CompliantModel<T>,
+    /// Coefficients while both clutches slip; a clutch that holds does so with the torque that this takes.
+    both: ShiftCoefficients<T>,
+    /// Coefficients after lock-up.
+    locked: ShiftCoefficients<T>,
+    /// The valve.
+    pub valve: ValveModel<T>,
+    /// What it does not know.
+    pub uncertainty: Uncertainty<T>,
+    /// How turbine, output and wheel speed are read.
+    pub readings: [SpeedReading<T>; 3],
+    /// How the engine speed is read.
+    pub engine: (SpeedReading<T>, EngineNoise<T>),
+    /// The phase supervisor.
+    pub supervisor: Supervisor<T>,
+    /// What counts as a measurement.
+    pub limits: InputLimits<T>,
+}
+
+/// Memory of a [`KalmanFilter`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KalmanState<T> {
+    started: bool,
+    /// Pressure by the valve model alone, Pa.
+    valve_pa: T,
+    commands: Commands<T>,
+    supervisor: SupervisorState<T>,
+    engine: Option<Engine<T>>,
+    /// The newest readings of turbine, output and wheel: value, and age in s.
+    newest: [Option<(T, T)>; 3],
+    running: Option<Running<T>>,
+    /// Mean and covariance of what was learnt.
+    learnt: Option<([T; LEARNT.len()], [[T; LEARNT.len()]; LEARNT.len()])>,
+    /// Whether it has run before and lost its state.
+    lost: bool,
+    estimate: Estimate<T>,
+}
+
+/// The filter at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Running<T> {
+    mean: [T; N],
+    covariance: Covariance<T>,
+    /// The speeds at an earlier time, with which readings are compared that are older than this step.
+    earlier: Earlier<T>,
+    /// Accelerations over the time since then, rad/s^2, and over the one before.
+    accelerations: [T; 3],
+    accelerations_before: [T; 3],
+    /// How fast the pressure moves or moved a while ago, Pa/s.
+    motion_pa_s: T,
+    acting: Phase,
+    /// Direction of the oncoming clutch's slip, 1 or -1, and for how long it has been the other one, s.
+    direction: T,
+    turned_s: T,
+    gates: [Gate; 3],
+    /// Time since a reading of turbine, output or wheel was taken, s.
+    silent_s: [T; 3],
+}
+
+/// Turbine, output and wheel speed at an earlier time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Earlier<T> {
+    age_s: T,
+    mean: [T; 3],
+}
+
+impl<T: Real> KalmanFilter<T> {
+    /// The filter of this powertrain.
+    pub fn new(
+        model: CompliantModel<T>,
+        valve: ValveModel<T>,
+        uncertainty: Uncertainty<T>,
+        readings: [SpeedReading<T>; 3],
+        engine: (SpeedReading<T>, EngineNoise<T>),
+        supervisor: Supervisor<T>,
+        limits: InputLimits<T>,
+    ) -> Self {
+        let of = |engagement| model.shift.coefficients(engagement);
+        let (both, locked) = (of(Engagement::BothSlipping), of(Engagement::OncomingStuck));
+        Self { both, locked, model, valve, uncertainty, readings, engine, supervisor, limits }
+    }
+}
+
+impl<T: Real> Estimator<T> for KalmanFilter<T> {
+    type State = KalmanState<T>;
+
+    fn start(&self) -> KalmanState<T> {
+        KalmanState {
+            started: false,
+            valve_pa: T::zero(),
+            commands: Commands::new(),
+            supervisor: SupervisorState::new(),
+            engine: None,
+            newest: [None; 3],
+            running: None,
+            learnt: None,
+            lost: false,
+            estimate: Estimate {
+                pressure_pa: T::zero(),
+                clutch_torque_n_m: T::zero(),
+                shaft_torque_n_m: None,
+                phase: Phase::BeforeShift,
+                health: Health::Good,
+                channels: Channels::all(ChannelHealth::Lost),
+                bounds: None,
+            },
+        }
+    }
+
+    #[inline]
+    fn step(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Estimate<T> {
+        let dt_s = if state.started { input.dt_s } else { T::zero() };
+        if !(dt_s >= T::zero() && dt_s.is_finite()) {
+            state.lose();
+            state.newest = [None; 3];
+            state.engine = None;
+            state.estimate.health = Health::TimeRejected;
+            state.estimate.channels = Channels::all(ChannelHealth::Refused);
+            return state.estimate;
+        }
+        state.started = true;
+        self.pass(state, dt_s);
+        let mut channels = Channels::all(ChannelHealth::Absent);
+        channels.command = self.take_command(state, input);
+        channels.engine = self.take_engine(state, input);
+        let speeds = self.take_speeds(state, input);
+        [channels.turbine, channels.output, channels.wheel] = speeds;
+        let sound = self.settle(state);
+        self.find_phase(state, dt_s);
+        self.conclude(state, &channels, sound)
+    }
+}
+
+impl<T: Real> KalmanFilter<T> {
+    /// Lets time pass: valve, engine, powertrain.
+    #[inline]
+    fn pass(&self, state: &mut KalmanState<T>, dt_s: T) {
+        if dt_s <= T::zero() {
+            return;
+        }
+        for newest in state.newest.iter_mut().flatten() {
+            newest.1 = newest.1 + dt_s;
+        }
+        if dt_s > T::of(LOST_S) {
+            state.lose();
+            state.engine = None;
+        }
+        let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, 32);
+        let piece_s = dt_s / T::of(pieces as f64);
+        for _ in 0..pieces {
+            state.commands.pass(piece_s);
+            let settled_pa = self.valve.target_pa(&state.commands, piece_s);
+            let step = self.valve.step(settled_pa, state.valve_pa, piece_s);
+            state.valve_pa = self.limits.possible_pressure(step.phi * state.valve_pa + step.drift_pa);
+            if let Some(engine) = &mut state.engine {
+                engine.predict(&self.engine.1, piece_s);
+            }
+            if let (Some(running), Some(engine)) = (&mut state.running, &state.engine) {
+                self.predict(running, engine, settled_pa, piece_s);
+            }
+        }
+    }
+
+    #[inline]
+    fn take_command(&self, state: &mut KalmanState<T>, input: &Input<T>) -> ChannelHealth {
+        let Some(reading) = input.command else {
+            return if state.commands.newest_pa().is_some() { ChannelHealth::Absent } else { ChannelHealth::Lost };
+        };
+        if !(self.limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
+            return ChannelHealth::Refused;
+        }
+        let settled_pa = self.valve.valve.settled_pressure(reading.value);
+        if state.commands.newest_pa().is_none() {
+            // The first command is taken to have stood for long.
+            state.valve_pa = self.limits.possible_pressure(settled_pa);
+        }
+        state.commands.send(reading.age_s, settled_pa);
+        ChannelHealth::Good
+    }
+
+    #[inline]
+    fn take_engine(&self, state: &mut KalmanState<T>, input: &Input<T>) -> ChannelHealth {
+        let (sensor, noise) = &self.engine;
+        let lost = T::of(LOST_S);
+        let Some(reading) = input.engine_rad_s else {
+            let lost = state.engine.is_none_or(|engine| engine.silent_s > lost);
+            return if lost { ChannelHealth::Lost } else { ChannelHealth::Absent };
+        };
+        if !(self.limits.speed_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s <= lost) {
+            return ChannelHealth::Refused;
+        }
+        let slowest = self.uncertainty.output_least_rad_s;
+        let age_s = reading.age_s + sensor.delay_s + sensor.lag_rad / reading.value.abs().max(slowest);
+        match &mut state.engine {
+            None => state.engine = Some(Engine::new(reading.value, noise)),
+            Some(engine) => {
+                if engine.take(noise, reading.value, age_s) == gate::Verdict::Refused {
+                    return ChannelHealth::Refused;
+                }
+                if !engine.is_sound() {
+                    state.engine = Some(Engine::new(reading.value, noise));
+                }
+            }
+        }
+        ChannelHealth::Good
+    }
+
+    /// Takes the readings of turbine, output and wheel.
+    #[inline]
+    fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>) -> [ChannelHealth; 3] {
+        let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        let mut health = [ChannelHealth::Absent; 3];
+        for (k, reading) in given.into_iter().enumerate() {
+            let Some(reading) = reading else { continue };
+            let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
+            if !(self.limits.speed_valid(reading.value) && aged) {
+                health[k] = ChannelHealth::Refused;
+                continue;
+            }
+            if state.newest[k].is_some_and(|(_, age_s)| age_s < reading.age_s) {
+                // It came too late: a newer one has been taken.
+                health[k] = ChannelHealth::Refused;
+                continue;
+            }
+            state.newest[k] = Some((reading.value, reading.age_s));
+            health[k] = match &mut state.running {
+                Some(running) => self.correct(running, k, reading),
+                None => ChannelHealth::Good,
+            };
+        }
+        if let Some(running) = &mut state.running {
+            let lost = T::of(LOST_S);
+            for (health, silent_s) in health.iter_mut().zip(running.silent_s) {
+                if *health == ChannelHealth::Absent && silent_s > lost {
+                    *health = ChannelHealth::Lost;
+                }
+            }
+            if state.supervisor.phase == Phase::BeforeShift
+                && holds_offgoing(&self.supervisor, &self.model, &state.newest)
+            {
+                self.tie(running);
+            }
+        } else {
+            for (health, newest) in health.iter_mut().zip(&state.newest) {
+                if *health == ChannelHealth::Absent && newest.is_none_or(|(_, age_s)| age_s > T::of(LOST_S)) {
+                    *health = ChannelHealth::Lost;
+                }
+            }
+        }
+        health
+    }
+
+    /// Keeps the state within what is possible; begins or ends the filter. Whether the estimate is sound.
+    #[inline]
+    fn settle(&self, state: &mut KalmanState<T>) -> Health {
+        let mut health = Health::Good;
+        if let Some(running) = &mut state.running {
+            let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > T::of(LOST_S);
+            let slow = running.mean[OUTPUT] <= self.uncertainty.output_least_rad_s;
+            let possible = running.is_sound() && self.limits.shaft_torque_possible(running.mean[SPRING]);
+            let limited = self.limits.possible_pressure(running.mean[PRESSURE]);
+            if limited != running.mean[PRESSURE] && possible {
+                health = Health::PressureLimited;
+                running.mean[PRESSURE] = limited;
+            }
+            if blind || slow || !possible {
+                state.lose();
+                // At low speed a new start is no loss; and what was learnt with an impossible state is not kept.
+                state.lost = blind || !possible;
+                if !possible {
+                    state.learnt = None;
+                }
+            }
+        }
+        if state.running.is_none() {
+            state.running = self.begin(state);
+            if let Some(running) = &state.running {
+                // A log may begin in any phase.
+                state.supervisor.phase = running.acting;
+            }
+            if state.running.is_some() && core::mem::take(&mut state.lost) {
+                health = Health::Restarted;
+            }
+        }
+        health
+    }
+
+    /// The estimate at the end of a step.
+    #[inline]
+    fn conclude(&self, state: &mut KalmanState<T>, channels: &Channels<ChannelHealth>, sound: Health) -> Estimate<T> {
+        let clutch = &self.model.rigid.clutch;
+        let mut health = sound;
+        for channel in channels.each() {
+            health = health.max(match channel {
+                ChannelHealth::Good | ChannelHealth::Absent => Health::Good,
+                ChannelHealth::Refused => Health::ReadingRefused,
+                ChannelHealth::Lost => Health::ChannelLost,
+            });
+        }
+        if matches!(channels.command, ChannelHealth::Refused | ChannelHealth::Lost) {
+            health = health.max(Health::CommandRejected);
+        }
+        let estimate = &mut state.estimate;
+        estimate.phase = state.supervisor.phase;
+        estimate.channels = *channels;
+        match &state.running {
+            Some(running) => {
+                let x = &running.mean;
+                let line = &self.model.rigid.driveline;
+                let limit = self.limits.shaft_torque_max_n_m;
+                let shaft = x[SPRING] + line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
+                let slip = self.model.shift.oncoming_slip(x[TURBINE], x[OUTPUT]);
+                let engine = state.engine.map_or(x[TURBINE], |engine| engine.speed_before(T::zero()));
+                estimate.pressure_pa = x[PRESSURE];
+                estimate.shaft_torque_n_m = Some(shaft.max(-limit).min(limit));
+                estimate.clutch_torque_n_m = if running.acting == Phase::AfterShift {
+                    self.model.rigid.clutch_torque(running.acting, x[PRESSURE], engine, x[TURBINE], slip)
+                } else {
+                    (T::one() + x[FRICTION]) * running.direction * clutch.torque_capacity(x[PRESSURE], slip)
+                };
+            }
+            None => {
+                // The valve model alone.
+                estimate.pressure_pa = state.valve_pa;
+                estimate.shaft_torque_n_m = None;
+                let (turbine, slip) = match state.newest {
+                    [Some((turbine, _)), Some((output, _)), _] => {
+                        (turbine, self.model.shift.oncoming_slip(turbine, output))
+                    }
+                    _ => (T::zero(), T::zero()),
+                };
+                let engine = state.engine.map_or(turbine, |engine| engine.speed_before(T::zero()));
+                let acting = self.supervisor.acting_phase(estimate.phase, slip);
+                estimate.clutch_torque_n_m =
+                    self.model.rigid.clutch_torque(acting, state.valve_pa, engine, turbine, slip);
+                health = health.max(if state.lost { Health::SpeedsRejected } else { Health::Good });
+            }
+        }
+        estimate.health = health;
+        *estimate
+    }
+
+    /// The same filter in another precision.
+    pub fn cast<U: Real>(&self) -> KalmanFilter<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        let (sensor, noise) = &self.engine;
+        let noise = EngineNoise {
+            reading_rad_s: to(noise.reading_rad_s),
+            acceleration_walk: to(noise.acceleration_walk),
+            acceleration_max_rad_s2: to(noise.acceleration_max_rad_s2),
+        };
+        KalmanFilter::new(
+            self.model.cast(),
+            self.valve.cast(),
+            self.uncertainty.cast(),
+            self.readings.map(|reading| reading.cast()),
+            (sensor.cast(), noise),
+            self.supervisor.cast(),
+            self.limits.cast(),
+        )
+    }
+}
+
+/// Whether the newest readings say that the offgoing clutch holds.
+#[inline]
+fn holds_offgoing<T: Real>(
+    supervisor: &Supervisor<T>,
+    model: &CompliantModel<T>,
+    newest: &[Option<(T, T)>; 3],
+) -> bool {
+    match newest {
+        [Some((turbine, _)), Some((output, _)), _] => {
+            let slip = model.shift.offgoing_slip(*turbine, *output);
+            slip.abs() <= supervisor.release_slip_rad_s.max(T::of(0.02) * turbine.abs())
+        }
+        _ => false,
+    }
+}
+
+impl<T: Real> Running<T> {
+    /// Whether mean and covariance are numbers, and no variance is negative.
+    #[inline]
+    fn is_sound(&self) -> bool {
+        self.mean.iter().all(|x| x.is_finite()) && self.covariance.is_sound()
+    }
+}
+
+/// Names and units of the filter's states, in their order.
+pub const STATES: [(&str, &str); N] = [
+    ("turbine speed", "rad/s"),
+    ("output speed", "rad/s"),
+    ("wheel speed", "rad/s"),
+    ("spring torque of the shafts", "N m"),
+    ("pressure", "Pa"),
+    ("share of the turbine torque", "1"),
+    ("torque of the offgoing clutch", "N m"),
+    ("load of the wheels", "N m"),
+    ("share of the friction", "1"),
+    ("share of the valve's gain", "1"),
+    ("scale of the wheel speed", "1"),
+    ("delay of the wheel speed", "s"),
+    ("delay of the output speed against the turbine speed", "s"),
+];
+
+impl<T: Real> KalmanState<T> {
+    /// Mean and standard deviation of each of the [`STATES`], while the filter runs.
+    pub fn states(&self) -> Option<[(T, T); N]> {
+        let running = self.running.as_ref()?;
+        Some(core::array::from_fn(|i| (running.mean[i], running.covariance.states[i][i].max(T::zero()).sqrt())))
+    }
+
+    /// Ends the filter; what it has learnt is kept.
+    fn lose(&mut self) {
+        if let Some(running) = self.running.take() {
+            self.learnt = Some((LEARNT.map(|i| running.mean[i]), running.covariance.block(LEARNT)));
+            self.lost = true;
+        }
+    }
+}
+
+impl<T: Real> SpeedReading<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> SpeedReading<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        SpeedReading {
+            deviation_rad_s: to(self.deviation_rad_s),
+            lag_rad: to(self.lag_rad),
+            pitch_rad: to(self.pitch_rad),
+            delay_s: to(self.delay_s),
+        }
+    }
+}
+
+impl<T: Real> Uncertainty<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> Uncertainty<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        Uncertainty {
+            turbine_share: to(self.turbine_share),
+            turbine_share_s: to(self.turbine_share_s),
+            stiffness_share: to(self.stiffness_share),
+            backlash_n_m: to(self.backlash_n_m),
+            valve_share: to(self.valve_share),
+            valve_gain: to(self.valve_gain),
+            rate_s: to(self.rate_s),
+            friction: to(self.friction),
+            offgoing_n_m: to(self.offgoing_n_m),
+            offgoing_release_s: to(self.offgoing_release_s),
+            load_shifting_n_m: to(self.load_shifting_n_m),
+            load_in_gear_n_m: to(self.load_in_gear_n_m),
+            wheel_scale: to(self.wheel_scale),
+            wheel_delay_s: self.wheel_delay_s.map(to),
+            skew_s: to(self.skew_s),
+            scale_least: to(self.scale_least),
+            delay_least_s: to(self.delay_least_s),
+            output_least_rad_s: to(self.output_least_rad_s),
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! The prediction over a step, and the first state.
+
+use drivetrain::{Real, clutch::direction};
+
+use super::covariance::Covariance;
+use super::engine::Engine;
+use super::gate::Gate;
+use super::powertrain::Step;
+use super::{
+    DELAY, Earlier, FIRST_S, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE,
+    Running, SCALE, SHARE, SKEW, SPRING, TURBINE, WHEEL,
+};
+use crate::Phase;
+
+/// Time after which the earlier speeds are taken anew, s.
+const EARLIER_S: f64 = 0.009;
+/// Deviation of the speeds' model over 10 ms, in deviations of a reading.
+const MODEL_SHARE: f64 = 0.1;
+
+impl<T: Real> KalmanFilter<T> {
+    /// The first state, once turbine, output and engine speed are known.
+    pub(super) fn begin(&self, state: &KalmanState<T>) -> Option<Running<T>> {
+        let (zero, u) = (T::zero(), &self.uncertainty);
+        let first = |k: usize| state.newest[k].filter(|&(_, age_s)| age_s <= T::of(FIRST_S)).map(|(value, _)| value);
+        let (turbine, output, engine) = (first(TURBINE)?, first(OUTPUT)?, state.engine.as_ref()?);
+        if output <= u.output_least_rad_s {
+            return None;
+        }
+        let (model, line) = (&self.model, &self.model.rigid.driveline);
+        let acting = self.first_phase(state, turbine, output);
+        let torque = model.rigid.converter.torques(engine.speed_before(zero), turbine).turbine_n_m;
+        let ratio =
+            if acting == Phase::AfterShift { model.shift.ratio_oncoming() } else { model.shift.ratio_offgoing() };
+        let shaft = torque * ratio * line.final_ratio;
+        let offgoing = if acting == Phase::AfterShift { zero } else { self.holding(torque, shaft) };
+        let load = model.rigid.road.wheel_torque(output / line.final_ratio);
+        // The readings are old; since then the car has gone on to accelerate, as the torques say.
+        let wheel_rad_s2 = (shaft - load) / (model.rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2);
+        let output_rad_s2 = wheel_rad_s2 * line.final_ratio;
+        let accelerations = [output_rad_s2 * ratio, output_rad_s2, wheel_rad_s2];
+        let ages = [(TURBINE, turbine), (OUTPUT, output)].map(|(k, speed)| {
+            let sensor = &self.readings[k];
+            let read_s = state.newest[k].map_or(zero, |(_, age_s)| age_s);
+            read_s + sensor.delay_s + sensor.lag_rad / speed.abs().max(u.output_least_rad_s)
+        });
+        let mut mean = [zero; N];
+        mean[TURBINE] = turbine + ages[TURBINE] * accelerations[TURBINE];
+        mean[OUTPUT] = output + ages[OUTPUT] * accelerations[OUTPUT];
+        mean[WHEEL] = mean[OUTPUT] / line.final_ratio;
+        mean[SPRING] = shaft;
+        mean[PRESSURE] = state.valve_pa;
+        mean[OFFGOING] = offgoing;
+        mean[LOAD] = load;
+        let [least, most] = u.wheel_delay_s;
+        let mut deviations = [zero; N];
+        for k in [TURBINE, OUTPUT] {
+            // In a shift, or on a hill, the acceleration is another one.
+            let old = (ages[k] + u.skew_s) * accelerations[k];
+            deviations[k] = self.readings[k].deviation_rad_s.hypot(old);
+        }
+        // Out of balance the shafts swing, at the start of a log as much as the torque itself.
+        deviations[WHEEL] = T::of(0.3);
+        deviations[SPRING] = T::of(0.3) * shaft.abs() + T::of(100.0);
+        deviations[PRESSURE] = self.first_pressure_deviation(acting, state.valve_pa);
+        deviations[SHARE] = u.turbine_share;
+        deviations[OFFGOING] = T::of(0.5) * offgoing.abs() + T::of(50.0);
+        deviations[LOAD] = T::of(400.0) + T::of(0.15) * shaft.abs();
+        deviations[FRICTION] = u.friction;
+        deviations[GAIN] = u.valve_gain;
+        deviations[SCALE] = u.wheel_scale;
+        // A uniform distribution between its limits, about zero.
+        deviations[DELAY] = ((most * most * most - least * least * least) / (T::of(3.0) * (most - least))).sqrt();
+        deviations[SKEW] = u.skew_s / T::of(3.0).sqrt();
+        let mut covariance = Covariance::of(deviations);
+        // An error of the turbine torque is one of the shaft torque in balance with it.
+        let shared = u.turbine_share * u.turbine_share * shaft;
+        covariance.states[SPRING][SHARE] = shared;
+        covariance.states[SHARE][SPRING] = shared;
+        covariance.add(SPRING, shared * shaft);
+        if let Some((learnt, block)) = &state.learnt {
+            for (a, i) in LEARNT.into_iter().enumerate() {
+                mean[i] = learnt[a];
+                for (b, j) in LEARNT.into_iter().enumerate() {
+                    covariance.states[i][j] = block[a][b];
+                }
+            }
+        }
+        covariance.remember();
+        let speeds = [mean[TURBINE], mean[OUTPUT], mean[WHEEL]];
+        Some(Running {
+            mean,
+            covariance,
+            earlier: Earlier { age_s: zero, mean: speeds },
+            accelerations,
+            accelerations_before: accelerations,
+            motion_pa_s: zero,
+            acting,
+            direction: direction(model.shift.oncoming_slip(turbine, output)),
+            turned_s: zero,
+            gates: [Gate::new(); 3],
+            silent_s: [zero; 3],
+        })
+    }
+
+    /// Torque by which the offgoing clutch holds the gear before the shift, N m.
+    pub(super) fn holding(&self, turbine_n_m: T, shaft_n_m: T) -> T {
+        let held = &self.model.torque_phase.holding_offgoing;
+        held.per_turbine_torque * turbine_n_m
+            + held.per_output_torque * shaft_n_m / self.model.rigid.driveline.final_ratio
+    }
+
+    /// An open cylinder is empty; of one under pressure the command before the log is not known.
+    fn first_pressure_deviation(&self, acting: Phase, pressure_pa: T) -> T {
+        let known = T::of(1e3);
+        if acting == Phase::BeforeShift { known } else { known + T::of(0.3) * pressure_pa }
+    }
+
+    /// Carries mean and covariance over a step, under commands that end at `settled_pa`. Where the slip of the oncoming
+    /// clutch ends within the step, it is locked from there on.
+    #[inline]
+    pub(super) fn predict(&self, running: &mut Running<T>, engine: &Engine<T>, settled_pa: T, dt_s: T) {
+        let shift = &self.model.shift;
+        if running.acting == Phase::InertiaPhase {
+            let slip = shift.oncoming_slip(running.mean[TURBINE], running.mean[OUTPUT]);
+            let rate = shift.oncoming_slip(running.accelerations[TURBINE], running.accelerations[OUTPUT]);
+            let until_s = -slip / rate;
+            if until_s > T::zero() && until_s < dt_s {
+                self.advance(running, engine, settled_pa, until_s, dt_s - until_s);
+                running.acting = Phase::AfterShift;
+                self.advance(running, engine, settled_pa, dt_s - until_s, T::zero());
+                return;
+            }
+        }
+        self.advance(running, engine, settled_pa, dt_s, T::zero());
+    }
+
+    /// A step in one phase, that ends `left_s` before now.
+    #[inline]
+    fn advance(&self, running: &mut Running<T>, engine: &Engine<T>, settled_pa: T, dt_s: T, left_s: T) {
+        if running.earlier.age_s >= T::of(EARLIER_S) || running.earlier.age_s <= T::zero() {
+            running.accelerations_before = running.accelerations;
+            running.covariance.remember();
+            let x = &running.mean;
+            running.earlier = Earlier { age_s: T::zero(), mean: [x[TURBINE], x[OUTPUT], x[WHEEL]] };
+        }
+        let x = running.mean;
+        let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
+        let f = step.jacobian(&x);
+        running.mean = step.propagate(&x);
+        running.covariance.spread(&f, step.stay, step.keep);
+        self.add_noise(running, engine, &step, &x, settled_pa);
+        running.earlier.age_s = running.earlier.age_s + dt_s;
+        for (k, acceleration) in running.accelerations.iter_mut().enumerate() {
+            *acceleration = (running.mean[k] - running.earlier.mean[k]) / running.earlier.age_s;
+        }
+        for silent_s in &mut running.silent_s {
+            *silent_s = *silent_s + dt_s;
+        }
+    }
+
+    /// The step with coefficients frozen at its start.
+    #[inline]
+    fn step_of(&self, running: &Running<T>, engine: &Engine<T>, settled_pa: T, dt_s: T, left_s: T) -> Step<T> {
+        let (zero, one, half, u) = (T::zero(), T::one(), T::of(0.5), &self.uncertainty);
+        let x = &running.mean;
+        let locked = running.acting == Phase::AfterShift;
+        let rigid = &self.model.rigid;
+        let (line, clutch) = (&rigid.driveline, &rigid.clutch);
+        let mut rows =
+            if locked { [self.locked.turbine, self.locked.output] } else { [self.both.turbine, self.both.output] };
+        if locked {
+            rows[0].per_offgoing_torque = zero;
+            rows[1].per_offgoing_torque = zero;
+        }
+        let released = matches!(running.acting, Phase::InertiaPhase | Phase::AfterShift);
+        let slip = self.model.shift.oncoming_slip(x[TURBINE], x[OUTPUT]);
+        let valve = self.valve.step(settled_pa, x[PRESSURE], dt_s);
+        let per_start = valve.psi / dt_s;
+        let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s / dt_s;
+        let sigma_pa = running.covariance.states[PRESSURE][PRESSURE].max(zero).sqrt();
+        let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), sigma_pa);
+        let middle = x[TURBINE] + half * dt_s * running.accelerations[TURBINE];
+        Step {
+            dt_s,
+            rows,
+            turbine_n_m: rigid.converter.torques(engine.speed_before(left_s + half * dt_s), middle).turbine_n_m,
+            per_pressure: if locked {
+                zero
+            } else {
+                running.direction * clutch.torque_per_force(slip) * clutch.piston_area_m2
+            },
+            above_kiss: [above_pa, slope * per_start],
+            settled_pa,
+            valve,
+            ratio: line.final_ratio,
+            stiffness: line.shaft_stiffness_n_m_rad,
+            damping: line.shaft_damping_n_m_s_rad,
+            inertia: rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2,
+            stay: lasting(dt_s, u.turbine_share_s),
+            keep: if released { lasting(dt_s, u.offgoing_release_s) } else { one },
+        }
+    }
+
+    /// Adds what the step leaves open.
+    #[inline]
+    fn add_noise(&self, running: &mut Running<T>, engine: &Engine<T>, step: &Step<T>, x: &[T; N], settled_pa: T) {
+        let (one, two, u) = (T::one(), T::of(2.0), &self.uncertainty);
+        let square = |x: T| x * x;
+        let dt = step.dt_s;
+        let per_10_ms = dt / T::of(0.01);
+        // How the pressure moves or moved a while ago.
+        let rate = ((one - step.valve.phi) * (settled_pa - x[PRESSURE]) / dt).abs();
+        running.motion_pa_s = rate.max(running.motion_pa_s * lasting(dt, u.rate_s));
+        let shifting = matches!(running.acting, Phase::TorquePhase | Phase::InertiaPhase);
+        let released = matches!(running.acting, Phase::InertiaPhase | Phase::AfterShift);
+        let twist_rate = x[OUTPUT] / step.ratio - x[WHEEL];
+        let p = &mut running.covariance;
+        for k in [TURBINE, OUTPUT] {
+            p.add(k, per_10_ms * square(T::of(MODEL_SHARE) * self.readings[k].deviation_rad_s));
+        }
+        // Within the backlash the shafts twist without torque.
+        let stiffness_share = if x[SPRING].abs() < u.backlash_n_m { one } else { u.stiffness_share };
+        p.add(SPRING, two * dt * u.rate_s * square(stiffness_share * step.stiffness * twist_rate));
+        p.add(PRESSURE, two * dt * u.rate_s * square(u.valve_share * running.motion_pa_s));
+        p.add(SHARE, square(u.turbine_share) * (one - square(step.stay)));
+        // How fast it drains is not known: the rate may be wrong by its own size for as long as it lasts.
+        let offgoing =
+            if released { two * dt / u.offgoing_release_s * square(x[OFFGOING]) } else { dt * square(u.offgoing_n_m) };
+        p.add(OFFGOING, offgoing);
+        p.add(LOAD, dt * square(if shifting { u.load_shifting_n_m } else { u.load_in_gear_n_m }));
+        if engine.silent_s > T::of(0.5) * T::of(FIRST_S) {
+            // A missing engine speed leaves the turbine torque open.
+            let torque = square(step.turbine_n_m) * engine.variance() / square(engine.speed_before(T::zero())).max(one);
+            for (k, row) in [(TURBINE, &step.rows[0]), (OUTPUT, &step.rows[1])] {
+                p.add(k, square(two * dt * row.per_turbine_torque) * torque);
+            }
+        }
+    }
+}
+
+/// What is left after `dt_s` of a random number that lasts for a time, as implicit Euler has it.
+#[inline]
+fn lasting<T: Real>(dt_s: T, time_s: T) -> T {
+    time_s / (time_s + dt_s)
+}
+
+/// Mean of `max(x, 0)` and its derivative, of a normal distribution about `x`.
+#[inline]
+pub(super) fn above<T: Real>(x: T, deviation: T) -> (T, T) {
+    let z = x / deviation.max(T::min_positive_value());
+    if z.abs() >= T::of(6.0) || z.is_nan() {
+        return if x > T::zero() { (x, T::one()) } else { (T::zero(), T::zero()) };
+    }
+    let density = (T::of(-0.5) * z * z).exp() * T::of(0.398_942_280_401_432_7);
+    // Abramowitz and Stegun, Handbook of Mathematical Functions (1964), 26.2.17: error below 7.5e-8.
+    let t = (T::one() + T::of(0.231_641_9) * z.abs()).recip();
+    let series = [1.330_274_429, -1.821_255_978, 1.781_477_937, -0.356_563_782, 0.319_381_530];
+    let tail = density * series.into_iter().fold(T::zero(), |sum, c| (sum + T::of(c)) * t);
+    let below = if z > T::zero() { T::one() - tail } else { tail };
+    (deviation * density + x * below, below)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_above_zero_is_that_of_the_distribution() {
+        // At zero: deviation/sqrt(2 pi), and half of the samples.
+        let (mean, share) = above(0.0_f64, 2.0);
+        assert!((mean - 2.0 * 0.398_942_28).abs() < 1e-6 && (share - 0.5).abs() < 1e-6);
+        // One deviation above: 1.0833, 84.13 %.
+        let (mean, share) = above(1.0_f64, 1.0);
+        assert!((mean - 1.083_315_47).abs() < 1e-6 && (share - 0.841_344_75).abs() < 1e-6);
+        assert_eq!(above(5.0_f64, 0.0), (5.0, 1.0));
+        assert_eq!(above(-5.0_f32, 0.0), (0.0, 0.0));
+        let (mean, _) = above(-3.0_f64, 1.0);
+        assert!((mean - 3.821_5e-4).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,140 @@
+//! The valve as the filter knows it: the vehicle's maps, and commands that arrive after the middle of the delay budget.
+
+use drivetrain::{ClutchValve, Real, ValveStep};
+
+/// Commands that are remembered: enough for a delay of 30 ms at a sample time of 1 ms.
+const REMEMBERED: usize = 32;
+
+/// The valve model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValveModel<T> {
+    /// Lag and gain over the operating point.
+    pub valve: ClutchValve<T>,
+    /// Time until a command arrives, s.
+    pub delay_s: T,
+}
+
+/// A command that was sent, as the pressure it ends at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sent<T> {
+    age_s: T,
+    settled_pa: T,
+}
+
+/// The commands on their way to the valve, newest first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Commands<T> {
+    sent: [Sent<T>; REMEMBERED],
+    count: usize,
+}
+
+impl<T: Real> Commands<T> {
+    /// None yet.
+    pub(crate) fn new() -> Self {
+        Self { sent: [Sent { age_s: T::zero(), settled_pa: T::zero() }; REMEMBERED], count: 0 }
+    }
+
+    /// Pressure that the newest command ends at, Pa, if there was one.
+    pub(crate) fn newest_pa(&self) -> Option<T> {
+        self.sent.iter().take(self.count).map(|sent| sent.settled_pa).next()
+    }
+
+    /// Lets time pass.
+    #[inline]
+    pub(crate) fn pass(&mut self, dt_s: T) {
+        for sent in self.sent.iter_mut().take(self.count) {
+            sent.age_s = sent.age_s + dt_s;
+        }
+    }
+
+    /// Takes a command that was sent `age_s` ago.
+    #[inline]
+    pub(crate) fn send(&mut self, age_s: T, settled_pa: T) {
+        // Commands arrive in their order; the oldest one gives way.
+        let age_s = self.sent.iter().take(self.count.min(1)).fold(age_s, |age, newest| age.min(newest.age_s));
+        let kept = self.count.min(REMEMBERED - 1);
+        let mut moved = Sent { age_s, settled_pa };
+        for sent in self.sent.iter_mut().take(kept + 1) {
+            core::mem::swap(sent, &mut moved);
+        }
+        self.count = kept + 1;
+    }
+
+    /// Mean of what the commands end at that were in effect from `dt_s` ago until now, Pa; `None` before the first
+    /// command. The first one is taken to have stood before.
+    #[inline]
+    fn mean_pa(&self, delay_s: T, dt_s: T) -> Option<T> {
+        // At a time `x` ago the newest command was in effect that is older than `x` and the delay.
+        let (newest, oldest) = (delay_s, delay_s + dt_s);
+        let first = self.sent.iter().take(self.count).find(|sent| sent.age_s >= newest);
+        let earliest = self.sent.iter().take(self.count).last()?;
+        if dt_s <= T::zero() {
+            return Some(first.unwrap_or(earliest).settled_pa);
+        }
+        let (mut until, mut sum) = (newest, T::zero());
+        for sent in self.sent.iter().take(self.count) {
+            let begun = sent.age_s.max(newest).min(oldest);
+            sum = sum + (begun - until) * sent.settled_pa;
+            until = begun;
+            if sent.age_s >= oldest {
+                break;
+            }
+        }
+        Some((sum + (oldest - until) * earliest.settled_pa) / dt_s)
+    }
+}
+
+impl<T: Real> ValveModel<T> {
+    /// Mean of what the commands in effect over the last `dt_s` end at, Pa.
+    #[inline]
+    pub(crate) fn target_pa(&self, commands: &Commands<T>, dt_s: T) -> T {
+        commands.mean_pa(self.delay_s, dt_s).unwrap_or_else(T::zero)
+    }
+
+    /// The valve over `dt_s` on its way from `pressure_pa` to `settled_pa`.
+    #[inline]
+    pub(crate) fn step(&self, settled_pa: T, pressure_pa: T, dt_s: T) -> ValveStep<T> {
+        self.valve.step(settled_pa, pressure_pa, dt_s)
+    }
+
+    /// The same model in another precision.
+    pub fn cast<U: Real>(&self) -> ValveModel<U> {
+        ValveModel { valve: self.valve.cast(), delay_s: U::of(self.delay_s.to_f64_exact()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_in_effect_after_the_delay_and_for_as_long_as_it_stood() {
+        let mut commands = Commands::<f64>::new();
+        assert_eq!(commands.mean_pa(0.015, 0.01), None);
+        commands.send(0.0, 1.0);
+        // The first command has stood for ever.
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 1.0).abs() < 1e-12);
+        commands.pass(0.01);
+        commands.send(0.0, 3.0);
+        commands.pass(0.01);
+        // Sent 10 ms ago: not in effect yet.
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 1.0).abs() < 1e-12);
+        commands.pass(0.01);
+        // Sent 20 ms ago, so in effect since 5 ms of 10 ms.
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 2.0).abs() < 1e-12);
+        commands.pass(0.01);
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn more_commands_than_are_remembered_do_no_harm() {
+        let mut commands = Commands::<f32>::new();
+        for i in 0..100_u8 {
+            commands.send(0.0, f32::from(i));
+            commands.pass(0.001);
+        }
+        // Number 84 was sent 16 ms ago, and 83 before it.
+        let mean = commands.mean_pa(0.0155, 0.001).unwrap();
+        assert!((mean - 83.5).abs() < 0.01, "{mean}");
+    }
+}

@@ -1,0 +1,307 @@
+//! The range of the pressure that follows from the commands alone.
+//!
+//! For any lag, gain, delay and hysteresis within the budget, the pressure at the valve's outlet is between the solutions of
+//! the slowest and the fastest valve of the budget. This is the certificate's recursion for a gain of zero, with lag and
+//! gain at the operating point instead of one worst rate. Without a stroke of the piston in the budget the outlet pressure is
+//! the cylinder pressure; with one, [`crate::fill_range`] carries the range on to the cylinder.
+//!
+//! **What it assumes:** the entries of [`Budget`]; that the command stays between the readings of two neighbouring
+//! samples, also over one lost sample, and is the first of them until [`Budget::command_age_s`] before the second; the lag
+//! at a pressure is that of the budget's map times its factors.
+
+use drivetrain::Real;
+
+use crate::Budget;
+use crate::commands::Commands;
+use crate::fill_range::{Outlet, PistonRange};
+
+/// Longest time over which the lag is taken at its extreme, s; a longer sample is cut into pieces.
+const PIECE_S: f64 = 0.0101;
+/// Most pieces; beyond them each is longer, which makes the range wider and not wrong.
+const MOST_PIECES: usize = 8;
+/// A time step of more than this many times the one before has lost a sample: a command of between may be that of the
+/// sample that was lost.
+const LOST: f64 = 1.5;
+/// A time step of more than this many times the one before is a gap: more than one sample is missing.
+const GAP: f64 = 2.5;
+
+/// Memory of the range of the pressure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressureRange<T> {
+    commands: Commands<T>,
+    /// Lowest and highest settled pressure behind the hysteresis, Pa.
+    asked_pa: [T; 2],
+    /// Lowest and highest pressure at the valve's outlet, Pa.
+    outlet_pa: [T; 2],
+    piston: PistonRange<T>,
+    /// The time step before, s.
+    last_dt_s: T,
+}
+
+impl<T: Real> PressureRange<T> {
+    /// Nothing is known of the cylinder, nor of the command before the first one, up to `command_max`.
+    pub fn unknown(budget: &Budget<T>, command_max: T) -> Self {
+        let zero = T::zero();
+        Self {
+            commands: Commands::unknown(command_max),
+            asked_pa: [zero, T::infinity()],
+            outlet_pa: [zero, budget.pressure_max_pa],
+            piston: PistonRange::unknown(budget.pressure_max_pa),
+            last_dt_s: T::infinity(),
+        }
+    }
+
+    /// Lowest and highest cylinder pressure, Pa.
+    #[inline]
+    pub fn pressure_pa(&self, budget: &Budget<T>) -> [T; 2] {
+        budget.fill.as_ref().map_or(self.outlet_pa, |fill| self.piston.pressure_pa(fill))
+    }
+
+    /// What is known of the piston, where the budget has a stroke.
+    pub fn piston(&self, budget: &Budget<T>) -> Option<&PistonRange<T>> {
+        budget.fill.is_some().then_some(&self.piston)
+    }
+
+    /// Takes a sample, `dt_s` after the one before, whose command is between two limits; `command_max` is the largest
+    /// that there is. After a gap any command may have come and gone unseen.
+    #[inline]
+    pub fn step(&mut self, budget: &Budget<T>, dt_s: T, command: [T; 2], command_max: T) {
+        let (zero, delay_max_s) = (T::zero(), budget.delay_s[1]);
+        if dt_s > T::of(GAP) * self.last_dt_s {
+            self.commands.send(zero, zero, [zero, command_max], delay_max_s);
+        }
+        let lost = dt_s > T::of(LOST) * self.last_dt_s;
+        if dt_s > zero {
+            self.last_dt_s = dt_s;
+        }
+        let early_s = if lost { dt_s } else { budget.command_age_s.min(dt_s) };
+        if early_s > zero {
+            self.commands.send(-dt_s, early_s, command, delay_max_s);
+        }
+        self.advance(budget, dt_s);
+        if early_s <= zero {
+            self.commands.send(zero, zero, command, delay_max_s);
+        }
+    }
+
+    /// Everything is possible: time was lost, and with it commands.
+    pub fn forget(&mut self, budget: &Budget<T>, command_max: T) {
+        *self = Self { last_dt_s: self.last_dt_s, ..Self::unknown(budget, command_max) };
+    }
+
+    /// Carries the range over `dt_s` under the commands that were sent.
+    #[inline]
+    fn advance(&mut self, budget: &Budget<T>, dt_s: T) {
+        let zero = T::zero();
+        if dt_s > zero {
+            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+            let length_s = dt_s / T::of(pieces as f64);
+            let mut done_s = zero;
+            for _ in 0..pieces {
+                let commands = self.commands.in_effect(budget.delay_s, done_s, done_s + length_s);
+                self.asked_pa = budget.asked(self.asked_pa, commands);
+                self.advance_piece(budget, length_s);
+                done_s = done_s + length_s;
+            }
+            self.commands.age(dt_s);
+        }
+    }
+
+    /// Carries the pressures over a piece of the time step.
+    #[inline]
+    fn advance_piece(&mut self, budget: &Budget<T>, dt_s: T) {
+        let ([lowest, highest], [low, high]) = (self.outlet_pa, budget.supplied(self.asked_pa));
+        let lag = budget.lag_factor;
+        let lower = budget.valve.moved(lowest, low, dt_s, lag, low < lowest);
+        let upper = budget.valve.moved(highest, high, dt_s, lag, high > highest);
+        let lower = lower.max(T::zero()).min(budget.pressure_max_pa);
+        // Where both ends have settled at one pressure, rounding may put them in the wrong order.
+        let upper = upper.max(lower).min(budget.pressure_max_pa);
+        self.outlet_pa = [lower, upper];
+        if let Some(fill) = &budget.fill {
+            let outlet = Outlet {
+                lowest_pa: lowest.min(lower),
+                highest_pa: highest.max(upper),
+                line_pa: budget.line_pressure_pa[1],
+            };
+            self.piston.advance(fill, &outlet, dt_s);
+        }
+    }
+}
+
+impl<T: Real> Budget<T> {
+    /// Lowest and highest settled pressure behind the hysteresis, Pa, from those before and the commands in effect.
+    ///
+    /// The hysteresis is a play operator of half-width 0 to `r`: the settled pressure stays where it is until the
+    /// command has moved by more than the half-width from it. It does not fall with command and start, and the largest
+    /// value over all half-widths is `max(u, min(w, u + r))`: after a rise `u`, after a fall at most `u + r`.
+    #[inline]
+    fn asked(&self, [low, high]: [T; 2], [lowest, highest]: [T; 2]) -> [T; 2] {
+        let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
+        let bottom = settled((lowest - self.command).max(T::zero()), self.gain_factor[0]);
+        let top = settled(highest + self.command, self.gain_factor[1]);
+        [bottom.min(low.max(bottom - self.hysteresis_pa)), top.max(high.min(top + self.hysteresis_pa))]
+    }
+
+    /// What the supply gives of settled pressures, Pa.
+    #[inline]
+    fn supplied(&self, [low, high]: [T; 2]) -> [T; 2] {
+        let [least, greatest] = self.line_pressure_pa;
+        [low.max(T::zero()).min(least), high.min(greatest)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use drivetrain::{ClutchValve, PulseWidth, Table1, ValveMaps};
+    use std::vec;
+    use std::vec::Vec;
+
+    fn budget() -> Budget<f64> {
+        Budget {
+            valve: ClutchValve::Proportional(ValveMaps {
+                time_constant_s: Table1::new(&[0.0, 1e5, 4e5, 1e6], &[0.2, 0.08, 0.035, 0.02]).unwrap(),
+                gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[0.7e6, 1.0e6, 1.1e6]).unwrap(),
+                delay_s: Table1::constant(0.01),
+            }),
+            lag_factor: [0.5, 1.5],
+            gain_factor: [0.9, 1.1],
+            delay_s: [0.0, 0.03],
+            hysteresis_pa: 0.0,
+            command: 0.005,
+            command_age_s: 0.0,
+            line_pressure_pa: [1.2e6; 2],
+            pressure_max_pa: 1.2e6,
+            fill: None,
+            friction_factor: [0.8, 1.2],
+            slip_rad_s: 0.6,
+        }
+    }
+
+    /// The same of a valve that is commanded by a duty cycle.
+    fn pulse_width_budget() -> Budget<f64> {
+        let law = PulseWidth { flow_sqrt_pa_s: 12e3, line_pressure_pa: 1e6 };
+        let valve = ClutchValve::PulseWidth { law, delay_s: Table1::constant(0.01) };
+        Budget { valve, command: 0.5, ..budget() }
+    }
+
+    /// An empty cylinder whose valve has had no command for long.
+    fn empty(b: &Budget<f64>) -> PressureRange<f64> {
+        let mut range = PressureRange::unknown(b, 0.0);
+        range.outlet_pa[1] = 0.0;
+        range
+    }
+
+    /// A valve within the budget, by small Euler steps, under commands held for 10 ms.
+    fn simulated(b: &Budget<f64>, lag: f64, gain: f64, delay_ms: usize, commands: &[f64]) -> Vec<f64> {
+        let mut p = 0.0;
+        let mut at_samples = vec![0.0];
+        for k in 0..commands.len() * 10 {
+            let command = if k < delay_ms { 0.0 } else { commands[(k - delay_ms) / 10] };
+            let settled = gain * b.valve.settled_pressure(command);
+            for _ in 0..100 {
+                p += 1e-5 * b.valve.pressure_rate(p, settled) / lag;
+            }
+            if (k + 1) % 10 == 0 {
+                at_samples.push(p);
+            }
+        }
+        at_samples
+    }
+
+    #[test]
+    fn every_valve_within_the_budget_stays_in_the_range() {
+        for (b, unit) in [(budget(), 1.0), (pulse_width_budget(), 100.0)] {
+            let steps = [0.0, 0.3, 0.12, 0.15, 0.2, 0.5, 0.9, 0.4, 0.05];
+            let commands: Vec<f64> = (0..60).map(|i| unit * steps[i / 7]).collect();
+            assert_every_valve_stays_in_the_range(&b, &commands);
+        }
+    }
+
+    fn assert_every_valve_stays_in_the_range(b: &Budget<f64>, commands: &[f64]) {
+        let mut range = empty(b);
+        let ranges: Vec<[f64; 2]> = (0..=60)
+            .map(|k| {
+                let command = commands.get(k).copied().unwrap_or_default();
+                range.step(b, if k == 0 { 0.0 } else { 0.01 }, [command; 2], 1.2);
+                range.pressure_pa(b)
+            })
+            .collect();
+        let mut closest = f64::INFINITY;
+        for (lag, gain, delay) in
+            [(0.5, 1.1, 0), (0.5, 0.9, 0), (1.5, 1.1, 30), (1.5, 0.9, 30), (1.0, 1.0, 10), (0.5, 1.1, 30)]
+        {
+            let pressures = simulated(b, lag, gain, delay, commands);
+            assert_eq!((pressures.len(), ranges.len()), (61, 61));
+            for (p, [low, high]) in pressures.iter().zip(&ranges) {
+                assert!(low - 1e-6 <= *p && *p <= high + 1e-6, "{p} not in {low} to {high} ({lag}, {gain}, {delay})");
+                closest = closest.min(high - p).min(p - low);
+            }
+        }
+        assert!(ranges.iter().all(|[low, high]| *low >= 0.0 && *high <= 1.2e6));
+        assert!(closest < 20e3, "the range is far wider than any of these valves: {closest}");
+    }
+
+    #[test]
+    fn a_held_command_leaves_only_the_gain_and_the_reading() {
+        let b = budget();
+        let mut range = PressureRange::unknown(&b, 1.2);
+        for _ in 0..200 {
+            range.step(&b, 0.01, [0.3; 2], 1.2);
+        }
+        let settled = |command: f64, gain: f64| gain * b.valve.settled_pressure(command);
+        let [low, high] = range.pressure_pa(&b);
+        assert!((low - settled(0.295, 0.9)).abs() < 1.0 && (high - settled(0.305, 1.1)).abs() < 1.0, "{low} {high}");
+    }
+
+    #[test]
+    fn a_valve_outside_the_budget_leaves_the_range() {
+        let commands = [0.4; 40];
+        let b = budget();
+        let mut range = empty(&b);
+        let mut left = false;
+        for (k, p) in simulated(&b, 1.0, 1.3, 10, &commands).into_iter().enumerate() {
+            range.step(&b, if k == 0 { 0.0 } else { 0.01 }, [0.4; 2], 1.2);
+            let [_, high] = range.pressure_pa(&b);
+            left |= p > high;
+        }
+        assert!(left);
+    }
+
+    #[test]
+    fn more_commands_than_can_be_remembered_widen_the_range() {
+        let b = Budget { delay_s: [0.0, 0.2], ..budget() };
+        let mut range = empty(&b);
+        for k in 0..500 {
+            let command = if k == 300 { 1.0 } else { 0.1 };
+            range.step(&b, 0.001, [command; 2], 1.2);
+            // Up to 0.2 s later the large command may still act.
+            if (302..=500).contains(&k) {
+                assert!(range.pressure_pa(&b)[1] > 0.1e6);
+            }
+        }
+    }
+
+    #[test]
+    fn an_unknown_start_and_a_gap_leave_everything_possible_until_the_command_tells() {
+        let b = budget();
+        let mut range = PressureRange::unknown(&b, 1.2);
+        assert_eq!(range.pressure_pa(&b), [0.0, b.pressure_max_pa]);
+        let mut hold = |dt_s: f64, samples: u32| {
+            for _ in 0..samples {
+                range.step(&b, dt_s, [0.3; 2], 1.2);
+            }
+            range.pressure_pa(&b)
+        };
+        let [low, high] = hold(0.01, 300);
+        assert!(low > 0.2e6 && high < 0.4e6, "{low} {high}");
+        // One lost sample is no gap; in a longer one the clutch may have been emptied or filled.
+        let [low, high] = hold(0.02, 1);
+        assert!(low > 0.2e6 && high < 0.4e6, "{low} {high}");
+        let [low, high] = hold(0.5, 1);
+        assert!(low < 0.05e6 && high > 1.1e6, "{low} {high}");
+    }
+}

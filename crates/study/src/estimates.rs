@@ -1,0 +1,75 @@
+//! Estimates as columns of a table.
+
+use observer::Estimate;
+use trace::{Cell, Trace, signal};
+
+/// A column of numbers: its name, and its value where there is one.
+type Number = (&'static str, fn(&Estimate<f64>) -> Option<f64>);
+
+const ALWAYS: [Number; 2] =
+    [(signal::PRESSURE_ESTIMATE, |e| Some(e.pressure_pa)), (signal::TORQUE_ESTIMATE, |e| Some(e.clutch_torque_n_m))];
+const SHAFT: [Number; 1] = [(signal::SHAFT_ESTIMATE, |e| e.shaft_torque_n_m)];
+const RANGE: [Number; 4] = [
+    (signal::PRESSURE_LEAST, |e| Some(e.bounds?.pressure_pa[0])),
+    (signal::PRESSURE_GREATEST, |e| Some(e.bounds?.pressure_pa[1])),
+    (signal::TORQUE_LEAST, |e| Some(e.bounds?.clutch_torque_n_m[0])),
+    (signal::TORQUE_GREATEST, |e| Some(e.bounds?.clutch_torque_n_m[1])),
+];
+const SHAFT_RANGE: [Number; 2] = [
+    (signal::SHAFT_LEAST, |e| Some(e.bounds?.shaft_torque_n_m?[0])),
+    (signal::SHAFT_GREATEST, |e| Some(e.bounds?.shaft_torque_n_m?[1])),
+];
+
+/// Which columns estimates have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EstimateColumns {
+    /// Whether the observer estimates the drive-shaft torque.
+    pub shaft: bool,
+    /// Whether there are guaranteed ranges.
+    pub range: bool,
+    /// Whether there is one of the drive-shaft torque.
+    pub shaft_range: bool,
+}
+
+impl EstimateColumns {
+    /// Those that any of these estimates fills.
+    pub fn of(estimates: &[Estimate<f64>]) -> Self {
+        let filled = |column: &Number| estimates.iter().any(|estimate| column.1(estimate).is_some());
+        Self { shaft: filled(&SHAFT[0]), range: filled(&RANGE[0]), shaft_range: filled(&SHAFT_RANGE[0]) }
+    }
+
+    fn numbers(self) -> impl Iterator<Item = &'static Number> {
+        let or_none = |there: bool, columns: &'static [Number]| if there { columns } else { &[] };
+        (ALWAYS.iter())
+            .chain(or_none(self.shaft, &SHAFT))
+            .chain(or_none(self.range, &RANGE))
+            .chain(or_none(self.shaft_range, &SHAFT_RANGE))
+    }
+
+    /// Their names, without the time.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        self.numbers().map(|(name, _)| *name).chain([signal::PHASE, signal::HEALTH]).chain(signal::READINGS)
+    }
+
+    /// What an estimate writes into them.
+    pub fn cells(self, estimate: &Estimate<f64>) -> impl Iterator<Item = Cell<'static>> {
+        let number = |(_, value): &Number| Cell::Number(value(estimate).unwrap_or(f64::NAN));
+        let words = [estimate.phase.name(), estimate.health.name()].map(Cell::Word);
+        let channels = estimate.channels.each().map(|channel| Cell::Word(channel.name()));
+        self.numbers().map(number).chain(words).chain(channels)
+    }
+}
+
+/// Estimates as a trace of their own.
+pub fn estimates_trace(time_s: &[f64], estimates: &[Estimate<f64>]) -> Trace {
+    let mut trace = Trace { path: None, time_s: time_s.to_vec(), columns: Vec::new() };
+    for (name, value) in EstimateColumns::of(estimates).numbers() {
+        trace.add(name, estimates.iter().map(|estimate| value(estimate).unwrap_or(f64::NAN)).collect());
+    }
+    trace.add_words(signal::PHASE, estimates.iter().map(|e| e.phase.name().into()).collect());
+    trace.add_words(signal::HEALTH, estimates.iter().map(|e| e.health.name().into()).collect());
+    for (at, name) in signal::READINGS.into_iter().enumerate() {
+        trace.add_words(name, estimates.iter().map(|e| e.channels.each()[at].name().into()).collect());
+    }
+    trace
+}

@@ -1,0 +1,117 @@
+//! A measured log, read row by row.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use config::Vehicle;
+use observer::{Input, Phase};
+use trace::{CsvRows, TraceError, signal};
+
+use crate::Signals;
+
+/// Rows that are looked at before the first estimate: gains are designed for the median time between them.
+pub const FIRST_LOOK: usize = 10_000;
+
+/// The samples of a log. However long it is, only its first rows are held in memory, until they have been used.
+#[derive(Debug)]
+pub struct Log {
+    rows: CsvRows,
+    signals: Signals<usize>,
+    truth: Option<TruthColumns>,
+    last_s: Option<f64>,
+    looked_at: VecDeque<(Input<f64>, LogRow)>,
+    median_step_s: f64,
+}
+
+/// Places of what only a simulated log has.
+#[derive(Debug, Clone, Copy)]
+struct TruthColumns {
+    phase: usize,
+    pressure: usize,
+}
+
+/// What comes along with a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogRow {
+    /// Time, s.
+    pub time_s: f64,
+    /// The true values, if the log has them.
+    pub truth: Option<Truth>,
+}
+
+/// The truth at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Phase of the shift.
+    pub phase: Phase,
+    /// Pressure of the oncoming clutch, Pa.
+    pub pressure_pa: f64,
+}
+
+impl Log {
+    /// Opens a log, finds the columns and looks at the first rows.
+    ///
+    /// # Errors
+    /// The file cannot be read, lacks a signal, or one of its first rows is wrong.
+    pub fn open(path: &Path, vehicle: &Vehicle) -> Result<Self, TraceError> {
+        let rows = CsvRows::open(path)?;
+        let signals = Signals::choose(vehicle, |name| rows.find(name), |name| rows.require(name))?;
+        let truth = rows.find(signal::TRUE_PHASE).zip(rows.find(signal::ONCOMING_PRESSURE));
+        let truth = truth.map(|(phase, pressure)| TruthColumns { phase, pressure });
+        let looked_at = VecDeque::with_capacity(FIRST_LOOK);
+        let mut log = Self { rows, signals, truth, last_s: None, looked_at, median_step_s: f64::NAN };
+        while log.looked_at.len() < FIRST_LOOK
+            && let Some(sample) = log.read()?
+        {
+            log.looked_at.push_back(sample);
+        }
+        let steps = log.looked_at.iter().skip(1).map(|(input, _)| input.dt_s);
+        log.median_step_s = trace::median_step_s(steps.collect());
+        Ok(log)
+    }
+
+    /// Where the signals are.
+    pub fn signals(&self) -> &Signals<usize> {
+        &self.signals
+    }
+
+    /// Refuses a log without the wheel speed.
+    ///
+    /// # Errors
+    /// It has none.
+    pub fn require_wheel_speed(&self) -> Result<(), TraceError> {
+        self.rows.require(signal::WHEEL_SPEED).map(drop)
+    }
+
+    /// Median time between two of the first [`FIRST_LOOK`] samples, s.
+    pub fn median_step_s(&self) -> f64 {
+        self.median_step_s
+    }
+
+    /// The next row of the file.
+    fn read(&mut self) -> Result<Option<(Input<f64>, LogRow)>, TraceError> {
+        if !self.rows.advance()? {
+            return Ok(None);
+        }
+        let (rows, time_s) = (&self.rows, self.rows.time_s());
+        let dt_s = self.last_s.replace(time_s).map_or(0.0, |last_s| time_s - last_s);
+        let input = self.signals.input(dt_s, |column| rows.number(column))?;
+        let truth = self.truth.and_then(|columns| {
+            let word = rows.text(columns.phase);
+            let phase = Phase::ALL.into_iter().find(|phase| phase.name() == word)?;
+            Some(rows.number(columns.pressure).map(|pressure_pa| Truth { phase, pressure_pa }))
+        });
+        Ok(Some((input, LogRow { time_s, truth: truth.transpose()? })))
+    }
+}
+
+impl Iterator for Log {
+    type Item = Result<(Input<f64>, LogRow), TraceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self.looked_at.pop_front() {
+            Some(sample) => Some(Ok(sample)),
+            None => self.read().transpose(),
+        }
+    }
+}
