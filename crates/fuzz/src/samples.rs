@@ -30,11 +30,11 @@ pub(crate) fn observers(vehicle: &Vehicle, methods: &[GainMethod]) -> Result<Vec
 }
 
 /// What must hold of an estimate whatever the input was.
-fn assert_what_holds_for_any_input<T: Real>(limits: &InputLimits<T>, estimate: &Estimate<T>) {
+fn assert_what_holds_for_any_input<T: Real, O>(_: &O, limits: &InputLimits<T>, estimate: &Estimate<T>) {
     let possible = estimate.pressure_pa >= T::zero() && estimate.pressure_pa <= limits.pressure_max_pa;
     let finite = estimate.clutch_torque_n_m.is_finite() && estimate.shaft_torque_n_m.is_none_or(|n_m| n_m.is_finite());
     let held = estimate.bounds.is_none_or(|bounds| bounds.hold(estimate)) || estimate.health != Health::Good;
-    assert!(possible && finite && held, "{estimate:?}");
+    assert!(possible && finite && held, "{}: {estimate:?}", std::any::type_name::<O>());
 }
 
 fn step_through<T: Real>(
@@ -44,7 +44,7 @@ fn step_through<T: Real>(
 ) {
     let mut state = observer.start();
     for input in inputs {
-        assert_what_holds_for_any_input(limits, &observer.step(&mut state, &input));
+        assert_what_holds_for_any_input(observer, limits, &observer.step(&mut state, &input));
     }
 }
 

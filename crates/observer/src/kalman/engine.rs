@@ -3,6 +3,7 @@
 use drivetrain::Real;
 
 use super::gate::{Gate, Verdict};
+use crate::InputLimits;
 
 /// What the engine's filter knows beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,19 +98,25 @@ impl<T: Real> Engine<T> {
         let variance = total(with);
         let gain = with.map(|with| with / variance);
         self.mean = [self.mean[0] + gain[0] * surprise, self.mean[1] + gain[1] * surprise];
-        self.speed_variance = (self.speed_variance - gain[0] * with[0]).max(T::zero());
-        self.covariance = self.covariance - gain[0] * with[1];
-        self.acceleration_variance = (self.acceleration_variance - gain[1] * with[1]).max(T::zero());
+        // Joseph's form stays a covariance when rounding or a cut variance has made the gain another one.
+        let left = [T::one() - gain[0], age_s * gain[0], -gain[1], T::one() + age_s * gain[1]];
+        let row = |a: T, b: T| {
+            [a * self.speed_variance + b * self.covariance, a * self.covariance + b * self.acceleration_variance]
+        };
+        let (speed, acceleration) = (row(left[0], left[1]), row(left[2], left[3]));
+        self.speed_variance = speed[0] * left[0] + speed[1] * left[1] + gain[0] * gain[0] * reading;
+        self.covariance = speed[0] * left[2] + speed[1] * left[3] + gain[0] * gain[1] * reading;
+        self.acceleration_variance =
+            acceleration[0] * left[2] + acceleration[1] * left[3] + gain[1] * gain[1] * reading;
         self.silent_s = T::zero();
         verdict
     }
 
-    /// Whether all of it are numbers.
-    pub(crate) fn is_sound(&self) -> bool {
+    /// Whether its speed is possible, and all of it are numbers.
+    pub(crate) fn is_sound(&self, limits: &InputLimits<T>) -> bool {
         let [speed, acceleration] = self.mean;
-        [speed, acceleration, self.speed_variance, self.covariance, self.acceleration_variance]
-            .into_iter()
-            .all(|x| x.is_finite())
+        let numbers = [acceleration, self.speed_variance, self.covariance, self.acceleration_variance];
+        limits.speed_valid(speed) && numbers.into_iter().all(|x| x.is_finite())
     }
 }
 

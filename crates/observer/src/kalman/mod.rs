@@ -329,7 +329,7 @@ impl<T: Real> KalmanFilter<T> {
                 if engine.take(noise, reading.value, age_s) == gate::Verdict::Refused {
                     return ChannelHealth::Refused;
                 }
-                if !engine.is_sound() {
+                if !engine.is_sound(&self.limits) {
                     state.engine = Some(Engine::new(reading.value, noise));
                 }
             }
@@ -405,7 +405,10 @@ impl<T: Real> KalmanFilter<T> {
             }
         }
         if state.running.is_none() {
-            state.running = self.begin(state);
+            // From readings without sense nothing begins.
+            state.running = self
+                .begin(state)
+                .filter(|running| running.is_sound() && self.limits.shaft_torque_possible(running.mean[SPRING]));
             if let Some(running) = &state.running {
                 // A log may begin in any phase.
                 state.supervisor.phase = running.acting;
