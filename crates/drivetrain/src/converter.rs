@@ -38,6 +38,16 @@ impl<T: Real> Converter<T> {
         ConverterTorques { pump_n_m, turbine_n_m: self.torque_ratio.at(speed_ratio) * pump_n_m }
     }
 
+    /// Turbine torque, N m, and its derivative by the turbine speed, N m s/rad.
+    #[inline]
+    pub fn turbine_with_slope(&self, engine_rad_s: T, turbine_rad_s: T) -> (T, T) {
+        let engine_rad_s = engine_rad_s.max(T::of(SLOWEST_ENGINE_RAD_S));
+        let (capacity, capacity_slope) = self.capacity_n_m_s2.at_with_slope(turbine_rad_s / engine_rad_s);
+        let (ratio, ratio_slope) = self.torque_ratio.at_with_slope(turbine_rad_s / engine_rad_s);
+        let per_speed_ratio = ratio_slope * capacity + ratio * capacity_slope;
+        (ratio * capacity * engine_rad_s * engine_rad_s, per_speed_ratio * engine_rad_s)
+    }
+
     /// Least and greatest turbine torque with both speeds anywhere in these ranges, N m.
     pub fn turbine_range(&self, engine_rad_s: [T; 2], turbine_rad_s: [T; 2]) -> [T; 2] {
         let engine = engine_rad_s.map(|speed| speed.max(T::of(SLOWEST_ENGINE_RAD_S)));
@@ -96,6 +106,18 @@ mod tests {
     fn overrun_turns_the_flow_of_torque_around() {
         let torques = converter().torques(100.0, 130.0);
         assert!(torques.pump_n_m < 0.0 && torques.turbine_n_m < 0.0);
+    }
+
+    #[test]
+    fn the_slope_is_the_derivative_of_the_turbine_torque() {
+        let converter = converter();
+        for turbine in [60.0, 150.0, 190.0, 199.0, 230.0, 500.0] {
+            let (torque, slope) = converter.turbine_with_slope(200.0, turbine);
+            assert_eq!(torque, converter.torques(200.0, turbine).turbine_n_m);
+            let at = |by: f64| converter.torques(200.0, turbine + by).turbine_n_m;
+            let difference = (at(1e-4) - at(-1e-4)) / 2e-4;
+            assert!((slope - difference).abs() < 1e-5, "{turbine}: {slope} {difference}");
+        }
     }
 
     #[test]

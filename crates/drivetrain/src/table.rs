@@ -177,6 +177,15 @@ impl<T: Real> Table1<T> {
         self.values[i] + self.slopes[i] * (x - self.axis.points[i])
     }
 
+    /// The value at `x` and its derivative, which is zero outside the breakpoints.
+    #[inline]
+    pub fn at_with_slope(&self, x: T) -> (T, T) {
+        let within = self.axis.clamp(x);
+        let i = self.axis.segment(within);
+        let slope = if within == x { self.slopes[i] } else { T::zero() };
+        (self.values[i] + self.slopes[i] * (within - self.axis.points[i]), slope)
+    }
+
     /// The argument at which a table of rising values reaches `value`; the end arguments outside.
     ///
     /// Meaningful only where the values rise; elsewhere it returns the first crossing.

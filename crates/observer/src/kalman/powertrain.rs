@@ -16,18 +16,22 @@ const _: () =
 ///
 /// ```text
 /// a     = w_w + dt/(2 J) (T_k + C_s (w_0/i - w_w) - T_L)           wheel speed at the middle of the step
-/// T_k+  = T_k + K_s dt ((w_0 + w_0+)/(2 i) - a)                    T_s = T_k + (K_s dt/2 + C_s) ((w_0 + w_0+)/(2 i) - a)
-/// w_0+  = w_0 + dt (free_o + c_o T_s)                              implicit in w_0+
-/// w_t+  = w_t + dt (free_t + c_t T_s)                              w_w+ = w_w + dt/J (T_s - T_L)
+/// T_s   = T_k + (K_s dt/2 + C_s) ((w_0 + w_0+)/(2 i) - a)          T_k+ = T_k + K_s dt ((w_0 + w_0+)/(2 i) - a)
+/// T     = (1 + e) (T_t + T_t' (w_t+ - w_t)/2)                      turbine torque, T_t' its slope by the turbine speed
+/// w_t+  = w_t + dt (c_t1 T + ... + c_t4 T_s)                       implicit in w_t+ and w_0+
+/// w_0+  = w_0 + dt (c_o1 T + ... + c_o4 T_s)                       w_w+ = w_w + dt/J (T_s - T_L)
 /// p+    = phi p + drift + (1 - phi) g settled
 /// ```
+///
+/// Near a speed ratio of one the turbine torque falls by as much as 10 N m per rad/s: with both clutches slipping an
+/// explicit step of 10 ms would overshoot, and the correction of the next reading with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step<T> {
     pub(super) dt_s: T,
     /// Of turbine and output, for the clutches that slip.
     pub(super) rows: [AccelerationRow<T>; 2],
-    /// Turbine torque by the maps, at the middle of the step, N m.
-    pub(super) turbine_n_m: T,
+    /// Turbine torque by the maps at the start, with the engine speed of the middle, N m, and its slope, N m s/rad.
+    pub(super) turbine: [T; 2],
     /// Torque of the oncoming clutch per pressure above the kiss point, N m/Pa.
     pub(super) per_pressure: T,
     /// Mean pressure above the kiss point, Pa, and its derivative by the pressure at the start.
@@ -59,27 +63,42 @@ impl<T: Real> Step<T> {
         (T::one() - self.valve.phi) * self.settled_pa
     }
 
+    /// Solves for how much turbine and output speed change, from what they would change by at the torques of the start.
+    #[inline]
+    fn implicit(&self, share: T) -> Implicit<T> {
+        let (one, half, dt) = (T::one(), T::of(0.5), self.dt_s);
+        let per_turbine = half * dt * (one + share) * self.turbine[1];
+        let per_output = half * dt * self.shaft_per_twist() / (self.ratio * self.ratio);
+        let [t, o] = &self.rows;
+        let matrix = [
+            [one - per_turbine * t.per_turbine_torque, -per_output * t.per_output_torque],
+            [-per_turbine * o.per_turbine_torque, one - per_output * o.per_output_torque],
+        ];
+        let determinant = matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0];
+        Implicit { matrix, per_determinant: determinant.recip() }
+    }
+
     /// The states at the end.
     #[inline]
     pub(super) fn propagate(&self, x: &[T; N]) -> [T; N] {
         let (one, half, dt) = (T::one(), T::of(0.5), self.dt_s);
         let oncoming = (one + x[FRICTION]) * self.per_pressure * self.above_kiss[0];
-        let free = |row: &AccelerationRow<T>| {
-            row.per_turbine_torque * self.turbine_n_m * (one + x[SHARE])
-                + row.per_oncoming_torque * oncoming
-                + row.per_offgoing_torque * x[OFFGOING]
-        };
         let twist = x[OUTPUT] / self.ratio - x[WHEEL];
         let middle = x[WHEEL] + half * dt / self.inertia * (x[SPRING] + self.damping * twist - x[LOAD]);
         let k = self.shaft_per_twist();
-        let [c_t, c_o] = self.rows.map(|row| row.per_output_torque / self.ratio);
-        let held = x[SPRING] + k * (half * x[OUTPUT] / self.ratio - middle);
-        let output = (x[OUTPUT] + dt * (free(&self.rows[1]) + c_o * held)) / (one - half * dt * c_o * k / self.ratio);
-        let mean_twist = half * (x[OUTPUT] + output) / self.ratio - middle;
+        let held = x[SPRING] + k * (x[OUTPUT] / self.ratio - middle);
+        let explicit = |row: &AccelerationRow<T>| {
+            dt * (row.per_turbine_torque * self.turbine[0] * (one + x[SHARE])
+                + row.per_oncoming_torque * oncoming
+                + row.per_offgoing_torque * x[OFFGOING]
+                + row.per_output_torque / self.ratio * held)
+        };
+        let [turbine, output] = self.implicit(x[SHARE]).solve([explicit(&self.rows[0]), explicit(&self.rows[1])]);
+        let mean_twist = (x[OUTPUT] + half * output) / self.ratio - middle;
         let shaft = x[SPRING] + k * mean_twist;
         let mut next = *x;
-        next[TURBINE] = x[TURBINE] + dt * (free(&self.rows[0]) + c_t * shaft);
-        next[OUTPUT] = output;
+        next[TURBINE] = x[TURBINE] + turbine;
+        next[OUTPUT] = x[OUTPUT] + output;
         next[WHEEL] = x[WHEEL] + dt / self.inertia * (shaft - x[LOAD]);
         next[SPRING] = x[SPRING] + self.stiffness * dt * mean_twist;
         next[PRESSURE] = self.valve.phi * x[PRESSURE] + self.valve.drift_pa + self.per_gain() * x[GAIN];
@@ -88,21 +107,13 @@ impl<T: Real> Step<T> {
         next
     }
 
-    /// Derivatives of the first five states at the end by those that they depend on.
+    /// Derivatives of the first five states at the end, which are `next`, by those that they depend on.
     #[inline]
-    pub(super) fn jacobian(&self, x: &[T; N]) -> [[T; COLUMNS]; LAWS] {
+    pub(super) fn jacobian(&self, x: &[T; N], next: &[T; N]) -> [[T; COLUMNS]; LAWS] {
         let (zero, one, half, dt) = (T::zero(), T::one(), T::of(0.5), self.dt_s);
         let friction = one + x[FRICTION];
-        let free = |row: &AccelerationRow<T>| {
-            let mut by = [zero; COLUMNS];
-            by[PRESSURE] = row.per_oncoming_torque * friction * self.per_pressure * self.above_kiss[1];
-            by[FRICTION] = row.per_oncoming_torque * self.per_pressure * self.above_kiss[0];
-            by[SHARE] = row.per_turbine_torque * self.turbine_n_m;
-            by[OFFGOING] = row.per_offgoing_torque;
-            by
-        };
+        let mean_turbine_n_m = self.turbine[0] + half * self.turbine[1] * (next[TURBINE] - x[TURBINE]);
         let k = self.shaft_per_twist();
-        let [c_t, c_o] = self.rows.map(|row| row.per_output_torque / self.ratio);
         // Of the wheel speed at the middle.
         let per_torque = half * dt / self.inertia;
         let mut middle = [zero; COLUMNS];
@@ -110,30 +121,53 @@ impl<T: Real> Step<T> {
         middle[OUTPUT] = per_torque * self.damping / self.ratio;
         middle[SPRING] = per_torque;
         middle[LOAD] = -per_torque;
+        // Of the shaft torque, as far as it does not depend on the output speed at the end.
+        let mut held = middle.map(|by| -k * by);
+        held[OUTPUT] = held[OUTPUT] + k / self.ratio;
+        held[SPRING] = held[SPRING] + one;
+        let explicit = |row: &AccelerationRow<T>| {
+            let mut by = held.map(|held| dt * row.per_output_torque / self.ratio * held);
+            let per_pressure = dt * row.per_oncoming_torque * self.per_pressure;
+            by[PRESSURE] = per_pressure * friction * self.above_kiss[1];
+            by[FRICTION] = per_pressure * self.above_kiss[0];
+            by[SHARE] = dt * row.per_turbine_torque * mean_turbine_n_m;
+            by[TURBINE] = dt * row.per_turbine_torque * (one + x[SHARE]) * self.turbine[1];
+            by[OFFGOING] = dt * row.per_offgoing_torque;
+            by
+        };
+        let (implicit, by_turbine, by_output) = (self.implicit(x[SHARE]), explicit(&self.rows[0]), explicit(&self.rows[1]));
         let mut f = [[zero; COLUMNS]; LAWS];
-        let solve = (one - half * dt * c_o * k / self.ratio).recip();
-        let by_output = free(&self.rows[1]);
-        for (c, by) in by_output.into_iter().enumerate() {
-            f[OUTPUT][c] = solve * dt * (by - c_o * k * middle[c]);
-        }
-        f[OUTPUT][OUTPUT] = f[OUTPUT][OUTPUT] + solve * (one + half * dt * c_o * k / self.ratio);
-        f[OUTPUT][SPRING] = f[OUTPUT][SPRING] + solve * dt * c_o;
-        let by_turbine = free(&self.rows[0]);
         for c in 0..COLUMNS {
+            let [turbine, output] = implicit.solve([by_turbine[c], by_output[c]]);
             let same = if c == OUTPUT { one } else { zero };
-            let twist = half * (same + f[OUTPUT][c]) / self.ratio - middle[c];
+            let twist = (same + half * output) / self.ratio - middle[c];
             let shaft = k * twist + if c == SPRING { one } else { zero };
-            f[TURBINE][c] = dt * (by_turbine[c] + c_t * shaft);
+            f[TURBINE][c] = turbine;
+            f[OUTPUT][c] = output;
             f[SPRING][c] = self.stiffness * dt * twist;
             f[WHEEL][c] = dt / self.inertia * shaft;
         }
-        f[TURBINE][TURBINE] = f[TURBINE][TURBINE] + one;
-        f[SPRING][SPRING] = f[SPRING][SPRING] + one;
-        f[WHEEL][WHEEL] = f[WHEEL][WHEEL] + one;
+        for state in [TURBINE, OUTPUT, WHEEL, SPRING] {
+            f[state][state] = f[state][state] + one;
+        }
         f[WHEEL][LOAD] = f[WHEEL][LOAD] - dt / self.inertia;
         f[PRESSURE][PRESSURE] = self.valve.phi;
         f[PRESSURE][GAIN] = self.per_gain();
         f
+    }
+}
+
+/// The implicit part of a step: the changes of turbine and output speed depend on each other.
+struct Implicit<T> {
+    matrix: [[T; 2]; 2],
+    per_determinant: T,
+}
+
+impl<T: Real> Implicit<T> {
+    #[inline]
+    fn solve(&self, [turbine, output]: [T; 2]) -> [T; 2] {
+        let [[tt, to], [ot, oo]] = self.matrix;
+        [(oo * turbine - to * output) * self.per_determinant, (tt * output - ot * turbine) * self.per_determinant]
     }
 }
 
@@ -151,7 +185,7 @@ mod tests {
         Step {
             dt_s: 0.01,
             rows: [row([15.2, -9.4, -15.5, 0.11]), row([0.5, 10.1, 0.16, -6.1])],
-            turbine_n_m: 130.0,
+            turbine: [130.0, -6.0],
             per_pressure: 5.1e-4,
             above_kiss: [0.15e6, 0.9],
             settled_pa: 0.23e6,
@@ -170,14 +204,17 @@ mod tests {
         let step = step();
         let mut x = [0.0; N];
         x[..COLUMNS].copy_from_slice(&[300.0, 120.0, 40.5, 900.0, 0.2e6, 0.03, 60.0, 700.0, -0.1, 0.04]);
-        let f = step.jacobian(&x);
+        let f = step.jacobian(&x, &step.propagate(&x));
         for c in 0..COLUMNS {
             let small = 1e-5 * x[c].abs().max(1e-2);
             let moved = |by: f64| {
                 let mut x = x;
                 x[c] += by;
-                // The mean pressure above the kiss point belongs to the step.
+                // The mean pressure above the kiss point and the turbine torque at the start belong to the step.
                 let mut step = step;
+                if c == TURBINE {
+                    step.turbine[0] += by * step.turbine[1];
+                }
                 if c == PRESSURE {
                     step.above_kiss[0] += by * step.above_kiss[1];
                 }
@@ -203,7 +240,7 @@ mod tests {
         let [t, o] = step.rows;
         let output = 900.0 / 3.0;
         let determinant = t.per_turbine_torque * o.per_offgoing_torque - o.per_turbine_torque * t.per_offgoing_torque;
-        step.turbine_n_m = -(t.per_output_torque * o.per_offgoing_torque - o.per_output_torque * t.per_offgoing_torque)
+        step.turbine[0] = -(t.per_output_torque * o.per_offgoing_torque - o.per_output_torque * t.per_offgoing_torque)
             * output
             / determinant;
         x[OFFGOING] = -(o.per_output_torque * t.per_turbine_torque - t.per_output_torque * o.per_turbine_torque)

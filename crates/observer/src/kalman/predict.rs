@@ -145,8 +145,8 @@ impl<T: Real> KalmanFilter<T> {
         }
         let x = running.mean;
         let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
-        let f = step.jacobian(&x);
         running.mean = step.propagate(&x);
+        let f = step.jacobian(&x, &running.mean);
         running.covariance.spread(&f, step.stay, step.keep);
         self.add_noise(running, engine, &step, &x, settled_pa);
         running.earlier.age_s = running.earlier.age_s + dt_s;
@@ -179,11 +179,13 @@ impl<T: Real> KalmanFilter<T> {
         let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s / dt_s;
         let sigma_pa = running.covariance.states[PRESSURE][PRESSURE].max(zero).sqrt();
         let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), sigma_pa);
-        let middle = x[TURBINE] + half * dt_s * running.accelerations[TURBINE];
+        let (turbine_n_m, slope_n_m_s) =
+            rigid.converter.turbine_with_slope(engine.speed_before(left_s + half * dt_s), x[TURBINE]);
         Step {
             dt_s,
             rows,
-            turbine_n_m: rigid.converter.torques(engine.speed_before(left_s + half * dt_s), middle).turbine_n_m,
+            // A torque that rises with the turbine speed is taken as it is at the start: implicit it might have no solution.
+            turbine: [turbine_n_m, slope_n_m_s.min(zero)],
             per_pressure: if locked {
                 zero
             } else {
@@ -230,7 +232,7 @@ impl<T: Real> KalmanFilter<T> {
         p.add(LOAD, dt * square(if shifting { u.load_shifting_n_m } else { u.load_in_gear_n_m }));
         if engine.silent_s > T::of(0.5) * T::of(FIRST_S) {
             // A missing engine speed leaves the turbine torque open.
-            let torque = square(step.turbine_n_m) * engine.variance() / square(engine.speed_before(T::zero())).max(one);
+            let torque = square(step.turbine[0]) * engine.variance() / square(engine.speed_before(T::zero())).max(one);
             for (k, row) in [(TURBINE, &step.rows[0]), (OUTPUT, &step.rows[1])] {
                 p.add(k, square(two * dt * row.per_turbine_torque) * torque);
             }
