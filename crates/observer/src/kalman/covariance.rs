@@ -1,45 +1,91 @@
-//! The covariance of the states and of the speeds at an earlier time.
+//! The covariance of the states and of the speeds at earlier times.
 
 use drivetrain::Real;
 
+use super::past::{CLONES, PASTS, SPEEDS};
 use super::powertrain::{COLUMNS, LAWS};
 use super::{GAIN, N, OFFGOING, PRESSURE, SHARE};
 
-/// Covariance of the states, of the states with the three speeds at an earlier time, and of those.
+/// Covariance of the states, of the states with the speeds at earlier times, and of those.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Covariance<T> {
     pub(super) states: [[T; N]; N],
-    pub(super) across: [[T; 3]; N],
-    pub(super) within: [[T; 3]; 3],
+    pub(super) across: [[T; CLONES]; N],
+    pub(super) within: [[T; CLONES]; CLONES],
 }
 
 /// A scalar measurement: covariance of the states and of the earlier speeds with it, and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Measured<T> {
     pub(super) states: [T; N],
-    pub(super) earlier: [T; 3],
+    pub(super) earlier: [T; CLONES],
     pub(super) variance: T,
 }
 
 impl<T: Real> Covariance<T> {
-    /// Independent states with these standard deviations.
+    /// Independent states with these standard deviations, without a past.
     pub(super) fn of(deviations: [T; N]) -> Self {
         let mut states = [[T::zero(); N]; N];
         for (i, deviation) in deviations.into_iter().enumerate() {
             states[i][i] = deviation * deviation;
         }
-        let mut covariance = Self { states, across: [[T::zero(); 3]; N], within: [[T::zero(); 3]; 3] };
-        covariance.remember();
-        covariance
+        Self { states, across: [[T::zero(); CLONES]; N], within: [[T::zero(); CLONES]; CLONES] }
     }
 
-    /// The speeds of now become the earlier ones.
+    /// A past of these ages: the speeds were as uncertain as now, and have changed by accelerations with these variances.
+    pub(super) fn steady_past(&mut self, ages: [T; PASTS], acceleration_variances: [T; SPEEDS]) {
+        for (across, row) in self.across.iter_mut().zip(&self.states) {
+            *across = core::array::from_fn(|m| row[m % SPEEDS]);
+        }
+        for (m, row) in self.within.iter_mut().enumerate() {
+            let (age_s, k) = (ages[m / SPEEDS], m % SPEEDS);
+            for (l, value) in row.iter_mut().enumerate() {
+                let same = if l % SPEEDS == k { acceleration_variances[k] } else { T::zero() };
+                *value = self.states[k][l % SPEEDS] + same * age_s * ages[l / SPEEDS];
+            }
+        }
+    }
+
+    /// The speeds of now become the newest of the past.
     #[inline]
     pub(super) fn remember(&mut self) {
-        for (across, row) in self.across.iter_mut().zip(&self.states) {
-            *across = [row[0], row[1], row[2]];
+        for m in (SPEEDS..CLONES).rev() {
+            for l in (SPEEDS..CLONES).rev() {
+                self.within[m][l] = self.within[m - SPEEDS][l - SPEEDS];
+            }
         }
-        self.within = [self.across[0], self.across[1], self.across[2]];
+        for k in 0..SPEEDS {
+            for l in SPEEDS..CLONES {
+                let value = self.across[k][l - SPEEDS];
+                self.within[k][l] = value;
+                self.within[l][k] = value;
+            }
+            for l in 0..SPEEDS {
+                self.within[k][l] = self.states[k][l];
+            }
+        }
+        for (across, row) in self.across.iter_mut().zip(&self.states) {
+            across.copy_within(..CLONES - SPEEDS, SPEEDS);
+            across[..SPEEDS].copy_from_slice(&row[..SPEEDS]);
+        }
+    }
+
+    /// Covariance of the state `i` with the speed `k` at a point in time, counted from 0 for now.
+    #[inline]
+    pub(super) fn with_speed(&self, i: usize, k: usize, point: usize) -> T {
+        match point.checked_sub(1) {
+            None => self.states[i][k],
+            Some(n) => self.across[i][(SPEEDS * n + k).min(CLONES - 1)],
+        }
+    }
+
+    /// Covariance of the remembered speed `m` with the speed `k` at a point in time.
+    #[inline]
+    pub(super) fn past_with_speed(&self, m: usize, k: usize, point: usize) -> T {
+        match point.checked_sub(1) {
+            None => self.across[k][m],
+            Some(n) => self.within[m][(SPEEDS * n + k).min(CLONES - 1)],
+        }
     }
 
     /// `P = F P F'`: the first states have a full row each over the first columns, two others fade, the rest stands.
@@ -47,7 +93,7 @@ impl<T: Real> Covariance<T> {
     pub(super) fn spread(&mut self, f: &[[T; COLUMNS]; LAWS], stay: T, keep: T) {
         let p = &mut self.states;
         let mut fp = [[T::zero(); N]; LAWS];
-        let mut across = [[T::zero(); 3]; LAWS];
+        let mut across = [[T::zero(); CLONES]; LAWS];
         for (i, row) in f.iter().enumerate() {
             if i == PRESSURE {
                 for j in 0..N {
@@ -68,7 +114,7 @@ impl<T: Real> Covariance<T> {
             }
         }
         self.across[..LAWS].copy_from_slice(&across);
-        for m in 0..3 {
+        for m in 0..CLONES {
             self.across[SHARE][m] = stay * self.across[SHARE][m];
             self.across[OFFGOING][m] = keep * self.across[OFFGOING][m];
         }
@@ -115,14 +161,14 @@ impl<T: Real> Covariance<T> {
             self.states[i][state] = T::zero();
             self.states[state][i] = T::zero();
         }
-        self.across[state] = [T::zero(); 3];
+        self.across[state] = [T::zero(); CLONES];
         self.states[state][state] = deviation * deviation;
     }
 
     /// Corrects for a measurement by Joseph's form, which holds for any gain: `P - K S' - S K' + K V K'`. The gain of
     /// the states that are `considered` is zero: their uncertainty is accounted for and stays.
     #[inline]
-    pub(super) fn correct(&mut self, measured: &Measured<T>, considered: [bool; N]) -> ([T; N], [T; 3]) {
+    pub(super) fn correct(&mut self, measured: &Measured<T>, considered: [bool; N]) -> ([T; N], [T; CLONES]) {
         let per_variance = measured.variance.recip();
         let mut gain = measured.states.map(|with| with * per_variance);
         for (gain, considered) in gain.iter_mut().zip(considered) {
@@ -134,21 +180,22 @@ impl<T: Real> Covariance<T> {
         let half_variance = T::of(0.5) * measured.variance;
         // K w' + w K' with w = K V/2 - S.
         let weight: [T; N] = core::array::from_fn(|i| half_variance * gain[i] - measured.states[i]);
-        let earlier_weight: [T; 3] = core::array::from_fn(|m| half_variance * earlier[m] - measured.earlier[m]);
+        let earlier_weight: [T; CLONES] = core::array::from_fn(|m| half_variance * earlier[m] - measured.earlier[m]);
         for i in 0..N {
             for j in i..N {
                 let value = self.states[i][j] + (gain[i] * weight[j] + weight[i] * gain[j]);
                 self.states[i][j] = value;
                 self.states[j][i] = value;
             }
-            for m in 0..3 {
+            for m in 0..CLONES {
                 self.across[i][m] = self.across[i][m] + (gain[i] * earlier_weight[m] + weight[i] * earlier[m]);
             }
         }
-        for l in 0..3 {
-            for m in 0..3 {
-                self.within[l][m] =
-                    self.within[l][m] + (earlier[l] * earlier_weight[m] + earlier_weight[l] * earlier[m]);
+        for l in 0..CLONES {
+            for m in l..CLONES {
+                let value = self.within[l][m] + (earlier[l] * earlier_weight[m] + earlier_weight[l] * earlier[m]);
+                self.within[l][m] = value;
+                self.within[m][l] = value;
             }
         }
         (gain, earlier)

@@ -5,6 +5,9 @@ use drivetrain::Real;
 use super::gate::{Gate, Verdict};
 use crate::InputLimits;
 
+/// Time without a reading after which the acceleration is taken to fade, and in which it does, s.
+const SILENT_S: f64 = 0.05;
+
 /// What the engine's filter knows beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EngineNoise<T> {
@@ -59,17 +62,23 @@ impl<T: Real> Engine<T> {
     /// Lets time pass.
     #[inline]
     pub(crate) fn predict(&mut self, noise: &EngineNoise<T>, dt_s: T) {
-        let walk = noise.acceleration_walk * noise.acceleration_walk * dt_s;
+        let square = |x: T| x * x;
+        let (two, third) = (T::of(2.0), T::of(1.0 / 3.0));
+        // The acceleration fades, so that its variance ends at the square of its limit: cut there, the covariance would not
+        // stay one.
         let limit = noise.acceleration_max_rad_s2;
+        let fade_s = two * square(limit / noise.acceleration_walk);
+        let stay = fade_s / (fade_s + dt_s);
+        let walk = square(limit) * (T::one() - square(stay));
         self.mean[0] = self.mean[0] + dt_s * self.mean[1];
         // Without readings an acceleration does not last for ever.
-        self.mean[1] =
-            self.mean[1].max(-limit).min(limit) * if self.silent_s > T::of(0.05) { T::of(0.5) } else { T::one() };
+        let silent = if self.silent_s > T::of(SILENT_S) { T::of(SILENT_S) / (T::of(SILENT_S) + dt_s) } else { stay };
+        self.mean[1] = self.mean[1].max(-limit).min(limit) * silent;
         self.speed_variance = self.speed_variance
-            + dt_s * (T::of(2.0) * self.covariance + dt_s * self.acceleration_variance)
-            + walk * dt_s * dt_s / T::of(3.0);
-        self.covariance = self.covariance + dt_s * self.acceleration_variance + T::of(0.5) * walk * dt_s;
-        self.acceleration_variance = (self.acceleration_variance + walk).min(limit * limit);
+            + dt_s * (two * self.covariance + dt_s * self.acceleration_variance)
+            + third * walk * dt_s * dt_s;
+        self.covariance = stay * (self.covariance + dt_s * self.acceleration_variance) + T::of(0.5) * walk * dt_s;
+        self.acceleration_variance = square(stay) * self.acceleration_variance + walk;
         self.silent_s = self.silent_s + dt_s;
     }
 
@@ -137,6 +146,27 @@ mod tests {
         }
         assert!((engine.speed_before(0.0) - 160.0).abs() < 0.05, "{engine:?}");
         assert!((engine.speed_before(0.01) - 158.5).abs() < 0.05, "{engine:?}");
+    }
+
+    #[test]
+    fn the_covariance_stays_one_from_the_first_reading_on() {
+        for age_s in [0.0, 0.004, 0.0064, 0.02, 0.05] {
+            let mut engine = Engine::new(
+                93.2_f32,
+                &EngineNoise { reading_rad_s: 0.1, acceleration_walk: 1315.0, acceleration_max_rad_s2: 2353.0 },
+            );
+            let noise = EngineNoise { reading_rad_s: 0.1, acceleration_walk: 1315.0, acceleration_max_rad_s2: 2353.0 };
+            for k in 0..200_u16 {
+                engine.predict(&noise, 0.01);
+                let product = engine.speed_variance * engine.acceleration_variance;
+                assert!(product >= engine.covariance * engine.covariance * 0.999, "{age_s} {k}: {engine:?}");
+                if k % 7 != 0 {
+                    engine.take(&noise, 93.2 + 0.6 * f32::from(k), age_s);
+                    assert!((engine.mean[0] - (93.2 + 0.6 * f32::from(k) + 60.0 * age_s)).abs() < 20.0, "{engine:?}");
+                }
+            }
+            assert!((engine.mean[0] - (93.2 + 0.6 * 199.0 + 60.0 * age_s)).abs() < 0.3, "{age_s}: {engine:?}");
+        }
     }
 
     #[test]

@@ -26,6 +26,7 @@
 mod covariance;
 mod engine;
 mod gate;
+mod past;
 mod phases;
 mod powertrain;
 mod predict;
@@ -41,6 +42,7 @@ use crate::{
 use covariance::Covariance;
 use engine::Engine;
 use gate::Gate;
+use past::Past;
 use valve_model::Commands;
 
 pub use engine::EngineNoise;
@@ -173,11 +175,8 @@ pub struct KalmanState<T> {
 struct Running<T> {
     mean: [T; N],
     covariance: Covariance<T>,
-    /// The speeds at an earlier time, with which readings are compared that are older than this step.
-    earlier: Earlier<T>,
-    /// Accelerations over the time since then, rad/s^2, and over the one before.
-    accelerations: [T; 3],
-    accelerations_before: [T; 3],
+    /// The speeds at earlier times, with which readings are compared that are older than this step.
+    past: Past<T>,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
     acting: Phase,
@@ -187,13 +186,6 @@ struct Running<T> {
     gates: [Gate; 3],
     /// Time since a reading of turbine, output or wheel was taken, s.
     silent_s: [T; 3],
-}
-
-/// Turbine, output and wheel speed at an earlier time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Earlier<T> {
-    age_s: T,
-    mean: [T; 3],
 }
 
 impl<T: Real> KalmanFilter<T> {
@@ -539,6 +531,9 @@ pub const STATES: [(&str, &str); N] = [
 
 impl<T: Real> KalmanState<T> {
     /// Mean and standard deviation of each of the [`STATES`], while the filter runs.
+    pub fn dbg(&self) -> (T, T) {
+        self.engine.as_ref().map_or((T::zero(), T::zero()), |e| (e.speed_before(T::zero()), e.variance().sqrt()))
+    }
     pub fn states(&self) -> Option<[(T, T); N]> {
         let running = self.running.as_ref()?;
         Some(core::array::from_fn(|i| (running.mean[i], running.covariance.states[i][i].max(T::zero()).sqrt())))

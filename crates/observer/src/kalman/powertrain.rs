@@ -135,7 +135,8 @@ impl<T: Real> Step<T> {
             by[OFFGOING] = dt * row.per_offgoing_torque;
             by
         };
-        let (implicit, by_turbine, by_output) = (self.implicit(x[SHARE]), explicit(&self.rows[0]), explicit(&self.rows[1]));
+        let (implicit, by_turbine, by_output) =
+            (self.implicit(x[SHARE]), explicit(&self.rows[0]), explicit(&self.rows[1]));
         let mut f = [[zero; COLUMNS]; LAWS];
         for c in 0..COLUMNS {
             let [turbine, output] = implicit.solve([by_turbine[c], by_output[c]]);

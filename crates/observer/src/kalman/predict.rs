@@ -5,15 +5,14 @@ use drivetrain::{Real, clutch::direction};
 use super::covariance::Covariance;
 use super::engine::Engine;
 use super::gate::Gate;
+use super::past::Past;
 use super::powertrain::Step;
 use super::{
-    DELAY, Earlier, FIRST_S, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE,
-    Running, SCALE, SHARE, SKEW, SPRING, TURBINE, WHEEL,
+    DELAY, FIRST_S, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE, Running,
+    SCALE, SHARE, SKEW, SPRING, TURBINE, WHEEL,
 };
 use crate::Phase;
 
-/// Time after which the earlier speeds are taken anew, s.
-const EARLIER_S: f64 = 0.009;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 
@@ -85,14 +84,13 @@ impl<T: Real> KalmanFilter<T> {
                 }
             }
         }
-        covariance.remember();
-        let speeds = [mean[TURBINE], mean[OUTPUT], mean[WHEEL]];
+        let past = Past::steady([mean[TURBINE], mean[OUTPUT], mean[WHEEL]], accelerations);
+        // On a hill, or in a shift, the acceleration is another one.
+        covariance.steady_past(past.ages(), accelerations.map(|acceleration| acceleration * acceleration));
         Some(Running {
             mean,
             covariance,
-            earlier: Earlier { age_s: zero, mean: speeds },
-            accelerations,
-            accelerations_before: accelerations,
+            past,
             motion_pa_s: zero,
             acting,
             direction: direction(model.shift.oncoming_slip(turbine, output)),
@@ -122,7 +120,8 @@ impl<T: Real> KalmanFilter<T> {
         let shift = &self.model.shift;
         if running.acting == Phase::InertiaPhase {
             let slip = shift.oncoming_slip(running.mean[TURBINE], running.mean[OUTPUT]);
-            let rate = shift.oncoming_slip(running.accelerations[TURBINE], running.accelerations[OUTPUT]);
+            let [turbine, output] = [TURBINE, OUTPUT].map(|k| running.past.accelerations(k, running.mean[k])[0]);
+            let rate = shift.oncoming_slip(turbine, output);
             let until_s = -slip / rate;
             if until_s > T::zero() && until_s < dt_s {
                 self.advance(running, engine, settled_pa, until_s, dt_s - until_s);
@@ -137,11 +136,9 @@ impl<T: Real> KalmanFilter<T> {
     /// A step in one phase, that ends `left_s` before now.
     #[inline]
     fn advance(&self, running: &mut Running<T>, engine: &Engine<T>, settled_pa: T, dt_s: T, left_s: T) {
-        if running.earlier.age_s >= T::of(EARLIER_S) || running.earlier.age_s <= T::zero() {
-            running.accelerations_before = running.accelerations;
+        if running.past.is_due() {
+            running.past.remember([running.mean[TURBINE], running.mean[OUTPUT], running.mean[WHEEL]]);
             running.covariance.remember();
-            let x = &running.mean;
-            running.earlier = Earlier { age_s: T::zero(), mean: [x[TURBINE], x[OUTPUT], x[WHEEL]] };
         }
         let x = running.mean;
         let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
@@ -149,10 +146,7 @@ impl<T: Real> KalmanFilter<T> {
         let f = step.jacobian(&x, &running.mean);
         running.covariance.spread(&f, step.stay, step.keep);
         self.add_noise(running, engine, &step, &x, settled_pa);
-        running.earlier.age_s = running.earlier.age_s + dt_s;
-        for (k, acceleration) in running.accelerations.iter_mut().enumerate() {
-            *acceleration = (running.mean[k] - running.earlier.mean[k]) / running.earlier.age_s;
-        }
+        running.past.pass(dt_s);
         for silent_s in &mut running.silent_s {
             *silent_s = *silent_s + dt_s;
         }

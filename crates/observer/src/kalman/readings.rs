@@ -4,17 +4,17 @@ use drivetrain::Real;
 
 use super::covariance::Measured;
 use super::gate::Verdict;
+use super::past::{CLONES, PASTS, Place, SPEEDS};
 use super::{DELAY, FRICTION, GAIN, KalmanFilter, N, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
 use crate::{ChannelHealth, Phase, Reading};
 
 /// Standard deviation of a uniform distribution, in its width.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
-/// A speed at the time of a reading: what of it the states at the end of the step and the earlier speeds make.
+/// A speed at the time of a reading.
 struct Line<T> {
     value: T,
-    now: T,
-    earlier: T,
+    place: Place<T>,
     /// Its derivative by the age, rad/s^2.
     per_age: T,
     /// What a line leaves open.
@@ -54,14 +54,14 @@ impl<T: Real> KalmanFilter<T> {
         };
         let noise = sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance;
         let innovation = reading.value - scale * line.value;
-        let weights = [scale * line.now, scale * line.earlier];
-        let mut measured = with_reading(running, k, weights, by, noise);
+        let place = Place { shares: line.place.shares.map(|share| scale * share), ..line.place };
+        let mut measured = with_reading(running, k, &place, by, noise);
         let verdict = running.gates[k].judge(innovation, measured.variance);
         match verdict {
             Verdict::Refused => return ChannelHealth::Refused,
             Verdict::Jumped => {
                 running.covariance.add(k, innovation * innovation);
-                measured = with_reading(running, k, weights, by, noise);
+                measured = with_reading(running, k, &place, by, noise);
             }
             Verdict::Taken => {}
         }
@@ -78,33 +78,31 @@ impl<T: Real> KalmanFilter<T> {
     /// The speed `k` an age ago.
     #[inline]
     fn line(&self, running: &Running<T>, k: usize, age_s: T, size_rad_s: T) -> Line<T> {
-        let (zero, one) = (T::zero(), T::one());
-        let span_s = running.earlier.age_s;
-        let (now, earlier) = (running.mean[k], running.earlier.mean[k]);
-        let acceleration = if span_s > zero { (now - earlier) / span_s } else { running.accelerations[k] };
         let square = |x: T| x * x;
-        let change = acceleration - running.accelerations_before[k];
+        let (past, now) = (&running.past, running.mean[k]);
+        let place = past.place(age_s);
+        let [late, early] = place.between.map(|point| past.speed(k, now, point));
+        let acceleration = if place.width_s > T::zero() { (late - early) / place.width_s } else { T::zero() };
+        let [newest, before] = past.accelerations(k, now);
+        // Between two points a parabola differs from a line by this, and beyond the oldest by more and more.
+        let bend_s = T::of(0.5) * (place.shares[0] * place.shares[1] * place.width_s + place.beyond_s);
         let pitch_s = self.readings[k].pitch_rad / size_rad_s;
-        let mut variance = square(T::of(0.5) * age_s * change) + square(T::of(UNIFORM) * pitch_s * acceleration);
+        let mut variance = square(bend_s * (newest - before)) + square(T::of(UNIFORM) * pitch_s * acceleration);
+        if place.beyond_s > T::zero() && place.width_s > T::zero() {
+            // The acceleration of before is carried on, as well as it is known.
+            variance = variance + square(place.beyond_s / place.width_s) * variance_between(running, k, place.between);
+        }
         if k == WHEEL {
             let u = &self.uncertainty;
             let shifting = matches!(running.acting, Phase::TorquePhase | Phase::InertiaPhase);
             let load = if shifting { u.load_shifting_n_m } else { u.load_in_gear_n_m };
             let line = &self.model.rigid.driveline;
             let inertia = self.model.rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
-            let beyond = (age_s - span_s).max(zero);
+            let beyond = place.beyond_s;
             variance = variance + square(load / inertia) * beyond * beyond * beyond / T::of(3.0);
         }
-        // A line through both ends; over a short span it is noise, and the acceleration of before is carried on.
-        let share = if span_s > zero { age_s / span_s } else { zero };
-        if share <= one || span_s >= T::of(0.005) {
-            let now_share = one - share;
-            let value = now_share * now + share * earlier;
-            return Line { value, now: now_share, earlier: share, per_age: -acceleration, variance };
-        }
-        let before = running.accelerations_before[k];
-        let value = earlier - (age_s - span_s) * before;
-        Line { value, now: zero, earlier: one, per_age: -before, variance }
+        let value = place.shares[0] * late + place.shares[1] * early - place.beyond_s * acceleration;
+        Line { value, place, per_age: -acceleration, variance }
     }
 
     /// Ties turbine to output speed by the ratio of the gear before the shift.
@@ -114,7 +112,7 @@ impl<T: Real> KalmanFilter<T> {
         let p = &running.covariance;
         let of = |row: &[T; N]| row[TURBINE] - ratio * row[OUTPUT];
         let states: [T; N] = core::array::from_fn(|i| of(&p.states[i]));
-        let earlier: [T; 3] = core::array::from_fn(|m| p.across[TURBINE][m] - ratio * p.across[OUTPUT][m]);
+        let earlier = core::array::from_fn(|m| p.across[TURBINE][m] - ratio * p.across[OUTPUT][m]);
         let deviation = self.readings[TURBINE].deviation_rad_s;
         let variance = (states[TURBINE] - ratio * states[OUTPUT]).max(T::zero()) + deviation * deviation;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
@@ -139,39 +137,52 @@ impl<T: Real> KalmanFilter<T> {
         for (x, gain) in running.mean.iter_mut().zip(gain) {
             *x = *x + gain * innovation;
         }
-        for (x, gain) in running.earlier.mean.iter_mut().zip(earlier) {
-            *x = *x + gain * innovation;
-        }
+        running.past.correct(&earlier.map(|gain| gain * innovation));
         let [least, most] = u.wheel_delay_s;
         let x = &mut running.mean;
         x[DELAY] = x[DELAY].max(least).min(most);
         x[SKEW] = x[SKEW].max(-u.skew_s).min(u.skew_s);
-        if running.earlier.age_s > T::zero() {
-            for k in [TURBINE, OUTPUT, WHEEL] {
-                running.accelerations[k] = (running.mean[k] - running.earlier.mean[k]) / running.earlier.age_s;
-            }
-        }
     }
 }
 
-/// What a reading has to do with the states: it is `weights[0]` of the speed now and `weights[1]` of the earlier one, and
-/// depends on scale, wheel delay and skew as `by` says.
+/// Variance of the change of a speed between two points in time.
 #[inline]
-fn with_reading<T: Real>(running: &Running<T>, k: usize, weights: [T; 2], by: [T; 3], noise: T) -> Measured<T> {
+fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2]) -> T {
+    let [late, early] = points.map(|point| SPEEDS * point.saturating_sub(1).min(PASTS - 1) + k);
+    let within = |m: usize, l: usize| running.covariance.within[m.min(CLONES - 1)][l.min(CLONES - 1)];
+    (within(late, late) - T::of(2.0) * within(late, early) + within(early, early)).max(T::zero())
+}
+
+/// What a reading of the speed `k` at a place in time has to do with the states: it also depends on scale, wheel delay and
+/// skew as `by` says.
+#[inline]
+fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
     let p = &running.covariance;
-    let [now, earlier] = weights;
+    let ([late, early], [a, b]) = (place.between, place.shares);
     let states: [T; N] = core::array::from_fn(|i| {
         let row = &p.states[i];
-        now * row[k] + earlier * p.across[i][k] + by[0] * row[SCALE] + by[1] * row[DELAY] + by[2] * row[SKEW]
+        a * p.with_speed(i, k, late)
+            + b * p.with_speed(i, k, early)
+            + by[0] * row[SCALE]
+            + by[1] * row[DELAY]
+            + by[2] * row[SKEW]
     });
-    let before: [T; 3] = core::array::from_fn(|m| {
-        now * p.across[k][m]
-            + earlier * p.within[k][m]
+    let earlier: [T; CLONES] = core::array::from_fn(|m| {
+        a * p.past_with_speed(m, k, late)
+            + b * p.past_with_speed(m, k, early)
             + by[0] * p.across[SCALE][m]
             + by[1] * p.across[DELAY][m]
             + by[2] * p.across[SKEW][m]
     });
-    let total =
-        now * states[k] + earlier * before[k] + by[0] * states[SCALE] + by[1] * states[DELAY] + by[2] * states[SKEW];
-    Measured { states, earlier: before, variance: total.max(T::zero()) + noise }
+    // Of the reading without its noise with the speed at a point.
+    let with_point = |point: usize| match point.checked_sub(1) {
+        None => states[k],
+        Some(n) => earlier[(SPEEDS * n + k).min(CLONES - 1)],
+    };
+    let total = a * with_point(late)
+        + b * with_point(early)
+        + by[0] * states[SCALE]
+        + by[1] * states[DELAY]
+        + by[2] * states[SKEW];
+    Measured { states, earlier, variance: total.max(T::zero()) + noise }
 }
