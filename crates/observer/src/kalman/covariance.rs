@@ -155,6 +155,13 @@ impl<T: Real> Covariance<T> {
         self.states[state][state] = self.states[state][state] + variance;
     }
 
+    /// Keeps the variance of a state from falling below a limit.
+    #[inline]
+    pub(super) fn hold_above(&mut self, state: usize, variance: T) {
+        let own = &mut self.states[state][state];
+        *own = own.max(variance);
+    }
+
     /// Makes a state independent of all others, with this standard deviation.
     pub(super) fn renew(&mut self, state: usize, deviation: T) {
         for i in 0..N {
@@ -165,17 +172,12 @@ impl<T: Real> Covariance<T> {
         self.states[state][state] = deviation * deviation;
     }
 
-    /// Corrects for a measurement by Joseph's form, which holds for any gain: `P - K S' - S K' + K V K'`. The gain of
-    /// the states that are `considered` is zero: their uncertainty is accounted for and stays.
+    /// Corrects for a measurement by Joseph's form, which holds for any gain: `P - K S' - S K' + K V K'`. Of the best gain
+    /// each state gets a share; with none its uncertainty is accounted for and stays.
     #[inline]
-    pub(super) fn correct(&mut self, measured: &Measured<T>, considered: [bool; N]) -> ([T; N], [T; CLONES]) {
+    pub(super) fn correct(&mut self, measured: &Measured<T>, shares: &[T; N]) -> ([T; N], [T; CLONES]) {
         let per_variance = measured.variance.recip();
-        let mut gain = measured.states.map(|with| with * per_variance);
-        for (gain, considered) in gain.iter_mut().zip(considered) {
-            if considered {
-                *gain = T::zero();
-            }
-        }
+        let gain: [T; N] = core::array::from_fn(|i| shares[i] * measured.states[i] * per_variance);
         let earlier = measured.earlier.map(|with| with * per_variance);
         let half_variance = T::of(0.5) * measured.variance;
         // K w' + w K' with w = K V/2 - S.

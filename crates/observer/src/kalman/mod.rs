@@ -247,7 +247,7 @@ impl<T: Real> Estimator<T> for KalmanFilter<T> {
         let mut channels = Channels::all(ChannelHealth::Absent);
         channels.command = self.take_command(state, input);
         channels.engine = self.take_engine(state, input);
-        let speeds = self.take_speeds(state, input);
+        let speeds = self.take_speeds(state, input, dt_s);
         [channels.turbine, channels.output, channels.wheel] = speeds;
         let sound = self.settle(state);
         self.find_phase(state, dt_s);
@@ -331,7 +331,7 @@ impl<T: Real> KalmanFilter<T> {
 
     /// Takes the readings of turbine, output and wheel.
     #[inline]
-    fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>) -> [ChannelHealth; 3] {
+    fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>, dt_s: T) -> [ChannelHealth; 3] {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let mut health = [ChannelHealth::Absent; 3];
         for (k, reading) in given.into_iter().enumerate() {
@@ -362,7 +362,7 @@ impl<T: Real> KalmanFilter<T> {
             if state.supervisor.phase == Phase::BeforeShift
                 && holds_offgoing(&self.supervisor, &self.model, &state.newest)
             {
-                self.tie(running);
+                self.tie(running, dt_s);
             }
         } else {
             for (health, newest) in health.iter_mut().zip(&state.newest) {
@@ -531,9 +531,6 @@ pub const STATES: [(&str, &str); N] = [
 
 impl<T: Real> KalmanState<T> {
     /// Mean and standard deviation of each of the [`STATES`], while the filter runs.
-    pub fn dbg(&self) -> (T, T) {
-        self.engine.as_ref().map_or((T::zero(), T::zero()), |e| (e.speed_before(T::zero()), e.variance().sqrt()))
-    }
     pub fn states(&self) -> Option<[(T, T); N]> {
         let running = self.running.as_ref()?;
         Some(core::array::from_fn(|i| (running.mean[i], running.covariance.states[i][i].max(T::zero()).sqrt())))

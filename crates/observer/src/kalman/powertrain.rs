@@ -32,6 +32,9 @@ pub(super) struct Step<T> {
     pub(super) rows: [AccelerationRow<T>; 2],
     /// Turbine torque by the maps at the start, with the engine speed of the middle, N m, and its slope, N m s/rad.
     pub(super) turbine: [T; 2],
+    /// Whether the offgoing clutch holds the turbine to the vehicle: then an error of its speed does not fade by that slope,
+    /// though the equations, in which both clutches slip, would have it so.
+    pub(super) held: bool,
     /// Torque of the oncoming clutch per pressure above the kiss point, N m/Pa.
     pub(super) per_pressure: T,
     /// Mean pressure above the kiss point, Pa, and its derivative by the pressure at the start.
@@ -65,9 +68,9 @@ impl<T: Real> Step<T> {
 
     /// Solves for how much turbine and output speed change, from what they would change by at the torques of the start.
     #[inline]
-    fn implicit(&self, share: T) -> Implicit<T> {
+    fn implicit(&self, share: T, slope_n_m_s: T) -> Implicit<T> {
         let (one, half, dt) = (T::one(), T::of(0.5), self.dt_s);
-        let per_turbine = half * dt * (one + share) * self.turbine[1];
+        let per_turbine = half * dt * (one + share) * slope_n_m_s;
         let per_output = half * dt * self.shaft_per_twist() / (self.ratio * self.ratio);
         let [t, o] = &self.rows;
         let matrix = [
@@ -93,7 +96,8 @@ impl<T: Real> Step<T> {
                 + row.per_offgoing_torque * x[OFFGOING]
                 + row.per_output_torque / self.ratio * held)
         };
-        let [turbine, output] = self.implicit(x[SHARE]).solve([explicit(&self.rows[0]), explicit(&self.rows[1])]);
+        let implicit = self.implicit(x[SHARE], self.turbine[1]);
+        let [turbine, output] = implicit.solve([explicit(&self.rows[0]), explicit(&self.rows[1])]);
         let mean_twist = (x[OUTPUT] + half * output) / self.ratio - middle;
         let shaft = x[SPRING] + k * mean_twist;
         let mut next = *x;
@@ -112,6 +116,7 @@ impl<T: Real> Step<T> {
     pub(super) fn jacobian(&self, x: &[T; N], next: &[T; N]) -> [[T; COLUMNS]; LAWS] {
         let (zero, one, half, dt) = (T::zero(), T::one(), T::of(0.5), self.dt_s);
         let friction = one + x[FRICTION];
+        let slope_n_m_s = if self.held { zero } else { self.turbine[1] };
         let mean_turbine_n_m = self.turbine[0] + half * self.turbine[1] * (next[TURBINE] - x[TURBINE]);
         let k = self.shaft_per_twist();
         // Of the wheel speed at the middle.
@@ -131,12 +136,12 @@ impl<T: Real> Step<T> {
             by[PRESSURE] = per_pressure * friction * self.above_kiss[1];
             by[FRICTION] = per_pressure * self.above_kiss[0];
             by[SHARE] = dt * row.per_turbine_torque * mean_turbine_n_m;
-            by[TURBINE] = dt * row.per_turbine_torque * (one + x[SHARE]) * self.turbine[1];
+            by[TURBINE] = dt * row.per_turbine_torque * (one + x[SHARE]) * slope_n_m_s;
             by[OFFGOING] = dt * row.per_offgoing_torque;
             by
         };
         let (implicit, by_turbine, by_output) =
-            (self.implicit(x[SHARE]), explicit(&self.rows[0]), explicit(&self.rows[1]));
+            (self.implicit(x[SHARE], slope_n_m_s), explicit(&self.rows[0]), explicit(&self.rows[1]));
         let mut f = [[zero; COLUMNS]; LAWS];
         for c in 0..COLUMNS {
             let [turbine, output] = implicit.solve([by_turbine[c], by_output[c]]);
@@ -187,6 +192,7 @@ mod tests {
             dt_s: 0.01,
             rows: [row([15.2, -9.4, -15.5, 0.11]), row([0.5, 10.1, 0.16, -6.1])],
             turbine: [130.0, -6.0],
+            held: false,
             per_pressure: 5.1e-4,
             above_kiss: [0.15e6, 0.9],
             settled_pa: 0.23e6,

@@ -180,6 +180,7 @@ impl<T: Real> KalmanFilter<T> {
             rows,
             // A torque that rises with the turbine speed is taken as it is at the start: implicit it might have no solution.
             turbine: [turbine_n_m, slope_n_m_s.min(zero)],
+            held: !released,
             per_pressure: if locked {
                 zero
             } else {

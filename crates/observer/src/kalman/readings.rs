@@ -11,6 +11,9 @@ use crate::{ChannelHealth, Phase, Reading};
 /// Standard deviation of a uniform distribution, in its width.
 const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
+/// Time over which the readings are averaged that tell what is known as well as it can be, at the least, s.
+const SLOWLY_S: f64 = 0.2;
+
 /// A speed at the time of a reading.
 struct Line<T> {
     value: T,
@@ -65,8 +68,8 @@ impl<T: Real> KalmanFilter<T> {
             }
             Verdict::Taken => {}
         }
-        running.silent_s[k] = zero;
-        self.apply(running, &measured, innovation);
+        let since_s = core::mem::replace(&mut running.silent_s[k], zero);
+        self.apply(running, &measured, innovation, since_s);
         ChannelHealth::Good
     }
 
@@ -107,7 +110,7 @@ impl<T: Real> KalmanFilter<T> {
 
     /// Ties turbine to output speed by the ratio of the gear before the shift.
     #[inline]
-    pub(super) fn tie(&self, running: &mut Running<T>) {
+    pub(super) fn tie(&self, running: &mut Running<T>, dt_s: T) {
         let ratio = self.model.shift.ratio_offgoing();
         let p = &running.covariance;
         let of = |row: &[T; N]| row[TURBINE] - ratio * row[OUTPUT];
@@ -116,24 +119,33 @@ impl<T: Real> KalmanFilter<T> {
         let deviation = self.readings[TURBINE].deviation_rad_s;
         let variance = (states[TURBINE] - ratio * states[OUTPUT]).max(T::zero()) + deviation * deviation;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
-        self.apply(running, &Measured { states, earlier, variance }, innovation);
+        self.apply(running, &Measured { states, earlier, variance }, innovation, dt_s);
     }
 
-    /// Corrects mean and covariance for a measurement.
+    /// Corrects mean and covariance for a measurement, that comes `since_s` after the last of its kind.
     #[inline]
-    fn apply(&self, running: &mut Running<T>, measured: &Measured<T>, innovation: T) {
+    fn apply(&self, running: &mut Running<T>, measured: &Measured<T>, innovation: T, since_s: T) {
         let u = &self.uncertainty;
-        let mut considered = [false; N];
+        let mut shares = [T::one(); N];
         // Before both clutches slip an error of the turbine torque cancels in the clutch torque, and a cylinder that fills late
         // looks like a clutch with less friction or a valve with less gain.
-        for state in [SHARE, FRICTION, GAIN] {
-            considered[state] = running.acting != Phase::InertiaPhase;
+        if running.acting != Phase::InertiaPhase {
+            for state in [SHARE, FRICTION, GAIN] {
+                shares[state] = T::zero();
+            }
         }
-        // What is known as well as it can be is not corrected any more: the model would claim more than is true.
-        for (state, least) in [(SCALE, u.scale_least), (DELAY, u.delay_least_s), (SKEW, u.delay_least_s)] {
-            considered[state] = running.covariance.states[state][state] <= least * least;
+        // What is known as well as it can be is corrected slowly: the errors of many readings are alike, and the model would
+        // claim more than is true.
+        let least = [(SCALE, u.scale_least), (DELAY, u.delay_least_s), (SKEW, u.delay_least_s)];
+        for (state, least) in least {
+            if running.covariance.states[state][state] <= least * least {
+                shares[state] = (since_s / T::of(SLOWLY_S)).min(T::one());
+            }
         }
-        let (gain, earlier) = running.covariance.correct(measured, considered);
+        let (gain, earlier) = running.covariance.correct(measured, &shares);
+        for (state, least) in least {
+            running.covariance.hold_above(state, least * least);
+        }
         for (x, gain) in running.mean.iter_mut().zip(gain) {
             *x = *x + gain * innovation;
         }
