@@ -55,20 +55,25 @@ impl<T: Real> KalmanFilter<T> {
             _ if skew < zero => -by_delay,
             _ => zero,
         };
-        let noise = sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance;
+        // Readings that come more often than teeth tell no more than the teeth do.
+        let since_s = core::mem::replace(&mut running.silent_s[k], zero);
+        let repeated = if since_s > zero { (sensor.pitch_rad / (size * since_s)).max(one) } else { one };
+        let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
         let place = Place { shares: line.place.shares.map(|share| scale * share), ..line.place };
         let mut measured = with_reading(running, k, &place, by, noise);
         let verdict = running.gates[k].judge(innovation, measured.variance);
         match verdict {
-            Verdict::Refused => return ChannelHealth::Refused,
+            Verdict::Refused => {
+                running.silent_s[k] = since_s;
+                return ChannelHealth::Refused;
+            }
             Verdict::Jumped => {
                 running.covariance.add(k, innovation * innovation);
                 measured = with_reading(running, k, &place, by, noise);
             }
             Verdict::Taken => {}
         }
-        let since_s = core::mem::replace(&mut running.silent_s[k], zero);
         self.apply(running, &measured, innovation, since_s);
         ChannelHealth::Good
     }
