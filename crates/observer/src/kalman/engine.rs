@@ -8,6 +8,10 @@ use crate::InputLimits;
 /// Time without a reading after which the acceleration is taken to fade, and in which it does, s.
 const SILENT_S: f64 = 0.05;
 
+/// Innovation beyond which a reading is refused, in its deviations: fewer than for the other speeds, as nothing else tells
+/// the engine speed, and it is the turbine torque within the same step.
+const GATE: u8 = 3;
+
 /// What the engine's filter knows beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EngineNoise<T> {
@@ -42,7 +46,7 @@ impl<T: Real> Engine<T> {
             speed_variance: noise.reading_rad_s * noise.reading_rad_s,
             covariance: zero,
             acceleration_variance: noise.acceleration_max_rad_s2 * noise.acceleration_max_rad_s2,
-            gate: Gate::new(),
+            gate: Gate::new(GATE),
             silent_s: zero,
         }
     }

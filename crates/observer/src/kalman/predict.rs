@@ -13,6 +13,8 @@ use super::{
 };
 use crate::Phase;
 
+/// Innovation beyond which a reading is refused, in its deviations.
+const GATE: u8 = 5;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 
@@ -95,7 +97,7 @@ impl<T: Real> KalmanFilter<T> {
             acting,
             direction: direction(model.shift.oncoming_slip(turbine, output)),
             turned_s: zero,
-            gates: [Gate::new(); 3],
+            gates: [Gate::new(GATE); 3],
             silent_s: [zero; 3],
         })
     }
