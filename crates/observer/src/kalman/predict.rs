@@ -14,7 +14,7 @@ use super::{
 use crate::Phase;
 
 /// Innovation beyond which a reading is refused, in its deviations.
-const GATE: u8 = 5;
+const GATE: u8 = 4;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 
