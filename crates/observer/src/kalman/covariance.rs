@@ -183,21 +183,20 @@ impl<T: Real> Covariance<T> {
         // K w' + w K' with w = K V/2 - S.
         let weight: [T; N] = core::array::from_fn(|i| half_variance * gain[i] - measured.states[i]);
         let earlier_weight: [T; CLONES] = core::array::from_fn(|m| half_variance * earlier[m] - measured.earlier[m]);
+        // Whole rows: both halves come out the same, and the processor does several columns at once.
         for i in 0..N {
-            for j in i..N {
-                let value = self.states[i][j] + (gain[i] * weight[j] + weight[i] * gain[j]);
-                self.states[i][j] = value;
-                self.states[j][i] = value;
+            let (g, w) = (gain[i], weight[i]);
+            for ((p, gain), weight) in self.states[i].iter_mut().zip(&gain).zip(&weight) {
+                *p = *p + (g * *weight + w * *gain);
             }
-            for m in 0..CLONES {
-                self.across[i][m] = self.across[i][m] + (gain[i] * earlier_weight[m] + weight[i] * earlier[m]);
+            for ((p, earlier), weight) in self.across[i].iter_mut().zip(&earlier).zip(&earlier_weight) {
+                *p = *p + (g * *weight + w * *earlier);
             }
         }
         for l in 0..CLONES {
-            for m in l..CLONES {
-                let value = self.within[l][m] + (earlier[l] * earlier_weight[m] + earlier_weight[l] * earlier[m]);
-                self.within[l][m] = value;
-                self.within[m][l] = value;
+            let (g, w) = (earlier[l], earlier_weight[l]);
+            for ((p, earlier), weight) in self.within[l].iter_mut().zip(&earlier).zip(&earlier_weight) {
+                *p = *p + (g * *weight + w * *earlier);
             }
         }
         (gain, earlier)
