@@ -6,11 +6,11 @@ use super::past::{CLONES, PASTS, SPEEDS};
 use super::powertrain::{COLUMNS, LAWS};
 use super::{GAIN, N, OFFGOING, PRESSURE, SHARE};
 
-/// Covariance of the states, of the states with the speeds at earlier times, and of those.
+/// Covariance of the states, of the speeds at earlier times with the states, and of those speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Covariance<T> {
     pub(super) states: [[T; N]; N],
-    pub(super) across: [[T; CLONES]; N],
+    pub(super) across: [[T; N]; CLONES],
     pub(super) within: [[T; CLONES]; CLONES],
 }
 
@@ -22,6 +22,12 @@ pub(super) struct Measured<T> {
     pub(super) variance: T,
 }
 
+/// Which of the remembered speeds is the speed `k` at the earlier time `n`.
+#[inline]
+fn clone_of(k: usize, n: usize) -> usize {
+    (SPEEDS * n + k).min(CLONES - 1)
+}
+
 impl<T: Real> Covariance<T> {
     /// Independent states with these standard deviations, without a past.
     pub(super) fn of(deviations: [T; N]) -> Self {
@@ -29,13 +35,13 @@ impl<T: Real> Covariance<T> {
         for (i, deviation) in deviations.into_iter().enumerate() {
             states[i][i] = deviation * deviation;
         }
-        Self { states, across: [[T::zero(); CLONES]; N], within: [[T::zero(); CLONES]; CLONES] }
+        Self { states, across: [[T::zero(); N]; CLONES], within: [[T::zero(); CLONES]; CLONES] }
     }
 
     /// A past of these ages: the speeds were as uncertain as now, and have changed by accelerations with these variances.
     pub(super) fn steady_past(&mut self, ages: [T; PASTS], acceleration_variances: [T; SPEEDS]) {
-        for (across, row) in self.across.iter_mut().zip(&self.states) {
-            *across = core::array::from_fn(|m| row[m % SPEEDS]);
+        for (m, across) in self.across.iter_mut().enumerate() {
+            *across = self.states[m % SPEEDS];
         }
         for (m, row) in self.within.iter_mut().enumerate() {
             let (age_s, k) = (ages[m / SPEEDS], m % SPEEDS);
@@ -56,7 +62,7 @@ impl<T: Real> Covariance<T> {
         }
         for k in 0..SPEEDS {
             for l in SPEEDS..CLONES {
-                let value = self.across[k][l - SPEEDS];
+                let value = self.across[l - SPEEDS][k];
                 self.within[k][l] = value;
                 self.within[l][k] = value;
             }
@@ -64,27 +70,25 @@ impl<T: Real> Covariance<T> {
                 self.within[k][l] = self.states[k][l];
             }
         }
-        for (across, row) in self.across.iter_mut().zip(&self.states) {
-            across.copy_within(..CLONES - SPEEDS, SPEEDS);
-            across[..SPEEDS].copy_from_slice(&row[..SPEEDS]);
+        self.across.copy_within(..CLONES - SPEEDS, SPEEDS);
+        self.across[..SPEEDS].copy_from_slice(&self.states[..SPEEDS]);
+    }
+
+    /// Covariances of the speed `k` at a point in time, counted from 0 for now, with all states.
+    #[inline]
+    pub(super) fn of_speed(&self, k: usize, point: usize) -> &[T; N] {
+        match point.checked_sub(1) {
+            None => &self.states[k],
+            Some(n) => &self.across[clone_of(k, n)],
         }
     }
 
-    /// Covariance of the state `i` with the speed `k` at a point in time, counted from 0 for now.
+    /// The same with the remembered speeds.
     #[inline]
-    pub(super) fn with_speed(&self, i: usize, k: usize, point: usize) -> T {
+    pub(super) fn of_speed_with_past(&self, k: usize, point: usize) -> [T; CLONES] {
         match point.checked_sub(1) {
-            None => self.states[i][k],
-            Some(n) => self.across[i][(SPEEDS * n + k).min(CLONES - 1)],
-        }
-    }
-
-    /// Covariance of the remembered speed `m` with the speed `k` at a point in time.
-    #[inline]
-    pub(super) fn past_with_speed(&self, m: usize, k: usize, point: usize) -> T {
-        match point.checked_sub(1) {
-            None => self.across[k][m],
-            Some(n) => self.within[m][(SPEEDS * n + k).min(CLONES - 1)],
+            None => core::array::from_fn(|m| self.across[m][k]),
+            Some(n) => self.within[clone_of(k, n)],
         }
     }
 
@@ -93,14 +97,10 @@ impl<T: Real> Covariance<T> {
     pub(super) fn spread(&mut self, f: &[[T; COLUMNS]; LAWS], stay: T, keep: T) {
         let p = &mut self.states;
         let mut fp = [[T::zero(); N]; LAWS];
-        let mut across = [[T::zero(); CLONES]; LAWS];
         for (i, row) in f.iter().enumerate() {
             if i == PRESSURE {
                 for j in 0..N {
                     fp[i][j] = row[PRESSURE] * p[PRESSURE][j] + row[GAIN] * p[GAIN][j];
-                }
-                for (sum, (p, g)) in across[i].iter_mut().zip(self.across[PRESSURE].iter().zip(&self.across[GAIN])) {
-                    *sum = row[PRESSURE] * *p + row[GAIN] * *g;
                 }
                 continue;
             }
@@ -108,15 +108,15 @@ impl<T: Real> Covariance<T> {
                 for j in 0..N {
                     fp[i][j] = fp[i][j] + *weight * p[c][j];
                 }
-                for (sum, p) in across[i].iter_mut().zip(&self.across[c]) {
-                    *sum = *sum + *weight * *p;
-                }
             }
         }
-        self.across[..LAWS].copy_from_slice(&across);
-        for m in 0..CLONES {
-            self.across[SHARE][m] = stay * self.across[SHARE][m];
-            self.across[OFFGOING][m] = keep * self.across[OFFGOING][m];
+        for across in &mut self.across {
+            let before = *across;
+            for (value, row) in across.iter_mut().zip(f) {
+                *value = row.iter().zip(&before).fold(T::zero(), |sum, (weight, p)| sum + *weight * *p);
+            }
+            across[SHARE] = stay * before[SHARE];
+            across[OFFGOING] = keep * before[OFFGOING];
         }
         // The states without a law of their own, among each other.
         for (fading, left) in [(SHARE, stay), (OFFGOING, keep)] {
@@ -168,7 +168,9 @@ impl<T: Real> Covariance<T> {
             self.states[i][state] = T::zero();
             self.states[state][i] = T::zero();
         }
-        self.across[state] = [T::zero(); CLONES];
+        for across in &mut self.across {
+            across[state] = T::zero();
+        }
         self.states[state][state] = deviation * deviation;
     }
 
@@ -189,12 +191,12 @@ impl<T: Real> Covariance<T> {
             for ((p, gain), weight) in self.states[i].iter_mut().zip(&gain).zip(&weight) {
                 *p = *p + (g * *weight + w * *gain);
             }
-            for ((p, earlier), weight) in self.across[i].iter_mut().zip(&earlier).zip(&earlier_weight) {
-                *p = *p + (g * *weight + w * *earlier);
-            }
         }
         for l in 0..CLONES {
             let (g, w) = (earlier[l], earlier_weight[l]);
+            for ((p, gain), weight) in self.across[l].iter_mut().zip(&gain).zip(&weight) {
+                *p = *p + (g * *weight + w * *gain);
+            }
             for ((p, earlier), weight) in self.within[l].iter_mut().zip(&earlier).zip(&earlier_weight) {
                 *p = *p + (g * *weight + w * *earlier);
             }

@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 /// Earlier times that are remembered.
-pub(super) const PASTS: usize = 3;
+pub(super) const PASTS: usize = 2;
 /// Turbine, output and wheel.
 pub(super) const SPEEDS: usize = 3;
 /// Remembered speeds.
@@ -99,14 +99,11 @@ impl<T: Real> Past<T> {
     /// Accelerations of the speed `k`, rad/s^2: now, and over the time before.
     #[inline]
     pub(super) fn accelerations(&self, k: usize, now: T) -> [T; 2] {
-        let [newest, middle, oldest] = &self.points;
+        let [newest, oldest] = &self.points;
         let over = |late: T, early: &Point<T>, span_s: T| (late - early.speeds[k]) / span_s.max(T::of(LEAST_SPAN_S));
-        let before = over(middle.speeds[k], oldest, oldest.age_s - middle.age_s);
-        if newest.age_s >= T::of(LEAST_SPAN_S) {
-            [over(now, newest, newest.age_s), over(newest.speeds[k], middle, middle.age_s - newest.age_s)]
-        } else {
-            [over(now, middle, middle.age_s), before]
-        }
+        let before = over(newest.speeds[k], oldest, oldest.age_s - newest.age_s);
+        let after = if newest.age_s >= T::of(LEAST_SPAN_S) { newest } else { oldest };
+        [over(now, after, after.age_s), before]
     }
 
     /// Where a time is that was `age_s` ago.

@@ -120,7 +120,7 @@ impl<T: Real> KalmanFilter<T> {
         let p = &running.covariance;
         let of = |row: &[T; N]| row[TURBINE] - ratio * row[OUTPUT];
         let states: [T; N] = core::array::from_fn(|i| of(&p.states[i]));
-        let earlier = core::array::from_fn(|m| p.across[TURBINE][m] - ratio * p.across[OUTPUT][m]);
+        let earlier = core::array::from_fn(|m| p.across[m][TURBINE] - ratio * p.across[m][OUTPUT]);
         let deviation = self.readings[TURBINE].deviation_rad_s;
         let variance = (states[TURBINE] - ratio * states[OUTPUT]).max(T::zero()) + deviation * deviation;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
@@ -176,20 +176,16 @@ fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2])
 fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
     let p = &running.covariance;
     let ([late, early], [a, b]) = (place.between, place.shares);
+    let with_states = [p.of_speed(k, late), p.of_speed(k, early)];
+    let by_states = [&p.states[SCALE], &p.states[DELAY], &p.states[SKEW]];
     let states: [T; N] = core::array::from_fn(|i| {
-        let row = &p.states[i];
-        a * p.with_speed(i, k, late)
-            + b * p.with_speed(i, k, early)
-            + by[0] * row[SCALE]
-            + by[1] * row[DELAY]
-            + by[2] * row[SKEW]
+        let speed = a * with_states[0][i] + b * with_states[1][i];
+        speed + by[0] * by_states[0][i] + by[1] * by_states[1][i] + by[2] * by_states[2][i]
     });
+    let with_past = [p.of_speed_with_past(k, late), p.of_speed_with_past(k, early)];
     let earlier: [T; CLONES] = core::array::from_fn(|m| {
-        a * p.past_with_speed(m, k, late)
-            + b * p.past_with_speed(m, k, early)
-            + by[0] * p.across[SCALE][m]
-            + by[1] * p.across[DELAY][m]
-            + by[2] * p.across[SKEW][m]
+        let row = &p.across[m];
+        a * with_past[0][m] + b * with_past[1][m] + by[0] * row[SCALE] + by[1] * row[DELAY] + by[2] * row[SKEW]
     });
     // Of the reading without its noise with the speed at a point.
     let with_point = |point: usize| match point.checked_sub(1) {
