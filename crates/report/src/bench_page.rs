@@ -58,6 +58,21 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             number(s.shaft_range_median_width_n_m?, 0),
         ])
     });
+    let consistency = bench.consistency.as_ref().map(|filter| {
+        let (all, (scenario, least)) = (&filter.all, &filter.least);
+        context! {
+            observer => &filter.observer,
+            inside => coverage(all.inside_share()),
+            least => coverage(*least),
+            scenario,
+            nees => ratio(all.nees()),
+            nis => all.nis().map(ratio),
+            same => coverage(all.same_share()),
+            largest_kpa => number(1e-3 * all.largest_pa, 2),
+            excess_percent => number(100.0 * all.excess_in_single(), 2),
+            restarts => all.restarts,
+        }
+    });
     Ok(templates()?.get_template("bench.html")?.render(context! {
         name => &experiment.name,
         title => &experiment.title,
@@ -69,6 +84,7 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         phases,
         rows => bench.rows.len(),
         widths,
+        consistency,
         inputs => origin(&[&vehicle.source, &experiment.source]),
     })?)
 }

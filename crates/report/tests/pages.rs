@@ -135,7 +135,8 @@ fn the_bench_page_has_a_column_for_each_observer_even_without_a_ranking() {
         completed,
         cells: vec![cell("first"), cell("second")],
     };
-    let bench = Bench { rows: vec![row("nominal", true), row("stalled", false)], ranking: Vec::new() };
+    let bench =
+        Bench { rows: vec![row("nominal", true), row("stalled", false)], ranking: Vec::new(), consistency: None };
     let html = bench_page(&bench, &vehicle, &experiment).unwrap();
     assert!(html.contains("<th>first</th><th>second</th>") && html.contains("<b>0.010</b>"));
     assert!(html.contains("There is no ranking") && html.contains("shift not completed") && !html.contains("NaN"));

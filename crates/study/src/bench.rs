@@ -2,14 +2,16 @@
 
 use std::time::Instant;
 
-use config::{ConfigError, Experiment, ObserverKind, Vehicle};
-use observer::{Estimate, Phase};
+use config::{ConfigError, Experiment, ObserverEntry, ObserverKind, Vehicle};
+use observer::{Estimate, KalmanFilter, Phase};
 use serde::Serialize;
 use trace::Trace;
 
 use crate::campaign::plan::mixed;
 use crate::campaign::summary::over;
-use crate::comparison::{observers, run_observers};
+use crate::comparison::{measured, observers, run_observers};
+use crate::consistency::Consistency;
+use crate::observers::AnyObserver;
 use crate::sampling::sampled;
 use crate::{ObserverRun, PhaseScore, RangeScore, RunColumns, ShiftQuality, StudyError, simulate_drive};
 
@@ -102,6 +104,28 @@ pub struct Bench {
     pub rows: Vec<BenchRow>,
     /// Every observer, the one with the least error over the shift first.
     pub ranking: Vec<BenchSummary>,
+    /// The first Kalman filter of the experiment against itself, if there is one.
+    pub consistency: Option<BenchConsistency>,
+}
+
+/// How sure a Kalman filter is, and how it does in single precision, over all scenarios.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BenchConsistency {
+    /// The observer.
+    pub observer: String,
+    /// Over the scenarios that were completed, each with one draw of the sensors' noise.
+    pub all: Consistency,
+    /// The scenario with the least share of samples in the filter's 95 % band, and this share.
+    pub least: (String, f64),
+}
+
+impl BenchConsistency {
+    fn of(observer: &str, scenarios: &[(String, Consistency)]) -> Option<Self> {
+        let all = scenarios.iter().fold(Consistency::default(), |all, (_, one)| all.with(one));
+        let shares = scenarios.iter().map(|(name, one)| (name.clone(), one.inside_share()));
+        let least = shares.filter(|(_, share)| share.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(Self { observer: observer.to_owned(), all, least })
+    }
 }
 
 impl Bench {
@@ -120,6 +144,7 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     let open_loop = open_loop(experiment)?;
     let observers = self::observers(vehicle, experiment)?;
     let mut rows = Vec::new();
+    let mut consistency = Vec::new();
     let mut drives: Vec<(Experiment, Trace)> = Vec::new();
     for (number, scenario) in experiment.scenarios.iter().enumerate() {
         progress(&scenario.name);
@@ -130,6 +155,12 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
         let observers = told_otherwise.as_ref().unwrap_or(&observers);
         // One noise, the same for all, would decide between observers that are close.
         let seed = varied.sensors.map(|sensors| mixed(sensors.seed, number as u64));
+        let completed = ShiftQuality::of(trace, &vehicle.shift).is_some();
+        if let (true, Some((entry, filter))) = (completed, first_filter(&varied, observers)) {
+            let seen = measured(vehicle, &varied, entry, trace);
+            let one = Consistency::of(filter, &seen, &RunColumns::of(&seen, vehicle)?)?;
+            consistency.push((scenario.name.clone(), one));
+        }
         let mut draws = Vec::new();
         for draw in 0..if seed.is_some() { experiment.draws } else { 1 } {
             if let (Some(sensors), Some(seed)) = (&mut varied.sensors, seed) {
@@ -138,7 +169,6 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
             let runs = run_observers(vehicle, &varied, observers, trace)?;
             draws.push(runs.iter().map(cell).collect::<Vec<BenchCell>>());
         }
-        let completed = ShiftQuality::of(trace, &vehicle.shift).is_some();
         let cells =
             (0..experiment.observers.len()).map(|at| over_draws(draws.iter().map(|cells| &cells[at]))).collect();
         rows.push(BenchRow { scenario: scenario.name.clone(), completed, cells });
@@ -158,7 +188,20 @@ pub fn bench(vehicle: &Vehicle, experiment: &Experiment, mut progress: impl FnMu
     for row in &mut rows {
         row.cells.sort_by_key(place);
     }
-    Ok(Bench { rows, ranking })
+    let name = first_filter(experiment, &observers).map(|(entry, _)| entry.name.as_str());
+    let consistency = name.and_then(|name| BenchConsistency::of(name, &consistency));
+    Ok(Bench { rows, ranking, consistency })
+}
+
+/// The first Kalman filter of an experiment that believes its readings.
+fn first_filter<'a>(
+    experiment: &'a Experiment,
+    observers: &'a [AnyObserver],
+) -> Option<(&'a ObserverEntry, &'a KalmanFilter<f64>)> {
+    experiment.observers.iter().zip(observers).find_map(|(entry, observer)| match observer {
+        AnyObserver::Kalman(filter) if entry.kind == ObserverKind::Kalman => Some((entry, filter.as_ref())),
+        _ => None,
+    })
 }
 
 /// The drive of an experiment, simulated once for all scenarios that differ in their sensors alone.

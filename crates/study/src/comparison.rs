@@ -161,12 +161,7 @@ pub fn run_observers(
             let at = match at {
                 Some(at) => at,
                 None => {
-                    let trace = match &experiment.sensors {
-                        Some(sensors) if entry.real_sensors => {
-                            through_sensors(whole, entry.sample_time_s, sensors, vehicle)
-                        }
-                        _ => sampled(whole, entry.sample_time_s),
-                    };
+                    let trace = measured(vehicle, experiment, entry, whole);
                     let ranges = ranges(vehicle, &RunColumns::of(&trace, vehicle)?);
                     seen.push((signals, trace, ranges));
                     seen.len() - 1
@@ -176,6 +171,14 @@ pub fn run_observers(
             run_observer(vehicle, experiment, entry, observer, trace, ranges)
         })
         .collect()
+}
+
+/// What an observer sees of a drive: the signals at its sample time, behind the sensors if it is to.
+pub(crate) fn measured(vehicle: &Vehicle, experiment: &Experiment, entry: &ObserverEntry, whole: &Trace) -> Trace {
+    match &experiment.sensors {
+        Some(sensors) if entry.real_sensors => through_sensors(whole, entry.sample_time_s, sensors, vehicle),
+        _ => sampled(whole, entry.sample_time_s),
+    }
 }
 
 fn run_observer(

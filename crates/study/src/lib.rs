@@ -6,6 +6,7 @@
 pub mod bench;
 pub mod campaign;
 pub mod comparison;
+pub mod consistency;
 pub mod drive;
 pub mod error_bound;
 pub mod estimates;
@@ -22,6 +23,7 @@ pub mod worst_case;
 pub use bench::{Bench, bench};
 pub use campaign::{Campaign, Row, Status, Summary, execute};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
+pub use consistency::Consistency;
 pub use drive::{DriveColumns, DriveRow, simulate_drive, simulate_shift, true_phases};
 pub use error_bound::{ErrorBound, error_bound};
 pub use estimates::{EstimateColumns, estimates_trace};

@@ -186,6 +186,8 @@ struct Running<T> {
     gates: [Gate; 3],
     /// Time since a reading of turbine, output or wheel was taken, s.
     silent_s: [T; 3],
+    /// Squared innovations over their variances of the readings that were taken in the last step.
+    squared_innovations: [Option<T>; 3],
 }
 
 impl<T: Real> KalmanFilter<T> {
@@ -334,6 +336,9 @@ impl<T: Real> KalmanFilter<T> {
     fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>, dt_s: T) -> [ChannelHealth; 3] {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let mut health = [ChannelHealth::Absent; 3];
+        if let Some(running) = &mut state.running {
+            running.squared_innovations = [None; 3];
+        }
         for (k, reading) in given.into_iter().enumerate() {
             let Some(reading) = reading else { continue };
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
@@ -534,6 +539,12 @@ impl<T: Real> KalmanState<T> {
     pub fn states(&self) -> Option<[(T, T); N]> {
         let running = self.running.as_ref()?;
         Some(core::array::from_fn(|i| (running.mean[i], running.covariance.states[i][i].max(T::zero()).sqrt())))
+    }
+
+    /// Squared innovations over their variances of the readings of turbine, output and wheel speed that were taken in the last
+    /// step: 1 on average for a filter that is as sure as it may be.
+    pub fn squared_innovations(&self) -> [Option<T>; 3] {
+        self.running.as_ref().map_or([None; 3], |running| running.squared_innovations)
     }
 
     /// Ends the filter; what it has learnt is kept.

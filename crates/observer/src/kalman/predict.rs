@@ -99,6 +99,7 @@ impl<T: Real> KalmanFilter<T> {
             turned_s: zero,
             gates: [Gate::new(GATE); 3],
             silent_s: [zero; 3],
+            squared_innovations: [None; 3],
         })
     }
 

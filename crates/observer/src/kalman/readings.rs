@@ -74,6 +74,7 @@ impl<T: Real> KalmanFilter<T> {
             }
             Verdict::Taken => {}
         }
+        running.squared_innovations[k] = Some(innovation * innovation / measured.variance);
         self.apply(running, &measured, innovation, since_s);
         ChannelHealth::Good
     }
