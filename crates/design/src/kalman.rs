@@ -26,8 +26,8 @@ const LOAD_IN_GEAR: f64 = 0.3;
 /// Time of such a change, s \[chosen\].
 const LOAD_IN_GEAR_S: f64 = 0.05;
 
-/// The scale is known no better than this: half of what was left of it after seven seconds of a launch, when the filter would
-/// have claimed a fifth. Scale and delay of the wheel trade with each other while the acceleration stands.
+/// The scale is known no better than this \[chosen\]: scale and delay of the wheel trade with each other while the
+/// acceleration stands. A test of the combined study holds the errors after a launch against it.
 const SCALE_LEAST: f64 = 3e-4;
 /// The same of a delay, s.
 const DELAY_LEAST_S: f64 = 1.3e-3;

@@ -4,11 +4,11 @@
 
 use std::path::Path;
 
-use config::{Experiment, Vehicle};
+use config::{Experiment, Study, Vehicle};
 use design::{kalman_filter, open_loop_maps, rigid_observer};
 use observer::{ChannelHealth, Estimate, Estimator, Health, Input, Phase, Reading, RigidGains};
 use study::sampling::through_sensors;
-use study::{RunColumns, simulate_drive, true_phases};
+use study::{Campaign, Consistency, RunColumns, simulate_drive, true_phases};
 use trace::{Trace, signal};
 
 const SAMPLE_S: f64 = 0.01;
@@ -115,38 +115,58 @@ fn what_is_missing_or_refused_is_said_of_its_channel() {
 }
 
 #[test]
-fn single_precision_gives_the_same_pressure() {
+fn the_filter_is_as_sure_as_it_may_be_and_the_same_in_single_precision() {
     let field = Field::new();
-    let filter = kalman_filter(&field.vehicle, field.experiment.sensors_told.as_ref());
-    for scenario in ["nominal", "a bad log", "asynchronous channels"] {
-        let rows = field.rows(scenario);
-        let double = field.kalman(&rows);
-        let single = filter.cast::<f32>();
-        let mut state = single.start();
-        for ((input, phase, _), double) in rows.iter().zip(&double) {
-            let estimate = single.step(&mut state, &narrowed(input));
-            if SHIFT.contains(phase) {
-                let difference = (f64::from(estimate.pressure_pa) - double.pressure_pa).abs();
-                assert!(difference < 1e3, "{scenario}: {difference} Pa");
-            }
-        }
+    let mut all = Consistency::default();
+    for scenario in &field.experiment.scenarios {
+        let varied = field.experiment.with_scenario(scenario);
+        let sample_s = varied.observers[0].sample_time_s;
+        let measured = through_sensors(&field.drive, sample_s, &varied.sensors.unwrap(), &field.vehicle);
+        let filter = kalman_filter(&field.vehicle, varied.sensors_told.as_ref());
+        let columns = RunColumns::of(&measured, &field.vehicle).unwrap();
+        all = all.with(&Consistency::of(&filter, &measured, &columns).unwrap());
     }
+    assert!(all.inside_share() > 0.93, "{all:?}");
+    // From above alone: a budget is wider than any one car.
+    assert!(all.nees() < 1.2 && all.nis().iter().all(|nis| *nis < 1.2), "{all:?}");
+    assert!(all.same_share() > 0.99 && all.excess_in_single().abs() < 0.02 && all.restarts == 0, "{all:?}");
 }
 
-/// The input in single precision.
-#[expect(clippy::cast_possible_truncation, reason = "single precision is what is tested")]
-fn narrowed(input: &Input<f64>) -> Input<f32> {
-    let reading = |reading: Option<Reading<f64>>| {
-        reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })
-    };
-    Input {
-        dt_s: input.dt_s as f32,
-        engine_rad_s: reading(input.engine_rad_s),
-        turbine_rad_s: reading(input.turbine_rad_s),
-        output_rad_s: reading(input.output_rad_s),
-        wheel_rad_s: reading(input.wheel_rad_s),
-        command: reading(input.command),
+#[test]
+fn what_is_learnt_in_a_launch_is_no_more_than_twice_too_sure() {
+    const SCALE: usize = 10;
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments/combined.toml");
+    let campaign = Campaign::new(Study::read(&path).unwrap()).unwrap();
+    let mut squares = [0.0; 3];
+    const RUNS: u64 = 24;
+    for run in 0..RUNS {
+        let full = campaign.run_in_full(run).unwrap();
+        let (vehicle, experiment) = (&full.varied.vehicle, &full.varied.experiment);
+        let sensors = experiment.sensors.unwrap();
+        let measured = through_sensors(&full.trace, SAMPLE_S, &sensors, vehicle);
+        let filter = kalman_filter(vehicle, experiment.sensors_told.as_ref());
+        let mut state = filter.start();
+        let columns = RunColumns::of(&measured, vehicle).unwrap();
+        for (sample, time_s) in columns.samples().zip(&measured.time_s) {
+            if *time_s > experiment.shift.request_s {
+                break;
+            }
+            filter.step(&mut state, &sample.unwrap().0);
+        }
+        let states = state.states().unwrap();
+        // The filter counts delays from the turbine's.
+        let truth = [
+            sensors.wheel.scale - 1.0,
+            sensors.wheel.delay_s - sensors.turbine.delay_s,
+            sensors.output.delay_s - sensors.turbine.delay_s,
+        ];
+        for (k, truth) in truth.into_iter().enumerate() {
+            let (mean, deviation) = states[SCALE + k];
+            squares[k] += ((mean - truth) / deviation).powi(2) / RUNS as f64;
+        }
     }
+    let too_sure = squares.map(f64::sqrt);
+    assert!(too_sure.iter().all(|&times| times < 2.0), "{too_sure:?}");
 }
 
 #[test]
