@@ -23,6 +23,13 @@ use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEst
 /// Time over which the acceleration of the wheels is averaged, s.
 const WHEEL_AVERAGE_S: f64 = 0.05;
 
+/// Deviation of the speeds' model over a sample, in deviations of a reading \[chosen\]: small beside it.
+const MODEL_SHARE: f64 = 0.1;
+
+/// Deviations beside their own size that shaft and offgoing torque may begin with, N m \[chosen\].
+const SHAFT_START_N_M: f64 = 100.0;
+const OFFGOING_START_N_M: f64 = 50.0;
+
 /// Age beyond which a reading is taken to be no older, in samples.
 const OLDEST_SAMPLES: f64 = 20.0;
 
@@ -177,10 +184,10 @@ impl<T: Real> ExtendedFilter<T> {
         let deviations = [
             noise.turbine_rad_s,
             noise.output_rad_s,
-            shaft.abs() + T::of(100.0),
+            shaft.abs() + T::of(SHAFT_START_N_M),
             T::of(1e3),
             zero,
-            holding.abs() + T::of(50.0),
+            holding.abs() + T::of(OFFGOING_START_N_M),
         ];
         for (i, deviation) in deviations.into_iter().enumerate() {
             covariance[i][i] = deviation * deviation;
@@ -192,9 +199,19 @@ impl<T: Real> ExtendedFilter<T> {
         Running { mean, covariance, slow_wheel, motion_pa_s: zero, last: *sample, acting, filters: false }
     }
 
+    /// Follows the wheel speed and the motion of the pressure over the interval that ends with `sample`.
+    #[inline]
+    pub(crate) fn follow(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) {
+        let wheel = T::of(0.5) * (running.last.wheel_rad_s + sample.wheel_rad_s);
+        let share = (interval.dt_s / T::of(WHEEL_AVERAGE_S)).min(T::one());
+        running.slow_wheel = running.slow_wheel + share * (wheel - running.slow_wheel);
+        let rate = interval.start_rate(running.mean[PRESSURE]).abs();
+        running.motion_pa_s = rate.max(running.motion_pa_s * lasting(interval.dt_s, self.noise.valve_rate_s));
+    }
+
     /// What the powertrain does over the interval that ends with `sample`.
     #[inline]
-    pub(crate) fn passage(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) -> Passage<T> {
+    pub(crate) fn passage(&self, running: &Running<T>, interval: &Interval<T>, sample: &Sample<T>) -> Passage<T> {
         let (one, half) = (T::one(), T::of(0.5));
         let (dt, last, noise) = (interval.dt_s, running.last, &self.noise);
         let locked = running.acting == Phase::AfterShift;
@@ -203,13 +220,8 @@ impl<T: Real> ExtendedFilter<T> {
 
         // The wheel's readings are as old as its teeth are apart; over that time it went on as it does on average.
         let wheel = half * (last.wheel_rad_s + sample.wheel_rad_s);
-        let slow_s = T::of(WHEEL_AVERAGE_S);
-        running.slow_wheel = running.slow_wheel + (dt / slow_s).min(one) * (wheel - running.slow_wheel);
-        let wheel_rate = (wheel - running.slow_wheel) / slow_s;
+        let wheel_rate = (wheel - running.slow_wheel) / T::of(WHEEL_AVERAGE_S);
         let wheel_rad_s = wheel + self.age(self.readings.wheel_rad, wheel) * wheel_rate;
-
-        let rate = interval.start_rate(running.mean[PRESSURE]).abs();
-        running.motion_pa_s = rate.max(running.motion_pa_s * lasting(dt, noise.valve_rate_s));
 
         // Shaft torque over the interval: T_k + h (w_0 + w_0+) - u w_w.
         let (ratio, stiffness) = (line.final_ratio, line.shaft_stiffness_n_m_rad);
@@ -250,6 +262,7 @@ impl<T: Real> ExtendedFilter<T> {
     /// Carries mean and covariance over the interval.
     #[inline]
     fn predict(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) -> Start<T> {
+        self.follow(running, interval, sample);
         let c = self.passage(running, interval, sample);
         let x = running.mean;
         let (above, slope) = c.tangent(x[PRESSURE]);
@@ -272,9 +285,8 @@ impl<T: Real> ExtendedFilter<T> {
         let square = |x: T| x * x;
         let dt = c.interval.dt_s;
         [
-            // What the model of the accelerations leaves out is small beside the readings.
-            square(T::of(0.1) * noise.turbine_rad_s),
-            square(T::of(0.1) * noise.output_rad_s),
+            square(T::of(MODEL_SHARE) * noise.turbine_rad_s),
+            square(T::of(MODEL_SHARE) * noise.output_rad_s),
             square(c.twist)
                 * (square(noise.wheel_rad_s) + if c.shifting { zero } else { square(noise.twist_rate_rad_s) }),
             T::of(2.0)

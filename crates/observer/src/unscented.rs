@@ -49,6 +49,7 @@ fn predict<T: Real>(
     interval: &Interval<T>,
     sample: &Sample<T>,
 ) -> Start<T> {
+    filter.follow(running, interval, sample);
     let passage = filter.passage(running, interval, sample);
     let before = running.mean;
     let axes = square_root(&running.covariance);

@@ -2,6 +2,7 @@
 
 use drivetrain::Real;
 
+use super::predict::{OFFGOING_START, at_start};
 use super::{KalmanFilter, KalmanState, OFFGOING, OUTPUT, Running, SPRING, TURBINE};
 use crate::Phase;
 
@@ -55,7 +56,7 @@ impl<T: Real> KalmanFilter<T> {
             let torque = self.model.rigid.converter.torques(engine, turbine).turbine_n_m;
             let holding = self.holding(torque, running.mean[SPRING]);
             running.mean[OFFGOING] = holding;
-            running.covariance.renew(OFFGOING, T::of(0.5) * holding.abs() + T::of(50.0));
+            running.covariance.renew(OFFGOING, at_start(OFFGOING_START, holding));
         }
         running.acting = acting;
     }

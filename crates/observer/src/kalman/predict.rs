@@ -15,6 +15,13 @@ use crate::Phase;
 
 /// Innovation beyond which a reading is refused, in its deviations.
 const GATE: u8 = 4;
+/// Deviations that the filter begins with \[chosen\]: of the wheel speed about the output's, rad/s; of shaft, offgoing and load
+/// torque, as a share of the shaft or holding torque and beside it, N m; of the pressure of a clutch under command, as a share of it.
+const WHEEL_START_RAD_S: f64 = 0.3;
+const SHAFT_START: (f64, f64) = (0.3, 100.0);
+pub(super) const OFFGOING_START: (f64, f64) = (0.5, 50.0);
+const LOAD_START: (f64, f64) = (0.15, 400.0);
+const PRESSURE_START: f64 = 0.3;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 
@@ -60,12 +67,12 @@ impl<T: Real> KalmanFilter<T> {
             deviations[k] = self.readings[k].deviation_rad_s.hypot(old);
         }
         // Out of balance the shafts swing, at the start of a log as much as the torque itself.
-        deviations[WHEEL] = T::of(0.3);
-        deviations[SPRING] = T::of(0.3) * shaft.abs() + T::of(100.0);
+        deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
+        deviations[SPRING] = at_start(SHAFT_START, shaft);
         deviations[PRESSURE] = self.first_pressure_deviation(acting, state.valve_pa);
         deviations[SHARE] = u.turbine_share;
-        deviations[OFFGOING] = T::of(0.5) * offgoing.abs() + T::of(50.0);
-        deviations[LOAD] = T::of(400.0) + T::of(0.15) * shaft.abs();
+        deviations[OFFGOING] = at_start(OFFGOING_START, offgoing);
+        deviations[LOAD] = at_start(LOAD_START, shaft);
         deviations[FRICTION] = u.friction;
         deviations[GAIN] = u.valve_gain;
         deviations[SCALE] = u.wheel_scale;
@@ -113,7 +120,7 @@ impl<T: Real> KalmanFilter<T> {
     /// An open cylinder is empty; of one under pressure the command before the log is not known.
     fn first_pressure_deviation(&self, acting: Phase, pressure_pa: T) -> T {
         let known = T::of(1e3);
-        if acting == Phase::BeforeShift { known } else { known + T::of(0.3) * pressure_pa }
+        if acting == Phase::BeforeShift { known } else { known + T::of(PRESSURE_START) * pressure_pa }
     }
 
     /// Carries mean and covariance over a step, under commands that end at `settled_pa`. Where the slip of the oncoming
@@ -236,6 +243,12 @@ impl<T: Real> KalmanFilter<T> {
             }
         }
     }
+}
+
+/// A deviation that is a share of a torque and something beside it.
+#[inline]
+pub(super) fn at_start<T: Real>((share, beside): (f64, f64), torque_n_m: T) -> T {
+    T::of(share) * torque_n_m.abs() + T::of(beside)
 }
 
 /// What is left after `dt_s` of a random number that lasts for a time, as implicit Euler has it.
