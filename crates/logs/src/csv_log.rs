@@ -79,7 +79,8 @@ impl CsvLog {
             .iter()
             .map(|&i| Channel { name: names[i].0.clone(), unit: names[i].1.clone(), group: String::new() })
             .collect();
-        let log = Self { path: path.to_owned(), dialect, reader: Some(reader), time, columns, width: titles.len(), notes };
+        let log =
+            Self { path: path.to_owned(), dialect, reader: Some(reader), time, columns, width: titles.len(), notes };
         Ok((log, channels))
     }
 
@@ -177,8 +178,10 @@ impl Stream for Rows<'_> {
                     Err(()) => {
                         self.no_numbers += 1;
                         if self.first_text.is_none() {
-                            let line = self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
-                            self.first_text = Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
+                            let line =
+                                self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
+                            self.first_text =
+                                Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
                         }
                         (f64::NAN, Quality::Missing)
                     }
@@ -220,7 +223,10 @@ fn read_row(
         _ if reader.get_ref().left == 0 => LogError::damaged(
             path,
             format!("line {line}"),
-            format!("the row that begins here is longer than {} MiB\nhint: a quotation mark may not be closed", LONGEST_ROW >> 20),
+            format!(
+                "the row that begins here is longer than {} MiB\nhint: a quotation mark may not be closed",
+                LONGEST_ROW >> 20
+            ),
         ),
         csv::ErrorKind::Io(source) => LogError::Io { path: path.to_owned(), source },
         other => LogError::damaged(path, format!("line {line}"), format!("{other:?}")),
@@ -310,24 +316,35 @@ impl Dialect {
             let count: usize = rows.iter().skip(first).map(numbers).sum();
             Some((count, delimiter, comma, first))
         });
-        let Some((_, delimiter, decimal_comma, first)) = best.max_by_key(|(count, delimiter, ..)| (*count, *delimiter != b',')) else {
+        let Some((_, delimiter, decimal_comma, first)) =
+            best.max_by_key(|(count, delimiter, ..)| (*count, *delimiter != b','))
+        else {
             let only = lines.iter().filter(|line| !line.trim().is_empty()).count();
             return Err(LogError::file(
                 path,
-                if only == 1 { "there are no rows" } else {
+                if only == 1 {
+                    "there are no rows"
+                } else {
                     "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns), Parquet, MDF 4, candump, ASC or BLF"
                 },
             ));
         };
-        let names = |row: &[String]| row.len() >= 2 && row.iter().any(|cell| !cell.is_empty()) && !row.iter().any(|cell| is_number(cell, decimal_comma));
-        let above = |i: usize| lines.get(i).map(|line| cells(line, delimiter)).filter(|row| names(row) || is_units(row));
+        let names = |row: &[String]| {
+            row.len() >= 2
+                && row.iter().any(|cell| !cell.is_empty())
+                && !row.iter().any(|cell| is_number(cell, decimal_comma))
+        };
+        let above =
+            |i: usize| lines.get(i).map(|line| cells(line, delimiter)).filter(|row| names(row) || is_units(row));
         let filled: Vec<usize> = (0..first).rev().filter(|&i| !lines[i].trim().is_empty()).collect();
         let line = |nth: usize| filled.get(nth).and_then(|&i| above(i).map(|row| (i, row)));
         match (line(0), line(1).filter(|(_, row)| names(row))) {
             (Some((_, units)), Some((names_at, _))) if is_units(&units) => {
                 Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: true })
             }
-            (Some((names_at, row)), _) if names(&row) => Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: false }),
+            (Some((names_at, row)), _) if names(&row) => {
+                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: false })
+            }
             _ => Err(LogError::damaged(
                 path,
                 format!("line {}", first + 1),
@@ -370,7 +387,25 @@ pub(crate) fn split_unit(title: &str) -> (String, String) {
 
 /// Whether a name is that of the time.
 pub(crate) fn is_time_name(name: &str) -> bool {
-    const NAMES: &[&str] = &["time", "t", "zeit", "timestamp", "timestamps", "times", "elapsed", "abszeit", "relzeit", "time_s", "time_ms", "time_us", "time_ns", "zeit_s", "zeit_ms", "t_s", "t_ms"];
+    const NAMES: &[&str] = &[
+        "time",
+        "t",
+        "zeit",
+        "timestamp",
+        "timestamps",
+        "times",
+        "elapsed",
+        "abszeit",
+        "relzeit",
+        "time_s",
+        "time_ms",
+        "time_us",
+        "time_ns",
+        "zeit_s",
+        "zeit_ms",
+        "t_s",
+        "t_ms",
+    ];
     NAMES.contains(&name.to_lowercase().replace([' ', '-'], "_").as_str())
 }
 
@@ -387,11 +422,15 @@ pub(crate) fn time_column(
         None => (0..names.len()).find(|&i| is_time_name(&names[i].0)),
     };
     let Some(i) = found else {
-        let wanted = wanted.map_or("for the time".to_owned(), |time| format!("`{}` for the time", error::shown(&time.name)));
+        let wanted =
+            wanted.map_or("for the time".to_owned(), |time| format!("`{}` for the time", error::shown(&time.name)));
         let some: Vec<String> = names.iter().take(12).map(|(name, _)| error::shown(name)).collect();
         return Err(LogError::file(
             path,
-            format!("there is no column {wanted}; the first columns are {}\nhint: name it `time_s`, or in the channel map under [time]", some.join(", ")),
+            format!(
+                "there is no column {wanted}; the first columns are {}\nhint: name it `time_s`, or in the channel map under [time]",
+                some.join(", ")
+            ),
         ));
     };
     let text = wanted.and_then(|time| time.unit.clone()).unwrap_or_else(|| names[i].1.clone());
@@ -403,7 +442,11 @@ pub(crate) fn time_column(
         Some(Unit { quantity: Quantity::Time, size, .. }) => Ok((i, size)),
         _ => Err(LogError::file(
             path,
-            format!("the time `{}` has the unit `{}`\nhint: it can be s, ms, us or ns; say it in the channel map under [time]", error::shown(&names[i].0), error::shown(&text)),
+            format!(
+                "the time `{}` has the unit `{}`\nhint: it can be s, ms, us or ns; say it in the channel map under [time]",
+                error::shown(&names[i].0),
+                error::shown(&text)
+            ),
         )),
     }
 }

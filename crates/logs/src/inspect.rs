@@ -118,5 +118,8 @@ pub fn inspect(log: &mut Log) -> Result<Inspection, LogError> {
         watched[sample.channel].push(sample.time_s, sample.value, sample.quality);
     }
     let notes = samples.notes().to_vec();
-    Ok(Inspection { channels: watched.into_iter().zip(channels).map(|(watched, channel)| watched.finish(channel)).collect(), notes })
+    Ok(Inspection {
+        channels: watched.into_iter().zip(channels).map(|(watched, channel)| watched.finish(channel)).collect(),
+        notes,
+    })
 }

@@ -76,29 +76,39 @@ impl Log {
         let database = options.dbc.as_deref().map(Database::read).transpose()?;
         let is_file = path != Path::new("-");
         let (source, channels) = match Format::of(&head) {
-            Format::Mdf if is_file => MdfLog::open(path, database).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?,
+            Format::Mdf if is_file => {
+                MdfLog::open(path, database).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
+            }
             Format::Parquet if is_file => {
                 ParquetLog::open(path, options.time.as_ref()).map(|(log, channels)| (Source::Parquet(log), channels))?
             }
             Format::Mdf | Format::Parquet => {
-                return Err(LogError::file(path, "MDF and Parquet files cannot be read from a pipe\nhint: give the file itself"));
+                return Err(LogError::file(
+                    path,
+                    "MDF and Parquet files cannot be read from a pipe\nhint: give the file itself",
+                ));
             }
             Format::Mdf3 => {
-                return Err(LogError::file(path, "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf"));
+                return Err(LogError::file(
+                    path,
+                    "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf",
+                ));
             }
             Format::Utf16 => {
                 return Err(LogError::file(path, "the text is UTF-16\nhint: save it as UTF-8"));
             }
             Format::Can(kind) => {
                 let database = database.ok_or_else(|| {
-                    LogError::file(path, "a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc")
+                    LogError::file(
+                        path,
+                        "a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc",
+                    )
                 })?;
                 let channels = database.channels().to_vec();
                 (Source::Can(CanLog::new(path, kind, head, reader, database)), channels)
             }
-            Format::Csv => {
-                CsvLog::open(path, head, reader, options.time.as_ref()).map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?
-            }
+            Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref())
+                .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
         };
         Ok(Self { path: path.to_owned(), channels, source })
     }
@@ -149,7 +159,12 @@ impl Log {
     pub fn find(&self, name: &str, group: Option<&str>) -> Result<usize, LogError> {
         let same = |channel: &Channel| match group {
             Some(group) => channel.name == name && channel.group == group,
-            None => channel.name == name || name.strip_prefix(&*channel.group).is_some_and(|rest| rest.strip_prefix('.') == Some(&channel.name)),
+            None => {
+                channel.name == name
+                    || name
+                        .strip_prefix(&*channel.group)
+                        .is_some_and(|rest| rest.strip_prefix('.') == Some(&channel.name))
+            }
         };
         let found: Vec<usize> = (0..self.channels.len()).filter(|&i| same(&self.channels[i])).collect();
         match found[..] {
@@ -162,7 +177,8 @@ impl Log {
                 self.nearest(name)
             ))),
             _ => {
-                let groups: Vec<String> = found.iter().take(8).map(|&i| format!("`{}`", error::shown(&self.channels[i].group))).collect();
+                let groups: Vec<String> =
+                    found.iter().take(8).map(|&i| format!("`{}`", error::shown(&self.channels[i].group))).collect();
                 Err(LogError::map(format!(
                     "{}: there are {} channels `{}`\nhint: choose one by its `group`: {}",
                     self.path.display(),
@@ -253,7 +269,10 @@ impl Format {
             return Self::Can(CanKind::Candump);
         }
         let lower = first.to_lowercase();
-        if lower.starts_with("date ") && !first.contains([',', ';', '\t']) || lower.starts_with("base hex") || lower.starts_with("base dec") {
+        if lower.starts_with("date ") && !first.contains([',', ';', '\t'])
+            || lower.starts_with("base hex")
+            || lower.starts_with("base dec")
+        {
             return Self::Can(CanKind::Asc);
         }
         Self::Csv

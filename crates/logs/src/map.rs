@@ -136,7 +136,8 @@ impl ChannelMap {
         let text = std::fs::read_to_string(path).map_err(LogError::io(path))?;
         let wrong = |message: String| LogError::map(format!("{}: {message}", path.display()));
         let raw: RawMap = toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))?;
-        let channels = raw.channel.into_iter().map(|(role, raw)| mapped(&role, raw).map_err(&wrong)).collect::<Result<_, _>>()?;
+        let channels =
+            raw.channel.into_iter().map(|(role, raw)| mapped(&role, raw).map_err(&wrong)).collect::<Result<_, _>>()?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let gearbox = raw.gearbox.map_or(Ok(Gearbox::default()), gearbox).map_err(&wrong)?;
         Ok(Self {
@@ -154,7 +155,12 @@ impl ChannelMap {
     /// # Errors
     /// There is no such role, or no name.
     pub fn set(&mut self, text: &str) -> Result<(), LogError> {
-        let wrong = || LogError::map(format!("`{}` is not ROLE=NAME\nhint: for example engine_speed=\"N_Eng [rpm]\"", error::shown(text)));
+        let wrong = || {
+            LogError::map(format!(
+                "`{}` is not ROLE=NAME\nhint: for example engine_speed=\"N_Eng [rpm]\"",
+                error::shown(text)
+            ))
+        };
         let (role, name) = text.split_once('=').ok_or_else(wrong)?;
         let (name, unit) = csv_log::split_unit(name.trim());
         if name.is_empty() {
@@ -183,7 +189,8 @@ impl ChannelMap {
 
 fn known_role(name: &str) -> Result<Role, String> {
     let names = || Role::all().map(Role::name).collect::<Vec<_>>().join(", ");
-    Role::parse(name).ok_or_else(|| format!("there is no role `{}`\nhint: the roles are {}", error::shown(name), names()))
+    Role::parse(name)
+        .ok_or_else(|| format!("there is no role `{}`\nhint: the roles are {}", error::shown(name), names()))
 }
 
 fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
@@ -195,9 +202,13 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
         _ => return Err(format!("{} or {} must say the channel", key("name"), key("names"))),
     };
     if names.len() > 1 && raw.combine.is_none() {
-        return Err(format!("{} is missing\nhint: \"mean\", as for two wheels, or \"sum\", as for a value in two parts", key("combine")));
+        return Err(format!(
+            "{} is missing\nhint: \"mean\", as for two wheels, or \"sum\", as for a value in two parts",
+            key("combine")
+        ));
     }
-    let finite = |value: f64, name: &str| if value.is_finite() { Ok(value) } else { Err(format!("{} is {value}", key(name))) };
+    let finite =
+        |value: f64, name: &str| if value.is_finite() { Ok(value) } else { Err(format!("{} is {value}", key(name))) };
     if raw.scale == 0.0 {
         return Err(format!("{} is 0", key("scale")));
     }
@@ -205,7 +216,7 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
         return Err(format!("{} is {}, expected -10 to 10", key("delay_s"), raw.delay_s));
     }
     if let Some([least, greatest]) = raw.valid_range
-        && !(least < greatest)
+        && (least >= greatest || least.is_nan() || greatest.is_nan())
     {
         return Err(format!("{} is [{least}, {greatest}], expected a smaller value first", key("valid_range")));
     }
@@ -263,7 +274,8 @@ pub struct Resolved {
 
 impl Resolved {
     fn of(entry: &Mapped, log: &Log, gearbox: &Gearbox) -> Result<Self, LogError> {
-        let channels = entry.names.iter().map(|name| log.find(name, entry.group.as_deref())).collect::<Result<Vec<_>, _>>()?;
+        let channels =
+            entry.names.iter().map(|name| log.find(name, entry.group.as_deref())).collect::<Result<Vec<_>, _>>()?;
         let units: Vec<&str> = channels.iter().map(|&i| log.channels()[i].unit.as_str()).collect();
         let text = match &entry.unit {
             Some(unit) => unit.clone(),
@@ -277,7 +289,8 @@ impl Resolved {
                 )));
             }
         };
-        let (unit_name, size, zero) = conversion(entry.role, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
+        let (unit_name, size, zero) =
+            conversion(entry.role, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
         Ok(Self { entry: entry.clone(), channels, unit_name, size, zero })
     }
 
@@ -348,14 +361,20 @@ mod tests {
         assert_eq!(map.channels.len(), 1);
         assert_eq!((map.channels[0].names[0].as_str(), map.channels[0].unit.as_deref()), ("N_Mot", Some("1/min")));
         let error = map.set("speed=N").unwrap_err().to_string();
-        assert!(error.starts_with("there is no role `speed`\nhint: the roles are engine_speed, turbine_speed"), "{error}");
+        assert!(
+            error.starts_with("there is no role `speed`\nhint: the roles are engine_speed, turbine_speed"),
+            "{error}"
+        );
         assert!(map.set("engine_speed").is_err() && map.set("engine_speed= ").is_err());
     }
 
     #[test]
     fn ratios_fall_and_are_told_apart() {
         assert!(check_ratios(&[4.7, 3.1, 1.0]).is_ok() && check_ratios(&[]).is_ok());
-        assert_eq!(check_ratios(&[3.1, 4.7]).unwrap_err(), "3.1 is followed by 4.7, expected falling ratios, 1st gear first");
+        assert_eq!(
+            check_ratios(&[3.1, 4.7]).unwrap_err(),
+            "3.1 is followed by 4.7, expected falling ratios, 1st gear first"
+        );
         assert!(check_ratios(&[f64::NAN]).is_err() && check_ratios(&[4.0, -1.0]).is_err());
     }
 }

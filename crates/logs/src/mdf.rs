@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use falcon_mdf::{CanFrames, Channel as MdfChannel, Mf4Error, Mf4File, OpenOptions, Signal, SignalValues, SignalsChunks};
+use falcon_mdf::{
+    CanFrames, Channel as MdfChannel, Mf4Error, Mf4File, OpenOptions, Signal, SignalValues, SignalsChunks,
+};
 
 use crate::can::{Database, Decoder, Frame};
 use crate::samples::{Quality, Sample, Stream};
@@ -49,17 +51,27 @@ impl MdfLog {
             if data.master_channel().is_none_or(|master| !master.is_time_channel()) {
                 let count = data.channels.iter().filter(|channel| !channel.is_master()).count();
                 if count > 0 {
-                    notes.push(format!("{count} channels of group `{}` have no time and are left out", group_name(data, data_group)));
+                    notes.push(format!(
+                        "{count} channels of group `{}` have no time and are left out",
+                        group_name(data, data_group)
+                    ));
                 }
                 continue;
             }
             for (i, channel) in data.channels.iter().enumerate().filter(|(_, channel)| !channel.is_master()) {
-                if channel.unreadable().is_some() || !(channel.value_kind().is_numeric() || channel.raw_value_kind().is_numeric()) || channel.is_array() {
+                if channel.unreadable().is_some()
+                    || !(channel.value_kind().is_numeric() || channel.raw_value_kind().is_numeric())
+                    || channel.is_array()
+                {
                     unreadable += 1;
                     continue;
                 }
                 places.push(Place { data_group, group, channel: i });
-                channels.push(Channel { name: channel.name.clone(), unit: channel.unit.clone(), group: group_name(data, data_group) });
+                channels.push(Channel {
+                    name: channel.name.clone(),
+                    unit: channel.unit.clone(),
+                    group: group_name(data, data_group),
+                });
             }
         }
         if unreadable > 0 {
@@ -90,7 +102,8 @@ impl MdfLog {
                 std::iter::once(master).chain(chosen.iter().map(|&i| &data.channels[self.places[i].channel])).collect();
             let name = group_name(data, data_group);
             let place = format!("group `{name}`");
-            let chunks = self.file.signals_chunks(&channels, BATCH).map_err(|error| damaged(&self.path, &place, &error))?;
+            let chunks =
+                self.file.signals_chunks(&channels, BATCH).map_err(|error| damaged(&self.path, &place, &error))?;
             streams.push(Box::new(Group {
                 path: &self.path,
                 place,
@@ -104,7 +117,10 @@ impl MdfLog {
         let own = self.places.len();
         if let Some(database) = self.database.as_ref().filter(|_| wanted.len() > own) {
             for group in self.file.can_frame_groups() {
-                let frames = self.file.can_frames(group).map_err(|error| damaged(&self.path, "the frames of its bus", &error))?;
+                let frames = self
+                    .file
+                    .can_frames(group)
+                    .map_err(|error| damaged(&self.path, "the frames of its bus", &error))?;
                 streams.push(Box::new(Bus { frames, at: 0, decoder: Decoder::new(database, &wanted[own..]), own }));
             }
         }
@@ -115,7 +131,10 @@ impl MdfLog {
 
 /// Data group, channel group, and the group itself.
 fn groups(file: &Mf4File) -> impl Iterator<Item = (usize, usize, &falcon_mdf::ChannelGroup)> {
-    file.data_groups().iter().enumerate().flat_map(|(i, data)| data.channel_groups.iter().enumerate().map(move |(j, group)| (i, j, group)))
+    file.data_groups()
+        .iter()
+        .enumerate()
+        .flat_map(|(i, data)| data.channel_groups.iter().enumerate().map(move |(j, group)| (i, j, group)))
 }
 
 /// A group by the name that its recorder gave it, or its number.
@@ -190,7 +209,9 @@ impl Stream for Group<'_> {
             None => Ok(false),
             Some(signals) => {
                 let decoded = signals.and_then(|signals| self.decode(&signals, batch));
-                decoded.map(|()| true).map_err(|error| damaged(self.path, &format!("{}, record {}", self.place, self.read + 1), &error))
+                decoded
+                    .map(|()| true)
+                    .map_err(|error| damaged(self.path, &format!("{}, record {}", self.place, self.read + 1), &error))
             }
         }
     }

@@ -32,7 +32,9 @@ pub(crate) struct ParquetLog {
 impl ParquetLog {
     pub(crate) fn open(path: &Path, time: Option<&TimeColumn>) -> Result<(Self, Vec<Channel>), LogError> {
         let file = File::open(path).map_err(LogError::io(path))?;
+        let length = file.metadata().map_err(LogError::io(path))?.len();
         let reader = SerializedFileReader::new(file).map_err(|error| damaged(path, "its end", &error))?;
+        check_places(path, length, &reader)?;
         let leaves: Vec<ColumnDescPtr> = reader.metadata().file_metadata().schema_descr().columns().to_vec();
         let titles: Vec<String> = leaves.iter().map(|leaf| leaf.path().string()).collect();
         let names: Vec<(String, String)> = titles
@@ -53,20 +55,31 @@ impl ParquetLog {
         // A column of time stamps is the time where no name says so.
         let stamps = (0..leaves.len()).find(|&i| stamp_unit(&leaves[i]).is_some());
         let named = names.iter().any(|(name, _)| is_time_name(name));
-        let by_kind = stamps.filter(|_| time.is_none() && !named).map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
+        let by_kind =
+            stamps.filter(|_| time.is_none() && !named).map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
         let time = time_column(path, &names, &titles, time.or(by_kind.as_ref()), &mut notes)?;
         let is_number = |leaf: &ColumnDescPtr| {
             leaf.max_rep_level() == 0
-                && matches!(leaf.physical_type(), Physical::BOOLEAN | Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE)
+                && matches!(
+                    leaf.physical_type(),
+                    Physical::BOOLEAN | Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE
+                )
         };
         if !is_number(&leaves[time.0]) {
-            return Err(LogError::file(path, format!("the time `{}` does not hold numbers", error::shown(&titles[time.0]))));
+            return Err(LogError::file(
+                path,
+                format!("the time `{}` does not hold numbers", error::shown(&titles[time.0])),
+            ));
         }
         let columns: Vec<usize> = (0..leaves.len()).filter(|&i| i != time.0 && is_number(&leaves[i])).collect();
         if columns.len() + 1 < leaves.len() {
             notes.push(format!("{} columns do not hold numbers and are left out", leaves.len() - 1 - columns.len()));
         }
-        let channels = columns.iter().map(|&i| Channel { name: names[i].0.clone(), unit: names[i].1.clone(), group: String::new() });
+        let channels = columns.iter().map(|&i| Channel {
+            name: names[i].0.clone(),
+            unit: names[i].1.clone(),
+            group: String::new(),
+        });
         let channels = channels.collect();
         Ok((Self { path: path.to_owned(), reader, time, columns, notes }, channels))
     }
@@ -77,6 +90,26 @@ impl ParquetLog {
             .map(|(channel, (&column, _))| (channel, column));
         Ok(Box::new(Groups { columns: columns.collect(), log: self, group: 0, open: None, without_time: 0 }))
     }
+}
+
+/// Checks that every column chunk lies within the file. The reader takes the places on trust.
+fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -> Result<(), LogError> {
+    for (group, metadata) in reader.metadata().row_groups().iter().enumerate() {
+        for column in metadata.columns() {
+            let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+            let end = start.checked_add(column.compressed_size());
+            let inside =
+                start >= 0 && column.compressed_size() >= 0 && end.is_some_and(|end| end.unsigned_abs() <= length);
+            if !inside || metadata.num_rows() < 0 || column.num_values() < 0 {
+                return Err(LogError::damaged(
+                    path,
+                    format!("row group {}", group + 1),
+                    format!("column `{}` lies outside the file", error::shown(&column.column_path().string())),
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
@@ -120,7 +153,8 @@ impl Groups<'_> {
     fn open(&self) -> Result<OpenGroup, ParquetError> {
         let group = self.log.reader.get_row_group(self.group)?;
         let rows_left = u64::try_from(group.metadata().num_rows()).unwrap_or(0);
-        let columns = self.columns.iter().map(|(_, column)| group.get_column_reader(*column)).collect::<Result<_, _>>()?;
+        let columns =
+            self.columns.iter().map(|(_, column)| group.get_column_reader(*column)).collect::<Result<_, _>>()?;
         Ok(OpenGroup { time: group.get_column_reader(self.log.time.0)?, columns, rows_left })
     }
 
@@ -177,7 +211,11 @@ impl Stream for Groups<'_> {
 
 /// The next numbers of a column; NaN where there is none.
 fn numbers(column: &mut ColumnReader, rows: usize) -> Result<Vec<f64>, ParquetError> {
-    fn read<D: DataType>(column: &mut ColumnReaderImpl<D>, rows: usize, number: impl Fn(&D::T) -> f64) -> Result<Vec<f64>, ParquetError> {
+    fn read<D: DataType>(
+        column: &mut ColumnReaderImpl<D>,
+        rows: usize,
+        number: impl Fn(&D::T) -> f64,
+    ) -> Result<Vec<f64>, ParquetError> {
         let (mut levels, mut values) = (Vec::new(), Vec::new());
         let mut got = 0;
         // A call may end with a page.
@@ -194,7 +232,10 @@ fn numbers(column: &mut ColumnReader, rows: usize) -> Result<Vec<f64>, ParquetEr
         // Where values are absent, their level is below the highest.
         let highest = levels.iter().copied().max().unwrap_or(0);
         let mut values = values.iter();
-        Ok(levels.iter().map(|level| if *level == highest { values.next().map_or(f64::NAN, &number) } else { f64::NAN }).collect())
+        Ok(levels
+            .iter()
+            .map(|level| if *level == highest { values.next().map_or(f64::NAN, &number) } else { f64::NAN })
+            .collect())
     }
     #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
     match column {

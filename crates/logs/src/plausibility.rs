@@ -3,8 +3,8 @@
 use trace::Quantity;
 use trace::units::{mpa, rpm};
 
-use crate::readings::RoleSummary;
 use crate::Role;
+use crate::readings::RoleSummary;
 
 /// Least and greatest of some values, and the middle of their sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,13 +59,20 @@ impl Extremes {
 
 /// What cannot be right, each with a hint.
 pub fn findings(summary: &[RoleSummary]) -> Vec<String> {
-    let turning = |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.size() > 1.0);
+    let turning =
+        |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.size() > 1.0);
     let mut findings: Vec<String> = summary.iter().filter_map(alone).collect();
     // A turbine reaches nearly the speed of the engine; in another unit it is ten times off.
-    if let (Some(engine), Some(turbine), true) = (turning(Role::EngineSpeed), turning(Role::TurbineSpeed), findings.is_empty()) {
+    if let (Some(engine), Some(turbine), true) =
+        (turning(Role::EngineSpeed), turning(Role::TurbineSpeed), findings.is_empty())
+    {
         let ratio = turbine.extremes.size() / engine.extremes.size();
         let off = |found: &str, likely: &str| {
-            finding(turbine, found, &format!("its greatest value is {ratio:.2} times that of the engine speed; it looks like {likely}"))
+            finding(
+                turbine,
+                found,
+                &format!("its greatest value is {ratio:.2} times that of the engine speed; it looks like {likely}"),
+            )
         };
         if (0.08..0.13).contains(&ratio) && turbine.unit_name == "rpm" {
             findings.push(off("rpm", "rad/s"));
@@ -78,7 +85,9 @@ pub fn findings(summary: &[RoleSummary]) -> Vec<String> {
 
 fn finding(entry: &RoleSummary, found: &str, why: &str) -> String {
     let name = entry.role.name();
-    format!("{name} cannot be in {found}: {why}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`")
+    format!(
+        "{name} cannot be in {found}: {why}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`"
+    )
 }
 
 /// What cannot be right by the values of the signal alone.
@@ -87,23 +96,41 @@ fn alone(entry: &RoleSummary) -> Option<String> {
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
     let say = |text: String, likely: &str| Some(finding(entry, unit, &format!("{text}; it looks like {likely}")));
     match entry.role.quantity()? {
-        Quantity::Rotation if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) => {
+        Quantity::Rotation
+            if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) =>
+        {
             say(format!("most values would be about {:.0} rpm", rpm(middle)), "rpm")
         }
         Quantity::Rotation if unit == "rpm" && entry.role == Role::EngineSpeed && size > 2.0 && middle < 42.0 => {
             say(format!("most values would be about {:.0} rpm, below idle", rpm(middle)), "rad/s")
         }
-        Quantity::Current if unit == "A" && size > 10.0 => say(format!("its greatest value would be {size:.0} A"), "mA"),
-        Quantity::Current if unit == "mA" && size < 0.01 => say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A"),
-        Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => say(format!("its greatest value is {size:.1}"), "%"),
-        Quantity::Share if unit == "1" && is_duty(entry.role) && size > 150.0 => say(format!("its greatest value is {:.1}", size / 100.0), "%"),
+        Quantity::Current if unit == "A" && size > 10.0 => {
+            say(format!("its greatest value would be {size:.0} A"), "mA")
+        }
+        Quantity::Current if unit == "mA" && size < 0.01 => {
+            say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
+        }
+        Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
+            say(format!("its greatest value is {size:.1}"), "%")
+        }
+        Quantity::Share if unit == "1" && is_duty(entry.role) && size > 150.0 => {
+            say(format!("its greatest value is {:.1}", size / 100.0), "%")
+        }
         Quantity::Share if unit == "%" && !is_duty(entry.role) && size <= 0.0101 && size > 0.0 => {
             say(format!("its greatest value is {:.2} %", 100.0 * size), "a share from 0 to 1 (unit `1`)")
         }
-        Quantity::Pressure if size > 20e6 => say(format!("its greatest value would be {:.0} MPa", mpa(size)), "a smaller unit (bar, kPa or Pa)"),
-        Quantity::Pressure if size < 5e3 => say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)"),
-        Quantity::Velocity if size > 120.0 => say(format!("its greatest value would be {:.0} km/h", 3.6 * size), "a smaller unit (km/h)"),
-        Quantity::Torque if size > 20e3 => say(format!("its greatest value would be {size:.0} N m"), "a share or raw value; give `scale`"),
+        Quantity::Pressure if size > 20e6 => {
+            say(format!("its greatest value would be {:.0} MPa", mpa(size)), "a smaller unit (bar, kPa or Pa)")
+        }
+        Quantity::Pressure if size < 5e3 => {
+            say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
+        }
+        Quantity::Velocity if size > 120.0 => {
+            say(format!("its greatest value would be {:.0} km/h", 3.6 * size), "a smaller unit (km/h)")
+        }
+        Quantity::Torque if size > 20e3 => {
+            say(format!("its greatest value would be {size:.0} N m"), "a share or raw value; give `scale`")
+        }
         _ => None,
     }
 }

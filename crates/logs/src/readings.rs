@@ -105,7 +105,14 @@ impl<'a> Readings<'a> {
             still: None,
         });
         let roles = roles.collect();
-        Ok(Self { samples: log.samples(&wanted)?, roles, users, pending: Vec::new(), sample: None, speeds: [None; SPEEDS] })
+        Ok(Self {
+            samples: log.samples(&wanted)?,
+            roles,
+            users,
+            pending: Vec::new(),
+            sample: None,
+            speeds: [None; SPEEDS],
+        })
     }
 
     /// What came of the samples so far.
@@ -179,7 +186,9 @@ impl<'a> Readings<'a> {
             value = known.iter().sum::<f64>() / divisor;
         }
         let value = channels.resolved.in_unit(value);
-        if quality == Quality::Good && entry.valid_range.is_some_and(|[least, greatest]| !(least..=greatest).contains(&value)) {
+        if quality == Quality::Good
+            && entry.valid_range.is_some_and(|[least, greatest]| !(least..=greatest).contains(&value))
+        {
             quality = Quality::OutOfRange;
         }
         let value = channels.resolved.in_si(value);
@@ -210,9 +219,14 @@ impl Channels {
         match &mut self.still {
             Some(still) if still.value == value => {
                 still.samples += 1;
-                if !still.frozen && value != 0.0 && still.samples >= FROZEN_SAMPLES && time_s - still.since_s >= FROZEN_S {
+                if !still.frozen
+                    && value != 0.0
+                    && still.samples >= FROZEN_SAMPLES
+                    && time_s - still.since_s >= FROZEN_S
+                {
                     let changed = |(i, (now, then)): (usize, (&Option<f64>, &Option<f64>))| {
-                        i != own && matches!((now, then), (Some(now), Some(then)) if (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs()))
+                        i != own
+                            && matches!((now, then), (Some(now), Some(then)) if (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs()))
                     };
                     still.frozen = speeds.iter().zip(&still.others).enumerate().any(changed);
                 }

@@ -186,6 +186,19 @@ struct Merged<'a> {
     next: Option<Sample>,
 }
 
+impl Merged<'_> {
+    /// Says once what the clock met.
+    fn say_resets(&mut self, notes: &mut Vec<String>) {
+        let Clock { resets, wrong_jumps, .. } = self.clock;
+        if resets > 0 {
+            notes.push(format!("the clock was reset {resets} times: the time goes on one second later"));
+        }
+        if wrong_jumps > 0 {
+            notes.push(format!("{wrong_jumps} time stamps are far too late: the time goes on before them"));
+        }
+    }
+}
+
 /// Time and stream, earliest first.
 #[derive(Debug, PartialEq)]
 struct Next(f64, usize);
@@ -230,8 +243,7 @@ struct Newest {
 
 impl<'a> Samples<'a> {
     pub(crate) fn new(channels: usize, streams: Vec<Box<dyn Stream + 'a>>) -> Result<Self, LogError> {
-        let merged =
-            |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None };
+        let merged = |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None };
         let mut samples = Self {
             streams: streams.into_iter().map(merged).collect(),
             heap: BinaryHeap::new(),
@@ -263,30 +275,22 @@ impl<'a> Samples<'a> {
         merged.batch.clear();
         merged.at = 0;
         while merged.batch.is_empty() {
-            match merged.stream.next_batch(&mut merged.batch) {
-                Ok(true) => {}
-                Ok(false) => {
-                    self.notes.append(&mut merged.stream.notes());
-                    let Clock { resets, wrong_jumps, .. } = merged.clock;
-                    if resets > 0 {
-                        self.notes.push(format!("the clock was reset {resets} times: the time goes on one second later"));
-                    }
-                    if wrong_jumps > 0 {
-                        self.notes.push(format!("{wrong_jumps} time stamps are far too late: the time goes on before them"));
-                    }
-                    return Ok(false);
-                }
-                Err(error @ LogError::Damaged { .. }) => {
-                    self.notes.append(&mut merged.stream.notes());
-                    self.notes.push(format!("{error}\nhint: the log is read up to this place"));
-                    self.damage.get_or_insert(error);
-                    // What was decoded before the damage is given first.
-                    merged.stream = Box::new(Ended);
-                    if merged.batch.is_empty() {
-                        return Ok(false);
-                    }
-                }
+            let damage = match merged.stream.next_batch(&mut merged.batch) {
+                Ok(true) => continue,
+                Ok(false) => None,
+                Err(error @ LogError::Damaged { .. }) => Some(error),
                 Err(error) => return Err(error),
+            };
+            self.notes.append(&mut merged.stream.notes());
+            if let Some(error) = damage {
+                self.notes.push(format!("{error}\nhint: the log is read up to this place"));
+                self.damage.get_or_insert(error);
+            }
+            // What came with the end or before the damage is given first.
+            merged.stream = Box::new(Ended);
+            if merged.batch.is_empty() {
+                merged.say_resets(&mut self.notes);
+                return Ok(false);
             }
         }
         Ok(true)
@@ -350,7 +354,7 @@ impl Iterator for Samples<'_> {
     }
 }
 
-/// What is left of a stream after damage.
+/// What is left of a stream after its end.
 struct Ended;
 
 impl Stream for Ended {

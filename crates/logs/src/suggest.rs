@@ -19,7 +19,8 @@ struct Words {
 
 const ENGINE: &[&str] = &["engine", "eng", "mot", "motor", "ice", "crank", "vkm"];
 const SPEED: &[&str] = &["speed", "spd", "n", "rpm", "drehzahl", "nd", "revs", "rad"];
-const TURBINE: &[&str] = &["turbine", "turb", "tur", "trb", "turbinen*", "input", "nt", "gearboxinput", "transinput", "getriebeeingang*"];
+const TURBINE: &[&str] =
+    &["turbine", "turb", "tur", "trb", "turbinen*", "input", "nt", "gearboxinput", "transinput", "getriebeeingang*"];
 const TORQUE: &[&str] = &["torque", "tq", "trq", "tqi", "moment", "drehmoment", "md", "m"];
 const OUTPUT: &[&str] = &["output", "abtrieb", "abtriebs*", "out", "nab", "getriebeausgang*"];
 const WHEEL: &[&str] = &["wheel", "whl", "rad", "raddrehzahl", "radgeschw*", "whlspd", "hr", "hl"];
@@ -31,31 +32,148 @@ const ACTUAL: &[&str] = &["actual", "ist", "cur", "current", "engaged", "act", "
 const SHIFT: &[&str] = &["shift", "schalt*", "shiftinprogress", "shifting"];
 
 const TABLE: &[Words] = &[
-    Words { role: Role::EngineSpeed, all: &[ENGINE, SPEED], none: &["target", "soll", "desired", "idle", "limit"], exact: &["n", "n_mot", "nmot", "nmot_w", "neng", "rpm", "enginespeed", "motordrehzahl"] },
-    Words { role: Role::TurbineSpeed, all: &[TURBINE, SPEED], none: &["target", "soll", "engine"], exact: &["nt", "n_t", "nturb", "nturbine", "turbinespeed", "turbinendrehzahl", "n_turbine"] },
-    Words { role: Role::OutputSpeed, all: &[OUTPUT, SPEED], none: &["target", "soll", "torque"], exact: &["nab", "n_ab", "nout", "n_out", "outputspeed", "abtriebsdrehzahl"] },
-    Words { role: Role::WheelSpeed, all: &[WHEEL, &["speed", "spd", "n", "drehzahl", "v", "rr", "rl", "hr", "hl", "raddrehzahl", "radgeschw*"]], none: &["fl", "fr", "vl", "vr", "steering", "front", "lenk*"], exact: &["wheelspeed", "whlspd", "raddrehzahl"] },
-    Words { role: Role::VehicleSpeed, all: &[&["vehicle", "veh", "car", "fahrzeug*", "vs", "vss"], &["speed", "spd", "v", "geschwindigkeit", "kmh", "vs", "vss"]], none: &["target", "soll", "cruise"], exact: &["vehiclespeed", "vfzg", "v_fzg", "vveh", "v_veh", "geschwindigkeit", "vs"] },
-    Words { role: Role::VehicleAcceleration, all: &[&["acc", "accel", "acceleration", "beschl", "beschleunigung", "ax", "a"], &["long", "longitudinal", "laengs", "x", "vehicle", "ax"]], none: &["pedal", "lat", "lateral"], exact: &["ax", "a_x", "along", "laengsbeschleunigung"] },
-    Words { role: Role::OncomingCurrent, all: &[CURRENT, CLUTCH], none: &["offgoing", "line", "tcc", "lockup", "battery"], exact: &[] },
+    Words {
+        role: Role::EngineSpeed,
+        all: &[ENGINE, SPEED],
+        none: &["target", "soll", "desired", "idle", "limit"],
+        exact: &["n", "n_mot", "nmot", "nmot_w", "neng", "rpm", "enginespeed", "motordrehzahl"],
+    },
+    Words {
+        role: Role::TurbineSpeed,
+        all: &[TURBINE, SPEED],
+        none: &["target", "soll", "engine"],
+        exact: &["nt", "n_t", "nturb", "nturbine", "turbinespeed", "turbinendrehzahl", "n_turbine"],
+    },
+    Words {
+        role: Role::OutputSpeed,
+        all: &[OUTPUT, SPEED],
+        none: &["target", "soll", "torque"],
+        exact: &["nab", "n_ab", "nout", "n_out", "outputspeed", "abtriebsdrehzahl"],
+    },
+    Words {
+        role: Role::WheelSpeed,
+        all: &[WHEEL, &["speed", "spd", "n", "drehzahl", "v", "rr", "rl", "hr", "hl", "raddrehzahl", "radgeschw*"]],
+        none: &["fl", "fr", "vl", "vr", "steering", "front", "lenk*"],
+        exact: &["wheelspeed", "whlspd", "raddrehzahl"],
+    },
+    Words {
+        role: Role::VehicleSpeed,
+        all: &[
+            &["vehicle", "veh", "car", "fahrzeug*", "vs", "vss"],
+            &["speed", "spd", "v", "geschwindigkeit", "kmh", "vs", "vss"],
+        ],
+        none: &["target", "soll", "cruise"],
+        exact: &["vehiclespeed", "vfzg", "v_fzg", "vveh", "v_veh", "geschwindigkeit", "vs"],
+    },
+    Words {
+        role: Role::VehicleAcceleration,
+        all: &[
+            &["acc", "accel", "acceleration", "beschl", "beschleunigung", "ax", "a"],
+            &["long", "longitudinal", "laengs", "x", "vehicle", "ax"],
+        ],
+        none: &["pedal", "lat", "lateral"],
+        exact: &["ax", "a_x", "along", "laengsbeschleunigung"],
+    },
+    Words {
+        role: Role::OncomingCurrent,
+        all: &[CURRENT, CLUTCH],
+        none: &["offgoing", "line", "tcc", "lockup", "battery"],
+        exact: &[],
+    },
     Words { role: Role::OffgoingCurrent, all: &[CURRENT, &["offgoing"]], none: &[], exact: &[] },
-    Words { role: Role::OncomingDuty, all: &[&["duty", "tastverhaeltnis", "pwm"], CLUTCH], none: &["offgoing", "line", "tcc", "lockup"], exact: &[] },
-    Words { role: Role::OffgoingDuty, all: &[&["duty", "tastverhaeltnis", "pwm"], &["offgoing"]], none: &[], exact: &[] },
-    Words { role: Role::OncomingPressureCommand, all: &[&["pressure", "druck", "p", "prs"], CLUTCH, TARGET], none: &["line", "oil", "fuel"], exact: &[] },
-    Words { role: Role::OncomingPressure, all: &[&["pressure", "druck", "p", "prs"], CLUTCH], none: &["line", "oil", "fuel", "soll", "target", "offgoing"], exact: &[] },
+    Words {
+        role: Role::OncomingDuty,
+        all: &[&["duty", "tastverhaeltnis", "pwm"], CLUTCH],
+        none: &["offgoing", "line", "tcc", "lockup"],
+        exact: &[],
+    },
+    Words {
+        role: Role::OffgoingDuty,
+        all: &[&["duty", "tastverhaeltnis", "pwm"], &["offgoing"]],
+        none: &[],
+        exact: &[],
+    },
+    Words {
+        role: Role::OncomingPressureCommand,
+        all: &[&["pressure", "druck", "p", "prs"], CLUTCH, TARGET],
+        none: &["line", "oil", "fuel"],
+        exact: &[],
+    },
+    Words {
+        role: Role::OncomingPressure,
+        all: &[&["pressure", "druck", "p", "prs"], CLUTCH],
+        none: &["line", "oil", "fuel", "soll", "target", "offgoing"],
+        exact: &[],
+    },
     Words { role: Role::OncomingTorque, all: &[TORQUE, CLUTCH], none: &["offgoing", "engine"], exact: &[] },
-    Words { role: Role::EngineTorque, all: &[TORQUE, ENGINE], none: &["friction", "reib*", "loss", "verlust", "max", "min", "ref", "reference", "target", "soll", "req", "indicated", "ind"], exact: &["tqi", "md_mot", "mmot", "enginetorque", "motormoment"] },
-    Words { role: Role::Throttle, all: &[&["throttle", "drossel*", "dk", "tps", "accelerator", "fahrpedal", "pedal", "wped"]], none: &["target", "soll", "brake", "kick"], exact: &["wped", "wdk", "tps"] },
-    Words { role: Role::TargetGear, all: &[GEAR, TARGET], none: &["ratio", "actual", "ist"], exact: &["targetgear", "zielgang", "sollgang"] },
-    Words { role: Role::Gear, all: &[GEAR, ACTUAL], none: &["target", "soll", "ziel", "ratio", "sel", "lever", "desired"], exact: &["gear", "gang", "currentgear", "istgang", "gangist"] },
-    Words { role: Role::ShiftActive, all: &[SHIFT, &["active", "aktiv", "progress", "flag", "state", "laeuft", "in"]], none: &["lever", "light"], exact: &["shiftinprogress", "schaltung_aktiv"] },
-    Words { role: Role::Selector, all: &[&["selector", "lever", "prnd", "waehlhebel", "sel"]], none: &["speed"], exact: &[] },
-    Words { role: Role::OilTemperature, all: &[&["temp", "temperature", "temperatur", "t"], &["oil", "oel", "trans", "getriebe", "atf", "tcu", "at"]], none: &["engine", "mot", "water", "coolant"], exact: &["atf_temp", "toel"] },
+    Words {
+        role: Role::EngineTorque,
+        all: &[TORQUE, ENGINE],
+        none: &[
+            "friction",
+            "reib*",
+            "loss",
+            "verlust",
+            "max",
+            "min",
+            "ref",
+            "reference",
+            "target",
+            "soll",
+            "req",
+            "indicated",
+            "ind",
+        ],
+        exact: &["tqi", "md_mot", "mmot", "enginetorque", "motormoment"],
+    },
+    Words {
+        role: Role::Throttle,
+        all: &[&["throttle", "drossel*", "dk", "tps", "accelerator", "fahrpedal", "pedal", "wped"]],
+        none: &["target", "soll", "brake", "kick"],
+        exact: &["wped", "wdk", "tps"],
+    },
+    Words {
+        role: Role::TargetGear,
+        all: &[GEAR, TARGET],
+        none: &["ratio", "actual", "ist"],
+        exact: &["targetgear", "zielgang", "sollgang"],
+    },
+    Words {
+        role: Role::Gear,
+        all: &[GEAR, ACTUAL],
+        none: &["target", "soll", "ziel", "ratio", "sel", "lever", "desired"],
+        exact: &["gear", "gang", "currentgear", "istgang", "gangist"],
+    },
+    Words {
+        role: Role::ShiftActive,
+        all: &[SHIFT, &["active", "aktiv", "progress", "flag", "state", "laeuft", "in"]],
+        none: &["lever", "light"],
+        exact: &["shiftinprogress", "schaltung_aktiv"],
+    },
+    Words {
+        role: Role::Selector,
+        all: &[&["selector", "lever", "prnd", "waehlhebel", "sel"]],
+        none: &["speed"],
+        exact: &[],
+    },
+    Words {
+        role: Role::OilTemperature,
+        all: &[&["temp", "temperature", "temperatur", "t"], &["oil", "oel", "trans", "getriebe", "atf", "tcu", "at"]],
+        none: &["engine", "mot", "water", "coolant"],
+        exact: &["atf_temp", "toel"],
+    },
 ];
 
 /// The words of a name: divided at signs, before capitals and at the ends of numbers, in small letters.
 fn words(name: &str) -> Vec<String> {
-    let plain = name.replace('ä', "ae").replace('ö', "oe").replace('ü', "ue").replace('Ä', "Ae").replace('Ö', "Oe").replace('Ü', "Ue").replace('ß', "ss");
+    let plain = name
+        .replace('ä', "ae")
+        .replace('ö', "oe")
+        .replace('ü', "ue")
+        .replace('Ä', "Ae")
+        .replace('Ö', "Oe")
+        .replace('Ü', "Ue")
+        .replace('ß', "ss");
     let mut words = vec![String::new()];
     let mut before = ' ';
     for c in plain.chars() {
@@ -94,7 +212,11 @@ fn fit(entry: &Words, channel: &Channel) -> Option<u32> {
         (None, None) => 2,
         (None, Some(unit)) if unit.quantity == Quantity::Share => 2,
         (Some(wanted), Some(unit)) if wanted == unit.quantity => 4,
-        (Some(Quantity::Rotation), Some(unit)) if entry.role == Role::WheelSpeed && unit.quantity == Quantity::Velocity => 3,
+        (Some(Quantity::Rotation), Some(unit))
+            if entry.role == Role::WheelSpeed && unit.quantity == Quantity::Velocity =>
+        {
+            3
+        }
         // A torque or a state in % of something has a scale that no name tells.
         (Some(_), None) => 1,
         _ => return None,
@@ -111,8 +233,12 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     let mut missing = Vec::new();
     let mut taken = vec![false; channels.len()];
     for entry in TABLE {
-        let mut found: Vec<(u32, usize)> =
-            channels.iter().enumerate().filter(|(i, _)| !taken[*i]).filter_map(|(i, channel)| fit(entry, channel).map(|fit| (fit, i))).collect();
+        let mut found: Vec<(u32, usize)> = channels
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !taken[*i])
+            .filter_map(|(i, channel)| fit(entry, channel).map(|fit| (fit, i)))
+            .collect();
         found.sort_by_key(|(fit, i)| (std::cmp::Reverse(*fit), *i));
         let Some(&(_, best)) = found.first() else {
             missing.push(entry.role.name());
@@ -169,10 +295,37 @@ mod tests {
     #[test]
     fn usual_names_in_two_languages_are_found() {
         let logs: [&[(&str, &str, &str)]; 4] = [
-            &[("N_Eng", "rpm", "engine_speed"), ("N_Turb", "rpm", "turbine_speed"), ("N_Out", "rpm", "output_speed"), ("GearCurrent", "", "gear")],
-            &[("Motordrehzahl", "1/min", "engine_speed"), ("Turbinendrehzahl", "1/min", "turbine_speed"), ("Abtriebsdrehzahl", "1/min", "output_speed"), ("Zielgang", "", "target_gear"), ("Ventilstrom_Kupplung_B", "mA", "oncoming_current")],
-            &[("EngineSpeed", "rpm", "engine_speed"), ("TurbineSpeed", "rpm", "turbine_speed"), ("VehicleSpeed", "km/h", "vehicle_speed"), ("TargetGear", "", "target_gear"), ("CurrentGear", "", "gear"), ("EngineTorque", "Nm", "engine_torque"), ("OilTemperature", "degC", "oil_temperature")],
-            &[("engine_speed_rad_s", "rad/s", "engine_speed"), ("turbine_speed_rad_s", "rad/s", "turbine_speed"), ("output_speed_rad_s", "rad/s", "output_speed"), ("wheel_speed_rad_s", "rad/s", "wheel_speed"), ("oncoming_current_a", "A", "oncoming_current"), ("offgoing_current_a", "A", "offgoing_current"), ("throttle", "", "throttle")],
+            &[
+                ("N_Eng", "rpm", "engine_speed"),
+                ("N_Turb", "rpm", "turbine_speed"),
+                ("N_Out", "rpm", "output_speed"),
+                ("GearCurrent", "", "gear"),
+            ],
+            &[
+                ("Motordrehzahl", "1/min", "engine_speed"),
+                ("Turbinendrehzahl", "1/min", "turbine_speed"),
+                ("Abtriebsdrehzahl", "1/min", "output_speed"),
+                ("Zielgang", "", "target_gear"),
+                ("Ventilstrom_Kupplung_B", "mA", "oncoming_current"),
+            ],
+            &[
+                ("EngineSpeed", "rpm", "engine_speed"),
+                ("TurbineSpeed", "rpm", "turbine_speed"),
+                ("VehicleSpeed", "km/h", "vehicle_speed"),
+                ("TargetGear", "", "target_gear"),
+                ("CurrentGear", "", "gear"),
+                ("EngineTorque", "Nm", "engine_torque"),
+                ("OilTemperature", "degC", "oil_temperature"),
+            ],
+            &[
+                ("engine_speed_rad_s", "rad/s", "engine_speed"),
+                ("turbine_speed_rad_s", "rad/s", "turbine_speed"),
+                ("output_speed_rad_s", "rad/s", "output_speed"),
+                ("wheel_speed_rad_s", "rad/s", "wheel_speed"),
+                ("oncoming_current_a", "A", "oncoming_current"),
+                ("offgoing_current_a", "A", "offgoing_current"),
+                ("throttle", "", "throttle"),
+            ],
         ];
         for log in logs {
             let found = suggested(&log.iter().map(|(name, unit, _)| channel(name, unit)).collect::<Vec<_>>());

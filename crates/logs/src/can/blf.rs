@@ -81,7 +81,10 @@ impl Blf {
         };
         let start = blf.bytes(8)?;
         let length = u32_at(&start, 4);
-        if start.len() < 8 || !(48..=4096).contains(&length) || blf.bytes(length as usize - 8)?.len() + 8 < length as usize {
+        if start.len() < 8
+            || !(48..=4096).contains(&length)
+            || blf.bytes(length as usize - 8)?.len() + 8 < length as usize
+        {
             return Err(LogError::damaged(path, "byte 4", "the head of the file is cut or has a wrong length"));
         }
         Ok(blf)
@@ -109,7 +112,9 @@ impl Blf {
         let object = Object::parse(&bytes).map_err(|message| self.damaged(offset, message))?;
         let body = self.bytes(object.size - BASE)?;
         if body.len() < object.size - BASE {
-            return Err(self.damaged(offset, format!("the object is cut: {} of {} bytes", body.len() + BASE, object.size)));
+            return Err(
+                self.damaged(offset, format!("the object is cut: {} of {} bytes", body.len() + BASE, object.size))
+            );
         }
         bytes.extend(body);
         // Objects begin at multiples of four bytes, counted as their writers do.
@@ -134,7 +139,10 @@ impl Blf {
                     return Err(self.damaged(offset, format!("a container unpacks to {got} of {declared} bytes")));
                 }
             }
-            other => return Err(self.damaged(offset, format!("a container is packed by method {other}, known are 0 and 2 (deflate)"))),
+            other => {
+                return Err(self
+                    .damaged(offset, format!("a container is packed by method {other}, known are 0 and 2 (deflate)")));
+            }
         }
         Ok(true)
     }
@@ -163,7 +171,8 @@ impl Blf {
         let bytes = self.inner.get(start..start + object.size)?;
         let body = bytes.get(object.header..)?;
         // Head of version 1 or 2: flags, then the time in units of 10 us or 1 ns.
-        let (unit_s, stamp) = (if u32_at(bytes, BASE) == 1 { 1e-5 } else { 1e-9 }, u64::from_le_bytes(bytes_at(bytes, 24)));
+        let (unit_s, stamp) =
+            (if u32_at(bytes, BASE) == 1 { 1e-5 } else { 1e-9 }, u64::from_le_bytes(bytes_at(bytes, 24)));
         #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
         let time_s = stamp as f64 * unit_s;
         let (id, payload, remote) = match object.kind {

@@ -59,7 +59,7 @@ impl Bits {
             if self.big_endian {
                 raw = raw << 1 | bit;
                 // To the next lower bit; from the lowest of a byte to the highest of the next byte.
-                at = if at % 8 == 0 { at + 15 } else { at - 1 };
+                at = if at.is_multiple_of(8) { at + 15 } else { at - 1 };
             } else {
                 raw |= bit << i;
                 at += 1;
@@ -86,7 +86,8 @@ impl Database {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, LogError> {
-        let dbc = Dbc::try_from(text).map_err(|error| LogError::file(path, format!("this is no DBC that can be read: {error}")))?;
+        let dbc = Dbc::try_from(text)
+            .map_err(|error| LogError::file(path, format!("this is no DBC that can be read: {error}")))?;
         let mut database = Self { messages: HashMap::new(), channels: Vec::new() };
         for message in &dbc.messages {
             let key = match message.id {
@@ -100,17 +101,26 @@ impl Database {
                 if size == 0 || size > 64 || start >= 8 * super::PAYLOAD {
                     return Err(LogError::file(
                         path,
-                        format!("signal `{}` of message `{}` has {size} bits from bit {start}, expected 1 to 64 within 64 bytes", signal.name, message.name),
+                        format!(
+                            "signal `{}` of message `{}` has {size} bits from bit {start}, expected 1 to 64 within 64 bytes",
+                            signal.name, message.name
+                        ),
                     ));
                 }
-                let float = dbc.signal_extended_value_type_list.iter().find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
+                let float = dbc
+                    .signal_extended_value_type_list
+                    .iter()
+                    .find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
                 let number = match (float.map(|entry| entry.signal_extended_value_type), signal.value_type, size) {
                     (Some(SignalExtendedValueType::IEEEfloat32Bit), _, 32) => Number::Float,
                     (Some(SignalExtendedValueType::IEEEdouble64bit), _, 64) => Number::Double,
                     (Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit), ..) => {
                         return Err(LogError::file(
                             path,
-                            format!("signal `{}` of message `{}` is a float of {size} bits, expected 32 or 64", signal.name, message.name),
+                            format!(
+                                "signal `{}` of message `{}` is a float of {size} bits, expected 32 or 64",
+                                signal.name, message.name
+                            ),
                         ));
                     }
                     (_, ValueType::Signed, _) => Number::Signed,
@@ -124,7 +134,11 @@ impl Database {
                     offset: signal.offset,
                     multiplexed: multiplexed(&dbc, message, signal),
                 });
-                database.channels.push(Channel { name: signal.name.clone(), unit: signal.unit.clone(), group: message.name.clone() });
+                database.channels.push(Channel {
+                    name: signal.name.clone(),
+                    unit: signal.unit.clone(),
+                    group: message.name.clone(),
+                });
             }
             database.messages.insert(key, signals);
         }
@@ -156,7 +170,12 @@ impl Database {
 impl Signal {
     fn value(&self, raw: u64) -> (f64, Quality) {
         let size = self.bits.size;
-        #[expect(clippy::cast_precision_loss, clippy::cast_possible_wrap, clippy::cast_possible_truncation, reason = "bit patterns; a double keeps 53 bits")]
+        #[expect(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_wrap,
+            clippy::cast_possible_truncation,
+            reason = "bit patterns; a double keeps 53 bits"
+        )]
         let number = match self.number {
             Number::Unsigned => raw as f64,
             Number::Signed => ((raw << (64 - size)) as i64 >> (64 - size)) as f64,
@@ -180,7 +199,10 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
     let Some(multiplexed) = &signal.multiplexed else { return true };
     let Some(by) = signals.get(multiplexed.by) else { return false };
     depth < DEEPEST
-        && by.bits.of(data).is_some_and(|raw| multiplexed.values.iter().any(|(least, most)| (*least..=*most).contains(&raw)))
+        && by
+            .bits
+            .of(data)
+            .is_some_and(|raw| multiplexed.values.iter().any(|(least, most)| (*least..=*most).contains(&raw)))
         && in_force(signals, by, data, depth + 1)
 }
 
@@ -188,14 +210,18 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
 fn multiplexed(dbc: &Dbc, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Option<Multiplexed> {
     let value = match signal.multiplexer_indicator {
         MultiplexIndicator::Plain | MultiplexIndicator::Multiplexor => return None,
-        MultiplexIndicator::MultiplexedSignal(value) | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value) => value,
+        MultiplexIndicator::MultiplexedSignal(value) | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value) => {
+            value
+        }
     };
     let place = |name: &str| message.signals.iter().position(|signal| signal.name == name);
-    let extended = dbc.extended_multiplex.iter().find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
+    let extended =
+        dbc.extended_multiplex.iter().find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
     if let Some(extended) = extended {
         let values = extended.mappings.iter().map(|mapping| (mapping.min_value, mapping.max_value)).collect();
         return Some(Multiplexed { by: place(&extended.multiplexor_signal_name).unwrap_or(usize::MAX), values });
     }
-    let main = message.signals.iter().position(|signal| signal.multiplexer_indicator == MultiplexIndicator::Multiplexor);
+    let main =
+        message.signals.iter().position(|signal| signal.multiplexer_indicator == MultiplexIndicator::Multiplexor);
     Some(Multiplexed { by: main.unwrap_or(usize::MAX), values: vec![(value, value)] })
 }

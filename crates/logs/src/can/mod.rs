@@ -76,7 +76,10 @@ impl CanLog {
         let Some(input) = self.input.take() else {
             return Err(LogError::file(&self.path, "the log was read already"));
         };
-        Ok(Box::new(Signals { frames: frames(&self.path, self.kind, input)?, decoder: Decoder::new(&self.database, wanted) }))
+        Ok(Box::new(Signals {
+            frames: frames(&self.path, self.kind, input)?,
+            decoder: Decoder::new(&self.database, wanted),
+        }))
     }
 }
 
@@ -146,7 +149,10 @@ impl<'a> Decoder<'a> {
         }
         let mut most: Vec<_> = self.unknown.iter().collect();
         most.sort_by_key(|(id, count)| (std::cmp::Reverse(**count), **id));
-        let ids = most.iter().take(SHOWN).map(|((extended, id), _)| if *extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") });
+        let ids = most
+            .iter()
+            .take(SHOWN)
+            .map(|((extended, id), _)| if *extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") });
         vec![format!(
             "{} of {} frames, of {} identifiers, are not in the DBC: {}{}",
             self.unknown_frames,

@@ -55,7 +55,8 @@ impl Lines {
     /// Reads a line; false at the end.
     fn read(&mut self) -> Result<bool, LogError> {
         self.line.clear();
-        let read = (&mut self.input).take(LONGEST_LINE).read_until(b'\n', &mut self.line).map_err(LogError::io(&self.path))?;
+        let read =
+            (&mut self.input).take(LONGEST_LINE).read_until(b'\n', &mut self.line).map_err(LogError::io(&self.path))?;
         // What goes on beyond is another line, which is no frame.
         self.number += 1;
         Ok(read > 0)
@@ -112,7 +113,8 @@ impl Lines {
             return Line::Remark;
         }
         let mut words = text.split_whitespace();
-        let Some(stamp) = words.next().and_then(|word| word.parse::<f64>().ok()).filter(|stamp| stamp.is_finite()) else {
+        let Some(stamp) = words.next().and_then(|word| word.parse::<f64>().ok()).filter(|stamp| stamp.is_finite())
+        else {
             // Dates, comments, `Begin Triggerblock`.
             return Line::Remark;
         };
@@ -194,7 +196,10 @@ impl Frames for Lines {
         match &self.first_unread {
             Some(first) if self.unread > self.frames => Err(LogError::file(
                 &self.path,
-                format!("{} lines are no frames and {} are, the first that is none is {first}", self.unread, self.frames),
+                format!(
+                    "{} lines are no frames and {} are, the first that is none is {first}",
+                    self.unread, self.frames
+                ),
             )),
             _ if self.frames == 0 => Err(LogError::file(&self.path, "there are no data frames")),
             _ => Ok(None),
@@ -202,7 +207,8 @@ impl Frames for Lines {
     }
 
     fn notes(&self) -> Vec<String> {
-        let note = |first: &String| format!("{} lines are no frames and are left out, the first is {first}", self.unread);
+        let note =
+            |first: &String| format!("{} lines are no frames and are left out, the first is {first}", self.unread);
         self.first_unread.iter().map(note).collect()
     }
 }

@@ -181,7 +181,9 @@ impl ShiftFinder {
             Role::EngineSpeed if self.by_engine => self.ratio.turbine(time_s, value),
             Role::OutputSpeed => self.ratio.output(time_s, value),
             Role::VehicleSpeed => {
-                if let (Some(rad_per_m), true) = (self.output_rad_per_m, self.tracks[Role::OutputSpeed as usize].is_empty()) {
+                if let (Some(rad_per_m), true) =
+                    (self.output_rad_per_m, self.tracks[Role::OutputSpeed as usize].is_empty())
+                {
                     self.ratio.output(time_s, value * rad_per_m);
                 }
             }
@@ -210,7 +212,9 @@ impl ShiftFinder {
         for by_signal in self.by_signal {
             let same = |shift: &&mut Shift| {
                 let near = |gear_s: f64| (shift.start_s() - SAME_S..=shift.end_s() + SAME_S).contains(&gear_s);
-                shift.gear_s.is_none() && (shift.from, shift.to) == (by_signal.from, by_signal.to) && by_signal.gear_s.is_some_and(near)
+                shift.gear_s.is_none()
+                    && (shift.from, shift.to) == (by_signal.from, by_signal.to)
+                    && by_signal.gear_s.is_some_and(near)
             };
             match shifts.iter_mut().find(same) {
                 Some(shift) => {
@@ -227,7 +231,8 @@ impl ShiftFinder {
     /// A forward gear; none for neutral, reverse and what stands for no gear.
     fn gear_number(&self, value: f64) -> Option<u32> {
         const MOST: f64 = 12.0;
-        let most = if self.ratios.is_empty() { MOST } else { f64::from(u32::try_from(self.ratios.len()).unwrap_or(u32::MAX)) };
+        let most =
+            if self.ratios.is_empty() { MOST } else { f64::from(u32::try_from(self.ratios.len()).unwrap_or(u32::MAX)) };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 1 to the number of gears")]
         (value.fract() == 0.0 && (1.0..=most).contains(&value)).then_some(value as u32)
     }

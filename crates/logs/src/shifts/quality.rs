@@ -43,7 +43,11 @@ pub(super) fn quality(
     output_rad_per_m: Option<f64>,
 ) -> ShiftQuality {
     let response_s = shift.command_s.zip(shift.inertia_s).map(|(command_s, inertia_s)| inertia_s[0] - command_s);
-    ShiftQuality { response_s, flare_rad_s: flare(shift, ratios, points), jerk_m_s3: jerk(shift, tracks, output_rad_per_m) }
+    ShiftQuality {
+        response_s,
+        flare_rad_s: flare(shift, ratios, points),
+        jerk_m_s3: jerk(shift, tracks, output_rad_per_m),
+    }
 }
 
 fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {
@@ -65,19 +69,23 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Optio
     const AROUND_S: f64 = 0.3;
     let track = |role: Role| Some(&tracks[role as usize]).filter(|track| !track.is_empty());
     // What the derivatives are taken of, in m/s or m/s^2: its factor and which coefficient of the parabola is the jerk.
-    let (track, factor, of_speed) = match (track(Role::VehicleAcceleration), track(Role::VehicleSpeed), track(Role::OutputSpeed)) {
-        (Some(acceleration), ..) => (acceleration, 1.0, false),
-        (_, Some(speed), _) => (speed, 1.0, true),
-        (.., Some(output)) => (output, 1.0 / output_rad_per_m?, true),
-        _ => return None,
-    };
+    let (track, factor, of_speed) =
+        match (track(Role::VehicleAcceleration), track(Role::VehicleSpeed), track(Role::OutputSpeed)) {
+            (Some(acceleration), ..) => (acceleration, 1.0, false),
+            (_, Some(speed), _) => (speed, 1.0, true),
+            (.., Some(output)) => (output, 1.0 / output_rad_per_m?, true),
+            _ => return None,
+        };
     let (from_s, to_s) = (shift.start_s() - AROUND_S, shift.end_s() + AROUND_S);
     let centres: Vec<f64> = track.between(from_s, to_s).map(|(time_s, _)| time_s).collect();
     let mut most: Option<f64> = None;
     for centre_s in centres {
         // A hole in the middle would leave the parabola free.
         track.at(centre_s, APART_S)?;
-        let points: Vec<(f64, f64)> = track.between(centre_s - HALF_S, centre_s + HALF_S).map(|(time_s, value)| (time_s - centre_s, value)).collect();
+        let points: Vec<(f64, f64)> = track
+            .between(centre_s - HALF_S, centre_s + HALF_S)
+            .map(|(time_s, value)| (time_s - centre_s, value))
+            .collect();
         let spread = points.first().zip(points.last()).map_or(0.0, |(first, last)| last.0 - first.0);
         if points.len() < 7 || spread < 1.5 * HALF_S {
             continue;
@@ -105,7 +113,7 @@ fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     // The matrix is symmetric and positive definite: no pivots are needed.
     for i in 0..3 {
         let pivot = sums[i];
-        if !(pivot[i].abs() > 1e-9) {
+        if pivot[i].abs() <= 1e-9 || pivot[i].is_nan() {
             return None;
         }
         for row in sums.iter_mut().skip(i + 1) {
@@ -127,7 +135,8 @@ mod tests {
 
     #[test]
     fn a_parabola_through_its_own_points_is_found() {
-        let points: Vec<(f64, f64)> = (0_i32..11).map(|i| f64::from(i - 4) * 0.02).map(|t| (t, 3.0 - 2.0 * t + 7.0 * t * t)).collect();
+        let points: Vec<(f64, f64)> =
+            (0_i32..11).map(|i| f64::from(i - 4) * 0.02).map(|t| (t, 3.0 - 2.0 * t + 7.0 * t * t)).collect();
         let found = parabola(&points).unwrap();
         for (found, expected) in found.into_iter().zip([3.0, -2.0, 7.0]) {
             assert!((found - expected).abs() < 1e-9, "{found} {expected}");

@@ -117,7 +117,9 @@ impl RatioWatch {
             self.outputs.clear();
             return;
         }
-        while let Some(&(time_s, output_rad_s)) = self.outputs.front().filter(|(time_s, _)| *time_s <= self.turbine.newest_s()) {
+        while let Some(&(time_s, output_rad_s)) =
+            self.outputs.front().filter(|(time_s, _)| *time_s <= self.turbine.newest_s())
+        {
             self.outputs.pop_front();
             let turbine_rad_s = self.turbine.at(time_s, HOLE_S).filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
             if let Some(turbine_rad_s) = turbine_rad_s.filter(|_| output_rad_s > OUTPUT_MIN_RAD_S) {
@@ -197,8 +199,15 @@ impl RatioWatch {
             if x1 == x0 { t1 } else { t0 + ((level - x0) / (x1 - x0)).clamp(0.0, 1.0) * (t1 - t0) }
         };
         let up = |level: f64| move |pair: &&[(f64, f64)]| pair[0].1 <= level && pair[1].1 > level;
-        let first = points[..=half.min(points.len().saturating_sub(1))].windows(2).rev().find(up(0.05)).map(|pair| crossing(pair, 0.05));
-        let last = points[half.saturating_sub(1).min(points.len())..].windows(2).find(up(0.95)).map(|pair| crossing(pair, 0.95));
+        let first = points[..=half.min(points.len().saturating_sub(1))]
+            .windows(2)
+            .rev()
+            .find(up(0.05))
+            .map(|pair| crossing(pair, 0.05));
+        let last = points[half.saturating_sub(1).min(points.len())..]
+            .windows(2)
+            .find(up(0.95))
+            .map(|pair| crossing(pair, 0.95));
         [first.unwrap_or(before.last_s), last.unwrap_or(now.first_s)]
     }
 }

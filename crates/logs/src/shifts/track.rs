@@ -37,7 +37,8 @@ impl Track {
 
     /// The mean from one time to another.
     pub(super) fn mean(&self, from_s: f64, to_s: f64) -> Option<f64> {
-        let (count, sum) = self.between(from_s, to_s).fold((0_u32, 0.0), |(count, sum), (_, value)| (count + 1, sum + value));
+        let (count, sum) =
+            self.between(from_s, to_s).fold((0_u32, 0.0), |(count, sum), (_, value)| (count + 1, sum + value));
         (count > 0).then(|| sum / f64::from(count))
     }
 
@@ -50,7 +51,7 @@ impl Track {
         }
         let &(before_s, before_value) = self.values.get(after.checked_sub(1)?)?;
         let share = (time_s - before_s) / (after_s - before_s);
-        (after_s - before_s <= apart_s).then(|| before_value + share * (after_value - before_value))
+        (after_s - before_s <= apart_s).then_some(before_value + share * (after_value - before_value))
     }
 
     /// The newest time.
