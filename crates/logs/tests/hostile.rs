@@ -1,8 +1,6 @@
 //! Broken files of every format: cut, with flipped bytes, with absurd lengths. Each gives an error or a readable part with a
 //! note; none a panic, a hang or a large allocation.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 mod common;
 
 use std::time::{Duration, Instant};
