@@ -25,7 +25,7 @@ pub mod suggest;
 
 pub use error::LogError;
 pub use inspect::{ChannelSummary, Inspection, inspect};
-pub use log::{Channel, Log, OpenOptions, TimeColumn};
+pub use log::{Channel, Log, OpenOptions, TimeColumn, needs_map};
 pub use map::{ChannelMap, Combine, Gearbox, Mapped};
 pub use readings::{Reading, Readings, RoleSummary};
 pub use role::Role;

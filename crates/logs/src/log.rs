@@ -210,6 +210,19 @@ impl Log {
     }
 }
 
+/// Whether a regular file is of a format that needs a channel map, by its first bytes.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn needs_map(path: &Path) -> Result<bool, LogError> {
+    let io = LogError::io(path);
+    if !path.metadata().map_err(&io)?.is_file() {
+        return Ok(false);
+    }
+    let head = head(&mut File::open(path).map_err(&io)?).map_err(&io)?;
+    Ok(!matches!(Format::of(&head), Format::Csv | Format::Utf16))
+}
+
 /// The first bytes of a file, or of a pipe as far as it has come: at least its first lines.
 fn head(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
     const LINES: usize = 50;

@@ -3,8 +3,9 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use parquet::basic::{LogicalType, TimeUnit, Type as Physical};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::basic::{Encoding, LogicalType, TimeUnit, Type as Physical};
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -132,6 +133,43 @@ fn stamp_unit(leaf: &ColumnDescPtr) -> Option<&'static str> {
     }
 }
 
+/// The pages of a column. The decoder takes on trust that a dictionary stands before the pages that need it.
+struct CheckedPages {
+    pages: Box<dyn PageReader>,
+    dictionary: bool,
+}
+
+impl PageReader for CheckedPages {
+    fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
+        let page = self.pages.get_next_page()?;
+        if let Some(page) = &page {
+            let by_dictionary = matches!(page.encoding(), Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY);
+            if matches!(page, Page::DictionaryPage { .. }) {
+                self.dictionary = true;
+            } else if by_dictionary && !self.dictionary {
+                return Err(ParquetError::General("a page needs a dictionary, and there is none".to_owned()));
+            }
+        }
+        Ok(page)
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>, ParquetError> {
+        self.pages.peek_next_page()
+    }
+
+    fn skip_next_page(&mut self) -> Result<(), ParquetError> {
+        self.pages.skip_next_page()
+    }
+}
+
+impl Iterator for CheckedPages {
+    type Item = Result<Page, ParquetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
 /// The open columns of a row group.
 struct OpenGroup {
     time: ColumnReader,
@@ -153,9 +191,12 @@ impl Groups<'_> {
     fn open(&self) -> Result<OpenGroup, ParquetError> {
         let group = self.log.reader.get_row_group(self.group)?;
         let rows_left = u64::try_from(group.metadata().num_rows()).unwrap_or(0);
-        let columns =
-            self.columns.iter().map(|(_, column)| group.get_column_reader(*column)).collect::<Result<_, _>>()?;
-        Ok(OpenGroup { time: group.get_column_reader(self.log.time.0)?, columns, rows_left })
+        let reader = |column: usize| {
+            let pages = CheckedPages { pages: group.get_column_page_reader(column)?, dictionary: false };
+            Ok::<_, ParquetError>(get_column_reader(group.metadata().schema_descr().column(column), Box::new(pages)))
+        };
+        let columns = self.columns.iter().map(|(_, column)| reader(*column)).collect::<Result<_, _>>()?;
+        Ok(OpenGroup { time: reader(self.log.time.0)?, columns, rows_left })
     }
 
     fn decode(&mut self, open: &mut OpenGroup, batch: &mut Vec<Sample>) -> Result<(), ParquetError> {

@@ -15,8 +15,6 @@ pub struct Step {
     pub time_s: f64,
     /// The newest reading of each channel since the step before.
     pub input: Input<f64>,
-    /// Measured pressure of the oncoming clutch, Pa, where it came with the step.
-    pub pressure_pa: Option<f64>,
 }
 
 /// The steps of a log.
@@ -36,12 +34,11 @@ struct Open {
     output: Option<Reading>,
     wheel: Option<Reading>,
     command: Option<Reading>,
-    pressure: Option<Reading>,
 }
 
 impl Open {
     fn new(time_s: f64) -> Self {
-        Self { time_s, engine: None, turbine: None, output: None, wheel: None, command: None, pressure: None }
+        Self { time_s, engine: None, turbine: None, output: None, wheel: None, command: None }
     }
 
     /// Where a reading belongs; none if no observer reads it.
@@ -52,7 +49,6 @@ impl Open {
             Role::OutputSpeed => Some(&mut self.output),
             Role::WheelSpeed => Some(&mut self.wheel),
             Role::OncomingCurrent | Role::OncomingDuty => Some(&mut self.command),
-            Role::OncomingPressure => Some(&mut self.pressure),
             _ => None,
         }
     }
@@ -71,7 +67,6 @@ impl Open {
                 wheel_rad_s: measured(self.wheel),
                 command: measured(self.command),
             },
-            pressure_pa: self.pressure.map(|reading| reading.value),
         }
     }
 }

@@ -62,9 +62,10 @@ fn attempt(folder: &Folder, name: &str, bytes: &[u8]) -> (usize, String) {
 #[test]
 fn broken_files_give_errors_or_what_can_be_read() {
     let folder = Folder::new("hostile");
-    // More of them where there is time: `WETCLUTCH_FLIPS=20000 cargo test -p logs --test hostile`.
+    // More of them where there is time: `WETCLUTCH_FLIPS=20000 WETCLUTCH_ONLY=parquet cargo test -p logs --test hostile`.
     let flips = std::env::var("WETCLUTCH_FLIPS").ok().and_then(|flips| flips.parse().ok()).unwrap_or(100);
-    for name in FILES {
+    let only = std::env::var("WETCLUTCH_ONLY").unwrap_or_default();
+    for name in FILES.into_iter().filter(|name| name.contains(&only)) {
         let whole = std::fs::read(data(name)).unwrap();
         let (all, _) = attempt(&folder, name, &whole);
         for end in (0..whole.len()).step_by(64) {

@@ -7,6 +7,7 @@ mod design;
 mod error_bound;
 mod estimate;
 mod inspect;
+mod measured;
 mod reproduce;
 mod sensitivity;
 mod simulate;
