@@ -212,8 +212,8 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     if raw.scale == 0.0 {
         return Err(format!("{} is 0", key("scale")));
     }
-    if !(-10.0..=10.0).contains(&raw.delay_s) {
-        return Err(format!("{} is {}, expected -10 to 10", key("delay_s"), raw.delay_s));
+    if !(0.0..=10.0).contains(&raw.delay_s) {
+        return Err(format!("{} is {}, expected 0 to 10", key("delay_s"), raw.delay_s));
     }
     if let Some([least, greatest]) = raw.valid_range
         && (least >= greatest || least.is_nan() || greatest.is_nan())

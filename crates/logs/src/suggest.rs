@@ -217,8 +217,9 @@ fn fit(entry: &Words, channel: &Channel) -> Option<u32> {
         {
             3
         }
-        // A torque or a state in % of something has a scale that no name tells.
         (Some(_), None) => 1,
+        // Per cent of a torque that the name does not tell.
+        (Some(Quantity::Torque), Some(unit)) if unit.quantity == Quantity::Share => 0,
         _ => return None,
     };
     Some(unit_fits + if exact { 3 } else { 0 } + if words.len() <= 3 { 1 } else { 0 })
@@ -252,6 +253,13 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
         }
         let known = Unit::parse(&channel.unit);
         match known {
+            Some(Unit { quantity: Quantity::Share, .. }) if entry.role.quantity() == Some(Quantity::Torque) => {
+                let _ = writeln!(
+                    text,
+                    "unit = \"N m\"\nscale = 1.0 # the log has {}: check, N m for each",
+                    error::shown(&channel.unit)
+                );
+            }
             Some(_) if !channel.unit.trim().is_empty() => {
                 let _ = writeln!(text, "# unit of the log: {}", error::shown(&channel.unit));
             }

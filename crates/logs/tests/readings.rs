@@ -161,7 +161,7 @@ fn a_wrong_map_is_refused_with_its_key() {
         ("[channel.gear]\n", "`channel.gear.name` or `channel.gear.names` must say the channel"),
         ("[channel.gear]\nnames = [\"a\", \"b\"]\n", "`channel.gear.combine` is missing"),
         ("[channel.gear]\nname = \"a\"\nscale = 0\n", "`channel.gear.scale` is 0"),
-        ("[channel.gear]\nname = \"a\"\ndelay_s = 100\n", "`channel.gear.delay_s` is 100, expected -10 to 10"),
+        ("[channel.gear]\nname = \"a\"\ndelay_s = 100\n", "`channel.gear.delay_s` is 100, expected 0 to 10"),
         ("[channel.gear]\nname = \"a\"\nvalid_range = [1, nan]\n", "`channel.gear.valid_range` is [1, NaN]"),
         ("[gearbox]\nratios = [1.0, 2.0]\n", "`gearbox.ratios`: 1 is followed by 2, expected falling ratios"),
         ("[gearbox]\nwheel_radius_m = -1\n", "`gearbox.wheel_radius_m` is -1"),
