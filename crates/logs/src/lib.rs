@@ -5,7 +5,7 @@
 //! [`Readings`] applies it, with stated rules for what cannot be a reading (see [`Quality`]). [`Steps`] makes the inputs of an
 //! observer from readings; [`ShiftFinder`] finds the shifts of a drive.
 //!
-//! **Architecture invariant:** this is the only crate with the dependencies for measurement formats.
+//! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
 pub mod can;
 pub mod csv_log;

@@ -48,13 +48,11 @@ impl MdfLog {
         let (mut places, mut channels, mut notes) = (Vec::new(), Vec::new(), Vec::new());
         let mut unreadable = 0;
         for (data_group, group, data) in groups(&file) {
+            let name = group_name(&file, data, data_group);
             if data.master_channel().is_none_or(|master| !master.is_time_channel()) {
                 let count = data.channels.iter().filter(|channel| !channel.is_master()).count();
                 if count > 0 {
-                    notes.push(format!(
-                        "{count} channels of group `{}` have no time and are left out",
-                        group_name(data, data_group)
-                    ));
+                    notes.push(format!("{count} channels of group `{name}` have no time and are left out"));
                 }
                 continue;
             }
@@ -67,11 +65,7 @@ impl MdfLog {
                     continue;
                 }
                 places.push(Place { data_group, group, channel: i });
-                channels.push(Channel {
-                    name: channel.name.clone(),
-                    unit: channel.unit.clone(),
-                    group: group_name(data, data_group),
-                });
+                channels.push(Channel { name: channel.name.clone(), unit: channel.unit.clone(), group: name.clone() });
             }
         }
         if unreadable > 0 {
@@ -100,7 +94,7 @@ impl MdfLog {
             let Some(master) = data.master_channel().filter(|_| !chosen.is_empty()) else { continue };
             let channels: Vec<&MdfChannel> =
                 std::iter::once(master).chain(chosen.iter().map(|&i| &data.channels[self.places[i].channel])).collect();
-            let name = group_name(data, data_group);
+            let name = group_name(&self.file, data, data_group);
             let place = format!("group `{name}`");
             let chunks =
                 self.file.signals_chunks(&channels, BATCH).map_err(|error| damaged(&self.path, &place, &error))?;
@@ -137,10 +131,13 @@ fn groups(file: &Mf4File) -> impl Iterator<Item = (usize, usize, &falcon_mdf::Ch
         .flat_map(|(i, data)| data.channel_groups.iter().enumerate().map(move |(j, group)| (i, j, group)))
 }
 
-/// A group by the name that its recorder gave it, or its number.
-fn group_name(group: &falcon_mdf::ChannelGroup, data_group: usize) -> String {
+/// A group by the name that its recorder gave it, or its number; by both where several have the name.
+fn group_name(file: &Mf4File, group: &falcon_mdf::ChannelGroup, data_group: usize) -> String {
+    let number = data_group + 1;
+    let same = groups(file).filter(|(.., other)| other.acquisition_name == group.acquisition_name).count();
     match group.acquisition_name.trim() {
-        "" => format!("{}", data_group + 1),
+        "" => format!("{number}"),
+        name if same > 1 => format!("{name} #{number}"),
         name => name.to_owned(),
     }
 }

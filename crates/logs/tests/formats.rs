@@ -14,8 +14,9 @@ const ROWS: u32 = 40;
 fn check(found: &[(f64, f64, Quality)], expected: impl ExactSizeIterator<Item = (f64, f64, Quality)>, name: &str) {
     assert_eq!(found.len(), expected.len(), "{name}");
     for ((time_s, value, quality), (expected_s, expected, expected_quality)) in found.iter().zip(expected) {
-        // BLF keeps whole nanoseconds, and its writer cuts off what is below.
-        assert!((time_s - expected_s).abs() < 2e-9, "{name}: {time_s} {expected_s}");
+        // BLF keeps whole nanoseconds, and its writer cuts off what is below; a double keeps 53 bits.
+        let tolerance_s = 2e-9 + 2.0 * f64::EPSILON * expected_s.abs();
+        assert!((time_s - expected_s).abs() < tolerance_s, "{name}: {time_s} {expected_s}");
         assert_eq!(*quality, expected_quality, "{name} at {time_s}");
         let same = (value - expected).abs() <= 1e-9 * expected.abs().max(1.0);
         assert!(same || *quality != Quality::Good, "{name}: {value} {expected}");
@@ -80,9 +81,10 @@ fn mdf_invalidation_bits_mark_samples() {
     check(&channel(&log, &samples, "N_Turb"), slow(|i| 700.0 + 3.0 * i), "N_Turb");
 }
 
-/// Times of a bus log count from its first frame, or not, as its format has it.
-fn bus(file: &str, first_s: f64) {
+/// Times of a bus log count from its first frame, or from another time, as its format has it.
+fn bus(file: &str, first_s: Option<f64>) {
     let (log, samples, notes) = read(&data(file), &with_dbc()).unwrap();
+    let first_s = first_s.unwrap_or(samples[0].time_s);
     let rows = |shift_s: f64, value: fn(f64) -> f64| {
         (0..ROWS).map(move |i| good(first_s + f64::from(i) * 0.01 + shift_s, value(f64::from(i))))
     };
@@ -90,7 +92,7 @@ fn bus(file: &str, first_s: f64) {
         let mut found = channel(&log, &samples, name);
         // The frame that ends before the signal.
         let (time_s, _, quality) = found.pop().unwrap();
-        assert!((time_s - first_s - 1.01).abs() < 1e-9 && quality == Quality::Missing, "{file}: {name}");
+        assert!((time_s - first_s - 1.01).abs() < 1e-6 && quality == Quality::Missing, "{file}: {name}");
         found
     };
     let mut engine = channel(&log, &samples, "N_Eng");
@@ -107,15 +109,17 @@ fn bus(file: &str, first_s: f64) {
         |from: u32, value: f64| (0..ROWS / 2).map(move |i| good(first_s + f64::from(2 * i + from) * 0.01, value));
     check(&channel(&log, &samples, "T_Oil"), each_second(0, 60.0), "T_Oil");
     check(&channel(&log, &samples, "T_Air"), each_second(1, 21.5), "T_Air");
-    assert_eq!(notes, ["1 of 82 frames, of 1 identifiers, are not in the DBC: 0x7DF"], "{file}");
+    assert_eq!(notes.last().unwrap(), "1 of 82 frames, of 1 identifiers, are not in the DBC: 0x7DF", "{file}");
     assert_eq!(log.channels()[log.find("T_Oil", None).unwrap()].group, "Engine");
 }
 
 #[test]
-fn can_logs_of_three_formats_give_the_same_signals() {
-    bus("bus.log", 1000.0);
-    bus("bus.asc", 0.0);
-    bus("bus.blf", 0.0);
+fn can_logs_of_four_formats_give_the_same_signals() {
+    bus("bus.log", Some(1000.0));
+    bus("bus.asc", Some(0.0));
+    bus("bus.blf", Some(0.0));
+    // Its times count from when it was written.
+    bus("bus.mf4", None);
 }
 
 #[test]

@@ -36,6 +36,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     remarks(&inspection.notes);
     if !map.channels.is_empty() {
         map.resolve(&log)?;
+        output::note("the channel map fits the log");
     }
     Ok(())
 }

@@ -44,6 +44,13 @@ impl<'a> Measured<'a> {
             CommandKind::Current => Role::OncomingCurrent,
             CommandKind::DutyCycle => Role::OncomingDuty,
         };
+        if !map.has(command) {
+            return Err(Failure::Input(format!(
+                "the channel map has no {0}, the command of this vehicle's valve: without it no pressure can be estimated\n\
+                 hint: add `[channel.{0}]` or --channel {0}=NAME if the log has it",
+                command.name()
+            )));
+        }
         let needed = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, command];
         if let Some(missing) = needed.into_iter().find(|role| !map.has(*role)) {
             return Err(Failure::Input(format!(

@@ -182,7 +182,8 @@ def frames():
 def bus():
     # cantools writes the DBC from what it read, in its own layout.
     (HERE / "bus.dbc").write_text(cantools.database.load_string(DBC, "dbc").as_dbc_string().replace("\r\n", "\n"))
-    for name, writer in (("bus.blf", can.BLFWriter), ("bus.asc", can.ASCWriter), ("bus.log", can.CanutilsLogWriter)):
+    writers = (("bus.blf", can.BLFWriter), ("bus.asc", can.ASCWriter), ("bus.log", can.CanutilsLogWriter), ("bus.mf4", can.MF4Writer))
+    for name, writer in writers:
         with writer(str(HERE / name)) as log:
             for message in frames():
                 log.on_message_received(message)
