@@ -30,6 +30,6 @@ pub use map::{ChannelMap, Combine, Gearbox, Mapped};
 pub use readings::{Reading, Readings, RoleSummary};
 pub use role::Role;
 pub use samples::{Quality, QualityCounts, Sample, Samples};
-pub use shifts::{Direction, Load, Shift, ShiftFinder, ShiftQuality};
+pub use shifts::{Direction, Load, Shift, ShiftFinder, ShiftPhase, ShiftQuality};
 pub use steps::{Step, Steps};
 pub use suggest::suggest;

@@ -7,7 +7,7 @@ mod common;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use logs::{ChannelMap, Direction, Gearbox, Load, Log, Reading, Readings, Role, Shift, ShiftFinder};
+use logs::{ChannelMap, Direction, Gearbox, Load, Log, Reading, Readings, Role, Shift, ShiftFinder, ShiftPhase};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -162,7 +162,10 @@ fn signals_and_speeds_together_give_each_shift_once() {
     let shifts = drive.found(&[Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear]);
     assert_eq!(gears(&shifts), [(1, 2), (2, 3), (3, 2)]);
     for shift in &shifts {
-        let response_s = shift.quality.response_s.unwrap();
+        let (phase, [from_s, to_s]) = shift.phases()[0];
+        // A power-on downshift begins with its inertia phase.
+        assert_eq!(phase, if shift.direction == Direction::Up { ShiftPhase::FillAndTorque } else { ShiftPhase::Fill });
+        let response_s = to_s - from_s;
         assert!((response_s - FILL_S - 0.05 * INERTIA_S).abs() < 0.03, "{response_s}");
         assert!(shift.gear_s.is_some());
     }

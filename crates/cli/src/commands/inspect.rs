@@ -160,17 +160,16 @@ fn shifts(log: &mut Log, map: &logs::ChannelMap) -> Result<(), Failure> {
         let titles = [
             "shift",
             "kind",
+            "phases, s each",
             "command s",
             "gear signal s",
             "inertia phase s",
-            "its length s",
-            "response s",
             "flare rpm",
             "jerk m/s^3",
         ];
         let mut rows = vec![titles.map(str::to_owned).to_vec()];
         rows.extend(found.iter().map(|shift| row(shift, origin_s)));
-        output::table(2, &rows)?;
+        output::table(3, &rows)?;
     }
     if !map.has(Role::OncomingCurrent) && !map.has(Role::OncomingDuty) && !map.has(Role::OncomingPressureCommand) {
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
@@ -191,16 +190,17 @@ fn row(shift: &Shift, origin_s: f64) -> Vec<String> {
     let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{:.2}", time_s - origin_s));
     let number =
         |number: Option<f64>, digits: usize| number.map_or(String::new(), |number| format!("{number:.digits$}"));
+    let phases: Vec<String> =
+        shift.phases().iter().map(|(phase, [from_s, to_s])| format!("{} {:.2}", phase.name(), to_s - from_s)).collect();
     vec![
         format!("{}-{}", shift.from, shift.to),
         format!("{load}{direction}"),
+        phases.join(", "),
         time(shift.command_s),
         time(shift.gear_s),
         shift
             .inertia_s
             .map_or(String::new(), |[from_s, to_s]| format!("{:.2} to {:.2}", from_s - origin_s, to_s - origin_s)),
-        number(shift.inertia_s.map(|[from_s, to_s]| to_s - from_s), 2),
-        number(shift.quality.response_s, 2),
         number(shift.quality.flare_rad_s.map(rpm), 0),
         number(shift.quality.jerk_m_s3, 1),
     ]

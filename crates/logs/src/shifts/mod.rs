@@ -39,8 +39,6 @@ pub enum Load {
 /// Quality of a shift, as far as the channels tell it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ShiftQuality {
-    /// From the command to the inertia phase, s.
-    pub response_s: Option<f64>,
     /// Turbine speed above that of the old gear before an upshift's inertia phase, or above that of the new gear after a
     /// downshift's, rad/s; not below zero.
     pub flare_rad_s: Option<f64>,
@@ -81,13 +79,57 @@ impl Shift {
         self.inertia_s.map(|inertia_s| inertia_s[1]).or(self.gear_s).unwrap_or(f64::NAN)
     }
 
-    /// What comes before the inertia phase: the torque phase comes first in power-on upshifts and power-off downshifts, and
-    /// after the inertia phase otherwise.
-    pub fn before_inertia(&self) -> &'static str {
-        match (self.load, self.direction) {
-            (Load::PowerOn, Direction::Up) | (Load::PowerOff, Direction::Down) => "fill and torque phase",
-            (Load::Unknown, _) => "before the inertia phase",
-            _ => "fill",
+    /// The phases, as far as the times are known, each from one time to another, s.
+    ///
+    /// In power-on upshifts and power-off downshifts the torque phase comes before the inertia phase, otherwise after it. The filling of
+    /// the oncoming clutch cannot be told from a torque phase that follows it, nor the torque phase at the end from what the
+    /// control unit does until it reports the gear.
+    pub fn phases(&self) -> Vec<(ShiftPhase, [f64; 2])> {
+        let Some([begin_s, end_s]) = self.inertia_s else { return Vec::new() };
+        let (before, after) = match (self.load, self.direction) {
+            (Load::PowerOn, Direction::Up) | (Load::PowerOff, Direction::Down) => {
+                (ShiftPhase::FillAndTorque, ShiftPhase::LockUp)
+            }
+            (Load::Unknown, _) => (ShiftPhase::Before, ShiftPhase::After),
+            _ => (ShiftPhase::Fill, ShiftPhase::TorqueAndLockUp),
+        };
+        let before =
+            self.command_s.filter(|command_s| *command_s < begin_s).map(|command_s| (before, [command_s, begin_s]));
+        let after = self.gear_s.filter(|gear_s| *gear_s > end_s).map(|gear_s| (after, [end_s, gear_s]));
+        before.into_iter().chain([(ShiftPhase::Inertia, [begin_s, end_s])]).chain(after).collect()
+    }
+}
+
+/// A phase of a shift as a log tells it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShiftPhase {
+    /// From the command on: the oncoming clutch fills, then takes the load.
+    FillAndTorque,
+    /// From the command on: the oncoming clutch fills.
+    Fill,
+    /// From the command on, where the load is not known.
+    Before,
+    /// The ratio changes.
+    Inertia,
+    /// Until the gear is reported: the oncoming clutch is closed.
+    LockUp,
+    /// Until the gear is reported: the oncoming clutch takes the load and is closed.
+    TorqueAndLockUp,
+    /// Until the gear is reported, where the load is not known.
+    After,
+}
+
+impl ShiftPhase {
+    /// A word for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FillAndTorque => "fill and torque",
+            Self::Fill => "fill",
+            Self::Before => "before",
+            Self::Inertia => "inertia",
+            Self::LockUp => "lock-up",
+            Self::TorqueAndLockUp => "torque and lock-up",
+            Self::After => "after",
         }
     }
 }

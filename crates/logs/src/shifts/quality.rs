@@ -42,12 +42,7 @@ pub(super) fn quality(
     points: &RatioWatch,
     output_rad_per_m: Option<f64>,
 ) -> ShiftQuality {
-    let response_s = shift.command_s.zip(shift.inertia_s).map(|(command_s, inertia_s)| inertia_s[0] - command_s);
-    ShiftQuality {
-        response_s,
-        flare_rad_s: flare(shift, ratios, points),
-        jerk_m_s3: jerk(shift, tracks, output_rad_per_m),
-    }
+    ShiftQuality { flare_rad_s: flare(shift, ratios, points), jerk_m_s3: jerk(shift, tracks, output_rad_per_m) }
 }
 
 fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {
