@@ -17,7 +17,9 @@ fn map(entries: &[&str]) -> ChannelMap {
 }
 
 /// The readings of a table, what came of its samples, and the notes.
-fn readings(text: &str, map: &ChannelMap) -> Result<(Vec<Reading>, Vec<RoleSummary>, Vec<String>), LogError> {
+type Read = (Vec<Reading>, Vec<RoleSummary>, Vec<String>);
+
+fn readings(text: &str, map: &ChannelMap) -> Result<Read, LogError> {
     let folder = Folder::new(&format!("readings-{:?}", std::thread::current().id()));
     let mut log = Log::open(&folder.write("log.csv", text), &map.open)?;
     let mut readings = Readings::new(&mut log, map)?;

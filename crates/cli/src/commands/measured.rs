@@ -14,7 +14,7 @@ use crate::output;
 
 /// Rows of signals with the names of the program, or channels with clocks of their own.
 pub(super) enum Measured<'a> {
-    Rows(study::log::Log),
+    Rows(Box<study::log::Log>),
     Channels(Box<Channels<'a>>),
 }
 
@@ -35,7 +35,7 @@ impl<'a> Measured<'a> {
                 path.display()
             )));
         }
-        Ok(Self::Rows(study::log::Log::open(path, vehicle)?))
+        Ok(Self::Rows(Box::new(study::log::Log::open(path, vehicle)?)))
     }
 
     /// Channels of a log by a map.
