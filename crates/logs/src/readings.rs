@@ -4,8 +4,10 @@
 //!
 //! - a value outside `valid_range` of the map is not used;
 //! - several channels of one signal count where all of them have the same time stamp;
-//! - a speed that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples, while another
-//!   speed changes by [`FROZEN_CHANGE`], is frozen: from then on it is not used until it changes.
+//! - a speed is frozen that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples
+//!   and three times as many samples as ever before, while a speed that it cannot part from changes by [`FROZEN_CHANGE`]: it is
+//!   not used until it changes. Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from
+//!   the turbine.
 
 use crate::map::Resolved;
 use crate::plausibility::Extremes;
@@ -14,9 +16,11 @@ use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
 
 /// A speed is frozen when it stood still for so long, s.
 pub const FROZEN_S: f64 = 0.5;
+/// When it has not changed since the log began, s: how coarse it is, is not known then.
+pub const FROZEN_FROM_START_S: f64 = 5.0;
 /// And for so many samples.
 pub const FROZEN_SAMPLES: u32 = 10;
-/// While another speed changed by this share of its value.
+/// While a speed that it cannot part from changed by this share of its value.
 pub const FROZEN_CHANGE: f64 = 0.1;
 
 /// A value of a signal.
@@ -54,6 +58,8 @@ struct Channels {
     counts: QualityCounts,
     extremes: Extremes,
     still: Option<Still>,
+    /// Samples of the longest time so far in which the speed stood still and was not frozen: coarse signals do so often.
+    longest_still: u32,
 }
 
 /// A speed that stands still.
@@ -103,6 +109,7 @@ impl<'a> Readings<'a> {
             counts: QualityCounts::default(),
             extremes: Extremes::default(),
             still: None,
+            longest_still: 0,
         });
         let roles = roles.collect();
         Ok(Self {
@@ -136,10 +143,21 @@ impl<'a> Readings<'a> {
         self.samples.resets()
     }
 
-    /// Checks units against what the values can be, and that most samples of each role can be used.
+    /// Checks units against what the values so far can be.
     ///
     /// # Errors
-    /// A unit is wrong by all appearances, or most samples are unusable.
+    /// A unit is wrong by all appearances.
+    pub fn check_units(&self) -> Result<(), LogError> {
+        match plausibility::findings(&self.summary()).into_iter().next() {
+            Some(finding) => Err(LogError::map(finding)),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks, after the last reading, that most samples of each role could be used, and the units.
+    ///
+    /// # Errors
+    /// Most samples are unusable, or a unit is wrong by all appearances.
     pub fn check(&self) -> Result<(), LogError> {
         let summary = self.summary();
         for role in &summary {
@@ -153,10 +171,7 @@ impl<'a> Readings<'a> {
                 )));
             }
         }
-        match plausibility::findings(&summary).into_iter().next() {
-            Some(finding) => Err(LogError::map(finding)),
-            None => Ok(()),
-        }
+        self.check_units()
     }
 
     /// Gives the sample to a role; a reading if it is one.
@@ -215,28 +230,31 @@ impl<'a> Readings<'a> {
 
 impl Channels {
     fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &[Option<f64>; SPEEDS]) -> bool {
-        let own = self.resolved.entry.role as usize;
-        match &mut self.still {
-            Some(still) if still.value == value => {
-                still.samples += 1;
-                if !still.frozen
-                    && value != 0.0
-                    && still.samples >= FROZEN_SAMPLES
-                    && time_s - still.since_s >= FROZEN_S
-                {
-                    let changed = |(i, (now, then)): (usize, (&Option<f64>, &Option<f64>))| {
-                        i != own
-                            && matches!((now, then), (Some(now), Some(then)) if (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs()))
-                    };
-                    still.frozen = speeds.iter().zip(&still.others).enumerate().any(changed);
-                }
-                still.frozen
+        let partners: &[Role] = match self.resolved.entry.role {
+            Role::EngineSpeed => &[Role::TurbineSpeed],
+            Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed, Role::VehicleSpeed],
+            Role::OutputSpeed => &[Role::WheelSpeed, Role::VehicleSpeed],
+            Role::WheelSpeed => &[Role::OutputSpeed, Role::VehicleSpeed],
+            _ => &[Role::OutputSpeed, Role::WheelSpeed],
+        };
+        let Some(still) = self.still.as_mut().filter(|still| still.value == value) else {
+            if let Some(before) = self.still.filter(|before| !before.frozen) {
+                self.longest_still = self.longest_still.max(before.samples);
             }
-            _ => {
-                self.still = Some(Still { value, since_s: time_s, samples: 1, others: *speeds, frozen: false });
-                false
-            }
+            self.still = Some(Still { value, since_s: time_s, samples: 1, others: *speeds, frozen: false });
+            return false;
+        };
+        still.samples += 1;
+        let limit_s = if self.longest_still == 0 { FROZEN_FROM_START_S } else { FROZEN_S };
+        let long = still.samples >= FROZEN_SAMPLES.max(3 * self.longest_still) && time_s - still.since_s >= limit_s;
+        if !still.frozen && value != 0.0 && long {
+            still.frozen =
+                partners.iter().any(|partner| match (speeds[*partner as usize], still.others[*partner as usize]) {
+                    (Some(now), Some(then)) => (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs()),
+                    _ => false,
+                });
         }
+        still.frozen
     }
 }
 

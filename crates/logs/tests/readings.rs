@@ -75,16 +75,18 @@ fn a_stamp_that_is_far_too_late_does_not_move_the_clock() {
 
 #[test]
 fn a_speed_that_stands_still_while_another_moves_is_frozen() {
-    let mut text = "time_s,e_rpm,t_rpm,o_rpm\n".to_owned();
+    let mut text = "time_s,e_rpm,t_rpm,o_rpm,w_rpm\n".to_owned();
     for i in 0..300 {
-        // The turbine stands still from 1 to 2 s; at rest the output stands still too, which is right.
+        // The turbine stands still from 1 to 2 s. So does the wheel, in a coarse unit, for as long as it always does; and the engine
+        // may hold its speed for 0.4 s.
         let turbine = if (100..200).contains(&i) { 1500.0 } else { 1000.0 + 5.0 * f64::from(i) };
-        writeln!(text, "{},{},{turbine},0", f64::from(i) * 0.01, 1000 + 8 * i).unwrap();
+        let engine = if (20..60).contains(&i) { 1160 } else { 1000 + 8 * i };
+        writeln!(text, "{},{engine},{turbine},{},{}", f64::from(i) * 0.01, 400 + 3 * i, 100 + 80 * (i / 70)).unwrap();
     }
-    let map = map(&["engine_speed=e_rpm", "turbine_speed=t_rpm", "output_speed=o_rpm"]);
+    let map = map(&["engine_speed=e_rpm", "turbine_speed=t_rpm", "output_speed=o_rpm", "wheel_speed=w_rpm"]);
     let (read, summary, _) = readings(&text, &map).unwrap();
     let frozen = |role: Role| summary.iter().find(|entry| entry.role == role).unwrap().counts.of(Quality::Frozen);
-    assert_eq!((frozen(Role::EngineSpeed), frozen(Role::OutputSpeed)), (0, 0));
+    assert_eq!([Role::EngineSpeed, Role::OutputSpeed, Role::WheelSpeed].map(frozen), [0; 3]);
     // Half a second is waited for, and the value before is the same.
     assert_eq!(frozen(Role::TurbineSpeed), 50);
     let after = read.iter().filter(|reading| reading.role == Role::TurbineSpeed && reading.stamp_s > 1.995).count();

@@ -67,7 +67,7 @@ impl<'a> Measured<'a> {
         let mut steps = Steps::new(Readings::new(log, &map)?);
         let looked_at = steps.by_ref().take(FIRST_LOOK).collect::<Result<VecDeque<_>, LogError>>()?;
         // Wrong units are an error before the first estimate.
-        steps.readings().check()?;
+        steps.readings().check_units()?;
         let median_step_s = trace::median_step_s(looked_at.iter().skip(1).map(|step| step.input.dt_s).collect());
         let has_wheel_speed = map.has(Role::WheelSpeed);
         Ok(Self::Channels(Box::new(Channels { steps, looked_at, median_step_s, has_wheel_speed })))
