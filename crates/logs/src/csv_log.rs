@@ -173,8 +173,12 @@ impl Stream for Rows<'_> {
             };
             for i in 0..self.columns.len() {
                 let (channel, column) = self.columns[i];
+                // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
                 let (value, quality) = match self.number(column) {
+                    Ok(None) => continue,
+                    Ok(Some(value)) if value.is_nan() => continue,
                     Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
+                    Ok(Some(value)) => (value, Quality::Missing),
                     Err(()) => {
                         self.no_numbers += 1;
                         if self.first_text.is_none() {
@@ -185,7 +189,6 @@ impl Stream for Rows<'_> {
                         }
                         (f64::NAN, Quality::Missing)
                     }
-                    _ => (f64::NAN, Quality::Missing),
                 };
                 batch.push(Sample { channel, time_s, value, quality });
             }

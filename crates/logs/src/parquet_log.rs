@@ -249,6 +249,10 @@ impl Groups<'_> {
             }
             for (column, (channel, _)) in columns.iter().zip(&self.columns) {
                 let value = column[row];
+                // An absent value, or NaN, is a reading that did not come.
+                if value.is_nan() {
+                    continue;
+                }
                 let quality = if value.is_finite() { Quality::Good } else { Quality::Missing };
                 batch.push(Sample { channel: *channel, time_s: time * self.log.time.1, value, quality });
             }

@@ -162,6 +162,12 @@ impl<'a> Readings<'a> {
         let summary = self.summary();
         for role in &summary {
             let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+            if total == 0 {
+                let name = role.role.name();
+                return Err(LogError::map(format!(
+                    "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
+                )));
+            }
             if 2 * good < total {
                 return Err(LogError::map(format!(
                     "{} of {total} samples of {} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",

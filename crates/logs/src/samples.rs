@@ -13,7 +13,7 @@ use crate::LogError;
 pub enum Quality {
     /// It can be used.
     Good,
-    /// The cell is empty, not a number, or the frame is too short for the signal.
+    /// It is not a finite number, or the frame is too short for the signal. (An empty cell of a table, or NaN in it, is no sample.)
     Missing,
     /// Its invalidation bit is set.
     Invalid,

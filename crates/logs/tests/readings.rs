@@ -144,9 +144,14 @@ fn what_does_not_fit_says_what_to_do() {
             "engine_speed=n",
             "engine_speed cannot be in rad/s: most values would be about",
         ),
+        (
+            "time_s,n [rpm],m [rpm]\n0,,1\n1,,2\n",
+            "engine_speed=n",
+            "the channel of engine_speed has no samples\nhint: ",
+        ),
         ("time_s,i [A]\n0,350\n1,700\n", "oncoming_current=i", "it looks like mA\nhint: "),
         (
-            "time_s,n [rpm]\n0,800\n1,\n2,\n3,x\n",
+            "time_s,n [rpm]\n0,800\n1,a\n2,b\n3,x\n",
             "engine_speed=n",
             "3 of 4 samples of engine_speed cannot be used: 3 missing\nhint: ",
         ),
@@ -211,6 +216,30 @@ fn channels_at_several_rates_are_neither_thinned_nor_repeated() {
         assert!((time_s - 0.005 - f64::from(i) * 0.025).abs() < 1e-9);
     }
     assert!(steps.windows(2).all(|pair| pair[0].time_s < pair[1].time_s));
+}
+
+#[test]
+fn a_table_with_empty_cells_gives_the_steps_of_channels_with_clocks_of_their_own() {
+    // The fast and the slow group of the MDF file by the formulas of `make.py`, in one table.
+    let fast = (0..40_u32).map(|i| (f64::from(i) * 0.01, format!("{},", 800 + 10 * i)));
+    let slow = (0..20_u32).map(|i| (0.005 + f64::from(i) * 0.025, format!(",{}", 700 + 3 * i)));
+    let mut rows: Vec<(f64, String)> = fast.chain(slow).collect();
+    rows.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut text = "time_s,N_Eng [1/min],N_Turb [1/min]\n".to_owned();
+    for (time_s, cells) in rows {
+        writeln!(text, "{time_s},{cells}").unwrap();
+    }
+    let folder = Folder::new("clocks");
+    let map = map(&["engine_speed=N_Eng", "turbine_speed=N_Turb"]);
+    let steps = |path: &std::path::Path| {
+        let mut log = Log::open(path, &OpenOptions::default()).unwrap();
+        let readings = Readings::new(&mut log, &map).unwrap();
+        let mut steps = Steps::new(readings);
+        let all = steps.by_ref().collect::<Result<Vec<_>, _>>().unwrap();
+        steps.readings().check().unwrap();
+        all
+    };
+    assert_eq!(steps(&folder.write("log.csv", text)), steps(&data("plain_410.mf4")));
 }
 
 #[test]
