@@ -228,3 +228,20 @@ fn what_is_no_log_is_refused_with_what_to_do() {
     assert!(matches!(Log::open(&folder.0.join("none"), &OpenOptions::default()), Err(logs::LogError::Io { .. })));
     assert!(matches!(Log::open(&folder.0, &OpenOptions::default()), Err(logs::LogError::Io { .. })));
 }
+
+#[test]
+fn a_cut_container_gives_the_frames_before_the_cut() {
+    let folder = Folder::new("cut");
+    let whole = std::fs::read(data("bus.blf")).unwrap();
+    let path = folder.write("cut.blf", &whole[..whole.len() / 2]);
+    let (log, samples, notes) = read(&path, &with_dbc()).unwrap();
+    let engine = channel(&log, &samples, "N_Eng");
+    assert!((5..40).contains(&engine.len()), "{}", engine.len());
+    check(
+        &engine,
+        (0..u32::try_from(engine.len()).unwrap()).map(|i| good(f64::from(i) * 0.01, 800.0 + 10.0 * f64::from(i))),
+        "N_Eng",
+    );
+    assert!(notes.last().unwrap().contains("byte 144: the object is cut"), "{notes:?}");
+    assert!(notes.last().unwrap().ends_with("hint: the log is read up to this place"), "{notes:?}");
+}

@@ -32,6 +32,7 @@ pub(crate) struct Blf {
     inner: Vec<u8>,
     at: usize,
     frames: u64,
+    damage: Option<LogError>,
     ended: bool,
 }
 
@@ -77,6 +78,7 @@ impl Blf {
             inner: Vec::new(),
             at: 0,
             frames: 0,
+            damage: None,
             ended: false,
         };
         let start = blf.bytes(8)?;
@@ -111,12 +113,12 @@ impl Blf {
         }
         let object = Object::parse(&bytes).map_err(|message| self.damaged(offset, message))?;
         let body = self.bytes(object.size - BASE)?;
-        if body.len() < object.size - BASE {
-            return Err(
-                self.damaged(offset, format!("the object is cut: {} of {} bytes", body.len() + BASE, object.size))
-            );
-        }
         bytes.extend(body);
+        let cut = bytes.len() < object.size;
+        if cut {
+            self.damage =
+                Some(self.damaged(offset, format!("the object is cut: {} of {} bytes", bytes.len(), object.size)));
+        }
         // Objects begin at multiples of four bytes, counted as their writers do.
         self.bytes(object.size % 4)?;
         self.inner.drain(..self.at);
@@ -135,8 +137,9 @@ impl Blf {
                 let before = self.inner.len();
                 let unpacked = ZlibDecoder::new(packed).take(limit).read_to_end(&mut self.inner);
                 let got = self.inner.len() - before;
-                if unpacked.is_err() || got as u64 != u64::from(declared) {
-                    return Err(self.damaged(offset, format!("a container unpacks to {got} of {declared} bytes")));
+                if !cut && (unpacked.is_err() || got as u64 != u64::from(declared)) {
+                    self.damage =
+                        Some(self.damaged(offset, format!("a container unpacks to {got} of {declared} bytes")));
                 }
             }
             other => {
@@ -202,6 +205,11 @@ impl Frames for Blf {
                     self.frames += 1;
                     return Ok(Some(frame));
                 }
+            }
+            // What was unpacked before the damage is given first.
+            if let Some(damage) = self.damage.take() {
+                self.ended = true;
+                return Err(damage);
             }
             if self.ended || !self.read_outer()? {
                 if !self.ended && self.inner.len() - self.at >= BASE {
