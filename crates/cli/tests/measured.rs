@@ -63,7 +63,12 @@ fn inspect_lists_the_channels_of_every_format() {
         let text = stdout(&wetclutch(&arguments));
         let row = text.lines().find(|line| line.starts_with("N_Eng ")).unwrap_or_else(|| panic!("{name}: {text}"));
         let cells: Vec<&str> = row.split_whitespace().collect();
-        let samples = if dbc.is_some() { "41" } else { "40" };
+        // A bus has one more frame, and in the Parquet file six values are absent.
+        let samples = match name {
+            "snappy.parquet" => "34",
+            _ if dbc.is_some() => "41",
+            _ => "40",
+        };
         assert!(cells.contains(&samples) && cells.contains(&"100"), "{name}: {row}");
     }
     let unnamed = wetclutch(&["inspect", &format!("{DATA}/bus.blf")]);
@@ -112,7 +117,7 @@ fn what_an_estimate_lacks_is_said_before_anything_is_written() {
         (
             &mdf,
             vec!["--channel".to_owned(), "engine_speed=N_Eng".to_owned()],
-            "the channel map has no turbine_speed\nhint: an estimate needs",
+            "the channel map has no oncoming_current, the command of this vehicle's valve: without it no pressure",
         ),
         (&table, with(&["engine_speed=e [rad/s]"]), "engine_speed cannot be in rad/s"),
         (&table, with(&["oncoming_current=x [A]"]), "there is no channel `x`"),
