@@ -17,6 +17,7 @@ Examples:
   wetclutch study experiments/settings.toml -o out   two thousand shifts: errors and sensitivities
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
+  wetclutch inspect drive.mf4                        channels, units, rates and gaps of a log
   wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
 
 All files use SI units, which are part of keys and column names. Column names of measured files may also
@@ -70,6 +71,17 @@ pub(crate) enum Command {
     ///   wetclutch design vehicles/two_speed_at.toml --bounds bounds.toml
     #[command(verbatim_doc_comment)]
     Design(Design),
+    /// List what is in a log, suggest a channel map, find the shifts
+    ///
+    /// Reads a log of any format: CSV (any delimiter, decimal comma, units in names or in a row), Parquet, ASAM MDF 4,
+    /// CAN logs (candump, ASC, BLF) with a DBC. `-` is standard input. Lists channels, units, groups, samples, rates, spans,
+    /// values, gaps, and samples that cannot be used.
+    ///
+    ///   wetclutch inspect drive.mf4
+    ///   wetclutch inspect drive.blf --dbc bus.dbc --suggest > map.toml
+    ///   wetclutch inspect drive.blf --map map.toml --shifts
+    #[command(verbatim_doc_comment)]
+    Inspect(Inspect),
     /// Estimate pressure and torque from a file of measured signals
     ///
     /// Runs an observer over a file of measured signals. The file needs the columns
@@ -81,6 +93,9 @@ pub(crate) enum Command {
     ///
     /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell or `nan` is a reading that did
     /// not come. If the file also contains the true pressure (a simulated drive), the error is reported.
+    ///
+    /// A log with other names, or of another format (Parquet, MDF 4, CAN with a DBC), needs a channel map, see `inspect
+    /// --suggest`; every reading then comes with its own time.
     ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
@@ -273,10 +288,43 @@ pub(crate) enum PhaseChoice {
     Inertia,
 }
 
+/// Which channels of a log are which signals.
+#[derive(Debug, Args)]
+pub(crate) struct Mapping {
+    /// Messages and signals of a CAN log; replaces `dbc` of the map
+    #[arg(long, value_name = "FILE.dbc")]
+    pub(crate) dbc: Option<PathBuf>,
+    /// Channel map
+    #[arg(long, value_name = "MAP.toml")]
+    pub(crate) map: Option<PathBuf>,
+    /// Channel of a signal, such as `engine_speed="N_Eng [rpm]"`; replaces that of the map. May be given several times
+    #[arg(long, value_name = "ROLE=NAME")]
+    pub(crate) channel: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Inspect {
+    /// Log
+    pub(crate) log: PathBuf,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// Print a first channel map from names and units
+    #[arg(long, conflicts_with_all = ["shifts", "map", "channel"])]
+    pub(crate) suggest: bool,
+    /// List the shifts; needs --map or --channel
+    #[arg(long)]
+    pub(crate) shifts: bool,
+    /// Ratios of the forward gears, 1st first; they replace those of the map
+    #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
+    pub(crate) ratios: Vec<f64>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Estimate {
     /// File of measured signals
     pub(crate) log: PathBuf,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
     /// Vehicle file
     #[arg(long)]
     pub(crate) vehicle: PathBuf,

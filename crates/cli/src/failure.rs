@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use config::ConfigError;
 use design::DesignError;
+use logs::LogError;
 use plant::PlantError;
 use report::PageError;
 use study::StudyError;
@@ -66,6 +67,12 @@ impl From<ConfigError> for Failure {
 
 impl From<TraceError> for Failure {
     fn from(error: TraceError) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+impl From<LogError> for Failure {
+    fn from(error: LogError) -> Self {
         Self::Input(error.to_string())
     }
 }

@@ -20,6 +20,7 @@ fn main() -> ExitCode {
         Command::Demo(options) => commands::demo(&options),
         Command::Simulate(options) => commands::simulate(&options),
         Command::Design(options) => commands::design(&options),
+        Command::Inspect(options) => commands::inspect(&options),
         Command::Estimate(options) => commands::estimate(&options),
         Command::Reproduce(options) => commands::reproduce(&options),
         Command::Bench(options) => commands::bench(&options),

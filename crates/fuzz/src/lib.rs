@@ -8,6 +8,7 @@
 //! `corpus/`: the test tries each of those files as it is, and mutates them too.
 
 pub mod files;
+pub mod measured;
 pub mod mutate;
 pub mod samples;
 
@@ -36,11 +37,27 @@ pub enum Target {
     Table,
     /// The `step` of every observer.
     Step,
+    /// The readers of measured logs of every format, and what reads from them.
+    Measured,
+    /// The reader of channel maps.
+    Map,
+    /// The reader of the messages and signals of a bus.
+    Dbc,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Vehicle, Self::Experiment, Self::Study, Self::Log, Self::Table, Self::Step];
+    pub const ALL: [Self; 9] = [
+        Self::Vehicle,
+        Self::Experiment,
+        Self::Study,
+        Self::Log,
+        Self::Table,
+        Self::Step,
+        Self::Measured,
+        Self::Map,
+        Self::Dbc,
+    ];
 
     /// Its name on the command line, and the folder of its corpus.
     pub fn name(self) -> &'static str {
@@ -51,6 +68,9 @@ impl Target {
             Self::Log => "log",
             Self::Table => "table",
             Self::Step => "step",
+            Self::Measured => "measured",
+            Self::Map => "map",
+            Self::Dbc => "dbc",
         }
     }
 }
@@ -121,6 +141,9 @@ impl Fuzzer {
             Target::Log => files::log(self, input),
             Target::Table => files::table(self, input),
             Target::Step => samples::step_all(&self.vehicle, &self.observers, input),
+            Target::Measured => measured::log(self, input),
+            Target::Map => measured::map(self, input),
+            Target::Dbc => measured::dbc(self, input),
         }
     }
 
@@ -147,6 +170,9 @@ impl Fuzzer {
                 ["settings", "budget", "error_bound"].map(|name| text(&experiments.join(name).with_extension("toml"))),
             ),
             Target::Table => seeds.push(self.table()),
+            Target::Measured => seeds.extend(texts(&[measured::data()])),
+            Target::Map => seeds.push(text(&project().join("maps/genesis_at8.toml"))),
+            Target::Dbc => seeds.extend([text(&measured::bus()), text(&project().join("maps/genesis_at8.dbc"))]),
             Target::Log | Target::Step => {}
         }
         seeds

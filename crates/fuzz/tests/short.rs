@@ -47,6 +47,21 @@ fn no_sample_panics_an_observer() {
 }
 
 #[test]
+fn no_measured_log_panics() {
+    first_cases(Target::Measured, 300);
+}
+
+#[test]
+fn no_channel_map_panics() {
+    first_cases(Target::Map, 300);
+}
+
+#[test]
+fn no_dbc_panics() {
+    first_cases(Target::Dbc, 300);
+}
+
+#[test]
 fn a_case_is_the_same_again_and_unlike_the_next() {
     let [one, other] = [(); 2].map(|()| Fuzzer::new(Depth::Short).unwrap());
     for target in Target::ALL {

@@ -20,6 +20,7 @@ pub use csv_file::{Cell, CsvRows, CsvWriter, read_csv, write_csv};
 pub use error::TraceError;
 pub use parquet_file::{ColumnKind, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
+pub use units::{Quantity, Unit};
 
 /// A word of a column; the program's own cost nothing to copy.
 pub type Word = Cow<'static, str>;

@@ -28,6 +28,126 @@ pub fn to_si(name: &str) -> (String, f64) {
     (name, 1.0)
 }
 
+/// What a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Speed of a shaft, rad/s.
+    Rotation,
+    /// Speed of the car or of a wheel's tread, m/s.
+    Velocity,
+    /// Acceleration of the car, m/s^2.
+    Acceleration,
+    /// Electric current, A.
+    Current,
+    /// A part of a whole, from 0 to 1.
+    Share,
+    /// Pressure, Pa.
+    Pressure,
+    /// Torque, N m.
+    Torque,
+    /// Time, s.
+    Time,
+    /// Temperature, degC.
+    Temperature,
+}
+
+/// A unit as measured files write it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// The usual spelling.
+    pub name: &'static str,
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Its size in the unit of the quantity.
+    pub size: f64,
+    /// What is added after the multiplication.
+    pub zero: f64,
+}
+
+impl Unit {
+    /// A value of this unit in the unit of the quantity.
+    pub fn to_si(&self, value: f64) -> f64 {
+        value * self.size + self.zero
+    }
+
+    /// The unit with this name. Spaces, brackets and multiplication signs are ignored; capitals count only where two units
+    /// differ by them.
+    pub fn parse(text: &str) -> Option<Self> {
+        let plain: String = text.chars().filter(|c| !" \t[](){}*·⋅".contains(*c)).collect();
+        let plain = plain.replace('²', "2").replace("^", "").replace(['µ', 'μ'], "u");
+        let find = |same: &dyn Fn(&str) -> bool| {
+            UNITS.iter().find(|(_, spellings, ..)| spellings.iter().any(|spelling| same(spelling)))
+        };
+        let found =
+            find(&|spelling| spelling == plain).or_else(|| find(&|spelling| spelling.eq_ignore_ascii_case(&plain)));
+        found.map(|&(name, _, quantity, size, zero)| Self { name, quantity, size, zero })
+    }
+
+    /// The usual spellings of all units, for messages.
+    pub fn known() -> String {
+        UNITS.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The unit that the ending of a name says, such as `_rpm`.
+    pub fn of_name(name: &str) -> Option<Self> {
+        const SI: &[(&str, &str)] = &[
+            ("_rad_s", "rad/s"),
+            ("_m_s2", "m/s^2"),
+            ("_m_s", "m/s"),
+            ("_n_m", "N m"),
+            ("_nm", "N m"),
+            ("_pa", "Pa"),
+            ("_degc", "degC"),
+            ("_a", "A"),
+            ("_s", "s"),
+            ("_rpm", "rpm"),
+            ("_bar", "bar"),
+            ("_mpa", "MPa"),
+            ("_kpa", "kPa"),
+            ("_ms", "ms"),
+            ("_ma", "mA"),
+            ("_km_h", "km/h"),
+            ("_kmh", "km/h"),
+            ("_kph", "km/h"),
+            ("_percent", "%"),
+        ];
+        let name = name.trim().to_lowercase();
+        SI.iter().find(|(ending, _)| name.ends_with(ending)).and_then(|(_, unit)| Self::parse(unit))
+    }
+}
+
+/// Name, spellings, quantity, size, zero. The first spelling that is the same to the letter counts.
+#[rustfmt::skip]
+const UNITS: &[(&str, &[&str], Quantity, f64, f64)] = &[
+    ("rad/s", &["rad/s", "rad/sec", "1rad/s"], Quantity::Rotation, 1.0, 0.0),
+    ("rpm", &["rpm", "1/min", "min-1", "/min", "U/min", "Umin", "r/min", "rev/min", "upm", "1/minute"], Quantity::Rotation, PI / 30.0, 0.0),
+    ("Hz", &["Hz", "1/s", "rps", "U/s", "rev/s", "s-1"], Quantity::Rotation, 2.0 * PI, 0.0),
+    ("km/h", &["km/h", "kmh", "kph", "km/hr", "kmph"], Quantity::Velocity, 1.0 / 3.6, 0.0),
+    ("mph", &["mph", "mi/h"], Quantity::Velocity, 0.44704, 0.0),
+    ("m/s", &["m/s", "mps"], Quantity::Velocity, 1.0, 0.0),
+    ("m/s^2", &["m/s2", "m/s/s", "mps2"], Quantity::Acceleration, 1.0, 0.0),
+    ("g", &["g", "g0"], Quantity::Acceleration, 9.806_65, 0.0),
+    ("A", &["A", "amp", "ampere"], Quantity::Current, 1.0, 0.0),
+    ("mA", &["mA", "milliampere"], Quantity::Current, 1e-3, 0.0),
+    ("%", &["%", "percent", "prozent", "pct"], Quantity::Share, 1e-2, 0.0),
+    ("1", &["1", "-", "ratio"], Quantity::Share, 1.0, 0.0),
+    ("Pa", &["Pa"], Quantity::Pressure, 1.0, 0.0),
+    ("hPa", &["hPa", "mbar"], Quantity::Pressure, 1e2, 0.0),
+    ("kPa", &["kPa"], Quantity::Pressure, 1e3, 0.0),
+    ("bar", &["bar"], Quantity::Pressure, 1e5, 0.0),
+    ("MPa", &["MPa", "N/mm2"], Quantity::Pressure, 1e6, 0.0),
+    ("psi", &["psi", "psig", "lbf/in2"], Quantity::Pressure, 6_894.757_293_168, 0.0),
+    ("N m", &["Nm", "N.m", "N-m"], Quantity::Torque, 1.0, 0.0),
+    ("lb ft", &["lbft", "ftlb", "lb-ft", "ft-lb", "lbfft", "ftlbf"], Quantity::Torque, 1.355_817_948_331_4, 0.0),
+    ("s", &["s", "sec", "seconds", "sek"], Quantity::Time, 1.0, 0.0),
+    ("ms", &["ms", "msec"], Quantity::Time, 1e-3, 0.0),
+    ("us", &["us", "usec"], Quantity::Time, 1e-6, 0.0),
+    ("ns", &["ns"], Quantity::Time, 1e-9, 0.0),
+    ("degC", &["degC", "°C", "C", "deg_C", "celsius", "gradC"], Quantity::Temperature, 1.0, 0.0),
+    ("K", &["K", "kelvin"], Quantity::Temperature, 1.0, -273.15),
+    ("degF", &["degF", "°F", "deg_F"], Quantity::Temperature, 5.0 / 9.0, -160.0 / 9.0),
+];
+
 /// Pascal in megapascal.
 pub fn mpa(pascal: f64) -> f64 {
     pascal * 1e-6
@@ -46,6 +166,34 @@ pub fn km_h(m_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn units_are_read_as_files_write_them() {
+        for (text, name) in [
+            ("[1/min]", "rpm"),
+            ("U/min", "rpm"),
+            ("RPM", "rpm"),
+            ("N·m", "N m"),
+            ("Nm", "N m"),
+            ("mA", "mA"),
+            ("MPa", "MPa"),
+            ("km/h", "km/h"),
+            ("m/s²", "m/s^2"),
+            ("°C", "degC"),
+            ("%", "%"),
+            (" rad / s ", "rad/s"),
+        ] {
+            assert_eq!(Unit::parse(text).unwrap().name, name, "{text}");
+        }
+        // One pound-force per square inch is 0.45359237 kg times 9.80665 m/s^2 on 0.0254 m squared.
+        let psi = 0.453_592_37 * 9.806_65 / (0.0254 * 0.0254);
+        assert!((Unit::parse("psi").unwrap().to_si(1.0) - psi).abs() < 1e-6);
+        assert!((Unit::parse("degF").unwrap().to_si(212.0) - 100.0).abs() < 1e-12);
+        assert!(Unit::parse("furlong").is_none() && Unit::parse("").is_none());
+        assert_eq!(Unit::of_name("Turbine_Speed_rpm").unwrap().name, "rpm");
+        assert_eq!(Unit::of_name("vehicle_acceleration_m_s2").unwrap().name, "m/s^2");
+        assert!(Unit::of_name("gear").is_none());
+    }
 
     #[test]
     fn names_in_other_units_become_si_names() {

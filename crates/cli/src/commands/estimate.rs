@@ -6,14 +6,16 @@ use std::path::Path;
 use clap::ValueEnum;
 use config::{ObserverKind, Sensors, Vehicle};
 use design::{compliant_open_loop_phases, rigid_open_loop_phases};
+use logs::Log;
 use observer::{Estimate as Sample, Health};
 use report::tables::phase_name;
-use study::log::{Log, LogRow};
+use study::log::LogRow;
 use study::{AnyObserver, ErrorScore, EstimateColumns, Passages};
 use trace::{CsvWriter, WholeFile, units};
 
 use crate::args::{Estimate, MethodChoice, ObserverChoice};
-use crate::commands::{check_output, not_an_input};
+use crate::commands::measured::Measured;
+use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
 
@@ -21,8 +23,15 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     check_output(options.output.as_ref())?;
     not_an_input(options.output.as_ref(), options.sensors.iter().chain([&options.vehicle]))?;
     let vehicle = Vehicle::read(&options.vehicle)?;
-    let log = Log::open(&options.log, &vehicle)?;
-    let has_wheel = log.signals().has_wheel_speed();
+    let map = channel_map(&options.mapping)?;
+    let mut opened = None;
+    let mut log = if map.channels.is_empty() {
+        Measured::rows(&options.log, &vehicle)?
+    } else {
+        let opened = opened.insert(Log::open(&options.log, &map.open)?);
+        Measured::channels(opened, &map, &vehicle)?
+    };
+    let has_wheel = log.has_wheel_speed();
     let designed = matches!(options.observer, ObserverChoice::Rigid | ObserverChoice::Compliant);
     if options.method.is_some() && !designed {
         return Err(Failure::Input(
@@ -87,13 +96,16 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     let findings = match &options.output {
         Some(path) => {
             let writing = |error: io::Error| Failure::writing(path, &error);
-            let (file, findings) = estimates.write(log, WholeFile::create(path).map_err(writing)?, writing)?;
+            let (file, findings) = estimates.write(&mut log, WholeFile::create(path).map_err(writing)?, writing)?;
+            log.finish()?;
             file.finish().map_err(writing)?;
             findings
         }
         None => {
-            let (mut stdout, findings) = estimates.write(log, BufWriter::new(io::stdout().lock()), Failure::from)?;
+            let (mut stdout, findings) =
+                estimates.write(&mut log, BufWriter::new(io::stdout().lock()), Failure::from)?;
             stdout.flush()?;
+            log.finish()?;
             findings
         }
     };
@@ -162,14 +174,13 @@ impl Estimates<'_> {
     /// Writes an estimate for each row of a log; returns the writer and the findings.
     fn write<W: Write>(
         &self,
-        log: Log,
+        log: &mut Measured<'_>,
         writer: W,
         writing: impl Fn(io::Error) -> Failure,
     ) -> Result<(W, Findings), Failure> {
         let mut findings = Findings::new();
         let mut table = CsvWriter::new(writer, self.columns.names()).map_err(&writing)?;
-        let rows = log.map(|row| row.map_err(Failure::from));
-        self.observer.run_over(Some(self.vehicle), rows, |row, estimate| {
+        self.observer.run_over(Some(self.vehicle), log, |row, estimate| {
             findings.push(&row, &estimate);
             table.row(row.time_s, self.columns.cells(&estimate)).map_err(&writing)
         })?;

@@ -6,6 +6,8 @@ mod demo;
 mod design;
 mod error_bound;
 mod estimate;
+mod inspect;
+mod measured;
 mod reproduce;
 mod sensitivity;
 mod simulate;
@@ -18,6 +20,7 @@ pub(crate) use demo::demo;
 pub(crate) use design::design;
 pub(crate) use error_bound::error_bound;
 pub(crate) use estimate::estimate;
+pub(crate) use inspect::inspect;
 pub(crate) use reproduce::reproduce;
 pub(crate) use sensitivity::sensitivity;
 pub(crate) use simulate::simulate;
@@ -27,8 +30,10 @@ pub(crate) use worst_case::worst_case;
 use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use logs::ChannelMap;
 use trace::Trace;
 
+use crate::args::Mapping;
 use crate::failure::Failure;
 
 /// Writes a trace as a comma-separated file, whole or not at all.
@@ -61,6 +66,18 @@ fn not_an_input<'a>(output: Option<&PathBuf>, inputs: impl IntoIterator<Item = &
             input.display()
         ))),
     }
+}
+
+/// The channel map of these options.
+fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
+    let mut map = options.map.as_deref().map_or_else(|| Ok(ChannelMap::default()), ChannelMap::read)?;
+    for channel in &options.channel {
+        map.set(channel)?;
+    }
+    if options.dbc.is_some() {
+        map.open.dbc.clone_from(&options.dbc);
+    }
+    Ok(map)
 }
 
 /// A path as a shell takes it.

@@ -1,0 +1,207 @@
+//! `wetclutch inspect`.
+
+use logs::{Direction, Inspection, Load, Log, Readings, Role, Shift, ShiftFinder};
+use trace::units::rpm;
+
+use crate::args::Inspect;
+use crate::commands::channel_map;
+use crate::failure::Failure;
+use crate::output;
+
+/// Longer names are cut in the table.
+const LONGEST_NAME: usize = 40;
+
+pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
+    let mut map = channel_map(&options.mapping)?;
+    if !options.ratios.is_empty() {
+        map.gearbox.ratios.clone_from(&options.ratios);
+    }
+    let mut log = Log::open(&options.log, &map.open)?;
+    if options.suggest {
+        let dbc = options.mapping.dbc.as_ref().map(|dbc| dbc.display().to_string());
+        return Ok(output::line(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
+    }
+    if options.shifts {
+        if map.channels.is_empty() {
+            return Err(Failure::Input(
+                "--shifts needs to know the channels\nhint: give --map MAP.toml (`inspect --suggest` writes a first one) or --channel"
+                    .to_owned(),
+            ));
+        }
+        return shifts(&mut log, &map);
+    }
+    let inspection = logs::inspect(&mut log)?;
+    output::line(&format!("{}: {}, {} channels", options.log.display(), log.format(), log.channels().len()))?;
+    channels(&inspection)?;
+    remarks(&inspection.notes);
+    if !map.channels.is_empty() {
+        map.resolve(&log)?;
+        output::note("the channel map fits the log");
+    }
+    Ok(())
+}
+
+fn remarks(notes: &[String]) {
+    for note in notes {
+        output::note(&format!("warning: {note}"));
+    }
+}
+
+/// Where the times of a table begin: times since 1970 are shown from the first one on.
+fn origin(first_s: f64) -> f64 {
+    const LONGEST_S: f64 = 1e7;
+    if first_s.abs() > LONGEST_S { first_s.floor() } else { 0.0 }
+}
+
+fn say_origin(origin_s: f64) -> Result<(), Failure> {
+    if origin_s != 0.0 {
+        output::line(&format!("times from {origin_s:.0} s of the log's clock on"))?;
+    }
+    Ok(())
+}
+
+/// A name as the table shows it.
+fn cut(name: &str) -> String {
+    if name.chars().count() <= LONGEST_NAME {
+        return name.escape_debug().to_string();
+    }
+    name.chars().take(LONGEST_NAME - 3).flat_map(char::escape_debug).collect::<String>() + "..."
+}
+
+/// A number with about four digits.
+fn short(number: f64) -> String {
+    let size = number.abs();
+    match () {
+        () if size != 0.0 && !(1e-3..1e7).contains(&size) => format!("{number:.2e}"),
+        () if size >= 1000.0 || number.fract() == 0.0 => format!("{number:.0}"),
+        () if size >= 10.0 => format!("{number:.1}"),
+        () => format!("{number:.3}"),
+    }
+}
+
+fn channels(inspection: &Inspection) -> Result<(), Failure> {
+    let first_s = inspection
+        .channels
+        .iter()
+        .filter_map(|channel| channel.span_s)
+        .map(|[first_s, _]| first_s)
+        .fold(f64::INFINITY, f64::min);
+    let origin_s = origin(if first_s.is_finite() { first_s } else { 0.0 });
+    say_origin(origin_s)?;
+    let grouped = inspection.channels.iter().any(|summary| !summary.channel.group.is_empty());
+    let faulty = inspection.channels.iter().any(|summary| !summary.counts.faults().is_empty());
+    let cells = |group: &str, rest: [String; 9], faults: String| {
+        let group = grouped.then(|| group.to_owned());
+        let [name, unit, rest @ ..] = rest;
+        [Some(name), group, Some(unit)]
+            .into_iter()
+            .flatten()
+            .chain(rest)
+            .chain(faulty.then_some(faults))
+            .collect::<Vec<_>>()
+    };
+    let titles = ["channel", "unit", "samples", "Hz", "from s", "to s", "least", "greatest", "longest gap s"];
+    let mut rows = vec![cells("group", titles.map(str::to_owned), "not usable".to_owned())];
+    for summary in &inspection.channels {
+        let span = |i: usize| summary.span_s.map_or(String::new(), |span_s| format!("{:.2}", span_s[i] - origin_s));
+        let range = |i: usize| summary.range.map_or(String::new(), |range| short(range[i]));
+        let gap = match summary.gaps {
+            0 => String::new(),
+            gaps => format!("{:.2} ({gaps})", summary.longest_s),
+        };
+        rows.push(cells(
+            &cut(&summary.channel.group),
+            [
+                cut(&summary.channel.name),
+                cut(&summary.channel.unit),
+                output::grouped(summary.counts.total()),
+                summary.period_s.map_or(String::new(), |period_s| short((1.0 / period_s * 100.0).round() / 100.0)),
+                span(0),
+                span(1),
+                range(0),
+                range(1),
+                gap,
+            ],
+            summary.counts.faults(),
+        ));
+    }
+    Ok(output::table(if grouped { 3 } else { 2 }, &rows)?)
+}
+
+fn shifts(log: &mut Log, map: &logs::ChannelMap) -> Result<(), Failure> {
+    let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
+    let mut readings = Readings::new(log, map)?;
+    let (mut first_s, mut last_s, mut resets) = (f64::NAN, f64::NAN, 0);
+    while let Some(reading) = readings.next() {
+        let reading = reading?;
+        if readings.resets() > resets {
+            resets = readings.resets();
+            finder.restart();
+        }
+        first_s = first_s.min(reading.time_s);
+        last_s = reading.time_s;
+        finder.push(&reading);
+    }
+    readings.check()?;
+    let found = finder.finish();
+    let origin_s = origin(first_s);
+    for summary in readings.summary().iter().filter(|summary| !summary.counts.faults().is_empty()) {
+        output::note(&format!(
+            "warning: of {} samples of {} some are not used: {}",
+            output::grouped(summary.counts.total()),
+            summary.role.name(),
+            summary.counts.faults()
+        ));
+    }
+    remarks(readings.notes());
+    say_origin(origin_s)?;
+    output::line(&format!("{} shifts from {:.2} to {:.2} s", found.len(), first_s - origin_s, last_s - origin_s))?;
+    if !found.is_empty() {
+        let titles = [
+            "shift",
+            "kind",
+            "phases, s each",
+            "command s",
+            "gear signal s",
+            "inertia phase s",
+            "flare rpm",
+            "jerk m/s^3",
+        ];
+        let mut rows = vec![titles.map(str::to_owned).to_vec()];
+        rows.extend(found.iter().map(|shift| row(shift, origin_s)));
+        output::table(3, &rows)?;
+    }
+    if !map.has(Role::OncomingCurrent) && !map.has(Role::OncomingDuty) && !map.has(Role::OncomingPressureCommand) {
+        output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
+    }
+    Ok(())
+}
+
+fn row(shift: &Shift, origin_s: f64) -> Vec<String> {
+    let load = match shift.load {
+        Load::PowerOn => "power-on ",
+        Load::PowerOff => "power-off ",
+        Load::Unknown => "",
+    };
+    let direction = match shift.direction {
+        Direction::Up => "up",
+        Direction::Down => "down",
+    };
+    let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{:.2}", time_s - origin_s));
+    let number =
+        |number: Option<f64>, digits: usize| number.map_or(String::new(), |number| format!("{number:.digits$}"));
+    let phases: Vec<String> =
+        shift.phases().iter().map(|(phase, [from_s, to_s])| format!("{} {:.2}", phase.name(), to_s - from_s)).collect();
+    vec![
+        format!("{}-{}", shift.from, shift.to),
+        format!("{load}{direction}"),
+        phases.join(", "),
+        time(shift.command_s),
+        time(shift.gear_s),
+        shift
+            .inertia_s
+            .map_or(String::new(), |[from_s, to_s]| format!("{:.2} to {:.2}", from_s - origin_s, to_s - origin_s)),
+        number(shift.quality.flare_rad_s.map(rpm), 0),
+        number(shift.quality.jerk_m_s3, 1),
+    ]
+}

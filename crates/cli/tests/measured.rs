@@ -1,0 +1,153 @@
+//! Logs of every format, from `inspect` to `estimate`.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
+const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
+/// Files that other programs wrote.
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../logs/tests/data");
+
+fn wetclutch(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    assert!(output.status.success(), "{}", stderr(output));
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("wetclutch-measured-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn inspect_lists_the_channels_of_every_format() {
+    let bus = ["bus.log", "bus.asc", "bus.blf"].map(|name| (name, Some("bus.dbc")));
+    let plain = ["plain_410.mf4", "deflate.mf4", "unsorted.mf4", "snappy.parquet"].map(|name| (name, None));
+    for (name, dbc) in bus.into_iter().chain(plain) {
+        let log = format!("{DATA}/{name}");
+        let dbc = dbc.map(|dbc| format!("{DATA}/{dbc}"));
+        let mut arguments = vec!["inspect", &log];
+        if let Some(dbc) = &dbc {
+            arguments.extend(["--dbc", dbc]);
+        }
+        let text = stdout(&wetclutch(&arguments));
+        let row = text.lines().find(|line| line.starts_with("N_Eng ")).unwrap_or_else(|| panic!("{name}: {text}"));
+        let cells: Vec<&str> = row.split_whitespace().collect();
+        // A bus has one more frame, and in the Parquet file six values are absent.
+        let samples = match name {
+            "snappy.parquet" => "34",
+            _ if dbc.is_some() => "41",
+            _ => "40",
+        };
+        assert!(cells.contains(&samples) && cells.contains(&"100"), "{name}: {row}");
+    }
+    let unnamed = wetclutch(&["inspect", &format!("{DATA}/bus.blf")]);
+    assert_eq!(unnamed.status.code(), Some(2));
+    assert!(stderr(&unnamed).contains("hint: give it with --dbc"), "{}", stderr(&unnamed));
+}
+
+#[test]
+fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
+    let folder = Folder::new("suggested");
+    stdout(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("")]));
+    let log = folder.path("e1_measured.csv");
+    let expected = stdout(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE]));
+    let map = folder.write("map.toml", &stdout(&wetclutch(&["inspect", &log, "--suggest"])));
+    let mapped = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--map", &map]);
+    assert!(stdout(&mapped) == expected, "{}", stderr(&mapped));
+    assert!(stderr(&mapped).contains("shifts: 1 (7.701 to 8.332 s)"), "{}", stderr(&mapped));
+    // The same drive with other names, units and signs of decimals.
+    let text = std::fs::read_to_string(&log).unwrap();
+    let renamed = text.replacen("oncoming_current_a", "Strom [A]", 1).replace(',', ";").replace('.', ",");
+    let other = folder.write("other.csv", &renamed);
+    let arguments = ["estimate", &other, "--vehicle", VEHICLE, "--map", &map, "--channel", "oncoming_current=Strom"];
+    let mapped = wetclutch(&arguments);
+    assert!(stdout(&mapped) == expected, "{}", stderr(&mapped));
+    let shifts = stdout(&wetclutch(&["inspect", &log, "--map", &map, "--shifts", "--ratios", "2.5,1.0"]));
+    assert!(
+        shifts.starts_with("1 shifts from 0.00 to 9.50 s\n") && shifts.contains("\n1-2    power-on up"),
+        "{shifts}"
+    );
+}
+
+#[test]
+fn what_an_estimate_lacks_is_said_before_anything_is_written() {
+    let folder = Folder::new("lacks");
+    let mdf = format!("{DATA}/plain_410.mf4");
+    let out = folder.path("out.csv");
+    let table =
+        folder.write("log.csv", "time_s,e,t,o,i\n0,800,790,300,0.1\n0.01,900,890,310,0.1\n0.02,900,890,310,0.1\n");
+    let complete = ["engine_speed=e [rpm]", "turbine_speed=t [rpm]", "output_speed=o [rpm]", "oncoming_current=i [A]"];
+    let with = |changed: &[&'static str]| {
+        let entries = complete.iter().copied().chain(changed.iter().copied());
+        entries.flat_map(|entry| ["--channel", entry]).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let cases = [
+        (&mdf, vec![], "this log needs a channel map\nhint: `wetclutch inspect`"),
+        (
+            &mdf,
+            vec!["--channel".to_owned(), "engine_speed=N_Eng".to_owned()],
+            "the channel map has no oncoming_current, the command of this vehicle's valve: without it no pressure",
+        ),
+        (&table, with(&["engine_speed=e [rad/s]"]), "engine_speed cannot be in rad/s"),
+        (&table, with(&["oncoming_current=x [A]"]), "there is no channel `x`"),
+        (&table, with(&["engine_speed=e [furlong]"]), "which is not known\nhint: the units are"),
+    ];
+    for (log, more, message) in cases {
+        let mut arguments = vec!["estimate", log, "--vehicle", VEHICLE, "--observer", "open-loop", "-o", &out];
+        arguments.extend(more.iter().map(String::as_str));
+        let output = wetclutch(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(stderr(&output).contains(message), "{message}: {}", stderr(&output));
+        assert!(!std::path::Path::new(&out).exists(), "{message}");
+    }
+    let mut arguments = vec!["estimate", &table, "--vehicle", VEHICLE, "--observer", "open-loop"];
+    let entries = with(&[]);
+    arguments.extend(entries.iter().map(String::as_str));
+    assert_eq!(stdout(&wetclutch(&arguments)).lines().count(), 4);
+}
+
+#[test]
+fn the_map_of_the_public_drive_is_in_order() {
+    let maps = concat!(env!("CARGO_MANIFEST_DIR"), "/../../maps");
+    let folder = Folder::new("public");
+    // One frame of each message: enough for the map, its units and its DBC.
+    let frames = "(1.0) can0 316#353EAC173E0E1B72\n(1.0) can0 43F#834480FF77901700\n(1.0) can0 440#FFB31B00FF9C1753\n(1.01) can0 316#353EAC173E0E1B72\n(1.01) can0 43F#834480FF77901700\n(1.01) can0 440#FFB31B00FF9C1753\n";
+    let log = folder.write("drive.log", frames);
+    let output = wetclutch(&["inspect", &log, "--map", &format!("{maps}/genesis_at8.toml"), "--shifts"]);
+    assert!(stdout(&output).starts_with("0 shifts from 1.00 to 1.01 s"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("no valve command is mapped"), "{}", stderr(&output));
+    let text = stdout(&wetclutch(&["inspect", &log, "--dbc", &format!("{maps}/genesis_at8.dbc")]));
+    // Bytes 5 and 6 of 0x43F: 0x1790 times 0.25 rpm.
+    assert!(text.lines().any(|line| line.starts_with("TurbineSpeed ") && line.contains(" 1508 ")), "{text}");
+}

@@ -1,0 +1,230 @@
+//! CAN logs as BLF: objects in compressed containers.
+//!
+//! The crate `ablf` 0.2 was tried: it prints, panics on damaged data, and does not know the object of plain CAN messages (type 1)
+//! nor those of CAN FD. The layout here follows python-can's reader and the public header of the format.
+
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::ZlibDecoder;
+
+use super::{Frame, Frames};
+use crate::LogError;
+
+/// Largest object that is read, bytes; writers use containers of 128 KiB.
+const LARGEST_OBJECT: u32 = 64 << 20;
+/// Bytes that every object begins with.
+const BASE: usize = 16;
+
+const CAN_MESSAGE: u32 = 1;
+const CONTAINER: u32 = 10;
+const CAN_MESSAGE2: u32 = 86;
+const CAN_FD_MESSAGE: u32 = 100;
+const CAN_FD_MESSAGE_64: u32 = 101;
+
+/// A BLF file that is read object by object.
+pub(crate) struct Blf {
+    path: PathBuf,
+    input: BufReader<Box<dyn Read>>,
+    /// Place in the file.
+    offset: u64,
+    /// What is left of the containers so far: whole objects and the beginning of one.
+    inner: Vec<u8>,
+    at: usize,
+    frames: u64,
+    damage: Option<LogError>,
+    ended: bool,
+}
+
+/// The head of an object.
+struct Object {
+    kind: u32,
+    header: usize,
+    size: usize,
+}
+
+impl Object {
+    fn parse(bytes: &[u8]) -> Result<Self, String> {
+        if bytes.get(..4) != Some(b"LOBJ") {
+            return Err("there is no object where one should begin".to_owned());
+        }
+        let (header, size, kind) = (u16_at(bytes, 4), u32_at(bytes, 8), u32_at(bytes, 12));
+        if size < BASE as u32 || size > LARGEST_OBJECT || usize::from(header) < BASE {
+            return Err(format!("an object says that it has {size} bytes, {header} of them in its head"));
+        }
+        Ok(Self { kind, header: usize::from(header), size: size as usize })
+    }
+}
+
+/// Little-endian numbers; zero beyond the end.
+fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    bytes.get(at..at + N).and_then(|bytes| bytes.try_into().ok()).unwrap_or([0; N])
+}
+
+fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(bytes_at(bytes, at))
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes_at(bytes, at))
+}
+
+impl Blf {
+    pub(crate) fn open(path: &Path, input: Box<dyn Read>) -> Result<Self, LogError> {
+        let mut blf = Self {
+            path: path.to_owned(),
+            input: BufReader::new(input),
+            offset: 0,
+            inner: Vec::new(),
+            at: 0,
+            frames: 0,
+            damage: None,
+            ended: false,
+        };
+        let start = blf.bytes(8)?;
+        let length = u32_at(&start, 4);
+        if start.len() < 8
+            || !(48..=4096).contains(&length)
+            || blf.bytes(length as usize - 8)?.len() + 8 < length as usize
+        {
+            return Err(LogError::damaged(path, "byte 4", "the head of the file is cut or has a wrong length"));
+        }
+        Ok(blf)
+    }
+
+    /// Up to this many bytes of the file. The memory grows with what is there, not with what is asked for.
+    fn bytes(&mut self, count: usize) -> Result<Vec<u8>, LogError> {
+        let mut bytes = Vec::new();
+        let read = (&mut self.input).take(count as u64).read_to_end(&mut bytes).map_err(LogError::io(&self.path))?;
+        self.offset += read as u64;
+        Ok(bytes)
+    }
+
+    fn damaged(&self, offset: u64, message: impl Into<String>) -> LogError {
+        LogError::damaged(&self.path, format!("byte {offset}"), message)
+    }
+
+    /// Reads the next object of the file into the memory; false at the end.
+    fn read_outer(&mut self) -> Result<bool, LogError> {
+        let offset = self.offset;
+        let mut bytes = self.bytes(BASE)?;
+        if bytes.is_empty() {
+            return Ok(false);
+        }
+        let object = Object::parse(&bytes).map_err(|message| self.damaged(offset, message))?;
+        let body = self.bytes(object.size - BASE)?;
+        bytes.extend(body);
+        let cut = bytes.len() < object.size;
+        if cut {
+            self.damage =
+                Some(self.damaged(offset, format!("the object is cut: {} of {} bytes", bytes.len(), object.size)));
+        }
+        // Objects begin at multiples of four bytes, counted as their writers do.
+        self.bytes(object.size % 4)?;
+        self.inner.drain(..self.at);
+        self.at = 0;
+        if object.kind != CONTAINER {
+            self.inner.extend(bytes);
+            return Ok(true);
+        }
+        const HEAD: usize = 16;
+        let (method, declared) = (u16_at(&bytes, BASE), u32_at(&bytes, BASE + 8));
+        let packed = bytes.get(BASE + HEAD..).unwrap_or_default();
+        match method {
+            0 => self.inner.extend_from_slice(packed),
+            2 => {
+                let limit = u64::from(declared.min(LARGEST_OBJECT));
+                let before = self.inner.len();
+                let unpacked = ZlibDecoder::new(packed).take(limit).read_to_end(&mut self.inner);
+                let got = self.inner.len() - before;
+                if !cut && (unpacked.is_err() || got as u64 != u64::from(declared)) {
+                    self.damage =
+                        Some(self.damaged(offset, format!("a container unpacks to {got} of {declared} bytes")));
+                }
+            }
+            other => {
+                return Err(self
+                    .damaged(offset, format!("a container is packed by method {other}, known are 0 and 2 (deflate)")));
+            }
+        }
+        Ok(true)
+    }
+
+    /// The next object that lies whole in the memory; none if there is none.
+    fn next_inner(&mut self) -> Result<Option<(usize, Object)>, LogError> {
+        // Between objects lie up to three bytes of padding.
+        let left = self.inner.get(self.at..).unwrap_or_default();
+        let skip = left.iter().take(3).take_while(|byte| **byte == 0).count();
+        let left = left.get(skip..).unwrap_or_default();
+        if left.len() < BASE {
+            return Ok(None);
+        }
+        let object = Object::parse(left)
+            .map_err(|message| self.damaged(self.offset, format!("{message}, in the container that ends here")))?;
+        if left.len() < object.size {
+            return Ok(None);
+        }
+        let start = self.at + skip;
+        self.at = start + object.size;
+        Ok(Some((start, object)))
+    }
+
+    /// The frame of an object, if it is one with data.
+    fn frame(&self, start: usize, object: &Object) -> Option<Frame> {
+        let bytes = self.inner.get(start..start + object.size)?;
+        let body = bytes.get(object.header..)?;
+        // Head of version 1 or 2: flags, then the time in units of 10 us or 1 ns.
+        let (unit_s, stamp) =
+            (if u32_at(bytes, BASE) == 1 { 1e-5 } else { 1e-9 }, u64::from_le_bytes(bytes_at(bytes, 24)));
+        #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
+        let time_s = stamp as f64 * unit_s;
+        let (id, payload, remote) = match object.kind {
+            CAN_MESSAGE | CAN_MESSAGE2 => {
+                let length = usize::from(*body.get(3)?).min(8);
+                (u32_at(body, 4), body.get(8..8 + length)?, body.get(2)? & 0x80 != 0)
+            }
+            CAN_FD_MESSAGE => {
+                let length = usize::from(*body.get(14)?);
+                (u32_at(body, 4), body.get(20..20 + length)?, body.get(2)? & 0x80 != 0)
+            }
+            CAN_FD_MESSAGE_64 => {
+                let length = usize::from(*body.get(2)?);
+                (u32_at(body, 4), body.get(40..40 + length)?, u32_at(body, 12) & 0x10 != 0)
+            }
+            _ => return None,
+        };
+        (!remote).then(|| Frame::new(time_s, id & 0x1fff_ffff, id & 0x8000_0000 != 0, payload))
+    }
+}
+
+impl Frames for Blf {
+    fn next_frame(&mut self) -> Result<Option<Frame>, LogError> {
+        loop {
+            while let Some((start, object)) = self.next_inner()? {
+                if let Some(frame) = self.frame(start, &object) {
+                    self.frames += 1;
+                    return Ok(Some(frame));
+                }
+            }
+            // What was unpacked before the damage is given first.
+            if let Some(damage) = self.damage.take() {
+                self.ended = true;
+                return Err(damage);
+            }
+            if self.ended || !self.read_outer()? {
+                if !self.ended && self.inner.len() - self.at >= BASE {
+                    self.ended = true;
+                    return Err(self.damaged(self.offset, "the last object is cut"));
+                }
+                return match self.frames {
+                    0 => Err(LogError::file(&self.path, "there are no data frames")),
+                    _ => Ok(None),
+                };
+            }
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,165 @@
+//! CAN logs: frames from candump, ASC or BLF files, and the signals that a DBC finds in them.
+
+mod blf;
+mod database;
+mod text;
+
+use std::collections::BTreeMap;
+use std::io::{Cursor, Read};
+use std::path::{Path, PathBuf};
+
+pub use database::Database;
+
+use crate::LogError;
+use crate::log::CanKind;
+use crate::samples::{Sample, Stream};
+
+/// Largest payload, bytes: that of CAN FD.
+const PAYLOAD: usize = 64;
+
+/// A frame on the bus.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) time_s: f64,
+    pub(crate) id: u32,
+    pub(crate) extended: bool,
+    data: [u8; PAYLOAD],
+    length: usize,
+}
+
+impl Frame {
+    /// A frame; of a longer payload the first 64 bytes count.
+    pub(crate) fn new(time_s: f64, id: u32, extended: bool, payload: &[u8]) -> Self {
+        let mut data = [0; PAYLOAD];
+        let length = payload.len().min(PAYLOAD);
+        data[..length].copy_from_slice(&payload[..length]);
+        Self { time_s, id, extended, data, length }
+    }
+
+    pub(crate) fn data(&self) -> &[u8] {
+        &self.data[..self.length]
+    }
+}
+
+/// Something that gives frames.
+pub(crate) trait Frames {
+    /// The next data frame; none at the end.
+    fn next_frame(&mut self) -> Result<Option<Frame>, LogError>;
+
+    /// What else is to be said.
+    fn notes(&self) -> Vec<String>;
+}
+
+/// A CAN log that has not been read yet.
+pub(crate) struct CanLog {
+    path: PathBuf,
+    kind: CanKind,
+    input: Option<Box<dyn Read>>,
+    database: Database,
+}
+
+impl CanLog {
+    pub(crate) fn new(path: &Path, kind: CanKind, head: Vec<u8>, rest: Box<dyn Read>, database: Database) -> Self {
+        let input: Box<dyn Read> = Box::new(Cursor::new(head).chain(rest));
+        Self { path: path.to_owned(), kind, input: Some(input), database }
+    }
+
+    pub(crate) fn format(&self) -> &'static str {
+        match self.kind {
+            CanKind::Candump => "CAN log (candump)",
+            CanKind::Asc => "CAN log (ASC)",
+            CanKind::Blf => "CAN log (BLF)",
+        }
+    }
+
+    pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
+        let Some(input) = self.input.take() else {
+            return Err(LogError::file(&self.path, "the log was read already"));
+        };
+        Ok(Box::new(Signals {
+            frames: frames(&self.path, self.kind, input)?,
+            decoder: Decoder::new(&self.database, wanted),
+        }))
+    }
+}
+
+fn frames(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Result<Box<dyn Frames>, LogError> {
+    Ok(match kind {
+        CanKind::Candump | CanKind::Asc => Box::new(text::Lines::new(path, kind, input)),
+        CanKind::Blf => Box::new(blf::Blf::open(path, input)?),
+    })
+}
+
+/// The signals of the frames of a log.
+struct Signals<'a> {
+    frames: Box<dyn Frames>,
+    decoder: Decoder<'a>,
+}
+
+impl Stream for Signals<'_> {
+    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+        const FRAMES: usize = 64;
+        for _ in 0..FRAMES {
+            let Some(frame) = self.frames.next_frame()? else { return Ok(false) };
+            self.decoder.decode(&frame, batch);
+        }
+        Ok(true)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = self.frames.notes();
+        notes.extend(self.decoder.notes());
+        notes
+    }
+}
+
+/// A database, the signals that are wanted, and what it did not know.
+pub(crate) struct Decoder<'a> {
+    database: &'a Database,
+    wanted: Vec<bool>,
+    frames: u64,
+    /// Frames of each identifier that the database does not have.
+    unknown: BTreeMap<(bool, u32), u64>,
+    unknown_frames: u64,
+}
+
+impl<'a> Decoder<'a> {
+    pub(crate) fn new(database: &'a Database, wanted: &[bool]) -> Self {
+        Self { database, wanted: wanted.to_vec(), frames: 0, unknown: BTreeMap::new(), unknown_frames: 0 }
+    }
+
+    pub(crate) fn decode(&mut self, frame: &Frame, batch: &mut Vec<Sample>) {
+        const MOST: usize = 4096;
+        self.frames += 1;
+        if !self.database.decode(frame, &self.wanted, batch) {
+            self.unknown_frames += 1;
+            let known = self.unknown.len();
+            if let Some(count) = self.unknown.get_mut(&(frame.extended, frame.id)) {
+                *count += 1;
+            } else if known < MOST {
+                self.unknown.insert((frame.extended, frame.id), 1);
+            }
+        }
+    }
+
+    pub(crate) fn notes(&self) -> Vec<String> {
+        const SHOWN: usize = 8;
+        if self.unknown_frames == 0 {
+            return Vec::new();
+        }
+        let mut most: Vec<_> = self.unknown.iter().collect();
+        most.sort_by_key(|(id, count)| (std::cmp::Reverse(**count), **id));
+        let ids = most
+            .iter()
+            .take(SHOWN)
+            .map(|((extended, id), _)| if *extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") });
+        vec![format!(
+            "{} of {} frames, of {} identifiers, are not in the DBC: {}{}",
+            self.unknown_frames,
+            self.frames,
+            self.unknown.len(),
+            ids.collect::<Vec<_>>().join(", "),
+            if self.unknown.len() > SHOWN { ", ..." } else { "" }
+        )]
+    }
+}

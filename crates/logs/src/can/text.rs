@@ -1,0 +1,214 @@
+//! CAN logs as text: candump and ASC.
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use super::{Frame, Frames, PAYLOAD};
+use crate::log::CanKind;
+use crate::{LogError, error};
+
+/// Longest line that is read, bytes.
+const LONGEST_LINE: u64 = 4096;
+
+/// The lines of a log. A line that is no frame and no known remark is counted.
+pub(crate) struct Lines {
+    path: PathBuf,
+    kind: CanKind,
+    input: BufReader<Box<dyn Read>>,
+    line: Vec<u8>,
+    number: u64,
+    frames: u64,
+    unread: u64,
+    first_unread: Option<String>,
+    /// ASC: identifiers and data are hexadecimal.
+    hex: bool,
+    /// ASC: times count from the frame before.
+    relative: bool,
+    time_s: f64,
+}
+
+/// What a line is.
+enum Line {
+    Frame(Frame),
+    /// A header, a comment, an error or remote frame.
+    Remark,
+    Unread,
+}
+
+impl Lines {
+    pub(crate) fn new(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Self {
+        Self {
+            path: path.to_owned(),
+            kind,
+            input: BufReader::new(input),
+            line: Vec::new(),
+            number: 0,
+            frames: 0,
+            unread: 0,
+            first_unread: None,
+            hex: true,
+            relative: false,
+            time_s: 0.0,
+        }
+    }
+
+    /// Reads a line; false at the end.
+    fn read(&mut self) -> Result<bool, LogError> {
+        self.line.clear();
+        let read =
+            (&mut self.input).take(LONGEST_LINE).read_until(b'\n', &mut self.line).map_err(LogError::io(&self.path))?;
+        // What goes on beyond is another line, which is no frame.
+        self.number += 1;
+        Ok(read > 0)
+    }
+
+    fn candump(text: &str) -> Line {
+        let candump = |text: &str| -> Option<Frame> {
+            let (stamp, rest) = text.trim().strip_prefix('(')?.split_once(')')?;
+            let time_s: f64 = stamp.trim().parse().ok()?;
+            let mut words = rest.split_whitespace();
+            words.next()?;
+            let second = words.next()?;
+            let (id, payload) = match second.split_once('#') {
+                Some((id, data)) => {
+                    // `ID##F` is CAN FD with one digit of flags; `ID#R` asks for data.
+                    let data = match data.strip_prefix('#') {
+                        Some(fd) => fd.get(1..)?,
+                        None => data,
+                    };
+                    (id, data.to_owned())
+                }
+                // The form without -l: `can0  43F   [8]  83 44 ...`
+                None => {
+                    let length = words.next()?;
+                    length.strip_prefix('[')?.strip_suffix(']')?;
+                    (second, words.collect())
+                }
+            };
+            if !id.bytes().all(|byte| byte.is_ascii_hexdigit()) || id.len() > 8 {
+                return None;
+            }
+            let (mut data, length) = ([0; PAYLOAD], payload.len() / 2);
+            if payload.len() % 2 != 0 || length > PAYLOAD || !payload.is_ascii() {
+                return None;
+            }
+            for (i, byte) in data.iter_mut().take(length).enumerate() {
+                *byte = u8::from_str_radix(&payload[2 * i..2 * i + 2], 16).ok()?;
+            }
+            let number = u32::from_str_radix(id, 16).ok()?;
+            time_s.is_finite().then(|| Frame::new(time_s, number & 0x1fff_ffff, id.len() > 3, &data[..length]))
+        };
+        match candump(text) {
+            Some(frame) => Line::Frame(frame),
+            None if text.trim().is_empty() || text.contains("#R") || text.contains("remote request") => Line::Remark,
+            None => Line::Unread,
+        }
+    }
+
+    fn asc(&mut self, text: &str) -> Line {
+        let lower = text.trim().to_lowercase();
+        if lower.starts_with("base ") {
+            self.hex = !lower.starts_with("base dec");
+            self.relative = lower.contains("timestamps relative");
+            return Line::Remark;
+        }
+        let mut words = text.split_whitespace();
+        let Some(stamp) = words.next().and_then(|word| word.parse::<f64>().ok()).filter(|stamp| stamp.is_finite())
+        else {
+            // Dates, comments, `Begin Triggerblock`.
+            return Line::Remark;
+        };
+        self.time_s = if self.relative { self.time_s + stamp } else { stamp };
+        let words: Vec<&str> = words.collect();
+        let frame = match words[..] {
+            // Times of triggers, `Start of measurement`, statistics and error frames.
+            [] => return Line::Remark,
+            ["CANFD", ..] => self.asc_fd(&words[1..]),
+            [channel, _, direction, kind, ..]
+                if channel.parse::<u32>().is_ok() && matches!(direction, "Rx" | "Tx" | "TxRq") && kind == "d" =>
+            {
+                self.asc_classic(&words)
+            }
+            _ => return Line::Remark,
+        };
+        frame.map_or(Line::Unread, Line::Frame)
+    }
+
+    fn radix(&self) -> u32 {
+        if self.hex { 16 } else { 10 }
+    }
+
+    /// `CHANNEL ID Rx d LENGTH DATA...`
+    fn asc_classic(&self, words: &[&str]) -> Option<Frame> {
+        let (id, extended) = self.asc_id(words.get(1)?)?;
+        let length = usize::from_str_radix(words.get(4)?, 16).ok().filter(|length| *length <= 8)?;
+        self.asc_data(id, extended, words.get(5..5 + length)?)
+    }
+
+    /// `CHANNEL Rx ID [NAME] BRS ESI DLC LENGTH DATA...`
+    fn asc_fd(&self, words: &[&str]) -> Option<Frame> {
+        let (id, extended) = self.asc_id(words.get(2)?)?;
+        // A name of the message may stand between; the first 0 or 1 is the bit-rate switch.
+        let switch = (3..words.len().min(5)).find(|&i| matches!(words[i], "0" | "1"))?;
+        let length: usize = words.get(switch + 3)?.parse().ok().filter(|length| *length <= PAYLOAD)?;
+        self.asc_data(id, extended, words.get(switch + 4..switch + 4 + length)?)
+    }
+
+    fn asc_id(&self, word: &str) -> Option<(u32, bool)> {
+        let (digits, extended) = match word.strip_suffix(['x', 'X']) {
+            Some(digits) => (digits, true),
+            None => (word, false),
+        };
+        u32::from_str_radix(digits, self.radix()).ok().filter(|id| *id <= 0x1fff_ffff).map(|id| (id, extended))
+    }
+
+    fn asc_data(&self, id: u32, extended: bool, words: &[&str]) -> Option<Frame> {
+        let mut data = [0; PAYLOAD];
+        for (byte, word) in data.iter_mut().zip(words) {
+            *byte = u8::from_str_radix(word, self.radix()).ok()?;
+        }
+        Some(Frame::new(self.time_s, id, extended, data.get(..words.len())?))
+    }
+}
+
+impl Frames for Lines {
+    fn next_frame(&mut self) -> Result<Option<Frame>, LogError> {
+        while self.read()? {
+            let text = String::from_utf8_lossy(&self.line).into_owned();
+            let line = match self.kind {
+                CanKind::Asc => self.asc(&text),
+                _ => Self::candump(&text),
+            };
+            match line {
+                Line::Frame(frame) => {
+                    self.frames += 1;
+                    return Ok(Some(frame));
+                }
+                Line::Remark => {}
+                Line::Unread => {
+                    self.unread += 1;
+                    if self.first_unread.is_none() {
+                        self.first_unread = Some(format!("line {}: `{}`", self.number, error::shown(text.trim())));
+                    }
+                }
+            }
+        }
+        match &self.first_unread {
+            Some(first) if self.unread > self.frames => Err(LogError::file(
+                &self.path,
+                format!(
+                    "{} lines are no frames and {} are, the first that is none is {first}",
+                    self.unread, self.frames
+                ),
+            )),
+            _ if self.frames == 0 => Err(LogError::file(&self.path, "there are no data frames")),
+            _ => Ok(None),
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let note =
+            |first: &String| format!("{} lines are no frames and are left out, the first is {first}", self.unread);
+        self.first_unread.iter().map(note).collect()
+    }
+}

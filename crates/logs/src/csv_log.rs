@@ -1,0 +1,455 @@
+//! Comma-separated files of any dialect.
+//!
+//! Delimiter, decimal comma and the row of names are told from the first lines. Lines before the names are passed over. Units stand
+//! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Rows are read one by one.
+
+use std::io::{self, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use trace::{Quantity, Unit};
+
+use crate::samples::{Quality, Sample, Stream};
+use crate::{Channel, LogError, TimeColumn, error};
+
+/// Longest row that is read, bytes. A file without an end of line does not fill the memory.
+const LONGEST_ROW: usize = 32 << 20;
+/// Rows in a batch.
+const BATCH: usize = 64;
+
+/// An open comma-separated file.
+pub(crate) struct CsvLog {
+    path: PathBuf,
+    dialect: Dialect,
+    reader: Option<csv::Reader<RowByRow>>,
+    /// Column and size in s of the time.
+    time: (usize, f64),
+    /// Column of each channel.
+    columns: Vec<usize>,
+    width: usize,
+    notes: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Dialect {
+    delimiter: u8,
+    decimal_comma: bool,
+    /// Lines before the row of names.
+    preamble: usize,
+    units_row: bool,
+}
+
+impl CsvLog {
+    pub(crate) fn open(
+        path: &Path,
+        head: Vec<u8>,
+        rest: Box<dyn Read>,
+        time: Option<&TimeColumn>,
+    ) -> Result<(Self, Vec<Channel>), LogError> {
+        let start = if head.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
+        let dialect = Dialect::of(path, &text(&head[start..]))?;
+        let mut input = Cursor::new(head).chain(rest);
+        skip(&mut input, start, dialect.preamble).map_err(LogError::io(path))?;
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .delimiter(dialect.delimiter)
+            .from_reader(RowByRow { input: Box::new(input), left: LONGEST_ROW });
+        let mut row = csv::ByteRecord::new();
+        let mut next = |row: &mut csv::ByteRecord| read_row(path, &mut reader, dialect.preamble, row);
+        next(&mut row)?;
+        let titles: Vec<String> = row.iter().map(|cell| text(cell).trim().to_owned()).collect();
+        let units: Vec<String> = if dialect.units_row {
+            next(&mut row)?;
+            row.iter().map(|cell| unit_text(&text(cell))).collect()
+        } else {
+            Vec::new()
+        };
+        let split: Vec<(String, String)> = titles.iter().map(|title| split_unit(title)).collect();
+        let unit = |i: usize| match units.get(i).filter(|unit| !unit.is_empty()) {
+            Some(unit) => unit.clone(),
+            None if !split[i].1.is_empty() => split[i].1.clone(),
+            None => Unit::of_name(&split[i].0).map_or(String::new(), |unit| unit.name.to_owned()),
+        };
+        let names: Vec<(String, String)> = (0..titles.len()).map(|i| (split[i].0.clone(), unit(i))).collect();
+        let mut notes = Vec::new();
+        let time = time_column(path, &names, &titles, time, &mut notes)?;
+        let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
+        let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
+        let channels = columns
+            .iter()
+            .map(|&i| Channel { name: names[i].0.clone(), unit: names[i].1.clone(), group: String::new() })
+            .collect();
+        let log =
+            Self { path: path.to_owned(), dialect, reader: Some(reader), time, columns, width: titles.len(), notes };
+        Ok((log, channels))
+    }
+
+    pub(crate) fn format(&self) -> String {
+        let delimiter = match self.dialect.delimiter {
+            b'\t' => "tab".to_owned(),
+            other => format!("`{}`", char::from(other)),
+        };
+        format!("CSV, delimiter {delimiter}, decimal {}", if self.dialect.decimal_comma { "comma" } else { "point" })
+    }
+
+    pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
+        let Some(reader) = self.reader.take() else {
+            return Err(LogError::file(&self.path, "the log was read already"));
+        };
+        let columns = (self.columns.iter().zip(wanted).enumerate())
+            .filter(|(_, (_, wanted))| **wanted)
+            .map(|(channel, (&column, _))| (channel, column));
+        Ok(Box::new(Rows {
+            columns: columns.collect(),
+            log: self,
+            reader,
+            row: csv::ByteRecord::new(),
+            text: String::new(),
+            rows: 0,
+            without_time: 0,
+            short: 0,
+            long: 0,
+            no_numbers: 0,
+            first_text: None,
+        }))
+    }
+}
+
+/// The rows of a table.
+struct Rows<'a> {
+    log: &'a CsvLog,
+    reader: csv::Reader<RowByRow>,
+    /// Channel and column.
+    columns: Vec<(usize, usize)>,
+    row: csv::ByteRecord,
+    text: String,
+    rows: u64,
+    without_time: u64,
+    short: u64,
+    long: u64,
+    no_numbers: u64,
+    first_text: Option<String>,
+}
+
+impl Rows<'_> {
+    /// The number in a cell: none where it is empty, an error where it is something else.
+    fn number(&mut self, column: usize) -> Result<Option<f64>, ()> {
+        let cell = self.row.get(column).unwrap_or_default().trim_ascii();
+        if cell.is_empty() {
+            return Ok(None);
+        }
+        self.text.clear();
+        let comma = self.log.dialect.decimal_comma;
+        // Cells of numbers are ASCII; anything else fails to parse below.
+        self.text.extend(cell.iter().map(|&byte| if comma && byte == b',' { '.' } else { char::from(byte) }));
+        self.text.parse::<f64>().map(Some).map_err(drop)
+    }
+}
+
+impl Stream for Rows<'_> {
+    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+        for _ in 0..BATCH {
+            if !read_row(&self.log.path, &mut self.reader, self.log.dialect.preamble, &mut self.row)? {
+                if self.rows == 0 {
+                    return Err(LogError::file(&self.log.path, "there are no rows"));
+                }
+                if 2 * self.without_time > self.rows {
+                    return Err(LogError::file(
+                        &self.log.path,
+                        format!("{} of {} rows have no time that is a number", self.without_time, self.rows),
+                    ));
+                }
+                return Ok(false);
+            }
+            self.rows += 1;
+            self.short += u64::from(self.row.len() < self.log.width);
+            self.long += u64::from((self.log.width..self.row.len()).any(|i| !self.row[i].trim_ascii().is_empty()));
+            let time_s = match self.number(self.log.time.0) {
+                Ok(Some(time)) if time.is_finite() => time * self.log.time.1,
+                _ => {
+                    self.without_time += 1;
+                    continue;
+                }
+            };
+            for i in 0..self.columns.len() {
+                let (channel, column) = self.columns[i];
+                // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
+                let (value, quality) = match self.number(column) {
+                    Ok(None) => continue,
+                    Ok(Some(value)) if value.is_nan() => continue,
+                    Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
+                    Ok(Some(value)) => (value, Quality::Missing),
+                    Err(()) => {
+                        self.no_numbers += 1;
+                        if self.first_text.is_none() {
+                            let line =
+                                self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
+                            self.first_text =
+                                Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
+                        }
+                        (f64::NAN, Quality::Missing)
+                    }
+                };
+                batch.push(Sample { channel, time_s, value, quality });
+            }
+        }
+        Ok(true)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = self.log.notes.clone();
+        let mut count = |count: u64, what: &str| {
+            if count > 0 {
+                notes.push(format!("{count} of {} rows {what}", self.rows));
+            }
+        };
+        count(self.without_time, "have no time and are left out");
+        count(self.short, "have fewer cells than there are columns; the last line may be cut");
+        count(self.long, "have more cells than there are columns");
+        if let Some(first) = &self.first_text {
+            notes.push(format!("{} cells are not numbers and count as missing, the first in {first}", self.no_numbers));
+        }
+        notes
+    }
+}
+
+/// Reads a row; false at the end.
+fn read_row(
+    path: &Path,
+    reader: &mut csv::Reader<RowByRow>,
+    preamble: usize,
+    row: &mut csv::ByteRecord,
+) -> Result<bool, LogError> {
+    let line = reader.position().line() + preamble as u64;
+    reader.get_mut().left = LONGEST_ROW;
+    reader.read_byte_record(row).map_err(|error| match error.into_kind() {
+        _ if reader.get_ref().left == 0 => LogError::damaged(
+            path,
+            format!("line {line}"),
+            format!(
+                "the row that begins here is longer than {} MiB\nhint: a quotation mark may not be closed",
+                LONGEST_ROW >> 20
+            ),
+        ),
+        csv::ErrorKind::Io(source) => LogError::Io { path: path.to_owned(), source },
+        other => LogError::damaged(path, format!("line {line}"), format!("{other:?}")),
+    })
+}
+
+/// An input of which no row may be longer than what is left.
+struct RowByRow {
+    input: Box<dyn Read>,
+    left: usize,
+}
+
+impl Read for RowByRow {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let most = buffer.len().min(self.left);
+        let read = self.input.read(&mut buffer[..most])?;
+        self.left -= read;
+        Ok(read)
+    }
+}
+
+/// Text of a file: UTF-8, or else Latin-1, in which every byte is a letter.
+fn text(bytes: &[u8]) -> String {
+    std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
+}
+
+/// Passes over some bytes and then some lines.
+fn skip(input: &mut impl Read, bytes: usize, lines: usize) -> io::Result<()> {
+    let (mut byte, mut lines) = ([0], lines);
+    for _ in 0..bytes {
+        input.read_exact(&mut byte)?;
+    }
+    while lines > 0 {
+        input.read_exact(&mut byte)?;
+        lines -= usize::from(byte[0] == b'\n');
+    }
+    Ok(())
+}
+
+/// The cells of a line; quotation marks are respected.
+fn cells(line: &str, delimiter: u8) -> Vec<String> {
+    let mut cells = vec![String::new()];
+    let mut quoted = false;
+    for c in line.chars() {
+        if c == '"' {
+            quoted = !quoted;
+        } else if c == char::from(delimiter) && !quoted {
+            cells.push(String::new());
+        } else if let Some(cell) = cells.last_mut() {
+            cell.push(c);
+        }
+    }
+    cells.iter().map(|cell| cell.trim().to_owned()).collect()
+}
+
+fn is_number(cell: &str, decimal_comma: bool) -> bool {
+    let plain = if decimal_comma { cell.replacen(',', ".", 1) } else { cell.to_owned() };
+    plain.parse::<f64>().is_ok()
+}
+
+impl Dialect {
+    /// Tells the dialect from the first lines.
+    fn of(path: &Path, head: &str) -> Result<Self, LogError> {
+        let mut lines: Vec<&str> = head.lines().collect();
+        // The head may end within a line.
+        if !head.ends_with('\n') && lines.len() > 1 {
+            lines.pop();
+        }
+        // Of the delimiters that divide lines into numbers, the one with the most numbers; a comma may be decimal.
+        let best = [b'\t', b';', b'|', b','].into_iter().filter_map(|delimiter| {
+            let decimal_comma = |cells: &[String]| {
+                delimiter != b','
+                    && cells.iter().any(|cell| cell.matches(',').count() == 1 && is_number(cell, true))
+                    && !cells.iter().any(|cell| cell.contains('.') && is_number(cell, false))
+            };
+            let rows: Vec<Vec<String>> = lines.iter().map(|line| cells(line, delimiter)).collect();
+            let comma = rows.iter().any(|row| decimal_comma(row));
+            let numbers = |row: &Vec<String>| row.iter().filter(|cell| is_number(cell, comma)).count();
+            let filled = |row: &Vec<String>| row.iter().filter(|cell| !cell.is_empty()).count();
+            let is_data = |row: &Vec<String>| {
+                row.len() >= 2 && numbers(row) >= 1 && (2 * numbers(row) >= filled(row) || !is_units(row))
+            };
+            let first = rows.iter().position(|row| is_data(row) && rows_after_agree(&rows, row.len()))?;
+            let count: usize = rows.iter().skip(first).map(numbers).sum();
+            Some((count, delimiter, comma, first))
+        });
+        let Some((_, delimiter, decimal_comma, first)) =
+            best.max_by_key(|(count, delimiter, ..)| (*count, *delimiter != b','))
+        else {
+            let only = lines.iter().filter(|line| !line.trim().is_empty()).count();
+            return Err(LogError::file(
+                path,
+                if only == 1 {
+                    "there are no rows"
+                } else {
+                    "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns), Parquet, MDF 4, candump, ASC or BLF"
+                },
+            ));
+        };
+        let names = |row: &[String]| {
+            row.len() >= 2
+                && row.iter().any(|cell| !cell.is_empty())
+                && !row.iter().any(|cell| is_number(cell, decimal_comma))
+        };
+        let above =
+            |i: usize| lines.get(i).map(|line| cells(line, delimiter)).filter(|row| names(row) || is_units(row));
+        let filled: Vec<usize> = (0..first).rev().filter(|&i| !lines[i].trim().is_empty()).collect();
+        let line = |nth: usize| filled.get(nth).and_then(|&i| above(i).map(|row| (i, row)));
+        match (line(0), line(1).filter(|(_, row)| names(row))) {
+            (Some((_, units)), Some((names_at, _))) if is_units(&units) => {
+                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: true })
+            }
+            (Some((names_at, row)), _) if names(&row) => {
+                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: false })
+            }
+            _ => Err(LogError::damaged(
+                path,
+                format!("line {}", first + 1),
+                "there is no row of names above the first row of numbers\nhint: add one, with a time and a unit for each column",
+            )),
+        }
+    }
+}
+
+/// Whether the cells are units, or most of them.
+fn is_units(row: &[String]) -> bool {
+    let filled: Vec<&String> = row.iter().filter(|cell| !cell.is_empty()).collect();
+    let bracketed = |cell: &str| cell.starts_with('[') || cell.starts_with('(');
+    let units = filled.iter().filter(|cell| bracketed(cell) || Unit::parse(cell).is_some()).count();
+    !filled.is_empty() && 2 * units >= filled.len()
+}
+
+/// Whether most of the rows have this many cells.
+fn rows_after_agree(rows: &[Vec<String>], width: usize) -> bool {
+    let filled = rows.iter().filter(|row| row.len() > 1 || row.iter().any(|cell| !cell.is_empty()));
+    let (same, all) = filled.fold((0, 0), |(same, all), row| (same + usize::from(row.len() == width), all + 1));
+    3 * same >= all
+}
+
+/// A unit without its brackets.
+fn unit_text(cell: &str) -> String {
+    cell.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']).trim().to_owned()
+}
+
+/// Name and unit of a title such as `N_Eng [rpm]`. Round brackets are a unit only if it is known.
+pub(crate) fn split_unit(title: &str) -> (String, String) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        let Some(inner) = title.strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) else { continue };
+        if open == '[' || Unit::parse(inner.1).is_some() {
+            return (inner.0.trim().to_owned(), inner.1.trim().to_owned());
+        }
+    }
+    (title.to_owned(), String::new())
+}
+
+/// Whether a name is that of the time.
+pub(crate) fn is_time_name(name: &str) -> bool {
+    const NAMES: &[&str] = &[
+        "time",
+        "t",
+        "zeit",
+        "timestamp",
+        "timestamps",
+        "times",
+        "elapsed",
+        "abszeit",
+        "relzeit",
+        "time_s",
+        "time_ms",
+        "time_us",
+        "time_ns",
+        "zeit_s",
+        "zeit_ms",
+        "t_s",
+        "t_ms",
+    ];
+    NAMES.contains(&name.to_lowercase().replace([' ', '-'], "_").as_str())
+}
+
+/// The column of the time and its size in s.
+pub(crate) fn time_column(
+    path: &Path,
+    names: &[(String, String)],
+    titles: &[String],
+    wanted: Option<&TimeColumn>,
+    notes: &mut Vec<String>,
+) -> Result<(usize, f64), LogError> {
+    let found = match wanted {
+        Some(TimeColumn { name, .. }) => (0..names.len()).find(|&i| names[i].0 == *name || titles[i] == *name),
+        None => (0..names.len()).find(|&i| is_time_name(&names[i].0)),
+    };
+    let Some(i) = found else {
+        let wanted =
+            wanted.map_or("for the time".to_owned(), |time| format!("`{}` for the time", error::shown(&time.name)));
+        let some: Vec<String> = names.iter().take(12).map(|(name, _)| error::shown(name)).collect();
+        return Err(LogError::file(
+            path,
+            format!(
+                "there is no column {wanted}; the first columns are {}\nhint: name it `time_s`, or in the channel map under [time]",
+                some.join(", ")
+            ),
+        ));
+    };
+    let text = wanted.and_then(|time| time.unit.clone()).unwrap_or_else(|| names[i].1.clone());
+    if text.is_empty() {
+        notes.push(format!("the column `{}` has no unit: taken as s", error::shown(&names[i].0)));
+        return Ok((i, 1.0));
+    }
+    match Unit::parse(&text) {
+        Some(Unit { quantity: Quantity::Time, size, .. }) => Ok((i, size)),
+        _ => Err(LogError::file(
+            path,
+            format!(
+                "the time `{}` has the unit `{}`\nhint: it can be s, ms, us or ns; say it in the channel map under [time]",
+                error::shown(&names[i].0),
+                error::shown(&text)
+            ),
+        )),
+    }
+}

@@ -1,0 +1,65 @@
+//! Errors in logs and channel maps.
+
+use std::path::{Path, PathBuf};
+
+/// Why a log cannot be read or used.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file as a whole is not what it should be.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// The file is damaged at one place.
+    #[error("{}: {position}: {message}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Where: a line, byte, row or group.
+        position: String,
+        /// What is wrong there.
+        message: String,
+    },
+    /// The channel map does not fit the log, or is wrong in itself.
+    #[error("{message}")]
+    Map {
+        /// What is wrong, and what to do.
+        message: String,
+    },
+}
+
+impl LogError {
+    pub(crate) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
+        |source| Self::Io { path: path.to_owned(), source }
+    }
+
+    pub(crate) fn file(path: &Path, message: impl Into<String>) -> Self {
+        Self::File { path: path.to_owned(), message: message.into() }
+    }
+
+    pub(crate) fn damaged(path: &Path, position: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Damaged { path: path.to_owned(), position: position.into(), message: message.into() }
+    }
+
+    pub(crate) fn map(message: impl Into<String>) -> Self {
+        Self::Map { message: message.into() }
+    }
+}
+
+/// A text from a file as messages show it: what cannot be printed is escaped, and a long one cut.
+pub(crate) fn shown(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let cut = if text.chars().nth(LONGEST).is_some() { "..." } else { "" };
+    text.chars().take(LONGEST).flat_map(char::escape_debug).collect::<String>() + cut
+}

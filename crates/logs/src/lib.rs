@@ -1,0 +1,35 @@
+//! Measured logs, in the files that engineers have.
+//!
+//! A log is a set of channels, each with its own clock. [`Log`] reads CSV, Parquet, ASAM MDF 4 and CAN logs with a DBC and
+//! gives their samples merged in time order, in bounded memory. A [`ChannelMap`] says which channel is which signal;
+//! [`Readings`] applies it, with stated rules for what cannot be a reading (see [`Quality`]). [`Steps`] makes the inputs of an
+//! observer from readings; [`ShiftFinder`] finds the shifts of a drive.
+//!
+//! **Architecture invariant:** this is the only crate that reads the formats of recorders.
+
+pub mod can;
+pub mod csv_log;
+pub mod error;
+pub mod inspect;
+pub mod log;
+pub mod map;
+mod mdf;
+mod parquet_log;
+pub mod plausibility;
+pub mod readings;
+pub mod role;
+pub mod samples;
+pub mod shifts;
+pub mod steps;
+pub mod suggest;
+
+pub use error::LogError;
+pub use inspect::{ChannelSummary, Inspection, inspect};
+pub use log::{Channel, Log, OpenOptions, TimeColumn, needs_map};
+pub use map::{ChannelMap, Combine, Gearbox, Mapped};
+pub use readings::{Reading, Readings, RoleSummary};
+pub use role::Role;
+pub use samples::{Quality, QualityCounts, Sample, Samples};
+pub use shifts::{Direction, Load, Shift, ShiftFinder, ShiftPhase, ShiftQuality};
+pub use steps::{Step, Steps};
+pub use suggest::suggest;

@@ -1,0 +1,293 @@
+//! A measured log of any format.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use crate::can::{CanLog, Database};
+use crate::csv_log::CsvLog;
+use crate::mdf::MdfLog;
+use crate::parquet_log::ParquetLog;
+use crate::samples::{Samples, Stream};
+use crate::{LogError, error};
+
+/// A channel of a log.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Channel {
+    /// Its name.
+    pub name: String,
+    /// Its unit as the log writes it; may be empty.
+    pub unit: String,
+    /// What it shares a clock with: the message of a bus signal, the channel group of an MDF file. Empty for tables.
+    pub group: String,
+}
+
+/// Which column of a table is the time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeColumn {
+    /// Its name.
+    pub name: String,
+    /// Its unit, if the log does not say it.
+    pub unit: Option<String>,
+}
+
+/// What must be known to open some logs.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct OpenOptions {
+    /// The messages and signals of a CAN log.
+    pub dbc: Option<PathBuf>,
+    /// The time of a table; without it, a column with a usual name.
+    pub time: Option<TimeColumn>,
+}
+
+/// A log: channels, each with its own clock.
+pub struct Log {
+    path: PathBuf,
+    channels: Vec<Channel>,
+    source: Source,
+}
+
+enum Source {
+    Csv(Box<CsvLog>),
+    Parquet(ParquetLog),
+    Mdf(Box<MdfLog>),
+    Can(CanLog),
+}
+
+/// Bytes that tell the format of a file, and the lines that tell the form of a table.
+const HEAD: usize = 64 << 10;
+
+impl Log {
+    /// Opens a log; `-` is standard input, which must be CSV or text of a CAN log. The format is told by the first bytes,
+    /// not by the name.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is none of the known formats.
+    pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, LogError> {
+        let io = LogError::io(path);
+        let mut reader: Box<dyn Read> = match path.to_str() {
+            Some("-") => Box::new(io::stdin()),
+            _ => Box::new(File::open(path).map_err(&io)?),
+        };
+        let head = head(&mut reader).map_err(&io)?;
+        if head.is_empty() {
+            return Err(LogError::file(path, "the file is empty"));
+        }
+        let database = options.dbc.as_deref().map(Database::read).transpose()?;
+        let is_file = path != Path::new("-");
+        let (source, channels) = match Format::of(&head) {
+            Format::Mdf if is_file => {
+                MdfLog::open(path, database).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
+            }
+            Format::Parquet if is_file => {
+                ParquetLog::open(path, options.time.as_ref()).map(|(log, channels)| (Source::Parquet(log), channels))?
+            }
+            Format::Mdf | Format::Parquet => {
+                return Err(LogError::file(
+                    path,
+                    "MDF and Parquet files cannot be read from a pipe\nhint: give the file itself",
+                ));
+            }
+            Format::Mdf3 => {
+                return Err(LogError::file(
+                    path,
+                    "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf",
+                ));
+            }
+            Format::Utf16 => {
+                return Err(LogError::file(path, "the text is UTF-16\nhint: save it as UTF-8"));
+            }
+            Format::Can(kind) => {
+                let database = database.ok_or_else(|| {
+                    LogError::file(
+                        path,
+                        "a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc",
+                    )
+                })?;
+                let channels = database.channels().to_vec();
+                (Source::Can(CanLog::new(path, kind, head, reader, database)), channels)
+            }
+            Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref())
+                .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
+        };
+        Ok(Self { path: path.to_owned(), channels, source })
+    }
+
+    /// Where it was read from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its channels, the time itself left out.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Its format, in words.
+    pub fn format(&self) -> String {
+        match &self.source {
+            Source::Csv(log) => log.format(),
+            Source::Parquet(_) => "Parquet".to_owned(),
+            Source::Mdf(log) => log.format(),
+            Source::Can(log) => log.format().to_owned(),
+        }
+    }
+
+    /// The samples of these channels, all in time order. Tables and bus logs are read once: a second call is an error.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    pub fn samples(&mut self, wanted: &[usize]) -> Result<Samples<'_>, LogError> {
+        let count = self.channels.len();
+        let mut mask = vec![false; count];
+        for &channel in wanted {
+            mask[channel] = true;
+        }
+        let streams: Vec<Box<dyn Stream + '_>> = match &mut self.source {
+            Source::Csv(log) => vec![log.stream(&mask)?],
+            Source::Parquet(log) => vec![log.stream(&mask)?],
+            Source::Mdf(log) => log.streams(&mask)?,
+            Source::Can(log) => vec![log.stream(&mask)?],
+        };
+        Samples::new(count, streams)
+    }
+
+    /// The place of the channel with this name. `group` chooses between several; a name may also be `group.name`.
+    ///
+    /// # Errors
+    /// There is none, or several.
+    pub fn find(&self, name: &str, group: Option<&str>) -> Result<usize, LogError> {
+        let same = |channel: &Channel| match group {
+            Some(group) => channel.name == name && channel.group == group,
+            None => {
+                channel.name == name
+                    || name
+                        .strip_prefix(&*channel.group)
+                        .is_some_and(|rest| rest.strip_prefix('.') == Some(&channel.name))
+            }
+        };
+        let found: Vec<usize> = (0..self.channels.len()).filter(|&i| same(&self.channels[i])).collect();
+        match found[..] {
+            [one] => Ok(one),
+            [] => Err(LogError::map(format!(
+                "{}: there is no channel `{}`{}\nhint: {}",
+                self.path.display(),
+                error::shown(name),
+                group.map_or(String::new(), |group| format!(" in group `{}`", error::shown(group))),
+                self.nearest(name)
+            ))),
+            _ => {
+                let groups: Vec<String> =
+                    found.iter().take(8).map(|&i| format!("`{}`", error::shown(&self.channels[i].group))).collect();
+                Err(LogError::map(format!(
+                    "{}: there are {} channels `{}`\nhint: choose one by its `group`: {}",
+                    self.path.display(),
+                    found.len(),
+                    error::shown(name),
+                    groups.join(", ")
+                )))
+            }
+        }
+    }
+
+    /// Names a channel with a similar name, or some channels.
+    fn nearest(&self, name: &str) -> String {
+        let wanted = name.to_lowercase();
+        let similar = |channel: &&Channel| {
+            let name = channel.name.to_lowercase();
+            name.contains(&wanted) || (!name.is_empty() && wanted.contains(&name))
+        };
+        if let Some(channel) = self.channels.iter().find(similar) {
+            return format!("`{}` has a similar name", error::shown(&channel.name));
+        }
+        const MOST: usize = 12;
+        let names: Vec<String> = self.channels.iter().take(MOST).map(|channel| error::shown(&channel.name)).collect();
+        match self.channels.len() {
+            0 => "the log has no channels".to_owned(),
+            more if more > MOST => format!("the channels are {} and {} more", names.join(", "), more - MOST),
+            _ => format!("the channels are {}", names.join(", ")),
+        }
+    }
+}
+
+/// Whether a regular file is of a format that needs a channel map, by its first bytes.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn needs_map(path: &Path) -> Result<bool, LogError> {
+    let io = LogError::io(path);
+    if !path.metadata().map_err(&io)?.is_file() {
+        return Ok(false);
+    }
+    let head = head(&mut File::open(path).map_err(&io)?).map_err(&io)?;
+    Ok(!matches!(Format::of(&head), Format::Csv | Format::Utf16))
+}
+
+/// The first bytes of a file, or of a pipe as far as it has come: at least its first lines.
+fn head(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
+    const LINES: usize = 50;
+    let mut head = vec![0; HEAD];
+    let mut length = 0;
+    while length < HEAD {
+        match reader.read(&mut head[length..]) {
+            Ok(0) => break,
+            Ok(read) => length += read,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+        if head[..length].iter().filter(|&&byte| byte == b'\n').count() >= LINES {
+            break;
+        }
+    }
+    head.truncate(length);
+    Ok(head)
+}
+
+/// The kinds of CAN logs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CanKind {
+    Candump,
+    Asc,
+    Blf,
+}
+
+enum Format {
+    Mdf,
+    Mdf3,
+    Parquet,
+    Utf16,
+    Can(CanKind),
+    Csv,
+}
+
+impl Format {
+    fn of(head: &[u8]) -> Self {
+        if head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ") {
+            return if matches!(head.get(8), Some(b'2' | b'3')) { Self::Mdf3 } else { Self::Mdf };
+        }
+        if head.starts_with(b"PAR1") {
+            return Self::Parquet;
+        }
+        if head.starts_with(b"LOGG") {
+            return Self::Can(CanKind::Blf);
+        }
+        if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
+            return Self::Utf16;
+        }
+        let text = String::from_utf8_lossy(head);
+        let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("//")).unwrap_or("");
+        let words: Vec<&str> = first.split_whitespace().collect();
+        let stamped = words.first().is_some_and(|word| word.starts_with('(')) && first.contains(')');
+        if stamped && words.len() >= 3 {
+            return Self::Can(CanKind::Candump);
+        }
+        let lower = first.to_lowercase();
+        if lower.starts_with("date ") && !first.contains([',', ';', '\t'])
+            || lower.starts_with("base hex")
+            || lower.starts_with("base dec")
+        {
+            return Self::Can(CanKind::Asc);
+        }
+        Self::Csv
+    }
+}

@@ -1,0 +1,380 @@
+//! Channel maps: which channel of a log is which signal.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use trace::{Quantity, Unit};
+
+use crate::{Channel, Log, LogError, OpenOptions, Role, TimeColumn, csv_log, error};
+
+/// How several channels become one signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Combine {
+    /// Their mean, as for two driven wheels.
+    Mean,
+    /// Their sum, as for a value in two parts.
+    Sum,
+}
+
+/// The channels of one signal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mapped {
+    /// What they are.
+    pub role: Role,
+    /// Their names.
+    pub names: Vec<String>,
+    /// The group of them all; needed where a name stands in several.
+    pub group: Option<String>,
+    /// How several become one.
+    pub combine: Combine,
+    /// The unit, if not that of the log.
+    pub unit: Option<String>,
+    /// What a value is multiplied by, before it is converted.
+    pub scale: f64,
+    /// What is added after that, in the unit.
+    pub offset: f64,
+    /// How much earlier than its time stamp a value was measured, s.
+    pub delay_s: f64,
+    /// Least and greatest value in the unit; others are not used.
+    pub valid_range: Option<[f64; 2]>,
+}
+
+impl Mapped {
+    /// One channel with the unit of the log.
+    pub fn new(role: Role, name: &str) -> Self {
+        Self {
+            role,
+            names: vec![name.to_owned()],
+            group: None,
+            combine: Combine::Mean,
+            unit: None,
+            scale: 1.0,
+            offset: 0.0,
+            delay_s: 0.0,
+            valid_range: None,
+        }
+    }
+}
+
+/// What is known of the gearbox without a vehicle file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Gearbox {
+    /// Ratios of the forward gears, 1st first.
+    pub ratios: Vec<f64>,
+    /// Speed of the gearbox output per speed of the car, rad/m: final ratio over wheel radius.
+    pub output_rad_per_m: Option<f64>,
+    /// Rolling radius of the driven wheels, m.
+    pub wheel_radius_m: Option<f64>,
+}
+
+/// Which channel of a log is which signal.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ChannelMap {
+    /// The channels, one entry for each role.
+    pub channels: Vec<Mapped>,
+    /// What is needed to open the log.
+    pub open: OpenOptions,
+    /// What is known of the gearbox.
+    pub gearbox: Gearbox,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMap {
+    dbc: Option<PathBuf>,
+    time: Option<RawTime>,
+    gearbox: Option<RawGearbox>,
+    #[serde(default)]
+    channel: BTreeMap<String, RawChannel>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTime {
+    name: String,
+    unit: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawGearbox {
+    #[serde(default)]
+    ratios: Vec<f64>,
+    output_rad_per_m: Option<f64>,
+    wheel_radius_m: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawChannel {
+    name: Option<String>,
+    names: Option<Vec<String>>,
+    group: Option<String>,
+    combine: Option<Combine>,
+    unit: Option<String>,
+    #[serde(default = "one")]
+    scale: f64,
+    #[serde(default)]
+    offset: f64,
+    #[serde(default)]
+    delay_s: f64,
+    valid_range: Option<[f64; 2]>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl ChannelMap {
+    /// Reads a map. The path of a DBC in it counts from the folder of the map.
+    ///
+    /// # Errors
+    /// The file cannot be read, or something in it is wrong; the message has the line.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let text = std::fs::read_to_string(path).map_err(LogError::io(path))?;
+        let wrong = |message: String| LogError::map(format!("{}: {message}", path.display()));
+        let raw: RawMap = toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))?;
+        let channels =
+            raw.channel.into_iter().map(|(role, raw)| mapped(&role, raw).map_err(&wrong)).collect::<Result<_, _>>()?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let gearbox = raw.gearbox.map_or(Ok(Gearbox::default()), gearbox).map_err(&wrong)?;
+        Ok(Self {
+            channels,
+            open: OpenOptions {
+                dbc: raw.dbc.map(|dbc| folder.join(dbc)),
+                time: raw.time.map(|time| TimeColumn { name: time.name, unit: time.unit }),
+            },
+            gearbox,
+        })
+    }
+
+    /// Takes `ROLE=NAME` or `ROLE=NAME [UNIT]`, in place of an entry with this role.
+    ///
+    /// # Errors
+    /// There is no such role, or no name.
+    pub fn set(&mut self, text: &str) -> Result<(), LogError> {
+        let wrong = || {
+            LogError::map(format!(
+                "`{}` is not ROLE=NAME\nhint: for example engine_speed=\"N_Eng [rpm]\"",
+                error::shown(text)
+            ))
+        };
+        let (role, name) = text.split_once('=').ok_or_else(wrong)?;
+        let (name, unit) = csv_log::split_unit(name.trim());
+        if name.is_empty() {
+            return Err(wrong());
+        }
+        let role = known_role(role.trim()).map_err(LogError::map)?;
+        let unit = Some(unit).filter(|unit| !unit.is_empty());
+        self.channels.retain(|entry| entry.role != role);
+        self.channels.push(Mapped { unit, ..Mapped::new(role, &name) });
+        Ok(())
+    }
+
+    /// Whether there is a channel for a role.
+    pub fn has(&self, role: Role) -> bool {
+        self.channels.iter().any(|entry| entry.role == role)
+    }
+
+    /// Finds the channels in a log and their units.
+    ///
+    /// # Errors
+    /// A channel is not there or there twice, or its unit is not known, or not of its role.
+    pub fn resolve(&self, log: &Log) -> Result<Vec<Resolved>, LogError> {
+        self.channels.iter().map(|entry| Resolved::of(entry, log, &self.gearbox)).collect()
+    }
+}
+
+fn known_role(name: &str) -> Result<Role, String> {
+    let names = || Role::all().map(Role::name).collect::<Vec<_>>().join(", ");
+    Role::parse(name)
+        .ok_or_else(|| format!("there is no role `{}`\nhint: the roles are {}", error::shown(name), names()))
+}
+
+fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
+    let role = known_role(role)?;
+    let key = |key: &str| format!("`channel.{}.{key}`", role.name());
+    let names = match (raw.name, raw.names) {
+        (Some(name), None) => vec![name],
+        (None, Some(names)) if !names.is_empty() => names,
+        _ => return Err(format!("{} or {} must say the channel", key("name"), key("names"))),
+    };
+    if names.len() > 1 && raw.combine.is_none() {
+        return Err(format!(
+            "{} is missing\nhint: \"mean\", as for two wheels, or \"sum\", as for a value in two parts",
+            key("combine")
+        ));
+    }
+    let finite =
+        |value: f64, name: &str| if value.is_finite() { Ok(value) } else { Err(format!("{} is {value}", key(name))) };
+    if raw.scale == 0.0 {
+        return Err(format!("{} is 0", key("scale")));
+    }
+    if !(0.0..=10.0).contains(&raw.delay_s) {
+        return Err(format!("{} is {}, expected 0 to 10", key("delay_s"), raw.delay_s));
+    }
+    if let Some([least, greatest]) = raw.valid_range
+        && (least >= greatest || least.is_nan() || greatest.is_nan())
+    {
+        return Err(format!("{} is [{least}, {greatest}], expected a smaller value first", key("valid_range")));
+    }
+    Ok(Mapped {
+        role,
+        names,
+        group: raw.group,
+        combine: raw.combine.unwrap_or(Combine::Mean),
+        unit: raw.unit,
+        scale: finite(raw.scale, "scale")?,
+        offset: finite(raw.offset, "offset")?,
+        delay_s: raw.delay_s,
+        valid_range: raw.valid_range,
+    })
+}
+
+fn gearbox(raw: RawGearbox) -> Result<Gearbox, String> {
+    check_ratios(&raw.ratios).map_err(|message| format!("`gearbox.ratios`: {message}"))?;
+    for (name, value) in [("output_rad_per_m", raw.output_rad_per_m), ("wheel_radius_m", raw.wheel_radius_m)] {
+        if value.is_some_and(|value| !(0.01..=1000.0).contains(&value)) {
+            return Err(format!("`gearbox.{name}` is {}, expected 0.01 to 1000", value.unwrap_or_default()));
+        }
+    }
+    Ok(Gearbox { ratios: raw.ratios, output_rad_per_m: raw.output_rad_per_m, wheel_radius_m: raw.wheel_radius_m })
+}
+
+/// Checks ratios of forward gears: positive, falling, told apart by at least 2 %.
+///
+/// # Errors
+/// What is wrong with them.
+pub fn check_ratios(ratios: &[f64]) -> Result<(), String> {
+    if let Some(wrong) = ratios.iter().find(|ratio| !(0.1..=30.0).contains(*ratio)) {
+        return Err(format!("a ratio is {wrong}, expected 0.1 to 30"));
+    }
+    match ratios.windows(2).find(|pair| pair[0] < 1.02 * pair[1]) {
+        Some(pair) => Err(format!("{} is followed by {}, expected falling ratios, 1st gear first", pair[0], pair[1])),
+        None => Ok(()),
+    }
+}
+
+/// An entry of a map with the channels of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resolved {
+    /// The entry.
+    pub entry: Mapped,
+    /// Its channels.
+    pub channels: Vec<usize>,
+    /// The unit as it is used, for messages.
+    pub unit_name: String,
+    /// What a value in the unit is multiplied by.
+    size: f64,
+    /// What is added after that.
+    zero: f64,
+}
+
+impl Resolved {
+    fn of(entry: &Mapped, log: &Log, gearbox: &Gearbox) -> Result<Self, LogError> {
+        let channels =
+            entry.names.iter().map(|name| log.find(name, entry.group.as_deref())).collect::<Result<Vec<_>, _>>()?;
+        let units: Vec<&str> = channels.iter().map(|&i| log.channels()[i].unit.as_str()).collect();
+        let text = match &entry.unit {
+            Some(unit) => unit.clone(),
+            None if units.windows(2).all(|pair| pair[0] == pair[1]) => units[0].to_owned(),
+            None => {
+                return Err(LogError::map(format!(
+                    "the channels of {} have the units {}\nhint: say one in `channel.{}.unit`",
+                    entry.role.name(),
+                    units.join(" and "),
+                    entry.role.name()
+                )));
+            }
+        };
+        let (unit_name, size, zero) =
+            conversion(entry.role, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
+        Ok(Self { entry: entry.clone(), channels, unit_name, size, zero })
+    }
+
+    /// A value in the channel's unit, scale and offset applied.
+    pub fn in_unit(&self, value: f64) -> f64 {
+        value * self.entry.scale + self.entry.offset
+    }
+
+    /// A value of [`Self::in_unit`] in the unit of the role.
+    pub fn in_si(&self, value: f64) -> f64 {
+        value * self.size + self.zero
+    }
+}
+
+/// Name, size and zero of the unit of a role.
+fn conversion(role: Role, text: &str, channel: &Channel, gearbox: &Gearbox) -> Result<(String, f64, f64), String> {
+    let Some(wanted) = role.quantity() else { return Ok((String::new(), 1.0, 0.0)) };
+    let name = role.name();
+    let channel = error::shown(&channel.name);
+    if text.trim().is_empty() && wanted != Quantity::Share {
+        return Err(format!(
+            "channel `{channel}` ({name}) has no unit in the log\nhint: say it, as in `--channel {name}=\"{channel} [{}]\"` or `channel.{name}.unit`",
+            role.unit()
+        ));
+    }
+    let unit = if text.trim().is_empty() { Unit::parse("1") } else { Unit::parse(text) };
+    let Some(unit) = unit else {
+        return Err(format!(
+            "channel `{channel}` ({name}) has the unit `{}`, which is not known\nhint: the units are {}; say one in `channel.{name}.unit`, with `channel.{name}.scale` where none fits",
+            error::shown(text),
+            Unit::known()
+        ));
+    };
+    let duty = matches!(role, Role::OncomingDuty | Role::OffgoingDuty);
+    let (size, zero) = match (role, unit.quantity) {
+        // A duty cycle is in % inside.
+        _ if duty && unit.quantity == Quantity::Share => (100.0 * unit.size, 0.0),
+        _ if unit.quantity == wanted => (unit.size, unit.zero),
+        (Role::WheelSpeed, Quantity::Velocity) => match gearbox.wheel_radius_m {
+            Some(radius_m) => (unit.size / radius_m, 0.0),
+            None => {
+                return Err(format!(
+                    "channel `{channel}` ({name}) is in {}, and the radius of the wheels is not known\nhint: give `gearbox.wheel_radius_m` in the channel map",
+                    unit.name
+                ));
+            }
+        },
+        _ => {
+            return Err(format!(
+                "channel `{channel}` ({name}) is in {}, expected a unit like {}\nhint: say it in `channel.{name}.unit` if the log is wrong",
+                unit.name,
+                role.unit()
+            ));
+        }
+    };
+    Ok((unit.name.to_owned(), size, zero))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_option_replaces_an_entry_and_may_have_a_unit() {
+        let mut map = ChannelMap::default();
+        map.set("engine_speed=N_Eng [rpm]").unwrap();
+        map.set("engine_speed = N_Mot [1/min]").unwrap();
+        assert_eq!(map.channels.len(), 1);
+        assert_eq!((map.channels[0].names[0].as_str(), map.channels[0].unit.as_deref()), ("N_Mot", Some("1/min")));
+        let error = map.set("speed=N").unwrap_err().to_string();
+        assert!(
+            error.starts_with("there is no role `speed`\nhint: the roles are engine_speed, turbine_speed"),
+            "{error}"
+        );
+        assert!(map.set("engine_speed").is_err() && map.set("engine_speed= ").is_err());
+    }
+
+    #[test]
+    fn ratios_fall_and_are_told_apart() {
+        assert!(check_ratios(&[4.7, 3.1, 1.0]).is_ok() && check_ratios(&[]).is_ok());
+        assert_eq!(
+            check_ratios(&[3.1, 4.7]).unwrap_err(),
+            "3.1 is followed by 4.7, expected falling ratios, 1st gear first"
+        );
+        assert!(check_ratios(&[f64::NAN]).is_err() && check_ratios(&[4.0, -1.0]).is_err());
+    }
+}

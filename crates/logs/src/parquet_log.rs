@@ -1,0 +1,341 @@
+//! Parquet files: a table of numbers, read by row group and in it some thousand rows at a time.
+
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use parquet::basic::{Encoding, LogicalType, TimeUnit, Type as Physical};
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
+use parquet::data_type::DataType;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescPtr;
+
+use crate::csv_log::{is_time_name, split_unit, time_column};
+use crate::samples::{Quality, Sample, Stream};
+use crate::{Channel, LogError, TimeColumn, error};
+use trace::Unit;
+
+/// Rows that are decoded at once.
+const BATCH: usize = 4096;
+
+/// An open Parquet file.
+pub(crate) struct ParquetLog {
+    path: PathBuf,
+    reader: SerializedFileReader<File>,
+    /// Column and size in s of the time.
+    time: (usize, f64),
+    /// Column of each channel.
+    columns: Vec<usize>,
+    notes: Vec<String>,
+}
+
+impl ParquetLog {
+    pub(crate) fn open(path: &Path, time: Option<&TimeColumn>) -> Result<(Self, Vec<Channel>), LogError> {
+        let file = File::open(path).map_err(LogError::io(path))?;
+        let length = file.metadata().map_err(LogError::io(path))?.len();
+        let reader = SerializedFileReader::new(file).map_err(|error| damaged(path, "its end", &error))?;
+        check_places(path, length, &reader)?;
+        let leaves: Vec<ColumnDescPtr> = reader.metadata().file_metadata().schema_descr().columns().to_vec();
+        let titles: Vec<String> = leaves.iter().map(|leaf| leaf.path().string()).collect();
+        let names: Vec<(String, String)> = titles
+            .iter()
+            .zip(&leaves)
+            .map(|(title, leaf)| {
+                let (name, mut unit) = split_unit(title);
+                if unit.is_empty() {
+                    unit = stamp_unit(leaf)
+                        .map(str::to_owned)
+                        .or_else(|| Unit::of_name(&name).map(|unit| unit.name.to_owned()))
+                        .unwrap_or_default();
+                }
+                (name, unit)
+            })
+            .collect();
+        let mut notes = Vec::new();
+        // A column of time stamps is the time where no name says so.
+        let stamps = (0..leaves.len()).find(|&i| stamp_unit(&leaves[i]).is_some());
+        let named = names.iter().any(|(name, _)| is_time_name(name));
+        let by_kind =
+            stamps.filter(|_| time.is_none() && !named).map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
+        let time = time_column(path, &names, &titles, time.or(by_kind.as_ref()), &mut notes)?;
+        let is_number = |leaf: &ColumnDescPtr| {
+            leaf.max_rep_level() == 0
+                && matches!(
+                    leaf.physical_type(),
+                    Physical::BOOLEAN | Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE
+                )
+        };
+        if !is_number(&leaves[time.0]) {
+            return Err(LogError::file(
+                path,
+                format!("the time `{}` does not hold numbers", error::shown(&titles[time.0])),
+            ));
+        }
+        let columns: Vec<usize> = (0..leaves.len()).filter(|&i| i != time.0 && is_number(&leaves[i])).collect();
+        if columns.len() + 1 < leaves.len() {
+            notes.push(format!("{} columns do not hold numbers and are left out", leaves.len() - 1 - columns.len()));
+        }
+        let channels = columns.iter().map(|&i| Channel {
+            name: names[i].0.clone(),
+            unit: names[i].1.clone(),
+            group: String::new(),
+        });
+        let channels = channels.collect();
+        Ok((Self { path: path.to_owned(), reader, time, columns, notes }, channels))
+    }
+
+    pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
+        let columns = (self.columns.iter().zip(wanted).enumerate())
+            .filter(|(_, (_, wanted))| **wanted)
+            .map(|(channel, (&column, _))| (channel, column));
+        Ok(Box::new(Groups { columns: columns.collect(), log: self, group: 0, open: None, without_time: 0 }))
+    }
+}
+
+/// Checks that every column chunk lies within the file. The reader takes the places on trust.
+fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -> Result<(), LogError> {
+    for (group, metadata) in reader.metadata().row_groups().iter().enumerate() {
+        for column in metadata.columns() {
+            let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+            let end = start.checked_add(column.compressed_size());
+            let inside =
+                start >= 0 && column.compressed_size() >= 0 && end.is_some_and(|end| end.unsigned_abs() <= length);
+            if !inside || metadata.num_rows() < 0 || column.num_values() < 0 {
+                return Err(LogError::damaged(
+                    path,
+                    format!("row group {}", group + 1),
+                    format!("column `{}` lies outside the file", error::shown(&column.column_path().string())),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
+    let hint = match error.to_string().contains("Disabled feature") {
+        true => "\nhint: this compression is not built in; write the file with snappy, gzip or none",
+        false => "",
+    };
+    LogError::damaged(path, position, format!("{error}{hint}"))
+}
+
+/// The unit of a column of time stamps.
+fn stamp_unit(leaf: &ColumnDescPtr) -> Option<&'static str> {
+    match leaf.logical_type_ref() {
+        Some(LogicalType::Timestamp(stamp)) => Some(match stamp.unit {
+            TimeUnit::MILLIS => "ms",
+            TimeUnit::MICROS => "us",
+            TimeUnit::NANOS => "ns",
+        }),
+        _ => None,
+    }
+}
+
+/// The pages of a column. What their heads say is checked, because the decoder takes it on trust: that a dictionary stands
+/// before the pages that need it and has as many values as it says, and that levels lie within their page.
+struct CheckedPages {
+    pages: Box<dyn PageReader>,
+    column: ColumnDescPtr,
+    dictionary: bool,
+}
+
+impl CheckedPages {
+    fn check(&mut self, page: &Page) -> Result<(), &'static str> {
+        let length = page.buffer().len();
+        if let Page::DictionaryPage { num_values, .. } = page {
+            let size = match self.column.physical_type() {
+                Physical::INT32 | Physical::FLOAT => 4,
+                _ => 8,
+            };
+            self.dictionary = true;
+            return if *num_values as usize <= length / size {
+                Ok(())
+            } else {
+                Err("a dictionary is shorter than it says")
+            };
+        }
+        if matches!(page.encoding(), Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) && !self.dictionary {
+            return Err("a page needs a dictionary, and there is none");
+        }
+        let levels = match page {
+            // Run lengths begin with their size, which the decoder checks; the older form has none. One bit is enough for the
+            // levels of a table.
+            Page::DataPage { num_values, def_level_encoding, .. }
+                if *def_level_encoding != Encoding::RLE && self.column.max_def_level() > 0 =>
+            {
+                (*num_values as usize).div_ceil(8) * usize::from(self.column.max_def_level().unsigned_abs())
+            }
+            Page::DataPageV2 { def_levels_byte_len, rep_levels_byte_len, .. } => {
+                *def_levels_byte_len as usize + *rep_levels_byte_len as usize
+            }
+            _ => 0,
+        };
+        if levels > length { Err("the levels of a page are longer than the page") } else { Ok(()) }
+    }
+}
+
+impl PageReader for CheckedPages {
+    fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
+        let page = self.pages.get_next_page()?;
+        if let Some(page) = &page {
+            self.check(page).map_err(|message| ParquetError::General(message.to_owned()))?;
+        }
+        Ok(page)
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>, ParquetError> {
+        self.pages.peek_next_page()
+    }
+
+    fn skip_next_page(&mut self) -> Result<(), ParquetError> {
+        self.pages.skip_next_page()
+    }
+}
+
+impl Iterator for CheckedPages {
+    type Item = Result<Page, ParquetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+/// The open columns of a row group.
+struct OpenGroup {
+    time: ColumnReader,
+    columns: Vec<ColumnReader>,
+    rows_left: u64,
+}
+
+/// The row groups of a file.
+struct Groups<'a> {
+    log: &'a ParquetLog,
+    /// Channel and column.
+    columns: Vec<(usize, usize)>,
+    group: usize,
+    open: Option<OpenGroup>,
+    without_time: u64,
+}
+
+impl Groups<'_> {
+    fn open(&self) -> Result<OpenGroup, ParquetError> {
+        let group = self.log.reader.get_row_group(self.group)?;
+        let rows_left = u64::try_from(group.metadata().num_rows()).unwrap_or(0);
+        let reader = |column: usize| {
+            let descriptor = group.metadata().schema_descr().column(column);
+            let pages = group.get_column_page_reader(column)?;
+            let pages = CheckedPages { pages, column: descriptor.clone(), dictionary: false };
+            Ok::<_, ParquetError>(get_column_reader(descriptor, Box::new(pages)))
+        };
+        let columns = self.columns.iter().map(|(_, column)| reader(*column)).collect::<Result<_, _>>()?;
+        Ok(OpenGroup { time: reader(self.log.time.0)?, columns, rows_left })
+    }
+
+    fn decode(&mut self, open: &mut OpenGroup, batch: &mut Vec<Sample>) -> Result<(), ParquetError> {
+        let rows = BATCH.min(usize::try_from(open.rows_left).unwrap_or(BATCH));
+        let times = numbers(&mut open.time, rows)?;
+        let columns = open.columns.iter_mut().map(|column| numbers(column, rows)).collect::<Result<Vec<_>, _>>()?;
+        if times.len() < rows || columns.iter().any(|column| column.len() < rows) {
+            return Err(ParquetError::EOF("a column has fewer rows than its group".to_owned()));
+        }
+        open.rows_left -= rows as u64;
+        for (row, time) in times.iter().enumerate() {
+            if !time.is_finite() {
+                self.without_time += 1;
+                continue;
+            }
+            for (column, (channel, _)) in columns.iter().zip(&self.columns) {
+                let value = column[row];
+                // An absent value, or NaN, is a reading that did not come.
+                if value.is_nan() {
+                    continue;
+                }
+                let quality = if value.is_finite() { Quality::Good } else { Quality::Missing };
+                batch.push(Sample { channel: *channel, time_s: time * self.log.time.1, value, quality });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Stream for Groups<'_> {
+    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+        // The decoders of `parquet` 60.1 index and assert on what pages say (byte-stream split, for one), deeper than can be checked
+        // before. What they leave behind is not used again: the stream ends here.
+        let read = catch_unwind(AssertUnwindSafe(|| self.read(batch)));
+        read.unwrap_or_else(|_| {
+            let place = format!("row group {}", self.group + 1);
+            Err(LogError::damaged(&self.log.path, place, "the pages of a column contradict themselves"))
+        })
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = self.log.notes.clone();
+        if self.without_time > 0 {
+            notes.push(format!("{} rows have no time and are left out", self.without_time));
+        }
+        notes
+    }
+}
+
+impl Groups<'_> {
+    fn read(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+        let place = format!("row group {}", self.group + 1);
+        let mut open = match self.open.take() {
+            Some(open) => open,
+            None if self.group < self.log.reader.num_row_groups() => {
+                self.open().map_err(|error| damaged(&self.log.path, &place, &error))?
+            }
+            None => return Ok(false),
+        };
+        self.decode(&mut open, batch).map_err(|error| damaged(&self.log.path, &place, &error))?;
+        if open.rows_left == 0 {
+            self.group += 1;
+        } else {
+            self.open = Some(open);
+        }
+        Ok(true)
+    }
+}
+
+/// The next numbers of a column; NaN where there is none.
+fn numbers(column: &mut ColumnReader, rows: usize) -> Result<Vec<f64>, ParquetError> {
+    fn read<D: DataType>(
+        column: &mut ColumnReaderImpl<D>,
+        rows: usize,
+        number: impl Fn(&D::T) -> f64,
+    ) -> Result<Vec<f64>, ParquetError> {
+        let (mut levels, mut values) = (Vec::new(), Vec::new());
+        let mut got = 0;
+        // A call may end with a page.
+        while got < rows {
+            let (records, ..) = column.read_records(rows - got, Some(&mut levels), None, &mut values)?;
+            if records == 0 {
+                break;
+            }
+            got += records;
+        }
+        if values.len() == got {
+            return Ok(values.iter().map(number).collect());
+        }
+        // Where values are absent, their level is below the highest.
+        let highest = levels.iter().copied().max().unwrap_or(0);
+        let mut values = values.iter();
+        Ok(levels
+            .iter()
+            .map(|level| if *level == highest { values.next().map_or(f64::NAN, &number) } else { f64::NAN })
+            .collect())
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
+    match column {
+        ColumnReader::BoolColumnReader(column) => read(column, rows, |value| f64::from(u8::from(*value))),
+        ColumnReader::Int32ColumnReader(column) => read(column, rows, |value| f64::from(*value)),
+        ColumnReader::Int64ColumnReader(column) => read(column, rows, |value| *value as f64),
+        ColumnReader::FloatColumnReader(column) => read(column, rows, |value| f64::from(*value)),
+        ColumnReader::DoubleColumnReader(column) => read(column, rows, |value| *value),
+        _ => Err(ParquetError::General("the column does not hold numbers".to_owned())),
+    }
+}

@@ -1,0 +1,194 @@
+//! Units that are wrong by all appearances.
+
+use trace::Quantity;
+use trace::units::{mpa, rpm};
+
+use crate::Role;
+use crate::readings::RoleSummary;
+
+/// Least and greatest of some values, and the middle of their sizes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extremes {
+    /// The least.
+    pub least: f64,
+    /// The greatest.
+    pub greatest: f64,
+    /// Values away from zero by their size: how many lie between two powers of two.
+    sizes: [u32; SIZES],
+}
+
+/// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has.
+const SIZES: usize = 64;
+
+impl Default for Extremes {
+    fn default() -> Self {
+        Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY, sizes: [0; SIZES] }
+    }
+}
+
+impl Extremes {
+    /// Takes a value.
+    pub fn push(&mut self, value: f64) {
+        self.least = self.least.min(value);
+        self.greatest = self.greatest.max(value);
+        if value != 0.0 {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the table")]
+            let size = (value.abs().log2().floor() + 32.0).clamp(0.0, 63.0) as usize;
+            self.sizes[size] = self.sizes[size].saturating_add(1);
+        }
+    }
+
+    /// The middle of the sizes of the values that are not zero, to a factor of the root of two; none without such values.
+    pub fn middle(&self) -> Option<f64> {
+        let all: u64 = self.sizes.iter().map(|count| u64::from(*count)).sum();
+        let mut below = 0;
+        for (size, count) in (0_i32..).zip(&self.sizes) {
+            below += u64::from(*count);
+            if 2 * below > all {
+                return Some(f64::from(size - 32).exp2() * std::f64::consts::SQRT_2);
+            }
+        }
+        None
+    }
+
+    /// The greatest size.
+    fn size(&self) -> f64 {
+        self.greatest.abs().max(self.least.abs())
+    }
+}
+
+/// What cannot be right, each with a hint.
+pub fn findings(summary: &[RoleSummary]) -> Vec<String> {
+    let turning =
+        |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.size() > 1.0);
+    let mut findings: Vec<String> = summary.iter().filter_map(alone).collect();
+    // A turbine reaches nearly the speed of the engine; in another unit it is ten times off.
+    if let (Some(engine), Some(turbine), true) =
+        (turning(Role::EngineSpeed), turning(Role::TurbineSpeed), findings.is_empty())
+    {
+        let ratio = turbine.extremes.size() / engine.extremes.size();
+        let off = |found: &str, likely: &str| {
+            finding(
+                turbine,
+                found,
+                &format!("its greatest value is {ratio:.2} times that of the engine speed; it looks like {likely}"),
+            )
+        };
+        if (0.08..0.13).contains(&ratio) && turbine.unit_name == "rpm" {
+            findings.push(off("rpm", "rad/s"));
+        } else if (7.5..12.5).contains(&ratio) && turbine.unit_name == "rad/s" {
+            findings.push(off("rad/s", "rpm"));
+        }
+    }
+    findings
+}
+
+fn finding(entry: &RoleSummary, found: &str, why: &str) -> String {
+    let name = entry.role.name();
+    format!(
+        "{name} cannot be in {found}: {why}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`"
+    )
+}
+
+/// What cannot be right by the values of the signal alone.
+fn alone(entry: &RoleSummary) -> Option<String> {
+    let middle = entry.extremes.middle()?;
+    let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
+    let say = |text: String, likely: &str| Some(finding(entry, unit, &format!("{text}; it looks like {likely}")));
+    match entry.role.quantity()? {
+        Quantity::Rotation
+            if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) =>
+        {
+            say(format!("most values would be about {:.0} rpm", rpm(middle)), "rpm")
+        }
+        Quantity::Rotation if unit == "rpm" && entry.role == Role::EngineSpeed && size > 2.0 && middle < 42.0 => {
+            say(format!("most values would be about {:.0} rpm, below idle", rpm(middle)), "rad/s")
+        }
+        Quantity::Current if unit == "A" && size > 10.0 => {
+            say(format!("its greatest value would be {size:.0} A"), "mA")
+        }
+        Quantity::Current if unit == "mA" && size < 0.01 => {
+            say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
+        }
+        Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
+            say(format!("its greatest value is {size:.1}"), "%")
+        }
+        Quantity::Share if unit == "1" && is_duty(entry.role) && size > 150.0 => {
+            say(format!("its greatest value is {:.1}", size / 100.0), "%")
+        }
+        Quantity::Share if unit == "%" && !is_duty(entry.role) && size <= 0.0101 && size > 0.0 => {
+            say(format!("its greatest value is {:.2} %", 100.0 * size), "a share from 0 to 1 (unit `1`)")
+        }
+        Quantity::Pressure if size > 20e6 => {
+            say(format!("its greatest value would be {:.0} MPa", mpa(size)), "a smaller unit (bar, kPa or Pa)")
+        }
+        Quantity::Pressure if size < 5e3 => {
+            say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
+        }
+        Quantity::Velocity if size > 120.0 => {
+            say(format!("its greatest value would be {:.0} km/h", 3.6 * size), "a smaller unit (km/h)")
+        }
+        Quantity::Torque if size > 20e3 => {
+            say(format!("its greatest value would be {size:.0} N m"), "a share or raw value; give `scale`")
+        }
+        _ => None,
+    }
+}
+
+fn is_duty(role: Role) -> bool {
+    matches!(role, Role::OncomingDuty | Role::OffgoingDuty)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::QualityCounts;
+
+    fn summary(role: Role, unit_name: &str, values: &[f64]) -> RoleSummary {
+        let mut extremes = Extremes::default();
+        values.iter().for_each(|value| extremes.push(*value));
+        RoleSummary { role, counts: QualityCounts::default(), extremes, unit_name: unit_name.to_owned() }
+    }
+
+    #[test]
+    fn wrong_units_are_named_with_the_likely_one() {
+        let cases = [
+            // Idle to 4000 rpm, read as rad/s and the other way round.
+            (Role::EngineSpeed, "rad/s", vec![800.0, 2000.0, 4000.0], "rpm"),
+            (Role::EngineSpeed, "rpm", vec![8.4, 20.0, 44.0], "rad/s"),
+            (Role::OncomingCurrent, "A", vec![0.0, 350.0, 900.0], "mA"),
+            (Role::OncomingCurrent, "mA", vec![0.0, 0.35e-3, 0.9e-3], "A"),
+            (Role::Throttle, "1", vec![0.0, 35.0], "%"),
+            (Role::OncomingPressure, "bar", vec![1e5, 900e5 * 10.0], "a smaller unit"),
+            (Role::OncomingPressure, "Pa", vec![0.2, 1.1], "a larger unit"),
+        ];
+        for (role, unit, values, likely) in cases {
+            let found = findings(&[summary(role, unit, &values)]);
+            assert!(found.len() == 1 && found[0].contains(&format!("looks like {likely}")), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn right_units_pass() {
+        let fine = [
+            summary(Role::EngineSpeed, "rad/s", &[70.0, 200.0, 680.0]),
+            summary(Role::EngineSpeed, "rpm", &[60.0, 70.0, 90.0]),
+            summary(Role::TurbineSpeed, "rpm", &[0.0, 10.0, 300.0]),
+            summary(Role::OncomingCurrent, "A", &[0.0, 0.2, 1.1]),
+            summary(Role::OncomingDuty, "%", &[0.0, 45.0]),
+            summary(Role::Throttle, "%", &[0.0, 0.14]),
+            summary(Role::OncomingPressure, "bar", &[0.0, 1.6e6]),
+            summary(Role::OncomingCurrent, "A", &[0.0]),
+        ];
+        for entry in fine {
+            assert_eq!(findings(std::slice::from_ref(&entry)), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn a_turbine_in_another_unit_than_the_engine_is_found() {
+        let engine = summary(Role::EngineSpeed, "rpm", &[80.0, 400.0]);
+        let turbine = summary(Role::TurbineSpeed, "rpm", &[0.0, 39.0]);
+        assert!(findings(&[engine, turbine])[0].contains("it looks like rad/s"));
+    }
+}

@@ -1,0 +1,286 @@
+//! Readings: samples of mapped channels in SI, with what cannot be a reading taken out by stated rules and counted.
+//!
+//! Besides the rules for time stamps (see [`crate::samples`]):
+//!
+//! - a value outside `valid_range` of the map is not used;
+//! - several channels of one signal count where all of them have the same time stamp;
+//! - a speed is frozen that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples
+//!   and three times as many samples as ever before, while a speed that it cannot part from changes by [`FROZEN_CHANGE`]: it is
+//!   not used until it changes. Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from
+//!   the turbine.
+
+use crate::map::Resolved;
+use crate::plausibility::Extremes;
+use crate::samples::{Quality, QualityCounts};
+use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
+
+/// A speed is frozen when it stood still for so long, s.
+pub const FROZEN_S: f64 = 0.5;
+/// When it has not changed since the log began, s: how coarse it is, is not known then.
+pub const FROZEN_FROM_START_S: f64 = 5.0;
+/// And for so many samples.
+pub const FROZEN_SAMPLES: u32 = 10;
+/// While a speed that it cannot part from changed by this share of its value.
+pub const FROZEN_CHANGE: f64 = 0.1;
+
+/// A value of a signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// What it is.
+    pub role: Role,
+    /// When it was measured, s: its time stamp less the delay of the map.
+    pub time_s: f64,
+    /// Its time stamp, s; rising for each role.
+    pub stamp_s: f64,
+    /// The value in the unit of the role.
+    pub value: f64,
+}
+
+/// What came of the samples of a role.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoleSummary {
+    /// The role.
+    pub role: Role,
+    /// Samples of each quality.
+    pub counts: QualityCounts,
+    /// Extremes and middle of the good ones, in the unit of the role.
+    pub extremes: Extremes,
+    /// The unit in which the log has it.
+    pub unit_name: String,
+}
+
+/// The channels of one role while they are read.
+struct Channels {
+    resolved: Resolved,
+    /// Values of the parts at one time, and the time.
+    parts: Vec<Option<f64>>,
+    parts_s: f64,
+    counts: QualityCounts,
+    extremes: Extremes,
+    still: Option<Still>,
+    /// Samples of the longest time so far in which the speed stood still and was not frozen: coarse signals do so often.
+    longest_still: u32,
+}
+
+/// A speed that stands still.
+#[derive(Debug, Clone, Copy)]
+struct Still {
+    value: f64,
+    since_s: f64,
+    samples: u32,
+    /// The other speeds when it began.
+    others: [Option<f64>; SPEEDS],
+    frozen: bool,
+}
+
+/// Roles that are speeds: the first five.
+const SPEEDS: usize = 5;
+
+/// The readings of a log in the order of their time stamps.
+pub struct Readings<'a> {
+    samples: Samples<'a>,
+    roles: Vec<Channels>,
+    /// Role and part of each channel; a channel may serve several roles.
+    users: Vec<Vec<(usize, usize)>>,
+    /// Roles that the last sample still has to be given to.
+    pending: Vec<(usize, usize)>,
+    sample: Option<crate::Sample>,
+    speeds: [Option<f64>; SPEEDS],
+}
+
+impl<'a> Readings<'a> {
+    /// The readings of a log by a map.
+    ///
+    /// # Errors
+    /// The map does not fit the log, or the log cannot be read.
+    pub fn new(log: &'a mut Log, map: &ChannelMap) -> Result<Self, LogError> {
+        let resolved = map.resolve(log)?;
+        let mut users = vec![Vec::new(); log.channels().len()];
+        for (i, resolved) in resolved.iter().enumerate() {
+            for (part, &channel) in resolved.channels.iter().enumerate() {
+                users[channel].push((i, part));
+            }
+        }
+        let wanted: Vec<usize> = (0..users.len()).filter(|&i| !users[i].is_empty()).collect();
+        let roles = resolved.into_iter().map(|resolved| Channels {
+            parts: vec![None; resolved.channels.len()],
+            parts_s: f64::NAN,
+            resolved,
+            counts: QualityCounts::default(),
+            extremes: Extremes::default(),
+            still: None,
+            longest_still: 0,
+        });
+        let roles = roles.collect();
+        Ok(Self {
+            samples: log.samples(&wanted)?,
+            roles,
+            users,
+            pending: Vec::new(),
+            sample: None,
+            speeds: [None; SPEEDS],
+        })
+    }
+
+    /// What came of the samples so far.
+    pub fn summary(&self) -> Vec<RoleSummary> {
+        let summary = |channels: &Channels| RoleSummary {
+            role: channels.resolved.entry.role,
+            counts: channels.counts,
+            extremes: channels.extremes,
+            unit_name: channels.resolved.unit_name.clone(),
+        };
+        self.roles.iter().map(summary).collect()
+    }
+
+    /// What is to be said about the log, complete after the last reading.
+    pub fn notes(&self) -> &[String] {
+        self.samples.notes()
+    }
+
+    /// Resets of clocks so far.
+    pub fn resets(&self) -> u32 {
+        self.samples.resets()
+    }
+
+    /// Checks units against what the values so far can be.
+    ///
+    /// # Errors
+    /// A unit is wrong by all appearances.
+    pub fn check_units(&self) -> Result<(), LogError> {
+        match plausibility::findings(&self.summary()).into_iter().next() {
+            Some(finding) => Err(LogError::map(finding)),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks, after the last reading, that most samples of each role could be used, and the units.
+    ///
+    /// # Errors
+    /// Most samples are unusable, or a unit is wrong by all appearances.
+    pub fn check(&self) -> Result<(), LogError> {
+        let summary = self.summary();
+        for role in &summary {
+            let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+            if total == 0 {
+                let name = role.role.name();
+                return Err(LogError::map(format!(
+                    "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
+                )));
+            }
+            if 2 * good < total {
+                return Err(LogError::map(format!(
+                    "{} of {total} samples of {} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
+                    total - good,
+                    role.role.name(),
+                    role.counts.faults()
+                )));
+            }
+        }
+        self.check_units()
+    }
+
+    /// Gives the sample to a role; a reading if it is one.
+    fn take(&mut self, (role, part): (usize, usize), sample: &crate::Sample) -> Option<Reading> {
+        let channels = &mut self.roles[role];
+        let entry = &channels.resolved.entry;
+        let mut quality = sample.quality;
+        let mut value = sample.value;
+        if channels.parts.len() > 1 {
+            if sample.time_s != channels.parts_s {
+                if channels.parts.iter().any(Option::is_some) {
+                    channels.counts.push(Quality::Missing);
+                }
+                channels.parts.fill(None);
+                channels.parts_s = sample.time_s;
+            }
+            if quality == Quality::Good {
+                channels.parts[part] = Some(value);
+            }
+            let known: Vec<f64> = channels.parts.iter().flatten().copied().collect();
+            if known.len() < channels.parts.len() {
+                return None;
+            }
+            channels.parts.fill(None);
+            #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
+            let divisor = if entry.combine == Combine::Mean { known.len() as f64 } else { 1.0 };
+            value = known.iter().sum::<f64>() / divisor;
+        }
+        let value = channels.resolved.in_unit(value);
+        if quality == Quality::Good
+            && entry.valid_range.is_some_and(|[least, greatest]| !(least..=greatest).contains(&value))
+        {
+            quality = Quality::OutOfRange;
+        }
+        let value = channels.resolved.in_si(value);
+        if quality == Quality::Good && !value.is_finite() {
+            quality = Quality::Missing;
+        }
+        let kind = entry.role;
+        let time_s = sample.time_s - entry.delay_s;
+        if quality == Quality::Good && kind.is_speed() {
+            if channels.is_frozen(value, sample.time_s, &self.speeds) {
+                quality = Quality::Frozen;
+            } else {
+                self.speeds[kind as usize] = Some(value);
+            }
+        }
+        channels.counts.push(quality);
+        if quality != Quality::Good {
+            return None;
+        }
+        channels.extremes.push(value);
+        Some(Reading { role: kind, time_s, stamp_s: sample.time_s, value })
+    }
+}
+
+impl Channels {
+    fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &[Option<f64>; SPEEDS]) -> bool {
+        let partners: &[Role] = match self.resolved.entry.role {
+            Role::EngineSpeed => &[Role::TurbineSpeed],
+            Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed, Role::VehicleSpeed],
+            Role::OutputSpeed => &[Role::WheelSpeed, Role::VehicleSpeed],
+            Role::WheelSpeed => &[Role::OutputSpeed, Role::VehicleSpeed],
+            _ => &[Role::OutputSpeed, Role::WheelSpeed],
+        };
+        let Some(still) = self.still.as_mut().filter(|still| still.value == value) else {
+            if let Some(before) = self.still.filter(|before| !before.frozen) {
+                self.longest_still = self.longest_still.max(before.samples);
+            }
+            self.still = Some(Still { value, since_s: time_s, samples: 1, others: *speeds, frozen: false });
+            return false;
+        };
+        still.samples += 1;
+        let limit_s = if self.longest_still == 0 { FROZEN_FROM_START_S } else { FROZEN_S };
+        let long = still.samples >= FROZEN_SAMPLES.max(3 * self.longest_still) && time_s - still.since_s >= limit_s;
+        if !still.frozen && value != 0.0 && long {
+            still.frozen =
+                partners.iter().any(|partner| match (speeds[*partner as usize], still.others[*partner as usize]) {
+                    (Some(now), Some(then)) => (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs()),
+                    _ => false,
+                });
+        }
+        still.frozen
+    }
+}
+
+impl Iterator for Readings<'_> {
+    type Item = Result<Reading, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            while let (Some(user), Some(sample)) = (self.pending.pop(), self.sample) {
+                if let Some(reading) = self.take(user, &sample) {
+                    return Some(Ok(reading));
+                }
+            }
+            match self.samples.next()? {
+                Err(error) => return Some(Err(error)),
+                Ok(sample) => {
+                    self.pending.extend_from_slice(&self.users[sample.channel]);
+                    self.sample = Some(sample);
+                }
+            }
+        }
+    }
+}

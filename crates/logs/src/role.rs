@@ -1,0 +1,126 @@
+//! What a channel can be for the program.
+
+use trace::Quantity;
+
+/// A signal of the car that a channel of a log can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Role {
+    /// Engine speed, rad/s.
+    EngineSpeed,
+    /// Turbine (gearbox input) speed, rad/s.
+    TurbineSpeed,
+    /// Gearbox output speed, rad/s.
+    OutputSpeed,
+    /// Speed of the driven wheels, rad/s.
+    WheelSpeed,
+    /// Speed of the car, m/s.
+    VehicleSpeed,
+    /// Longitudinal acceleration of the car, m/s^2.
+    VehicleAcceleration,
+    /// Current of the oncoming clutch's valve, A.
+    OncomingCurrent,
+    /// Current of the offgoing clutch's valve, A.
+    OffgoingCurrent,
+    /// Duty cycle of the oncoming clutch's valve, %.
+    OncomingDuty,
+    /// Duty cycle of the offgoing clutch's valve, %.
+    OffgoingDuty,
+    /// Commanded pressure of the oncoming clutch, Pa.
+    OncomingPressureCommand,
+    /// Measured pressure of the oncoming clutch, Pa.
+    OncomingPressure,
+    /// Measured torque of the oncoming clutch, N m.
+    OncomingTorque,
+    /// Engine torque, N m.
+    EngineTorque,
+    /// Throttle, 0 to 1.
+    Throttle,
+    /// Engaged gear; below 1 it is not a forward gear.
+    Gear,
+    /// Commanded gear.
+    TargetGear,
+    /// Whether a shift is in progress: 0 or 1.
+    ShiftActive,
+    /// Position of the selector, as the log has it.
+    Selector,
+    /// Oil temperature, degC.
+    OilTemperature,
+}
+
+/// Role, its name in maps, what it measures, and its unit in readings.
+const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
+    (Role::EngineSpeed, "engine_speed", Some(Quantity::Rotation), "rad/s"),
+    (Role::TurbineSpeed, "turbine_speed", Some(Quantity::Rotation), "rad/s"),
+    (Role::OutputSpeed, "output_speed", Some(Quantity::Rotation), "rad/s"),
+    (Role::WheelSpeed, "wheel_speed", Some(Quantity::Rotation), "rad/s"),
+    (Role::VehicleSpeed, "vehicle_speed", Some(Quantity::Velocity), "m/s"),
+    (Role::VehicleAcceleration, "vehicle_acceleration", Some(Quantity::Acceleration), "m/s^2"),
+    (Role::OncomingCurrent, "oncoming_current", Some(Quantity::Current), "A"),
+    (Role::OffgoingCurrent, "offgoing_current", Some(Quantity::Current), "A"),
+    (Role::OncomingDuty, "oncoming_duty", Some(Quantity::Share), "%"),
+    (Role::OffgoingDuty, "offgoing_duty", Some(Quantity::Share), "%"),
+    (Role::OncomingPressureCommand, "oncoming_pressure_command", Some(Quantity::Pressure), "Pa"),
+    (Role::OncomingPressure, "oncoming_pressure", Some(Quantity::Pressure), "Pa"),
+    (Role::OncomingTorque, "oncoming_torque", Some(Quantity::Torque), "N m"),
+    (Role::EngineTorque, "engine_torque", Some(Quantity::Torque), "N m"),
+    (Role::Throttle, "throttle", Some(Quantity::Share), "1"),
+    (Role::Gear, "gear", None, ""),
+    (Role::TargetGear, "target_gear", None, ""),
+    (Role::ShiftActive, "shift_active", None, ""),
+    (Role::Selector, "selector", None, ""),
+    (Role::OilTemperature, "oil_temperature", Some(Quantity::Temperature), "degC"),
+];
+
+impl Role {
+    /// All of them, in their order.
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.iter().map(|(role, ..)| *role)
+    }
+
+    fn row(self) -> &'static (Self, &'static str, Option<Quantity>, &'static str) {
+        // The table has every role, in the order of the enumeration; a test checks it.
+        &TABLE[self as usize]
+    }
+
+    /// Its name in a channel map.
+    pub fn name(self) -> &'static str {
+        self.row().1
+    }
+
+    /// What it measures; none for gears and states.
+    pub fn quantity(self) -> Option<Quantity> {
+        self.row().2
+    }
+
+    /// The unit of its readings.
+    pub fn unit(self) -> &'static str {
+        self.row().3
+    }
+
+    /// The role of this name.
+    pub fn parse(name: &str) -> Option<Self> {
+        Self::all().find(|role| role.name() == name)
+    }
+
+    /// Whether it is the speed of a shaft or of the car.
+    pub fn is_speed(self) -> bool {
+        matches!(
+            self,
+            Self::EngineSpeed | Self::TurbineSpeed | Self::OutputSpeed | Self::WheelSpeed | Self::VehicleSpeed
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_role_is_in_its_row() {
+        for (i, role) in Role::all().enumerate() {
+            assert_eq!(role as usize, i);
+            assert_eq!(Role::parse(role.name()), Some(role));
+        }
+        assert_eq!(Role::OilTemperature as usize, TABLE.len() - 1);
+    }
+}

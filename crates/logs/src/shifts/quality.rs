@@ -1,0 +1,141 @@
+//! Load and quality of a shift.
+
+use super::ratio::RatioWatch;
+use super::track::Track;
+use super::{Direction, Load, Shift, ShiftQuality};
+use crate::Role;
+
+/// The load is that of so long before the shift, s.
+const LOAD_S: f64 = 0.3;
+/// Slip of the converter that tells who drives: share of the turbine speed, and least size, rad/s.
+const SLIP: f64 = 0.02;
+const SLIP_RAD_S: f64 = 3.0;
+/// Engine torque that tells who drives, N m.
+const TORQUE_N_M: f64 = 5.0;
+/// Throttle of a driver who accelerates.
+const THROTTLE: f64 = 0.03;
+/// Readings further apart are not joined by a line, s.
+const APART_S: f64 = 0.3;
+
+/// Power-on or power-off: from the slip of the converter, else the engine torque, else the throttle.
+pub(super) fn load(shift: &Shift, tracks: &[Track]) -> Load {
+    let to_s = shift.start_s();
+    let mean = |role: Role| tracks[role as usize].mean(to_s - LOAD_S, to_s);
+    let sign = |value: f64| if value > 0.0 { Load::PowerOn } else { Load::PowerOff };
+    if let (Some(engine), Some(turbine)) = (mean(Role::EngineSpeed), mean(Role::TurbineSpeed)) {
+        let slip = engine - turbine;
+        if slip.abs() > SLIP_RAD_S.max(SLIP * turbine) {
+            return sign(slip);
+        }
+    }
+    match (mean(Role::EngineTorque).filter(|torque| torque.abs() > TORQUE_N_M), mean(Role::Throttle)) {
+        (Some(torque), _) => sign(torque),
+        (None, Some(throttle)) => sign(throttle - THROTTLE),
+        _ => Load::Unknown,
+    }
+}
+
+pub(super) fn quality(
+    shift: &Shift,
+    ratios: &[f64],
+    tracks: &[Track],
+    points: &RatioWatch,
+    output_rad_per_m: Option<f64>,
+) -> ShiftQuality {
+    ShiftQuality { flare_rad_s: flare(shift, ratios, points), jerk_m_s3: jerk(shift, tracks, output_rad_per_m) }
+}
+
+fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {
+    let [begin_s, end_s] = shift.inertia_s?;
+    let (gear, from_s, to_s) = match shift.direction {
+        Direction::Up => (shift.from, shift.start_s().min(begin_s - 0.3), 0.5 * (begin_s + end_s)),
+        Direction::Down => (shift.to, 0.5 * (begin_s + end_s), end_s + 0.5),
+    };
+    let ratio = ratios.get(usize::try_from(gear).ok()?.checked_sub(1)?)?;
+    let above = points.between(from_s, to_s).map(|point| (point.ratio - ratio) * point.output_rad_s);
+    above.reduce(f64::max).map(|most| most.max(0.0))
+}
+
+/// The greatest size of the jerk around a shift.
+fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Option<f64> {
+    /// Half the time over which a parabola is laid, s.
+    const HALF_S: f64 = 0.15;
+    /// Time around the shift, s.
+    const AROUND_S: f64 = 0.3;
+    let track = |role: Role| Some(&tracks[role as usize]).filter(|track| !track.is_empty());
+    // What the derivatives are taken of, in m/s or m/s^2: its factor and which coefficient of the parabola is the jerk.
+    let (track, factor, of_speed) =
+        match (track(Role::VehicleAcceleration), track(Role::VehicleSpeed), track(Role::OutputSpeed)) {
+            (Some(acceleration), ..) => (acceleration, 1.0, false),
+            (_, Some(speed), _) => (speed, 1.0, true),
+            (.., Some(output)) => (output, 1.0 / output_rad_per_m?, true),
+            _ => return None,
+        };
+    let (from_s, to_s) = (shift.start_s() - AROUND_S, shift.end_s() + AROUND_S);
+    let centres: Vec<f64> = track.between(from_s, to_s).map(|(time_s, _)| time_s).collect();
+    let mut most: Option<f64> = None;
+    for centre_s in centres {
+        // A hole in the middle would leave the parabola free.
+        track.at(centre_s, APART_S)?;
+        let points: Vec<(f64, f64)> = track
+            .between(centre_s - HALF_S, centre_s + HALF_S)
+            .map(|(time_s, value)| (time_s - centre_s, value))
+            .collect();
+        let spread = points.first().zip(points.last()).map_or(0.0, |(first, last)| last.0 - first.0);
+        if points.len() < 7 || spread < 1.5 * HALF_S {
+            continue;
+        }
+        let Some([_, linear, quadratic]) = parabola(&points) else { continue };
+        let jerk = factor * if of_speed { 2.0 * quadratic } else { linear };
+        most = Some(most.map_or(jerk.abs(), |most| most.max(jerk.abs())));
+    }
+    most
+}
+
+/// Coefficients of the parabola with the least squares of distances.
+fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
+    // Normal equations; times are within a fraction of a second, so they are scaled to 1.
+    let scale = points.iter().map(|(time_s, _)| time_s.abs()).fold(0.0, f64::max);
+    let mut sums = [[0.0; 4]; 3];
+    for (time_s, value) in points {
+        let powers = [1.0, time_s / scale, (time_s / scale).powi(2)];
+        for (row, power) in sums.iter_mut().zip(powers) {
+            for (sum, factor) in row.iter_mut().zip([powers[0], powers[1], powers[2], *value]) {
+                *sum += power * factor;
+            }
+        }
+    }
+    // The matrix is symmetric and positive definite: no pivots are needed.
+    for i in 0..3 {
+        let pivot = sums[i];
+        if pivot[i].abs() <= 1e-9 || pivot[i].is_nan() {
+            return None;
+        }
+        for row in sums.iter_mut().skip(i + 1) {
+            let factor = row[i] / pivot[i];
+            for (cell, above) in row.iter_mut().zip(pivot) {
+                *cell -= factor * above;
+            }
+        }
+    }
+    let quadratic = sums[2][3] / sums[2][2];
+    let linear = (sums[1][3] - sums[1][2] * quadratic) / sums[1][1];
+    let constant = (sums[0][3] - sums[0][1] * linear - sums[0][2] * quadratic) / sums[0][0];
+    Some([constant, linear / scale, quadratic / (scale * scale)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_through_its_own_points_is_found() {
+        let points: Vec<(f64, f64)> =
+            (0_i32..11).map(|i| f64::from(i - 4) * 0.02).map(|t| (t, 3.0 - 2.0 * t + 7.0 * t * t)).collect();
+        let found = parabola(&points).unwrap();
+        for (found, expected) in found.into_iter().zip([3.0, -2.0, 7.0]) {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+        assert!(parabola(&[(0.0, 1.0); 9]).is_none());
+    }
+}

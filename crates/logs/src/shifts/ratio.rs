@@ -1,0 +1,213 @@
+//! Gears and their changes from the ratio of turbine and output speed.
+
+use std::collections::VecDeque;
+
+use super::track::Track;
+
+/// Below this output speed a ratio says nothing, rad/s.
+const OUTPUT_MIN_RAD_S: f64 = 8.0;
+/// Below this turbine speed a ratio says nothing, rad/s.
+const TURBINE_MIN_RAD_S: f64 = 20.0;
+/// A ratio is in gear within this part of the way to the next gear.
+const BAND: f64 = 0.2;
+/// And within this share.
+const BAND_MAX: f64 = 0.04;
+/// A gear counts when the ratio was in it for so long, s, and for so many points.
+const IN_GEAR_S: f64 = 0.1;
+const IN_GEAR_POINTS: u32 = 5;
+/// A change that takes longer is none: a neutral, or a converter in place of a turbine, s.
+const LONGEST_S: f64 = 3.0;
+/// Readings further apart than this are a hole, s: what happens in it is not seen.
+const HOLE_S: f64 = 0.3;
+/// Points of which the middle one is taken.
+const MEDIAN: usize = 5;
+
+/// Ratio of turbine and output at one time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    pub(super) time_s: f64,
+    pub(super) ratio: f64,
+    pub(super) output_rad_s: f64,
+}
+
+/// Some time in one gear.
+#[derive(Debug, Clone, Copy)]
+struct InGear {
+    gear: usize,
+    first_s: f64,
+    last_s: f64,
+    points: u32,
+}
+
+impl InGear {
+    fn counts(&self) -> bool {
+        self.points >= IN_GEAR_POINTS && self.last_s - self.first_s >= IN_GEAR_S
+    }
+}
+
+/// A change of the gear.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RatioChange {
+    pub(super) from: u32,
+    pub(super) to: u32,
+    pub(super) inertia_s: [f64; 2],
+}
+
+/// Watches the ratio.
+pub(super) struct RatioWatch {
+    /// Logarithms of the ratios and the widths of their bands.
+    gears: Vec<(f64, f64)>,
+    turbine: Track,
+    /// Output readings for which the turbine speed is still to come.
+    outputs: VecDeque<(f64, f64)>,
+    raw: VecDeque<Point>,
+    held_s: f64,
+    points: VecDeque<Point>,
+    before: Option<InGear>,
+    now: Option<InGear>,
+    changes: VecDeque<RatioChange>,
+}
+
+impl RatioWatch {
+    pub(super) fn new(ratios: &[f64], held_s: f64) -> Self {
+        let logs: Vec<f64> = ratios.iter().map(|ratio| ratio.ln()).collect();
+        let band = |i: usize| {
+            let step = |j: usize| logs.get(j).map_or(f64::INFINITY, |other| (other - logs[i]).abs());
+            (BAND * step(i.wrapping_sub(1)).min(step(i + 1))).min(BAND_MAX)
+        };
+        Self {
+            gears: (0..logs.len()).map(|i| (logs[i], band(i))).collect(),
+            turbine: Track::new(held_s),
+            outputs: VecDeque::new(),
+            raw: VecDeque::new(),
+            held_s,
+            points: VecDeque::new(),
+            before: None,
+            now: None,
+            changes: VecDeque::new(),
+        }
+    }
+
+    pub(super) fn turbine(&mut self, time_s: f64, rad_s: f64) {
+        self.turbine.push(time_s, rad_s);
+        self.join();
+    }
+
+    pub(super) fn output(&mut self, time_s: f64, rad_s: f64) {
+        self.outputs.push_back((time_s, rad_s));
+        // Without a turbine speed nothing is held for long.
+        while self.outputs.front().is_some_and(|(first_s, _)| time_s - first_s > self.held_s) {
+            self.outputs.pop_front();
+        }
+        self.join();
+    }
+
+    pub(super) fn next_change(&mut self) -> Option<RatioChange> {
+        self.changes.pop_front()
+    }
+
+    /// The points from one time to another.
+    pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(move |point| (from_s..=to_s).contains(&point.time_s))
+    }
+
+    /// Makes points of the output readings that the turbine speed has passed.
+    fn join(&mut self) {
+        if self.gears.is_empty() {
+            self.outputs.clear();
+            return;
+        }
+        while let Some(&(time_s, output_rad_s)) =
+            self.outputs.front().filter(|(time_s, _)| *time_s <= self.turbine.newest_s())
+        {
+            self.outputs.pop_front();
+            let turbine_rad_s = self.turbine.at(time_s, HOLE_S).filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
+            if let Some(turbine_rad_s) = turbine_rad_s.filter(|_| output_rad_s > OUTPUT_MIN_RAD_S) {
+                self.raw.push_back(Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s });
+            } else {
+                // Standstill and holes: what is before is not compared with what comes after.
+                self.raw.clear();
+                if self.now.or(self.before).is_none_or(|gear| time_s - gear.last_s > HOLE_S) {
+                    (self.before, self.now) = (None, None);
+                }
+            }
+            if self.raw.len() > MEDIAN {
+                self.raw.pop_front();
+            }
+            if self.raw.len() == MEDIAN {
+                let mut ratios: [f64; MEDIAN] = std::array::from_fn(|i| self.raw[i].ratio);
+                ratios.sort_by(f64::total_cmp);
+                self.take(Point { ratio: ratios[MEDIAN / 2], ..self.raw[MEDIAN / 2] });
+            }
+        }
+    }
+
+    fn take(&mut self, point: Point) {
+        let hole = self.points.back().is_some_and(|last| point.time_s - last.time_s > HOLE_S);
+        if hole {
+            (self.before, self.now) = (None, None);
+        }
+        self.points.push_back(point);
+        while self.points.front().is_some_and(|first| point.time_s - first.time_s > self.held_s) {
+            self.points.pop_front();
+        }
+        let log = point.ratio.ln();
+        let gear = self.gears.iter().position(|(gear, band)| (log - gear).abs() <= *band);
+        match (gear, &mut self.now) {
+            (Some(gear), Some(now)) if now.gear == gear => {
+                let counted = now.counts();
+                now.last_s = point.time_s;
+                now.points += 1;
+                if !counted && now.counts() {
+                    self.engaged(gear);
+                }
+            }
+            (Some(gear), _) => {
+                self.leave();
+                self.now = Some(InGear { gear, first_s: point.time_s, last_s: point.time_s, points: 1 });
+            }
+            (None, _) => self.leave(),
+        }
+    }
+
+    /// The ratio left a gear; it is remembered if it was in it for long enough.
+    fn leave(&mut self) {
+        if let Some(now) = self.now.take().filter(InGear::counts) {
+            self.before = Some(now);
+        }
+    }
+
+    /// The ratio has been in a gear for long enough.
+    fn engaged(&mut self, gear: usize) {
+        let (Some(before), Some(now)) = (self.before, self.now) else { return };
+        if before.gear != gear && now.first_s - before.last_s <= LONGEST_S {
+            let number = |gear: usize| u32::try_from(gear + 1).unwrap_or(u32::MAX);
+            let inertia_s = self.inertia(&before, &now);
+            self.changes.push_back(RatioChange { from: number(before.gear), to: number(gear), inertia_s });
+        }
+    }
+
+    /// Between which times the ratio went from 5 to 95 % of its way, by lines between the points.
+    fn inertia(&self, before: &InGear, now: &InGear) -> [f64; 2] {
+        let (from, to) = (self.gears[before.gear].0, self.gears[now.gear].0);
+        let way = |point: &Point| (point.ratio.ln() - from) / (to - from);
+        let points: Vec<(f64, f64)> =
+            self.between(before.last_s - 1.0, now.last_s).map(|point| (point.time_s, way(point))).collect();
+        let half = points.iter().position(|(_, way)| *way > 0.5).unwrap_or(0);
+        let crossing = |pair: &[(f64, f64)], level: f64| {
+            let ((t0, x0), (t1, x1)) = (pair[0], pair[1]);
+            if x1 == x0 { t1 } else { t0 + ((level - x0) / (x1 - x0)).clamp(0.0, 1.0) * (t1 - t0) }
+        };
+        let up = |level: f64| move |pair: &&[(f64, f64)]| pair[0].1 <= level && pair[1].1 > level;
+        let first = points[..=half.min(points.len().saturating_sub(1))]
+            .windows(2)
+            .rev()
+            .find(up(0.05))
+            .map(|pair| crossing(pair, 0.05));
+        let last = points[half.saturating_sub(1).min(points.len())..]
+            .windows(2)
+            .find(up(0.95))
+            .map(|pair| crossing(pair, 0.95));
+        [first.unwrap_or(before.last_s), last.unwrap_or(now.first_s)]
+    }
+}

@@ -1,0 +1,247 @@
+//! Files that asammdf, python-can, cantools and pyarrow wrote. What must be in them follows from the formulas of
+//! `tests/data/make.py`, which are stated again here.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use common::{Folder, channel, data, read, with_dbc};
+use logs::{Log, OpenOptions, Quality};
+
+const ROWS: u32 = 40;
+
+/// Checks times and values of a channel; an invalid one is told by its quality alone.
+fn check(found: &[(f64, f64, Quality)], expected: impl ExactSizeIterator<Item = (f64, f64, Quality)>, name: &str) {
+    assert_eq!(found.len(), expected.len(), "{name}");
+    for ((time_s, value, quality), (expected_s, expected, expected_quality)) in found.iter().zip(expected) {
+        // BLF keeps whole nanoseconds, and its writer cuts off what is below; a double keeps 53 bits.
+        let tolerance_s = 2e-9 + 2.0 * f64::EPSILON * expected_s.abs();
+        assert!((time_s - expected_s).abs() < tolerance_s, "{name}: {time_s} {expected_s}");
+        assert_eq!(*quality, expected_quality, "{name} at {time_s}");
+        let same = (value - expected).abs() <= 1e-9 * expected.abs().max(1.0);
+        assert!(same || *quality != Quality::Good, "{name}: {value} {expected}");
+    }
+}
+
+fn good(time_s: f64, value: f64) -> (f64, f64, Quality) {
+    (time_s, value, Quality::Good)
+}
+
+/// Rows of the fast group, from number to value.
+fn fast(value: impl Fn(f64) -> f64) -> impl ExactSizeIterator<Item = (f64, f64, Quality)> {
+    (0..ROWS).map(move |i| good(f64::from(i) * 0.01, value(f64::from(i))))
+}
+
+/// Rows of the slow group.
+fn slow(value: impl Fn(f64) -> f64) -> impl ExactSizeIterator<Item = (f64, f64, Quality)> {
+    (0..ROWS / 2).map(move |i| good(0.005 + f64::from(i) * 0.025, value(f64::from(i))))
+}
+
+#[test]
+fn mdf_of_every_version_and_layout_gives_the_same_values() {
+    for file in ["plain_400.mf4", "plain_410.mf4", "plain_420.mf4", "deflate.mf4", "transposed.mf4", "unsorted.mf4"] {
+        let (log, samples, notes) = read(&data(file), &OpenOptions::default()).unwrap();
+        assert_eq!(notes, Vec::<String>::new(), "{file}");
+        check(&channel(&log, &samples, "N_Eng"), fast(|i| 800.0 + 10.0 * i), file);
+        check(&channel(&log, &samples, "N_Turb"), slow(|i| 700.0 + 3.0 * i), file);
+        if file != "unsorted.mf4" {
+            check(&channel(&log, &samples, "Gear"), slow(|i| 1.0 + (i / 10.0).floor()), file);
+        }
+        assert!(
+            samples.windows(2).all(|pair| pair[0].time_s <= pair[1].time_s),
+            "{file}: the groups are merged by time"
+        );
+        let engine = &log.channels()[log.find("N_Eng", None).unwrap()];
+        assert_eq!((engine.unit.as_str(), engine.group.as_str()), ("1/min", "fast"), "{file}");
+        assert!(log.find("N_Eng", Some("slow")).is_err() && log.find("fast.N_Eng", None).is_ok(), "{file}");
+    }
+}
+
+#[test]
+fn mdf_conversions_give_physical_values() {
+    for file in ["deflate.mf4", "transposed.mf4"] {
+        let (log, samples, _) = read(&data(file), &OpenOptions::default()).unwrap();
+        let of = |name: &str| channel(&log, &samples, name);
+        check(&of("Rational"), slow(|i| (2.0 * i + 6.0) / 4.0), "Rational");
+        check(&of("Table"), slow(|i| if i <= 10.0 { 10.0 * i } else { 100.0 + 30.0 * (i - 10.0) }), "Table");
+        check(&of("Signed"), slow(|i| i - 5.0), "Signed");
+        check(&of("Single"), slow(|i| i / 8.0), "Single");
+        check(&of("Lever"), slow(|i| i % 2.0), "Lever");
+    }
+}
+
+#[test]
+fn mdf_invalidation_bits_mark_samples() {
+    let (log, samples, _) = read(&data("invalidation.mf4"), &OpenOptions::default()).unwrap();
+    let expected = (0..ROWS).map(|i| {
+        let quality = if i % 5 == 3 { Quality::Invalid } else { Quality::Good };
+        (f64::from(i) * 0.01, 800.0 + 10.0 * f64::from(i), quality)
+    });
+    check(&channel(&log, &samples, "N_Eng"), expected, "N_Eng");
+    check(&channel(&log, &samples, "N_Turb"), slow(|i| 700.0 + 3.0 * i), "N_Turb");
+}
+
+/// Times of a bus log count from its first frame, or from another time, as its format has it.
+fn bus(file: &str, first_s: Option<f64>) {
+    let (log, samples, notes) = read(&data(file), &with_dbc()).unwrap();
+    let first_s = first_s.unwrap_or(samples[0].time_s);
+    let rows = |shift_s: f64, value: fn(f64) -> f64| {
+        (0..ROWS).map(move |i| good(first_s + f64::from(i) * 0.01 + shift_s, value(f64::from(i))))
+    };
+    let short = |name: &str| {
+        let mut found = channel(&log, &samples, name);
+        // The frame that ends before the signal.
+        let (time_s, _, quality) = found.pop().unwrap();
+        assert!((time_s - first_s - 1.01).abs() < 1e-6 && quality == Quality::Missing, "{file}: {name}");
+        found
+    };
+    let mut engine = channel(&log, &samples, "N_Eng");
+    // The short frame has this signal: 0x0400 times 0.25.
+    assert_eq!(engine.pop().unwrap().1, 256.0, "{file}");
+    check(&engine, rows(0.0, |i| 800.0 + 10.0 * i), "N_Eng");
+    check(&short("Tq_Eng"), rows(0.0, |i| 2.5 * i - 20.0), "Tq_Eng");
+    check(&short("Throttle"), rows(0.0, |i| 0.4 * i), "Throttle");
+    check(&channel(&log, &samples, "N_Turb"), rows(0.002, |i| 700.0 + 3.0 * i), "N_Turb");
+    check(&channel(&log, &samples, "Gear"), rows(0.002, |i| 1.0 + (i / 20.0).floor()), "Gear");
+    check(&channel(&log, &samples, "P_Clutch"), rows(0.002, |i| i / 8.0), "P_Clutch");
+    // Two signals in the same place, one in even and one in odd frames.
+    let each_second =
+        |from: u32, value: f64| (0..ROWS / 2).map(move |i| good(first_s + f64::from(2 * i + from) * 0.01, value));
+    check(&channel(&log, &samples, "T_Oil"), each_second(0, 60.0), "T_Oil");
+    check(&channel(&log, &samples, "T_Air"), each_second(1, 21.5), "T_Air");
+    assert_eq!(notes.last().unwrap(), "1 of 82 frames, of 1 identifiers, are not in the DBC: 0x7DF", "{file}");
+    assert_eq!(log.channels()[log.find("T_Oil", None).unwrap()].group, "Engine");
+}
+
+#[test]
+fn can_logs_of_four_formats_give_the_same_signals() {
+    bus("bus.log", Some(1000.0));
+    bus("bus.asc", Some(0.0));
+    bus("bus.blf", Some(0.0));
+    // Its times count from when it was written.
+    bus("bus.mf4", None);
+}
+
+#[test]
+fn can_fd_frames_are_read() {
+    for file in ["fd.asc", "fd.blf"] {
+        let (log, samples, _) = read(&data(file), &with_dbc()).unwrap();
+        let rows = (0..8_u32).map(|i| good(f64::from(i) * 0.01, 0.25 * f64::from(0x0c40 + i)));
+        check(&channel(&log, &samples, "N_Eng"), rows, file);
+    }
+}
+
+#[test]
+fn parquet_gives_numbers_and_leaves_out_what_is_absent() {
+    for file in ["snappy.parquet", "gzip.parquet", "stamps.parquet"] {
+        let (log, samples, notes) = read(&data(file), &OpenOptions::default()).unwrap();
+        let came: Vec<u32> = (0..ROWS).filter(|i| i % 7 != 2).collect();
+        let engine = came.iter().map(|&i| good(f64::from(i) * 0.01, 800.0 + 10.0 * f64::from(i)));
+        check(&channel(&log, &samples, "N_Eng"), engine, file);
+        check(&channel(&log, &samples, "gear"), fast(|i| 1.0 + (i / 20.0).floor()), file);
+        check(&channel(&log, &samples, "locked"), fast(|i| 1.0 - i % 2.0), file);
+        check(&channel(&log, &samples, "turbine_speed_rpm"), fast(|i| 700.0 + 3.0 * i), file);
+        let unit = |name: &str| log.channels()[log.find(name, None).unwrap()].unit.clone();
+        assert_eq!((unit("N_Eng").as_str(), unit("turbine_speed_rpm").as_str()), ("rpm", "rpm"), "{file}");
+        assert_eq!(notes, ["1 columns do not hold numbers and are left out"], "{file}");
+    }
+}
+
+#[test]
+fn csv_of_every_dialect_gives_the_same_values() {
+    let folder = Folder::new("dialects");
+    let row = |i: u32, d: char, p: &str| {
+        format!("{}{d}{}{d}{}", f64::from(i) * 0.01, 800.5 + 10.0 * f64::from(i), 700 + 3 * i).replace('.', p)
+    };
+    let table = |head: &str, d: char, p: &str| {
+        let rows: Vec<String> = (0..ROWS).map(|i| row(i, d, p)).collect();
+        format!("{head}\n{}\n", rows.join("\n"))
+    };
+    let dialects = [
+        table("time_s,N_Eng [rpm],N_Turb [1/min]", ',', "."),
+        table("time,N_Eng,N_Turb\ns,rpm,1/min", ',', "."),
+        table("Zeit;N_Eng;N_Turb\n[s];[1/min];[1/min]", ';', ","),
+        table("t [s]\tN_Eng [rpm]\tN_Turb [rpm]", '\t', "."),
+        table("t [s]\tN_Eng [rpm]\tN_Turb [rpm]", '\t', ","),
+        table("time_s|N_Eng (rpm)|N_Turb (rpm)", '|', "."),
+        format!("\u{feff}{}", table("time_s,N_Eng [rpm],N_Turb [rpm]", ',', ".").replace('\n', "\r\n")),
+        table("Recorder 7\nDriver: a name\n\ntime_s,N_Eng [rpm],N_Turb [rpm]", ',', "."),
+        table("# a remark\nZeit [s];N_Eng [U/min];N_Turb [U/min]", ';', "."),
+        table("\"time_s\",\"N_Eng [rpm]\",\"N_Turb [rpm]\"", ',', "."),
+    ];
+    for text in dialects {
+        let path = folder.write("log.csv", &text);
+        let (log, samples, notes) =
+            read(&path, &OpenOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        check(&channel(&log, &samples, "N_Eng"), fast(|i| 800.5 + 10.0 * i), &text[..40]);
+        check(&channel(&log, &samples, "N_Turb"), fast(|i| 700.0 + 3.0 * i), &text[..40]);
+        assert_eq!(notes, Vec::<String>::new(), "{text}");
+        for channel in log.channels() {
+            assert_eq!(trace::Unit::parse(&channel.unit).unwrap().name, "rpm", "{text}");
+        }
+    }
+}
+
+#[test]
+fn csv_that_is_not_clean_says_so() {
+    let folder = Folder::new("unclean");
+    let text = "time_ms,a_rpm,b\n0,1,2\n10,,n/a\n,3,3\n20,nan,x\n30,5,6\n40,7";
+    let (log, samples, notes) = read(&folder.write("log.csv", text), &OpenOptions::default()).unwrap();
+    let missing = |time_s: f64| (time_s, f64::NAN, Quality::Missing);
+    check(&channel(&log, &samples, "a_rpm"), [good(0.0, 1.0), good(0.03, 5.0), good(0.04, 7.0)].into_iter(), "a");
+    check(
+        &channel(&log, &samples, "b"),
+        [good(0.0, 2.0), missing(0.01), missing(0.02), good(0.03, 6.0)].into_iter(),
+        "b",
+    );
+    assert_eq!(
+        notes,
+        [
+            "1 of 6 rows have no time and are left out",
+            "1 of 6 rows have fewer cells than there are columns; the last line may be cut",
+            "2 cells are not numbers and count as missing, the first in line 3: `n/a`",
+        ]
+    );
+}
+
+#[test]
+fn what_is_no_log_is_refused_with_what_to_do() {
+    let folder = Folder::new("refused");
+    let cases: [(&[u8], &str); 9] = [
+        (b"", ": the file is empty"),
+        (b"hello", ": there are no rows"),
+        (b"hello\nworld\n", ": this is no format that is known\nhint: logs are CSV"),
+        (b"time_s,a\n", ": there are no rows"),
+        (b"1,2\n3,4\n5,6\n", ": line 1: there is no row of names above the first row of numbers\nhint: "),
+        (b"a,b\n1,2\n3,4\n", ": there is no column for the time; the first columns are a, b\nhint: "),
+        (b"time,b\nfurlong,rpm\n3,4\n5,6\n", "hint: "),
+        (b"MDF     3.30    ", ": this is MDF of version 2 or 3\nhint: "),
+        (
+            b"(1.0) can0 123#00\n",
+            ": a CAN log has frames; a DBC says which signals are in them\nhint: give it with --dbc",
+        ),
+    ];
+    for (bytes, message) in cases {
+        let error = read(&folder.write("log", bytes), &OpenOptions::default()).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(message), "{error} | {message}");
+    }
+    assert!(matches!(Log::open(&folder.0.join("none"), &OpenOptions::default()), Err(logs::LogError::Io { .. })));
+    assert!(matches!(Log::open(&folder.0, &OpenOptions::default()), Err(logs::LogError::Io { .. })));
+}
+
+#[test]
+fn a_cut_container_gives_the_frames_before_the_cut() {
+    let folder = Folder::new("cut");
+    let whole = std::fs::read(data("bus.blf")).unwrap();
+    let path = folder.write("cut.blf", &whole[..whole.len() / 2]);
+    let (log, samples, notes) = read(&path, &with_dbc()).unwrap();
+    let engine = channel(&log, &samples, "N_Eng");
+    assert!((5..40).contains(&engine.len()), "{}", engine.len());
+    check(
+        &engine,
+        (0..u32::try_from(engine.len()).unwrap()).map(|i| good(f64::from(i) * 0.01, 800.0 + 10.0 * f64::from(i))),
+        "N_Eng",
+    );
+    assert!(notes.last().unwrap().contains("byte 144: the object is cut"), "{notes:?}");
+    assert!(notes.last().unwrap().ends_with("hint: the log is read up to this place"), "{notes:?}");
+}
