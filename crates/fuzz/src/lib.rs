@@ -36,11 +36,14 @@ pub enum Target {
     Table,
     /// The `step` of every observer.
     Step,
+    /// The reader of gearbox files, and the diagrams of a gearbox.
+    Gearbox,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Vehicle, Self::Experiment, Self::Study, Self::Log, Self::Table, Self::Step];
+    pub const ALL: [Self; 7] =
+        [Self::Vehicle, Self::Experiment, Self::Study, Self::Log, Self::Table, Self::Step, Self::Gearbox];
 
     /// Its name on the command line, and the folder of its corpus.
     pub fn name(self) -> &'static str {
@@ -51,6 +54,7 @@ impl Target {
             Self::Log => "log",
             Self::Table => "table",
             Self::Step => "step",
+            Self::Gearbox => "gearbox",
         }
     }
 }
@@ -84,7 +88,7 @@ impl Fuzzer {
         static MADE: AtomicUsize = AtomicUsize::new(0);
         let number = MADE.fetch_add(1, Ordering::Relaxed);
         let folder = env::temp_dir().join(format!("wetclutch-fuzz-{}-{number}", std::process::id()));
-        for name in ["vehicles", "experiments"] {
+        for name in ["vehicles", "experiments", "gearboxes"] {
             fs::create_dir_all(folder.join(name))?;
             for entry in fs::read_dir(project().join(name))? {
                 let path = entry?.path();
@@ -121,6 +125,7 @@ impl Fuzzer {
             Target::Log => files::log(self, input),
             Target::Table => files::table(self, input),
             Target::Step => samples::step_all(&self.vehicle, &self.observers, input),
+            Target::Gearbox => files::gearbox(self, input),
         }
     }
 
@@ -146,6 +151,7 @@ impl Fuzzer {
             Target::Study => seeds.extend(
                 ["settings", "budget", "error_bound"].map(|name| text(&experiments.join(name).with_extension("toml"))),
             ),
+            Target::Gearbox => seeds.extend(texts(&[self.folder.join("gearboxes")])),
             Target::Table => seeds.push(self.table()),
             Target::Log | Target::Step => {}
         }

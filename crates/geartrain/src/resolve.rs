@@ -189,10 +189,8 @@ fn elements(
     let dogs = diagram.pairs.iter().enumerate().filter_map(|(at, pair)| Some((at, pair.dog.as_deref()?)));
     let names_of: Vec<&str> =
         diagram.elements.iter().map(|element| &*element.name).chain(dogs.clone().map(|dog| dog.1)).collect();
-    if names_of.len() > diagram.elements.len() {
-        let repeated =
-            |&(_, dog): &(usize, &str)| names_of.iter().filter(|&&name| name == dog).count() > 1 || dog == HOUSING;
-        if let Some((at, dog)) = dogs.clone().find(repeated) {
+    for (nth, (at, dog)) in dogs.clone().enumerate() {
+        if dog == HOUSING || names_of.iter().take(diagram.elements.len() + nth).any(|&name| name == dog) {
             return Err(Finding { part: Part::Pair(at), key: "dog", fault: Fault::Repeated(dog.to_owned()) });
         }
     }

@@ -6,6 +6,7 @@ mod demo;
 mod design;
 mod error_bound;
 mod estimate;
+mod gearbox;
 mod reproduce;
 mod sensitivity;
 mod simulate;
