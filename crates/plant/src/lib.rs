@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod contact;
 pub mod controller;
 pub mod delay;
 pub mod energy;
@@ -29,6 +30,7 @@ pub mod sensors;
 pub mod simulate;
 pub mod state;
 
+pub use contact::{ContactProblem, ContactSolution, MAX_CONTACTS};
 pub use controller::{Commands, Measured, ShiftController, Stage};
 pub use energy::{PowerBalance, stored_energy};
 pub use fast_fill::FillPlan;
