@@ -147,6 +147,17 @@ impl GearTrain {
         matrix(&rows, self.shafts.len()) * &self.basis
     }
 
+    /// Inertia of the motions, `M = N' J N`, with more inertia on the output shaft.
+    pub fn mass_kg_m2(&self, more_on_output_kg_m2: f64) -> DMatrix<f64> {
+        let mut inertia = self.inertia();
+        inertia[self.output] += more_on_output_kg_m2;
+        self.basis.transpose() * DMatrix::from_diagonal(&inertia) * &self.basis
+    }
+
+    fn inertia(&self) -> DVector<f64> {
+        DVector::from_iterator(self.shafts.len(), self.shafts.iter().map(|shaft| shaft.inertia_kg_m2))
+    }
+
     /// A basis of the shaft speeds at which these elements do not slip.
     fn motions(&self, stuck: &[usize]) -> DMatrix<f64> {
         &self.basis * null_space(&self.slips(stuck))
@@ -183,11 +194,9 @@ impl GearTrain {
         Some((torques.as_slice().to_vec(), only))
     }
 
-    /// The shift from one element to another while others are held. `None` if turbine and output speed do not determine
-    /// all shaft speeds, or if an element's slip does not depend on both.
-    ///
-    /// With `w = P (w_t, w_0)`: `M = P' J P`, and the slip of a shift element is `k P = alpha (1, -i)`.
-    pub fn reduce(&self, held: &[usize], offgoing: usize, oncoming: usize) -> Option<ReducedShift<f64>> {
+    /// Shaft speeds (rows) per turbine and output speed (columns) while these elements are held. `None` if the two do not
+    /// determine all the others.
+    pub fn speeds_in_shift(&self, held: &[usize]) -> Option<DMatrix<f64>> {
         let motions = self.motions(held);
         if motions.ncols() != 2 {
             return None;
@@ -196,9 +205,26 @@ impl GearTrain {
         if ends.determinant().abs() < ZERO {
             return None;
         }
-        let speeds = motions * ends.try_inverse()?;
-        let inertia = DVector::from_iterator(self.shafts.len(), self.shafts.iter().map(|shaft| shaft.inertia_kg_m2));
-        let mass = speeds.transpose() * DMatrix::from_diagonal(&inertia) * &speeds;
+        Some(motions * ends.try_inverse()?)
+    }
+
+    /// The motion `q` whose shaft speeds `N q` are nearest to these. `None` if there is not one speed for each shaft.
+    pub fn motion(&self, shaft_speeds: &[f64]) -> Option<Vec<f64>> {
+        if shaft_speeds.len() != self.shafts.len() {
+            return None;
+        }
+        let right = self.basis.transpose() * DVector::from_row_slice(shaft_speeds);
+        let motion = (self.basis.transpose() * &self.basis).cholesky()?.solve(&right);
+        Some(motion.as_slice().to_vec())
+    }
+
+    /// The shift from one element to another while others are held. `None` if turbine and output speed do not determine
+    /// all shaft speeds, or if an element's slip does not depend on both.
+    ///
+    /// With `w = P (w_t, w_0)`: `M = P' J P`, and the slip of a shift element is `k P = alpha (1, -i)`.
+    pub fn reduce(&self, held: &[usize], offgoing: usize, oncoming: usize) -> Option<ReducedShift<f64>> {
+        let speeds = self.speeds_in_shift(held)?;
+        let mass = speeds.transpose() * DMatrix::from_diagonal(&self.inertia()) * &speeds;
         let slip = |element: usize| {
             let row = self.slip_row(element) * &speeds;
             (row[0].abs() > ZERO && row[1].abs() > ZERO).then_some([row[0], row[1]])

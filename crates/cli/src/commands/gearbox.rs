@@ -151,7 +151,9 @@ fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
             }
             None => vec![String::new(); 5],
         });
-        row.push(short(1.0 / (gearbox.gears[shift.from].ratio - gearbox.gears[shift.to].ratio), 2));
+        let [i_off, i_on] = [shift.from, shift.to].map(|gear| gearbox.gears[gear].ratio);
+        // Between forward and reverse there is no torque phase.
+        row.push(if i_off * i_on > 0.0 { short(1.0 / (i_off - i_on), 2) } else { String::new() });
         rows.push(row);
     }
     output::line("\nshifts between one element and another; the way back exchanges off and on")?;
