@@ -31,7 +31,7 @@ fn the_kind_of_a_gearbox_file_is_known_on_every_level() {
 fn an_unknown_element_is_named_with_those_that_exist() {
     assert_eq!(
         error_in(EIGHT_SPEED, r#"name = "4", engaged = ["B", "D", "E"]"#, r#"name = "4", engaged = ["B", "D", "X"]"#),
-        "`gear.engaged`: there is no element \"X\"\nhint: the elements are A, B, C, D, E"
+        "`gear.4.engaged`: there is no element \"X\"\nhint: the elements are A, B, C, D, E"
     );
 }
 
@@ -40,12 +40,12 @@ fn a_gear_with_too_few_or_too_many_elements_says_how_many_it_needs() {
     let engaged = r#"name = "4", engaged = ["B", "D", "E"]"#;
     assert_eq!(
         error_in(EIGHT_SPEED, engaged, r#"name = "4", engaged = ["B", "D"]"#),
-        "`gear.engaged`: \"4\" engages B, D: the ratio of input to output is not determined\n\
+        "`gear.4.engaged`: \"4\" engages B, D: the ratio of input to output is not determined\n\
          hint: a gear of this gearbox engages 3 elements: add 1"
     );
     assert_eq!(
         error_in(EIGHT_SPEED, engaged, r#"name = "4", engaged = ["A", "B", "D", "E"]"#),
-        "`gear.engaged`: \"4\" engages A, B, D, E: input and output cannot turn\n\
+        "`gear.4.engaged`: \"4\" engages A, B, D, E: input and output cannot turn\n\
          hint: 3 engaged elements are enough for a gear of this gearbox: remove 1"
     );
 }
@@ -58,7 +58,7 @@ fn a_stated_ratio_is_compared_with_as_many_digits_as_it_has() {
             r#"{ name = "2", engaged = ["A", "B", "E"], stated_ratio = 3.1304"#,
             r#"{ name = "2", engaged = ["A", "B", "E"], stated_ratio = 3.1403"#
         ),
-        "`gear.stated_ratio`: the ratio of \"2\" is 3.1304, but 3.1403 is stated\n\
+        "`gear.2.stated_ratio`: the ratio of \"2\" is 3.1304, but 3.1403 is stated\n\
          hint: check teeth, `planets` and the engaged elements; leave `stated_ratio` out if it is not known"
     );
     let shorter = EIGHT_SPEED.replacen("stated_ratio = 3.1304", "stated_ratio = 3.13", 1);
@@ -85,7 +85,7 @@ fn an_element_that_slips_at_the_torque_asked_names_gear_and_torques() {
     let text = EIGHT_SPEED.replacen(from, "stated_ratio = -3.2968, turbine_max_n_m = 600", 1);
     let error = GearboxFile::from_source(Source::built_in("g.toml", &text)).unwrap_err().to_string();
     assert!(
-        error.contains("`element.pack`: \"B\" slips in \"R\": it holds 1430 N m, 1585 N m are asked of it"),
+        error.contains("`element.B.pack`: \"B\" slips in \"R\": it holds 1430 N m, 1585 N m are asked of it"),
         "{error}"
     );
     assert!(error.contains("hint: with 1.1 times the friction faces"), "{error}");
@@ -143,4 +143,18 @@ fn teeth_that_are_unusual_are_warned_of_with_their_line() {
         "{:?}",
         file.warnings
     );
+}
+
+#[test]
+fn the_examples_of_the_documentation_are_gearbox_files() {
+    let page = include_str!("../../../docs/gearboxes.md");
+    let examples: Vec<&str> = page.split("```toml").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert_eq!(examples.len(), 2);
+    let gearboxes =
+        examples.iter().map(|text| GearboxFile::from_source(Source::built_in("g.toml", text)).unwrap().gearbox);
+    let shifts: Vec<_> = gearboxes.map(|gearbox| gearbox.shift(0, 1).unwrap().reduced.unwrap()).collect();
+    // The same gearbox on two levels, to the digits that are written.
+    for (a, b) in shifts[0].mass_kg_m2.concat().into_iter().zip(shifts[1].mass_kg_m2.concat()) {
+        assert!((a - b).abs() < 6e-5, "{a} {b}");
+    }
 }

@@ -282,6 +282,48 @@ fn all_holding_torques_of_the_a8lr1_and_the_dual_clutch_come_out() {
     }
 }
 
+#[test]
+fn the_output_gets_the_torques_of_the_turbine_and_of_the_housing() {
+    for gearbox in planetary() {
+        let train = gearbox.train.as_ref().unwrap();
+        // A set with the housing as a member takes torque from it as well.
+        if train.sets.iter().any(|set| [set.sun, set.carrier, set.ring].contains(&drivetrain::Member::Housing)) {
+            continue;
+        }
+        for gear in &gearbox.gears {
+            let is_brake = |element: usize| gearbox.elements[element].kind == geartrain::ElementKind::Brake;
+            let brakes = gear.holding.iter().filter(|holding| is_brake(holding.element));
+            let housing: f64 = brakes.map(|holding| holding.per_turbine_torque).sum();
+            assert!((gear.ratio - 1.0 - housing).abs() < 1e-9, "{} {}", gearbox.name, gear.name);
+            // Without a brake everything turns at one speed.
+            if housing == 0.0 && !gear.holding.iter().any(|holding| is_brake(holding.element)) {
+                assert!(gear.shaft_speeds.iter().all(|speed| (speed.unwrap() - 1.0).abs() < 1e-9), "{}", gearbox.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn in_every_gear_the_speeds_of_a_set_lie_on_its_lever() {
+    for gearbox in planetary().into_iter().chain([two_speed()]) {
+        let train = gearbox.train.as_ref().unwrap();
+        for gear in &gearbox.gears {
+            let speed = |member: drivetrain::Member| match member {
+                drivetrain::Member::Housing => 0.0,
+                drivetrain::Member::Shaft(shaft) => gear.shaft_speeds[shaft].unwrap(),
+            };
+            for set in &train.sets {
+                let planets = if set.planets == geartrain::Planets::Double { -1.0 } else { 1.0 };
+                let [sun, ring] = [set.sun_teeth, set.ring_teeth].map(f64::from);
+                // Along the lever: sun at 1/Z_s, carrier at 0, ring at -1/Z_r, or 1/Z_r with pairs of planets.
+                let to_sun = (speed(set.sun) - speed(set.carrier)) * sun;
+                let to_ring = (speed(set.carrier) - speed(set.ring)) * ring;
+                assert!((to_sun - planets * to_ring).abs() < 1e-7, "{} {}", gearbox.name, gear.name);
+            }
+        }
+    }
+}
+
 /// Forward gears in ascending order between which several elements change, as "1-4".
 fn several(gearbox: &Gearbox, name: &str) -> Vec<String> {
     let is = |from: usize, to: usize| {

@@ -69,9 +69,9 @@ pub enum Fault {
     #[error("input and output turn in the ratio {0:.4} with all elements open: there are no gears")]
     NoNeutral(f64),
     #[error("\"{gear}\" engages {engaged}: input and output cannot turn")]
-    Locked { gear: String, engaged: String, count: usize, wanted: usize },
+    Locked { gear: String, engaged: String, count: usize, wanted: Option<usize> },
     #[error("\"{gear}\" engages {engaged}: the ratio of input to output is not determined")]
-    Open { gear: String, engaged: String, count: usize, wanted: usize },
+    Open { gear: String, engaged: String, count: usize, wanted: Option<usize> },
     #[error("\"{gear}\" engages {engaged}: the {held} is held")]
     Held { gear: String, engaged: String, held: &'static str },
     #[error("the ratio of \"{gear}\" is {found:.4}, but {stated} is stated")]
@@ -118,21 +118,22 @@ impl Fault {
             Self::DependentSets => "check the members of the sets: two sets with the same three shafts fix all speeds".to_owned(),
             Self::Freedom(_) => "degrees of freedom are shafts less sets less gear pairs without a dog: add the missing shaft, or give a member the housing".to_owned(),
             Self::NoNeutral(_) => "a set or gear pair joins them for good: check its members, or give the gear pair a dog".to_owned(),
-            Self::Locked { count, wanted, .. } if count > wanted => {
+            Self::Locked { count, wanted: Some(wanted), .. } if count > wanted => {
                 format!("{wanted} engaged elements are enough for a gear of this gearbox: remove {}", count - wanted)
             }
             Self::Locked { .. } | Self::Held { .. } => {
                 "check the sides of these elements, and whether the gear engages them".to_owned()
             }
-            Self::Open { count, wanted, .. } if count < wanted => {
+            Self::Open { count, wanted: Some(wanted), .. } if count < wanted => {
                 format!("a gear of this gearbox engages {wanted} elements: add {}", wanted - count)
             }
+            Self::Open { wanted: None, .. } => "engage the elements that connect input and output: a clutch and a dog".to_owned(),
             Self::Open { .. } => "two of these elements do the same: check their sides, and whether the gear engages them".to_owned(),
             Self::StatedRatio { found, stated, .. } if (found + stated).abs() < 0.02 * stated.abs() => {
                 "the sign differs: a single-planet set in place of a double-planet one, or an idler, turns the output".to_owned()
             }
             Self::StatedRatio { .. } => "check teeth, `planets` and the engaged elements; leave `stated_ratio` out if it is not known".to_owned(),
-            Self::RingInSun { .. } => "swap `sun_teeth` and `ring_teeth`".to_owned(),
+            Self::RingInSun { .. } => "a ring has more teeth than the sun inside it".to_owned(),
             Self::SmallPlanet { .. } => "check the teeth of sun and ring".to_owned(),
             Self::PlanetTeeth { .. } => "one number for `planets = \"single\"`, two for \"double\"".to_owned(),
             Self::Coaxial(_) => "check the teeth of planet, sun and ring".to_owned(),

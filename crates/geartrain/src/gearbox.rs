@@ -151,12 +151,14 @@ fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
     let (train, warnings) = train(diagram)?;
     names((Part::Gearbox, "gear"), Part::Gear, diagram.gears.iter().map(|gear| gear.name.as_str()))?;
     let element_names = || train.elements.iter().map(|element| element.name.as_str());
+    // With dogs the idle shafts of a gear are free or not: there is no one number.
+    let has_dogs = train.pairs.iter().any(|pair| pair.dog.is_some());
+    let wanted = (!has_dogs).then(|| train.degrees_of_freedom() - 1);
     let mut gears = Vec::new();
     for (at, gear) in diagram.gears.iter().enumerate() {
         let about = |key, fault| Finding { part: Part::Gear(at), key, fault };
         let engaged = engaged(at, gear.engaged.iter().map(String::as_str), element_names())?;
-        let wrong =
-            |no_gear| about("engaged", no_gear_fault(no_gear, &gear.name, &gear.engaged, train.degrees_of_freedom()));
+        let wrong = |no_gear| about("engaged", no_gear_fault(no_gear, &gear.name, &gear.engaged, wanted));
         let motion = train.gear(&engaged).map_err(wrong)?;
         let torques = train.holding_torques(&engaged, motion.ratio);
         // A gear that turns has torques that hold it: both follow from the same rows.
@@ -196,8 +198,8 @@ fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
     Ok(gearbox)
 }
 
-fn no_gear_fault(no_gear: NoGear, gear: &str, engaged: &[String], freedom: usize) -> Fault {
-    let (gear, count, wanted) = (gear.to_owned(), engaged.len(), freedom - 1);
+fn no_gear_fault(no_gear: NoGear, gear: &str, engaged: &[String], wanted: Option<usize>) -> Fault {
+    let (gear, count) = (gear.to_owned(), engaged.len());
     let engaged = if engaged.is_empty() { "no element".to_owned() } else { engaged.join(", ") };
     match no_gear {
         NoGear::Locked => Fault::Locked { gear, engaged, count, wanted },

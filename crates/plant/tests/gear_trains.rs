@@ -91,6 +91,8 @@ fn load_kg_m2(gearbox: &Gearbox) -> f64 {
 struct Outcome {
     run_speeds: [f64; 2],
     stuck: Vec<bool>,
+    /// Largest slip of an element that sticks, rad/s.
+    slip_rad_s: f64,
     /// Energy that is not accounted for, over the energy that passed.
     audit: f64,
     lowest_friction_w: f64,
@@ -128,9 +130,12 @@ fn shift(gearbox: &Gearbox, from: usize, to: usize) -> Outcome {
     let stored = model.kinetic_energy(&run.motion) - start_j;
     let rest = stored + run.delivered_j + run.dissipated_j - run.supplied_j;
     let engaged = gearbox.gears[to].holding.iter().map(|holding| run.contacts[holding.element] == Contact::Stuck);
+    let sticking = (0..gearbox.elements.len()).filter(|&element| run.contacts[element] == Contact::Stuck);
+    let slips = sticking.map(|element| model.slip(&run.motion, element).abs());
     Outcome {
         run_speeds: run.ends(),
         stuck: engaged.collect(),
+        slip_rad_s: slips.fold(0.0, f64::max),
         audit: rest.abs() / run.supplied_j.abs().max(run.dissipated_j),
         lowest_friction_w,
         events,
@@ -148,6 +153,7 @@ fn every_shift_between_neighbours_ends_in_its_gear_and_accounts_for_its_energy()
                 let [turbine, output] = outcome.run_speeds;
                 assert!((turbine / output - gearbox.gears[to].ratio).abs() < 1e-6, "{name}: {turbine} {output}");
                 assert!(outcome.stuck.iter().all(|&stuck| stuck), "{name}: {:?}", outcome.stuck);
+                assert!(outcome.slip_rad_s < 1e-8, "{name}: {}", outcome.slip_rad_s);
                 assert!(outcome.audit < 1e-4, "{name}: {}", outcome.audit);
                 assert!(outcome.lowest_friction_w > -1e-3, "{name}: {}", outcome.lowest_friction_w);
                 assert!((2..200).contains(&outcome.events), "{name}: {} events", outcome.events);

@@ -33,13 +33,14 @@ fn head(gearbox: &Gearbox) -> String {
     let known = match (&gearbox.train, gearbox.elements.is_empty()) {
         (Some(train), _) => {
             let parts = [
-                (train.shafts.len(), "shafts"),
-                (train.sets.len(), "planetary sets"),
-                (train.pairs.len(), "gear pairs"),
-                (train.elements.len(), "elements"),
-                (train.degrees_of_freedom(), "degrees of freedom"),
+                (train.shafts.len(), "shaft", "shafts"),
+                (train.sets.len(), "planetary set", "planetary sets"),
+                (train.pairs.len(), "gear pair", "gear pairs"),
+                (train.elements.len(), "element", "elements"),
+                (train.degrees_of_freedom(), "degree of freedom", "degrees of freedom"),
             ];
-            let named = parts.iter().filter(|part| part.0 > 0).map(|(count, what)| format!("{count} {what}"));
+            let named = parts.iter().filter(|part| part.0 > 0);
+            let named = named.map(|(count, one, more)| format!("{count} {}", if *count == 1 { one } else { more }));
             format!("stick diagram of {}", named.collect::<Vec<_>>().join(", "))
         }
         (None, false) => format!("ratios and holding torques of {} elements", gearbox.elements.len()),
@@ -220,10 +221,15 @@ fn draw(gearbox: &Gearbox, folder: &Path) -> Result<(), Failure> {
         let message = "only a stick diagram can be drawn\nhint: leave -o out, or describe shafts, sets and elements";
         return Err(Failure::Input(message.to_owned()));
     };
-    let gears = gearbox.gears.iter().enumerate();
-    let gears =
-        gears.filter_map(|(at, gear)| Some((format!("gear_{}.svg", file_part(&gear.name)), gear_figure(gearbox, at)?)));
-    let figures: Vec<(String, String)> = [("train.svg".to_owned(), train)].into_iter().chain(gears).collect();
+    let mut figures = vec![("train.svg".to_owned(), train)];
+    for (at, gear) in gearbox.gears.iter().enumerate() {
+        let Some(figure) = gear_figure(gearbox, at) else { continue };
+        let name = format!("gear_{}.svg", file_part(&gear.name));
+        // Some file systems take R and r for the same.
+        let is_taken = figures.iter().any(|other| other.0.to_lowercase() == name.to_lowercase());
+        let name = if is_taken { format!("gear_{}_{}.svg", file_part(&gear.name), at + 1) } else { name };
+        figures.push((name, figure));
+    }
     let names: Vec<&str> = figures.iter().map(|figure| figure.0.as_str()).collect();
     super::writable(folder, &names)?;
     for (name, svg) in &figures {

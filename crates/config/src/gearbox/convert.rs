@@ -29,7 +29,8 @@ pub(super) struct Read {
 #[derive(Default)]
 pub(super) struct Spans {
     keys: BTreeMap<&'static str, usize>,
-    parts: BTreeMap<&'static str, Vec<usize>>,
+    /// Beginning and name of each entry; sets, gear pairs and masses have no names.
+    parts: BTreeMap<&'static str, Vec<(usize, Option<String>)>>,
 }
 
 impl Spans {
@@ -38,15 +39,27 @@ impl Spans {
         self.keys.get(key).copied().unwrap_or(0)
     }
 
-    /// Where an entry of a list begins.
-    pub(super) fn part(&self, list: &str, at: usize) -> usize {
-        self.parts.get(list).and_then(|entries| entries.get(at)).copied().unwrap_or_else(|| self.of(list))
+    /// Where an entry of a list begins, and its key.
+    pub(super) fn part(&self, list: &str, at: usize) -> (usize, String) {
+        match self.parts.get(list).and_then(|entries| entries.get(at)) {
+            Some((start, Some(name))) => (*start, format!("{list}.{name}")),
+            Some((start, None)) => (*start, list.to_owned()),
+            None => (self.of(list), list.to_owned()),
+        }
     }
 
-    fn list(&mut self, key: &'static str, entries: impl Iterator<Item = usize>) {
-        let entries: Vec<usize> = entries.collect();
-        if let Some(&first) = entries.first() {
-            self.keys.entry(key).or_insert(first);
+    fn named<'w>(&mut self, key: &'static str, names: impl Iterator<Item = &'w Word>) {
+        self.list(key, names.map(|name| (start(name), Some(name.get_ref().clone()))));
+    }
+
+    fn unnamed<'w, T: 'w>(&mut self, key: &'static str, entries: impl Iterator<Item = &'w Spanned<T>>) {
+        self.list(key, entries.map(|entry| (start(entry), None)));
+    }
+
+    fn list(&mut self, key: &'static str, entries: impl Iterator<Item = (usize, Option<String>)>) {
+        let entries: Vec<_> = entries.collect();
+        if let Some((first, _)) = entries.first() {
+            self.keys.entry(key).or_insert(*first);
         }
         self.parts.insert(key, entries);
     }
@@ -66,11 +79,11 @@ pub(super) fn stick_diagram(check: &Check<'_>, raw: &RawStickDiagram) -> Result<
     ] {
         spans.keys.insert(key, at);
     }
-    spans.list("shaft", raw.shaft.get_ref().iter().map(|shaft| start(&shaft.name)));
-    spans.list("planetary_set", raw.planetary_set.iter().map(start));
-    spans.list("gear_pair", raw.gear_pair.iter().map(start));
-    spans.list("element", raw.element.iter().map(|element| start(&element.name)));
-    spans.list("gear", raw.gear.get_ref().iter().map(|gear| start(&gear.name)));
+    spans.named("shaft", raw.shaft.get_ref().iter().map(|entry| &entry.name));
+    spans.unnamed("planetary_set", raw.planetary_set.iter());
+    spans.unnamed("gear_pair", raw.gear_pair.iter());
+    spans.named("element", raw.element.iter().map(|entry| &entry.name));
+    spans.named("gear", raw.gear.get_ref().iter().map(|entry| &entry.name));
 
     let shafts = raw.shaft.get_ref().iter().map(|shaft| {
         let name = name(check, "shaft.name", &shaft.name)?;
@@ -102,9 +115,9 @@ pub(super) fn stick_diagram(check: &Check<'_>, raw: &RawStickDiagram) -> Result<
 pub(super) fn shares(check: &Check<'_>, raw: &RawShares) -> Result<Read, ConfigError> {
     let mut spans = Spans::default();
     spans.keys.insert("gear", start(&raw.gear));
-    spans.list("element", raw.element.iter().map(|element| start(&element.name)));
-    spans.list("gear", raw.gear.get_ref().iter().map(|gear| start(&gear.name)));
-    spans.list("shift_mass", raw.shift_mass.iter().map(start));
+    spans.named("element", raw.element.iter().map(|entry| &entry.name));
+    spans.named("gear", raw.gear.get_ref().iter().map(|entry| &entry.name));
+    spans.unnamed("shift_mass", raw.shift_mass.iter());
     let elements = raw.element.iter().map(|element| {
         let name = name(check, "element.name", &element.name)?;
         let pack = element.pack.as_ref().map(|raw| pack(check, &name, raw)).transpose()?;
@@ -130,8 +143,8 @@ pub(super) fn shares(check: &Check<'_>, raw: &RawShares) -> Result<Read, ConfigE
 pub(super) fn ratios(check: &Check<'_>, raw: &RawRatios) -> Result<Read, ConfigError> {
     let mut spans = Spans::default();
     spans.keys.insert("gear", start(&raw.gear));
-    spans.list("gear", raw.gear.get_ref().iter().map(|gear| start(&gear.name)));
-    spans.list("shift_mass", raw.shift_mass.iter().map(start));
+    spans.named("gear", raw.gear.get_ref().iter().map(|entry| &entry.name));
+    spans.unnamed("shift_mass", raw.shift_mass.iter());
     let gears = raw.gear.get_ref().iter().map(|gear| {
         let name = name(check, "gear.name", &gear.name)?;
         Ok(Ratio { ratio: ratio(check, &name, &gear.ratio)?, name })

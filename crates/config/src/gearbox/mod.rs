@@ -73,6 +73,6 @@ fn meaning(check: &Check<'_>, spans: &Spans, finding: &Finding) -> ConfigError {
         Part::Gear(at) => ("gear", at),
         Part::Mass(at) => ("shift_mass", at),
     };
-    let offset = spans.part(list, at);
-    check.meaning(&format!("{list}.{key}"), offset, finding.to_string(), finding.fault.hint())
+    let (offset, part) = spans.part(list, at);
+    check.meaning(&format!("{part}.{key}"), offset, finding.to_string(), finding.fault.hint())
 }

@@ -149,7 +149,7 @@ fn gears_with_too_many_too_few_or_wrong_elements_are_refused() {
         &finding,
         Part::Gear(0),
         "engaged",
-        &Fault::Locked { gear: gear_name, engaged, count: 2, wanted: 1 },
+        &Fault::Locked { gear: gear_name, engaged, count: 2, wanted: Some(1) },
     );
     assert!(finding.fault.hint().unwrap().contains("remove 1"));
     let finding = wrong(|d| d.gears[0] = gear("1", &[]));

@@ -137,5 +137,5 @@ impl Canvas {
 
 /// Width of a text; bold letters are wider.
 pub(super) fn text_width(content: &str, bold: bool) -> f64 {
-    if bold { 1.1 * width(content) } else { width(content) }
+    if bold { 1.2 * width(content) } else { width(content) }
 }

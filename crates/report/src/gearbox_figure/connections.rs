@@ -154,7 +154,7 @@ fn draw_element(
     canvas.line((x, plates + gap), (x, bottom), tone);
     let kind = train.elements[at].kind;
     match kind {
-        ElementKind::Dog => canvas.dot((x, plates), 6.0, tone, torque.is_some()),
+        ElementKind::Dog => canvas.square((x, plates), 5.0, tone, torque.is_some()),
         _ => {
             canvas.thick((x - half, plates - gap), (x + half, plates - gap), tone);
             canvas.thick((x - half, plates + gap), (x + half, plates + gap), tone);
@@ -203,17 +203,20 @@ fn draw_speeds(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, gear: &E
 pub(super) fn legend(canvas: &mut Canvas, train: &GearTrain, (left, top): (f64, f64), speeds: Option<&[Option<f64>]>) {
     let is_gear = speeds.is_some();
     let has = |kind: ElementKind| train.elements.iter().any(|element| element.kind == kind);
-    let plates = train.elements.iter().any(|element| matches!(element.connection, Connection::Sides(..)));
+    let plates = train.elements.iter().any(|element| element.kind != ElementKind::Dog);
+    let sets = !train.sets.is_empty();
+    let is_free = speeds.is_some_and(|speeds| speeds.contains(&None));
     let lines = [
         (true, "Horizontal lines: shafts; the hatched line is the housing. Dots connect; lines that cross do not."),
         (
-            !train.sets.is_empty(),
+            sets,
             "Vertical lines named \"set\": planetary sets, with the teeth of sun and ring; \"double\" has pairs of planets.",
         ),
         (
             !train.pairs.is_empty(),
-            "Vertical lines with circles: gear pairs with their teeth; a square is the dog that is named above.",
+            "Vertical lines with two circles: gear pairs with their teeth; three circles: with an idler.",
         ),
+        (has(ElementKind::Dog), "Squares: dogs, named above."),
         (
             plates,
             "Vertical lines with two plates: clutches and brakes, named above; the lower half of a brake is the housing.",
@@ -223,12 +226,9 @@ pub(super) fn legend(canvas: &mut Canvas, train: &GearTrain, (left, top): (f64, 
             is_gear,
             "Orange: engaged elements, with their torque per N m of turbine torque; positive drives the output side. Grey: open.",
         ),
+        (is_free, "free: the speed of the shaft does not follow from the gear."),
         (
-            speeds.is_some_and(|speeds| speeds.contains(&None)),
-            "free: the speed of the shaft does not follow from the gear.",
-        ),
-        (
-            is_gear && !train.sets.is_empty(),
+            is_gear && sets,
             "Levers: the members of a set lie at distances of 1/teeth from the carrier; their speeds are on a straight line.",
         ),
     ];
