@@ -378,6 +378,21 @@ fn every_shift_between_neighbours_is_a_single_transition() {
 }
 
 #[test]
+fn kind_and_order_of_a_shift_follow_from_its_gears_and_the_turbine_torque() {
+    use drivetrain::{PhaseOrder, ShiftKind};
+    let gearbox = zf_8hp70();
+    let kind = |from: &str, to: &str, torque: f64| {
+        let [from, to] = [from, to].map(|name| gearbox.gear(name).unwrap());
+        gearbox.shift(from, to).unwrap().kind(&gearbox.gears, torque)
+    };
+    assert_eq!(kind("1", "2", 200.0), Some(ShiftKind::PowerOnUp));
+    assert_eq!(kind("8", "5", 200.0), Some(ShiftKind::PowerOnDown));
+    assert_eq!(kind("3", "4", -20.0), Some(ShiftKind::PowerOffUp));
+    assert_eq!(kind("3", "2", -20.0).unwrap().order(), PhaseOrder::TorqueFirst);
+    assert_eq!(kind("R", "1", 50.0), None);
+}
+
+#[test]
 fn in_all_single_transitions_turbine_and_output_speed_determine_the_others() {
     let mut count = 0;
     for gearbox in planetary() {

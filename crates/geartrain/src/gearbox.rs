@@ -3,7 +3,7 @@
 use drivetrain::{Clutch, ReducedShift};
 
 use crate::capacity::{self, Capacity};
-use crate::description::{Description, ElementKind, Given, Ratios, Shares, ShiftMass, StatedRatio, StickDiagram};
+use crate::description::{Description, ElementKind, Given, Ratios, Shares, ShiftMass, StickDiagram};
 use crate::finding::{Fault, Finding, Part};
 use crate::resolve::{engaged, names, place, positive, train};
 use crate::shift::{Change, Shift, change};
@@ -36,8 +36,6 @@ pub struct Gear {
     pub name: String,
     /// Turbine speed over output speed; negative in reverse.
     pub ratio: f64,
-    /// The ratio its maker prints.
-    pub stated_ratio: Option<StatedRatio>,
     /// The engaged elements with their torques; empty where only the ratio is known.
     pub holding: Vec<Holding>,
     /// Whether the torques are the only possible ones; if not, they are the smallest.
@@ -90,11 +88,6 @@ impl Gearbox {
     fn of(elements: Vec<GearboxElement>, gears: Vec<Gear>) -> Self {
         let (name, shifts, capacities, warnings) = (String::new(), Vec::new(), Vec::new(), Vec::new());
         Self { name, elements, gears, shifts, capacities, train: None, warnings }
-    }
-
-    /// Degrees of freedom, where the stick diagram is known.
-    pub fn degrees_of_freedom(&self) -> Option<usize> {
-        self.train.as_ref().map(GearTrain::degrees_of_freedom)
     }
 
     /// The forward gears from the largest ratio to the smallest.
@@ -175,7 +168,6 @@ fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
         gears.push(Gear {
             name: gear.name.clone(),
             ratio: motion.ratio,
-            stated_ratio: gear.stated_ratio,
             holding: holding.collect(),
             holding_is_unique,
             shaft_speeds: motion.speeds,
@@ -292,7 +284,6 @@ fn ratio_only(name: &str, ratio: f64) -> Gear {
     Gear {
         name: name.to_owned(),
         ratio,
-        stated_ratio: None,
         holding: Vec::new(),
         holding_is_unique: true,
         shaft_speeds: Vec::new(),

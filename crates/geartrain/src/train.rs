@@ -56,11 +56,11 @@ pub struct GearTrain {
 
 /// How a gear turns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GearMotion {
+pub(crate) struct GearMotion {
     /// Turbine speed over output speed.
-    pub ratio: f64,
+    pub(crate) ratio: f64,
     /// Speed of each shaft per turbine speed; `None` where the gear leaves it open, as for an idle shaft of a dual clutch.
-    pub speeds: Vec<Option<f64>>,
+    pub(crate) speeds: Vec<Option<f64>>,
 }
 
 /// Why elements make no gear.

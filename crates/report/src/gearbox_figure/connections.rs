@@ -5,11 +5,11 @@ use geartrain::{Connection, ElementKind, GearTrain};
 use kuva::render::render::TextAnchor;
 
 use super::canvas::{Canvas, Tone, text_width};
-use super::layout::{ARROW, Column, LABEL, Layout, ROW, labels, members, shaft_label};
-use super::{speed_text, tone};
+use super::layout::{ARROW, Column, LABEL, Layout, ROW, labels, members};
+use super::{member_name, speed_text, tone};
 
 /// Width of the speeds beside the shafts.
-pub(super) const SPEEDS: f64 = 200.0;
+const SPEEDS: f64 = 200.0;
 /// Half the gap between the plates of an open element, and half their length.
 const PLATES: (f64, f64) = (3.5, 9.0);
 /// Radius of a gear.
@@ -60,9 +60,9 @@ fn draw_shaft(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, shaft: us
     let to = if is_output { layout.right } else { to };
     canvas.line((layout.left, y), (layout.right, y), Tone::Guide);
     canvas.line((from, y), (to, y), Tone::Dark);
-    canvas.text((layout.left - 6.0, y + MIDDLE), shaft_label(train, member), TextAnchor::End, Tone::Dark);
+    canvas.text((layout.left - 6.0, y + MIDDLE), member_name(train, member), TextAnchor::End, Tone::Dark);
     if is_input {
-        arrow(canvas, layout.left - 6.0 - text_width(shaft_label(train, member), false) - 8.0, y, "input");
+        arrow(canvas, layout.left - 6.0 - text_width(member_name(train, member), false) - 8.0, y, "input");
     }
     if is_output {
         arrow(canvas, layout.right + ARROW - 6.0, y, "output");
@@ -86,7 +86,7 @@ fn draw_housing(canvas: &mut Canvas, train: &GearTrain, layout: &Layout) {
         canvas.line((x, y), (x - 8.0, y + 8.0), Tone::Open);
         x += 10.0;
     }
-    canvas.text((layout.left - 6.0, y + MIDDLE), shaft_label(train, Member::Housing), TextAnchor::End, Tone::Dark);
+    canvas.text((layout.left - 6.0, y + MIDDLE), member_name(train, Member::Housing), TextAnchor::End, Tone::Dark);
 }
 
 fn draw_set(canvas: &mut Canvas, train: &GearTrain, layout: &Layout, column: Column, x: f64) {

@@ -3,8 +3,8 @@
 use drivetrain::Member;
 use geartrain::{Connection, GearTrain, Planets};
 
+use super::MARGIN;
 use super::canvas::text_width;
-use super::{MARGIN, member_name};
 
 /// Distance between two shafts.
 pub(super) const ROW: f64 = 46.0;
@@ -42,8 +42,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// The layout of a train below `top`, with labels of the torques of engaged elements if `wide` is not zero.
-    pub(super) fn new(train: &GearTrain, top: f64, wide: f64) -> Self {
+    /// The layout of a train below `top`, with or without room for the torques of engaged elements.
+    pub(super) fn new(train: &GearTrain, top: f64, with_torques: bool) -> Self {
         let names = train.shafts.iter().map(|shaft| shaft.name.as_str()).chain([geartrain::HOUSING]);
         let widest = names.map(|name| text_width(name, false)).fold(0.0, f64::max);
         let left = MARGIN + ARROW + widest + 8.0;
@@ -57,7 +57,8 @@ impl Layout {
         for column in sets.chain(pairs).chain(elements) {
             columns.push((column, x));
             let label = labels(train, column).iter().map(|label| text_width(label, true)).fold(0.0, f64::max);
-            let torque = if wide > 0.0 && column_has_torque(column) { text_width("-0.000", true) } else { 0.0 };
+            let torque =
+                if with_torques && !matches!(column, Column::Set(_)) { text_width("-0.000", true) } else { 0.0 };
             x += LABEL + label.max(torque) + SPACE;
         }
         let mut layout = Self { rows: rows(train, &columns), columns, left, right: x, top: top + HEAD };
@@ -85,10 +86,6 @@ impl Layout {
     pub(super) fn head(&self) -> f64 {
         self.top - 32.0
     }
-}
-
-fn column_has_torque(column: Column) -> bool {
-    !matches!(column, Column::Set(_))
 }
 
 /// The members that a column joins.
@@ -167,9 +164,4 @@ fn rows(train: &GearTrain, columns: &[(Column, f64)]) -> Vec<usize> {
             return rows;
         }
     }
-}
-
-/// Label at the left of a shaft.
-pub(super) fn shaft_label(train: &GearTrain, member: Member) -> &str {
-    member_name(train, member)
 }

@@ -24,7 +24,7 @@ const TITLE: f64 = 34.0;
 /// The diagram of the train, where the gearbox has one.
 pub fn train_figure(gearbox: &Gearbox) -> Option<String> {
     let train = gearbox.train.as_ref()?;
-    let layout = Layout::new(train, MARGIN + TITLE, 0.0);
+    let layout = Layout::new(train, MARGIN + TITLE, false);
     let mut canvas = Canvas::new();
     canvas.title(MARGIN, &gearbox.name);
     connections::draw(&mut canvas, train, &layout, None);
@@ -37,7 +37,7 @@ pub fn gear_figure(gearbox: &Gearbox, gear: usize) -> Option<String> {
     let (train, gear) = (gearbox.train.as_ref()?, gearbox.gears.get(gear)?);
     let torques = gear.holding.iter().map(|holding| (holding.element, holding.per_turbine_torque));
     let engaged = Engaged { torques: torques.collect(), speeds: &gear.shaft_speeds };
-    let layout = Layout::new(train, MARGIN + TITLE, connections::SPEEDS);
+    let layout = Layout::new(train, MARGIN + TITLE, true);
     let mut canvas = Canvas::new();
     let names: Vec<&str> = gear.holding.iter().map(|holding| gearbox.elements[holding.element].name.as_str()).collect();
     canvas.title(
