@@ -157,11 +157,17 @@ pub(crate) enum Command {
     /// and whether an observer can distinguish the error from a pressure.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
-    /// Check a vehicle, experiment or study file
+    /// Check a vehicle, gearbox, experiment or study file
     ///
-    /// Checks a vehicle, experiment or study file, and the files that it names, and prints a summary. Also checks a
+    /// Checks a vehicle, gearbox, experiment or study file, and the files that it names, and prints a summary. Also checks a
     /// bounds file for `design --bounds` and a sensors file for `estimate --sensors`. Warns of given gains that are
     /// unstable at a vertex.
+    ///
+    /// Of a gearbox file it prints the gears with ratios and holding torques, the capacity of the elements, and the
+    /// shifts with their elements. With -o it draws them:
+    ///
+    ///   train.svg      shafts, planetary sets, gear pairs and elements
+    ///   gear_NAME.svg  the same in a gear: engaged elements, shaft speeds, levers of the sets
     #[command(verbatim_doc_comment)]
     Check(Check),
 }
@@ -536,6 +542,9 @@ pub(crate) struct Merge {
 pub(crate) struct Check {
     /// Vehicle, experiment, study, bounds or sensors file
     pub(crate) file: PathBuf,
+    /// Folder for the diagrams of a gearbox file
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
 }
 
 /// A number in this range, as a vehicle file has it.

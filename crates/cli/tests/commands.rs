@@ -542,3 +542,38 @@ fn a_column_with_another_meaning_is_not_proposed() {
     let said = stderr(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE]));
     assert!(said.contains("`engine_speed` has a similar name") && !said.contains("`wheel_speed"), "{said}");
 }
+
+const GEARBOX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../gearboxes/8hp.toml");
+
+#[test]
+fn check_prints_the_gears_and_shifts_of_a_gearbox_and_draws_them() {
+    let folder = Folder::new("gearbox");
+    let output = wetclutch(&["check", GEARBOX, "-o", &folder.path("out")]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let printed = stdout(&output);
+    // Third gear: ratio, step and the torques of B, C and E; the shift 2-3; those that change two elements.
+    for part in
+        ["2.1039  1.488", "-0.656", "2-3    A    C   B E", "double transition: R-3 R-6 1-4", "torque phase, then"]
+    {
+        assert!(printed.contains(part), "{part}: {printed}");
+    }
+    for file in ["out/train.svg", "out/gear_R.svg", "out/gear_8.svg"] {
+        assert!(read(folder.path(file)).ends_with("</svg>"), "{file}");
+    }
+    let refused = wetclutch(&["check", VEHICLE, "-o", &folder.path("out")]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("only a gearbox file is drawn"));
+}
+
+#[test]
+fn a_gearbox_of_ratios_alone_is_told_what_pressure_needs() {
+    let folder = Folder::new("ratios");
+    let path = folder.path("ratios.toml");
+    let text = "name = \"ratios\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 3.0 }, { name = \"2\", ratio = 2.0 }]\n";
+    std::fs::write(&path, text).unwrap();
+    let output = wetclutch(&["check", &path]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stdout(&output).contains("pressures need their plates and pistons"), "{}", stdout(&output));
+    let refused = wetclutch(&["check", &path, "-o", &folder.path("out")]);
+    assert!(stderr(&refused).contains("only a stick diagram can be drawn"));
+}

@@ -59,6 +59,11 @@ impl<'a> Check<'a> {
         Self { layers: Layers { source, over: None } }
     }
 
+    /// A value as it is written.
+    pub(crate) fn text(&self, span: std::ops::Range<usize>) -> &'a str {
+        self.layers.source.text.get(span).unwrap_or_default()
+    }
+
     /// The number, if it is in the range.
     pub(crate) fn number(&self, key: &str, value: &Number, range: RangeInclusive<f64>) -> Result<f64, ConfigError> {
         self.in_range(key, *value.get_ref(), value.span().start, &range)

@@ -7,6 +7,7 @@
 pub mod check;
 pub mod error;
 pub mod experiment;
+pub mod gearbox;
 pub mod source;
 pub mod study;
 pub mod vehicle;
@@ -16,6 +17,7 @@ pub use experiment::{
     CurrentSensor, Experiment, FastFill, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile,
     ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
+pub use gearbox::GearboxFile;
 pub use source::{Kind, Source, toml_string};
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{

@@ -21,6 +21,8 @@ pub enum Kind {
     Overlay,
     /// The sensors of a car.
     Sensors,
+    /// A gearbox.
+    Gearbox,
 }
 
 /// A text as a TOML file holds it: in double quotes, on one line, with everything else escaped.
@@ -84,6 +86,7 @@ impl Source {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
+            (false, false, false) if has("gear") => Ok(Kind::Gearbox),
             (false, false, false) if has("sensors") => Ok(Kind::Sensors),
             (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
             _ => Err(ConfigError::Syntax {
@@ -91,8 +94,8 @@ impl Source {
                 line: 1,
                 message:
                     "expected a vehicle file (with [gear_train]), experiment file (with [shift]), study file (with \
-                          [[factor]]), sensors file (with [sensors]) or bounds file (only with tables of a vehicle \
-                          file)"
+                          [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
+                          with tables of a vehicle file)"
                         .to_owned(),
             }),
         }

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{EXPERIMENT, FILL, STROKE, STUDY, VEHICLE, mutations};
-use config::{ConfigError, Experiment, Sensors, Source, Study, Vehicle};
+use config::{ConfigError, Experiment, GearboxFile, Sensors, Source, Study, Vehicle};
 
 /// Every error but those of reading names a line of the file.
 fn has_its_place(error: &ConfigError, path: &str, lines: usize, mutation: &str) {
@@ -32,6 +32,27 @@ fn every_mutation_of_a_vehicle_file_is_refused_with_its_place_or_accepted() {
         }
     }
     assert!(accepted > 100 && accepted < all.len() / 2, "{accepted} of {}", all.len());
+}
+
+#[test]
+fn every_mutation_of_a_gearbox_file_is_refused_with_its_place_or_accepted() {
+    let files = [
+        include_str!("../../../gearboxes/8hp.toml"),
+        include_str!("../../../gearboxes/dual_clutch_7.toml"),
+        include_str!("gearboxes/shares.toml"),
+        include_str!("gearboxes/ratios.toml"),
+    ];
+    for file in files {
+        let mut accepted = 0;
+        let all = mutations(file);
+        for (name, text) in &all {
+            match GearboxFile::from_source(Source::built_in("g.toml", text)) {
+                Ok(_) => accepted += 1,
+                Err(error) => has_its_place(&error, "g.toml", text.lines().count(), name),
+            }
+        }
+        assert!(accepted > 5 && accepted < all.len() / 2, "{accepted} of {}", all.len());
+    }
 }
 
 #[test]

@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 
-use config::{Experiment, Study, Vehicle};
+use config::{Experiment, GearboxFile, Study, Vehicle};
 use design::{design_compliant, design_rigid};
+use report::gearbox_figure::{gear_figure, train_figure};
 use study::campaign::{factor_values, run_seed};
 use study::{Row, RunColumns, simulate_shift};
 use trace::{ColumnKind, GrowingTable, partial_path, read_csv, read_rows, write_csv, write_parquet};
@@ -27,6 +28,14 @@ pub(crate) fn vehicle(fuzzer: &Fuzzer, input: &[u8]) {
     if fuzzer.depth == Depth::Long {
         // Requirements that cannot be met are an error, which is well.
         let _ = (design_rigid(&vehicle), design_compliant(&vehicle));
+    }
+}
+
+pub(crate) fn gearbox(fuzzer: &Fuzzer, input: &[u8]) {
+    let Ok(file) = GearboxFile::read(&written(fuzzer, "gearboxes/input", input)) else { return };
+    let _ = train_figure(&file.gearbox);
+    for gear in 0..file.gearbox.gears.len() {
+        let _ = gear_figure(&file.gearbox, gear);
     }
 }
 

@@ -43,11 +43,13 @@ pub enum Target {
     Map,
     /// The reader of the messages and signals of a bus.
     Dbc,
+    /// The reader of gearbox files, and the diagrams of a gearbox.
+    Gearbox,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Vehicle,
         Self::Experiment,
         Self::Study,
@@ -57,6 +59,7 @@ impl Target {
         Self::Measured,
         Self::Map,
         Self::Dbc,
+        Self::Gearbox,
     ];
 
     /// Its name on the command line, and the folder of its corpus.
@@ -71,6 +74,7 @@ impl Target {
             Self::Measured => "measured",
             Self::Map => "map",
             Self::Dbc => "dbc",
+            Self::Gearbox => "gearbox",
         }
     }
 }
@@ -104,7 +108,7 @@ impl Fuzzer {
         static MADE: AtomicUsize = AtomicUsize::new(0);
         let number = MADE.fetch_add(1, Ordering::Relaxed);
         let folder = env::temp_dir().join(format!("wetclutch-fuzz-{}-{number}", std::process::id()));
-        for name in ["vehicles", "experiments"] {
+        for name in ["vehicles", "experiments", "gearboxes"] {
             fs::create_dir_all(folder.join(name))?;
             for entry in fs::read_dir(project().join(name))? {
                 let path = entry?.path();
@@ -144,6 +148,7 @@ impl Fuzzer {
             Target::Measured => measured::log(self, input),
             Target::Map => measured::map(self, input),
             Target::Dbc => measured::dbc(self, input),
+            Target::Gearbox => files::gearbox(self, input),
         }
     }
 
@@ -169,6 +174,7 @@ impl Fuzzer {
             Target::Study => seeds.extend(
                 ["settings", "budget", "error_bound"].map(|name| text(&experiments.join(name).with_extension("toml"))),
             ),
+            Target::Gearbox => seeds.extend(texts(&[self.folder.join("gearboxes")])),
             Target::Table => seeds.push(self.table()),
             Target::Measured => seeds.extend(texts(&[measured::data()])),
             Target::Map => seeds.push(text(&project().join("maps/genesis_at8.toml"))),

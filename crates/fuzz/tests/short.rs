@@ -22,6 +22,11 @@ fn no_vehicle_file_panics() {
 }
 
 #[test]
+fn no_gearbox_file_panics() {
+    first_cases(Target::Gearbox, 300);
+}
+
+#[test]
 fn no_experiment_file_panics() {
     first_cases(Target::Experiment, 300);
 }

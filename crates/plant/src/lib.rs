@@ -17,10 +17,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod contact;
 pub mod controller;
 pub mod delay;
 pub mod energy;
 pub mod fast_fill;
+pub mod gear_train;
 pub mod hybrid;
 pub mod mode;
 pub mod powertrain;
@@ -29,9 +31,11 @@ pub mod sensors;
 pub mod simulate;
 pub mod state;
 
+pub use contact::{ContactProblem, ContactSolution, MAX_CONTACTS};
 pub use controller::{Commands, Measured, ShiftController, Stage};
 pub use energy::{PowerBalance, stored_energy};
 pub use fast_fill::FillPlan;
+pub use gear_train::{Limits, TrainError, TrainInputs, TrainModel, TrainRun};
 pub use hybrid::{HybridIntegrator, PlantError, Segment};
 pub use mode::{Contact, Direction, Mode};
 pub use powertrain::{Inputs, Powertrain, Torques};

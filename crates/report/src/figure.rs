@@ -35,8 +35,8 @@ const TICKS: f64 = 14.0;
 const TICK_SIZE: u32 = 12;
 /// Opacity of a shaded range.
 const RANGE_OPACITY: f64 = 0.16;
-const TEXT: &str = "#222222";
-const FONT: &str = "Helvetica, Arial, 'Liberation Sans', sans-serif";
+pub(crate) const TEXT: &str = "#222222";
+pub(crate) const FONT: &str = "Helvetica, Arial, 'Liberation Sans', sans-serif";
 
 /// One curve.
 #[derive(Debug, Clone)]
@@ -141,9 +141,7 @@ impl Figure {
             y += whole(panel);
         }
         self.name_spans(&mut scene, &margins);
-        let svg = SvgBackend::new().render_scene(&scene);
-        // A view box lets the figure scale with the page around it.
-        svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {WIDTH} {height}\" "), 1)
+        document(&scene)
     }
 
     fn place<'a>(&self, panel: &'a Panel) -> Placed<'a> {
@@ -323,6 +321,12 @@ impl Placed<'_> {
         let widest = self.legend(0.0).iter().map(Entry::width).fold(0.0, f64::max);
         GAP + KEY + GAP + widest + 4.0
     }
+}
+
+/// The scene as an SVG document that scales with the page around it.
+pub(crate) fn document(scene: &Scene) -> String {
+    let svg = SvgBackend::new().render_scene(scene);
+    svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {} {}\" ", scene.width, scene.height), 1)
 }
 
 fn draw_entry(scene: &mut Scene, entry: &Entry, x: f64, top: f64) {

@@ -4,6 +4,7 @@ mod axis;
 pub mod bench_page;
 pub mod error_bound_page;
 pub mod figure;
+pub mod gearbox_figure;
 mod legend;
 pub mod map_figures;
 pub mod page;

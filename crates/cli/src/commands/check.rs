@@ -1,17 +1,24 @@
 //! `wetclutch check`.
 
-use config::{Experiment, GainMethod, Kind, Sensors, Source, Study, Values, Vehicle};
+use config::{Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values, Vehicle};
 use design::{longest_step_of, unstable_corners};
 
 use report::tables::phase_name;
 
+use super::gearbox;
 use crate::args::Check;
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     let source = Source::read(&options.file)?;
-    match source.kind()? {
+    let kind = source.kind()?;
+    if options.output.is_some() && kind != Kind::Gearbox {
+        let message = format!("{}: only a gearbox file is drawn\nhint: leave -o out", options.file.display());
+        return Err(Failure::Input(message));
+    }
+    match kind {
+        Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
         Kind::Vehicle => describe(&Vehicle::from_source(source)?),
         Kind::Experiment => {
             let experiment = Experiment::from_source(source)?;

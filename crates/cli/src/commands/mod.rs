@@ -6,6 +6,7 @@ mod demo;
 mod design;
 mod error_bound;
 mod estimate;
+mod gearbox;
 mod inspect;
 mod measured;
 mod reproduce;

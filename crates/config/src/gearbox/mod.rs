@@ -1,0 +1,78 @@
+//! Gearbox files, on one of three levels: stick diagram, ratios and holding torques, ratios alone.
+
+mod convert;
+mod raw;
+
+use std::path::Path;
+
+use geartrain::{Finding, Gearbox, Part};
+
+use crate::check::Check;
+use crate::{ConfigError, Source};
+use convert::{Read, Spans};
+use raw::{RawHead, RawRatios, RawShares, RawStickDiagram};
+
+/// The levels of a gearbox file.
+const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements), \"shares\" (ratios and holding torques) and \
+                      \"ratios\" (ratios alone)";
+
+/// A checked gearbox file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GearboxFile {
+    /// The text.
+    pub source: Source,
+    /// What it describes.
+    pub gearbox: Gearbox,
+    /// What is unusual, each with file, line and hint.
+    pub warnings: Vec<String>,
+}
+
+impl GearboxFile {
+    /// Reads and checks a gearbox file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or something in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        Self::from_source(Source::read(path)?)
+    }
+
+    /// Checks the text of a gearbox file.
+    ///
+    /// # Errors
+    /// What is wrong, with its line and a hint.
+    pub fn from_source(source: Source) -> Result<Self, ConfigError> {
+        let check = Check::of(&source);
+        let head: RawHead = source.parse()?;
+        let level = head.level.as_ref().and_then(|level| level.get_ref().as_str());
+        let read = match level {
+            Some("stick-diagram") => convert::stick_diagram(&check, &source.parse::<RawStickDiagram>()?)?,
+            Some("shares") => convert::shares(&check, &source.parse::<RawShares>()?)?,
+            Some("ratios") => convert::ratios(&check, &source.parse::<RawRatios>()?)?,
+            _ => {
+                let at = head.level.as_ref().map_or(0, |level| level.span().start);
+                let message = if head.level.is_some() { "there is no such level" } else { "missing `level`" };
+                return Err(check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned())));
+            }
+        };
+        let Read { description, spans } = read;
+        let gearbox = Gearbox::new(&description).map_err(|finding| meaning(&check, &spans, &finding))?;
+        let warnings = gearbox.warnings.iter().map(|finding| meaning(&check, &spans, finding).to_string()).collect();
+        Ok(Self { source, gearbox, warnings })
+    }
+}
+
+/// A finding with its place in the file.
+fn meaning(check: &Check<'_>, spans: &Spans, finding: &Finding) -> ConfigError {
+    let key = finding.key;
+    let (list, at) = match finding.part {
+        Part::Gearbox => return check.meaning(key, spans.of(key), finding.to_string(), finding.fault.hint()),
+        Part::Shaft(at) => ("shaft", at),
+        Part::Set(at) => ("planetary_set", at),
+        Part::Pair(at) => ("gear_pair", at),
+        Part::Element(at) => ("element", at),
+        Part::Gear(at) => ("gear", at),
+        Part::Mass(at) => ("shift_mass", at),
+    };
+    let (offset, part) = spans.part(list, at);
+    check.meaning(&format!("{part}.{key}"), offset, finding.to_string(), finding.fault.hint())
+}

@@ -1,0 +1,323 @@
+//! A checked gearbox: its gears and its shifts, from whatever is known of it.
+
+use drivetrain::{Clutch, ReducedShift};
+
+use crate::capacity::{self, Capacity};
+use crate::description::{Description, ElementKind, Given, Ratios, Shares, ShiftMass, StickDiagram};
+use crate::finding::{Fault, Finding, Part};
+use crate::resolve::{engaged, names, place, positive, train};
+use crate::shift::{Change, Shift, change};
+use crate::train::{GearTrain, NoGear, ZERO};
+
+/// An element of a gearbox.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GearboxElement {
+    /// Its name.
+    pub name: String,
+    /// What it is.
+    pub kind: ElementKind,
+    /// Its friction plates and piston.
+    pub pack: Option<Clutch<f64>>,
+}
+
+/// The torque of an engaged element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Holding {
+    /// The element.
+    pub element: usize,
+    /// Its static torque per turbine torque; positive drives its output side. Its reciprocal is `alpha` of a shift.
+    pub per_turbine_torque: f64,
+}
+
+/// A gear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gear {
+    /// Its name.
+    pub name: String,
+    /// Turbine speed over output speed; negative in reverse.
+    pub ratio: f64,
+    /// The engaged elements with their torques; empty where only the ratio is known.
+    pub holding: Vec<Holding>,
+    /// Whether the torques are the only possible ones; if not, they are the smallest.
+    pub holding_is_unique: bool,
+    /// Speed of each shaft per turbine speed, `None` where the gear leaves it open; empty without a stick diagram.
+    pub shaft_speeds: Vec<Option<f64>>,
+    /// Largest turbine torque, N m.
+    pub turbine_max_n_m: Option<f64>,
+}
+
+/// A checked gearbox.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gearbox {
+    /// Name for people.
+    pub name: String,
+    /// The elements; empty where only ratios are known.
+    pub elements: Vec<GearboxElement>,
+    /// The gears, in the order of the description.
+    pub gears: Vec<Gear>,
+    /// The shifts between any two gears, in the order of the gears. Where only ratios are known, those between neighbours.
+    pub shifts: Vec<Shift>,
+    /// The elements whose capacity could be checked.
+    pub capacities: Vec<Capacity>,
+    /// The stick diagram, where it is known.
+    pub train: Option<GearTrain>,
+    /// What is unusual.
+    pub warnings: Vec<Finding>,
+}
+
+impl Gearbox {
+    /// Checks a description and derives gears and shifts.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place and what to do about it.
+    pub fn new(description: &Description) -> Result<Self, Finding> {
+        let mut gearbox = match &description.given {
+            Given::StickDiagram(diagram) => from_stick_diagram(diagram)?,
+            Given::Shares(shares) => from_shares(shares)?,
+            Given::Ratios(ratios) => from_ratios(ratios)?,
+        };
+        gearbox.name.clone_from(&description.name);
+        gearbox.check_one_way()?;
+        if let Some(line_pressure_pa) = description.line_pressure_pa {
+            positive(Part::Gearbox, "line_pressure_pa", line_pressure_pa)?;
+        }
+        gearbox.capacities = capacity::check(&gearbox.elements, &gearbox.gears, description.line_pressure_pa)?;
+        Ok(gearbox)
+    }
+
+    fn of(elements: Vec<GearboxElement>, gears: Vec<Gear>) -> Self {
+        let (name, shifts, capacities, warnings) = (String::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { name, elements, gears, shifts, capacities, train: None, warnings }
+    }
+
+    /// The forward gears from the largest ratio to the smallest.
+    pub fn forward_gears(&self) -> Vec<usize> {
+        let mut forward: Vec<usize> = (0..self.gears.len()).filter(|&gear| self.gears[gear].ratio > 0.0).collect();
+        forward.sort_by(|&a, &b| self.gears[b].ratio.total_cmp(&self.gears[a].ratio));
+        forward
+    }
+
+    /// The shift between two gears.
+    pub fn shift(&self, from: usize, to: usize) -> Option<&Shift> {
+        self.shifts.iter().find(|shift| (shift.from, shift.to) == (from, to))
+    }
+
+    /// The gear of this name.
+    pub fn gear(&self, name: &str) -> Option<usize> {
+        self.gears.iter().position(|gear| gear.name == name)
+    }
+
+    /// A one-way clutch carries only a positive torque.
+    fn check_one_way(&self) -> Result<(), Finding> {
+        for (at, gear) in self.gears.iter().enumerate() {
+            let backwards = |holding: &&Holding| {
+                self.elements[holding.element].kind == ElementKind::OneWayClutch && holding.per_turbine_torque < -ZERO
+            };
+            if let Some(holding) = gear.holding.iter().find(backwards) {
+                let element = self.elements[holding.element].name.clone();
+                let fault = Fault::OneWay { element, gear: gear.name.clone() };
+                return Err(Finding { part: Part::Gear(at), key: "engaged", fault });
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the shift between any two gears.
+    fn add_shifts(
+        &mut self,
+        possible: impl Fn(usize, usize, &[usize]) -> bool,
+        reduced: impl Fn(usize, usize, &Change) -> Option<ReducedShift<f64>>,
+    ) {
+        let engaged = |gear: usize| self.gears[gear].holding.iter().map(|holding| holding.element).collect::<Vec<_>>();
+        let count = self.gears.len();
+        let pairs = (0..count).flat_map(|from| (0..count).filter(move |&to| to != from).map(move |to| (from, to)));
+        self.shifts = pairs
+            .map(|(from, to)| {
+                let change = change(&self.elements, &engaged(from), &engaged(to), &possible);
+                Shift { from, to, reduced: reduced(from, to, &change), change }
+            })
+            .collect();
+    }
+}
+
+fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
+    let (train, warnings) = train(diagram)?;
+    names((Part::Gearbox, "gear"), Part::Gear, diagram.gears.iter().map(|gear| gear.name.as_str()))?;
+    let element_names = || train.elements.iter().map(|element| element.name.as_str());
+    // With dogs the idle shafts of a gear are free or not: there is no one number.
+    let has_dogs = train.pairs.iter().any(|pair| pair.dog.is_some());
+    let wanted = (!has_dogs).then(|| train.degrees_of_freedom() - 1);
+    let mut gears = Vec::new();
+    for (at, gear) in diagram.gears.iter().enumerate() {
+        let about = |key, fault| Finding { part: Part::Gear(at), key, fault };
+        let engaged = engaged(at, gear.engaged.iter().map(String::as_str), element_names())?;
+        let wrong = |no_gear| about("engaged", no_gear_fault(no_gear, &gear.name, &gear.engaged, wanted));
+        let motion = train.gear(&engaged).map_err(wrong)?;
+        let torques = train.holding_torques(&engaged, motion.ratio);
+        // A gear that turns has torques that hold it: both follow from the same rows.
+        let (torques, holding_is_unique) = torques.ok_or_else(|| wrong(NoGear::Open))?;
+        if let Some(stated) = gear.stated_ratio.filter(|stated| !stated.prints(motion.ratio)) {
+            let fault = Fault::StatedRatio { gear: gear.name.clone(), found: motion.ratio, stated: stated.value };
+            return Err(about("stated_ratio", fault));
+        }
+        if let Some(torque) = gear.turbine_max_n_m {
+            positive(Part::Gear(at), "turbine_max_n_m", torque)?;
+        }
+        let holding =
+            engaged.iter().zip(torques).map(|(&element, per_turbine_torque)| Holding { element, per_turbine_torque });
+        gears.push(Gear {
+            name: gear.name.clone(),
+            ratio: motion.ratio,
+            holding: holding.collect(),
+            holding_is_unique,
+            shaft_speeds: motion.speeds,
+            turbine_max_n_m: gear.turbine_max_n_m,
+        });
+    }
+    let elements = (train.elements.iter())
+        .map(|element| GearboxElement { name: element.name.clone(), kind: element.kind, pack: element.pack })
+        .collect();
+    let mut gearbox = Gearbox::of(elements, gears);
+    gearbox.warnings = warnings;
+    gearbox.add_shifts(
+        |offgoing, oncoming, held| train.reduce(held, offgoing, oncoming).is_some(),
+        |_, _, change| match change {
+            Change::Single { offgoing, oncoming, held } => train.reduce(held, *offgoing, *oncoming),
+            _ => None,
+        },
+    );
+    gearbox.train = Some(train);
+    Ok(gearbox)
+}
+
+fn no_gear_fault(no_gear: NoGear, gear: &str, engaged: &[String], wanted: Option<usize>) -> Fault {
+    let (gear, count) = (gear.to_owned(), engaged.len());
+    let engaged = if engaged.is_empty() { "no element".to_owned() } else { engaged.join(", ") };
+    match no_gear {
+        NoGear::Locked => Fault::Locked { gear, engaged, count, wanted },
+        NoGear::Open => Fault::Open { gear, engaged, count, wanted },
+        NoGear::InputHeld => Fault::Held { gear, engaged, held: "input" },
+        NoGear::OutputHeld => Fault::Held { gear, engaged, held: "output" },
+    }
+}
+
+/// A ratio must be finite and not zero.
+fn check_ratio(gear: usize, ratio: f64) -> Result<(), Finding> {
+    let valid = ratio.is_finite() && ratio != 0.0;
+    let fault = Fault::Number { value: ratio, expected: "turbine speed over output speed, negative in reverse" };
+    if valid { Ok(()) } else { Err(Finding { part: Part::Gear(gear), key: "ratio", fault }) }
+}
+
+fn from_shares(shares: &Shares) -> Result<Gearbox, Finding> {
+    let element_names = || shares.elements.iter().map(|element| element.0.as_str());
+    names((Part::Gearbox, "element"), Part::Element, element_names())?;
+    names((Part::Gearbox, "gear"), Part::Gear, shares.gears.iter().map(|gear| gear.name.as_str()))?;
+    let mut gears = Vec::new();
+    for (at, gear) in shares.gears.iter().enumerate() {
+        check_ratio(at, gear.ratio)?;
+        let places = engaged(at, gear.shares.iter().map(|share| share.0.as_str()), element_names())?;
+        if let Some((_, value)) = gear.shares.iter().find(|share| !share.1.is_finite()) {
+            let fault = Fault::Number { value: *value, expected: "torque of the element per turbine torque" };
+            return Err(Finding { part: Part::Gear(at), key: "shares", fault });
+        }
+        if let Some(torque) = gear.turbine_max_n_m {
+            positive(Part::Gear(at), "turbine_max_n_m", torque)?;
+        }
+        let holding =
+            places.iter().zip(&gear.shares).map(|(&element, share)| Holding { element, per_turbine_torque: share.1 });
+        gears.push(Gear {
+            holding: holding.collect(),
+            turbine_max_n_m: gear.turbine_max_n_m,
+            ..ratio_only(&gear.name, gear.ratio)
+        });
+    }
+    let masses = masses(&shares.masses, &gears)?;
+    let elements = shares.elements.iter().map(|(name, kind, pack)| GearboxElement {
+        name: name.clone(),
+        kind: *kind,
+        pack: *pack,
+    });
+    let mut gearbox = Gearbox::of(elements.collect(), gears);
+    let gears = gearbox.gears.clone();
+    let slip = |gear: usize, element: usize| {
+        let share = gears[gear].holding.iter().find(|holding| holding.element == element)?.per_turbine_torque;
+        (share != 0.0).then(|| [1.0 / share, -gears[gear].ratio / share])
+    };
+    gearbox.add_shifts(
+        |_, _, _| true,
+        |from, to, change| match *change {
+            Change::Single { offgoing, oncoming, .. } => Some(ReducedShift {
+                mass_kg_m2: mass_of(&masses, from, to)?,
+                slip_offgoing: slip(from, offgoing)?,
+                slip_oncoming: slip(to, oncoming)?,
+            }),
+            _ => None,
+        },
+    );
+    Ok(gearbox)
+}
+
+fn from_ratios(ratios: &Ratios) -> Result<Gearbox, Finding> {
+    names((Part::Gearbox, "gear"), Part::Gear, ratios.gears.iter().map(|gear| gear.name.as_str()))?;
+    for (at, gear) in ratios.gears.iter().enumerate() {
+        check_ratio(at, gear.ratio)?;
+    }
+    let gears: Vec<Gear> = ratios.gears.iter().map(|gear| ratio_only(&gear.name, gear.ratio)).collect();
+    let masses = masses(&ratios.masses, &gears)?;
+    let mut gearbox = Gearbox::of(Vec::new(), gears);
+    let forward = gearbox.forward_gears();
+    let up = forward.windows(2).map(|pair| (pair[0], pair[1]));
+    let both_ways = up.flat_map(|(low, high)| [(low, high), (high, low)]);
+    // Torques at the turbine: `alpha` is 1.
+    let slip = |gear: usize| [1.0, -gearbox.gears[gear].ratio];
+    let shifts = both_ways.map(|(from, to)| {
+        let mass = mass_of(&masses, from, to);
+        let reduced =
+            mass.map(|mass_kg_m2| ReducedShift { mass_kg_m2, slip_offgoing: slip(from), slip_oncoming: slip(to) });
+        Shift { from, to, change: Change::Unknown, reduced }
+    });
+    gearbox.shifts = shifts.collect();
+    Ok(gearbox)
+}
+
+fn ratio_only(name: &str, ratio: f64) -> Gear {
+    Gear {
+        name: name.to_owned(),
+        ratio,
+        holding: Vec::new(),
+        holding_is_unique: true,
+        shaft_speeds: Vec::new(),
+        turbine_max_n_m: None,
+    }
+}
+
+/// Two gears and the mass of the shift between them.
+type Mass = ([usize; 2], [[f64; 2]; 2]);
+
+fn masses(masses: &[ShiftMass], gears: &[Gear]) -> Result<Vec<Mass>, Finding> {
+    let mut checked: Vec<Mass> = Vec::new();
+    for (at, mass) in masses.iter().enumerate() {
+        let about = |key, fault| Finding { part: Part::Mass(at), key, fault };
+        let gear =
+            |name: &str| place((Part::Mass(at), "gears"), "gear", name, gears.iter().map(|gear| gear.name.as_str()));
+        let [a, b] = &mass.gears;
+        let between = [gear(a)?, gear(b)?];
+        let again = checked.iter().any(|(other, _)| *other == between || *other == [between[1], between[0]]);
+        if between[0] == between[1] || again {
+            return Err(about("gears", Fault::Repeated(format!("{a}, {b}"))));
+        }
+        positive(Part::Mass(at), "turbine_kg_m2", mass.turbine_kg_m2)?;
+        positive(Part::Mass(at), "output_kg_m2", mass.output_kg_m2)?;
+        let coupling = mass.coupling_kg_m2;
+        let is_definite = mass.turbine_kg_m2 * mass.output_kg_m2 > coupling * coupling;
+        if !is_definite {
+            return Err(about("coupling_kg_m2", Fault::Mass(a.clone(), b.clone())));
+        }
+        checked.push((between, [[mass.turbine_kg_m2, coupling], [coupling, mass.output_kg_m2]]));
+    }
+    Ok(checked)
+}
+
+fn mass_of(masses: &[Mass], from: usize, to: usize) -> Option<[[f64; 2]; 2]> {
+    masses.iter().find(|(gears, _)| *gears == [from, to] || *gears == [to, from]).map(|(_, mass)| *mass)
+}

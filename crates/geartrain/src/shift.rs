@@ -1,0 +1,108 @@
+//! From one gear to another: which elements change.
+
+use drivetrain::{ReducedShift, ShiftKind};
+
+use crate::description::ElementKind;
+use crate::gearbox::{Gear, GearboxElement};
+
+/// A change of gear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shift {
+    /// The gear before.
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// The elements that change.
+    pub change: Change,
+    /// The shift reduced to turbine and output speed; torques are those of the elements, or referred to the turbine where
+    /// only ratios are known. `None` where the inertia is not known, for changes of more elements, and where turbine and
+    /// output speed do not determine the others.
+    pub reduced: Option<ReducedShift<f64>>,
+}
+
+/// The elements that change in a shift, by their places in the list of elements.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Change {
+    /// One element off, one on: a clutch-to-clutch shift.
+    Single {
+        /// The element that opens.
+        offgoing: usize,
+        /// The element that closes.
+        oncoming: usize,
+        /// The elements that stay engaged. The dogs of both gears of a dual clutch are among them.
+        held: Vec<usize>,
+    },
+    /// Several elements change at once: a double or triple transition.
+    Several {
+        /// The elements that open.
+        offgoing: Vec<usize>,
+        /// The elements that close.
+        oncoming: Vec<usize>,
+    },
+    /// Only dogs change: the flow of power is interrupted, or the shift goes through a gear of the other clutch.
+    Interrupted {
+        /// The dogs that open.
+        offgoing: Vec<usize>,
+        /// The dogs that close.
+        oncoming: Vec<usize>,
+    },
+    /// The elements are not known.
+    Unknown,
+}
+
+impl Shift {
+    /// Power-on or power-off, up or down, at this turbine torque.
+    pub fn kind(&self, gears: &[Gear], turbine_n_m: f64) -> Option<ShiftKind> {
+        ShiftKind::of(turbine_n_m, gears[self.from].ratio, gears[self.to].ratio)
+    }
+}
+
+impl Change {
+    /// What the trade calls it.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Single { .. } => "single".to_owned(),
+            Self::Several { offgoing, oncoming } => match (offgoing.len(), oncoming.len()) {
+                (2, 2) => "double".to_owned(),
+                (3, 3) => "triple".to_owned(),
+                (off, on) => format!("{off} off, {on} on"),
+            },
+            Self::Interrupted { .. } => "interrupted".to_owned(),
+            Self::Unknown => "unknown".to_owned(),
+        }
+    }
+}
+
+/// The change between two gears. `possible` says whether two elements can change while others are held.
+pub(crate) fn change(
+    elements: &[GearboxElement],
+    from: &[usize],
+    to: &[usize],
+    possible: impl Fn(usize, usize, &[usize]) -> bool,
+) -> Change {
+    let only = |of: &[usize], other: &[usize]| -> Vec<usize> {
+        of.iter().copied().filter(|element| !other.contains(element)).collect()
+    };
+    let is_dog = |element: usize| elements[element].kind == ElementKind::Dog;
+    let (off, on) = (only(from, to), only(to, from));
+    let common: Vec<usize> = from.iter().copied().filter(|element| to.contains(element)).collect();
+    // The dogs of both gears are in while two clutches hand over.
+    if let ([offgoing], [oncoming]) = (&*without_dogs(&off, is_dog), &*without_dogs(&on, is_dog)) {
+        let dogs = off.iter().chain(&on).copied().filter(|&element| is_dog(element));
+        let held: Vec<usize> = common.iter().copied().chain(dogs).collect();
+        if held.len() == common.len() || possible(*offgoing, *oncoming, &held) {
+            return Change::Single { offgoing: *offgoing, oncoming: *oncoming, held };
+        }
+    }
+    match (&*off, &*on) {
+        _ if off.iter().chain(&on).all(|&element| is_dog(element)) => {
+            Change::Interrupted { offgoing: off, oncoming: on }
+        }
+        (&[offgoing], &[oncoming]) => Change::Single { offgoing, oncoming, held: common },
+        _ => Change::Several { offgoing: off, oncoming: on },
+    }
+}
+
+fn without_dogs(elements: &[usize], is_dog: impl Fn(usize) -> bool) -> Vec<usize> {
+    elements.iter().copied().filter(|&element| !is_dog(element)).collect()
+}
