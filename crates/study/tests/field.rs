@@ -156,7 +156,7 @@ fn what_is_learnt_in_a_launch_is_no_more_than_twice_too_sure() {
         let states = state.states().unwrap();
         // The filter counts delays from the turbine's.
         let truth = [
-            sensors.wheel.scale - 1.0,
+            sensors.wheel.errors.scale - 1.0,
             sensors.wheel.delay_s - sensors.turbine.delay_s,
             sensors.output.delay_s - sensors.turbine.delay_s,
         ];
