@@ -68,8 +68,8 @@ impl<T: Real> Engine<T> {
     pub(crate) fn predict(&mut self, noise: &EngineNoise<T>, dt_s: T) {
         let square = |x: T| x * x;
         let (two, third) = (T::of(2.0), T::of(1.0 / 3.0));
-        // The acceleration fades, so that its variance ends at the square of its limit: cut there, the covariance would not
-        // stay one.
+        // The acceleration fades, so that its variance ends at the square of its limit. If only this variance were cut there,
+        // the three numbers would no longer be a covariance.
         let limit = noise.acceleration_max_rad_s2;
         let fade_s = two * square(limit / noise.acceleration_walk);
         let stay = fade_s / (fade_s + dt_s);

@@ -20,8 +20,8 @@
 //! only corrected while both clutches slip (a consider state, S. F. Schmidt 1966): before, an error that shaft
 //! and turbine torque share cancels in the clutch torque, and no speed shows it.
 //!
-//! The covariance is corrected in Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain and stays positive
-//! in single precision.
+//! The covariance is corrected in Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain and keeps it
+//! positive but for rounding. A filter whose variance is no number, or negative, begins anew and says so.
 
 mod covariance;
 mod engine;
