@@ -41,6 +41,9 @@ impl<T: Real> OffgoingPressure<T> {
         }
         self.commands.pass(dt_s);
         self.settled_pa = offgoing.valve.target_pa(&self.commands, dt_s);
+        if self.settled_pa == self.pressure_pa {
+            return;
+        }
         let step = offgoing.valve.step(self.settled_pa, self.pressure_pa, dt_s);
         self.pressure_pa = limits.possible_pressure(step.phi * self.pressure_pa + step.drift_pa);
     }
@@ -80,12 +83,14 @@ impl<T: Real> KalmanFilter<T> {
         }
         let clutch = &self.offgoing.clutch;
         let pressure_pa = offgoing.pressure_pa;
+        let (torque, capacity) = (running.mean[OFFGOING], clutch.static_capacity(pressure_pa));
+        if torque.abs() <= capacity {
+            return;
+        }
         // Lag and delay err in proportion to what the pressure still has to go.
         let by_valve = (u.valve_gain * pressure_pa).hypot(u.valve_share * (pressure_pa - offgoing.settled_pa));
-        let capacity = clutch.static_capacity(pressure_pa);
         let per_pa = clutch.static_friction * clutch.lever() * clutch.piston_area_m2;
         let deviation = (u.friction * capacity).hypot(per_pa * by_valve) + self.offgoing.open_n_m;
-        let torque = running.mean[OFFGOING];
         let most = capacity + deviation;
         if torque.abs() <= most {
             return;
