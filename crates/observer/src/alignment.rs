@@ -116,7 +116,7 @@ impl<T: Real> Alignment<T> {
             wheel_rad_s,
             command: refused.or(state.command).unwrap_or_else(T::nan),
         };
-        let unused = ChannelHealth::Absent;
+        let unused = ChannelHealth::Unused;
         let channels =
             Channels { engine, turbine, output, wheel, command, offgoing_command: unused, engine_torque: unused };
         (sample, channels)

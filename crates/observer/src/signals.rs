@@ -209,6 +209,8 @@ impl Health {
 /// What became of a channel in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ChannelHealth {
+    /// The log has no such channel, or the observer does without it.
+    Unused,
     /// Its reading was taken.
     Good,
     /// No reading came; the channel goes on as before.
@@ -223,6 +225,7 @@ impl ChannelHealth {
     /// A word for logs and tables.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Unused => "unused",
             Self::Good => "good",
             Self::Absent => "absent",
             Self::Refused => "refused",

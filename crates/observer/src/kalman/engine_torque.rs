@@ -44,8 +44,9 @@ impl<T: Real> KalmanFilter<T> {
         state.reported = last;
         let Some(reading) = input.engine_torque_n_m else {
             // A log without this channel misses nothing.
-            let silent = last.is_some_and(|last| last.since_s > lost);
-            return if silent { ChannelHealth::Lost } else { ChannelHealth::Absent };
+            return last.map_or(ChannelHealth::Unused, |last| {
+                if last.since_s > lost { ChannelHealth::Lost } else { ChannelHealth::Absent }
+            });
         };
         let most = T::of(IMPOSSIBLE) * self.engine.1.acceleration_max_rad_s2 * self.reported.engine_kg_m2;
         if !(reading.value.abs() <= most && reading.age_s >= zero && reading.age_s <= lost) {

@@ -450,7 +450,7 @@ impl<T: Real> KalmanFilter<T> {
         let mut health = sound;
         for channel in channels.each() {
             health = health.max(match channel {
-                ChannelHealth::Good | ChannelHealth::Absent => Health::Good,
+                ChannelHealth::Unused | ChannelHealth::Good | ChannelHealth::Absent => Health::Good,
                 ChannelHealth::Refused => Health::ReadingRefused,
                 ChannelHealth::Lost => Health::ChannelLost,
             });

@@ -57,7 +57,10 @@ impl<T: Real> OffgoingPressure<T> {
         reading: Option<Reading<T>>,
     ) -> ChannelHealth {
         // A log without this channel misses nothing, and one command stands until the next.
-        let Some(reading) = reading else { return ChannelHealth::Absent };
+        let Some(reading) = reading else {
+            let known = self.commands.newest_pa().is_some();
+            return if known { ChannelHealth::Absent } else { ChannelHealth::Unused };
+        };
         if !(limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
             return ChannelHealth::Refused;
         }
