@@ -136,9 +136,6 @@ impl<'s> Rating<'s> {
             q.turbine_n_m = sample.turbine_n_m;
             self.was_requested = true;
         }
-        for &element in &self.held {
-            q.held_slip_rad_s = q.held_slip_rad_s.max(sample.slips_rad_s[element].abs());
-        }
         let direction = (self.ratios[0] - self.ratios[1]).signum();
         let slip = |ratio: f64| direction * (sample.torques.turbine_rad_s - ratio * sample.torques.output_rad_s);
         q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
@@ -149,6 +146,9 @@ impl<'s> Rating<'s> {
             }
             return;
         };
+        for &element in &self.held {
+            q.held_slip_rad_s = q.held_slip_rad_s.max(sample.slips_rad_s[element].abs());
+        }
         let [off, on] = [self.alphas[0] * shift.offgoing.torque_n_m, self.alphas[1] * shift.oncoming.torque_n_m];
         if off * on < 0.0 && shift.stage != ShiftStage::Done {
             q.tie_up_n_m = q.tie_up_n_m.max(off.abs().min(on.abs()));
