@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
+mod drives;
 mod energy;
 mod shifts;
 mod two_speed;

@@ -16,13 +16,7 @@ fn table(friction: f64) -> Vec<(String, CarShiftQuality)> {
         for ((from, to), throttle) in kinds(&nominal) {
             let shift = CarShift::usual(&nominal, from, to, throttle);
             let names = [from, to].map(|gear| nominal.gearbox.gears[gear].name.clone());
-            let label = format!(
-                "{} {}-{} {}",
-                nominal.gearbox.name,
-                names[0],
-                names[1],
-                throttle
-            );
+            let label = format!("{} {}-{} {}", nominal.gearbox.name, names[0], names[1], throttle);
             let quality = simulate_car_shift(&model, &nominal, CarCalibration::STANDARD, &shift, |_| {});
             let quality = quality.unwrap_or_else(|error| panic!("{label}: {error}"));
             println!(

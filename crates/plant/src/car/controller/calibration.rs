@@ -83,7 +83,7 @@ impl CarCalibration {
         release_s: 0.5,
         release_slip_rad_s: 3.0,
         inertia_phase_s: 0.40,
-        power_on_down_s: 0.65,
+        power_on_down_s: 0.72,
         power_off_up_s: 0.70,
         past_synchronous_rad_s: 2.5,
         proportional_per_s: 9.0,
