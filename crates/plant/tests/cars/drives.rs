@@ -1,47 +1,127 @@
 //! Whole drives.
 
-use config::{Drive, Source};
-use plant::car::{CarCalibration, CarModel, simulate_car_drive};
+use config::{Car, Drive, Source};
+use plant::car::{CarCalibration, CarError, CarModel, CarSample, Driver, simulate_car_drive};
 
-fn city() -> Drive {
-    let text = include_str!("../../../../drives/city.toml");
-    Drive::from_source(Source::built_in("drives/city.toml", text)).unwrap()
+fn drive(text: &str) -> Drive {
+    Drive::from_source(Source::built_in("drive.toml", text)).unwrap()
+}
+
+fn samples(car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
+    let model = CarModel::new(car.clone())?;
+    let mut samples = Vec::new();
+    simulate_car_drive(&model, car, CarCalibration::STANDARD, drive, |sample| samples.push(*sample))?;
+    Ok(samples)
 }
 
 #[test]
-fn an_hour_in_town() {
-    let drive = city();
+fn an_hour_in_town_uses_all_gears_and_shifts_more_than_200_times() {
+    let drive = drive(include_str!("../../../../drives/city.toml"));
+    for car in crate::cars().into_iter().take(4) {
+        let model = CarModel::new(car.clone()).unwrap();
+        let (mut count, mut used) = (0, vec![false; car.gearbox.gears.len()]);
+        let begin = std::time::Instant::now();
+        let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
+            count += 1;
+            used[sample.gear] = true;
+            assert!(sample.vehicle_m_s.is_finite() && sample.torques.engine_rad_s > 60.0, "{}", sample.time_s);
+        })
+        .unwrap();
+        println!("{}: {summary:?} in {:.2} s", car.gearbox.name, begin.elapsed().as_secs_f64());
+        assert_eq!(count, 360_000);
+        assert!(summary.shifts >= 200, "{summary:?}");
+        assert!(car.gearbox.forward_gears().iter().all(|&gear| used[gear]), "{used:?}");
+    }
+}
+
+#[test]
+fn the_same_drive_gives_the_same_samples() {
     let car = crate::cars().swap_remove(0);
+    let drive = drive("name = \"d\"\n[[segment]]\nduration_s = 20\nthrottle = [0.0, 0.5]\n");
+    assert_eq!(samples(&car, &drive).unwrap(), samples(&car, &drive).unwrap());
+}
+
+#[test]
+fn listed_shifts_are_made_at_their_times() {
+    let car = crate::cars().swap_remove(0);
+    let text = "name = \"d\"\nstart = { gear = \"2\", vehicle_m_s = 8.0 }\n\
+                shift = [{ time_s = 2.0, gear = \"3\" }, { time_s = 5.0, gear = \"2\" }]\n\
+                [[segment]]\nduration_s = 8\nthrottle = 0.15\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    let gear_at = |time_s: f64| {
+        let sample = samples.iter().find(|sample| sample.time_s >= time_s).unwrap();
+        car.gearbox.gears[sample.gear].name.clone()
+    };
+    assert_eq!([1.9, 4.9, 7.9].map(gear_at), ["2", "3", "2"]);
+    let begun = samples.iter().find(|sample| sample.shift.is_some()).unwrap();
+    assert!((begun.time_s - 2.0).abs() < 1e-6, "{}", begun.time_s);
+}
+
+#[test]
+fn a_car_that_is_braked_on_a_hill_stands() {
+    let car = crate::cars().swap_remove(0);
+    let text = "name = \"d\"\n[[segment]]\nduration_s = 30\nthrottle = 0.0\nbrake = 0.9\ngrade_rad = 0.15\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    // The brake holds by a creep: it carries 0.65 of its torque at 0.08 rad/s of the wheel.
+    let last = samples.last().unwrap();
+    assert!(last.vehicle_m_s.abs() < 0.05, "{}", last.vehicle_m_s);
+    assert!((60.0..100.0).contains(&last.torques.engine_rad_s), "idle at {}", last.torques.engine_rad_s);
+}
+
+#[test]
+fn a_dual_clutch_drives_and_says_that_it_cannot_launch() {
+    let car = crate::dual_clutch();
+    let segments =
+        "[[segment]]\nduration_s = 30\nthrottle = [0.1, 0.4]\n[[segment]]\nduration_s = 20\nthrottle = 0.0\n";
+    let rolling = format!("name = \"d\"\nstart = {{ gear = \"2\", vehicle_m_s = 5.0 }}\n{segments}");
+    let driven = samples(&car, &drive(&rolling)).unwrap();
+    assert!(driven.iter().any(|sample| sample.gear > 3));
+    let error = samples(&car, &drive(&format!("name = \"d\"\n{segments}"))).unwrap_err();
+    assert!(error.to_string().contains("launch is not simulated"), "{error}");
+}
+
+/// The four-speed box with a one-way clutch that holds 1st gear in place of the brake LR.
+#[test]
+fn a_one_way_clutch_drives_and_freewheels() {
+    let text = include_str!("../../../../gearboxes/ravigneaux_4.toml");
+    let gear = "name = \"1\", engaged = [\"FWD\", \"LR\"]";
+    assert!(text.contains(gear));
+    let text = text.replace(gear, "name = \"1\", engaged = [\"FWD\", \"OWC\"]")
+        + "\n[[element]]\nname = \"OWC\"\nkind = \"one-way-clutch\"\ninput = \"housing\"\noutput = \"car\"\n";
+    let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
+    let car = Car::from_sources(source, Source::built_in("g.toml", &text)).unwrap();
+    let text = "name = \"d\"\nstart = { gear = \"1\", vehicle_m_s = 6.0 }\nshift = []\n\
+                segment = [{ duration_s = 2, throttle = 0.2 }, { duration_s = 3, throttle = 0.0 }, \
+                { duration_s = 2, throttle = 0.3 }]\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    let slip_at = |time_s: f64| {
+        let sample = samples.iter().find(|sample| sample.time_s >= time_s).unwrap();
+        sample.torques.turbine_rad_s - car.gearbox.gears[sample.gear].ratio * sample.torques.output_rad_s
+    };
+    assert!(slip_at(1.9).abs() < 1e-6, "it drives: {}", slip_at(1.9));
+    assert!(slip_at(4.9) < -30.0, "the turbine falls behind: {}", slip_at(4.9));
+    assert!(slip_at(6.9).abs() < 1e-6, "it drives again: {}", slip_at(6.9));
+}
+
+#[test]
+fn wrong_requests_get_clear_errors() {
+    let car = crate::cars().swap_remove(0);
+    let error = |head: &str| {
+        let text = format!("name = \"d\"\n{head}\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n");
+        samples(&car, &drive(&text)).unwrap_err().to_string()
+    };
+    assert!(error("start = { gear = \"9\" }").contains("no gear \"9\"\nhint: its gears are R, 1, 2"));
+    assert!(error("start = { gear = \"1\", vehicle_m_s = 90.0 }").contains("the most is 700 rad/s"));
+    assert!(error("shift = [{ time_s = 1.0, gear = \"4\" }]").contains("shift 1-4 is not between two clutches"));
+
     let model = CarModel::new(car.clone()).unwrap();
-    let begin = std::time::Instant::now();
-    let mut samples = 0_u64;
-    let mut last = (usize::MAX, 0.0);
-    let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
-        samples += 1;
-        if sample.gear != last.0 && sample.time_s < 185.0 {
-            println!(
-                "{:7.2} s gear {} {:5.1} m/s input {:5.1} engine {:5.1}",
-                sample.time_s,
-                car.gearbox.gears[sample.gear].name,
-                sample.vehicle_m_s,
-                sample.torques.turbine_rad_s,
-                sample.torques.engine_rad_s
-            );
-            last.0 = sample.gear;
-        }
-        if sample.time_s >= last.1 && sample.time_s < 180.0 {
-            println!(
-                "{:7.2} s gear {} {:5.1} m/s input {:5.1} engine {:5.1} thr {:.2}",
-                sample.time_s,
-                car.gearbox.gears[sample.gear].name,
-                sample.vehicle_m_s,
-                sample.torques.turbine_rad_s,
-                sample.torques.engine_rad_s,
-                sample.driver.throttle
-            );
-            last.1 += 5.0;
-        }
-    });
-    println!("{summary:?} {samples} samples in {:.3} s", begin.elapsed().as_secs_f64());
-    summary.unwrap();
+    let nan = model.in_gear(1, None, f64::NAN, 0.1).unwrap_err();
+    assert!(nan.to_string().contains("cannot start at NaN m/s"), "{nan}");
+    let state = model.in_gear(1, None, 5.0, 0.1).unwrap();
+    let driver = Driver { throttle: 0.1, brake: 0.0, grade_rad: 0.0 };
+    let calibration = CarCalibration::STANDARD;
+    assert!(plant::car::CarRun::new(&model, &car, calibration, 1, state, (driver, 0.0)).is_err());
+    let mut infinite = state;
+    infinite.wheel_rad_s = f64::INFINITY;
+    assert!(plant::car::CarRun::new(&model, &car, calibration, 1, infinite, (driver, 0.01)).is_err());
 }
