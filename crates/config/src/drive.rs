@@ -104,8 +104,7 @@ impl Drive {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawDrive = source.parse()?;
         let check = Check::of(&source);
-        let segments = raw.segment.get_ref().iter().enumerate();
-        let segments = segments.map(|(at, segment)| check_segment(&check, at, segment));
+        let segments = raw.segment.get_ref().iter().map(|segment| check_segment(&check, segment));
         let segments: Vec<DriveSegment> = segments.collect::<Result<_, _>>()?;
         if segments.is_empty() {
             let message = "the drive has no segment".to_owned();
@@ -189,19 +188,19 @@ enum FromTo {
     Ramp([f64; 2]),
 }
 
-fn check_segment(check: &Check<'_>, at: usize, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {
+fn check_segment(check: &Check<'_>, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {
     let ends = |name: &str, value: &Spanned<FromTo>, range: std::ops::RangeInclusive<f64>| {
         let ends = match *value.get_ref() {
             FromTo::Constant(value) => [value; 2],
             FromTo::Ramp(ends) => ends,
         };
         for end in ends {
-            check.number(&format!("segment[{at}].{name}"), &Spanned::new(value.span(), end), range.clone())?;
+            check.number(&format!("segment.{name}"), &Spanned::new(value.span(), end), range.clone())?;
         }
         Ok(ends)
     };
     Ok(DriveSegment {
-        duration_s: check.number(&format!("segment[{at}].duration_s"), &raw.duration_s, 0.01..=1e6)?,
+        duration_s: check.number("segment.duration_s", &raw.duration_s, 0.01..=1e6)?,
         throttle: ends("throttle", &raw.throttle, 0.0..=1.0)?,
         brake: raw.brake.as_ref().map_or(Ok([0.0; 2]), |brake| ends("brake", brake, 0.0..=1.0))?,
         grade_rad: raw.grade_rad.as_ref().map_or(Ok([0.0; 2]), |grade| ends("grade_rad", grade, -0.4..=0.4))?,
