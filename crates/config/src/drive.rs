@@ -35,16 +35,20 @@ pub struct DriveSegment {
 #[derive(Debug, Clone, PartialEq)]
 pub enum ShiftPlan {
     /// By throttle and speed of the gearbox input.
-    Schedule {
-        /// Input speed above which the next gear is taken, over throttle, rad/s.
-        up_rad_s: Table1<f64>,
-        /// Input speed below which the gear below is taken, over throttle, rad/s.
-        down_rad_s: Table1<f64>,
-        /// Least time in a gear, s.
-        time_in_gear_s: f64,
-    },
+    Schedule(Box<ShiftSchedule>),
     /// At given times, in rising order: time, s, and name of the gear.
     Listed(Vec<(f64, String)>),
+}
+
+/// Lines of a shift schedule.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftSchedule {
+    /// Input speed above which the next gear is taken, over throttle, rad/s.
+    pub up_rad_s: Table1<f64>,
+    /// Input speed below which the gear below is taken, over throttle, rad/s.
+    pub down_rad_s: Table1<f64>,
+    /// Least time in a gear, s.
+    pub time_in_gear_s: f64,
 }
 
 /// A drive.
@@ -231,7 +235,8 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
             Table1::new(&throttle, values).map_err(|error| check.meaning("schedule", 0, error.to_string(), None))
         };
         let time_in_gear_s = LEAST_TIME_IN_GEAR_S;
-        return Ok(ShiftPlan::Schedule { up_rad_s: table(&up)?, down_rad_s: table(&down)?, time_in_gear_s });
+        let schedule = ShiftSchedule { up_rad_s: table(&up)?, down_rad_s: table(&down)?, time_in_gear_s };
+        return Ok(ShiftPlan::Schedule(Box::new(schedule)));
     };
     let axis = || ("schedule.throttle", &schedule.throttle, 0.0..=1.0);
     let up = ("schedule.up_input_rad_s", &schedule.up_input_rad_s, 20.0..=1e3);
@@ -247,5 +252,5 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
         Some(time) => check.number("schedule.time_in_gear_s", time, 0.0..=100.0)?,
         None => LEAST_TIME_IN_GEAR_S,
     };
-    Ok(ShiftPlan::Schedule { up_rad_s, down_rad_s, time_in_gear_s })
+    Ok(ShiftPlan::Schedule(Box::new(ShiftSchedule { up_rad_s, down_rad_s, time_in_gear_s })))
 }

@@ -13,7 +13,7 @@ pub mod source;
 pub mod study;
 pub mod vehicle;
 
-pub use drive::{Drive, DriveSegment, ShiftPlan};
+pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
 pub use experiment::{
     CurrentSensor, Experiment, FastFill, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile,

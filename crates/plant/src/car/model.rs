@@ -391,8 +391,3 @@ pub(super) fn end_responses(train: &TrainModel) -> [[f64; MAX_FREEDOMS]; 3] {
     engine[train.freedoms - 1] = 1.0;
     [engine, train.ends[0], train.ends[1]].map(|force| train.accelerate(&force))
 }
-
-/// A response seen by the slip of an element.
-pub(super) fn slip_of(train: &TrainModel, element: usize, response: &[f64; MAX_FREEDOMS]) -> f64 {
-    train.slip(response, element)
-}

@@ -51,6 +51,21 @@ pub struct CarCommands {
     pub engine_share: f64,
 }
 
+/// A shift that is under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShiftProgress {
+    /// The gear before.
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// Place of the clutch that opens among the elements.
+    pub offgoing: usize,
+    /// Place of the clutch that closes.
+    pub oncoming: usize,
+    /// What the controller is about.
+    pub stage: ShiftStage,
+}
+
 /// The shift controller.
 #[derive(Debug, Clone)]
 pub struct CarShiftController {
@@ -81,11 +96,15 @@ impl CarShiftController {
         self.gear
     }
 
-    /// Gears and elements of the shift that is under way, and its stage.
-    pub fn shift(&self) -> Option<(usize, usize, usize, usize, ShiftStage)> {
-        self.active
-            .as_ref()
-            .map(|shift| (self.gear, shift.to, shift.offgoing.element, shift.oncoming.element, shift.stage))
+    /// The shift that is under way.
+    pub fn shift(&self) -> Option<ShiftProgress> {
+        self.active.as_ref().map(|shift| ShiftProgress {
+            from: self.gear,
+            to: shift.to,
+            offgoing: shift.offgoing.element,
+            oncoming: shift.oncoming.element,
+            stage: shift.stage,
+        })
     }
 
     /// Puts in the dogs of this gear beside those of the gear that is engaged.
