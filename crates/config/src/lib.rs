@@ -23,6 +23,6 @@ pub use gearbox::GearboxFile;
 pub use source::{Kind, Source, toml_string};
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty,
+    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,
     ValveUncertainty, Vehicle,
 };

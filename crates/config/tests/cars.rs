@@ -54,6 +54,14 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
         ("[clutch.K1]\ndrag_n_m = 1.0\n", ["car.toml:3", "no clutch or brake \"K1\"", "hint: it has A, B, C, D, E"]),
         ("[friction]\nstatic_factor = 0.9\n", ["car.toml:4", "is 0.9, less than", "neither stick nor slip"]),
         ("[friction]\nfactor = [1.0]\n", ["car.toml:4", "friction.factor", "5 breakpoints"]),
+        (
+            "[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"9\"\non_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.5\n",
+            ["car.toml:5", "no gear \"9\"", "its gears are R, 1"],
+        ),
+        (
+            "[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\non_input_rad_s = 100\noff_input_rad_s = 110\nramp_s = 0.5\n",
+            ["car.toml:7", "is 110, not below", ""],
+        ),
         ("launch = \"turbo\"\n", ["car.toml:3", "turbo", ""]),
         ("mass = 3\n", ["car.toml:3", "unknown field `mass`", ""]),
         (

@@ -21,7 +21,7 @@ use toml::Spanned;
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
 use crate::{ConfigError, Source};
-pub use car::Car;
+pub use car::{Car, LockUp};
 pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
 use raw::{

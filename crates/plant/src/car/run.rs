@@ -155,6 +155,6 @@ fn inputs(model: &CarModel, valves: &mut CarValves, commands: &CarCommands, driv
         grade_rad: driver.grade_rad,
         settled_pa: valves.settled_pa(model, now_s),
         dogs: commands.dogs,
-        lock_up_n_m: 0.0,
+        lock_up_n_m: commands.lock_up_n_m,
     }
 }

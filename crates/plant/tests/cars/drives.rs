@@ -106,6 +106,26 @@ fn a_one_way_clutch_drives_and_freewheels() {
 }
 
 #[test]
+fn the_lock_up_clutch_closes_in_its_gears_and_opens_for_shifts() {
+    let gearbox = include_str!("../../../../gearboxes/8hp.toml");
+    let text = "name = \"car\"\ngearbox = \"g.toml\"\n[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\n\
+                on_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.6\n";
+    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap();
+    let samples = samples(&car, &drive("name = \"d\"\n[[segment]]\nduration_s = 25\nthrottle = 0.2\n")).unwrap();
+    let lock_up = car.gearbox.elements.len();
+    let slip = |sample: &CarSample| sample.torques.engine_rad_s - sample.torques.turbine_rad_s;
+    let locked = |sample: &&CarSample| sample.torques.elements_n_m[lock_up] != 0.0 && slip(sample).abs() < 1e-6;
+    let gear = |sample: &CarSample| car.gearbox.gears[sample.gear].name.clone();
+    assert!(samples.iter().filter(|sample| gear(sample) < "3".to_owned()).all(|sample| !locked(&sample)));
+    for name in ["3", "4", "5"] {
+        assert!(samples.iter().filter(|sample| gear(sample) == name).filter(locked).count() > 50, "gear {name}");
+    }
+    let late =
+        |sample: &&CarSample| sample.shift.is_some_and(|shift| !matches!(shift.stage, plant::car::ShiftStage::Fill));
+    assert!(samples.iter().filter(late).all(|sample| !locked(&sample)));
+}
+
+#[test]
 fn wrong_requests_get_clear_errors() {
     let car = crate::cars().swap_remove(0);
     let error = |head: &str| {

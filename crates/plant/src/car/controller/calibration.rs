@@ -64,6 +64,8 @@ pub struct CarCalibration {
     pub engine_way: f64,
     /// Time in which the share of the engine torque changes by one, s.
     pub engine_ramp_s: f64,
+    /// Time in which the lock-up clutch opens, s: less than that of the fill.
+    pub unlock_s: f64,
     /// Time constant of the output speed, s.
     pub output_filter_s: f64,
     /// Time constant with which a pressure is made to follow, s.
@@ -105,6 +107,7 @@ impl CarCalibration {
         down_engine_share: 0.7,
         engine_way: 0.8,
         engine_ramp_s: 0.2,
+        unlock_s: 0.12,
         output_filter_s: 0.04,
         pressure_follow_s: 0.02,
         pressure_lead_pa: 0.3e6,
