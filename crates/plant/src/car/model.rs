@@ -21,8 +21,8 @@ const PRESSURE: usize = MOTION + MAX_FREEDOMS;
 /// Number of states.
 pub(super) const STATES: usize = PRESSURE + MAX_PACKS;
 
-/// Speed of the wheel, rad/s, over which the torque of the brake turns around: a braked car creeps by millimetres per second
-/// instead of sticking.
+/// Speed of the wheel, rad/s, over which the torque of the brake turns around: the brakes of a standing car creep instead of
+/// sticking, as its tyres do.
 const BRAKE_TURN_RAD_S: f64 = 0.1;
 
 /// Torque by which the synchroniser of a dog brings its gear to the speed of the shaft, N m \[chosen\].

@@ -62,12 +62,16 @@ fn listed_shifts_are_made_at_their_times() {
 #[test]
 fn a_car_that_is_braked_on_a_hill_stands() {
     let car = crate::cars().swap_remove(0);
-    let text = "name = \"d\"\n[[segment]]\nduration_s = 30\nthrottle = 0.0\nbrake = 0.9\ngrade_rad = 0.15\n";
-    let samples = samples(&car, &drive(text)).unwrap();
-    // The brake holds by a creep: it carries 0.65 of its torque at 0.08 rad/s of the wheel.
-    let last = samples.last().unwrap();
-    assert!(last.vehicle_m_s.abs() < 0.05, "{}", last.vehicle_m_s);
-    assert!((60.0..100.0).contains(&last.torques.engine_rad_s), "idle at {}", last.torques.engine_rad_s);
+    let last = |brake: f64| {
+        let text =
+            format!("name = \"d\"\n[[segment]]\nduration_s = 30\nthrottle = 0.0\nbrake = {brake}\ngrade_rad = 0.3\n");
+        *samples(&car, &drive(&text)).unwrap().last().unwrap()
+    };
+    // Idling in 1st gear does not hold the car on this hill; the brake does, by a creep of tyre and brake.
+    let (free, braked) = (last(0.0), last(0.9));
+    assert!(free.vehicle_m_s < -1.0, "{}", free.vehicle_m_s);
+    assert!(braked.vehicle_m_s.abs() < 0.05, "{}", braked.vehicle_m_s);
+    assert!((60.0..100.0).contains(&braked.torques.engine_rad_s), "idle at {}", braked.torques.engine_rad_s);
 }
 
 #[test]
