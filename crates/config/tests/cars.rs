@@ -33,6 +33,17 @@ fn a_key_of_the_file_replaces_that_of_the_eight_speed_car() {
 }
 
 #[test]
+fn a_valve_of_another_kind_replaces_the_shipped_one() {
+    let valve = "[valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 2e4\nline_pressure_pa = 1.6e6\n\
+                 delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n";
+    let kinds: Vec<_> =
+        car(valve).unwrap().clutches.iter().flatten().map(|clutch| clutch.valve.command_kind()).collect();
+    assert_eq!(kinds, [drivetrain::CommandKind::DutyCycle; 5]);
+    let weak = car(&valve.replace("1.6e6", "1.2e6")).unwrap_err();
+    assert!(weak.contains("car.toml:3") && weak.contains("less than `hydraulics.line_pressure_pa`"), "{weak}");
+}
+
+#[test]
 fn the_shipped_vehicle_files_are_right() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/");
     for (name, elements) in
@@ -65,8 +76,8 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
         ("launch = \"turbo\"\n", ["car.toml:3", "turbo", ""]),
         ("mass = 3\n", ["car.toml:3", "unknown field `mass`", ""]),
         (
-            "[valve]\ngain = { current_a = [0.0, 0.5, 1.0], gain_pa_a = [1e6, 1e6, 0.4e6] }\n",
-            ["car.toml:4", "falls", ""],
+            "[valve]\ngain = { current_a = [0, 1], gain_pa_a = [1e6, 1e6] }\n",
+            ["car.toml:3", "missing field `delay`", ""],
         ),
     ] {
         let error = car(text).unwrap_err();

@@ -122,7 +122,11 @@ impl Car {
         let line_pressure_pa =
             check.number("hydraulics.line_pressure_pa", &raw.hydraulics.line_pressure_pa, 1e5..=10e6)?;
         let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
-        let clutches = clutches(&check, &raw, &gearbox, line_pressure_pa, oil_temperature_degc)?;
+        // A valve of one's own has nothing of the shipped one, which may be of another kind.
+        let own: RawOwnValve = source.parse()?;
+        let own_check = Check::of(&source);
+        let valve = own.valve.as_ref().map_or((&check, &raw.valve), |valve| (&own_check, valve));
+        let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
         Ok(Self {
             name: check.title("name", &raw.name)?,
             clutches,
@@ -179,6 +183,12 @@ struct RawCar {
     vehicle: RawRoad,
     #[serde(default)]
     oil: RawOil,
+}
+
+/// The valve as the file itself has it.
+#[derive(Deserialize)]
+struct RawOwnValve {
+    valve: Option<Spanned<RawClutchValve>>,
 }
 
 /// What connects the engine with the gearbox.
@@ -257,6 +267,7 @@ fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) 
 fn clutches(
     check: &Check<'_>,
     raw: &RawCar,
+    common_valve: (&Check<'_>, &Spanned<RawClutchValve>),
     gearbox: &Gearbox,
     line_pressure_pa: f64,
     oil_degc: f64,
@@ -315,14 +326,14 @@ fn clutches(
             Some(drag) => check.number(&key("drag_n_m"), drag, 0.0..=100.0)?,
             None => drag_n_m,
         };
-        let (table, spanned) = match own.and_then(|own| own.valve.as_ref()) {
-            Some(valve) => (key("valve"), valve),
-            None => ("valve".to_owned(), &raw.valve),
+        let (table, (valve_check, spanned)) = match own.and_then(|own| own.valve.as_ref()) {
+            Some(valve) => (key("valve"), (check, valve)),
+            None => ("valve".to_owned(), common_valve),
         };
-        let valve = valves::clutch_valve(check, &table, spanned)?;
-        reaches(check, &table, &valve, spanned, line_pressure_pa)?;
+        let valve = valves::clutch_valve(valve_check, &table, spanned)?;
+        reaches(valve_check, &table, &valve, spanned, line_pressure_pa)?;
         let hysteresis_pa = match &spanned.get_ref().hysteresis_pa {
-            Some(half_width) => check.number(&format!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            Some(half_width) => valve_check.number(&format!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         };
         if clutch.kiss_pressure() >= line_pressure_pa {

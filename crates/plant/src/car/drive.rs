@@ -43,6 +43,9 @@ pub fn simulate_car_drive(
     drive: &Drive,
     mut record: impl FnMut(&CarSample),
 ) -> Result<CarDriveSummary, CarError> {
+    if drive.segments.is_empty() || drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3) {
+        return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
+    }
     let mut road = Road::new(drive);
     let mut shifting = Shifting::new(&model.car, drive)?;
     let driver = road.at(0.0);

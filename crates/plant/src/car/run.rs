@@ -54,6 +54,10 @@ impl<'m> CarRun<'m> {
         if sample_time_s.is_nan() || sample_time_s < 1e-4 {
             return Err(CarError::Request(format!("the sample time is {sample_time_s} s, expected 1e-4 s or more")));
         }
+        if !is_same_box(&model.car, nominal) {
+            let message = "the controller's car has another gearbox than the simulated one".to_owned();
+            return Err(CarError::Request(message));
+        }
         let mut controller = CarShiftController::new(nominal, calibration, gear)?;
         let commands = controller.step(0.0, driver.throttle, &measure(model, &state));
         let mut valves = CarValves::new(model, &commands.elements);
@@ -138,6 +142,14 @@ impl<'m> CarRun<'m> {
 #[expect(clippy::cast_precision_loss, reason = "a drive has fewer samples than a double has integers")]
 fn sample_time(samples: u64, sample_time_s: f64) -> f64 {
     samples as f64 * sample_time_s
+}
+
+/// Whether gears and elements have the same places in both cars.
+fn is_same_box(car: &Car, other: &Car) -> bool {
+    let gears = |car: &Car| car.gearbox.gears.iter().map(|gear| gear.name.clone()).collect::<Vec<_>>();
+    let elements = |car: &Car| car.gearbox.elements.iter().map(|element| element.name.clone()).collect::<Vec<_>>();
+    let is_whole = other.clutches.len() == other.gearbox.elements.len();
+    is_whole && gears(car) == gears(other) && elements(car) == elements(other)
 }
 
 fn measure(model: &CarModel, state: &CarState) -> CarMeasured {

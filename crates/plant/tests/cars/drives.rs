@@ -147,6 +147,12 @@ fn wrong_requests_get_clear_errors() {
     let driver = Driver { throttle: 0.1, brake: 0.0, grade_rad: 0.0 };
     let calibration = CarCalibration::STANDARD;
     assert!(plant::car::CarRun::new(&model, &car, calibration, 1, state, (driver, 0.0)).is_err());
+    let other = crate::two_speed();
+    let error = plant::car::CarRun::new(&model, &other, calibration, 1, state, (driver, 0.01)).unwrap_err();
+    assert!(error.to_string().contains("another gearbox"), "{error}");
+    let mut empty = drive("name = \"d\"\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n");
+    empty.segments.clear();
+    assert!(samples(&car, &empty).unwrap_err().to_string().contains("segments of 1 ms"));
     let mut infinite = state;
     infinite.wheel_rad_s = f64::INFINITY;
     assert!(plant::car::CarRun::new(&model, &car, calibration, 1, infinite, (driver, 0.01)).is_err());
