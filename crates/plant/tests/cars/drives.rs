@@ -86,6 +86,17 @@ fn a_dual_clutch_drives_and_says_that_it_cannot_launch() {
     assert!(error.to_string().contains("launch is not simulated"), "{error}");
 }
 
+#[test]
+fn in_reverse_the_car_goes_backwards() {
+    let car = crate::cars().swap_remove(0);
+    let text = "name = \"d\"\nstart = { gear = \"R\" }\n[[segment]]\nduration_s = 5\nthrottle = 0.08\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    let last = samples.last().unwrap();
+    assert!(last.vehicle_m_s < -1.0 && last.torques.turbine_rad_s > 10.0, "{}", last.vehicle_m_s);
+    let ratio = car.gearbox.gears[last.gear].ratio;
+    assert!((last.torques.turbine_rad_s - ratio * last.torques.output_rad_s).abs() < 1e-6);
+}
+
 /// The four-speed box with a one-way clutch that holds 1st gear in place of the brake LR.
 #[test]
 fn a_one_way_clutch_drives_and_freewheels() {
