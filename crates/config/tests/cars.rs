@@ -20,8 +20,7 @@ fn a_name_and_a_gearbox_are_a_complete_vehicle_file() {
     assert_eq!(short.clutches, whole.clutches);
     assert_eq!((short.engine, short.converter, short.road), (whole.engine, whole.converter, whole.road));
     assert_eq!(short.defaults_taken.len(), 10);
-    // The shipped file leaves out the oil, which is warm.
-    assert_eq!(whole.defaults_taken, ["oil"]);
+    assert!(whole.defaults_taken.is_empty(), "{:?}", whole.defaults_taken);
 }
 
 #[test]
@@ -98,6 +97,13 @@ fn a_gearbox_without_stick_diagram_or_plates_is_refused() {
     let end = at + GEARBOX[at..].find('}').unwrap() + 1;
     let bare = format!("{}{}", &GEARBOX[..at], &GEARBOX[end..]);
     assert!(of(&bare).contains("element A of \"g.toml\" has no `pack`"), "{}", of(&bare));
+}
+
+#[test]
+fn a_vehicle_with_a_gearbox_is_not_one_with_a_single_shift() {
+    let text = include_str!("../../../vehicles/eight_speed.toml");
+    let error = config::Vehicle::from_source(Source::built_in("v.toml", text)).unwrap_err().to_string();
+    assert!(error.contains("v.toml:1: `gearbox`: is a vehicle with a whole gearbox"), "{error}");
 }
 
 #[test]

@@ -147,7 +147,11 @@ impl Car {
             tyre: tyre(&check, &raw.tyre)?,
             road: road(&check, &raw.vehicle)?,
             oil_temperature_degc,
-            defaults_taken: OPTIONAL.into_iter().filter(|key| !given.contains_key(*key)).collect(),
+            defaults_taken: OPTIONAL
+                .into_iter()
+                .filter(|key| !given.contains_key(*key))
+                .filter(|&key| key != "converter" || matches!(raw.launch, RawLaunch::Converter))
+                .collect(),
             source,
         })
     }
