@@ -57,7 +57,7 @@ pub(crate) enum Command {
     /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
     /// the drive is simulated without them, or with the scenario given by --scenario.
     ///
-    /// A drive file (with [[segment]]) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
+    /// A drive file (with segments) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
     /// listed shifts, and a vehicle file with a gearbox. The columns of the offgoing and oncoming clutch are empty between
     /// shifts.
     ///

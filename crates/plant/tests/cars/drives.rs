@@ -131,7 +131,7 @@ fn the_lock_up_clutch_closes_in_its_gears_and_opens_for_shifts() {
     let slip = |sample: &CarSample| sample.torques.engine_rad_s - sample.torques.turbine_rad_s;
     let locked = |sample: &&CarSample| sample.torques.elements_n_m[lock_up] != 0.0 && slip(sample).abs() < 1e-6;
     let gear = |sample: &CarSample| car.gearbox.gears[sample.gear].name.clone();
-    assert!(samples.iter().filter(|sample| gear(sample) < "3".to_owned()).all(|sample| !locked(&sample)));
+    assert!(samples.iter().filter(|sample| *gear(sample) < *"3").all(|sample| !locked(&sample)));
     for name in ["3", "4", "5"] {
         assert!(samples.iter().filter(|sample| gear(sample) == name).filter(locked).count() > 50, "gear {name}");
     }
