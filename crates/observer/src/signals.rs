@@ -154,7 +154,9 @@ pub enum Health {
     /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
     /// limit.
     PressureLimited,
-    /// A speed is unusable: in this sample the estimate is from the valve model alone.
+    /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
+    HeldClutchSlips,
+    /// The speeds cannot be used: the estimate is from the valve model alone.
     SpeedsRejected,
     /// The observer lost its state and starts again.
     Restarted,
@@ -164,7 +166,7 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
@@ -172,6 +174,7 @@ impl Health {
         Self::LimitedToRange,
         Self::CommandRejected,
         Self::PressureLimited,
+        Self::HeldClutchSlips,
         Self::SpeedsRejected,
         Self::Restarted,
         Self::TimeRejected,
@@ -187,6 +190,7 @@ impl Health {
             Self::LimitedToRange => "limited_to_range",
             Self::CommandRejected => "command_rejected",
             Self::PressureLimited => "pressure_limited",
+            Self::HeldClutchSlips => "held_clutch_slips",
             Self::SpeedsRejected => "speeds_rejected",
             Self::Restarted => "restarted",
             Self::TimeRejected => "time_rejected",

@@ -24,14 +24,14 @@
 //! positive but for rounding. A filter whose variance is no number, or negative, begins anew and says so.
 
 mod covariance;
-mod engine;
-mod gate;
+pub(crate) mod engine;
+pub(crate) mod gate;
 mod past;
 mod phases;
 mod powertrain;
 mod predict;
 mod readings;
-mod valve_model;
+pub(crate) mod valve_model;
 
 use drivetrain::{Engagement, Real, ShiftCoefficients};
 
