@@ -152,7 +152,9 @@ impl Controller {
                 self.hold = [if oncoming { 0.0 } else { u }, if oncoming { u } else { 0.0 }];
                 if self.kind == ShiftKind::PowerOnUp {
                     let reduced = if along < 0.8 { 0.55 } else { 0.55 + 0.45 * (along - 0.8) / 0.2 };
-                    throttle = self.throttle * reduced;
+                    // Over 80 ms: what an engine does.
+                    let into = ((time_s - self.begun_s) / 0.08).min(1.0);
+                    throttle = self.throttle * (1.0 + into * (reduced - 1.0));
                 }
                 let near = (z + 0.07 * self.slow_z_rate) * self.start_z.signum() <= 0.0;
                 if first_torque && (z * self.start_z <= 0.0 || z.abs() < 1.0) {

@@ -124,7 +124,7 @@ fn run(bench: &Bench, gearbox: &Gearbox, tables: &ShiftTables, shift: &Shift, ki
     }
     car.converter.capacity_n_m_s2 = car.converter.capacity_n_m_s2.scaled(draw.converter);
     let (turbine, throttle) = match kind {
-        ShiftKind::PowerOnUp => (260.0, 0.2),
+        ShiftKind::PowerOnUp => (220.0, 0.2),
         ShiftKind::PowerOffUp => (230.0, 0.0),
         ShiftKind::PowerOnDown => (170.0, 0.2),
         ShiftKind::CoastDown => (150.0, 0.0),
