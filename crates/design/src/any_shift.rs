@@ -1,6 +1,6 @@
 //! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
 
-use drivetrain::Converter;
+use drivetrain::{Converter, Real};
 use geartrain::{Change, Gearbox};
 use observer::any_shift::{
     FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftRow, ShiftUncertainty, TurbineTorque,
@@ -13,15 +13,15 @@ const MAP_SHARE: f64 = 0.06;
 
 /// The tables of a gearbox, owned.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ShiftTables {
-    elements: Vec<FrictionElement<f64>>,
-    gears: Vec<GearRow<f64>>,
-    shifts: Vec<ShiftRow<f64>>,
+pub struct ShiftTables<T> {
+    elements: Vec<FrictionElement<T>>,
+    gears: Vec<GearRow<T>>,
+    shifts: Vec<ShiftRow<T>>,
     /// Place of each of the gearbox's elements in the tables.
     places: Vec<Option<usize>>,
 }
 
-impl ShiftTables {
+impl ShiftTables<f64> {
     /// The tables of a gearbox whose elements have these valves, `None` for an element that has none, as a dog. An element
     /// without plates or valve is left out, and the shifts between others remain. What sits on the input
     /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
@@ -62,8 +62,20 @@ impl ShiftTables {
         Ok(Self { gears: gears.collect(), elements, shifts, places })
     }
 
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> ShiftTables<U> {
+        ShiftTables {
+            elements: self.elements.iter().map(FrictionElement::cast).collect(),
+            gears: self.gears.iter().map(GearRow::cast).collect(),
+            shifts: self.shifts.iter().map(ShiftRow::cast).collect(),
+            places: self.places.clone(),
+        }
+    }
+}
+
+impl<T: Real> ShiftTables<T> {
     /// As the filter takes them.
-    pub fn tables(&self) -> GearboxTables<'_, f64> {
+    pub fn tables(&self) -> GearboxTables<'_, T> {
         GearboxTables { elements: &self.elements, gears: &self.gears, shifts: &self.shifts }
     }
 

@@ -205,7 +205,42 @@ struct Running<T> {
     misfit: T,
 }
 
+impl<T: Real> ShiftUncertainty<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> ShiftUncertainty<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        ShiftUncertainty {
+            torque_share: to(self.torque_share),
+            gain_part: to(self.gain_part),
+            torque_share_s: to(self.torque_share_s),
+            valve_s: to(self.valve_s),
+            pressure_pa: to(self.pressure_pa),
+            pressure_s: to(self.pressure_s),
+            kiss_pa: to(self.kiss_pa),
+            turbine_walk: to(self.turbine_walk),
+            rate_rad_s: to(self.rate_rad_s),
+            rate_walk: to(self.rate_walk),
+            load_walk: to(self.load_walk),
+            output_least_rad_s: to(self.output_least_rad_s),
+        }
+    }
+}
+
 impl<T: Real> AnyShiftFilter<'_, T> {
+    /// The same filter in another precision, with the same tables in that precision.
+    pub fn cast<'a, U: Real>(&self, tables: GearboxTables<'a, U>) -> AnyShiftFilter<'a, U> {
+        AnyShiftFilter {
+            tables,
+            driveline: self.driveline.cast(),
+            wheels_kg_m2: U::of(self.wheels_kg_m2.to_f64_exact()),
+            turbine: self.turbine.cast(),
+            uncertainty: self.uncertainty.cast(),
+            readings: self.readings.map(|reading| reading.cast()),
+            engine: (self.engine.0.cast(), self.engine.1.cast()),
+            limits: self.limits.cast(),
+        }
+    }
+
     /// Its memory before the first step.
     pub fn start(&self) -> AnyShiftState<T> {
         let mut elements = [None; MAX_ELEMENTS];

@@ -474,19 +474,13 @@ impl<T: Real> KalmanFilter<T> {
 
     /// The same filter in another precision.
     pub fn cast<U: Real>(&self) -> KalmanFilter<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
         let (sensor, noise) = &self.engine;
-        let noise = EngineNoise {
-            reading_rad_s: to(noise.reading_rad_s),
-            acceleration_walk: to(noise.acceleration_walk),
-            acceleration_max_rad_s2: to(noise.acceleration_max_rad_s2),
-        };
         KalmanFilter::new(
             self.model.cast(),
             self.valve.cast(),
             self.uncertainty.cast(),
             self.readings.map(|reading| reading.cast()),
-            (sensor.cast(), noise),
+            (sensor.cast(), noise.cast()),
             self.supervisor.cast(),
             self.limits.cast(),
         )

@@ -66,7 +66,7 @@ impl Bench {
         })
     }
 
-    fn filter<'a>(&self, tables: &'a ShiftTables) -> AnyShiftFilter<'a, f64> {
+    fn filter<'a>(&self, tables: &'a ShiftTables<f64>) -> AnyShiftFilter<'a, f64> {
         let v = &self.vehicle;
         let wheel = |teeth: f64, periods: f64, deviation_rad_s: f64| SpeedReading {
             deviation_rad_s,
@@ -94,7 +94,7 @@ impl Bench {
         }
     }
 
-    fn tables(&self, gearbox: &Gearbox) -> ShiftTables {
+    fn tables(&self, gearbox: &Gearbox) -> ShiftTables<f64> {
         let valve = ValveModel { valve: ClutchValve::Proportional(self.valve), delay_s: 0.015 };
         ShiftTables::new(gearbox, |_| Some((valve, None)), 0.0).unwrap()
     }
@@ -115,7 +115,7 @@ struct Row {
     turbine: [f64; 2],
 }
 
-fn run(bench: &Bench, gearbox: &Gearbox, tables: &ShiftTables, shift: &Shift, kind: ShiftKind, draw: &Draw, random: &mut Random) -> Vec<Row> {
+fn run(bench: &Bench, gearbox: &Gearbox, tables: &ShiftTables<f64>, shift: &Shift, kind: ShiftKind, draw: &Draw, random: &mut Random) -> Vec<Row> {
     let nominal = bench.car(gearbox, shift).unwrap();
     let mut car = nominal;
     for c in 0..2 {
