@@ -21,6 +21,6 @@ pub use gearbox::GearboxFile;
 pub use source::{Kind, Source, toml_string};
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty, ValveUncertainty,
-    Vehicle,
+    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty,
+    ValveUncertainty, Vehicle,
 };

@@ -52,6 +52,11 @@ impl Limits {
     /// A dog that is in. It may be set at zero slip only.
     pub const DOG: Self = Self(-UNLIMITED_N_M, UNLIMITED_N_M);
 
+    /// From the lowest to the highest torque, N m.
+    pub(crate) fn between(lower_n_m: f64, upper_n_m: f64) -> Self {
+        Self(lower_n_m, upper_n_m)
+    }
+
     /// The torque at which an element slips in this direction.
     fn slipping(self, direction: Direction) -> f64 {
         match direction {
@@ -83,6 +88,12 @@ pub enum TrainError {
     /// A torque, speed or inertia is not a number, or the inertia is not positive.
     #[error("a torque, a speed or an inertia is not a finite number")]
     NotFinite,
+    /// The gearbox is known by its ratios only.
+    #[error("the gearbox has no stick diagram")]
+    NoDiagram,
+    /// A clutch or brake is known by its name only.
+    #[error("a clutch or brake of the gearbox has no `pack`")]
+    NoPack,
     /// The elements find no consistent contact.
     #[error("the elements change endlessly between sticking and slipping")]
     Chatter,
@@ -91,21 +102,22 @@ pub enum TrainError {
 /// The equations of motion of a train.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainModel {
-    freedoms: usize,
-    elements: usize,
+    pub(crate) freedoms: usize,
+    pub(crate) elements: usize,
     /// `M^-1`.
     inverse_mass: [[f64; MAX_FREEDOMS]; MAX_FREEDOMS],
     mass: [[f64; MAX_FREEDOMS]; MAX_FREEDOMS],
     /// Speeds of input and output per motion.
-    ends: [[f64; MAX_FREEDOMS]; 2],
+    pub(crate) ends: [[f64; MAX_FREEDOMS]; 2],
     /// `K`.
     slips: [[f64; MAX_FREEDOMS]; MAX_ELEMENTS],
     /// `M^-1 K'`, a row for each element.
-    responses: [[f64; MAX_FREEDOMS]; MAX_ELEMENTS],
+    pub(crate) responses: [[f64; MAX_FREEDOMS]; MAX_ELEMENTS],
 }
 
 /// The slice of a row that is in use, times another.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+#[inline]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
@@ -115,14 +127,32 @@ impl TrainModel {
     /// # Errors
     /// The train is too large, or its inertia cannot be inverted.
     pub fn new(train: &GearTrain, load_kg_m2: f64) -> Result<Self, TrainError> {
-        let (freedoms, elements) = (train.degrees_of_freedom(), train.elements.len());
+        Self::of(train, load_kg_m2, None)
+    }
+
+    /// The bare train with an engine of this inertia before its input. The speed of the engine is the last motion, and the
+    /// clutch between engine and input (input side: the engine) the last element.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_engine(train: &GearTrain, engine_kg_m2: f64) -> Result<Self, TrainError> {
+        Self::of(train, 0.0, Some(engine_kg_m2))
+    }
+
+    fn of(train: &GearTrain, load_kg_m2: f64, engine_kg_m2: Option<f64>) -> Result<Self, TrainError> {
+        let of_train = (train.degrees_of_freedom(), train.elements.len());
+        let more = usize::from(engine_kg_m2.is_some());
+        let (freedoms, elements) = (of_train.0 + more, of_train.1 + more);
         if freedoms > MAX_FREEDOMS || elements > MAX_ELEMENTS {
             return Err(TrainError::TooLarge);
         }
-        let mass = train.mass_kg_m2(load_kg_m2);
+        let mut mass = train.mass_kg_m2(load_kg_m2).resize(freedoms, freedoms, 0.0);
+        if let Some(engine_kg_m2) = engine_kg_m2 {
+            mass[(of_train.0, of_train.0)] = engine_kg_m2;
+        }
         let inverse = mass.clone().try_inverse().filter(|inverse| inverse.iter().all(|x| x.is_finite()));
         let inverse = inverse.ok_or(TrainError::NotFinite)?;
-        let all: Vec<usize> = (0..elements).collect();
+        let all: Vec<usize> = (0..of_train.1).collect();
         let slips = train.slips(&all);
         let mut model = Self {
             freedoms,
@@ -138,12 +168,18 @@ impl TrainModel {
                 model.inverse_mass[i][j] = inverse[(i, j)];
                 model.mass[i][j] = mass[(i, j)];
             }
+        }
+        for j in 0..of_train.0 {
             for (end, shaft) in [train.input, train.output].into_iter().enumerate() {
                 model.ends[end][j] = train.basis()[(shaft, j)];
             }
-            for element in 0..elements {
+            for element in 0..of_train.1 {
                 model.slips[element][j] = slips[(element, j)];
             }
+        }
+        if engine_kg_m2.is_some() {
+            model.slips[of_train.1] = model.ends[0].map(|input| -input);
+            model.slips[of_train.1][of_train.0] = 1.0;
         }
         for element in 0..elements {
             model.responses[element] = model.accelerate(&model.slips[element]);
@@ -152,7 +188,7 @@ impl TrainModel {
     }
 
     /// `M^-1` times a generalised force.
-    fn accelerate(&self, force: &[f64; MAX_FREEDOMS]) -> [f64; MAX_FREEDOMS] {
+    pub(crate) fn accelerate(&self, force: &[f64; MAX_FREEDOMS]) -> [f64; MAX_FREEDOMS] {
         let mut acceleration = [0.0; MAX_FREEDOMS];
         for (x, row) in acceleration.iter_mut().zip(&self.inverse_mass).take(self.freedoms) {
             *x = dot(row, force);
@@ -161,11 +197,13 @@ impl TrainModel {
     }
 
     /// Slip of an element, rad/s.
+    #[inline]
     pub fn slip(&self, motion: &[f64; MAX_FREEDOMS], element: usize) -> f64 {
         dot(&self.slips[element], motion)
     }
 
     /// Speeds of input and output, rad/s.
+    #[inline]
     pub fn ends(&self, motion: &[f64; MAX_FREEDOMS]) -> [f64; 2] {
         [dot(&self.ends[0], motion), dot(&self.ends[1], motion)]
     }
@@ -177,7 +215,7 @@ impl TrainModel {
 
     /// The nearest motion, in kinetic energy, at which these elements do not slip: what is left after an impulse of the
     /// elements, so that the momenta along the motions that stay free are conserved.
-    fn without_slip(
+    pub(crate) fn without_slip(
         &self,
         mut motion: [f64; MAX_FREEDOMS],
         stuck: &[usize],
@@ -196,7 +234,11 @@ impl TrainModel {
     }
 
     /// The contact problem of some elements, by what each has without the torques of the others, and by its limits.
-    fn problem(&self, elements: &[usize], of: impl Fn(usize) -> (f64, Limits)) -> Result<ContactProblem, TrainError> {
+    pub(crate) fn problem(
+        &self,
+        elements: &[usize],
+        of: impl Fn(usize) -> (f64, Limits),
+    ) -> Result<ContactProblem, TrainError> {
         if elements.len() > MAX_CONTACTS {
             return Err(TrainError::TooLarge);
         }

@@ -388,7 +388,7 @@ enum ClutchId {
 
 /// Where in `(0, 1]` a function that is not negative at 0 turns negative, by the Illinois variant of the false
 /// position, which ends within [`EVENT_TIME_S`] on the negative side.
-fn root(f: impl Fn(f64) -> f64) -> f64 {
+pub(crate) fn root(f: impl Fn(f64) -> f64) -> f64 {
     let mut not_negative = (0.0, f(0.0).max(0.0));
     let mut negative = (1.0, f(1.0));
     let close = EVENT_TIME_S / LONGEST_STEP_S;

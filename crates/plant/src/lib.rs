@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod car;
 pub mod contact;
 pub mod controller;
 pub mod delay;

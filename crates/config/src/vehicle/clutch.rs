@@ -56,7 +56,7 @@ pub(super) fn check(
     let (cylinder, has_stroke) = fill::cylinder(check, name, raw, &clutch, oil_degc)?;
     Ok(ShiftClutch {
         clutch,
-        valve: valves::clutch_valve(check, name, &raw.valve)?,
+        valve: valves::clutch_valve(check, &key("valve"), &raw.valve)?,
         hysteresis_pa: match &raw.valve.get_ref().hysteresis_pa {
             Some(half_width) => check.number(&key("valve.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,

@@ -1,5 +1,6 @@
 //! Checked vehicle files.
 
+mod car;
 mod clutch;
 mod fill;
 mod fill_bounds;
@@ -20,10 +21,12 @@ use toml::Spanned;
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
 use crate::{ConfigError, Source};
+pub use car::Car;
 pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
 use raw::{
-    RawCompliantRequirement, RawEngineMap, RawErrorBounds, RawFilter, RawObserver, RawRequirement, RawVehicleFile,
+    RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawErrorBounds, RawFilter,
+    RawObserver, RawOil, RawRequirement, RawRoad, RawTyre, RawVehicleFile,
 };
 
 /// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
@@ -293,38 +296,17 @@ impl Vehicle {
         let raw: RawVehicleFile = layers.parse()?;
         let check = Check { layers: *layers };
         let gear = gear_train::check(&check, &raw)?;
-        let oil_temperature_degc = oil_temperature(&check, &raw)?;
+        let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
         let clutch = |name: &str| clutch::check(&check, name, &raw, oil_temperature_degc);
         // A clutch that this shift leaves alone is checked like the others.
         for name in raw.clutch.keys() {
             clutch(name)?;
         }
         let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
-        let driveline = Driveline {
-            final_ratio: check.number("driveline.final_ratio", &raw.driveline.final_ratio, 0.5..=10.0)?,
-            shaft_stiffness_n_m_rad: check.number(
-                "driveline.shaft_stiffness_n_m_rad",
-                &raw.driveline.shaft_stiffness_n_m_rad,
-                500.0..=200e3,
-            )?,
-            shaft_damping_n_m_s_rad: check.number(
-                "driveline.shaft_damping_n_m_s_rad",
-                &raw.driveline.shaft_damping_n_m_s_rad,
-                0.0..=2e3,
-            )?,
-            wheel_inertia_kg_m2: check.number(
-                "driveline.wheel_inertia_kg_m2",
-                &raw.driveline.wheel_inertia_kg_m2,
-                0.2..=50.0,
-            )?,
-        };
-        let tyre = Tyre {
-            max_force_n: check.number("tyre.max_force_n", &raw.tyre.max_force_n, 1e3..=200e3)?,
-            slip_scale: check.number("tyre.slip_scale", &raw.tyre.slip_scale, 0.01..=0.5)?,
-            floor_m_s: check.number("tyre.floor_m_s", &raw.tyre.floor_m_s, 0.1..=10.0)?,
-        };
-        let error_bounds = error_bounds(&check, &raw.design.error_bounds, &oncoming, oil_temperature(&check, &raw)?)?;
-        let road = road(&check, &raw)?;
+        let (driveline, tyre) = (driveline(&check, &raw.driveline)?, tyre(&check, &raw.tyre)?);
+        let error_bounds =
+            error_bounds(&check, &raw.design.error_bounds, &oncoming, oil_temperature(&check, &raw.oil)?)?;
+        let road = road(&check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
         let limits = InputLimits {
             speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.observer.speed_max_rad_s, 100.0..=5e3)?,
@@ -335,28 +317,27 @@ impl Vehicle {
         let command_max = limits.command_max + error_bounds.command;
         valves::clutch_can_engage(&check, &oncoming, &limits, raw.observer.command_max.span().start)?;
         for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
-            valves::settled_pressure_rises(&check, name, &clutch.valve, &raw.clutch[name].valve, command_max)?;
+            valves::settled_pressure_rises(
+                &check,
+                &format!("clutch.{name}.valve"),
+                &clutch.valve,
+                &raw.clutch[name].valve,
+                command_max,
+            )?;
         }
         let observer_valve = valves::observer_valve(&check, &raw.observer.valve, &oncoming.valve)?;
         let command_kind = observer_valve.command_kind();
         let supervisor = supervisor(&check, &raw.observer, kiss_pressure_pa)?;
         Ok(Self {
             name: raw.name.clone(),
-            engine: Engine {
-                inertia_kg_m2: check.number("engine.inertia_kg_m2", &raw.engine.inertia_kg_m2, 0.01..=5.0)?,
-                drag_n_m_s: check.number("engine.drag_n_m_s", &raw.engine.drag_n_m_s, 0.0..=1.0)?,
-                torque_n_m: engine_map(&check, &raw.engine.torque)?,
-            },
-            converter: converter(&check, &raw)?,
+            engine: engine(&check, &raw.engine)?,
+            converter: converter(&check, &raw.converter)?,
             shift: gear.reduced,
             output_inertia_kg_m2: gear.output_inertia_kg_m2,
             offgoing,
             oncoming,
             driveline,
-            backlash_rad: match &raw.driveline.backlash_rad {
-                Some(backlash) => check.number("driveline.backlash_rad", backlash, BACKLASHES_RAD)?,
-                None => 0.0,
-            },
+            backlash_rad: backlash(&check, &raw.driveline)?,
             oil_temperature_degc,
             tyre,
             road,
@@ -374,6 +355,39 @@ impl Vehicle {
             source: Source { path: PathBuf::new(), text: String::new() },
         })
     }
+}
+
+fn engine(check: &Check<'_>, raw: &RawEngine) -> Result<Engine<f64>, ConfigError> {
+    Ok(Engine {
+        inertia_kg_m2: check.number("engine.inertia_kg_m2", &raw.inertia_kg_m2, 0.01..=5.0)?,
+        drag_n_m_s: check.number("engine.drag_n_m_s", &raw.drag_n_m_s, 0.0..=1.0)?,
+        torque_n_m: engine_map(check, &raw.torque)?,
+    })
+}
+
+fn driveline(check: &Check<'_>, raw: &RawDriveline) -> Result<Driveline<f64>, ConfigError> {
+    let number = |key: &str, value: &Number, range| check.number(&format!("driveline.{key}"), value, range);
+    Ok(Driveline {
+        final_ratio: number("final_ratio", &raw.final_ratio, 0.5..=10.0)?,
+        shaft_stiffness_n_m_rad: number("shaft_stiffness_n_m_rad", &raw.shaft_stiffness_n_m_rad, 500.0..=200e3)?,
+        shaft_damping_n_m_s_rad: number("shaft_damping_n_m_s_rad", &raw.shaft_damping_n_m_s_rad, 0.0..=2e3)?,
+        wheel_inertia_kg_m2: number("wheel_inertia_kg_m2", &raw.wheel_inertia_kg_m2, 0.2..=50.0)?,
+    })
+}
+
+fn backlash(check: &Check<'_>, raw: &RawDriveline) -> Result<f64, ConfigError> {
+    match &raw.backlash_rad {
+        Some(backlash) => check.number("driveline.backlash_rad", backlash, BACKLASHES_RAD),
+        None => Ok(0.0),
+    }
+}
+
+fn tyre(check: &Check<'_>, raw: &RawTyre) -> Result<Tyre<f64>, ConfigError> {
+    Ok(Tyre {
+        max_force_n: check.number("tyre.max_force_n", &raw.max_force_n, 1e3..=200e3)?,
+        slip_scale: check.number("tyre.slip_scale", &raw.slip_scale, 0.01..=0.5)?,
+        floor_m_s: check.number("tyre.floor_m_s", &raw.floor_m_s, 0.1..=10.0)?,
+    })
 }
 
 fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, ConfigError> {
@@ -400,8 +414,7 @@ fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, Conf
     })
 }
 
-fn converter(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Converter<f64>, ConfigError> {
-    let raw = &raw.converter;
+fn converter(check: &Check<'_>, raw: &RawConverter) -> Result<Converter<f64>, ConfigError> {
     let axis = || ("converter.speed_ratio", &raw.speed_ratio, 0.0..=10.0);
     let converter = Converter {
         capacity_n_m_s2: check.table(axis(), ("converter.capacity_n_m_s2", &raw.capacity_n_m_s2, -0.1..=0.1))?,
@@ -448,15 +461,14 @@ fn creating_power(converter: &Converter<f64>) -> Option<f64> {
     axis.iter().copied().chain([0.0]).chain(axis.windows(2).flat_map(between)).find(|&ratio| creates(ratio))
 }
 
-fn oil_temperature(check: &Check<'_>, raw: &RawVehicleFile) -> Result<f64, ConfigError> {
-    match &raw.oil.temperature_degc {
+fn oil_temperature(check: &Check<'_>, raw: &RawOil) -> Result<f64, ConfigError> {
+    match &raw.temperature_degc {
         Some(temperature) => check.number("oil.temperature_degc", temperature, OIL_TEMPERATURES_DEGC),
         None => Ok(WARM_OIL_DEGC),
     }
 }
 
-fn road(check: &Check<'_>, raw: &RawVehicleFile) -> Result<RoadLoad<f64>, ConfigError> {
-    let raw = &raw.vehicle;
+fn road(check: &Check<'_>, raw: &RawRoad) -> Result<RoadLoad<f64>, ConfigError> {
     Ok(RoadLoad {
         mass_kg: check.number("vehicle.mass_kg", &raw.mass_kg, 200.0..=60e3)?,
         wheel_radius_m: check.number("vehicle.wheel_radius_m", &raw.wheel_radius_m, 0.1..=1.0)?,

@@ -37,13 +37,12 @@ fn place<T>(value: &Option<Spanned<T>>) -> Option<usize> {
     value.as_ref().map(|value| value.span().start)
 }
 
-/// The valve of a clutch.
+/// The valve of a clutch, from a table of the file.
 pub(super) fn clutch_valve(
     check: &Check<'_>,
-    clutch: &str,
+    table: &str,
     spanned: &Spanned<RawClutchValve>,
 ) -> Result<ClutchValve<f64>, ConfigError> {
-    let table = format!("clutch.{clutch}.valve");
     let (at, raw) = (spanned.span().start, spanned.get_ref());
     let key = |name: &str| format!("{table}.{name}");
     let (delay_at, delay) = (raw.delay.span().start, raw.delay.get_ref());
@@ -56,9 +55,9 @@ pub(super) fn clutch_valve(
     match raw.kind {
         RawValveKind::Proportional => {
             let foreign = [place(&raw.flow_sqrt_pa_s), place(&raw.line_pressure_pa), place(&delay.duty_percent)];
-            refuse_foreign(check, &table, &foreign, hint)?;
-            let lag = check.required(&table, at, "lag", raw.lag.as_ref())?.get_ref();
-            let gain = check.required(&table, at, "gain", raw.gain.as_ref())?.get_ref();
+            refuse_foreign(check, table, &foreign, hint)?;
+            let lag = check.required(table, at, "lag", raw.lag.as_ref())?.get_ref();
+            let gain = check.required(table, at, "gain", raw.gain.as_ref())?.get_ref();
             Ok(ClutchValve::Proportional(ValveMaps {
                 time_constant_s: check.table(
                     (&key("lag.pressure_pa"), &lag.pressure_pa, 0.0..=10e6),
@@ -72,8 +71,8 @@ pub(super) fn clutch_valve(
             }))
         }
         RawValveKind::PulseWidth => {
-            refuse_foreign(check, &table, &[place(&raw.lag), place(&raw.gain), place(&delay.current_a)], hint)?;
-            let law = pulse_width(check, &table, at, &raw.flow_sqrt_pa_s, &raw.line_pressure_pa)?;
+            refuse_foreign(check, table, &[place(&raw.lag), place(&raw.gain), place(&delay.current_a)], hint)?;
+            let law = pulse_width(check, table, at, &raw.flow_sqrt_pa_s, &raw.line_pressure_pa)?;
             Ok(ClutchValve::PulseWidth { law, delay_s: delays("duty_percent", &delay.duty_percent, DUTY_CYCLES)? })
         }
     }
@@ -100,7 +99,7 @@ fn pulse_width(
 /// is `K0 + s (i - i0)` and the slope of `K(i) i` linear, so that it is least at an end.
 pub(super) fn settled_pressure_rises(
     check: &Check<'_>,
-    clutch: &str,
+    table: &str,
     valve: &ClutchValve<f64>,
     raw: &Spanned<RawClutchValve>,
     most_a: f64,
@@ -124,7 +123,7 @@ pub(super) fn settled_pressure_rises(
             "the pressure must increase with the current: between {} A and {} A the gain falls from {} Pa/A to {} Pa/A",
             i[0], i[1], k[0], k[1]
         );
-        let key = format!("clutch.{clutch}.valve.gain.gain_pa_a");
+        let key = format!("{table}.gain.gain_pa_a");
         return Err(check.meaning(&key, raw.get_ref().gain_pa_a.span().start, message, Some(hint)));
     }
     Ok(())

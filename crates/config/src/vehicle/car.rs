@@ -1,0 +1,309 @@
+//! Vehicle files with a whole gearbox: a car that shifts through all of its gears.
+//!
+//! The gearbox is a file of its own. What a vehicle file leaves out it takes from `vehicles/eight_speed.toml`, key by key.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use drivetrain::{Clutch, ClutchValve, Converter, Cylinder, Driveline, Engine, RoadLoad, Table1, Tyre};
+use geartrain::{ElementKind, Gearbox};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
+use super::{HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre, valves};
+use crate::check::{Check, Number, Word};
+use crate::source::Layers;
+use crate::{ConfigError, GearboxFile, Source};
+
+/// What a vehicle file leaves out.
+const DEFAULTS: (&str, &str) = ("vehicles/eight_speed.toml", include_str!("../../../../vehicles/eight_speed.toml"));
+const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../gearboxes/8hp.toml"));
+
+/// Tables and keys that a vehicle file may leave out.
+const OPTIONAL: [&str; 10] =
+    ["launch", "engine", "converter", "hydraulics", "friction", "valve", "driveline", "tyre", "vehicle", "oil"];
+
+/// A car with all the gears and elements of its gearbox.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Car {
+    /// The file.
+    pub source: Source,
+    /// Its name for people.
+    pub name: String,
+    /// The gearbox; its stick diagram is known.
+    pub gearbox: Gearbox,
+    /// The friction elements, in the order of the gearbox's elements; `None` for dogs and one-way clutches.
+    pub clutches: Vec<Option<ShiftClutch>>,
+    /// Line pressure, Pa: that of an element that holds a gear.
+    pub line_pressure_pa: f64,
+    /// The engine.
+    pub engine: Engine<f64>,
+    /// The torque converter; without one the engine turns the input shaft of the gearbox.
+    pub converter: Option<Converter<f64>>,
+    /// Differential, drive shafts, wheels.
+    pub driveline: Driveline<f64>,
+    /// Backlash between gearbox and wheels, rad at the wheel.
+    pub backlash_rad: f64,
+    /// The driven tyres.
+    pub tyre: Tyre<f64>,
+    /// Vehicle body and road.
+    pub road: RoadLoad<f64>,
+    /// Temperature of the oil, degC.
+    pub oil_temperature_degc: f64,
+    /// Tables that the file leaves out, so that they are those of `vehicles/eight_speed.toml`.
+    pub defaults_taken: Vec<&'static str>,
+}
+
+impl Car {
+    /// The eight-speed automatic that ships with the program.
+    ///
+    /// # Errors
+    /// None in a released program; the tests read this file.
+    pub fn eight_speed() -> Result<Self, ConfigError> {
+        Self::from_sources(Source::built_in(DEFAULTS.0, DEFAULTS.1), Source::built_in(GEARBOX.0, GEARBOX.1))
+    }
+
+    /// Reads and checks a vehicle file and the gearbox file that it names.
+    ///
+    /// # Errors
+    /// A file cannot be read, is of another kind, or holds a value that cannot be right.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let source = Source::read(path)?;
+        let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
+        let layers = Layers { source: &defaults, over: Some(&source) };
+        let raw: RawCar = layers.parse()?;
+        let own = source.parse::<toml::Table>()?.contains_key("gearbox");
+        if !own {
+            let hint = "gearbox = \"../gearboxes/8hp.toml\", a path from the folder of this file".to_owned();
+            let check = Check::of(&source);
+            return Err(check.meaning("gearbox", 0, "names no gearbox file".to_owned(), Some(hint)));
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let named_at = raw.gearbox.span().start.saturating_sub(defaults.text.len());
+        let gearbox = Source::read(&folder.join(raw.gearbox.get_ref()))
+            .map_err(|error| error.named_by(&source, "gearbox", named_at))?;
+        Self::from_sources(source, gearbox)
+    }
+
+    /// Checks the text of a vehicle file with that of its gearbox file.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_sources(source: Source, gearbox: Source) -> Result<Self, ConfigError> {
+        let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
+        let given: toml::Table = source.parse()?;
+        let raw: RawCar = Layers { source: &defaults, over: Some(&source) }.parse()?;
+        let check = Check { layers: Layers { source: &defaults, over: Some(&source) } };
+        let gearbox = GearboxFile::from_source(gearbox)?.gearbox;
+        let at = raw.gearbox.span().start;
+        if gearbox.train.is_none() {
+            let message = format!("\"{}\" has no stick diagram", raw.gearbox.get_ref());
+            let hint = "a simulated car needs a gearbox file with level = \"stick-diagram\"".to_owned();
+            return Err(check.meaning("gearbox", at, message, Some(hint)));
+        }
+        let line_pressure_pa =
+            check.number("hydraulics.line_pressure_pa", &raw.hydraulics.line_pressure_pa, 1e5..=10e6)?;
+        let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
+        let clutches = clutches(&check, &raw, &gearbox, line_pressure_pa, oil_temperature_degc)?;
+        Ok(Self {
+            name: check.title("name", &raw.name)?,
+            clutches,
+            gearbox,
+            line_pressure_pa,
+            engine: engine(&check, &raw.engine)?,
+            converter: match raw.launch {
+                RawLaunch::Converter => Some(converter(&check, &raw.converter)?),
+                RawLaunch::Clutch => None,
+            },
+            driveline: driveline(&check, &raw.driveline)?,
+            backlash_rad: backlash(&check, &raw.driveline)?,
+            tyre: tyre(&check, &raw.tyre)?,
+            road: road(&check, &raw.vehicle)?,
+            oil_temperature_degc,
+            defaults_taken: OPTIONAL.into_iter().filter(|key| !given.contains_key(*key)).collect(),
+            source,
+        })
+    }
+
+    /// The car with another friction of all clutches, times `factor`.
+    #[must_use]
+    pub fn with_friction(mut self, factor: f64) -> Self {
+        for clutch in self.clutches.iter_mut().flatten() {
+            clutch.clutch.friction = clutch.clutch.friction.scaled(factor);
+            clutch.clutch.static_friction *= factor;
+        }
+        self
+    }
+}
+
+/// The keys of a vehicle file with a gearbox file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawCar {
+    name: Word,
+    gearbox: Word,
+    launch: RawLaunch,
+    engine: RawEngine,
+    converter: RawConverter,
+    hydraulics: RawHydraulics,
+    friction: RawShape,
+    valve: Spanned<RawClutchValve>,
+    #[serde(default)]
+    clutch: BTreeMap<Spanned<String>, RawElementClutch>,
+    driveline: RawDriveline,
+    tyre: RawTyre,
+    vehicle: RawRoad,
+    #[serde(default)]
+    oil: RawOil,
+}
+
+/// What connects the engine with the gearbox.
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "kebab-case")]
+enum RawLaunch {
+    Converter,
+    Clutch,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawHydraulics {
+    line_pressure_pa: Number,
+}
+
+/// Course of the friction over slip, and drag, of all clutches.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawShape {
+    slip_rad_s: crate::check::Numbers,
+    factor: crate::check::Numbers,
+    static_factor: Number,
+    drag_n_m: Number,
+}
+
+/// What one element has of its own.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawElementClutch {
+    friction: Option<RawFriction>,
+    static_friction: Option<Number>,
+    drag_n_m: Option<Number>,
+    valve: Option<Spanned<RawClutchValve>>,
+}
+
+/// The friction elements: plates of the gearbox file, friction over slip, drag and valve of the vehicle file.
+fn clutches(
+    check: &Check<'_>,
+    raw: &RawCar,
+    gearbox: &Gearbox,
+    line_pressure_pa: f64,
+    oil_degc: f64,
+) -> Result<Vec<Option<ShiftClutch>>, ConfigError> {
+    let is_friction = |kind: ElementKind| matches!(kind, ElementKind::Clutch | ElementKind::Brake);
+    for name in raw.clutch.keys() {
+        let element = gearbox.elements.iter().find(|element| element.name == *name.get_ref());
+        if !element.is_some_and(|element| is_friction(element.kind)) {
+            let names = gearbox.elements.iter().filter(|element| is_friction(element.kind));
+            let names = names.map(|element| element.name.as_str()).collect::<Vec<_>>().join(", ");
+            let message = format!("the gearbox has no clutch or brake \"{}\"", name.get_ref());
+            let hint = format!("it has {names}");
+            return Err(check.meaning("clutch", name.span().start, message, Some(hint)));
+        }
+    }
+    let shape = &raw.friction;
+    let factor = check
+        .table(("friction.slip_rad_s", &shape.slip_rad_s, 0.0..=2e3), ("friction.factor", &shape.factor, 0.2..=5.0))?;
+    let static_factor = check.number("friction.static_factor", &shape.static_factor, 0.2..=5.0)?;
+    if static_factor < factor.at(0.0) {
+        let message = format!("is {static_factor}, less than `factor` at zero slip, {}", factor.at(0.0));
+        let hint = "with a smaller static friction a clutch could neither stick nor slip".to_owned();
+        return Err(check.meaning("friction.static_factor", shape.static_factor.span().start, message, Some(hint)));
+    }
+    let drag_n_m = check.number("friction.drag_n_m", &shape.drag_n_m, 0.0..=100.0)?;
+    let element = |element: &geartrain::GearboxElement| -> Result<Option<ShiftClutch>, ConfigError> {
+        if !is_friction(element.kind) {
+            return Ok(None);
+        }
+        let name = &element.name;
+        let Some(pack) = element.pack else {
+            let message = format!("element {name} of \"{}\" has no `pack`", raw.gearbox.get_ref());
+            let hint = "a simulated clutch needs faces, radius, friction, piston and spring".to_owned();
+            return Err(check.meaning("gearbox", raw.gearbox.span().start, message, Some(hint)));
+        };
+        let own = raw.clutch.get(name.as_str());
+        let key = |field: &str| format!("clutch.{name}.{field}");
+        let mut clutch = Clutch {
+            friction: factor.scaled(pack.static_friction),
+            static_friction: static_factor * pack.static_friction,
+            ..pack
+        };
+        if let Some(friction) = own.and_then(|own| own.friction.as_ref()) {
+            clutch.friction = own_friction(check, &key("friction"), friction)?;
+            clutch.static_friction = clutch.static_friction.max(clutch.friction.at(0.0));
+        }
+        if let Some(value) = own.and_then(|own| own.static_friction.as_ref()) {
+            clutch.static_friction = check.number(&key("static_friction"), value, 0.02..=0.5)?;
+            let sliding = clutch.friction.at(0.0);
+            if clutch.static_friction < sliding {
+                let message = format!("is {}, less than the friction at zero slip, {sliding}", clutch.static_friction);
+                return Err(check.meaning(&key("static_friction"), value.span().start, message, None));
+            }
+        }
+        let drag_n_m = match own.and_then(|own| own.drag_n_m.as_ref()) {
+            Some(drag) => check.number(&key("drag_n_m"), drag, 0.0..=100.0)?,
+            None => drag_n_m,
+        };
+        let (table, spanned) = match own.and_then(|own| own.valve.as_ref()) {
+            Some(valve) => (key("valve"), valve),
+            None => ("valve".to_owned(), &raw.valve),
+        };
+        let valve = valves::clutch_valve(check, &table, spanned)?;
+        reaches(check, &table, &valve, spanned, line_pressure_pa)?;
+        let hysteresis_pa = match &spanned.get_ref().hysteresis_pa {
+            Some(half_width) => check.number(&format!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            None => 0.0,
+        };
+        if clutch.kiss_pressure() >= line_pressure_pa {
+            let message = format!(
+                "is {line_pressure_pa} Pa, and the return spring of {name} holds up to {:.4e} Pa",
+                clutch.kiss_pressure()
+            );
+            let at = raw.hydraulics.line_pressure_pa.span().start;
+            return Err(check.meaning("hydraulics.line_pressure_pa", at, message, None));
+        }
+        let cylinder = Cylinder::of_clutch(&clutch).with_oil(oil_degc);
+        Ok(Some(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke: false, drag_n_m }))
+    };
+    gearbox.elements.iter().map(element).collect()
+}
+
+fn own_friction(check: &Check<'_>, key: &str, raw: &RawFriction) -> Result<Table1<f64>, ConfigError> {
+    check.table(
+        (&format!("{key}.slip_rad_s"), &raw.slip_rad_s, 0.0..=2e3),
+        (&format!("{key}.coefficient"), &raw.coefficient, 0.02..=0.5),
+    )
+}
+
+/// Refuses a valve whose pressure does not rise up to line pressure.
+fn reaches(
+    check: &Check<'_>,
+    table: &str,
+    valve: &ClutchValve<f64>,
+    raw: &Spanned<RawClutchValve>,
+    line_pressure_pa: f64,
+) -> Result<(), ConfigError> {
+    match valve {
+        ClutchValve::Proportional(maps) => {
+            valves::settled_pressure_rises(check, table, valve, raw, maps.current_for(line_pressure_pa))
+        }
+        ClutchValve::PulseWidth { law, .. } if law.line_pressure_pa < line_pressure_pa => {
+            let message = format!(
+                "its line pressure is {} Pa, less than `hydraulics.line_pressure_pa`, {line_pressure_pa} Pa",
+                law.line_pressure_pa
+            );
+            Err(check.meaning(table, raw.span().start, message, None))
+        }
+        ClutchValve::PulseWidth { .. } => Ok(()),
+    }
+}

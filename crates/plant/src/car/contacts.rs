@@ -1,0 +1,187 @@
+//! Which elements stick, and what follows for accelerations and holding torques.
+//!
+//! With the torques `s` on engine, input, output and of the elements that do not stick, the motion has the acceleration
+//! `sum s_k a_k`, and each sticking element holds `sum s_k h_k`. The columns `a_k` and `h_k` are computed once for each set of
+//! sticking elements.
+
+use super::model::{CarInputs, CarModel, CarState, end_responses, slip_of};
+use crate::gear_train::{Limits, MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
+use crate::{Contact, Direction, MAX_CONTACTS};
+
+/// Torques on engine, input and output come before those of the elements.
+const ENDS: usize = 3;
+
+/// What an element does: `None` if it is open.
+pub type ContactState = Option<Contact>;
+
+/// Contacts of all elements with the columns that follow from them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contacts {
+    states: [ContactState; MAX_ELEMENTS],
+    stuck: [usize; MAX_CONTACTS],
+    stuck_count: usize,
+    sliding: [usize; MAX_ELEMENTS],
+    sliding_count: usize,
+    /// `a_k`.
+    accelerations: [[f64; MAX_FREEDOMS]; ENDS + MAX_ELEMENTS],
+    /// `h_k` of each sticking element: ends, then elements.
+    holding: [[f64; ENDS + MAX_ELEMENTS]; MAX_CONTACTS],
+}
+
+/// A slip below this is zero, rad/s.
+const ZERO_SLIP_RAD_S: f64 = 1e-6;
+
+impl Contacts {
+    /// The columns of these contacts.
+    ///
+    /// # Errors
+    /// Too many elements stick.
+    pub(super) fn new(model: &CarModel, states: [ContactState; MAX_ELEMENTS]) -> Result<Self, TrainError> {
+        let train = &model.train;
+        let mut contacts = Self {
+            states,
+            stuck: [0; MAX_CONTACTS],
+            stuck_count: 0,
+            sliding: [0; MAX_ELEMENTS],
+            sliding_count: 0,
+            accelerations: [[0.0; MAX_FREEDOMS]; ENDS + MAX_ELEMENTS],
+            holding: [[0.0; ENDS + MAX_ELEMENTS]; MAX_CONTACTS],
+        };
+        for (element, state) in states.iter().enumerate().take(model.parts.len()) {
+            let (list, count) = match state {
+                Some(Contact::Stuck) => (&mut contacts.stuck[..], &mut contacts.stuck_count),
+                _ => (&mut contacts.sliding[..], &mut contacts.sliding_count),
+            };
+            *list.get_mut(*count).ok_or(TrainError::TooLarge)? = element;
+            *count += 1;
+        }
+        let sliding = contacts.sliding().to_vec();
+        let ends = end_responses(train).into_iter().enumerate();
+        // An element that drives its output side takes as much from its input side.
+        let elements = sliding.into_iter().map(|element| (ENDS + element, train.responses[element].map(|x| -x)));
+        for (source, free) in ends.chain(elements) {
+            let (stuck, count) = (contacts.stuck, contacts.stuck_count);
+            let stuck = &stuck[..count];
+            let problem = train.problem(stuck, |element| (slip_of(train, element, &free), Limits::DOG))?;
+            let held = problem.solve(&[]).torques_n_m;
+            let mut acceleration = free;
+            for (at, (&element, held)) in stuck.iter().zip(held).enumerate() {
+                for (x, response) in acceleration.iter_mut().zip(&train.responses[element]) {
+                    *x -= held * response;
+                }
+                contacts.holding[at][source] = held;
+            }
+            contacts.accelerations[source] = acceleration;
+        }
+        Ok(contacts)
+    }
+
+    /// What an element does.
+    #[inline]
+    pub fn of(&self, element: usize) -> ContactState {
+        self.states[element]
+    }
+
+    /// What all elements do.
+    pub(super) fn states(&self) -> &[ContactState; MAX_ELEMENTS] {
+        &self.states
+    }
+
+    /// The elements that stick.
+    #[inline]
+    pub fn stuck(&self) -> &[usize] {
+        &self.stuck[..self.stuck_count]
+    }
+
+    /// The elements that slip or are open.
+    #[inline]
+    pub fn sliding(&self) -> &[usize] {
+        &self.sliding[..self.sliding_count]
+    }
+
+    /// Accelerations under torques on engine, input and output, and those of the elements that do not stick.
+    #[inline]
+    pub(super) fn accelerations_rad_s2(
+        &self,
+        ends_n_m: &[f64; ENDS],
+        elements_n_m: &[f64; MAX_ELEMENTS],
+    ) -> [f64; MAX_FREEDOMS] {
+        let mut sum = [0.0; MAX_FREEDOMS];
+        let mut add = |torque: f64, column: &[f64; MAX_FREEDOMS]| {
+            for (sum, x) in sum.iter_mut().zip(column) {
+                *sum += torque * x;
+            }
+        };
+        for (torque, column) in ends_n_m.iter().zip(&self.accelerations) {
+            add(*torque, column);
+        }
+        for &element in self.sliding() {
+            if elements_n_m[element] != 0.0 {
+                add(elements_n_m[element], &self.accelerations[ENDS + element]);
+            }
+        }
+        sum
+    }
+
+    /// Torque of each sticking element, N m.
+    #[inline]
+    pub(super) fn holding_n_m(
+        &self,
+        ends_n_m: &[f64; ENDS],
+        elements_n_m: &[f64; MAX_ELEMENTS],
+    ) -> [f64; MAX_ELEMENTS] {
+        let mut torques = [0.0; MAX_ELEMENTS];
+        for (&stuck, row) in self.stuck().iter().zip(&self.holding) {
+            let ends: f64 = ends_n_m.iter().zip(row).map(|(torque, h)| torque * h).sum();
+            let others = self.sliding().iter().map(|&element| elements_n_m[element] * row[ENDS + element]);
+            torques[stuck] = ends + others.sum::<f64>();
+        }
+        torques
+    }
+
+    /// Contacts and motion at a start or at an event: all elements without slip are decided together. `touched` has no slip
+    /// whatever its rounding error.
+    ///
+    /// # Errors
+    /// Too many elements have no slip, or a number is not finite.
+    pub(super) fn settle(
+        model: &CarModel,
+        before: &[ContactState; MAX_ELEMENTS],
+        touched: Option<usize>,
+        state: &CarState,
+        inputs: &CarInputs,
+    ) -> Result<(Self, CarState), TrainError> {
+        let train = &model.train;
+        let mut states = *before;
+        let mut at_zero = [0; MAX_CONTACTS];
+        let mut count = 0;
+        for element in 0..model.parts.len() {
+            let slip = model.slip(state, element);
+            let sticks = before[element] == Some(Contact::Stuck) || touched == Some(element);
+            if model.holding_limits(element, state, inputs).is_none() {
+                states[element] = None;
+            } else if sticks || slip.abs() < ZERO_SLIP_RAD_S {
+                *at_zero.get_mut(count).ok_or(TrainError::TooLarge)? = element;
+                count += 1;
+                // Its torque is left out of what the others cause.
+                states[element] = None;
+            } else {
+                states[element] = Some(Contact::Slipping(Direction::of(slip)));
+            }
+        }
+        let at_zero = &at_zero[..count];
+        let state = CarState { motion: train.without_slip(state.motion, at_zero)?, ..*state };
+        let others = Self::new(model, states)?;
+        let torques = model.applied(&others, &state, inputs);
+        let free = others.accelerations_rad_s2(&model.ends_n_m(&torques), &torques.elements_n_m);
+        let problem = train.problem(at_zero, |element| {
+            let (lower, upper) = model.holding_limits(element, &state, inputs).unwrap_or((0.0, 0.0));
+            (slip_of(train, element, &free), Limits::between(lower, upper))
+        })?;
+        let solution = problem.solve(&[]);
+        for (&element, contact) in at_zero.iter().zip(solution.contacts) {
+            states[element] = Some(contact);
+        }
+        Ok((Self::new(model, states)?, state))
+    }
+}

@@ -1,0 +1,100 @@
+//! Numbers of the shift controller.
+
+/// Calibration of the shift controller: one set for all gearboxes and all kinds of shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarCalibration {
+    /// Control period, s.
+    pub control_period_s: f64,
+    /// Time to bring the oncoming clutch to its kiss point and the offgoing one to what it must hold, s.
+    pub fill_s: f64,
+    /// The oncoming clutch waits this far below its kiss point, Pa.
+    pub below_kiss_pa: f64,
+    /// Torque that the offgoing clutch can hold over what it must, before and during the torque phase.
+    pub holding_margin: f64,
+    /// Duration of the torque phase, s.
+    pub torque_phase_s: f64,
+    /// Speed of the oncoming ramp when the old gear flares, over that without.
+    pub flare_ramp: f64,
+    /// Share of the turbine torque that the offgoing clutch holds while the old gear flares.
+    pub flare_holding: f64,
+    /// Slip of the old gear at which it is left, or counts as a flare, rad/s at the turbine.
+    pub release_slip_rad_s: f64,
+    /// Duration of the inertia phase at 120 rad/s of slip where the turbine torque drives the change and the oncoming clutch
+    /// controls it, s.
+    pub inertia_phase_s: f64,
+    /// The same of power-on downshifts, s.
+    pub power_on_down_s: f64,
+    /// The same of power-off upshifts, s.
+    pub power_off_up_s: f64,
+    /// The reference of the slip ends this far past zero, rad/s.
+    pub past_synchronous_rad_s: f64,
+    /// Gain of the slip error, 1/s.
+    pub proportional_per_s: f64,
+    /// Gain of its integral, 1/s^2.
+    pub integral_per_s2: f64,
+    /// The new gear is taken over so long before the slip reaches zero, s (inertia phase first).
+    pub hand_over_lead_s: f64,
+    /// Duration of the hand-over, s.
+    pub hand_over_s: f64,
+    /// Torque of the oncoming clutch at the end over the turbine torque.
+    pub lock_margin: f64,
+    /// Least torque that is given to the oncoming clutch at the end, N m at the turbine.
+    pub lock_least_n_m: f64,
+    /// Slip at which the oncoming clutch counts as locked, rad/s at the turbine.
+    pub lock_slip_rad_s: f64,
+    /// Time for which it must be locked, s.
+    pub lock_hold_s: f64,
+    /// Time in which the locked clutch goes to line pressure, s.
+    pub lock_ramp_s: f64,
+    /// Time after which the oncoming clutch is closed whatever its slip, s.
+    pub longest_s: f64,
+    /// Share of the engine torque in the inertia phase of power-on upshifts.
+    pub up_engine_share: f64,
+    /// Share of the engine torque at the end of the inertia phase of power-on downshifts.
+    pub down_engine_share: f64,
+    /// Share of the way at which the torque of an upshift is given back, and that of a downshift is taken.
+    pub engine_way: f64,
+    /// Time in which the share of the engine torque changes by one, s.
+    pub engine_ramp_s: f64,
+    /// Time constant of the output speed, s.
+    pub output_filter_s: f64,
+    /// Time constant with which a pressure is made to follow, s.
+    pub pressure_follow_s: f64,
+    /// Most that a command is ahead of its pressure, Pa.
+    pub pressure_lead_pa: f64,
+}
+
+impl CarCalibration {
+    /// Numbers that give a good shift in every gearbox that ships with the program.
+    pub const STANDARD: Self = Self {
+        control_period_s: 0.01,
+        fill_s: 0.20,
+        below_kiss_pa: 4e3,
+        holding_margin: 1.15,
+        torque_phase_s: 0.20,
+        flare_ramp: 1.8,
+        flare_holding: 0.25,
+        release_slip_rad_s: 3.0,
+        inertia_phase_s: 0.40,
+        power_on_down_s: 0.65,
+        power_off_up_s: 0.70,
+        past_synchronous_rad_s: 2.5,
+        proportional_per_s: 9.0,
+        integral_per_s2: 25.0,
+        hand_over_lead_s: 0.07,
+        hand_over_s: 0.15,
+        lock_margin: 1.25,
+        lock_least_n_m: 12.0,
+        lock_slip_rad_s: 3.0,
+        lock_hold_s: 0.03,
+        lock_ramp_s: 0.15,
+        longest_s: 3.0,
+        up_engine_share: 0.55,
+        down_engine_share: 0.7,
+        engine_way: 0.8,
+        engine_ramp_s: 0.2,
+        output_filter_s: 0.04,
+        pressure_follow_s: 0.02,
+        pressure_lead_pa: 0.3e6,
+    };
+}

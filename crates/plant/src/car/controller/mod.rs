@@ -1,0 +1,175 @@
+//! The shift controller of any gearbox: commands of all elements and the share of engine torque, from measured speeds.
+//!
+//! A shift is run by the reduced shift of the gearbox: torques `U` at the turbine, `alpha` and ratio of both clutches, and the
+//! 2 x 2 mass. With the offgoing slip `y = w_t - i_off w_0` and the oncoming slip `z = w_t - i_on w_0` at the turbine, one
+//! speed controller serves the inertia phase of every kind of shift:
+//!
+//! ```text
+//! U = T_t - M11 (dz_ref/dt + i_on dw_0/dt) - M12 dw_0/dt + k_p M11 (z - z_ref) + k_i M11 integral(z - z_ref)
+//! ```
+//!
+//! The sum `U` goes to the clutch whose slip has the right sign: the oncoming one if `U (i_off - i_on) > 0`, else the
+//! offgoing one. So the roles change by themselves when the turbine torque changes its sign during a shift. The controller knows
+//! the nominal car; it does not know pressures, torques, or the errors of the valves.
+
+mod calibration;
+mod pressure;
+mod shift;
+mod track;
+
+use config::Car;
+use geartrain::{Change, ElementKind};
+
+use super::integrate::CarError;
+use crate::gear_train::MAX_ELEMENTS;
+pub use calibration::CarCalibration;
+use shift::ActiveShift;
+pub use shift::ShiftStage;
+use track::Track;
+
+/// What the controller measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarMeasured {
+    /// Engine speed, rad/s.
+    pub engine_rad_s: f64,
+    /// Turbine speed, rad/s; without a converter that of the gearbox input.
+    pub turbine_rad_s: f64,
+    /// Gearbox output speed, rad/s.
+    pub output_rad_s: f64,
+    /// Driven wheel speed, rad/s.
+    pub wheel_rad_s: f64,
+}
+
+/// What the controller commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarCommands {
+    /// Command of each friction element's valve: current in A, or duty cycle in %.
+    pub elements: [f64; MAX_ELEMENTS],
+    /// Which elements are dogs that are to be in.
+    pub dogs: [bool; MAX_ELEMENTS],
+    /// Share of the engine torque that the driver asks for.
+    pub engine_share: f64,
+}
+
+/// The shift controller.
+#[derive(Debug, Clone)]
+pub struct CarShiftController {
+    car: Car,
+    calibration: CarCalibration,
+    gear: usize,
+    active: Option<ActiveShift>,
+    preselected: Option<usize>,
+    output: Track,
+    engine_share: f64,
+}
+
+impl CarShiftController {
+    /// A controller for this car, in a gear.
+    ///
+    /// # Errors
+    /// There is no such gear.
+    pub fn new(car: &Car, calibration: CarCalibration, gear: usize) -> Result<Self, CarError> {
+        if gear >= car.gearbox.gears.len() {
+            return Err(CarError::Request(format!("the gearbox has no gear number {gear}")));
+        }
+        let output = Track::new(calibration.output_filter_s);
+        Ok(Self { car: car.clone(), calibration, gear, active: None, preselected: None, output, engine_share: 1.0 })
+    }
+
+    /// The gear, before and during a shift the one that is left.
+    pub fn gear(&self) -> usize {
+        self.gear
+    }
+
+    /// Gears and elements of the shift that is under way, and its stage.
+    pub fn shift(&self) -> Option<(usize, usize, usize, usize, ShiftStage)> {
+        self.active
+            .as_ref()
+            .map(|shift| (self.gear, shift.to, shift.offgoing.element, shift.oncoming.element, shift.stage))
+    }
+
+    /// Puts in the dogs of this gear beside those of the gear that is engaged.
+    pub fn preselect(&mut self, gear: Option<usize>) {
+        self.preselected = gear.filter(|&gear| gear < self.car.gearbox.gears.len());
+    }
+
+    /// Begins a shift to this gear. While another shift is under way nothing happens.
+    ///
+    /// # Errors
+    /// The shift is not one between two clutches.
+    pub fn request(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
+        if self.active.is_some() || to == self.gear {
+            return Ok(());
+        }
+        let names = |gear: usize| self.car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str());
+        let shift = self.car.gearbox.shift(self.gear, to);
+        let single = shift.and_then(|shift| match (&shift.change, &shift.reduced) {
+            (Change::Single { offgoing, oncoming, .. }, Some(reduced)) => Some((*offgoing, *oncoming, *reduced)),
+            _ => None,
+        });
+        let both = single.and_then(|(offgoing, oncoming, reduced)| {
+            let clutch = |element: usize| self.car.clutches.get(element).copied().flatten();
+            Some((offgoing, oncoming, clutch(offgoing)?, clutch(oncoming)?, reduced))
+        });
+        let Some((offgoing, oncoming, off, on, reduced)) = both else {
+            let message = format!(
+                "shift {}-{} is not between two clutches; shift through the gears between",
+                names(self.gear),
+                names(to)
+            );
+            return Err(CarError::Request(message));
+        };
+        self.active = Some(ActiveShift::new(to, (offgoing, off), (oncoming, on), &reduced, &self.car, time_s));
+        Ok(())
+    }
+
+    /// Commands for the period that begins at `time_s`.
+    pub fn step(&mut self, time_s: f64, throttle: f64, measured: &CarMeasured) -> CarCommands {
+        let period_s = self.calibration.control_period_s;
+        self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
+        let turbine_n_m = self.turbine_torque(throttle, measured);
+        let mut elements = [0.0; MAX_ELEMENTS];
+        let mut dogs = [false; MAX_ELEMENTS];
+        let line_pa = self.car.line_pressure_pa;
+        // The clutches of a shift get their commands below.
+        let to = self.active.as_ref().map(|shift| shift.to);
+        for gear in [Some(self.gear), to, self.preselected].into_iter().flatten() {
+            for holding in &self.car.gearbox.gears[gear].holding {
+                let element = holding.element;
+                match &self.car.clutches[element] {
+                    Some(clutch) if gear == self.gear => elements[element] = clutch.valve.command_for(line_pa),
+                    Some(_) => (),
+                    None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
+                }
+            }
+        }
+        let mut wanted = 1.0;
+        if let Some(shift) = &mut self.active {
+            let pressures = shift.step(&self.calibration, time_s, turbine_n_m, measured, &self.output);
+            for (clutch, pressure_pa) in [&shift.offgoing, &shift.oncoming].into_iter().zip(pressures) {
+                elements[clutch.element] = clutch.valve_command(pressure_pa.clamp(0.0, line_pa));
+            }
+            wanted = shift.engine_share(&self.calibration, turbine_n_m, measured);
+            if shift.stage == ShiftStage::Done {
+                self.gear = shift.to;
+                self.active = None;
+            }
+        }
+        let step = period_s / self.calibration.engine_ramp_s;
+        self.engine_share += (wanted - self.engine_share).clamp(-step, step);
+        CarCommands { elements, dogs, engine_share: self.engine_share }
+    }
+
+    /// Torque on the gearbox input as the nominal maps give it, N m. The engine controller's reductions are known.
+    fn turbine_torque(&self, throttle: f64, measured: &CarMeasured) -> f64 {
+        match &self.car.converter {
+            Some(converter) => converter.torques(measured.engine_rad_s, measured.turbine_rad_s).turbine_n_m,
+            None => {
+                let engine = &self.car.engine;
+                let torque = engine.torque(measured.turbine_rad_s, throttle);
+                let reduced = if torque > 0.0 { torque * self.engine_share } else { torque };
+                reduced - engine.drag_n_m_s * measured.turbine_rad_s
+            }
+        }
+    }
+}

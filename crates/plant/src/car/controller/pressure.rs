@@ -1,0 +1,59 @@
+//! A shift clutch as its controller sees it: from torque at the turbine to the command of its valve.
+
+use config::ShiftClutch;
+
+use super::CarCalibration;
+
+/// One of the two clutches of a shift.
+#[derive(Debug, Clone)]
+pub(super) struct Controlled {
+    /// Its place among the elements.
+    pub(super) element: usize,
+    clutch: ShiftClutch,
+    /// Its slip per turbine speed.
+    alpha: f64,
+    /// Turbine speed over output speed while it sticks.
+    pub(super) ratio: f64,
+    /// Pressure that the nominal valve has, Pa.
+    modelled_pa: f64,
+}
+
+impl Controlled {
+    pub(super) fn new(element: usize, clutch: ShiftClutch, slip_row: [f64; 2], modelled_pa: f64) -> Self {
+        let [alpha, per_output] = slip_row;
+        Self { element, clutch, alpha, ratio: -per_output / alpha, modelled_pa }
+    }
+
+    /// Its slip at the turbine, rad/s.
+    pub(super) fn slip_at_turbine(&self, turbine_rad_s: f64, output_rad_s: f64) -> f64 {
+        turbine_rad_s - self.ratio * output_rad_s
+    }
+
+    pub(super) fn kiss_pa(&self) -> f64 {
+        self.clutch.clutch.kiss_pressure()
+    }
+
+    /// Pressure at which it carries this torque at the turbine, Pa.
+    pub(super) fn pressure_for(&self, turbine_n_m: f64, slip_at_turbine_rad_s: f64) -> f64 {
+        self.clutch.clutch.pressure_for(turbine_n_m / self.alpha, self.alpha * slip_at_turbine_rad_s)
+    }
+
+    /// Pressure at which the command must settle for the pressure to follow `wanted_pa`, Pa. The valve's lag is compensated by
+    /// its nominal model, its delay is not.
+    pub(super) fn lead(&mut self, calibration: &CarCalibration, wanted_pa: f64, line_pa: f64) -> f64 {
+        let c = calibration;
+        let to_go = wanted_pa - self.modelled_pa;
+        let lag_s = self.clutch.valve.lag(self.modelled_pa, to_go / c.pressure_follow_s);
+        let ahead = (lag_s / c.pressure_follow_s - 1.0).max(0.0) * to_go;
+        let settled = wanted_pa + ahead.clamp(-c.pressure_lead_pa, c.pressure_lead_pa);
+        let settled = settled.clamp(0.0, line_pa);
+        let step = self.clutch.valve.step(settled, self.modelled_pa, c.control_period_s);
+        self.modelled_pa = step.phi * self.modelled_pa + step.drift_pa;
+        settled
+    }
+
+    /// Command at which its valve settles at this pressure, A or %.
+    pub(super) fn valve_command(&self, pressure_pa: f64) -> f64 {
+        self.clutch.valve.command_for(pressure_pa)
+    }
+}

@@ -1,0 +1,274 @@
+//! One shift: its stages and the pressures of both clutches.
+
+use config::{Car, ShiftClutch};
+use drivetrain::{PhaseOrder, ReducedShift};
+
+use super::pressure::Controlled;
+use super::track::Track;
+use super::{CarCalibration, CarMeasured};
+
+/// Stage of a shift, as the controller runs it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShiftStage {
+    /// The oncoming clutch goes to its kiss point, the offgoing one to what it must hold.
+    Fill,
+    /// The load goes from the offgoing to the oncoming clutch in the old ratio.
+    TorquePhase,
+    /// Slip control.
+    InertiaPhase,
+    /// The load goes to the oncoming clutch at its synchronous speed (inertia phase first).
+    HandOver,
+    /// The oncoming clutch goes to line pressure.
+    Lock,
+    /// The new gear is engaged.
+    Done,
+}
+
+/// A shift that is under way.
+#[derive(Debug, Clone)]
+pub(super) struct ActiveShift {
+    pub(super) to: usize,
+    pub(super) offgoing: Controlled,
+    pub(super) oncoming: Controlled,
+    pub(super) stage: ShiftStage,
+    mass_kg_m2: [[f64; 2]; 2],
+    line_pa: f64,
+    begun_s: f64,
+    since_s: f64,
+    /// Share of the load that the oncoming clutch has taken in the torque phase.
+    transferred: f64,
+    has_flared: bool,
+    /// Oncoming slip at the start of the inertia phase, and its duration.
+    from_rad_s: f64,
+    duration_s: f64,
+    integral_rad: f64,
+    /// Torque of the slip controller, N m at the turbine.
+    controlled_n_m: f64,
+    locked_since_s: Option<f64>,
+    /// Offgoing torque at the start of the hand-over, N m at the turbine.
+    handed_n_m: f64,
+    slip_before_rad_s: Option<f64>,
+}
+
+/// What a step of the controller looks at.
+#[derive(Clone, Copy)]
+struct Now {
+    time_s: f64,
+    turbine_n_m: f64,
+    /// Offgoing and oncoming slip at the turbine, rad/s.
+    y: f64,
+    z: f64,
+    /// Oncoming slip with the output speed of the wheels, rad/s: free of the oscillation of the shafts.
+    z_wheels: f64,
+    output_rad_s2: f64,
+}
+
+impl ActiveShift {
+    pub(super) fn new(
+        to: usize,
+        (offgoing, off): (usize, ShiftClutch),
+        (oncoming, on): (usize, ShiftClutch),
+        reduced: &ReducedShift<f64>,
+        car: &Car,
+        time_s: f64,
+    ) -> Self {
+        Self {
+            to,
+            offgoing: Controlled::new(offgoing, off, reduced.slip_offgoing, car.line_pressure_pa),
+            oncoming: Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0),
+            stage: ShiftStage::Fill,
+            mass_kg_m2: reduced.mass_kg_m2,
+            line_pa: car.line_pressure_pa,
+            begun_s: time_s,
+            since_s: time_s,
+            transferred: 0.0,
+            has_flared: false,
+            from_rad_s: 0.0,
+            duration_s: 1.0,
+            integral_rad: 0.0,
+            controlled_n_m: 0.0,
+            locked_since_s: None,
+            handed_n_m: 0.0,
+            slip_before_rad_s: None,
+        }
+    }
+
+    /// Positive for an upshift of forward gears.
+    fn direction(&self) -> f64 {
+        (self.offgoing.ratio - self.oncoming.ratio).signum()
+    }
+
+    /// Torque phase first where the turbine torque drives the speed change.
+    fn order(&self, turbine_n_m: f64) -> PhaseOrder {
+        if turbine_n_m * self.direction() > 0.0 { PhaseOrder::TorqueFirst } else { PhaseOrder::InertiaFirst }
+    }
+
+    /// Pressures at which offgoing and oncoming valve are to settle, Pa.
+    pub(super) fn step(
+        &mut self,
+        c: &CarCalibration,
+        time_s: f64,
+        turbine_n_m: f64,
+        measured: &CarMeasured,
+        output: &Track,
+    ) -> [f64; 2] {
+        let (turbine, out) = (measured.turbine_rad_s, measured.output_rad_s);
+        let now = Now {
+            time_s,
+            turbine_n_m,
+            y: self.offgoing.slip_at_turbine(turbine, out),
+            z: self.oncoming.slip_at_turbine(turbine, out),
+            z_wheels: self.oncoming.slip_at_turbine(turbine, output.speed_rad_s()),
+            output_rad_s2: output.rate_rad_s2,
+        };
+        self.change_stage(c, &now);
+        let torques = match self.stage {
+            ShiftStage::Fill => self.fill(c, &now),
+            ShiftStage::TorquePhase => self.transfer(c, &now),
+            ShiftStage::InertiaPhase => self.slip_control(c, &now),
+            ShiftStage::HandOver => self.hand_over(c, &now),
+            ShiftStage::Lock | ShiftStage::Done => [0.0, self.locked_pa(c, &now)],
+        };
+        self.slip_before_rad_s = Some(now.z_wheels);
+        let [off_pa, on_pa] = torques;
+        [self.offgoing.lead(c, off_pa, self.line_pa), self.oncoming.lead(c, on_pa, self.line_pa)]
+    }
+
+    fn change_stage(&mut self, c: &CarCalibration, now: &Now) {
+        // Times are sums of periods; a rounding error must not cost a whole one.
+        let passed = |since_s: f64, duration_s: f64| now.time_s - since_s >= duration_s - 1e-9;
+        let direction = self.direction();
+        let locks = now.z.abs() < c.lock_slip_rad_s || now.z * direction < 0.0;
+        self.locked_since_s =
+            if now.z.abs() < c.lock_slip_rad_s { self.locked_since_s.or(Some(now.time_s)) } else { None };
+        let holds = self.locked_since_s.is_some_and(|since_s| passed(since_s, c.lock_hold_s));
+        let next = match self.stage {
+            ShiftStage::Fill if passed(self.since_s, c.fill_s) => match self.order(now.turbine_n_m) {
+                PhaseOrder::TorqueFirst => ShiftStage::TorquePhase,
+                PhaseOrder::InertiaFirst => ShiftStage::InertiaPhase,
+            },
+            ShiftStage::TorquePhase if now.y * direction < -c.release_slip_rad_s => ShiftStage::InertiaPhase,
+            ShiftStage::TorquePhase if self.transferred >= 1.0 => ShiftStage::InertiaPhase,
+            ShiftStage::InertiaPhase => match self.order(self.controlled_n_m) {
+                PhaseOrder::TorqueFirst if locks => ShiftStage::Lock,
+                PhaseOrder::InertiaFirst if self.nears(c, now) => ShiftStage::HandOver,
+                _ if passed(self.begun_s, c.longest_s) => ShiftStage::Lock,
+                _ => ShiftStage::InertiaPhase,
+            },
+            ShiftStage::HandOver if passed(self.since_s, c.hand_over_s) => ShiftStage::Lock,
+            ShiftStage::Lock if holds && passed(self.since_s, c.lock_ramp_s) => ShiftStage::Done,
+            same => same,
+        };
+        if next == self.stage {
+            return;
+        }
+        self.stage = next;
+        self.since_s = now.time_s;
+        if next == ShiftStage::InertiaPhase {
+            self.from_rad_s = now.z_wheels;
+            let scale = (self.from_rad_s.abs() / 120.0).clamp(0.55, 1.3);
+            let at_full = match (self.order(now.turbine_n_m), direction > 0.0) {
+                (PhaseOrder::TorqueFirst, _) => c.inertia_phase_s,
+                (PhaseOrder::InertiaFirst, true) => c.power_off_up_s,
+                (PhaseOrder::InertiaFirst, false) => c.power_on_down_s,
+            };
+            self.duration_s = at_full * scale;
+            self.controlled_n_m = now.turbine_n_m;
+        }
+        if next == ShiftStage::HandOver {
+            self.handed_n_m = self.controlled_n_m;
+        }
+    }
+
+    /// Whether the slip reaches zero soon.
+    fn nears(&self, c: &CarCalibration, now: &Now) -> bool {
+        let rate = self.slip_before_rad_s.map_or(0.0, |before| (now.z_wheels - before) / c.control_period_s);
+        (now.z + c.hand_over_lead_s * rate) * self.direction() <= 0.0
+    }
+
+    fn waiting_pa(&self, c: &CarCalibration) -> f64 {
+        (self.oncoming.kiss_pa() - c.below_kiss_pa).max(0.0)
+    }
+
+    fn fill(&self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+        let share = ((now.time_s - self.since_s + c.control_period_s) / c.fill_s).min(1.0);
+        let held = self.offgoing.pressure_for(c.holding_margin * now.turbine_n_m, 0.0);
+        let offgoing_pa = self.line_pa.min(held + (1.0 - share) * (self.line_pa - held).max(0.0));
+        [offgoing_pa, self.waiting_pa(c)]
+    }
+
+    fn transfer(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+        let flare = now.y * self.direction() > c.release_slip_rad_s;
+        self.has_flared |= flare;
+        let speed = if self.has_flared { c.flare_ramp } else { 1.0 };
+        self.transferred = (self.transferred + speed * c.control_period_s / c.torque_phase_s).min(1.0);
+        let (taken, left) = (self.transferred, 1.0 - self.transferred);
+        let held = c.holding_margin * left;
+        let held = if flare { held.max(c.flare_holding) } else { held };
+        [
+            self.offgoing.pressure_for(held * now.turbine_n_m, now.y),
+            self.oncoming.pressure_for(taken * now.turbine_n_m, now.z),
+        ]
+    }
+
+    fn slip_control(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+        let elapsed_s = now.time_s - self.since_s;
+        let end = -c.past_synchronous_rad_s * self.direction();
+        let (reference, rate) = half_cosine(self.from_rad_s, end, elapsed_s, self.duration_s);
+        let error = now.z_wheels - reference;
+        self.integral_rad += error * c.control_period_s;
+        let [[m11, m12], _] = self.mass_kg_m2;
+        let wanted_rad_s2 = rate + self.oncoming.ratio * now.output_rad_s2;
+        self.controlled_n_m = now.turbine_n_m - m11 * wanted_rad_s2 - m12 * now.output_rad_s2
+            + m11 * (c.proportional_per_s * error + c.integral_per_s2 * self.integral_rad);
+        let u = self.controlled_n_m;
+        if u * self.direction() > 0.0 {
+            [0.0, self.oncoming.pressure_for(u, now.z)]
+        } else {
+            [self.offgoing.pressure_for(u, now.y), self.waiting_pa(c)]
+        }
+    }
+
+    /// Torque of the closed oncoming clutch, N m at the turbine.
+    fn closing_n_m(&self, c: &CarCalibration, now: &Now) -> f64 {
+        (c.lock_margin * now.turbine_n_m.abs()).max(c.lock_least_n_m)
+    }
+
+    fn hand_over(&self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+        let share = ((now.time_s - self.since_s + c.control_period_s) / c.hand_over_s).min(1.0);
+        [
+            self.offgoing.pressure_for((1.0 - share) * self.handed_n_m, now.y),
+            self.oncoming.pressure_for(share * self.closing_n_m(c, now), now.z),
+        ]
+    }
+
+    fn locked_pa(&self, c: &CarCalibration, now: &Now) -> f64 {
+        let closing = self.oncoming.pressure_for(self.closing_n_m(c, now), now.z);
+        let share = ((now.time_s - self.since_s) / c.lock_ramp_s).min(1.0);
+        closing + share * (self.line_pa - closing).max(0.0)
+    }
+
+    /// Share of the engine torque that suits the stage.
+    pub(super) fn engine_share(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
+        let z = self.oncoming.slip_at_turbine(measured.turbine_rad_s, measured.output_rad_s);
+        let way = 1.0 - z / self.from_rad_s;
+        match self.stage {
+            ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction() > 0.0 && way < c.engine_way => {
+                c.up_engine_share
+            }
+            ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction() < 0.0 && way > c.engine_way => {
+                c.down_engine_share
+            }
+            _ => 1.0,
+        }
+    }
+}
+
+/// Half a cosine between two values: value and rate after `elapsed_s` of `duration_s`.
+fn half_cosine(from: f64, to: f64, elapsed_s: f64, duration_s: f64) -> (f64, f64) {
+    let share = (elapsed_s / duration_s).clamp(0.0, 1.0);
+    let angle = std::f64::consts::PI * share;
+    let running = if share < 1.0 { 1.0 } else { 0.0 };
+    let half = 0.5 * (from - to);
+    (to + half * (1.0 + angle.cos()), -half * std::f64::consts::PI / duration_s * angle.sin() * running)
+}

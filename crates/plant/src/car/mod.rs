@@ -1,0 +1,39 @@
+//! The car with a whole gearbox: any gear train with all of its elements, in any gear and any shift.
+//!
+//! Engine, converter with lock-up clutch (or neither), gear train, drive shafts, tyres, vehicle, and a valve for each friction
+//! element. Which elements stick is decided for all of them at once ([`crate::ContactProblem`]). Within one set of contacts
+//! the equations are smooth; a step of the integration ends where a slip reaches zero, a holding torque its limit, or a
+//! pressure the kiss point of its clutch.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `model.rs` | the equations |
+//! | `contacts.rs` | which elements stick, and what follows for accelerations and torques |
+//! | `integrate.rs` | steps and events |
+//! | `energy.rs` | where the energy goes |
+//! | `valves.rs` | commands on their way to the valves |
+//! | `start.rs` | a car that runs steadily in a gear |
+//! | `controller/` | the shift controller |
+//! | `run.rs` | car, valves and controller together, period by period |
+//! | `shift.rs` | one shift |
+
+mod contacts;
+mod controller;
+mod energy;
+mod integrate;
+mod model;
+mod run;
+mod sample;
+mod shift;
+mod start;
+mod valves;
+
+pub use contacts::{ContactState, Contacts};
+pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftStage};
+pub use energy::{CarPowers, stored_car_energy};
+pub use integrate::{CarError, CarIntegrator, CarStep};
+pub use model::{CarInputs, CarModel, CarState, CarTorques, MAX_PACKS};
+pub use run::{CarRun, Driver};
+pub use sample::{CarSample, ElementSample, ShiftUnderWay};
+pub use shift::{CarShift, CarShiftQuality, simulate_car_shift};
+pub use valves::CarValves;

@@ -1,0 +1,397 @@
+//! The equations of the car.
+
+use config::{Car, ShiftClutch};
+use drivetrain::Driveline;
+use drivetrain::clutch::drag_torque;
+use geartrain::ElementKind;
+
+use super::contacts::Contacts;
+use crate::Contact;
+use crate::gear_train::{MAX_ELEMENTS, MAX_FREEDOMS, TrainError, TrainModel};
+use crate::rosenbrock::StiffRow;
+
+/// Most friction elements of a gearbox.
+pub const MAX_PACKS: usize = 6;
+/// Twist, wheel and vehicle come first in the state.
+const TWIST: usize = 0;
+const WHEEL: usize = 1;
+const VEHICLE: usize = 2;
+const MOTION: usize = 3;
+const PRESSURE: usize = MOTION + MAX_FREEDOMS;
+/// Number of states.
+pub(super) const STATES: usize = PRESSURE + MAX_PACKS;
+
+/// Speed of the wheel, rad/s, over which the torque of the brake turns around: a braked car creeps by millimetres per second
+/// instead of sticking.
+const BRAKE_TURN_RAD_S: f64 = 0.1;
+
+/// Torque by which the synchroniser of a dog brings its gear to the speed of the shaft, N m \[chosen\].
+const SYNCHRONISER_N_M: f64 = 40.0;
+
+/// What an element of the car is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Part {
+    /// A friction element with its valve; holds its place among the pressures.
+    Friction(usize, Box<ShiftClutch>),
+    /// A one-way clutch.
+    OneWay,
+    /// A dog clutch with synchroniser.
+    Dog,
+    /// The clutch between engine and gearbox input.
+    LockUp,
+}
+
+/// The continuous state. Pressures are gauge; twist is gearbox side minus wheel side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarState {
+    /// Twist of the drive shafts, rad at the wheel.
+    pub twist_rad: f64,
+    /// Driven wheel speed, rad/s.
+    pub wheel_rad_s: f64,
+    /// Vehicle speed, m/s.
+    pub vehicle_m_s: f64,
+    /// Speeds of train and engine in the coordinates of [`crate::TrainModel::with_engine`], rad/s.
+    pub motion: [f64; MAX_FREEDOMS],
+    /// Pressure of each friction element, Pa.
+    pub pressures_pa: [f64; MAX_PACKS],
+}
+
+impl CarState {
+    /// Size of each state that an absolute error is measured against.
+    pub(super) fn scale() -> [f64; STATES] {
+        Self {
+            twist_rad: 0.1,
+            wheel_rad_s: 10.0,
+            vehicle_m_s: 10.0,
+            motion: [100.0; MAX_FREEDOMS],
+            pressures_pa: [1e5; MAX_PACKS],
+        }
+        .to_array()
+    }
+
+    #[inline]
+    pub(super) fn to_array(self) -> [f64; STATES] {
+        let mut x = [0.0; STATES];
+        x[TWIST] = self.twist_rad;
+        x[WHEEL] = self.wheel_rad_s;
+        x[VEHICLE] = self.vehicle_m_s;
+        x[MOTION..PRESSURE].copy_from_slice(&self.motion);
+        x[PRESSURE..].copy_from_slice(&self.pressures_pa);
+        x
+    }
+
+    #[inline]
+    pub(super) fn from_array(x: &[f64; STATES]) -> Self {
+        Self {
+            twist_rad: x[TWIST],
+            wheel_rad_s: x[WHEEL],
+            vehicle_m_s: x[VEHICLE],
+            motion: std::array::from_fn(|i| x[MOTION + i]),
+            pressures_pa: std::array::from_fn(|i| x[PRESSURE + i]),
+        }
+    }
+}
+
+/// What acts on the car, constant over a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarInputs {
+    /// Throttle, 0 to 1.
+    pub throttle: f64,
+    /// Share of the driving engine torque that the transmission controller leaves, 0 to 1.
+    pub engine_share: f64,
+    /// Torque of the brakes on the driven wheels, N m.
+    pub brake_n_m: f64,
+    /// Grade, rad, positive uphill.
+    pub grade_rad: f64,
+    /// Pressure at which each friction element's valve settles, Pa.
+    pub settled_pa: [f64; MAX_PACKS],
+    /// Which elements are dogs that are in.
+    pub dogs: [bool; MAX_ELEMENTS],
+    /// Torque that the lock-up clutch holds, N m; without a converter it holds any torque.
+    pub lock_up_n_m: f64,
+}
+
+/// Torques and speeds at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarTorques {
+    /// Engine speed, rad/s.
+    pub engine_rad_s: f64,
+    /// Turbine speed, rad/s; without a converter that of the gearbox input.
+    pub turbine_rad_s: f64,
+    /// Gearbox output speed, rad/s.
+    pub output_rad_s: f64,
+    /// Torque of combustion and pumping at the crank, N m.
+    pub engine_n_m: f64,
+    /// Torque that the pump takes from the engine, N m; zero without a converter.
+    pub pump_n_m: f64,
+    /// Torque of the converter on the gearbox input, N m; zero without a converter.
+    pub converter_n_m: f64,
+    /// Torque of the drive shafts, N m at the wheel.
+    pub shaft_n_m: f64,
+    /// Torque of the brakes, N m.
+    pub brake_n_m: f64,
+    /// Force of the tyres, N.
+    pub tyre_n: f64,
+    /// Torque of each element, N m; of the sticking ones only after [`CarModel::torques`]. The last is the lock-up clutch.
+    pub elements_n_m: [f64; MAX_ELEMENTS],
+}
+
+impl CarTorques {
+    /// Torque on the gearbox input, N m: converter and lock-up clutch.
+    pub fn turbine_n_m(&self, model: &CarModel) -> f64 {
+        self.converter_n_m + self.elements_n_m[model.lock_up()]
+    }
+}
+
+/// A car whose equations are ready to be integrated.
+#[derive(Debug, Clone)]
+pub struct CarModel {
+    /// The car.
+    pub car: Car,
+    pub(super) train: TrainModel,
+    pub(super) parts: Vec<Part>,
+}
+
+impl CarModel {
+    /// Prepares a car.
+    ///
+    /// # Errors
+    /// The gearbox has no stick diagram, is too large, or its inertia cannot be inverted.
+    pub fn new(car: Car) -> Result<Self, TrainError> {
+        let train = car.gearbox.train.as_ref().ok_or(TrainError::NoDiagram)?;
+        let train = TrainModel::with_engine(train, car.engine.inertia_kg_m2)?;
+        let mut packs = 0;
+        let mut parts = Vec::new();
+        for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
+            parts.push(match (element.kind, clutch) {
+                (ElementKind::OneWayClutch, _) => Part::OneWay,
+                (ElementKind::Dog, _) => Part::Dog,
+                (_, Some(clutch)) => {
+                    packs += 1;
+                    Part::Friction(packs - 1, Box::new(*clutch))
+                }
+                (_, None) => return Err(TrainError::NoPack),
+            });
+        }
+        parts.push(Part::LockUp);
+        if packs > MAX_PACKS || parts.len() != train.elements {
+            return Err(TrainError::TooLarge);
+        }
+        Ok(Self { car, train, parts })
+    }
+
+    /// Place of the clutch between engine and gearbox input among the elements.
+    pub fn lock_up(&self) -> usize {
+        self.parts.len() - 1
+    }
+
+    /// Place of a friction element among the pressures, and its clutch.
+    pub fn friction(&self, element: usize) -> Option<(usize, &ShiftClutch)> {
+        match self.parts.get(element)? {
+            Part::Friction(slot, clutch) => Some((*slot, clutch)),
+            _ => None,
+        }
+    }
+
+    /// Speeds of engine, gearbox input and gearbox output, rad/s.
+    #[inline]
+    pub fn speeds(&self, state: &CarState) -> [f64; 3] {
+        let [turbine, output] = self.train.ends(&state.motion);
+        [state.motion[self.train.freedoms - 1], turbine, output]
+    }
+
+    /// Slip of an element, rad/s.
+    #[inline]
+    pub fn slip(&self, state: &CarState, element: usize) -> f64 {
+        self.train.slip(&state.motion, element)
+    }
+
+    /// Lowest and highest torque of an element that sticks, N m; `None` for one that is open.
+    #[inline]
+    pub(super) fn holding_limits(&self, element: usize, state: &CarState, inputs: &CarInputs) -> Option<(f64, f64)> {
+        const UNLIMITED_N_M: f64 = 1e9;
+        let capacity = match &self.parts[element] {
+            Part::Friction(slot, clutch) => clutch.clutch.static_capacity(state.pressures_pa[*slot]),
+            Part::OneWay => return Some((0.0, UNLIMITED_N_M)),
+            Part::Dog if inputs.dogs[element] => UNLIMITED_N_M,
+            Part::Dog => 0.0,
+            Part::LockUp if self.car.converter.is_none() => UNLIMITED_N_M,
+            Part::LockUp => inputs.lock_up_n_m,
+        };
+        (capacity > 0.0).then_some((-capacity, capacity))
+    }
+
+    /// Torque of an element that slips or is open, N m.
+    #[inline]
+    fn sliding_torque(&self, element: usize, contact: Option<Contact>, slip: f64, x: &CarState, u: &CarInputs) -> f64 {
+        let direction = match contact {
+            Some(Contact::Slipping(direction)) => direction.sign(),
+            _ => 0.0,
+        };
+        match &self.parts[element] {
+            Part::Friction(slot, clutch) => {
+                let torque = match contact {
+                    None => 0.0,
+                    Some(_) => direction * clutch.clutch.torque_capacity(x.pressures_pa[*slot], slip),
+                };
+                if clutch.drag_n_m > 0.0 { torque + drag_torque(clutch.drag_n_m, slip) } else { torque }
+            }
+            Part::OneWay => 0.0,
+            Part::Dog => direction * SYNCHRONISER_N_M,
+            Part::LockUp => direction * u.lock_up_n_m,
+        }
+    }
+
+    /// Every torque but those of the sticking elements, which stay zero.
+    #[inline]
+    pub(super) fn applied(&self, contacts: &Contacts, x: &CarState, u: &CarInputs) -> CarTorques {
+        let [engine_rad_s, turbine_rad_s, output_rad_s] = self.speeds(x);
+        let car = &self.car;
+        let (pump_n_m, converter_n_m) = match &car.converter {
+            Some(converter) => {
+                let torques = converter.torques(engine_rad_s, turbine_rad_s);
+                (torques.pump_n_m, torques.turbine_n_m)
+            }
+            None => (0.0, 0.0),
+        };
+        let engine_n_m = car.engine.torque(engine_rad_s, u.throttle);
+        let twist_rate = car.driveline.twist_rate(output_rad_s, x.wheel_rad_s);
+        let mut elements_n_m = [0.0; MAX_ELEMENTS];
+        for &element in contacts.sliding() {
+            let slip = self.slip(x, element);
+            elements_n_m[element] = self.sliding_torque(element, contacts.of(element), slip, x, u);
+        }
+        CarTorques {
+            engine_rad_s,
+            turbine_rad_s,
+            output_rad_s,
+            engine_n_m: if engine_n_m > 0.0 { engine_n_m * u.engine_share } else { engine_n_m },
+            pump_n_m,
+            converter_n_m,
+            shaft_n_m: car.driveline.shaft_torque_with_backlash(x.twist_rad, twist_rate, car.backlash_rad),
+            brake_n_m: brake(u.brake_n_m, x.wheel_rad_s),
+            tyre_n: car.tyre.force(car.road.wheel_radius_m * x.wheel_rad_s, x.vehicle_m_s),
+            elements_n_m,
+        }
+    }
+
+    /// Torques on engine, gearbox input and gearbox output, N m, without those of the elements.
+    #[inline]
+    pub(super) fn ends_n_m(&self, torques: &CarTorques) -> [f64; 3] {
+        let drag = self.car.engine.drag_n_m_s * torques.engine_rad_s;
+        [
+            torques.engine_n_m - torques.pump_n_m - drag,
+            torques.converter_n_m,
+            -torques.shaft_n_m / self.car.driveline.final_ratio,
+        ]
+    }
+
+    /// Every torque at this state.
+    pub fn torques(&self, contacts: &Contacts, x: &CarState, u: &CarInputs) -> CarTorques {
+        let mut torques = self.applied(contacts, x, u);
+        let ends = self.ends_n_m(&torques);
+        let held: [f64; MAX_ELEMENTS] = contacts.holding_n_m(&ends, &torques.elements_n_m);
+        for &element in contacts.stuck() {
+            torques.elements_n_m[element] = held[element];
+        }
+        torques
+    }
+
+    /// Time derivative of the state, and the torques that make it but for those of the sticking elements.
+    #[inline]
+    pub(super) fn rates(&self, contacts: &Contacts, x: &[f64; STATES], u: &CarInputs) -> ([f64; STATES], CarTorques) {
+        let x = CarState::from_array(x);
+        let torques = self.applied(contacts, &x, u);
+        let (car, ends) = (&self.car, self.ends_n_m(&torques));
+        let road = &car.road;
+        let mut pressures_pa = [0.0; MAX_PACKS];
+        for part in &self.parts {
+            if let Part::Friction(slot, clutch) = part {
+                let (now, settled) = (x.pressures_pa[*slot], u.settled_pa[*slot]);
+                // Most of a drive most pressures rest.
+                if now != settled {
+                    pressures_pa[*slot] = clutch.valve.pressure_rate(now, settled);
+                }
+            }
+        }
+        let wheel_n_m = torques.shaft_n_m
+            - road.rolling_moment(x.wheel_rad_s)
+            - torques.brake_n_m
+            - road.wheel_radius_m * torques.tyre_n;
+        let rates = CarState {
+            twist_rad: car.driveline.twist_rate(torques.output_rad_s, x.wheel_rad_s),
+            wheel_rad_s: wheel_n_m / car.driveline.wheel_inertia_kg_m2,
+            vehicle_m_s: self.vehicle_acceleration(&x, torques.tyre_n, u),
+            motion: contacts.accelerations_rad_s2(&ends, &torques.elements_n_m),
+            pressures_pa,
+        };
+        (rates.to_array(), torques)
+    }
+
+    /// `m dv/dt = F_x - F_A - F_G`, m/s^2.
+    #[inline]
+    pub fn vehicle_acceleration(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> f64 {
+        let road = &self.car.road;
+        (tyre_n - road.drag_force(x.vehicle_m_s)) / road.mass_kg - drivetrain::road::GRAVITY_M_S2 * u.grade_rad.sin()
+    }
+
+    /// The wheel's equation, which tyre and brake make stiff.
+    #[inline]
+    pub(super) fn stiff_row(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> StiffRow<STATES> {
+        let (road, line) = (&self.car.road, &self.car.driveline);
+        let radius = road.wheel_radius_m;
+        let grip = self.car.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s, tyre_n);
+        let in_gap = Driveline::spring_twist(x.twist_rad, self.car.backlash_rad).is_none();
+        let (damping, stiffness) =
+            if in_gap { (0.0, 0.0) } else { (line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad) };
+        let by_inertia = |torque: f64| torque / line.wheel_inertia_kg_m2;
+        let mut gradient = [0.0; STATES];
+        gradient[WHEEL] = by_inertia(-(radius * radius * grip + damping + brake_slope(u.brake_n_m, x.wheel_rad_s)));
+        gradient[VEHICLE] = by_inertia(radius * grip);
+        gradient[TWIST] = by_inertia(stiffness);
+        let by_output = by_inertia(damping / line.final_ratio);
+        for (entry, output) in gradient[MOTION..PRESSURE].iter_mut().zip(&self.train.ends[1]) {
+            *entry = by_output * output;
+        }
+        StiffRow { state: WHEEL, gradient }
+    }
+
+    /// Kinetic energy of engine and gearbox, J.
+    pub(super) fn rotating_energy(&self, x: &CarState) -> f64 {
+        self.train.kinetic_energy(&x.motion)
+    }
+
+    /// The motion in which the shafts of the gearbox have these speeds, rad/s, and the engine its own.
+    pub(super) fn motion_of(&self, shafts_rad_s: &[f64], engine_rad_s: f64) -> Option<[f64; MAX_FREEDOMS]> {
+        let train = self.car.gearbox.train.as_ref()?.motion(shafts_rad_s)?;
+        let mut motion = [0.0; MAX_FREEDOMS];
+        motion.get_mut(..train.len())?.copy_from_slice(&train);
+        *motion.get_mut(train.len())? = engine_rad_s;
+        Some(motion)
+    }
+}
+
+fn brake(torque_n_m: f64, wheel_rad_s: f64) -> f64 {
+    if torque_n_m == 0.0 { 0.0 } else { torque_n_m * (wheel_rad_s / BRAKE_TURN_RAD_S).tanh() }
+}
+
+/// Derivative of the brake's torque by the wheel speed, N m s/rad.
+fn brake_slope(torque_n_m: f64, wheel_rad_s: f64) -> f64 {
+    if torque_n_m == 0.0 {
+        return 0.0;
+    }
+    let share = (wheel_rad_s / BRAKE_TURN_RAD_S).tanh();
+    torque_n_m / BRAKE_TURN_RAD_S * (1.0 - share * share)
+}
+
+/// Response of the motion to unit torques on engine, gearbox input and gearbox output.
+pub(super) fn end_responses(train: &TrainModel) -> [[f64; MAX_FREEDOMS]; 3] {
+    let mut engine = [0.0; MAX_FREEDOMS];
+    engine[train.freedoms - 1] = 1.0;
+    [engine, train.ends[0], train.ends[1]].map(|force| train.accelerate(&force))
+}
+
+/// A response seen by the slip of an element.
+pub(super) fn slip_of(train: &TrainModel, element: usize, response: &[f64; MAX_FREEDOMS]) -> f64 {
+    train.slip(response, element)
+}

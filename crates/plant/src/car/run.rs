@@ -1,0 +1,160 @@
+//! Car, valves and shift controller together, one control period after another.
+
+use config::Car;
+
+use super::controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController};
+use super::integrate::{CarError, CarIntegrator, CarStep};
+use super::model::{CarInputs, CarModel, CarState};
+use super::sample::CarSample;
+use super::valves::CarValves;
+
+/// Times closer than this are the same instant, s: sums of periods differ in their last bits.
+const SAME_INSTANT_S: f64 = 1e-9;
+/// Largest torque of the brakes over what the tyres can pass to the road.
+const BRAKE_OVER_TYRES: f64 = 1.0;
+
+/// What the driver and the road do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Driver {
+    /// Throttle, 0 to 1.
+    pub throttle: f64,
+    /// Brake, 0 to 1.
+    pub brake: f64,
+    /// Grade, rad, positive uphill.
+    pub grade_rad: f64,
+}
+
+/// A car on its way.
+#[derive(Debug, Clone)]
+pub struct CarRun<'m> {
+    model: &'m CarModel,
+    controller: CarShiftController,
+    valves: CarValves,
+    plant: CarIntegrator,
+    commands: CarCommands,
+    period_s: f64,
+    periods: u64,
+    sample_time_s: f64,
+    samples: u64,
+}
+
+impl<'m> CarRun<'m> {
+    /// Starts at time zero from this state, in the gear of the controller. `nominal` is the car of the controller's model.
+    ///
+    /// # Errors
+    /// There is no such gear, or the state is not finite.
+    pub fn new(
+        model: &'m CarModel,
+        nominal: &Car,
+        calibration: CarCalibration,
+        gear: usize,
+        state: CarState,
+        (driver, sample_time_s): (Driver, f64),
+    ) -> Result<Self, CarError> {
+        if sample_time_s.is_nan() || sample_time_s < 1e-4 {
+            return Err(CarError::Request(format!("the sample time is {sample_time_s} s, expected 1e-4 s or more")));
+        }
+        let mut controller = CarShiftController::new(nominal, calibration, gear)?;
+        let commands = controller.step(0.0, driver.throttle, &measure(model, &state));
+        let mut valves = CarValves::new(model, &commands.elements);
+        let inputs = inputs(model, &mut valves, &commands, driver, 0.0);
+        let plant = CarIntegrator::new(model, 0.0, state, &inputs)?;
+        let period_s = calibration.control_period_s;
+        Ok(Self { model, controller, valves, plant, commands, period_s, periods: 0, sample_time_s, samples: 0 })
+    }
+
+    /// The same with another relative tolerance of the integration.
+    #[must_use]
+    pub fn with_tolerance(mut self, relative: f64) -> Self {
+        self.plant = self.plant.with_tolerance(relative);
+        self
+    }
+
+    /// Time reached, s.
+    #[expect(clippy::cast_precision_loss, reason = "a drive has fewer periods than a double has integers")]
+    pub fn time_s(&self) -> f64 {
+        self.periods as f64 * self.period_s
+    }
+
+    /// The shift controller.
+    pub fn controller(&self) -> &CarShiftController {
+        &self.controller
+    }
+
+    /// The state.
+    pub fn state(&self) -> &CarState {
+        &self.plant.state
+    }
+
+    /// Asks for a gear.
+    ///
+    /// # Errors
+    /// The shift is not one between two clutches.
+    pub fn request(&mut self, to: usize) -> Result<(), CarError> {
+        self.controller.request(to, self.time_s())
+    }
+
+    /// Puts in the dogs of a gear that is expected next.
+    pub fn preselect(&mut self, gear: Option<usize>) {
+        self.controller.preselect(gear);
+    }
+
+    /// Goes on by one control period. `on_step` sees every step of the integration, `record` a sample at every multiple of the
+    /// sample time.
+    ///
+    /// # Errors
+    /// Divergence or chatter.
+    pub fn advance(
+        &mut self,
+        driver: Driver,
+        mut on_step: impl FnMut(&CarStep<'_>),
+        mut record: impl FnMut(&CarSample),
+    ) -> Result<(), CarError> {
+        let (model, now_s) = (self.model, self.time_s());
+        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state));
+        self.valves.send(model, now_s, &self.commands.elements);
+        self.periods += 1;
+        let end_s = self.time_s();
+        let shown = (self.controller.gear(), self.controller.shift());
+        while self.plant.time_s < end_s - SAME_INSTANT_S {
+            let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s + SAME_INSTANT_S);
+            let until_s = self.valves.next_arrival_s().map_or(end_s, |arrival| arrival.min(end_s));
+            let (commands, samples, sample_time_s) = (&self.commands, &mut self.samples, self.sample_time_s);
+            self.plant.advance(model, &inputs, until_s, &mut |step| {
+                on_step(step);
+                // A sample on the border of two steps belongs to the second: at the instant of a new command it shows it.
+                while let time_s = sample_time(*samples, sample_time_s)
+                    && time_s < step.end_s - SAME_INSTANT_S
+                {
+                    record(&CarSample::of(model, step, time_s, commands, driver, shown));
+                    *samples += 1;
+                }
+            })?;
+        }
+        Ok(())
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a drive has fewer samples than a double has integers")]
+fn sample_time(samples: u64, sample_time_s: f64) -> f64 {
+    samples as f64 * sample_time_s
+}
+
+fn measure(model: &CarModel, state: &CarState) -> CarMeasured {
+    let [engine_rad_s, turbine_rad_s, output_rad_s] = model.speeds(state);
+    CarMeasured { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s: state.wheel_rad_s }
+}
+
+/// Commands that have arrived, and what the driver does.
+fn inputs(model: &CarModel, valves: &mut CarValves, commands: &CarCommands, driver: Driver, now_s: f64) -> CarInputs {
+    let car = &model.car;
+    CarInputs {
+        throttle: driver.throttle,
+        engine_share: commands.engine_share,
+        brake_n_m: driver.brake * BRAKE_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m,
+        grade_rad: driver.grade_rad,
+        settled_pa: valves.settled_pa(model, now_s),
+        dogs: commands.dogs,
+        lock_up_n_m: 0.0,
+    }
+}

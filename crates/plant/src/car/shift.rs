@@ -1,0 +1,157 @@
+//! One shift of a car.
+
+use config::Car;
+use geartrain::Change;
+
+use super::controller::{CarCalibration, ShiftStage};
+use super::integrate::CarError;
+use super::model::CarModel;
+use super::run::{CarRun, Driver};
+use super::sample::CarSample;
+
+/// A shift to be simulated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarShift {
+    /// The gear before.
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// Throttle throughout, 0 to 1; zero for a shift without power.
+    pub throttle: f64,
+    /// Vehicle speed at the start, m/s.
+    pub vehicle_m_s: f64,
+    /// Grade, rad, positive uphill.
+    pub grade_rad: f64,
+    /// Time of the request, s: until then the car settles in the old gear.
+    pub request_s: f64,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Sample time, s.
+    pub sample_time_s: f64,
+}
+
+impl CarShift {
+    /// A shift from one gear to another at this throttle, with one second before its request and three after it, at a vehicle
+    /// speed at which the gearbox input turns at 230 rad/s in the higher of the two gears' speeds.
+    pub fn usual(car: &Car, from: usize, to: usize, throttle: f64) -> Self {
+        const INPUT_RAD_S: f64 = 230.0;
+        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(1.0, |gear| gear.ratio.abs());
+        let output = INPUT_RAD_S / ratio(from).max(ratio(to));
+        let vehicle_m_s = output / car.driveline.final_ratio * car.road.wheel_radius_m;
+        let (request_s, duration_s, sample_time_s) = (1.0, 4.0, 0.01);
+        Self { from, to, throttle, vehicle_m_s, grade_rad: 0.0, request_s, duration_s, sample_time_s }
+    }
+}
+
+/// How a shift went. Slips and torques are at the turbine.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CarShiftQuality {
+    /// Time from the request until the oncoming clutch sticks and the controller is done, s; `None` if it was not completed.
+    pub complete_s: Option<f64>,
+    /// Largest slip of the old gear in the wrong direction, rad/s.
+    pub flare_rad_s: f64,
+    /// Largest slip beyond the new gear, rad/s.
+    pub past_synchronous_rad_s: f64,
+    /// Largest torque with which both clutches work against each other, N m.
+    pub tie_up_n_m: f64,
+    /// Largest slip of a clutch that is held through the shift, rad/s.
+    pub held_slip_rad_s: f64,
+    /// Largest change of the vehicle's acceleration within 20 ms, per second, m/s^3.
+    pub jerk_m_s3: f64,
+    /// Turbine torque at the request, N m.
+    pub turbine_n_m: f64,
+}
+
+/// Simulates one shift of a car and shows every sample to `record`. `nominal` is the car of the controller's model.
+///
+/// # Errors
+/// The shift is not one between two clutches, the car cannot run in this gear at this speed, or the simulation fails.
+pub fn simulate_car_shift(
+    model: &CarModel,
+    nominal: &Car,
+    calibration: CarCalibration,
+    shift: &CarShift,
+    mut record: impl FnMut(&CarSample),
+) -> Result<CarShiftQuality, CarError> {
+    let driver = Driver { throttle: shift.throttle, brake: 0.0, grade_rad: shift.grade_rad };
+    let state = model.in_gear(shift.from, Some(shift.to), shift.vehicle_m_s, shift.throttle)?;
+    let mut run = CarRun::new(model, nominal, calibration, shift.from, state, (driver, shift.sample_time_s))?;
+    run.preselect(Some(shift.to));
+    let mut rating = Rating::new(model, shift);
+    let mut requested = false;
+    while run.time_s() < shift.duration_s - 1e-9 {
+        if !requested && run.time_s() >= shift.request_s - 1e-9 {
+            run.request(shift.to)?;
+            requested = true;
+        }
+        run.advance(
+            driver,
+            |_| {},
+            |sample| {
+                rating.push(sample);
+                record(sample);
+            },
+        )?;
+    }
+    Ok(rating.quality)
+}
+
+/// Rates a shift sample by sample.
+struct Rating<'s> {
+    shift: &'s CarShift,
+    ratios: [f64; 2],
+    alphas: [f64; 2],
+    held: Vec<usize>,
+    quality: CarShiftQuality,
+    before: Option<(f64, f64)>,
+    was_requested: bool,
+}
+
+impl<'s> Rating<'s> {
+    fn new(model: &CarModel, shift: &'s CarShift) -> Self {
+        let reduced = model.car.gearbox.shift(shift.from, shift.to).and_then(|shift| shift.reduced);
+        let (ratios, alphas) = reduced.map_or(([1.0; 2], [1.0; 2]), |r| {
+            ([r.ratio_offgoing(), r.ratio_oncoming()], [r.slip_offgoing[0], r.slip_oncoming[0]])
+        });
+        let held = match model.car.gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
+            Some(Change::Single { held, .. }) => held.clone(),
+            _ => Vec::new(),
+        };
+        Self { shift, ratios, alphas, held, quality: CarShiftQuality::default(), before: None, was_requested: false }
+    }
+
+    fn push(&mut self, sample: &CarSample) {
+        let q = &mut self.quality;
+        let after = sample.time_s >= self.shift.request_s - 1e-9;
+        let before = self.before.replace((sample.time_s, sample.vehicle_m_s2));
+        if !after {
+            return;
+        }
+        if let Some((time_s, m_s2)) = before
+            && sample.time_s > time_s
+        {
+            q.jerk_m_s3 = q.jerk_m_s3.max(((sample.vehicle_m_s2 - m_s2) / (sample.time_s - time_s)).abs());
+        }
+        if !self.was_requested {
+            q.turbine_n_m = sample.turbine_n_m;
+            self.was_requested = true;
+        }
+        let direction = (self.ratios[0] - self.ratios[1]).signum();
+        let slip = |ratio: f64| direction * (sample.torques.turbine_rad_s - ratio * sample.torques.output_rad_s);
+        q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
+        q.past_synchronous_rad_s = q.past_synchronous_rad_s.max(-slip(self.ratios[1]));
+        let Some(shift) = &sample.shift else {
+            if sample.gear == self.shift.to {
+                q.complete_s.get_or_insert(sample.time_s - self.shift.request_s);
+            }
+            return;
+        };
+        for &element in &self.held {
+            q.held_slip_rad_s = q.held_slip_rad_s.max(sample.slips_rad_s[element].abs());
+        }
+        let [off, on] = [self.alphas[0] * shift.offgoing.torque_n_m, self.alphas[1] * shift.oncoming.torque_n_m];
+        if off * on < 0.0 && shift.stage != ShiftStage::Done {
+            q.tie_up_n_m = q.tie_up_n_m.max(off.abs().min(on.abs()));
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! A car that runs in a gear, as a shift or a drive begins.
+
+use super::integrate::CarError;
+use super::model::{CarModel, CarState, MAX_PACKS};
+use crate::gear_train::MAX_FREEDOMS;
+
+/// Engine speeds among which the steady one is sought, rad/s.
+const SPEEDS_RAD_S: (f64, f64) = (20.0, 700.0);
+/// Steps of the search from above.
+const SEARCH: u32 = 340;
+
+impl CarModel {
+    /// At this vehicle speed in a gear, with the engine at its steady speed under this throttle. In a box with dogs the shafts
+    /// turn as they do where both gears of the shift are in.
+    ///
+    /// # Errors
+    /// There is no such gear, or the engine would turn too fast.
+    pub fn in_gear(
+        &self,
+        gear: usize,
+        next: Option<usize>,
+        vehicle_m_s: f64,
+        throttle: f64,
+    ) -> Result<CarState, CarError> {
+        let car = &self.car;
+        let wrong = |message: String| Err(CarError::Request(message));
+        let (Some(of_gear), Some(train)) = (car.gearbox.gears.get(gear), car.gearbox.train.as_ref()) else {
+            return wrong(format!("the gearbox has no gear number {gear}"));
+        };
+        if !vehicle_m_s.is_finite() || !throttle.is_finite() {
+            return wrong(format!("a car cannot start at {vehicle_m_s} m/s with throttle {throttle}"));
+        }
+        let wheel_rad_s = vehicle_m_s / car.road.wheel_radius_m;
+        let output = wheel_rad_s * car.driveline.final_ratio;
+        let turbine = of_gear.ratio * output;
+        if turbine.abs() > SPEEDS_RAD_S.1 {
+            return wrong(format!(
+                "in gear {} at {vehicle_m_s} m/s the gearbox input would turn at {turbine:.0} rad/s; the most is {} rad/s",
+                of_gear.name, SPEEDS_RAD_S.1
+            ));
+        }
+        let held = next.and_then(|next| car.gearbox.shift(gear, next)).and_then(|shift| match &shift.change {
+            geartrain::Change::Single { held, .. } => train.speeds_in_shift(held),
+            _ => None,
+        });
+        let shafts: Vec<f64> = match held {
+            Some(speeds) => speeds.row_iter().map(|row| row[0] * turbine + row[1] * output).collect(),
+            None => of_gear.shaft_speeds.iter().map(|speed| speed.unwrap_or(0.0) * turbine).collect(),
+        };
+        let engine_rad_s = self.steady_engine(turbine, throttle);
+        let Some(motion) = self.motion_of(&shafts, engine_rad_s) else {
+            return Err(crate::TrainError::NoDiagram.into());
+        };
+        let turbine_n_m = match &car.converter {
+            Some(converter) => converter.torques(engine_rad_s, turbine).turbine_n_m,
+            None => car.engine.torque(turbine, throttle) - car.engine.drag_n_m_s * turbine,
+        };
+        // A standing car has been held by its brake.
+        let shaft_n_m = turbine_n_m * of_gear.ratio * car.driveline.final_ratio;
+        let mut pressures_pa = [0.0; MAX_PACKS];
+        for holding in &of_gear.holding {
+            if let Some((slot, _)) = self.friction(holding.element) {
+                pressures_pa[slot] = car.line_pressure_pa;
+            }
+        }
+        let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad + 0.5 * car.backlash_rad * shaft_n_m.signum();
+        let mut motion_and_engine = [0.0; MAX_FREEDOMS];
+        motion_and_engine.copy_from_slice(&motion);
+        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion: motion_and_engine, pressures_pa })
+    }
+
+    /// The highest speed at which engine and pump are in balance, rad/s; without a converter that of the gearbox input.
+    fn steady_engine(&self, turbine_rad_s: f64, throttle: f64) -> f64 {
+        let (car, (lowest, highest)) = (&self.car, SPEEDS_RAD_S);
+        let Some(converter) = &car.converter else { return turbine_rad_s };
+        let surplus = |speed: f64| {
+            car.engine.torque(speed, throttle)
+                - car.engine.drag_n_m_s * speed
+                - converter.torques(speed, turbine_rad_s).pump_n_m
+        };
+        let step = (highest - lowest) / f64::from(SEARCH);
+        let speed = |n: u32| highest - step * f64::from(n);
+        match (1..=SEARCH).find(|&n| surplus(speed(n)) > 0.0) {
+            // Between the two the surplus is linear enough for a start.
+            Some(n) => {
+                let (above, below) = (surplus(speed(n - 1)), surplus(speed(n)));
+                speed(n) + step * below / (below - above)
+            }
+            None => lowest,
+        }
+    }
+}
