@@ -109,7 +109,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
-                        self.in_range(estimate, &state.elements, &shift.clutches[c], speeds)
+                        self.in_range(estimate, &state.elements, &shift.clutches[c.min(1)], speeds)
                     })
                 });
             }
@@ -167,7 +167,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         c: usize,
     ) -> ClutchEstimate<T> {
         let (u, x, zero, one) = (&self.uncertainty, &running.x, T::zero(), T::one());
-        let clutch = &shift.clutches[c];
+        let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
         let Some(torques) = running.torques else {
             return self.by_valve(elements, clutch, [x.mean[0], x.mean[1]]);
         };

@@ -388,7 +388,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let health = [&mut channels.turbine, &mut channels.output, &mut channels.wheel];
-        for (((newest, reading), health), k) in state.newest.iter_mut().zip(given).zip(health).zip(0..) {
+        for (((newest, reading), health), sensor) in state.newest.iter_mut().zip(given).zip(health).zip(&self.readings) {
             if let Some((_, age_s)) = newest {
                 *age_s = *age_s + dt_s;
             }
@@ -399,7 +399,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             };
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
             if self.limits.speed_valid(reading.value) && aged {
-                let sensor: &SpeedReading<T> = &self.readings[k];
                 *newest = Some((reading.value, self.age(sensor, &reading)));
                 *health = ChannelHealth::Good;
             } else {
