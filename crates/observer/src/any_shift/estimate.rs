@@ -182,7 +182,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             row[PRESSURE[c]] = own.per_pressure_n_m;
         }
         let mut torque = dot(&row, &x.mean) + rest;
-        if !holds && torque * own.base_n_m <= zero {
+        // Without pressure error the direction would be lost at the kiss point.
+        let direction = own.base_n_m + own.per_pressure_n_m;
+        if !holds && torque * direction <= zero {
             // A slipping clutch does not push.
             torque = zero;
         }
