@@ -21,8 +21,10 @@ const RECORD_S: f64 = 0.001;
 pub const SAMPLE_S: f64 = 0.01;
 /// Torque below which a clutch carries nothing but drag, N m.
 const CARRIES_N_M: f64 = 2.0;
-/// Pressure that counts as outside its range only beyond rounding, Pa, and torque, N m.
+/// Pressure that counts as outside its range only beyond rounding, Pa.
 const ROUNDING_PA: f64 = 1.0;
+/// Drag of an open clutch, which the range leaves out, N m.
+const DRAG_N_M: f64 = 1.2;
 
 /// Why a shift could not be scored.
 #[derive(Debug, Error)]
@@ -307,7 +309,8 @@ fn row(
                 torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
                 pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
                 sticks: truth.sticks,
-                in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA),
+                in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
+                    && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
             }
         })
     };

@@ -105,7 +105,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.phase = Some(running.phase.phase);
                 estimate.shaft_n_m = Some(x[SPRING] + damper);
                 estimate.turbine_n_m = Some(turbine_n_m + x[SHARE] * running.slow_n_m);
-                let speeds = self.carried(&state.newest, Some(running));
+                let speeds = self.measured(&state.newest, Some(running));
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
@@ -115,7 +115,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             None => {
                 health = health.max(Health::SpeedsRejected);
-                let speeds = self.carried(&state.newest, None);
+                let speeds = self.measured(&state.newest, None);
                 estimate.clutches = self
                     .tables
                     .shift(input.gear.from, input.gear.to)

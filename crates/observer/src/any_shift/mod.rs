@@ -21,6 +21,7 @@
 mod covariance;
 mod elements;
 mod estimate;
+mod newest;
 mod phases;
 mod powertrain;
 mod tables;
@@ -33,6 +34,7 @@ use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, Reading, SpeedReading};
 use covariance::{Gaussian, Measured};
 use elements::ElementState;
+use newest::Newest;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, tied};
 use turbine::InputSide;
@@ -172,8 +174,8 @@ pub struct AnyShiftState<T> {
     engine: Option<Engine<T>>,
     /// Newest reported engine torque, N m, and its age, s.
     reported: Option<(T, T)>,
-    /// The newest readings of turbine, output and wheel: value, and age in s.
-    newest: [Option<(T, T)>; SPEEDS],
+    /// The newest readings of turbine, output and wheel.
+    newest: [Option<Newest<T>>; SPEEDS],
     running: Option<Running<T>>,
     /// Whether it has run before and lost its state.
     lost: bool,
@@ -278,7 +280,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if let Some(running) = &mut state.running {
             match &torque {
                 Some(torque) => {
-                    let speeds = self.carried(&state.newest, Some(running));
+                    let speeds = self.measured(&state.newest, Some(running));
                     self.advance(running, &state.elements, torque, speeds, dt_s);
                     [channels.turbine, channels.output, channels.wheel] =
                         self.take_speeds(running, input, &channels.each(), speeds);
@@ -389,17 +391,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let health = [&mut channels.turbine, &mut channels.output, &mut channels.wheel];
         for (((newest, reading), health), sensor) in state.newest.iter_mut().zip(given).zip(health).zip(&self.readings) {
-            if let Some((_, age_s)) = newest {
-                *age_s = *age_s + dt_s;
+            if let Some(newest) = newest {
+                newest.pass(dt_s);
             }
             let Some(reading) = reading else {
-                let lost = newest.is_none_or(|(_, age_s)| age_s > T::of(LOST_S));
+                let lost = newest.is_none_or(|newest| newest.age_s > T::of(LOST_S));
                 *health = if lost { ChannelHealth::Lost } else { ChannelHealth::Absent };
                 continue;
             };
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
             if self.limits.speed_valid(reading.value) && aged {
-                *newest = Some((reading.value, self.age(sensor, &reading)));
+                Newest::take(newest, reading.value, self.age(sensor, &reading));
                 *health = ChannelHealth::Good;
             } else {
                 *health = ChannelHealth::Refused;
@@ -407,19 +409,26 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
     }
 
-    /// Speeds of turbine and output now: the readings carried on by the model, or where there are none the estimates.
-    fn carried(&self, newest: &[Option<(T, T)>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
-        [TURBINE, OUTPUT].map(|k| match (newest[k], running) {
-            (Some((value, age_s)), Some(running)) if age_s <= T::of(FIRST_S) => value + age_s * running.rates[0][k],
-            (_, Some(running)) => running.x.mean[k],
-            (Some((value, _)), None) => value,
+    /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.
+    fn measured(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
+        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
+        let older_s = |k: usize| fresh(k).map_or(T::zero(), |newest| newest.age_s);
+        let age_s = older_s(TURBINE).max(older_s(OUTPUT));
+        [TURBINE, OUTPUT].map(|k| match (fresh(k), running) {
+            (Some(newest), _) => newest.at(age_s),
+            (None, Some(running)) => running.x.mean[k],
             (None, None) => T::zero(),
         })
     }
 
     /// The torque at the gearbox input now, if it is known.
     fn input_torque(&self, state: &AnyShiftState<T>, input: &ShiftInput<T>) -> Option<turbine::Found<T>> {
-        let [turbine, _] = self.carried(&state.newest, state.running.as_ref());
+        let turbine = match (state.newest[TURBINE], &state.running) {
+            (Some(newest), _) if newest.age_s <= T::of(FIRST_S) => newest.at(T::zero()),
+            (_, Some(running)) => running.x.mean[TURBINE],
+            (Some(newest), None) => newest.value,
+            (None, None) => return None,
+        };
         let engine = state.engine.as_ref().map(|engine| {
             let now = engine.speed_before(T::zero());
             [now, engine.variance(), now - engine.speed_before(T::one())]
@@ -437,7 +446,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Follows the shift command.
     fn take_gear(&self, state: &mut AnyShiftState<T>, command: GearCommand) -> Health {
-        let speeds = self.carried(&state.newest, state.running.as_ref());
+        let speeds = self.measured(&state.newest, state.running.as_ref());
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.from == command.to;
         match running.shift {
@@ -725,7 +734,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         torque: Option<&turbine::Found<T>>,
     ) -> Health {
         let mut health = Health::Good;
-        let speeds = self.carried(&state.newest, state.running.as_ref());
+        let speeds = self.measured(&state.newest, state.running.as_ref());
         if let Some(running) = &state.running {
             let lost = T::of(LOST_S);
             let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > lost;
@@ -766,7 +775,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         torque: Option<&turbine::Found<T>>,
     ) -> (Option<Running<T>>, bool) {
         let (u, line, gear) = (&self.uncertainty, &self.driveline, input.gear);
-        let first = |k: usize| state.newest[k].filter(|&(_, age_s)| age_s <= T::of(FIRST_S)).map(|(value, _)| value);
+        let first = |k: usize| state.newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
         let (Some(turbine), Some(output), Some(torque)) = (first(TURBINE), first(OUTPUT), torque) else {
             return (None, false);
         };
