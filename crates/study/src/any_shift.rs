@@ -108,6 +108,8 @@ pub struct ShiftScoreRow {
     pub clutches: [ClutchRow; 2],
     /// Torque at the gearbox input, N m: true and estimated.
     pub turbine_n_m: [f64; 2],
+    /// True speeds of engine, turbine, output and wheels, rad/s.
+    pub speeds_rad_s: [f64; 4],
     /// Phase by the filter.
     pub phase: &'static str,
     /// What the filter says of itself.
@@ -318,6 +320,12 @@ fn row(
         time_s: sample.time_s,
         clutches: [of(0)?, of(1)?],
         turbine_n_m: [sample.turbine_n_m, estimate.turbine_n_m.unwrap_or(f64::NAN)],
+        speeds_rad_s: [
+            sample.torques.engine_rad_s,
+            sample.torques.turbine_rad_s,
+            sample.torques.output_rad_s,
+            sample.wheel_rad_s,
+        ],
         phase: estimate.phase.map_or("-", |phase| phase.name()),
         health: estimate.health,
     })

@@ -139,14 +139,14 @@ fn one_shift() {
             format!("{}{truth:7.1} {estimate:7.1} {open_loop:7.1} p {:.3} {:.3}", if clutch.sticks { "*" } else { " " }, clutch.pressure_pa[0] / 1e6, clutch.pressure_pa[2] / 1e6)
         };
         println!(
-            "{:.2} {:<15} off {}  on {}  Tt {:.1} {:.1} {}",
+            "{:.2} {:<15} off {}  on {}  Tt {:.3} {:.1} {} {:?}",
             row.time_s,
             row.phase,
             torque(&off),
             torque(&on),
             row.turbine_n_m[0],
             row.turbine_n_m[1],
-            row.health.name()
+            row.health.name(), row.speeds_rad_s
         );
     }
 }
