@@ -5,6 +5,7 @@
 //! likely mistake.
 
 pub mod check;
+pub mod drive;
 pub mod error;
 pub mod experiment;
 pub mod gearbox;
@@ -12,6 +13,7 @@ pub mod source;
 pub mod study;
 pub mod vehicle;
 
+pub use drive::{Drive, DriveSegment, ShiftPlan};
 pub use error::ConfigError;
 pub use experiment::{
     CurrentSensor, Experiment, FastFill, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile,

@@ -13,8 +13,12 @@ use crate::ConfigError;
 pub enum Kind {
     /// A vehicle.
     Vehicle,
-    /// A simulated drive.
+    /// A vehicle with a gearbox file of its own.
+    Car,
+    /// A simulated drive with one shift.
     Experiment,
+    /// A simulated drive with all its shifts.
+    Drive,
     /// Drives with varied parameters.
     Study,
     /// Values in place of some of a vehicle file's.
@@ -84,6 +88,8 @@ impl Source {
         let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
+            (false, _, false) if has("segment") => Ok(Kind::Drive),
+            (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
             (false, false, false) if has("gear") => Ok(Kind::Gearbox),
@@ -93,8 +99,8 @@ impl Source {
                 path: self.path.clone(),
                 line: 1,
                 message:
-                    "expected a vehicle file (with [gear_train]), experiment file (with [shift]), study file (with \
-                          [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
+                    "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
+                          file (with [[segment]]), study file (with [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
                           with tables of a vehicle file)"
                         .to_owned(),
             }),

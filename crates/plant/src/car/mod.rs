@@ -16,9 +16,11 @@
 //! | `controller/` | the shift controller |
 //! | `run.rs` | car, valves and controller together, period by period |
 //! | `shift.rs` | one shift |
+//! | `drive.rs` | a drive with all its shifts |
 
 mod contacts;
 mod controller;
+mod drive;
 mod energy;
 mod integrate;
 mod model;
@@ -30,6 +32,7 @@ mod valves;
 
 pub use contacts::{ContactState, Contacts};
 pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftStage};
+pub use drive::{CarDriveSummary, simulate_car_drive};
 pub use energy::{CarPowers, stored_car_energy};
 pub use integrate::{CarError, CarIntegrator, CarStep};
 pub use model::{CarInputs, CarModel, CarState, CarTorques, MAX_PACKS};

@@ -361,8 +361,9 @@ impl CarModel {
         self.train.kinetic_energy(&x.motion)
     }
 
-    /// The motion in which the shafts of the gearbox have these speeds, rad/s, and the engine its own.
-    pub(super) fn motion_of(&self, shafts_rad_s: &[f64], engine_rad_s: f64) -> Option<[f64; MAX_FREEDOMS]> {
+    /// The motion in which the shafts of the gearbox have these speeds, rad/s, and the engine its own. `None` if there is not one
+    /// speed for each shaft.
+    pub fn motion_of(&self, shafts_rad_s: &[f64], engine_rad_s: f64) -> Option<[f64; MAX_FREEDOMS]> {
         let train = self.car.gearbox.train.as_ref()?.motion(shafts_rad_s)?;
         let mut motion = [0.0; MAX_FREEDOMS];
         motion.get_mut(..train.len())?.copy_from_slice(&train);

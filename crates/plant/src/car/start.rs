@@ -6,6 +6,8 @@ use crate::gear_train::MAX_FREEDOMS;
 
 /// Engine speeds among which the steady one is sought, rad/s.
 const SPEEDS_RAD_S: (f64, f64) = (20.0, 700.0);
+/// Idle speed of the engine, rad/s \[chosen\].
+pub(super) const IDLE_RAD_S: f64 = 85.0;
 /// Steps of the search from above.
 const SEARCH: u32 = 340;
 
@@ -69,7 +71,7 @@ impl CarModel {
         Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion: motion_and_engine, pressures_pa })
     }
 
-    /// The highest speed at which engine and pump are in balance, rad/s; without a converter that of the gearbox input.
+    /// The highest speed at which engine and pump are in balance, rad/s, at least idle speed; without a converter that of the gearbox input.
     fn steady_engine(&self, turbine_rad_s: f64, throttle: f64) -> f64 {
         let (car, (lowest, highest)) = (&self.car, SPEEDS_RAD_S);
         let Some(converter) = &car.converter else { return turbine_rad_s };
@@ -80,13 +82,14 @@ impl CarModel {
         };
         let step = (highest - lowest) / f64::from(SEARCH);
         let speed = |n: u32| highest - step * f64::from(n);
-        match (1..=SEARCH).find(|&n| surplus(speed(n)) > 0.0) {
+        let steady = match (1..=SEARCH).find(|&n| surplus(speed(n)) > 0.0) {
             // Between the two the surplus is linear enough for a start.
             Some(n) => {
                 let (above, below) = (surplus(speed(n - 1)), surplus(speed(n)));
                 speed(n) + step * below / (below - above)
             }
-            None => lowest,
-        }
+            None => IDLE_RAD_S,
+        };
+        steady.max(IDLE_RAD_S)
     }
 }

@@ -17,6 +17,8 @@ pub struct CarCalibration {
     pub flare_ramp: f64,
     /// Share of the turbine torque that the offgoing clutch holds while the old gear flares.
     pub flare_holding: f64,
+    /// Time in which the offgoing clutch gives up the turbine torque, until the old gear slips (inertia phase first), s.
+    pub release_s: f64,
     /// Slip of the old gear at which it is left, or counts as a flare, rad/s at the turbine.
     pub release_slip_rad_s: f64,
     /// Duration of the inertia phase at 120 rad/s of slip where the turbine torque drives the change and the oncoming clutch
@@ -32,6 +34,10 @@ pub struct CarCalibration {
     pub proportional_per_s: f64,
     /// Gain of its integral, 1/s^2.
     pub integral_per_s2: f64,
+    /// The rate of the reference is taken so long ahead, s: the delays of reading, controller and valve.
+    pub lead_s: f64,
+    /// Gain of the slip beyond synchronous speed during the hand-over, 1/s.
+    pub beyond_per_s: f64,
     /// The new gear is taken over so long before the slip reaches zero, s (inertia phase first).
     pub hand_over_lead_s: f64,
     /// Duration of the hand-over, s.
@@ -74,15 +80,18 @@ impl CarCalibration {
         torque_phase_s: 0.20,
         flare_ramp: 1.8,
         flare_holding: 0.25,
+        release_s: 0.5,
         release_slip_rad_s: 3.0,
         inertia_phase_s: 0.40,
-        power_on_down_s: 0.65,
+        power_on_down_s: 0.72,
         power_off_up_s: 0.70,
         past_synchronous_rad_s: 2.5,
         proportional_per_s: 9.0,
         integral_per_s2: 25.0,
-        hand_over_lead_s: 0.07,
-        hand_over_s: 0.15,
+        lead_s: 0.06,
+        beyond_per_s: 40.0,
+        hand_over_lead_s: 0.09,
+        hand_over_s: 0.12,
         lock_margin: 1.25,
         lock_least_n_m: 12.0,
         lock_slip_rad_s: 3.0,

@@ -132,8 +132,8 @@ impl CarShiftController {
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
         // The clutches of a shift get their commands below.
-        let to = self.active.as_ref().map(|shift| shift.to);
-        for gear in [Some(self.gear), to, self.preselected].into_iter().flatten() {
+        let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
+        for gear in [Some(self.gear), next].into_iter().flatten() {
             for holding in &self.car.gearbox.gears[gear].holding {
                 let element = holding.element;
                 match &self.car.clutches[element] {

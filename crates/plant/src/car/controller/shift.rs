@@ -7,6 +7,9 @@ use super::pressure::Controlled;
 use super::track::Track;
 use super::{CarCalibration, CarMeasured};
 
+/// Share of the fill after which the oncoming clutch is at its waiting pressure.
+const FILLED_AT: f64 = 0.75;
+
 /// Stage of a shift, as the controller runs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShiftStage {
@@ -38,9 +41,11 @@ pub(super) struct ActiveShift {
     /// Share of the load that the oncoming clutch has taken in the torque phase.
     transferred: f64,
     has_flared: bool,
+    is_slipping: bool,
     /// Oncoming slip at the start of the inertia phase, and its duration.
     from_rad_s: f64,
     duration_s: f64,
+    slipping_since_s: f64,
     integral_rad: f64,
     /// Torque of the slip controller, N m at the turbine.
     controlled_n_m: f64,
@@ -83,8 +88,10 @@ impl ActiveShift {
             since_s: time_s,
             transferred: 0.0,
             has_flared: false,
+            is_slipping: false,
             from_rad_s: 0.0,
             duration_s: 1.0,
+            slipping_since_s: time_s,
             integral_rad: 0.0,
             controlled_n_m: 0.0,
             locked_since_s: None,
@@ -165,19 +172,28 @@ impl ActiveShift {
         self.stage = next;
         self.since_s = now.time_s;
         if next == ShiftStage::InertiaPhase {
-            self.from_rad_s = now.z_wheels;
-            let scale = (self.from_rad_s.abs() / 120.0).clamp(0.55, 1.3);
-            let at_full = match (self.order(now.turbine_n_m), direction > 0.0) {
-                (PhaseOrder::TorqueFirst, _) => c.inertia_phase_s,
-                (PhaseOrder::InertiaFirst, true) => c.power_off_up_s,
-                (PhaseOrder::InertiaFirst, false) => c.power_on_down_s,
-            };
-            self.duration_s = at_full * scale;
             self.controlled_n_m = now.turbine_n_m;
+            if self.order(now.turbine_n_m) == PhaseOrder::TorqueFirst {
+                self.begin_slip(c, now);
+            }
         }
         if next == ShiftStage::HandOver {
             self.handed_n_m = self.controlled_n_m;
         }
+    }
+
+    /// The old gear slips: from now on the slip follows its reference.
+    fn begin_slip(&mut self, c: &CarCalibration, now: &Now) {
+        self.is_slipping = true;
+        self.from_rad_s = now.z_wheels;
+        self.slipping_since_s = now.time_s;
+        let scale = (self.from_rad_s.abs() / 120.0).clamp(0.55, 1.3);
+        let at_full = match (self.order(now.turbine_n_m), self.direction() > 0.0) {
+            (PhaseOrder::TorqueFirst, _) => c.inertia_phase_s,
+            (PhaseOrder::InertiaFirst, true) => c.power_off_up_s,
+            (PhaseOrder::InertiaFirst, false) => c.power_on_down_s,
+        };
+        self.duration_s = at_full * scale;
     }
 
     /// Whether the slip reaches zero soon.
@@ -194,7 +210,9 @@ impl ActiveShift {
         let share = ((now.time_s - self.since_s + c.control_period_s) / c.fill_s).min(1.0);
         let held = self.offgoing.pressure_for(c.holding_margin * now.turbine_n_m, 0.0);
         let offgoing_pa = self.line_pa.min(held + (1.0 - share) * (self.line_pa - held).max(0.0));
-        [offgoing_pa, self.waiting_pa(c)]
+        // Gently: a command that falls arrives later than the one that rises before it.
+        let filled = (std::f64::consts::FRAC_PI_2 * (share / FILLED_AT).min(1.0)).sin();
+        [offgoing_pa, filled * self.waiting_pa(c)]
     }
 
     fn transfer(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
@@ -211,17 +229,37 @@ impl ActiveShift {
         ]
     }
 
-    fn slip_control(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let elapsed_s = now.time_s - self.since_s;
+    /// The sum of the torques of both clutches that makes the slip follow its reference, N m at the turbine.
+    fn slip_controlled_n_m(&mut self, c: &CarCalibration, now: &Now) -> f64 {
         let end = -c.past_synchronous_rad_s * self.direction();
-        let (reference, rate) = half_cosine(self.from_rad_s, end, elapsed_s, self.duration_s);
+        let elapsed_s = now.time_s - self.slipping_since_s;
+        let (reference, _) = half_cosine(self.from_rad_s, end, elapsed_s, self.duration_s);
+        let (_, rate) = half_cosine(self.from_rad_s, end, elapsed_s + c.lead_s, self.duration_s);
         let error = now.z_wheels - reference;
         self.integral_rad += error * c.control_period_s;
         let [[m11, m12], _] = self.mass_kg_m2;
         let wanted_rad_s2 = rate + self.oncoming.ratio * now.output_rad_s2;
         self.controlled_n_m = now.turbine_n_m - m11 * wanted_rad_s2 - m12 * now.output_rad_s2
             + m11 * (c.proportional_per_s * error + c.integral_per_s2 * self.integral_rad);
-        let u = self.controlled_n_m;
+        self.controlled_n_m
+    }
+
+    fn slip_control(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+        if !self.is_slipping {
+            // Inertia phase first: the offgoing clutch gives way by and by until the old gear slips.
+            let margin = (c.holding_margin - (now.time_s - self.since_s) / c.release_s).max(0.0);
+            self.controlled_n_m = margin * now.turbine_n_m;
+            if now.y * self.direction() < -c.release_slip_rad_s || margin <= 0.0 {
+                let held = self.controlled_n_m;
+                self.begin_slip(c, now);
+                // What slipped tells the friction: the controller begins with the torque at which it did.
+                let without = self.slip_controlled_n_m(c, now);
+                self.integral_rad = (held - without) / (c.integral_per_s2 * self.mass_kg_m2[0][0]);
+            } else {
+                return [self.offgoing.pressure_for(self.controlled_n_m, 0.0), self.waiting_pa(c)];
+            }
+        }
+        let u = self.slip_controlled_n_m(c, now);
         if u * self.direction() > 0.0 {
             [0.0, self.oncoming.pressure_for(u, now.z)]
         } else {
@@ -234,29 +272,42 @@ impl ActiveShift {
         (c.lock_margin * now.turbine_n_m.abs()).max(c.lock_least_n_m)
     }
 
-    fn hand_over(&self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+    /// Torque of the oncoming clutch against a slip beyond synchronous speed, where both clutches hold the turbine, N m.
+    fn beyond_n_m(&self, c: &CarCalibration, now: &Now) -> f64 {
+        (-now.z * self.direction()).max(0.0) * c.beyond_per_s * self.mass_kg_m2[0][0]
+    }
+
+    /// The oncoming clutch closes; what it cannot yet carry of the controlled torque stays with the offgoing one.
+    fn hand_over(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
         let share = ((now.time_s - self.since_s + c.control_period_s) / c.hand_over_s).min(1.0);
-        [
-            self.offgoing.pressure_for((1.0 - share) * self.handed_n_m, now.y),
-            self.oncoming.pressure_for(share * self.closing_n_m(c, now), now.z),
-        ]
+        let taken = share * self.closing_n_m(c, now);
+        let left = (-self.slip_controlled_n_m(c, now) * self.direction() - taken).max(0.0);
+        // The offgoing clutch is open at the end, whatever the slip.
+        let left = left.min((1.0 - share) * c.holding_margin * self.handed_n_m.abs());
+        let oncoming = taken + self.beyond_n_m(c, now);
+        [self.offgoing.pressure_for(left, now.y), self.oncoming.pressure_for(oncoming, now.z)]
     }
 
     fn locked_pa(&self, c: &CarCalibration, now: &Now) -> f64 {
-        let closing = self.oncoming.pressure_for(self.closing_n_m(c, now), now.z);
+        let closing = self.oncoming.pressure_for(self.closing_n_m(c, now) + self.beyond_n_m(c, now), now.z);
         let share = ((now.time_s - self.since_s) / c.lock_ramp_s).min(1.0);
         closing + share * (self.line_pa - closing).max(0.0)
     }
 
     /// Share of the engine torque that suits the stage.
     pub(super) fn engine_share(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
+        if !self.is_slipping {
+            return 1.0;
+        }
         let z = self.oncoming.slip_at_turbine(measured.turbine_rad_s, measured.output_rad_s);
         let way = 1.0 - z / self.from_rad_s;
         match self.stage {
             ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction() > 0.0 && way < c.engine_way => {
                 c.up_engine_share
             }
-            ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction() < 0.0 && way > c.engine_way => {
+            ShiftStage::InertiaPhase | ShiftStage::HandOver
+                if turbine_n_m > 0.0 && self.direction() < 0.0 && way > c.engine_way =>
+            {
                 c.down_engine_share
             }
             _ => 1.0,

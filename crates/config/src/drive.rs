@@ -1,0 +1,252 @@
+//! Drive files: what the driver and the road do, and when the gearbox shifts.
+
+use std::path::{Path, PathBuf};
+
+use drivetrain::Table1;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::check::{Check, Number, Numbers, Word};
+use crate::{Car, ConfigError, Source};
+
+/// Most repetitions of the segments.
+const MOST_REPETITIONS: f64 = 1e6;
+/// Where a schedule says nothing \[chosen\]: throttle, and speed of the gearbox input at which the gear above and the gear below
+/// are taken, rad/s.
+const SCHEDULE: [[f64; 5]; 3] =
+    [[0.0, 0.1, 0.3, 0.6, 1.0], [190.0, 200.0, 260.0, 380.0, 560.0], [105.0, 110.0, 140.0, 230.0, 330.0]];
+/// Least time in a gear where a schedule says nothing, s.
+const LEAST_TIME_IN_GEAR_S: f64 = 1.0;
+
+/// A piece of a drive. Each value changes linearly from the first to the second number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveSegment {
+    /// Its length, s.
+    pub duration_s: f64,
+    /// Throttle, 0 to 1.
+    pub throttle: [f64; 2],
+    /// Brake, 0 to 1: share of the largest force of the tyres.
+    pub brake: [f64; 2],
+    /// Grade, rad, positive uphill.
+    pub grade_rad: [f64; 2],
+}
+
+/// When the gearbox shifts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ShiftPlan {
+    /// By throttle and speed of the gearbox input.
+    Schedule {
+        /// Input speed above which the next gear is taken, over throttle, rad/s.
+        up_rad_s: Table1<f64>,
+        /// Input speed below which the gear below is taken, over throttle, rad/s.
+        down_rad_s: Table1<f64>,
+        /// Least time in a gear, s.
+        time_in_gear_s: f64,
+    },
+    /// At given times, in rising order: time, s, and name of the gear.
+    Listed(Vec<(f64, String)>),
+}
+
+/// A drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// The file.
+    pub source: Source,
+    /// Its name, also that of its results.
+    pub name: String,
+    /// The vehicle file, from the folder of the drive file.
+    pub vehicle: Option<PathBuf>,
+    /// Time between two rows of the results, s.
+    pub sample_time_s: f64,
+    /// Gear at the start; the first of the gearbox if the file names none.
+    pub start_gear: Option<String>,
+    /// Vehicle speed at the start, m/s.
+    pub start_m_s: f64,
+    /// The pieces.
+    pub segments: Vec<DriveSegment>,
+    /// How often they are driven.
+    pub repetitions: u32,
+    /// When the gearbox shifts.
+    pub shifts: ShiftPlan,
+}
+
+impl Drive {
+    /// Reads and checks a drive file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or something in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        Self::from_source(Source::read(path)?)
+    }
+
+    /// Reads the vehicle file that the drive file names.
+    ///
+    /// # Errors
+    /// It names none, or the vehicle file is wrong.
+    pub fn read_vehicle(&self) -> Result<Car, ConfigError> {
+        let Some(vehicle) = &self.vehicle else {
+            let hint = "vehicle = \"../vehicles/eight_speed.toml\", or the option --vehicle".to_owned();
+            return Err(Check::of(&self.source).meaning("vehicle", 0, "names no vehicle file".to_owned(), Some(hint)));
+        };
+        let folder = self.source.path.parent().unwrap_or(Path::new(""));
+        Car::read(&folder.join(vehicle)).map_err(|error| error.named_by(&self.source, "vehicle", 0))
+    }
+
+    /// Length of the drive, s.
+    pub fn duration_s(&self) -> f64 {
+        f64::from(self.repetitions) * self.segments.iter().map(|segment| segment.duration_s).sum::<f64>()
+    }
+
+    /// Checks the text of a drive file.
+    ///
+    /// # Errors
+    /// What is wrong, with its line and a hint.
+    pub fn from_source(source: Source) -> Result<Self, ConfigError> {
+        let raw: RawDrive = source.parse()?;
+        let check = Check::of(&source);
+        let segments = raw.segment.get_ref().iter().enumerate();
+        let segments = segments.map(|(at, segment)| check_segment(&check, at, segment));
+        let segments: Vec<DriveSegment> = segments.collect::<Result<_, _>>()?;
+        if segments.is_empty() {
+            let message = "the drive has no segment".to_owned();
+            return Err(check.meaning("segment", raw.segment.span().start, message, None));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number within its range")]
+        let repetitions = match &raw.repetitions {
+            Some(count) => check.count("repetitions", count, 1.0..=MOST_REPETITIONS)? as u32,
+            None => 1,
+        };
+        let shifts = plan(&check, &raw)?;
+        let optional = |key: &str, value: &Option<Number>, range, default| match value {
+            Some(value) => check.number(key, value, range),
+            None => Ok(default),
+        };
+        Ok(Self {
+            name: check.file_name("name", &raw.name)?,
+            vehicle: raw.vehicle.as_ref().map(|vehicle| PathBuf::from(vehicle.get_ref())),
+            sample_time_s: optional("sample_time_s", &raw.sample_time_s, 1e-4..=10.0, 0.01)?,
+            start_m_s: optional("start.vehicle_m_s", &raw.start.vehicle_m_s, 0.0..=100.0, 0.0)?,
+            start_gear: raw.start.gear.map(Spanned::into_inner),
+            segments,
+            repetitions,
+            shifts,
+            source,
+        })
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawDrive {
+    name: Word,
+    vehicle: Option<Word>,
+    sample_time_s: Option<Number>,
+    repetitions: Option<Number>,
+    #[serde(default)]
+    start: RawStart,
+    schedule: Option<RawSchedule>,
+    shift: Option<Spanned<Vec<RawShift>>>,
+    segment: Spanned<Vec<RawSegment>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawStart {
+    gear: Option<Word>,
+    vehicle_m_s: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawSchedule {
+    throttle: Numbers,
+    up_input_rad_s: Numbers,
+    down_input_rad_s: Numbers,
+    time_in_gear_s: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawShift {
+    time_s: Number,
+    gear: Word,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawSegment {
+    duration_s: Number,
+    throttle: Spanned<FromTo>,
+    brake: Option<Spanned<FromTo>>,
+    grade_rad: Option<Spanned<FromTo>>,
+}
+
+/// One number, or the number at the start and that at the end.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a number or [from, to]")]
+enum FromTo {
+    Constant(f64),
+    Ramp([f64; 2]),
+}
+
+fn check_segment(check: &Check<'_>, at: usize, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {
+    let ends = |name: &str, value: &Spanned<FromTo>, range: std::ops::RangeInclusive<f64>| {
+        let ends = match *value.get_ref() {
+            FromTo::Constant(value) => [value; 2],
+            FromTo::Ramp(ends) => ends,
+        };
+        for end in ends {
+            check.number(&format!("segment[{at}].{name}"), &Spanned::new(value.span(), end), range.clone())?;
+        }
+        Ok(ends)
+    };
+    Ok(DriveSegment {
+        duration_s: check.number(&format!("segment[{at}].duration_s"), &raw.duration_s, 0.01..=1e6)?,
+        throttle: ends("throttle", &raw.throttle, 0.0..=1.0)?,
+        brake: raw.brake.as_ref().map_or(Ok([0.0; 2]), |brake| ends("brake", brake, 0.0..=1.0))?,
+        grade_rad: raw.grade_rad.as_ref().map_or(Ok([0.0; 2]), |grade| ends("grade_rad", grade, -0.4..=0.4))?,
+    })
+}
+
+fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
+    if let Some(shifts) = &raw.shift {
+        if raw.schedule.is_some() {
+            let message = "the drive has both [schedule] and [[shift]]".to_owned();
+            let hint = "leave one of them out".to_owned();
+            return Err(check.meaning("shift", shifts.span().start, message, Some(hint)));
+        }
+        let mut listed: Vec<(f64, String)> = Vec::new();
+        for shift in shifts.get_ref() {
+            let time_s = check.number("shift.time_s", &shift.time_s, 0.0..=1e9)?;
+            if listed.last().is_some_and(|&(before, _)| time_s <= before) {
+                let message = format!("is {time_s}, not after the shift before it");
+                return Err(check.meaning("shift.time_s", shift.time_s.span().start, message, None));
+            }
+            listed.push((time_s, shift.gear.get_ref().clone()));
+        }
+        return Ok(ShiftPlan::Listed(listed));
+    }
+    let Some(schedule) = &raw.schedule else {
+        let [throttle, up, down] = SCHEDULE;
+        let table = |values: &[f64]| {
+            Table1::new(&throttle, values).map_err(|error| check.meaning("schedule", 0, error.to_string(), None))
+        };
+        let time_in_gear_s = LEAST_TIME_IN_GEAR_S;
+        return Ok(ShiftPlan::Schedule { up_rad_s: table(&up)?, down_rad_s: table(&down)?, time_in_gear_s });
+    };
+    let axis = || ("schedule.throttle", &schedule.throttle, 0.0..=1.0);
+    let up = ("schedule.up_input_rad_s", &schedule.up_input_rad_s, 20.0..=1e3);
+    let down = ("schedule.down_input_rad_s", &schedule.down_input_rad_s, 0.0..=1e3);
+    let (up_rad_s, down_rad_s) = (check.table(axis(), up)?, check.table(axis(), down)?);
+    let crossed = up_rad_s.values().iter().zip(down_rad_s.values()).any(|(up, down)| up <= down);
+    if crossed {
+        let message = "is not below `up_input_rad_s` everywhere".to_owned();
+        let at = schedule.down_input_rad_s.span().start;
+        return Err(check.meaning("schedule.down_input_rad_s", at, message, None));
+    }
+    let time_in_gear_s = match &schedule.time_in_gear_s {
+        Some(time) => check.number("schedule.time_in_gear_s", time, 0.0..=100.0)?,
+        None => LEAST_TIME_IN_GEAR_S,
+    };
+    Ok(ShiftPlan::Schedule { up_rad_s, down_rad_s, time_in_gear_s })
+}

@@ -1,0 +1,47 @@
+//! Cars with whole gearboxes.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
+
+mod drives;
+mod energy;
+mod shifts;
+mod two_speed;
+
+use config::{Car, Source};
+
+/// A vehicle file of two or three lines with a gearbox that ships with the program.
+macro_rules! car {
+    ($gearbox:literal, $more:literal) => {
+        Car::from_sources(
+            Source::built_in("car.toml", concat!("name = \"car\"\ngearbox = \"", $gearbox, "\"\n", $more)),
+            Source::built_in($gearbox, include_str!(concat!("../../../../", $gearbox))),
+        )
+        .unwrap()
+    };
+}
+
+fn two_speed() -> Car {
+    car!("gearboxes/two_speed.toml", "[hydraulics]\nline_pressure_pa = 1.0e6\n")
+}
+
+fn dual_clutch() -> Car {
+    car!("gearboxes/dual_clutch_7.toml", "launch = \"clutch\"\n[driveline]\nfinal_ratio = 1.0\n")
+}
+
+/// A car for every gearbox that ships with the program.
+fn cars() -> Vec<Car> {
+    vec![
+        car!("gearboxes/8hp.toml", ""),
+        car!("gearboxes/lepelletier_6.toml", ""),
+        car!("gearboxes/ravigneaux_4.toml", ""),
+        car!("gearboxes/10_speed.toml", ""),
+        two_speed(),
+        dual_clutch(),
+    ]
+}
+
+/// Neighbouring gears in both directions.
+fn neighbours(car: &Car) -> Vec<(usize, usize)> {
+    let forward = car.gearbox.forward_gears();
+    forward.windows(2).flat_map(|pair| [(pair[0], pair[1]), (pair[1], pair[0])]).collect()
+}
