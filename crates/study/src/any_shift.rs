@@ -7,7 +7,6 @@
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::Real;
-use geartrain::Change;
 use observer::any_shift::{AnyShiftFilter, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use observer::{Health, Reading};
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
@@ -16,7 +15,7 @@ use plant::TrainError;
 use thiserror::Error;
 
 /// Sample time of the records that toothed wheels are read from, s.
-const RECORD_S: f64 = 0.001;
+pub const RECORD_S: f64 = 0.001;
 /// Sample time of the filter, s.
 pub const SAMPLE_S: f64 = 0.01;
 /// Torque below which a clutch carries nothing but drag, N m.
@@ -38,9 +37,6 @@ pub enum AnyShiftError {
     /// There are more clutches than the filter has room for.
     #[error("the gearbox has {0} clutches and brakes, and the filter has room for {MAX_ELEMENTS}")]
     TooManyElements(usize),
-    /// The gears have no shift between two clutches.
-    #[error("from \"{0}\" to \"{1}\" is no shift between two clutches")]
-    NoShift(String, String),
 }
 
 /// How a car differs from the one that is known.
@@ -95,6 +91,8 @@ pub struct ClutchRow {
     pub pressure_pa: [f64; 3],
     /// Whether it truly sticks.
     pub sticks: bool,
+    /// The guaranteed range of the torque, N m.
+    pub torque_range_n_m: Option<[f64; 2]>,
     /// Whether the truth is within the guaranteed ranges.
     pub in_range: bool,
 }
@@ -196,11 +194,14 @@ pub fn score_shift(
     let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
     let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
     let inputs = inputs(known, &tables, &samples, sensors, seed);
-    score_samples(known, &tables, &filter, &samples, &inputs, shift)
+    Ok(score_samples(&tables, &filter, &samples, &inputs))
 }
 
-/// The shift every [`RECORD_S`].
-fn simulated(known: &Car, truth: &Car, shift: &CarShift) -> Result<Vec<CarSample>, AnyShiftError> {
+/// A shift of the car `known` that truly is `truth`, recorded as [`inputs`] needs it.
+///
+/// # Errors
+/// The gears have no shift between two clutches, or the simulation fails.
+pub fn simulated(known: &Car, truth: &Car, shift: &CarShift) -> Result<Vec<CarSample>, AnyShiftError> {
     let model = CarModel::new(truth.clone())?;
     let mut samples = Vec::new();
     let shift = CarShift { sample_time_s: RECORD_S, ..*shift };
@@ -268,42 +269,28 @@ pub fn inputs(
     inputs
 }
 
-/// The estimates of a filter in either precision, while the shift is under way.
-fn score_samples(
-    car: &Car,
+/// Truth and estimates of a recorded drive while its shifts are under way.
+pub fn score_samples(
     tables: &ShiftTables<f64>,
     filter: &AnyShiftFilter<'_, f64>,
     samples: &[CarSample],
     inputs: &[(usize, ShiftInput<f64>)],
-    shift: &CarShift,
-) -> Result<Vec<ShiftScoreRow>, AnyShiftError> {
-    let elements = match car.gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
-        Some(Change::Single { offgoing, oncoming, .. }) => [*offgoing, *oncoming],
-        _ => {
-            let name = |gear: usize| car.gearbox.gears.get(gear).map_or_else(String::new, |gear| gear.name.clone());
-            return Err(AnyShiftError::NoShift(name(shift.from), name(shift.to)));
-        }
-    };
+) -> Vec<ShiftScoreRow> {
     let mut state = filter.start();
     let mut rows = Vec::new();
     for (at, input) in inputs {
         let estimate = filter.step(&mut state, input);
-        rows.extend(row(tables, &samples[*at], elements, &estimate));
+        rows.extend(row(tables, &samples[*at], &estimate));
     }
-    Ok(rows)
+    rows
 }
 
-fn row(
-    tables: &ShiftTables<f64>,
-    sample: &CarSample,
-    elements: [usize; 2],
-    estimate: &ShiftEstimate<f64>,
-) -> Option<ShiftScoreRow> {
+fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f64>) -> Option<ShiftScoreRow> {
     let under_way = sample.shift.as_ref()?;
     let clutches = estimate.clutches.as_ref()?;
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
-        (Some(found.element) == tables.place(elements[c])).then(|| {
+        (Some(found.element) == tables.place(truth.element)).then(|| {
             let within = |range: Option<[f64; 2]>, value: f64, tolerance: f64| {
                 range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
             };
@@ -311,6 +298,7 @@ fn row(
                 torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
                 pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
                 sticks: truth.sticks,
+                torque_range_n_m: found.torque_range_n_m,
                 in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
                     && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
             }

@@ -105,7 +105,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.phase = Some(running.phase.phase);
                 estimate.shaft_n_m = Some(x[SPRING] + damper);
                 estimate.turbine_n_m = Some(turbine_n_m + x[SHARE] * running.slow_n_m);
-                let speeds = self.measured(&state.newest, Some(running));
+                let speeds = self.then_and_now(&state.newest, Some(running));
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
@@ -115,14 +115,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             None => {
                 health = health.max(Health::SpeedsRejected);
-                let speeds = self.measured(&state.newest, None);
+                let speeds = self.then_and_now(&state.newest, None);
                 estimate.clutches = self
                     .tables
                     .shift(input.gear.from, input.gear.to)
                     .filter(|_| input.gear.from != input.gear.to)
                     .map(|shift| {
                         shift.clutches.map(|clutch| {
-                            let estimate = self.by_valve(&state.elements, &clutch, speeds);
+                            let estimate = self.by_valve(&state.elements, &clutch, speeds[0]);
                             self.in_range(estimate, &state.elements, &clutch, speeds)
                         })
                     });
@@ -219,12 +219,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         mut estimate: ClutchEstimate<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         clutch: &ShiftClutch<T>,
-        speeds: [T; 2],
+        speeds: [[T; 2]; 2],
     ) -> ClutchEstimate<T> {
-        let slip = self.slip(clutch.ratio, speeds);
-        // Twice the threshold: the readings are old, and the slip moves.
-        let error = (clutch.alpha * slip.threshold()).abs();
-        let known = [clutch.alpha * slip.value, error + error];
+        // Since the readings were taken the slip has gone on, and may have ended.
+        let (then, now) = (self.slip(clutch.ratio, speeds[0]), self.slip(clutch.ratio, speeds[1]));
+        let threshold = now.threshold();
+        let error = (clutch.alpha * (threshold + threshold)).abs()
+            + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
+        let known = [clutch.alpha * now.value, error];
         let ranges = self
             .element(elements, clutch.element)
             .and_then(|(memory, element)| memory.ranges(element, Some(known).filter(|[slip, _]| slip.is_finite())));

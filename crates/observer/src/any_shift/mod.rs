@@ -421,6 +421,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         })
     }
 
+    /// Speeds of turbine and output at the time of the older reading, and on the same lines now.
+    fn then_and_now(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [[T; 2]; 2] {
+        let then = self.measured(newest, running);
+        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
+        [then, [TURBINE, OUTPUT].map(|k| fresh(k).map_or(then[k], |newest| newest.at(T::zero())))]
+    }
+
     /// The torque at the gearbox input now, if it is known.
     fn input_torque(&self, state: &AnyShiftState<T>, input: &ShiftInput<T>) -> Option<turbine::Found<T>> {
         let turbine = match (state.newest[TURBINE], &state.running) {

@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
+mod attacks;
 mod cars;
 
 use std::collections::BTreeMap;
@@ -19,7 +20,7 @@ fn class(gain: f64) -> usize {
 }
 
 /// The clutch that drives the inertia phase.
-fn controlling(kind: ShiftKind) -> usize {
+pub(crate) fn controlling(kind: ShiftKind) -> usize {
     match kind {
         ShiftKind::PowerOnUp | ShiftKind::CoastDown => 1,
         ShiftKind::PowerOnDown | ShiftKind::PowerOffUp => 0,
@@ -53,6 +54,9 @@ fn matrix(draws: u64, verbose: bool) -> Matrix {
                 let rows = score_shift(&car, &truth, &usual(&car, from, to, throttle), &sensors, seed).unwrap();
                 matrix.rows[0] += 2 * rows.len() as u32;
                 matrix.rows[1] += rows.iter().flat_map(|row| row.clutches).filter(|clutch| !clutch.in_range).count() as u32;
+                for row in rows.iter().filter(|row| row.clutches.iter().any(|clutch| !clutch.in_range)) {
+                    println!("  outside its range: {} {from} {to} {throttle} {seed} {row:?}", car.gearbox.name);
+                }
                 for phase in [TruePhase::Torque, TruePhase::Inertia] {
                     for c in 0..2 {
                         let sum = SquaredErrors::of(&rows, phase, c);
