@@ -400,12 +400,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 continue;
             };
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
-            if self.limits.speed_valid(reading.value) && aged {
-                Newest::take(newest, reading.value, self.age(sensor, &reading));
-                *health = ChannelHealth::Good;
-            } else {
-                *health = ChannelHealth::Refused;
-            }
+            let taken = self.limits.speed_valid(reading.value)
+                && aged
+                && Newest::take(newest, reading.value, self.age(sensor, &reading), sensor.deviation_rad_s);
+            *health = if taken { ChannelHealth::Good } else { ChannelHealth::Refused };
         }
     }
 

@@ -91,10 +91,11 @@ fn lost_readings_cost_little() {
         let random = std::cell::RefCell::new(Random(seed_of(shift)));
         rows(car, &samples, 1, |input| {
             let lost = || random.borrow_mut().uniform() < 0.05;
-            for reading in
-                [&mut input.engine_rad_s, &mut input.turbine_rad_s, &mut input.output_rad_s, &mut input.wheel_rad_s]
+            let only = std::env::var("ONLY").ok().map(|only| only.parse::<usize>().unwrap());
+            for (k, reading) in
+                [&mut input.engine_rad_s, &mut input.turbine_rad_s, &mut input.output_rad_s, &mut input.wheel_rad_s].into_iter().enumerate()
             {
-                if lost() {
+                if lost() && only.is_none_or(|only| only == k) {
                     *reading = None;
                 }
             }
@@ -178,8 +179,8 @@ fn an_element_of_the_gear_that_slips_is_said() {
         let rows = rows(car, &samples, 1, |_| {});
         (slips, rows.iter().filter(|row| row.health == Health::HeldClutchSlips).count())
     };
-    let (sound, slipping) = (said(1.0), said(0.2));
-    println!("samples with slip and rows that say so: sound {sound:?}, friction of a held brake at a fifth {slipping:?}");
+    let (sound, slipping) = (said(1.0), said(0.1));
+    println!("samples with slip and rows that say so: sound {sound:?}, friction of a held brake at a tenth {slipping:?}");
     assert_eq!(sound.0, 0);
     assert!(slipping.0 > 50, "the brake does not slip");
     assert!(sound.1 <= 2 && slipping.1 > 20, "{sound:?} {slipping:?}");
