@@ -12,12 +12,14 @@ const JERK_RAD_S2: f64 = 10_000.0;
 /// Deviations of a reading from the line through the two before it beyond which it is no speed of this shaft.
 const DEVIATIONS: f64 = 5.0;
 
-/// The newest reading of a speed and the one before.
+/// The newest reading of a speed and the two before: the other channel may miss two in a row and is still compared at a time
+/// that lies between readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Newest<T> {
     pub(super) value: T,
     pub(super) age_s: T,
-    before: Option<(T, T)>,
+    /// Values and ages of those before, newer one first.
+    before: [Option<(T, T)>; 2],
     /// Whether the last reading was refused: an outlier is single, a jump persists.
     refused: bool,
 }
@@ -33,13 +35,15 @@ impl<T: Real> Newest<T> {
             newest.refused = true;
             return false;
         }
-        let before = newest.map(|newest| (newest.value, newest.age_s)).filter(|&(_, before_s)| before_s > age_s);
+        let before = newest.filter(|newest| newest.age_s > age_s).map_or([None; 2], |newest| {
+            [Some((newest.value, newest.age_s)), newest.before[0]]
+        });
         *newest = Some(Self { value, age_s, before, refused: false });
         true
     }
 
     fn is_off(&self, value: T, age_s: T, deviation: T) -> bool {
-        let Some((_, before_s)) = self.before else { return false };
+        let Some((_, before_s)) = self.before[0] else { return false };
         let (step_s, line_s) = (self.age_s - age_s, before_s - self.age_s);
         if line_s > T::of(LONGEST_S) || step_s <= T::zero() {
             return false;
@@ -55,19 +59,25 @@ impl<T: Real> Newest<T> {
     /// Lets time pass.
     pub(super) fn pass(&mut self, dt_s: T) {
         self.age_s = self.age_s + dt_s;
-        if let Some((_, age_s)) = &mut self.before {
+        for (_, age_s) in self.before.iter_mut().flatten() {
             *age_s = *age_s + dt_s;
         }
     }
 
-    /// The speed a time ago, on the line through both readings.
+    /// The speed a time ago, on the lines through the readings; before the oldest that reading.
     pub(super) fn at(&self, age_s: T) -> T {
-        match self.before {
-            Some((before, before_s)) if before_s - self.age_s <= T::of(LONGEST_S) => {
-                self.value + (before - self.value) * (age_s - self.age_s) / (before_s - self.age_s)
+        let mut late = (self.value, self.age_s);
+        for early in self.before.into_iter().flatten() {
+            let span_s = early.1 - late.1;
+            if span_s > T::of(LONGEST_S) {
+                break;
             }
-            _ => self.value,
+            if age_s <= early.1 {
+                return late.0 + (early.0 - late.0) * (age_s - late.1) / span_s;
+            }
+            late = early;
         }
+        late.0
     }
 }
 
@@ -85,6 +95,7 @@ mod tests {
         assert!((newest.at(0.004) - 102.0_f64).abs() < 1e-9);
         assert!((newest.at(0.009) - 101.0).abs() < 1e-9);
         assert!((newest.at(0.0) - 102.8).abs() < 1e-9);
+        assert_eq!(newest.at(0.02), 100.0);
     }
 
     #[test]
