@@ -125,7 +125,7 @@ impl<T: Real> RangeEstimator<T> {
             Some(dt_s) => state.pressure.step(&self.budget, dt_s, seen.command, limits.command_max),
             None => state.pressure.forget(&self.budget, limits.command_max),
         }
-        let (pressure_pa, clutch_torque_n_m) = 
+        let (pressure_pa, clutch_torque_n_m) =
             pressure_and_torque(&self.clutch, &self.budget, &state.pressure, seen.slip_rad_s);
         let shaft_torque_n_m = match seen.phase {
             Some(phase) if seen.dt_s.is_some() && seen.read => {

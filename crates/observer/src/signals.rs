@@ -154,10 +154,10 @@ pub enum Health {
     /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
     /// limit.
     PressureLimited,
-    /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
-    HeldClutchSlips,
     /// The speeds cannot be used: the estimate is from the valve model alone.
     SpeedsRejected,
+    /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
+    HeldClutchSlips,
     /// The observer lost its state and starts again.
     Restarted,
     /// The time step is unusable: the estimate is that of the sample before.
@@ -174,8 +174,8 @@ impl Health {
         Self::LimitedToRange,
         Self::CommandRejected,
         Self::PressureLimited,
-        Self::HeldClutchSlips,
         Self::SpeedsRejected,
+        Self::HeldClutchSlips,
         Self::Restarted,
         Self::TimeRejected,
     ];

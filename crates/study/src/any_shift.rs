@@ -9,9 +9,9 @@ use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::Real;
 use observer::any_shift::{AnyShiftFilter, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use observer::{Health, Reading};
+use plant::TrainError;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
 use plant::sensors::{Channel, Rows, read_speed};
-use plant::TrainError;
 use thiserror::Error;
 
 /// Sample time of the records that toothed wheels are read from, s.

@@ -5,8 +5,8 @@ use drivetrain::Real;
 use super::elements::ElementState;
 use super::powertrain::{ClutchTorque, dot};
 use super::{
-    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SPRING, ShiftClutch,
-    ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SPRING,
+    ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -116,16 +116,15 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             None => {
                 health = health.max(Health::SpeedsRejected);
                 let speeds = self.then_and_now(&state.newest, None);
-                estimate.clutches = self
-                    .tables
-                    .shift(input.gear.from, input.gear.to)
-                    .filter(|_| input.gear.from != input.gear.to)
-                    .map(|shift| {
-                        shift.clutches.map(|clutch| {
-                            let estimate = self.by_valve(&state.elements, &clutch, speeds[0]);
-                            self.in_range(estimate, &state.elements, &clutch, speeds)
-                        })
-                    });
+                estimate.clutches =
+                    self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
+                        |shift| {
+                            shift.clutches.map(|clutch| {
+                                let estimate = self.by_valve(&state.elements, &clutch, speeds[0]);
+                                self.in_range(estimate, &state.elements, &clutch, speeds)
+                            })
+                        },
+                    );
             }
         }
         state.estimate.health = health;
@@ -190,15 +189,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         let deviation = x.variance(&row).sqrt();
         let alone = own.per_friction_n_m.hypot(own.per_pressure_n_m);
-        let (valve_pa, correction) = self.element(elements, clutch.element).map_or((zero, zero), |(memory, element)| {
-            let pack = &element.clutch;
-            let above_kiss = (memory.valve_pa - pack.kiss_pressure()).max(zero);
-            // The part of the torque's error that is the valve's gain, and the error of the pressure itself.
-            let gain = above_kiss * u.torque_share * u.gain_part * x.mean[FRICTION[c]];
-            let per_pa = own.base_n_m / above_kiss.max(one);
-            let itself = if per_pa == zero { zero } else { own.per_pressure_n_m / per_pa * x.mean[PRESSURE[c]] };
-            (memory.valve_pa, gain + if holds { zero } else { itself })
-        });
+        let (valve_pa, correction) =
+            self.element(elements, clutch.element).map_or((zero, zero), |(memory, element)| {
+                let pack = &element.clutch;
+                let above_kiss = (memory.valve_pa - pack.kiss_pressure()).max(zero);
+                // The part of the torque's error that is the valve's gain, and the error of the pressure itself.
+                let gain = above_kiss * u.torque_share * u.gain_part * x.mean[FRICTION[c]];
+                let per_pa = own.base_n_m / above_kiss.max(one);
+                let itself = if per_pa == zero { zero } else { own.per_pressure_n_m / per_pa * x.mean[PRESSURE[c]] };
+                (memory.valve_pa, gain + if holds { zero } else { itself })
+            });
         ClutchEstimate {
             element: clutch.element,
             pressure_pa: self.limits.possible_pressure(valve_pa + correction),

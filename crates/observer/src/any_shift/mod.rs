@@ -78,9 +78,9 @@ const WHEEL_START_RAD_S: f64 = 0.3;
 const SHAFT_START: (f64, f64) = (0.3, 100.0);
 const LOAD_START: (f64, f64) = (1.0, 400.0);
 /// Time over which the squared innovations are averaged, s, and their mean above which no phase of the shift explains the
-/// speeds: three deviations that last.
+/// speeds: five deviations that last.
 const MISFIT_S: f64 = 0.05;
-const MISFIT: f64 = 9.0;
+const MISFIT: f64 = 25.0;
 /// Samples in a row with slip in a gear after which an element of the gear slips.
 const SLIPS_IN_GEAR: u8 = 3;
 
@@ -181,6 +181,8 @@ pub struct AnyShiftState<T> {
     lost: bool,
     /// Samples in a row in which the gear did not fit the speeds.
     unfit: u8,
+    /// Whether an element of the gear has slipped, and no gear has fitted since.
+    slips: bool,
     estimate: ShiftEstimate<T>,
 }
 
@@ -258,6 +260,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             running: None,
             lost: false,
             unfit: 0,
+            slips: false,
             estimate: ShiftEstimate::nothing(),
         }
     }
@@ -317,10 +320,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             let health = memory.step(element, &self.limits, *command, dt_s);
             came = came || health == ChannelHealth::Good;
             refused = refused || health == ChannelHealth::Refused;
-            memory.friction = [
-                stay * memory.friction[0],
-                T::one() - stay * stay * (T::one() - memory.friction[1]),
-            ];
+            memory.friction = [stay * memory.friction[0], T::one() - stay * stay * (T::one() - memory.friction[1])];
         }
         match (refused, came) {
             (true, _) => ChannelHealth::Refused,
@@ -390,7 +390,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let health = [&mut channels.turbine, &mut channels.output, &mut channels.wheel];
-        for (((newest, reading), health), sensor) in state.newest.iter_mut().zip(given).zip(health).zip(&self.readings) {
+        for (((newest, reading), health), sensor) in state.newest.iter_mut().zip(given).zip(health).zip(&self.readings)
+        {
             if let Some(newest) = newest {
                 newest.pass(dt_s);
             }
@@ -582,7 +583,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         // What the model leaves out moves both speeds alike while a clutch ties them.
-        let model = |k: usize| T::of(MODEL_SHARE * MODEL_SHARE * 100.0) * dt_s * square(self.readings[k].deviation_rad_s);
+        let model =
+            |k: usize| T::of(MODEL_SHARE * MODEL_SHARE * 100.0) * dt_s * square(self.readings[k].deviation_rad_s);
         x.add(WHEEL, WHEEL, model(WHEEL));
         x.add(OUTPUT, OUTPUT, model(OUTPUT));
         match self.tied_ratio(running) {
@@ -762,7 +764,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if state.running.is_none() {
             let (running, slips) = self.begin(state, input, torque);
             state.running = running.filter(|running| running.x.is_sound());
-            if slips {
+            state.slips = state.running.is_none() && (state.slips || slips);
+            if state.slips {
                 health = Health::HeldClutchSlips;
             }
             if state.running.is_some() && core::mem::take(&mut state.lost) {
@@ -780,7 +783,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         torque: Option<&turbine::Found<T>>,
     ) -> (Option<Running<T>>, bool) {
         let (u, line, gear) = (&self.uncertainty, &self.driveline, input.gear);
-        let first = |k: usize| state.newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
+        let first =
+            |k: usize| state.newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
         let (Some(turbine), Some(output), Some(torque)) = (first(TURBINE), first(OUTPUT), torque) else {
             return (None, false);
         };

@@ -35,9 +35,9 @@ impl<T: Real> Newest<T> {
             newest.refused = true;
             return false;
         }
-        let before = newest.filter(|newest| newest.age_s > age_s).map_or([None; 2], |newest| {
-            [Some((newest.value, newest.age_s)), newest.before[0]]
-        });
+        let before = newest
+            .filter(|newest| newest.age_s > age_s)
+            .map_or([None; 2], |newest| [Some((newest.value, newest.age_s)), newest.before[0]]);
         *newest = Some(Self { value, age_s, before, refused: false });
         true
     }

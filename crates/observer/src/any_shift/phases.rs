@@ -167,3 +167,56 @@ impl<T: Real> PhaseMemory<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contact(slip: f64, needed_n_m: f64) -> Contact<f64> {
+        Contact { slip: Slip { value: slip, deviation: 0.1 }, needed_n_m, holds_n_m: [40.0, 60.0] }
+    }
+
+    /// The phase after these samples of slip and torque needed, of offgoing and oncoming clutch.
+    fn after(phase: ShiftPhase, samples: &[[(f64, f64); 2]]) -> (ShiftPhase, [Option<f64>; 2]) {
+        let mut memory = PhaseMemory::new(phase);
+        for sample in samples {
+            memory.step(&sample.map(|(slip, needed)| contact(slip, needed)));
+        }
+        (memory.phase, memory.released)
+    }
+
+    #[test]
+    fn slip_in_either_direction_or_too_much_torque_releases_a_clutch() {
+        use ShiftPhase::{BothSlip, OffgoingHolds, OncomingHolds};
+        // The threshold is 3.5 * 0.1 + 0.3 = 0.65 rad/s.
+        assert_eq!(after(OffgoingHolds, &[[(0.6, 30.0), (100.0, 0.0)]]).0, OffgoingHolds);
+        assert_eq!(after(OffgoingHolds, &[[(0.7, 30.0), (100.0, 0.0)]]), (BothSlip, [None; 2]));
+        assert_eq!(after(OffgoingHolds, &[[(-0.7, 30.0), (100.0, 0.0)]]), (BothSlip, [None; 2]));
+        // Released by its load it slips in the direction of that load.
+        assert_eq!(after(OffgoingHolds, &[[(0.1, -61.0), (100.0, 0.0)]]), (BothSlip, [Some(-1.0), None]));
+        assert_eq!(after(OncomingHolds, &[[(90.0, 0.0), (0.9, 30.0)]]).0, OncomingHolds);
+        assert_eq!(after(OncomingHolds, &[[(90.0, 0.0), (1.0, 30.0)]]).0, BothSlip);
+    }
+
+    #[test]
+    fn a_clutch_grips_where_its_slip_ends_and_it_can_hold() {
+        use ShiftPhase::{BothSlip, OffgoingHolds, OncomingHolds};
+        assert_eq!(after(BothSlip, &[[(90.0, 0.0), (0.6, 30.0)]]).0, OncomingHolds);
+        assert_eq!(after(BothSlip, &[[(90.0, 0.0), (0.6, 70.0)]]).0, BothSlip);
+        // A flare that was caught: two samples.
+        let caught = [(0.4, 30.0), (100.0, 0.0)];
+        assert_eq!(after(BothSlip, &[caught]).0, BothSlip);
+        assert_eq!(after(BothSlip, &[caught, caught]).0, OffgoingHolds);
+        assert_eq!(after(BothSlip, &[caught, [(0.6, 30.0), (100.0, 0.0)], caught]).0, BothSlip);
+        let heavy = [(0.4, 50.0), (100.0, 0.0)];
+        assert_eq!(after(BothSlip, &[heavy, heavy]).0, BothSlip);
+    }
+
+    #[test]
+    fn nothing_that_is_not_a_number_changes_the_phase() {
+        use ShiftPhase::{OffgoingHolds, OncomingHolds};
+        let nan = [(f64::NAN, f64::NAN); 2];
+        assert_eq!(after(OffgoingHolds, &[nan]).0, OffgoingHolds);
+        assert_eq!(after(OncomingHolds, &[nan]).0, OncomingHolds);
+    }
+}

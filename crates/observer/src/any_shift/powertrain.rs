@@ -161,8 +161,7 @@ impl<T: Real> Motion<T> {
     /// By the series of the matrix exponential.
     pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T) -> Self {
         let (zero, one) = (T::zero(), T::one());
-        let (i, damping, stiffness) =
-            (line.final_ratio, line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad);
+        let (i, damping, stiffness) = (line.final_ratio, line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad);
         let mut a = [[zero; CORE]; CORE];
         let mut b = [[zero; DRIVES]; CORE];
         for k in [TURBINE, OUTPUT] {
@@ -225,5 +224,86 @@ impl<T: Real> Motion<T> {
     /// Change of the first states per torque on the turbine side, each per N m.
     pub(super) fn per_turbine_torque(&self) -> [T; CORE] {
         self.gamma.map(|row| row[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINE: Driveline<f64> = Driveline {
+        final_ratio: 3.0,
+        shaft_stiffness_n_m_rad: 13_000.0,
+        shaft_damping_n_m_s_rad: 20.0,
+        wheel_inertia_kg_m2: 2.4,
+    };
+    const WHEELS_KG_M2: f64 = 137.4;
+    const MASS: [[f64; 2]; 2] = [[0.08, 0.009], [0.009, 0.289]];
+
+    fn torques() -> Torques<f64> {
+        let clutch = |ratio, base_n_m| ClutchTorque {
+            ratio,
+            base_n_m,
+            per_friction_n_m: 0.12 * base_n_m,
+            per_pressure_n_m: 3.0,
+        };
+        Torques { turbine_n_m: 120.0, share_n_m: 115.0, clutches: [clutch(4.7, -20.0), clutch(3.13, 90.0)] }
+    }
+
+    fn state() -> [f64; N] {
+        [300.0, 70.0, 23.2, 900.0, 700.0, 0.05, -0.04, 0.5, -0.7, 0.3, 1.1]
+    }
+
+    /// A step as a whole is what many small ones by the rates are.
+    #[test]
+    fn a_step_is_the_solution_of_the_rates() {
+        for g in [free(&MASS), tied(4.7, MASS[1][1] + 2.0 * 4.7 * MASS[0][1] + 4.7 * 4.7 * MASS[0][0])] {
+            let torques = torques();
+            let (rows, rest) = Motion::new(g, &LINE, WHEELS_KG_M2, 0.01).rows(&torques);
+            let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
+            let mut x = state();
+            for _ in 0..100_000 {
+                let speeds = rates.at(&x);
+                let twist = x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE];
+                for k in 0..SPEEDS {
+                    x[k] += 1e-7 * speeds[k];
+                }
+                x[SPRING] += 1e-7 * LINE.shaft_stiffness_n_m_rad * twist;
+            }
+            for k in 0..CORE {
+                let whole = dot(&rows[k], &state()) + rest[k];
+                assert!((whole - x[k]).abs() < 2e-4 * (1.0 + x[k].abs()), "{k}: {whole} {}", x[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn tied_speeds_accelerate_in_their_ratio() {
+        let g = tied(2.5_f64, 0.7);
+        assert!((g[0][0] - 2.5 * g[1][0]).abs() < 1e-12 && (g[0][1] - 2.5 * g[1][1]).abs() < 1e-12);
+        // Turbine torque times ratio on the inertia at the output.
+        assert!((g[1][0] - 2.5 / 0.7).abs() < 1e-12 && (g[1][1] - 1.0 / 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn power_is_conserved_while_both_slip() {
+        let (torques, g) = (torques(), free(&MASS));
+        let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
+        let x = state();
+        let [turbine, output, _] = rates.at(&x);
+        let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
+            + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
+        let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);
+        let input = (torques.turbine_n_m + x[SHARE] * torques.share_n_m) * x[TURBINE];
+        let heat: f64 = (0..2)
+            .map(|c| {
+                let clutch = &torques.clutches[c];
+                let torque = clutch.base_n_m
+                    + x[FRICTION[c]] * clutch.per_friction_n_m
+                    + x[PRESSURE[c]] * clutch.per_pressure_n_m;
+                torque * (x[TURBINE] - clutch.ratio * x[OUTPUT])
+            })
+            .sum();
+        assert!((input - shaft / LINE.final_ratio * x[OUTPUT] - heat - kinetic).abs() < 1e-6);
     }
 }

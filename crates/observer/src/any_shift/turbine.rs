@@ -81,9 +81,7 @@ impl<T: Real> TurbineTorque<T> {
         match (self.converter.is_some(), reported) {
             (true, false) => self.converter_share,
             (false, _) => self.engine_share,
-            (true, true) => {
-                (square(self.converter_share).recip() + square(self.engine_share).recip()).recip().sqrt()
-            }
+            (true, true) => (square(self.converter_share).recip() + square(self.engine_share).recip()).recip().sqrt(),
         }
     }
 
