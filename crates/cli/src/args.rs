@@ -56,6 +56,13 @@ pub(crate) enum Command {
     /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
     /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
     /// the drive is simulated without them, or with the scenario given by --scenario.
+    ///
+    /// A drive file (with [[segment]]) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
+    /// listed shifts, and a vehicle file with a gearbox. The columns of the offgoing and oncoming clutch are empty between
+    /// shifts.
+    ///
+    ///   wetclutch simulate drives/city.toml -o out
+    ///   wetclutch simulate drives/city.toml --vehicle vehicles/ten_speed.toml -o out
     #[command(verbatim_doc_comment)]
     Simulate(Simulate),
     /// Design observer gains and print them with their certificate
@@ -181,8 +188,11 @@ pub(crate) struct Demo {
 
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
-    /// Experiment file
+    /// Experiment file, or drive file
     pub(crate) experiment: PathBuf,
+    /// Vehicle file with a gearbox, for a drive file; it replaces the one that the drive file names
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
     /// Scenario of the experiment to simulate; the files are then called NAME_SCENARIO
     #[arg(long, value_name = "NAME")]
     pub(crate) scenario: Option<String>,

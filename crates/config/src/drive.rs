@@ -35,16 +35,20 @@ pub struct DriveSegment {
 #[derive(Debug, Clone, PartialEq)]
 pub enum ShiftPlan {
     /// By throttle and speed of the gearbox input.
-    Schedule {
-        /// Input speed above which the next gear is taken, over throttle, rad/s.
-        up_rad_s: Table1<f64>,
-        /// Input speed below which the gear below is taken, over throttle, rad/s.
-        down_rad_s: Table1<f64>,
-        /// Least time in a gear, s.
-        time_in_gear_s: f64,
-    },
+    Schedule(Box<ShiftSchedule>),
     /// At given times, in rising order: time, s, and name of the gear.
     Listed(Vec<(f64, String)>),
+}
+
+/// Lines of a shift schedule.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftSchedule {
+    /// Input speed above which the next gear is taken, over throttle, rad/s.
+    pub up_rad_s: Table1<f64>,
+    /// Input speed below which the gear below is taken, over throttle, rad/s.
+    pub down_rad_s: Table1<f64>,
+    /// Least time in a gear, s.
+    pub time_in_gear_s: f64,
 }
 
 /// A drive.
@@ -104,8 +108,7 @@ impl Drive {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawDrive = source.parse()?;
         let check = Check::of(&source);
-        let segments = raw.segment.get_ref().iter().enumerate();
-        let segments = segments.map(|(at, segment)| check_segment(&check, at, segment));
+        let segments = raw.segment.get_ref().iter().map(|segment| check_segment(&check, segment));
         let segments: Vec<DriveSegment> = segments.collect::<Result<_, _>>()?;
         if segments.is_empty() {
             let message = "the drive has no segment".to_owned();
@@ -189,19 +192,19 @@ enum FromTo {
     Ramp([f64; 2]),
 }
 
-fn check_segment(check: &Check<'_>, at: usize, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {
+fn check_segment(check: &Check<'_>, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {
     let ends = |name: &str, value: &Spanned<FromTo>, range: std::ops::RangeInclusive<f64>| {
         let ends = match *value.get_ref() {
             FromTo::Constant(value) => [value; 2],
             FromTo::Ramp(ends) => ends,
         };
         for end in ends {
-            check.number(&format!("segment[{at}].{name}"), &Spanned::new(value.span(), end), range.clone())?;
+            check.number(&format!("segment.{name}"), &Spanned::new(value.span(), end), range.clone())?;
         }
         Ok(ends)
     };
     Ok(DriveSegment {
-        duration_s: check.number(&format!("segment[{at}].duration_s"), &raw.duration_s, 0.01..=1e6)?,
+        duration_s: check.number("segment.duration_s", &raw.duration_s, 0.01..=1e6)?,
         throttle: ends("throttle", &raw.throttle, 0.0..=1.0)?,
         brake: raw.brake.as_ref().map_or(Ok([0.0; 2]), |brake| ends("brake", brake, 0.0..=1.0))?,
         grade_rad: raw.grade_rad.as_ref().map_or(Ok([0.0; 2]), |grade| ends("grade_rad", grade, -0.4..=0.4))?,
@@ -232,7 +235,8 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
             Table1::new(&throttle, values).map_err(|error| check.meaning("schedule", 0, error.to_string(), None))
         };
         let time_in_gear_s = LEAST_TIME_IN_GEAR_S;
-        return Ok(ShiftPlan::Schedule { up_rad_s: table(&up)?, down_rad_s: table(&down)?, time_in_gear_s });
+        let schedule = ShiftSchedule { up_rad_s: table(&up)?, down_rad_s: table(&down)?, time_in_gear_s };
+        return Ok(ShiftPlan::Schedule(Box::new(schedule)));
     };
     let axis = || ("schedule.throttle", &schedule.throttle, 0.0..=1.0);
     let up = ("schedule.up_input_rad_s", &schedule.up_input_rad_s, 20.0..=1e3);
@@ -248,5 +252,5 @@ fn plan(check: &Check<'_>, raw: &RawDrive) -> Result<ShiftPlan, ConfigError> {
         Some(time) => check.number("schedule.time_in_gear_s", time, 0.0..=100.0)?,
         None => LEAST_TIME_IN_GEAR_S,
     };
-    Ok(ShiftPlan::Schedule { up_rad_s, down_rad_s, time_in_gear_s })
+    Ok(ShiftPlan::Schedule(Box::new(ShiftSchedule { up_rad_s, down_rad_s, time_in_gear_s })))
 }

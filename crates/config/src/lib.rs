@@ -13,7 +13,7 @@ pub mod source;
 pub mod study;
 pub mod vehicle;
 
-pub use drive::{Drive, DriveSegment, ShiftPlan};
+pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
 pub use experiment::{
     CurrentSensor, Experiment, FastFill, GainMethod, GivenGains, ObserverEntry, ObserverKind, OffNominal, Profile,
@@ -23,6 +23,6 @@ pub use gearbox::GearboxFile;
 pub use source::{Kind, Source, toml_string};
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, ShiftClutch, Uncertainty,
+    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,
     ValveUncertainty, Vehicle,
 };

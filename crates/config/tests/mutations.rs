@@ -5,7 +5,7 @@
 mod common;
 
 use common::{EXPERIMENT, FILL, STROKE, STUDY, VEHICLE, mutations};
-use config::{ConfigError, Experiment, GearboxFile, Sensors, Source, Study, Vehicle};
+use config::{Car, ConfigError, Drive, Experiment, GearboxFile, Sensors, Source, Study, Vehicle};
 
 /// Every error but those of reading names a line of the file.
 fn has_its_place(error: &ConfigError, path: &str, lines: usize, mutation: &str) {
@@ -53,6 +53,39 @@ fn every_mutation_of_a_gearbox_file_is_refused_with_its_place_or_accepted() {
         }
         assert!(accepted > 5 && accepted < all.len() / 2, "{accepted} of {}", all.len());
     }
+}
+
+#[test]
+fn every_mutation_of_a_vehicle_file_with_a_gearbox_is_refused_with_its_place_or_accepted() {
+    let file = include_str!("../../../vehicles/eight_speed.toml");
+    let mut accepted = 0;
+    let all = mutations(file);
+    for (name, text) in &all {
+        let gearbox = Source::built_in("g.toml", include_str!("../../../gearboxes/8hp.toml"));
+        match Car::from_sources(Source::built_in("c.toml", text), gearbox) {
+            Ok(_) => accepted += 1,
+            // A list may not fit the one that is taken from the shipped file.
+            Err(error) if error.path().ends_with("eight_speed.toml") => (),
+            Err(error) => has_its_place(&error, "c.toml", text.lines().count(), name),
+        }
+    }
+    assert!(accepted > 50 && accepted < all.len() / 2, "{accepted} of {}", all.len());
+}
+
+#[test]
+fn every_mutation_of_a_drive_file_is_refused_with_its_place_or_accepted() {
+    let mut accepted = 0;
+    let all = mutations(include_str!("../../../drives/city.toml"));
+    for (name, text) in &all {
+        match Drive::from_source(Source::built_in("d.toml", text)) {
+            Ok(drive) => {
+                assert!(drive.duration_s().is_finite());
+                accepted += 1;
+            }
+            Err(error) => has_its_place(&error, "d.toml", text.lines().count(), name),
+        }
+    }
+    assert!(accepted > 20 && accepted < all.len() / 2, "{accepted} of {}", all.len());
 }
 
 #[test]

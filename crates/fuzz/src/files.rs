@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 
-use config::{Experiment, GearboxFile, Study, Vehicle};
+use config::{Car, Experiment, GearboxFile, Source, Study, Vehicle};
 use design::{design_compliant, design_rigid};
+use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_shift};
 use report::gearbox_figure::{gear_figure, train_figure};
 use study::campaign::{factor_values, run_seed};
 use study::{Row, RunColumns, simulate_shift};
@@ -23,12 +24,24 @@ fn written(fuzzer: &Fuzzer, name: &str, input: &[u8]) -> PathBuf {
 }
 
 pub(crate) fn vehicle(fuzzer: &Fuzzer, input: &[u8]) {
+    car(input);
     let Ok(vehicle) = Vehicle::read(&written(fuzzer, "vehicles/input", input)) else { return };
     samples::drive_all(&vehicle);
     if fuzzer.depth == Depth::Long {
         // Requirements that cannot be met are an error, which is well.
         let _ = (design_rigid(&vehicle), design_compliant(&vehicle));
     }
+}
+
+/// A vehicle file with a gearbox file, and an upshift of the car.
+fn car(input: &[u8]) {
+    let gearbox = Source::built_in("gearboxes/8hp.toml", include_str!("../../../gearboxes/8hp.toml"));
+    let source = Source::built_in("vehicles/input", &String::from_utf8_lossy(input));
+    let Ok(car) = Car::from_sources(source, gearbox) else { return };
+    let Ok(model) = CarModel::new(car) else { return };
+    let shift = CarShift { duration_s: 2.0, ..CarShift::usual(&model.car, 2, 3, 0.2) };
+    // A car that cannot shift is an error, which is well.
+    let _ = simulate_car_shift(&model, &model.car, CarCalibration::STANDARD, &shift, |_| {});
 }
 
 pub(crate) fn gearbox(fuzzer: &Fuzzer, input: &[u8]) {

@@ -5,6 +5,8 @@
 //! ends where a slip reaches zero or a holding torque reaches its limit. This instant is located on the dense
 //! output of the integrator. Friction is not regularised.
 //!
+//! [`car`] is the same for a car with a whole gearbox, in any gear and any shift.
+//!
 //! ```
 //! use config::{Experiment, Vehicle};
 //! use plant::simulate;

@@ -1,11 +1,12 @@
 //! `wetclutch check`.
 
-use config::{Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values, Vehicle};
+use config::{Car, Drive, Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values, Vehicle};
 use design::{longest_step_of, unstable_corners};
 
 use report::tables::phase_name;
 
 use super::gearbox;
+use super::simulate_drive::{describe_car, describe_drive};
 use crate::args::Check;
 use crate::failure::Failure;
 use crate::output;
@@ -19,6 +20,8 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     }
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
+        Kind::Car => describe_car(&Car::read(&options.file)?),
+        Kind::Drive => describe_drive(&Drive::from_source(source)?, &options.file),
         Kind::Vehicle => describe(&Vehicle::from_source(source)?),
         Kind::Experiment => {
             let experiment = Experiment::from_source(source)?;

@@ -12,6 +12,7 @@ mod measured;
 mod reproduce;
 mod sensitivity;
 mod simulate;
+mod simulate_drive;
 mod study;
 mod worst_case;
 

@@ -2,16 +2,25 @@
 
 use std::path::PathBuf;
 
-use config::{Experiment, Vehicle};
+use config::{Experiment, Kind, Source, Vehicle};
 use study::drive::{DriveColumns, DriveRow};
 use study::{ShiftRating, ShiftSample};
 use trace::{CsvWriter, WholeFile, signal};
 
+use super::simulate_drive::simulate_drive;
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
+    if Source::read(&options.experiment)?.kind()? == Kind::Drive {
+        return simulate_drive(options);
+    }
+    if let Some(vehicle) = &options.vehicle {
+        let message =
+            format!("{}: an experiment names its vehicle file\nhint: --vehicle is for a drive file", vehicle.display());
+        return Err(Failure::Input(message));
+    }
     let experiment = Experiment::read(&options.experiment)?;
     let vehicle = experiment.read_vehicle()?;
     let (experiment, name) = chosen(experiment, options)?;

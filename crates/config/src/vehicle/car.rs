@@ -24,6 +24,21 @@ const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../g
 const OPTIONAL: [&str; 10] =
     ["launch", "engine", "converter", "hydraulics", "friction", "valve", "driveline", "tyre", "vehicle", "oil"];
 
+/// The lock-up clutch of the converter, and when it is closed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LockUp {
+    /// Torque that it holds when it is closed, N m.
+    pub capacity_n_m: f64,
+    /// Lowest gear in which it is closed.
+    pub first_gear: usize,
+    /// Speed of the gearbox input above which it is closed, rad/s.
+    pub on_rad_s: f64,
+    /// Speed of the gearbox input below which it is opened, rad/s.
+    pub off_rad_s: f64,
+    /// Time in which it closes, s.
+    pub ramp_s: f64,
+}
+
 /// A car with all the gears and elements of its gearbox.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Car {
@@ -41,6 +56,8 @@ pub struct Car {
     pub engine: Engine<f64>,
     /// The torque converter; without one the engine turns the input shaft of the gearbox.
     pub converter: Option<Converter<f64>>,
+    /// The lock-up clutch of the converter, if there is one.
+    pub lock_up: Option<LockUp>,
     /// Differential, drive shafts, wheels.
     pub driveline: Driveline<f64>,
     /// Backlash between gearbox and wheels, rad at the wheel.
@@ -105,23 +122,36 @@ impl Car {
         let line_pressure_pa =
             check.number("hydraulics.line_pressure_pa", &raw.hydraulics.line_pressure_pa, 1e5..=10e6)?;
         let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
-        let clutches = clutches(&check, &raw, &gearbox, line_pressure_pa, oil_temperature_degc)?;
+        // A valve of one's own has nothing of the shipped one, which may be of another kind.
+        let own: RawOwnValve = source.parse()?;
+        let own_check = Check::of(&source);
+        let valve = own.valve.as_ref().map_or((&check, &raw.valve), |valve| (&own_check, valve));
+        let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
         Ok(Self {
             name: check.title("name", &raw.name)?,
             clutches,
-            gearbox,
             line_pressure_pa,
             engine: engine(&check, &raw.engine)?,
             converter: match raw.launch {
                 RawLaunch::Converter => Some(converter(&check, &raw.converter)?),
                 RawLaunch::Clutch => None,
             },
+            lock_up: raw
+                .lock_up
+                .as_ref()
+                .map(|raw_lock_up| lock_up(&check, raw_lock_up, &raw, &gearbox))
+                .transpose()?,
+            gearbox,
             driveline: driveline(&check, &raw.driveline)?,
             backlash_rad: backlash(&check, &raw.driveline)?,
             tyre: tyre(&check, &raw.tyre)?,
             road: road(&check, &raw.vehicle)?,
             oil_temperature_degc,
-            defaults_taken: OPTIONAL.into_iter().filter(|key| !given.contains_key(*key)).collect(),
+            defaults_taken: OPTIONAL
+                .into_iter()
+                .filter(|key| !given.contains_key(*key))
+                .filter(|&key| key != "converter" || matches!(raw.launch, RawLaunch::Converter))
+                .collect(),
             source,
         })
     }
@@ -149,6 +179,7 @@ struct RawCar {
     hydraulics: RawHydraulics,
     friction: RawShape,
     valve: Spanned<RawClutchValve>,
+    lock_up: Option<RawLockUp>,
     #[serde(default)]
     clutch: BTreeMap<Spanned<String>, RawElementClutch>,
     driveline: RawDriveline,
@@ -156,6 +187,12 @@ struct RawCar {
     vehicle: RawRoad,
     #[serde(default)]
     oil: RawOil,
+}
+
+/// The valve as the file itself has it.
+#[derive(Deserialize)]
+struct RawOwnValve {
+    valve: Option<Spanned<RawClutchValve>>,
 }
 
 /// What connects the engine with the gearbox.
@@ -170,6 +207,16 @@ enum RawLaunch {
 #[serde(deny_unknown_fields, expecting = "a table")]
 struct RawHydraulics {
     line_pressure_pa: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawLockUp {
+    capacity_n_m: Number,
+    first_gear: Word,
+    on_input_rad_s: Number,
+    off_input_rad_s: Number,
+    ramp_s: Number,
 }
 
 /// Course of the friction over slip, and drag, of all clutches.
@@ -192,10 +239,39 @@ struct RawElementClutch {
     valve: Option<Spanned<RawClutchValve>>,
 }
 
+fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) -> Result<LockUp, ConfigError> {
+    let number = |key: &str, value, range| check.number(&format!("lock_up.{key}"), value, range);
+    let at = raw.first_gear.span().start;
+    if matches!(car.launch, RawLaunch::Clutch) {
+        let message = "the car has no converter".to_owned();
+        return Err(check.meaning("lock_up", at, message, Some("leave [lock_up] out".to_owned())));
+    }
+    let name = raw.first_gear.get_ref();
+    let Some(first_gear) = gearbox.gear(name) else {
+        let names = gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
+        let message = format!("the gearbox has no gear \"{name}\"");
+        return Err(check.meaning("lock_up.first_gear", at, message, Some(format!("its gears are {names}"))));
+    };
+    let on_rad_s = number("on_input_rad_s", &raw.on_input_rad_s, 20.0..=1e3)?;
+    let off_rad_s = number("off_input_rad_s", &raw.off_input_rad_s, 10.0..=1e3)?;
+    if off_rad_s >= on_rad_s {
+        let message = format!("is {off_rad_s}, not below `on_input_rad_s`, {on_rad_s}");
+        return Err(check.meaning("lock_up.off_input_rad_s", raw.off_input_rad_s.span().start, message, None));
+    }
+    Ok(LockUp {
+        capacity_n_m: number("capacity_n_m", &raw.capacity_n_m, 1.0..=1e4)?,
+        first_gear,
+        on_rad_s,
+        off_rad_s,
+        ramp_s: number("ramp_s", &raw.ramp_s, 0.05..=10.0)?,
+    })
+}
+
 /// The friction elements: plates of the gearbox file, friction over slip, drag and valve of the vehicle file.
 fn clutches(
     check: &Check<'_>,
     raw: &RawCar,
+    common_valve: (&Check<'_>, &Spanned<RawClutchValve>),
     gearbox: &Gearbox,
     line_pressure_pa: f64,
     oil_degc: f64,
@@ -254,14 +330,14 @@ fn clutches(
             Some(drag) => check.number(&key("drag_n_m"), drag, 0.0..=100.0)?,
             None => drag_n_m,
         };
-        let (table, spanned) = match own.and_then(|own| own.valve.as_ref()) {
-            Some(valve) => (key("valve"), valve),
-            None => ("valve".to_owned(), &raw.valve),
+        let (table, (valve_check, spanned)) = match own.and_then(|own| own.valve.as_ref()) {
+            Some(valve) => (key("valve"), (check, valve)),
+            None => ("valve".to_owned(), common_valve),
         };
-        let valve = valves::clutch_valve(check, &table, spanned)?;
-        reaches(check, &table, &valve, spanned, line_pressure_pa)?;
+        let valve = valves::clutch_valve(valve_check, &table, spanned)?;
+        reaches(valve_check, &table, &valve, spanned, line_pressure_pa)?;
         let hysteresis_pa = match &spanned.get_ref().hysteresis_pa {
-            Some(half_width) => check.number(&format!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            Some(half_width) => valve_check.number(&format!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         };
         if clutch.kiss_pressure() >= line_pressure_pa {

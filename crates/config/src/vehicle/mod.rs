@@ -20,8 +20,8 @@ use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
-use crate::{ConfigError, Source};
-pub use car::Car;
+use crate::{ConfigError, Kind, Source};
+pub use car::{Car, LockUp};
 pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
 use raw::{
@@ -287,6 +287,12 @@ impl Vehicle {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
+        if source.kind().is_ok_and(|kind| kind == Kind::Car) {
+            let message = "is a vehicle with a whole gearbox, not one with a single shift".to_owned();
+            let hint =
+                "`simulate` of a drive file and `check` take it; observers and designs need a file with [gear_train]";
+            return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
+        }
         let vehicle = Self::checked(&Layers { source: &source, over: None })?;
         Ok(Self { source, ..vehicle })
     }

@@ -4,7 +4,7 @@
 //! `sum s_k a_k`, and each sticking element holds `sum s_k h_k`. The columns `a_k` and `h_k` are computed once for each set of
 //! sticking elements.
 
-use super::model::{CarInputs, CarModel, CarState, end_responses, slip_of};
+use super::model::{CarInputs, CarModel, CarState, end_responses};
 use crate::gear_train::{Limits, MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
 use crate::{Contact, Direction, MAX_CONTACTS};
 
@@ -62,7 +62,7 @@ impl Contacts {
         for (source, free) in ends.chain(elements) {
             let (stuck, count) = (contacts.stuck, contacts.stuck_count);
             let stuck = &stuck[..count];
-            let problem = train.problem(stuck, |element| (slip_of(train, element, &free), Limits::DOG))?;
+            let problem = train.problem(stuck, |element| (train.slip(&free, element), Limits::DOG))?;
             let held = problem.solve(&[]).torques_n_m;
             let mut acceleration = free;
             for (at, (&element, held)) in stuck.iter().zip(held).enumerate() {
@@ -176,7 +176,7 @@ impl Contacts {
         let free = others.accelerations_rad_s2(&model.ends_n_m(&torques), &torques.elements_n_m);
         let problem = train.problem(at_zero, |element| {
             let (lower, upper) = model.holding_limits(element, &state, inputs).unwrap_or((0.0, 0.0));
-            (slip_of(train, element, &free), Limits::between(lower, upper))
+            (train.slip(&free, element), Limits::between(lower, upper))
         })?;
         let solution = problem.solve(&[]);
         for (&element, contact) in at_zero.iter().zip(solution.contacts) {

@@ -43,6 +43,9 @@ pub fn simulate_car_drive(
     drive: &Drive,
     mut record: impl FnMut(&CarSample),
 ) -> Result<CarDriveSummary, CarError> {
+    if drive.segments.is_empty() || drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3) {
+        return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
+    }
     let mut road = Road::new(drive);
     let mut shifting = Shifting::new(&model.car, drive)?;
     let driver = road.at(0.0);
@@ -135,7 +138,7 @@ impl<'d> Shifting<'d> {
             ShiftPlan::Listed(list) => {
                 list.iter().map(|(time_s, name)| named(name).map(|gear| (*time_s, gear))).collect::<Result<_, _>>()?
             }
-            ShiftPlan::Schedule { .. } => Vec::new(),
+            ShiftPlan::Schedule(_) => Vec::new(),
         };
         let final_ratio = car.driveline.final_ratio;
         let (plan, since_s) = (&drive.shifts, 0.0);
@@ -164,18 +167,18 @@ impl<'d> Shifting<'d> {
                     Ok(())
                 }
             },
-            ShiftPlan::Schedule { up_rad_s, down_rad_s, time_in_gear_s } => {
+            ShiftPlan::Schedule(schedule) => {
                 let Some(at) = self.gears.iter().position(|&(gear, _)| gear == self.gear) else { return Ok(()) };
                 let ratio = self.gears[at].1;
                 let input_rad_s = run.state().wheel_rad_s * self.final_ratio * ratio;
-                let (up, down) = (up_rad_s.at(driver.throttle), down_rad_s.at(driver.throttle));
+                let (up, down) = (schedule.up_rad_s.at(driver.throttle), schedule.down_rad_s.at(driver.throttle));
                 let above = self.gears.get(at + 1);
                 let below = at.checked_sub(1).map(|below| self.gears[below]);
                 let down = below.map_or(0.0, |(_, lower)| down.min(HYSTERESIS * up * ratio / lower));
                 let nearer_above = input_rad_s - down > up - input_rad_s;
                 let expected = if nearer_above { above.copied().or(below) } else { below.or(above.copied()) };
                 run.preselect(expected.map(|(gear, _)| gear));
-                if now_s < self.since_s + time_in_gear_s {
+                if now_s < self.since_s + schedule.time_in_gear_s {
                     return Ok(());
                 }
                 match (above, below) {

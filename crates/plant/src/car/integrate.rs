@@ -255,8 +255,8 @@ impl CarIntegrator {
         for &element in self.contacts.stuck() {
             let (lower, upper) = model.holding_limits(element, x, inputs).unwrap_or((0.0, 0.0));
             // The contact solver counts in shares of the limits.
-            let slack = TORQUE_SLACK * (1.0 + upper);
-            margins[element] = (upper - held[element]).min(held[element] - lower) + slack;
+            let slack = |limit: f64| TORQUE_SLACK * (1.0 + limit.abs());
+            margins[element] = (upper - held[element] + slack(upper)).min(held[element] - lower + slack(lower));
         }
         margins
     }

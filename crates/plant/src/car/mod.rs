@@ -31,7 +31,7 @@ mod start;
 mod valves;
 
 pub use contacts::{ContactState, Contacts};
-pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftStage};
+pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftProgress, ShiftStage};
 pub use drive::{CarDriveSummary, simulate_car_drive};
 pub use energy::{CarPowers, stored_car_energy};
 pub use integrate::{CarError, CarIntegrator, CarStep};

@@ -21,8 +21,8 @@ const PRESSURE: usize = MOTION + MAX_FREEDOMS;
 /// Number of states.
 pub(super) const STATES: usize = PRESSURE + MAX_PACKS;
 
-/// Speed of the wheel, rad/s, over which the torque of the brake turns around: a braked car creeps by millimetres per second
-/// instead of sticking.
+/// Speed of the wheel, rad/s, over which the torque of the brake turns around: the brakes of a standing car creep instead of
+/// sticking, as its tyres do.
 const BRAKE_TURN_RAD_S: f64 = 0.1;
 
 /// Torque by which the synchroniser of a dog brings its gear to the speed of the shaft, N m \[chosen\].
@@ -390,9 +390,4 @@ pub(super) fn end_responses(train: &TrainModel) -> [[f64; MAX_FREEDOMS]; 3] {
     let mut engine = [0.0; MAX_FREEDOMS];
     engine[train.freedoms - 1] = 1.0;
     [engine, train.ends[0], train.ends[1]].map(|force| train.accelerate(&force))
-}
-
-/// A response seen by the slip of an element.
-pub(super) fn slip_of(train: &TrainModel, element: usize, response: &[f64; MAX_FREEDOMS]) -> f64 {
-    train.slip(response, element)
 }

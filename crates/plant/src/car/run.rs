@@ -54,6 +54,10 @@ impl<'m> CarRun<'m> {
         if sample_time_s.is_nan() || sample_time_s < 1e-4 {
             return Err(CarError::Request(format!("the sample time is {sample_time_s} s, expected 1e-4 s or more")));
         }
+        if !is_same_box(&model.car, nominal) {
+            let message = "the controller's car has another gearbox than the simulated one".to_owned();
+            return Err(CarError::Request(message));
+        }
         let mut controller = CarShiftController::new(nominal, calibration, gear)?;
         let commands = controller.step(0.0, driver.throttle, &measure(model, &state));
         let mut valves = CarValves::new(model, &commands.elements);
@@ -140,6 +144,14 @@ fn sample_time(samples: u64, sample_time_s: f64) -> f64 {
     samples as f64 * sample_time_s
 }
 
+/// Whether gears and elements have the same places in both cars.
+fn is_same_box(car: &Car, other: &Car) -> bool {
+    let gears = |car: &Car| car.gearbox.gears.iter().map(|gear| gear.name.clone()).collect::<Vec<_>>();
+    let elements = |car: &Car| car.gearbox.elements.iter().map(|element| element.name.clone()).collect::<Vec<_>>();
+    let is_whole = other.clutches.len() == other.gearbox.elements.len();
+    is_whole && gears(car) == gears(other) && elements(car) == elements(other)
+}
+
 fn measure(model: &CarModel, state: &CarState) -> CarMeasured {
     let [engine_rad_s, turbine_rad_s, output_rad_s] = model.speeds(state);
     CarMeasured { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s: state.wheel_rad_s }
@@ -155,6 +167,6 @@ fn inputs(model: &CarModel, valves: &mut CarValves, commands: &CarCommands, driv
         grade_rad: driver.grade_rad,
         settled_pa: valves.settled_pa(model, now_s),
         dogs: commands.dogs,
-        lock_up_n_m: 0.0,
+        lock_up_n_m: commands.lock_up_n_m,
     }
 }

@@ -1,6 +1,6 @@
 //! What a simulated car shows at an instant.
 
-use super::controller::{CarCommands, ShiftStage};
+use super::controller::{CarCommands, ShiftProgress, ShiftStage};
 use super::integrate::CarStep;
 use super::model::{CarModel, CarTorques};
 use super::run::Driver;
@@ -81,7 +81,7 @@ impl CarSample {
         time_s: f64,
         commands: &CarCommands,
         driver: Driver,
-        (gear, shift): (usize, Option<(usize, usize, usize, usize, ShiftStage)>),
+        (gear, shift): (usize, Option<ShiftProgress>),
     ) -> Self {
         let x = step.at(time_s.clamp(step.start_s, step.end_s));
         let torques = model.torques(step.contacts, &x, step.inputs);
@@ -102,12 +102,12 @@ impl CarSample {
         Self {
             time_s,
             gear,
-            shift: shift.map(|(from, to, offgoing, oncoming, stage)| ShiftUnderWay {
-                from,
-                to,
-                stage,
-                offgoing: element(offgoing),
-                oncoming: element(oncoming),
+            shift: shift.map(|shift| ShiftUnderWay {
+                from: shift.from,
+                to: shift.to,
+                stage: shift.stage,
+                offgoing: element(shift.offgoing),
+                oncoming: element(shift.oncoming),
             }),
             driver,
             engine_share: commands.engine_share,

@@ -31,8 +31,8 @@ pub struct CarShift {
 }
 
 impl CarShift {
-    /// A shift from one gear to another at this throttle, with one second before its request and three after it, at a vehicle
-    /// speed at which the gearbox input turns at 230 rad/s in the higher of the two gears' speeds.
+    /// A shift from one gear to another at this throttle, with one second before its request and three after it, at the vehicle
+    /// speed at which the gearbox input turns at 230 rad/s in the lower of the two gears.
     pub fn usual(car: &Car, from: usize, to: usize, throttle: f64) -> Self {
         const INPUT_RAD_S: f64 = 230.0;
         let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(1.0, |gear| gear.ratio.abs());

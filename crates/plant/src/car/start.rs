@@ -2,7 +2,6 @@
 
 use super::integrate::CarError;
 use super::model::{CarModel, CarState, MAX_PACKS};
-use crate::gear_train::MAX_FREEDOMS;
 
 /// Engine speeds among which the steady one is sought, rad/s.
 const SPEEDS_RAD_S: (f64, f64) = (20.0, 700.0);
@@ -66,9 +65,7 @@ impl CarModel {
             }
         }
         let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad + 0.5 * car.backlash_rad * shaft_n_m.signum();
-        let mut motion_and_engine = [0.0; MAX_FREEDOMS];
-        motion_and_engine.copy_from_slice(&motion);
-        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion: motion_and_engine, pressures_pa })
+        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, pressures_pa })
     }
 
     /// The highest speed at which engine and pump are in balance, rad/s, at least idle speed; without a converter that of the gearbox input.

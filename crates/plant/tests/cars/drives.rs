@@ -1,47 +1,170 @@
 //! Whole drives.
 
-use config::{Drive, Source};
-use plant::car::{CarCalibration, CarModel, simulate_car_drive};
+use config::{Car, Drive, Source};
+use plant::car::{CarCalibration, CarError, CarModel, CarSample, Driver, simulate_car_drive};
 
-fn city() -> Drive {
-    let text = include_str!("../../../../drives/city.toml");
-    Drive::from_source(Source::built_in("drives/city.toml", text)).unwrap()
+fn drive(text: &str) -> Drive {
+    Drive::from_source(Source::built_in("drive.toml", text)).unwrap()
+}
+
+fn samples(car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
+    let model = CarModel::new(car.clone())?;
+    let mut samples = Vec::new();
+    simulate_car_drive(&model, car, CarCalibration::STANDARD, drive, |sample| samples.push(*sample))?;
+    Ok(samples)
 }
 
 #[test]
-fn an_hour_in_town() {
-    let drive = city();
+fn an_hour_in_town_uses_the_gears_and_shifts_more_than_200_times() {
+    let drive = drive(include_str!("../../../../drives/city.toml"));
+    for car in crate::cars().into_iter().take(4) {
+        let model = CarModel::new(car.clone()).unwrap();
+        let (mut count, mut used) = (0, vec![false; car.gearbox.gears.len()]);
+        let begin = std::time::Instant::now();
+        let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
+            count += 1;
+            used[sample.gear] = true;
+            assert!(sample.vehicle_m_s.is_finite() && sample.torques.engine_rad_s > 60.0, "{}", sample.time_s);
+        })
+        .unwrap();
+        println!("{}: {summary:?} in {:.2} s", car.gearbox.name, begin.elapsed().as_secs_f64());
+        assert_eq!(count, 360_000);
+        assert!(summary.shifts >= 200, "{summary:?}");
+        // The highest gear of the ten-speed box is for motorways.
+        let gears = car.gearbox.forward_gears();
+        assert!(gears[..gears.len().min(9)].iter().all(|&gear| used[gear]), "{used:?}");
+    }
+}
+
+#[test]
+fn the_same_drive_gives_the_same_samples() {
     let car = crate::cars().swap_remove(0);
+    let drive = drive("name = \"d\"\n[[segment]]\nduration_s = 20\nthrottle = [0.0, 0.5]\n");
+    assert_eq!(samples(&car, &drive).unwrap(), samples(&car, &drive).unwrap());
+}
+
+#[test]
+fn listed_shifts_are_made_at_their_times() {
+    let car = crate::cars().swap_remove(0);
+    let text = "name = \"d\"\nstart = { gear = \"2\", vehicle_m_s = 8.0 }\n\
+                shift = [{ time_s = 2.0, gear = \"3\" }, { time_s = 5.0, gear = \"2\" }]\n\
+                [[segment]]\nduration_s = 8\nthrottle = 0.15\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    let gear_at = |time_s: f64| {
+        let sample = samples.iter().find(|sample| sample.time_s >= time_s).unwrap();
+        car.gearbox.gears[sample.gear].name.clone()
+    };
+    assert_eq!([1.9, 4.9, 7.9].map(gear_at), ["2", "3", "2"]);
+    let begun = samples.iter().find(|sample| sample.shift.is_some()).unwrap();
+    assert!((begun.time_s - 2.0).abs() < 1e-6, "{}", begun.time_s);
+}
+
+#[test]
+fn a_car_that_is_braked_on_a_hill_stands() {
+    let car = crate::cars().swap_remove(0);
+    let last = |brake: f64| {
+        let text =
+            format!("name = \"d\"\n[[segment]]\nduration_s = 30\nthrottle = 0.0\nbrake = {brake}\ngrade_rad = 0.3\n");
+        *samples(&car, &drive(&text)).unwrap().last().unwrap()
+    };
+    // Idling in 1st gear does not hold the car on this hill; the brake does, by a creep of tyre and brake.
+    let (free, braked) = (last(0.0), last(0.9));
+    assert!(free.vehicle_m_s < -1.0, "{}", free.vehicle_m_s);
+    assert!(braked.vehicle_m_s.abs() < 0.05, "{}", braked.vehicle_m_s);
+    assert!((60.0..100.0).contains(&braked.torques.engine_rad_s), "idle at {}", braked.torques.engine_rad_s);
+}
+
+#[test]
+fn a_dual_clutch_drives_and_says_that_it_cannot_launch() {
+    let car = crate::dual_clutch();
+    let segments =
+        "[[segment]]\nduration_s = 30\nthrottle = [0.1, 0.4]\n[[segment]]\nduration_s = 20\nthrottle = 0.0\n";
+    let rolling = format!("name = \"d\"\nstart = {{ gear = \"2\", vehicle_m_s = 5.0 }}\n{segments}");
+    let driven = samples(&car, &drive(&rolling)).unwrap();
+    assert!(driven.iter().any(|sample| sample.gear > 3));
+    let error = samples(&car, &drive(&format!("name = \"d\"\n{segments}"))).unwrap_err();
+    assert!(error.to_string().contains("launch is not simulated"), "{error}");
+}
+
+#[test]
+fn in_reverse_the_car_goes_backwards() {
+    let car = crate::cars().swap_remove(0);
+    let text = "name = \"d\"\nstart = { gear = \"R\" }\n[[segment]]\nduration_s = 5\nthrottle = 0.08\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    let last = samples.last().unwrap();
+    assert!(last.vehicle_m_s < -1.0 && last.torques.turbine_rad_s > 10.0, "{}", last.vehicle_m_s);
+    let ratio = car.gearbox.gears[last.gear].ratio;
+    assert!((last.torques.turbine_rad_s - ratio * last.torques.output_rad_s).abs() < 1e-6);
+}
+
+/// The four-speed box with a one-way clutch that holds 1st gear in place of the brake LR.
+#[test]
+fn a_one_way_clutch_drives_and_freewheels() {
+    let text = include_str!("../../../../gearboxes/ravigneaux_4.toml");
+    let gear = "name = \"1\", engaged = [\"FWD\", \"LR\"]";
+    assert!(text.contains(gear));
+    let text = text.replace(gear, "name = \"1\", engaged = [\"FWD\", \"OWC\"]")
+        + "\n[[element]]\nname = \"OWC\"\nkind = \"one-way-clutch\"\ninput = \"housing\"\noutput = \"car\"\n";
+    let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
+    let car = Car::from_sources(source, Source::built_in("g.toml", &text)).unwrap();
+    let text = "name = \"d\"\nstart = { gear = \"1\", vehicle_m_s = 6.0 }\nshift = []\n\
+                segment = [{ duration_s = 2, throttle = 0.2 }, { duration_s = 3, throttle = 0.0 }, \
+                { duration_s = 2, throttle = 0.3 }]\n";
+    let samples = samples(&car, &drive(text)).unwrap();
+    let slip_at = |time_s: f64| {
+        let sample = samples.iter().find(|sample| sample.time_s >= time_s).unwrap();
+        sample.torques.turbine_rad_s - car.gearbox.gears[sample.gear].ratio * sample.torques.output_rad_s
+    };
+    assert!(slip_at(1.9).abs() < 1e-6, "it drives: {}", slip_at(1.9));
+    assert!(slip_at(4.9) < -30.0, "the turbine falls behind: {}", slip_at(4.9));
+    assert!(slip_at(6.9).abs() < 1e-6, "it drives again: {}", slip_at(6.9));
+}
+
+#[test]
+fn the_lock_up_clutch_closes_in_its_gears_and_opens_for_shifts() {
+    let gearbox = include_str!("../../../../gearboxes/8hp.toml");
+    let text = "name = \"car\"\ngearbox = \"g.toml\"\n[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\n\
+                on_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.6\n";
+    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap();
+    let samples = samples(&car, &drive("name = \"d\"\n[[segment]]\nduration_s = 25\nthrottle = 0.2\n")).unwrap();
+    let lock_up = car.gearbox.elements.len();
+    let slip = |sample: &CarSample| sample.torques.engine_rad_s - sample.torques.turbine_rad_s;
+    let locked = |sample: &&CarSample| sample.torques.elements_n_m[lock_up] != 0.0 && slip(sample).abs() < 1e-6;
+    let gear = |sample: &CarSample| car.gearbox.gears[sample.gear].name.clone();
+    assert!(samples.iter().filter(|sample| gear(sample) < "3".to_owned()).all(|sample| !locked(&sample)));
+    for name in ["3", "4", "5"] {
+        assert!(samples.iter().filter(|sample| gear(sample) == name).filter(locked).count() > 50, "gear {name}");
+    }
+    let late =
+        |sample: &&CarSample| sample.shift.is_some_and(|shift| !matches!(shift.stage, plant::car::ShiftStage::Fill));
+    assert!(samples.iter().filter(late).all(|sample| !locked(&sample)));
+}
+
+#[test]
+fn wrong_requests_get_clear_errors() {
+    let car = crate::cars().swap_remove(0);
+    let error = |head: &str| {
+        let text = format!("name = \"d\"\n{head}\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n");
+        samples(&car, &drive(&text)).unwrap_err().to_string()
+    };
+    assert!(error("start = { gear = \"9\" }").contains("no gear \"9\"\nhint: its gears are R, 1, 2"));
+    assert!(error("start = { gear = \"1\", vehicle_m_s = 90.0 }").contains("the most is 700 rad/s"));
+    assert!(error("shift = [{ time_s = 1.0, gear = \"4\" }]").contains("shift 1-4 is not between two clutches"));
+
     let model = CarModel::new(car.clone()).unwrap();
-    let begin = std::time::Instant::now();
-    let mut samples = 0_u64;
-    let mut last = (usize::MAX, 0.0);
-    let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
-        samples += 1;
-        if sample.gear != last.0 && sample.time_s < 185.0 {
-            println!(
-                "{:7.2} s gear {} {:5.1} m/s input {:5.1} engine {:5.1}",
-                sample.time_s,
-                car.gearbox.gears[sample.gear].name,
-                sample.vehicle_m_s,
-                sample.torques.turbine_rad_s,
-                sample.torques.engine_rad_s
-            );
-            last.0 = sample.gear;
-        }
-        if sample.time_s >= last.1 && sample.time_s < 180.0 {
-            println!(
-                "{:7.2} s gear {} {:5.1} m/s input {:5.1} engine {:5.1} thr {:.2}",
-                sample.time_s,
-                car.gearbox.gears[sample.gear].name,
-                sample.vehicle_m_s,
-                sample.torques.turbine_rad_s,
-                sample.torques.engine_rad_s,
-                sample.driver.throttle
-            );
-            last.1 += 5.0;
-        }
-    });
-    println!("{summary:?} {samples} samples in {:.3} s", begin.elapsed().as_secs_f64());
-    summary.unwrap();
+    let nan = model.in_gear(1, None, f64::NAN, 0.1).unwrap_err();
+    assert!(nan.to_string().contains("cannot start at NaN m/s"), "{nan}");
+    let state = model.in_gear(1, None, 5.0, 0.1).unwrap();
+    let driver = Driver { throttle: 0.1, brake: 0.0, grade_rad: 0.0 };
+    let calibration = CarCalibration::STANDARD;
+    assert!(plant::car::CarRun::new(&model, &car, calibration, 1, state, (driver, 0.0)).is_err());
+    let other = crate::two_speed();
+    let error = plant::car::CarRun::new(&model, &other, calibration, 1, state, (driver, 0.01)).unwrap_err();
+    assert!(error.to_string().contains("another gearbox"), "{error}");
+    let mut empty = drive("name = \"d\"\n[[segment]]\nduration_s = 3\nthrottle = 0.2\n");
+    empty.segments.clear();
+    assert!(samples(&car, &empty).unwrap_err().to_string().contains("segments of 1 ms"));
+    let mut infinite = state;
+    infinite.wheel_rad_s = f64::INFINITY;
+    assert!(plant::car::CarRun::new(&model, &car, calibration, 1, infinite, (driver, 0.01)).is_err());
 }

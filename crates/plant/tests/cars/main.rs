@@ -2,11 +2,6 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
-mod drives;
-mod energy;
-mod shifts;
-mod two_speed;
-
 use config::{Car, Source};
 
 /// A vehicle file of two or three lines with a gearbox that ships with the program.
@@ -19,6 +14,11 @@ macro_rules! car {
         .unwrap()
     };
 }
+
+mod drives;
+mod energy;
+mod shifts;
+mod two_speed;
 
 fn two_speed() -> Car {
     car!("gearboxes/two_speed.toml", "[hydraulics]\nline_pressure_pa = 1.0e6\n")

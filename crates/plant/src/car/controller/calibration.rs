@@ -17,6 +17,8 @@ pub struct CarCalibration {
     pub flare_ramp: f64,
     /// Share of the turbine torque that the offgoing clutch holds while the old gear flares.
     pub flare_holding: f64,
+    /// Turbine torque beyond which its sign is believed, N m.
+    pub sign_n_m: f64,
     /// Time in which the offgoing clutch gives up the turbine torque, until the old gear slips (inertia phase first), s.
     pub release_s: f64,
     /// Slip of the old gear at which it is left, or counts as a flare, rad/s at the turbine.
@@ -62,6 +64,8 @@ pub struct CarCalibration {
     pub engine_way: f64,
     /// Time in which the share of the engine torque changes by one, s.
     pub engine_ramp_s: f64,
+    /// Time in which the lock-up clutch opens, s: less than that of the fill.
+    pub unlock_s: f64,
     /// Time constant of the output speed, s.
     pub output_filter_s: f64,
     /// Time constant with which a pressure is made to follow, s.
@@ -80,6 +84,7 @@ impl CarCalibration {
         torque_phase_s: 0.20,
         flare_ramp: 1.8,
         flare_holding: 0.25,
+        sign_n_m: 5.0,
         release_s: 0.5,
         release_slip_rad_s: 3.0,
         inertia_phase_s: 0.40,
@@ -102,6 +107,7 @@ impl CarCalibration {
         down_engine_share: 0.7,
         engine_way: 0.8,
         engine_ramp_s: 0.2,
+        unlock_s: 0.12,
         output_filter_s: 0.04,
         pressure_follow_s: 0.02,
         pressure_lead_pa: 0.3e6,

@@ -49,6 +49,23 @@ pub struct CarCommands {
     pub dogs: [bool; MAX_ELEMENTS],
     /// Share of the engine torque that the driver asks for.
     pub engine_share: f64,
+    /// Torque that the lock-up clutch is to hold, N m.
+    pub lock_up_n_m: f64,
+}
+
+/// A shift that is under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShiftProgress {
+    /// The gear before.
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// Place of the clutch that opens among the elements.
+    pub offgoing: usize,
+    /// Place of the clutch that closes.
+    pub oncoming: usize,
+    /// What the controller is about.
+    pub stage: ShiftStage,
 }
 
 /// The shift controller.
@@ -61,6 +78,9 @@ pub struct CarShiftController {
     preselected: Option<usize>,
     output: Track,
     engine_share: f64,
+    /// Share of its capacity with which the lock-up clutch is closed.
+    lock_up_share: f64,
+    is_locked_up: bool,
 }
 
 impl CarShiftController {
@@ -73,7 +93,17 @@ impl CarShiftController {
             return Err(CarError::Request(format!("the gearbox has no gear number {gear}")));
         }
         let output = Track::new(calibration.output_filter_s);
-        Ok(Self { car: car.clone(), calibration, gear, active: None, preselected: None, output, engine_share: 1.0 })
+        Ok(Self {
+            car: car.clone(),
+            calibration,
+            gear,
+            active: None,
+            preselected: None,
+            output,
+            engine_share: 1.0,
+            lock_up_share: 0.0,
+            is_locked_up: false,
+        })
     }
 
     /// The gear, before and during a shift the one that is left.
@@ -81,11 +111,15 @@ impl CarShiftController {
         self.gear
     }
 
-    /// Gears and elements of the shift that is under way, and its stage.
-    pub fn shift(&self) -> Option<(usize, usize, usize, usize, ShiftStage)> {
-        self.active
-            .as_ref()
-            .map(|shift| (self.gear, shift.to, shift.offgoing.element, shift.oncoming.element, shift.stage))
+    /// The shift that is under way.
+    pub fn shift(&self) -> Option<ShiftProgress> {
+        self.active.as_ref().map(|shift| ShiftProgress {
+            from: self.gear,
+            to: shift.to,
+            offgoing: shift.offgoing.element,
+            oncoming: shift.oncoming.element,
+            stage: shift.stage,
+        })
     }
 
     /// Puts in the dogs of this gear beside those of the gear that is engaged.
@@ -157,7 +191,21 @@ impl CarShiftController {
         }
         let step = period_s / self.calibration.engine_ramp_s;
         self.engine_share += (wanted - self.engine_share).clamp(-step, step);
-        CarCommands { elements, dogs, engine_share: self.engine_share }
+        let lock_up_n_m = self.lock_up(measured);
+        CarCommands { elements, dogs, engine_share: self.engine_share, lock_up_n_m }
+    }
+
+    /// Torque that the lock-up clutch is to hold, N m. It is open during shifts: their turbine torque is that of the converter.
+    fn lock_up(&mut self, measured: &CarMeasured) -> f64 {
+        let Some(lock_up) = self.car.lock_up else { return 0.0 };
+        let ratio = |gear: usize| self.car.gearbox.gears[gear].ratio;
+        let is_high = ratio(self.gear) > 0.0 && ratio(self.gear) <= ratio(lock_up.first_gear);
+        let fastest = if self.is_locked_up { lock_up.off_rad_s } else { lock_up.on_rad_s };
+        self.is_locked_up = self.active.is_none() && is_high && measured.turbine_rad_s > fastest;
+        let period_s = self.calibration.control_period_s;
+        let step = if self.is_locked_up { period_s / lock_up.ramp_s } else { -period_s / self.calibration.unlock_s };
+        self.lock_up_share = (self.lock_up_share + step).clamp(0.0, 1.0);
+        self.lock_up_share * lock_up.capacity_n_m
     }
 
     /// Torque on the gearbox input as the nominal maps give it, N m. The engine controller's reductions are known.

@@ -154,8 +154,14 @@ impl ActiveShift {
                 PhaseOrder::TorqueFirst => ShiftStage::TorquePhase,
                 PhaseOrder::InertiaFirst => ShiftStage::InertiaPhase,
             },
+            // The turbine torque has changed its sign: the other clutch will control the inertia phase.
+            ShiftStage::TorquePhase if now.turbine_n_m * direction < -c.sign_n_m => ShiftStage::InertiaPhase,
+            ShiftStage::InertiaPhase if !self.is_slipping && now.turbine_n_m * direction > c.sign_n_m => {
+                ShiftStage::TorquePhase
+            }
             ShiftStage::TorquePhase if now.y * direction < -c.release_slip_rad_s => ShiftStage::InertiaPhase,
             ShiftStage::TorquePhase if self.transferred >= 1.0 => ShiftStage::InertiaPhase,
+            ShiftStage::InertiaPhase if !self.is_slipping => ShiftStage::InertiaPhase,
             ShiftStage::InertiaPhase => match self.order(self.controlled_n_m) {
                 PhaseOrder::TorqueFirst if locks => ShiftStage::Lock,
                 PhaseOrder::InertiaFirst if self.nears(c, now) => ShiftStage::HandOver,

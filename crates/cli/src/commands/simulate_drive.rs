@@ -1,0 +1,215 @@
+//! `wetclutch simulate` of a drive file.
+
+use std::path::{Path, PathBuf};
+
+use config::{Car, Drive};
+use drivetrain::CommandKind;
+use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, simulate_car_drive};
+use trace::{Cell, CsvWriter, WholeFile, signal};
+
+use crate::args::Simulate;
+use crate::failure::Failure;
+use crate::output;
+
+pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
+    let drive = Drive::read(&options.experiment)?;
+    let car = match &options.vehicle {
+        Some(vehicle) => Car::read(vehicle)?,
+        None => drive.read_vehicle()?,
+    };
+    if options.scenario.is_some() {
+        let message = format!("{}: a drive has no scenarios\nhint: leave --scenario out", options.experiment.display());
+        return Err(Failure::Input(message));
+    }
+    let name = drive.name.to_lowercase();
+    let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
+    let columns = columns(&car);
+    let mut whole = Table::create(options.output.join(format!("{name}.csv")), &columns, |_| true)?;
+    let mut measured =
+        Table::create(options.output.join(format!("{name}_measured.csv")), &columns, |column| column.is_measured)?;
+    let mut written = Ok(());
+    let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
+        // After a write error the simulation continues to its end without writing: this takes seconds.
+        if written.is_ok() {
+            written = whole.write(&car, sample).and_then(|()| measured.write(&car, sample));
+        }
+    })?;
+    written?;
+    let ((whole_file, whole), (measured_file, measured)) = (whole.complete()?, measured.complete()?);
+    WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(&options.output, &error))?;
+    output::note(&format!(
+        "drive: {:.0} s, {:.2} km, {} shifts, at most {:.0} km/h",
+        summary.duration_s,
+        1e-3 * summary.distance_m,
+        summary.shifts,
+        3.6 * summary.fastest_m_s,
+    ));
+    output::line(&whole.display().to_string())?;
+    output::line(&measured.display().to_string())?;
+    Ok(())
+}
+
+/// A column of the results.
+#[derive(Clone, Copy)]
+struct DriveColumn {
+    name: &'static str,
+    /// Whether a car measures or commands it.
+    is_measured: bool,
+    value: for<'c> fn(&'c Car, &CarSample) -> Cell<'c>,
+}
+
+/// A number of a shift clutch; an empty cell where no shift is under way.
+macro_rules! of_shift {
+    ($clutch:ident, $field:ident) => {
+        |_, sample| Cell::Number(sample.shift.map_or(f64::NAN, |shift| shift.$clutch.$field))
+    };
+}
+
+/// The columns in their order.
+fn columns(car: &Car) -> Vec<DriveColumn> {
+    let kinds = || car.clutches.iter().flatten().map(|clutch| clutch.valve.command_kind());
+    let [offgoing, oncoming] = if kinds().all(|kind| kind == CommandKind::Current) {
+        [signal::OFFGOING_CURRENT, signal::ONCOMING_CURRENT]
+    } else if kinds().all(|kind| kind == CommandKind::DutyCycle) {
+        [signal::OFFGOING_DUTY, signal::ONCOMING_DUTY]
+    } else {
+        ["offgoing_command", "oncoming_command"]
+    };
+    let measured = |name, value| DriveColumn { name, is_measured: true, value };
+    let truth = |name, value| DriveColumn { name, is_measured: false, value };
+    vec![
+        measured(signal::ENGINE_SPEED, |_, s| Cell::Number(s.torques.engine_rad_s)),
+        measured(signal::TURBINE_SPEED, |_, s| Cell::Number(s.torques.turbine_rad_s)),
+        measured(signal::OUTPUT_SPEED, |_, s| Cell::Number(s.torques.output_rad_s)),
+        measured(signal::WHEEL_SPEED, |_, s| Cell::Number(s.wheel_rad_s)),
+        measured(signal::THROTTLE, |_, s| Cell::Number(s.driver.throttle)),
+        measured("brake", |_, s| Cell::Number(s.driver.brake)),
+        measured("engine_share", |_, s| Cell::Number(s.engine_share)),
+        measured("gear", |car, s| gear_name(car, s.gear)),
+        measured("target_gear", |car, s| gear_name(car, s.shift.map_or(s.gear, |shift| shift.to))),
+        measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
+        measured("offgoing", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.offgoing.element))),
+        measured("oncoming", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.oncoming.element))),
+        measured(offgoing, of_shift!(offgoing, command)),
+        measured(oncoming, of_shift!(oncoming, command)),
+        truth(signal::OFFGOING_PRESSURE, of_shift!(offgoing, pressure_pa)),
+        truth(signal::ONCOMING_PRESSURE, of_shift!(oncoming, pressure_pa)),
+        truth(signal::OFFGOING_TORQUE, of_shift!(offgoing, torque_n_m)),
+        truth(signal::ONCOMING_TORQUE, of_shift!(oncoming, torque_n_m)),
+        truth(signal::OFFGOING_SLIP, of_shift!(offgoing, slip_rad_s)),
+        truth(signal::ONCOMING_SLIP, of_shift!(oncoming, slip_rad_s)),
+        truth(signal::ENGINE_TORQUE, |_, s| Cell::Number(s.torques.engine_n_m)),
+        truth(signal::TURBINE_TORQUE, |_, s| Cell::Number(s.turbine_n_m)),
+        truth(signal::SHAFT_TORQUE, |_, s| Cell::Number(s.torques.shaft_n_m)),
+        truth("grade_rad", |_, s| Cell::Number(s.driver.grade_rad)),
+        truth(signal::VEHICLE_SPEED, |_, s| Cell::Number(s.vehicle_m_s)),
+        truth(signal::VEHICLE_ACCELERATION, |_, s| Cell::Number(s.vehicle_m_s2)),
+    ]
+}
+
+fn gear_name(car: &Car, gear: usize) -> Cell<'_> {
+    Cell::Word(car.gearbox.gears.get(gear).map_or("", |gear| gear.name.as_str()))
+}
+
+fn element(car: &Car, element: usize) -> Cell<'_> {
+    Cell::Word(car.gearbox.elements.get(element).map_or("", |element| element.name.as_str()))
+}
+
+fn stage_name(stage: ShiftStage) -> &'static str {
+    match stage {
+        ShiftStage::Fill => "fill",
+        ShiftStage::TorquePhase => "torque phase",
+        ShiftStage::InertiaPhase => "inertia phase",
+        ShiftStage::HandOver => "hand-over",
+        ShiftStage::Lock => "lock",
+        ShiftStage::Done => "done",
+    }
+}
+
+/// Some columns of the drive, written as it is simulated.
+struct Table {
+    path: PathBuf,
+    columns: Vec<DriveColumn>,
+    writer: CsvWriter<WholeFile>,
+}
+
+impl Table {
+    fn create(path: PathBuf, columns: &[DriveColumn], keep: impl Fn(&DriveColumn) -> bool) -> Result<Self, Failure> {
+        let columns: Vec<DriveColumn> = columns.iter().filter(|column| keep(column)).copied().collect();
+        let names = columns.iter().map(|column| column.name);
+        let writer = WholeFile::create(&path).and_then(|file| CsvWriter::new(file, names));
+        let writer = writer.map_err(|error| Failure::writing(&path, &error))?;
+        Ok(Self { path, columns, writer })
+    }
+
+    fn write(&mut self, car: &Car, sample: &CarSample) -> Result<(), Failure> {
+        let cells = self.columns.iter().map(|column| (column.value)(car, sample));
+        self.writer.row(sample.time_s, cells).map_err(|error| Failure::writing(&self.path, &error))
+    }
+
+    /// The file, which contains every row, and its path.
+    fn complete(self) -> Result<(WholeFile, PathBuf), Failure> {
+        match self.writer.finish() {
+            Ok(file) => Ok((file, self.path)),
+            Err(error) => Err(Failure::writing(&self.path, &error)),
+        }
+    }
+}
+
+/// Prints what a vehicle file with a gearbox describes.
+pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
+    let gears = car.gearbox.forward_gears();
+    let ratio = |gear: Option<&usize>| gear.map_or(f64::NAN, |&gear| car.gearbox.gears[gear].ratio);
+    output::line(&format!(
+        "vehicle \"{}\": gearbox \"{}\", {} forward gears, ratio {:.3} to {:.3}, final ratio {:.3}, {} kg, {}",
+        car.name,
+        car.gearbox.name,
+        gears.len(),
+        ratio(gears.first()),
+        ratio(gears.last()),
+        car.driveline.final_ratio,
+        car.road.mass_kg,
+        if car.converter.is_some() { "torque converter" } else { "no converter" },
+    ))?;
+    for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
+        if let Some(clutch) = clutch {
+            output::line(&format!(
+                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure",
+                element.name,
+                trace::units::mpa(clutch.clutch.kiss_pressure()),
+                clutch.clutch.static_capacity(car.line_pressure_pa),
+            ))?;
+        }
+    }
+    if !car.defaults_taken.is_empty() {
+        output::line(&format!("left out, as in vehicles/eight_speed.toml: {}", car.defaults_taken.join(", ")))?;
+    }
+    Ok(())
+}
+
+/// Prints what a drive file describes.
+pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> {
+    output::line(&format!(
+        "drive {}: {:.0} s in {} segments, driven {} times",
+        drive.name,
+        drive.duration_s(),
+        drive.segments.len(),
+        drive.repetitions
+    ))?;
+    match drive.vehicle {
+        Some(_) => describe_car(&drive.read_vehicle()?),
+        None => {
+            output::line(&format!("use: wetclutch simulate {} --vehicle VEHICLE -o DIR", path.display()))?;
+            Ok(())
+        }
+    }
+}
+
+impl From<CarError> for Failure {
+    fn from(error: CarError) -> Self {
+        match error {
+            CarError::Request(message) => Self::Input(message),
+            other => Self::Work(other.to_string()),
+        }
+    }
+}
