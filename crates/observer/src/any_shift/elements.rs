@@ -71,7 +71,7 @@ impl<T: Real> ElementState<T> {
                     // The first command is taken to have stood for long.
                     self.valve_pa = limits.possible_pressure(settled_pa);
                 }
-                self.commands.send(reading.age_s, settled_pa);
+                self.commands.send(reading.age_s, settled_pa, element.valve.needed_s(T::of(PIECE_S)));
                 ChannelHealth::Good
             }
         }

@@ -82,8 +82,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         channels: &Channels<ChannelHealth>,
         mut health: Health,
     ) -> ShiftEstimate<T> {
-        let refused = channels.each().iter().any(|channel| *channel == ChannelHealth::Refused);
-        let lost = channels.each().iter().any(|channel| *channel == ChannelHealth::Lost);
+        let refused = channels.each().contains(&ChannelHealth::Refused);
+        let lost = channels.each().contains(&ChannelHealth::Lost);
         health = health.max(match (channels.command == ChannelHealth::Refused, lost, refused) {
             (true, _, _) => Health::CommandRejected,
             (_, true, _) => Health::ChannelLost,
