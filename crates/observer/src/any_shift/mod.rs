@@ -286,7 +286,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                     let speeds = self.measured(&state.newest, Some(running));
                     self.advance(running, &state.elements, torque, speeds, dt_s);
                     [channels.turbine, channels.output, channels.wheel] =
-                        self.take_speeds(running, input, &channels.each(), speeds);
+                        self.take_speeds(running, input, &channels, speeds);
                 }
                 None => state.lose(),
             }
@@ -674,11 +674,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         &self,
         running: &mut Running<T>,
         input: &ShiftInput<T>,
-        channels: &[ChannelHealth; 5],
+        channels: &Channels<ChannelHealth>,
         speeds: [T; 2],
     ) -> [ChannelHealth; SPEEDS] {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
-        let mut health = [channels[1], channels[2], channels[3]];
+        let mut health = [channels.turbine, channels.output, channels.wheel];
         let unseen = self.may_slip_unseen(running, speeds);
         let Some(torques) = running.torques else { return health };
         let torques = torques.without(running.phase.phase.holding());
