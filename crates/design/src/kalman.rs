@@ -39,7 +39,7 @@ const SCALE_LEAST: f64 = 3e-4;
 const DELAY_LEAST_S: f64 = 1.3e-3;
 
 /// Standard deviation of an error whose bound is the edge of a uniform distribution.
-fn deviation_of(bound: f64) -> f64 {
+pub(crate) fn deviation_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 
@@ -62,12 +62,21 @@ fn deviation_rad_s(sensor: Option<&SpeedSensor>) -> f64 {
     sensor.map_or(READING_RAD_S, |sensor| sensor.noise_rad_s.max(READING_RAD_S))
 }
 
-fn speed_reading(sensor: Option<&SpeedSensor>) -> SpeedReading<f64> {
+pub(crate) fn speed_reading(sensor: Option<&SpeedSensor>) -> SpeedReading<f64> {
     SpeedReading {
         deviation_rad_s: deviation_rad_s(sensor),
         lag_rad: sensor.map_or(0.0, lag_rad),
         pitch_rad: sensor.map_or(0.0, |sensor| std::f64::consts::TAU / sensor.teeth),
         delay_s: sensor.map_or(0.0, |sensor| sensor.delay_s),
+    }
+}
+
+/// How the speed of an engine with this inertia changes, and is read.
+pub(crate) fn engine_noise(inertia_kg_m2: f64, sensor: Option<&SpeedSensor>) -> EngineNoise<f64> {
+    EngineNoise {
+        reading_rad_s: deviation_rad_s(sensor),
+        acceleration_walk: ENGINE_CHANGE_N_M / inertia_kg_m2 / ENGINE_CHANGE_S.sqrt(),
+        acceleration_max_rad_s2: ENGINE_MOST_N_M / inertia_kg_m2,
     }
 }
 
@@ -108,11 +117,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         delay_least_s: DELAY_LEAST_S,
         output_least_rad_s: told.output_least_rad_s,
     };
-    let engine = EngineNoise {
-        reading_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.engine)),
-        acceleration_walk: ENGINE_CHANGE_N_M / vehicle.engine.inertia_kg_m2 / ENGINE_CHANGE_S.sqrt(),
-        acceleration_max_rad_s2: ENGINE_MOST_N_M / vehicle.engine.inertia_kg_m2,
-    };
+    let engine = engine_noise(vehicle.engine.inertia_kg_m2, sensors.map(|sensors| &sensors.engine));
     let valve_model = |valve| ValveModel { valve, delay_s: 0.5 * (delay_least_s + delay_most_s) };
     let offgoing = OffgoingClutch {
         valve: valve_model(vehicle.offgoing.valve),

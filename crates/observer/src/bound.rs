@@ -125,7 +125,8 @@ impl<T: Real> RangeEstimator<T> {
             Some(dt_s) => state.pressure.step(&self.budget, dt_s, seen.command, limits.command_max),
             None => state.pressure.forget(&self.budget, limits.command_max),
         }
-        let (pressure_pa, clutch_torque_n_m) = self.pressure_and_torque(&state.pressure, seen.slip_rad_s);
+        let (pressure_pa, clutch_torque_n_m) =
+            pressure_and_torque(&self.clutch, &self.budget, &state.pressure, seen.slip_rad_s);
         let shaft_torque_n_m = match seen.phase {
             Some(phase) if seen.dt_s.is_some() && seen.read => {
                 let range = self.shaft.step(&mut state.shaft, phase, &seen.sample, clutch_torque_n_m);
@@ -165,45 +166,6 @@ impl<T: Real> RangeEstimator<T> {
         Seen { dt_s, command, phase, sample, slip_rad_s, read }
     }
 
-    /// The ranges of pressure and clutch torque, with the slip if its reading is usable.
-    #[inline]
-    fn pressure_and_torque(&self, pressure: &PressureRange<T>, slip_rad_s: Option<[T; 2]>) -> ([T; 2], [T; 2]) {
-        let (clutch, budget, zero) = (&self.clutch, &self.budget, T::zero());
-        let [lower_pa, upper_pa] = pressure.pressure_pa(budget);
-        let [least, most] = budget.friction_factor;
-        // The sign of a slip that may be zero is not known, nor whether the clutch holds.
-        let slip = slip_rad_s.filter(|[slip, error]| slip.abs() > *error);
-        let (lowest, highest) = match slip {
-            Some([slip, error]) => clutch.friction.range_within(slip.abs() - error, slip.abs() + error),
-            None => {
-                let (lowest, highest) = clutch.friction.range();
-                (lowest.min(clutch.static_friction), highest.max(clutch.static_friction))
-            }
-        };
-        let [lowest_force, highest_force] = self.clamp_force(pressure, [lower_pa, upper_pa]);
-        let at_most = most * highest * clutch.lever() * highest_force;
-        let at_least = least * lowest * clutch.lever() * lowest_force;
-        let torque = match slip {
-            None => [-at_most, at_most],
-            Some([slip, _]) if slip > zero => [at_least, at_most],
-            Some(_) => [-at_most, -at_least],
-        };
-        ([lower_pa, upper_pa], torque)
-    }
-
-    /// Least and greatest force that presses the plates together, N: none before the piston has closed the clearance.
-    #[inline]
-    fn clamp_force(&self, pressure: &PressureRange<T>, [lower_pa, upper_pa]: [T; 2]) -> [T; 2] {
-        let (clutch, zero) = (&self.clutch, T::zero());
-        let Some((fill, piston)) = self.budget.fill.as_ref().zip(pressure.piston(&self.budget)) else {
-            return [lower_pa, upper_pa].map(|pressure_pa| clutch.clamp_force(pressure_pa));
-        };
-        let [kiss, kissed] = fill.kiss_pressure_pa;
-        let force = |above_kiss: T| clutch.piston_area_m2 * above_kiss.max(zero);
-        let greatest = if piston.stroke()[1] < T::one() { zero } else { force(upper_pa - kiss) };
-        [force(lower_pa - kissed), greatest]
-    }
-
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> RangeEstimator<U> {
         RangeEstimator {
@@ -213,6 +175,55 @@ impl<T: Real> RangeEstimator<T> {
             tracker: self.tracker.cast(),
         }
     }
+}
+
+/// The ranges of pressure and clutch torque, with the slip and the error of its reading if that is usable.
+#[inline]
+pub(crate) fn pressure_and_torque<T: Real>(
+    clutch: &Clutch<T>,
+    budget: &Budget<T>,
+    pressure: &PressureRange<T>,
+    slip_rad_s: Option<[T; 2]>,
+) -> ([T; 2], [T; 2]) {
+    let zero = T::zero();
+    let [lower_pa, upper_pa] = pressure.pressure_pa(budget);
+    let [least, most] = budget.friction_factor;
+    // The sign of a slip that may be zero is not known, nor whether the clutch holds.
+    let slip = slip_rad_s.filter(|[slip, error]| slip.abs() > *error);
+    let (lowest, highest) = match slip {
+        Some([slip, error]) => clutch.friction.range_within(slip.abs() - error, slip.abs() + error),
+        None => {
+            let (lowest, highest) = clutch.friction.range();
+            (lowest.min(clutch.static_friction), highest.max(clutch.static_friction))
+        }
+    };
+    let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
+    let at_most = most * highest * clutch.lever() * highest_force;
+    let at_least = least * lowest * clutch.lever() * lowest_force;
+    let torque = match slip {
+        None => [-at_most, at_most],
+        Some([slip, _]) if slip > zero => [at_least, at_most],
+        Some(_) => [-at_most, -at_least],
+    };
+    ([lower_pa, upper_pa], torque)
+}
+
+/// Least and greatest force that presses the plates together, N: none before the piston has closed the clearance.
+#[inline]
+fn clamp_force<T: Real>(
+    clutch: &Clutch<T>,
+    budget: &Budget<T>,
+    pressure: &PressureRange<T>,
+    [lower_pa, upper_pa]: [T; 2],
+) -> [T; 2] {
+    let zero = T::zero();
+    let Some((fill, piston)) = budget.fill.as_ref().zip(pressure.piston(budget)) else {
+        return [lower_pa, upper_pa].map(|pressure_pa| clutch.clamp_force(pressure_pa));
+    };
+    let [kiss, kissed] = fill.kiss_pressure_pa;
+    let force = |above_kiss: T| clutch.piston_area_m2 * above_kiss.max(zero);
+    let greatest = if piston.stroke()[1] < T::one() { zero } else { force(upper_pa - kiss) };
+    [force(lower_pa - kissed), greatest]
 }
 
 impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {

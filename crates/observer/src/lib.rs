@@ -9,6 +9,7 @@
 #![no_std]
 
 pub mod alignment;
+pub mod any_shift;
 pub mod bound;
 mod commands;
 pub mod compliant;
@@ -30,6 +31,7 @@ pub mod tracker;
 pub mod unscented;
 
 pub use alignment::{AlignedState, Alignment, AlignmentState};
+pub use any_shift::{AnyShiftFilter, AnyShiftState, GearboxTables, ShiftEstimate, ShiftInput};
 pub use bound::{Bounded, Bounds, Budget, RangeEstimator, RangeState};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};
 pub use compliant_model::{CompliantModel, CompliantSpeedModel};

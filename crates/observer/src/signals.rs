@@ -164,8 +164,10 @@ pub enum Health {
     /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
     /// limit.
     PressureLimited,
-    /// A speed is unusable: in this sample the estimate is from the valve model alone.
+    /// The speeds cannot be used: the estimate is from the valve model alone.
     SpeedsRejected,
+    /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
+    HeldClutchSlips,
     /// The observer lost its state and starts again.
     Restarted,
     /// The time step is unusable: the estimate is that of the sample before.
@@ -174,7 +176,7 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
@@ -184,6 +186,7 @@ impl Health {
         Self::CommandRejected,
         Self::PressureLimited,
         Self::SpeedsRejected,
+        Self::HeldClutchSlips,
         Self::Restarted,
         Self::TimeRejected,
     ];
@@ -199,6 +202,7 @@ impl Health {
             Self::LimitedToRange => "limited_to_range",
             Self::CommandRejected => "command_rejected",
             Self::PressureLimited => "pressure_limited",
+            Self::HeldClutchSlips => "held_clutch_slips",
             Self::SpeedsRejected => "speeds_rejected",
             Self::Restarted => "restarted",
             Self::TimeRejected => "time_rejected",

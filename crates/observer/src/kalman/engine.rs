@@ -23,6 +23,18 @@ pub struct EngineNoise<T> {
     pub acceleration_max_rad_s2: T,
 }
 
+impl<T: Real> EngineNoise<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> EngineNoise<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        EngineNoise {
+            reading_rad_s: to(self.reading_rad_s),
+            acceleration_walk: to(self.acceleration_walk),
+            acceleration_max_rad_s2: to(self.acceleration_max_rad_s2),
+        }
+    }
+}
+
 /// Memory of the engine's filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Engine<T> {

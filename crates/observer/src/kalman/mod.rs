@@ -24,16 +24,16 @@
 //! positive but for rounding. A filter whose variance is no number, or negative, begins anew and says so.
 
 mod covariance;
-mod engine;
+pub(crate) mod engine;
 mod engine_torque;
-mod gate;
+pub(crate) mod gate;
 mod offgoing;
 mod past;
 mod phases;
 mod powertrain;
 mod predict;
 mod readings;
-mod valve_model;
+pub(crate) mod valve_model;
 
 use drivetrain::{Engagement, Real, ShiftCoefficients};
 
@@ -503,19 +503,13 @@ impl<T: Real> KalmanFilter<T> {
 
     /// The same filter in another precision.
     pub fn cast<U: Real>(&self) -> KalmanFilter<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
         let (sensor, noise) = &self.engine;
-        let noise = EngineNoise {
-            reading_rad_s: to(noise.reading_rad_s),
-            acceleration_walk: to(noise.acceleration_walk),
-            acceleration_max_rad_s2: to(noise.acceleration_max_rad_s2),
-        };
         KalmanFilter::new(
             self.model.cast(),
             self.valve.cast(),
             self.uncertainty.cast(),
             self.readings.map(|reading| reading.cast()),
-            (sensor.cast(), noise),
+            (sensor.cast(), noise.cast()),
             self.offgoing.cast(),
             self.reported.cast(),
             self.supervisor.cast(),

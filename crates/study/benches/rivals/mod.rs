@@ -22,7 +22,7 @@ struct FirstGear<'a> {
 
 impl ODE<f64, [f64; STATES]> for FirstGear<'_> {
     fn diff(&self, _time: f64, x: &[f64; STATES], slope: &mut [f64; STATES]) {
-        *slope = self.powertrain.derivative(self.mode(), x, &INPUTS);
+        *slope = self.powertrain.derivative(self.mode, x, &INPUTS);
     }
 }
 

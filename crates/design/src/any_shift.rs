@@ -1,0 +1,253 @@
+//! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
+
+use config::{Car, Sensors};
+use drivetrain::{CommandKind, Real};
+use geartrain::{Change, Gearbox};
+use observer::any_shift::{
+    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftRow, ShiftUncertainty, TurbineTorque,
+};
+use observer::{Budget, InputLimits, ValveModel};
+
+use crate::kalman::{deviation_of, engine_noise, speed_reading};
+
+/// Errors of the valve's map beside its gain, as a share \[chosen\]: with the bounds of 15 % of friction and 10 % of gain it gives a
+/// deviation of 12 %.
+const MAP_SHARE: f64 = 0.06;
+
+/// The tables of a gearbox, owned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftTables<T> {
+    elements: Vec<FrictionElement<T>>,
+    gears: Vec<GearRow<T>>,
+    shifts: Vec<ShiftRow<T>>,
+    /// Place of each of the gearbox's elements in the tables.
+    places: Vec<Option<usize>>,
+}
+
+impl ShiftTables<f64> {
+    /// The tables of a gearbox whose elements have these valves, `None` for an element that has none, as a dog. An element
+    /// without plates or valve is left out, and the shifts between others remain. What sits on the input
+    /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
+    ///
+    /// # Errors
+    /// More clutches and brakes than the filter has room for; holds their number.
+    pub fn new(
+        gearbox: &Gearbox,
+        valve: impl Fn(usize) -> Option<(ValveModel<f64>, Option<Budget<f64>>)>,
+        more_on_input_kg_m2: f64,
+    ) -> Result<Self, usize> {
+        let (mut elements, mut places) = (Vec::new(), Vec::new());
+        for (at, element) in gearbox.elements.iter().enumerate() {
+            let friction = element.pack.zip(valve(at)).map(|(clutch, (valve, budget))| {
+                elements.push(FrictionElement { clutch, valve, budget });
+                elements.len() - 1
+            });
+            places.push(friction);
+        }
+        if elements.len() > MAX_ELEMENTS {
+            return Err(elements.len());
+        }
+        let shift_rows = gearbox.shifts.iter().filter_map(|shift| {
+            let Change::Single { offgoing, oncoming, .. } = &shift.change else { return None };
+            let mut reduced = shift.reduced?;
+            reduced.mass_kg_m2[0][0] += more_on_input_kg_m2;
+            let clutches = [places[*offgoing]?, places[*oncoming]?];
+            Some(ShiftRow::new([shift.from, shift.to], clutches, &reduced))
+        });
+        let shifts: Vec<_> = shift_rows.collect();
+        // In a gear the inertia is the same in every shift from it or to it.
+        let inertia = |gear: usize, ratio: f64| {
+            let shift = shifts.iter().find(|shift| shift.from == gear || shift.to == gear);
+            shift.map_or(f64::INFINITY, |shift| shift.inertia_at(ratio))
+        };
+        let gears = gearbox.gears.iter().enumerate();
+        let gears = gears.map(|(at, gear)| GearRow { ratio: gear.ratio, inertia_kg_m2: inertia(at, gear.ratio) });
+        Ok(Self { gears: gears.collect(), elements, shifts, places })
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> ShiftTables<U> {
+        ShiftTables {
+            elements: self.elements.iter().map(FrictionElement::cast).collect(),
+            gears: self.gears.iter().map(GearRow::cast).collect(),
+            shifts: self.shifts.iter().map(ShiftRow::cast).collect(),
+            places: self.places.clone(),
+        }
+    }
+}
+
+impl<T: Real> ShiftTables<T> {
+    /// As the filter takes them.
+    pub fn tables(&self) -> GearboxTables<'_, T> {
+        GearboxTables { elements: &self.elements, gears: &self.gears, shifts: &self.shifts }
+    }
+
+    /// Place of an element of the gearbox in the tables; `None` if it is not in them.
+    pub fn place(&self, element: usize) -> Option<usize> {
+        self.places.get(element).copied().flatten()
+    }
+}
+
+/// Bounds of what the filter may not know of a car, each as a share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftErrors {
+    /// Of the friction of a clutch.
+    pub friction: f64,
+    /// Of the gain of a valve.
+    pub valve_gain: f64,
+    /// Of the lag of a valve.
+    pub valve_lag: f64,
+    /// Of the converter's capacity.
+    pub converter: f64,
+    /// Of the engine torque that the engine's controller reports.
+    pub engine: f64,
+    /// Half-width of the hysteresis of a valve, Pa.
+    pub hysteresis_pa: f64,
+    /// Least and greatest delay of a valve, s.
+    pub valve_delay_s: [f64; 2],
+}
+
+impl ShiftErrors {
+    /// Those of a car in series \[chosen\].
+    pub const STANDARD: Self = Self {
+        friction: 0.15,
+        valve_gain: 0.10,
+        valve_lag: 0.5,
+        converter: 0.10,
+        engine: 0.08,
+        hysteresis_pa: 10e3,
+        valve_delay_s: [0.0, 0.03],
+    };
+}
+
+/// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen\].
+const OUTPUT_LEAST_RAD_S: f64 = 15.0;
+/// Largest speed, rad/s: a larger reading is none of a gearbox \[chosen\].
+const SPEED_MOST_RAD_S: f64 = 1500.0;
+/// Error of a reading of a valve's command, as a share of its largest \[chosen\]: five deviations of its sensor.
+const COMMAND_SHARE: f64 = 0.01;
+
+impl ShiftTables<f64> {
+    /// The tables of a car.
+    ///
+    /// # Errors
+    /// More clutches and brakes than the filter has room for; holds their number.
+    pub fn of_car(car: &Car, errors: &ShiftErrors) -> Result<Self, usize> {
+        let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
+        let [least_s, most_s] = errors.valve_delay_s;
+        let around = |share: f64| [1.0 - share, 1.0 + share];
+        let mut tables = Self::new(
+            &car.gearbox,
+            |element| {
+                let clutch = car.clutches.get(element)?.as_ref()?;
+                let pressure_max_pa = pressure_max_pa(car, errors);
+                let budget = Budget {
+                    valve: clutch.valve,
+                    lag_factor: around(errors.valve_lag),
+                    gain_factor: around(errors.valve_gain),
+                    delay_s: errors.valve_delay_s,
+                    hysteresis_pa: errors.hysteresis_pa,
+                    command: COMMAND_SHARE * command_max(car, errors),
+                    command_age_s: 0.0,
+                    line_pressure_pa: [pressure_max_pa; 2],
+                    pressure_max_pa,
+                    fill: None,
+                    friction_factor: around(errors.friction),
+                    slip_rad_s: 0.0,
+                };
+                Some((ValveModel { valve: clutch.valve, delay_s: 0.5 * (least_s + most_s) }, Some(budget)))
+            },
+            on_input_kg_m2,
+        )?;
+        // The friction over slip is the car's; the gearbox file has one coefficient.
+        for (element, place) in tables.places.clone().into_iter().enumerate() {
+            if let (Some(place), Some(Some(clutch))) = (place, car.clutches.get(element)) {
+                tables.elements[place].clutch = clutch.clutch;
+            }
+        }
+        Ok(tables)
+    }
+}
+
+/// The highest pressure that a valve can give, Pa.
+fn pressure_max_pa(car: &Car, errors: &ShiftErrors) -> f64 {
+    car.line_pressure_pa * (1.0 + errors.valve_gain)
+}
+
+/// The largest command of a valve, A or %.
+fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
+    let commands = car.clutches.iter().flatten().map(|clutch| match clutch.valve.command_kind() {
+        CommandKind::Current => clutch.valve.command_for(pressure_max_pa(car, errors)),
+        CommandKind::DutyCycle => 100.0,
+    });
+    commands.fold(0.0, f64::max)
+}
+
+/// The filter of a car with these tables, for readings of these sensors; without them the readings are taken to be of the
+/// moment and nearly exact.
+///
+/// A bound of the errors counts as the edge of a uniform distribution.
+pub fn any_shift_filter<'a>(
+    car: &Car,
+    tables: &'a ShiftTables<f64>,
+    errors: &ShiftErrors,
+    sensors: Option<&Sensors>,
+) -> AnyShiftFilter<'a, f64> {
+    let inertia = car.engine.inertia_kg_m2;
+    AnyShiftFilter {
+        tables: tables.tables(),
+        driveline: car.driveline,
+        wheels_kg_m2: car.road.inertia_at_wheel() + car.driveline.wheel_inertia_kg_m2,
+        turbine: TurbineTorque {
+            converter: car.converter,
+            engine_inertia_kg_m2: inertia,
+            converter_share: deviation_of(errors.converter),
+            engine_share: deviation_of(errors.engine),
+        },
+        uncertainty: uncertainty(errors),
+        readings: [
+            speed_reading(sensors.map(|sensors| &sensors.turbine)),
+            speed_reading(sensors.map(|sensors| &sensors.output)),
+            speed_reading(sensors.map(|sensors| &sensors.wheel)),
+        ],
+        engine: (
+            speed_reading(sensors.map(|sensors| &sensors.engine)),
+            engine_noise(inertia, sensors.map(|sensors| &sensors.engine)),
+        ),
+        limits: InputLimits {
+            speed_max_rad_s: SPEED_MOST_RAD_S,
+            command_max: 1.2 * command_max(car, errors),
+            pressure_max_pa: pressure_max_pa(car, errors),
+            shaft_torque_max_n_m: 3.0 * shaft_n_m(car),
+        },
+    }
+}
+
+/// Torque of the drive shafts with the largest turbine torque in the lowest gear, N m.
+fn shaft_n_m(car: &Car) -> f64 {
+    let speeds = (1..=12).map(|k| 50.0 * f64::from(k));
+    let engine = speeds.map(|speed| car.engine.torque(speed, 1.0)).fold(0.0, f64::max);
+    let converter = car.converter.map_or(1.0, |converter| converter.torque_ratio.range().1);
+    let ratio = car.gearbox.gears.iter().map(|gear| gear.ratio.abs()).fold(0.0, f64::max);
+    engine * converter * ratio * car.driveline.final_ratio
+}
+
+/// What the filter does not know.
+fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
+    let parts = [deviation_of(errors.friction), deviation_of(errors.valve_gain), MAP_SHARE];
+    let square: f64 = parts.iter().map(|part| part * part).sum();
+    ShiftUncertainty {
+        torque_share: square.sqrt(),
+        gain_part: parts[1] * parts[1] / square,
+        torque_share_s: 3.0,
+        valve_s: 0.012,
+        pressure_pa: 0.01e6,
+        pressure_s: 0.15,
+        kiss_pa: 0.015e6,
+        turbine_walk: 0.02,
+        rate_rad_s: 0.1,
+        rate_walk: 0.01,
+        load_walk: 1500.0,
+        output_least_rad_s: OUTPUT_LEAST_RAD_S,
+    }
+}

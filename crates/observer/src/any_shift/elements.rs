@@ -1,0 +1,143 @@
+//! The valve models of all elements, which run through the whole drive, and the torque that a slipping element has by them.
+
+use drivetrain::Real;
+
+use super::powertrain::ClutchTorque;
+use super::tables::{FrictionElement, ShiftClutch};
+use super::{PIECE_S, ShiftUncertainty};
+use crate::bound::pressure_and_torque;
+use crate::kalman::valve_model::Commands;
+use crate::{ChannelHealth, InputLimits, PressureRange, Reading};
+
+/// Memory of an element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ElementState<T> {
+    commands: Commands<T>,
+    /// Pressure by the valve model, Pa, and its rate over the last step, Pa/s.
+    pub(super) valve_pa: T,
+    rate_pa_s: T,
+    range: Option<PressureRange<T>>,
+    /// Mean and variance of the torque factor that the last shift left, in its own deviations.
+    pub(super) friction: [T; 2],
+}
+
+impl<T: Real> ElementState<T> {
+    pub(super) fn new(element: &FrictionElement<T>, limits: &InputLimits<T>) -> Self {
+        Self {
+            commands: Commands::new(),
+            valve_pa: T::zero(),
+            rate_pa_s: T::zero(),
+            range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
+            friction: [T::zero(), T::one()],
+        }
+    }
+
+    /// Lets time pass, and takes a command if there is one.
+    #[inline]
+    pub(super) fn step(
+        &mut self,
+        element: &FrictionElement<T>,
+        limits: &InputLimits<T>,
+        command: Option<Reading<T>>,
+        dt_s: T,
+    ) -> ChannelHealth {
+        if dt_s > T::zero() {
+            let before_pa = self.valve_pa;
+            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, super::MOST_PIECES);
+            let piece_s = dt_s / T::of(pieces as f64);
+            for _ in 0..pieces {
+                self.commands.pass(piece_s);
+                let settled_pa = element.valve.target_pa(&self.commands, piece_s);
+                let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
+                self.valve_pa = limits.possible_pressure(step.phi * self.valve_pa + step.drift_pa);
+            }
+            self.rate_pa_s = (self.valve_pa - before_pa) / dt_s;
+        }
+        let usable = command.filter(|reading| limits.command_valid(reading.value) && reading.age_s >= T::zero());
+        if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
+            let possible = match usable {
+                Some(reading) if reading.age_s <= T::zero() => [reading.value; 2],
+                _ => [T::zero(), limits.command_max],
+            };
+            range.step(budget, dt_s, possible, limits.command_max);
+        }
+        match (command, usable) {
+            (None, _) if self.commands.newest_pa().is_none() => ChannelHealth::Lost,
+            (None, _) => ChannelHealth::Absent,
+            (Some(_), None) => ChannelHealth::Refused,
+            (Some(_), Some(reading)) => {
+                let settled_pa = element.valve.valve.settled_pressure(reading.value);
+                if self.commands.newest_pa().is_none() {
+                    // The first command is taken to have stood for long.
+                    self.valve_pa = limits.possible_pressure(settled_pa);
+                }
+                self.commands.send(reading.age_s, settled_pa, element.valve.needed_s(T::of(PIECE_S)));
+                ChannelHealth::Good
+            }
+        }
+    }
+
+    /// Forgets the commands: time was lost, and with it some of them.
+    pub(super) fn forget(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>) {
+        if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
+            range.forget(budget, limits.command_max);
+        }
+        self.rate_pa_s = T::zero();
+    }
+
+    /// Standard deviation of the pressure by the valve model beside its gain, Pa: errors of lag and delay while it moves,
+    /// and of the kiss point. None well below the kiss point, where no torque depends on it.
+    fn deviation_pa(&self, element: &FrictionElement<T>, u: &ShiftUncertainty<T>) -> T {
+        if self.valve_pa < element.clutch.kiss_pressure() - u.kiss_pa {
+            return T::zero();
+        }
+        (u.valve_s * self.rate_pa_s).hypot(u.pressure_pa)
+    }
+
+    /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
+    /// is its sign, less where it is uncertain.
+    #[inline]
+    pub(super) fn torque(
+        &self,
+        element: &FrictionElement<T>,
+        shift: &ShiftClutch<T>,
+        u: &ShiftUncertainty<T>,
+        slip_rad_s: T,
+        direction: T,
+    ) -> ClutchTorque<T> {
+        let clutch = &element.clutch;
+        let slip = shift.alpha * slip_rad_s;
+        let size = shift.alpha.abs() * direction;
+        let capacity = size * clutch.torque_capacity(self.valve_pa, slip);
+        let per_pressure = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
+        ClutchTorque {
+            ratio: shift.ratio,
+            base_n_m: capacity,
+            per_friction_n_m: u.torque_share * capacity,
+            per_pressure_n_m: per_pressure * self.deviation_pa(element, u),
+        }
+    }
+
+    /// The torque at the turbine that the element holds for sure up to one deviation, and the most that it can hold at
+    /// three, N m.
+    #[inline]
+    pub(super) fn holds(
+        &self,
+        element: &FrictionElement<T>,
+        shift: &ShiftClutch<T>,
+        u: &ShiftUncertainty<T>,
+    ) -> [T; 2] {
+        let (clutch, one, three) = (&element.clutch, T::one(), T::of(3.0));
+        let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
+        let per_force = shift.alpha.abs() * friction * clutch.lever();
+        let capacity = per_force * clutch.clamp_force(self.valve_pa);
+        let wrong = per_force * clutch.piston_area_m2 * self.deviation_pa(element, u);
+        [capacity * (one + u.torque_share), capacity * (one + three * u.torque_share) + three * wrong]
+    }
+
+    /// Guaranteed ranges of pressure and torque at the element, with its slip and the error of the slip if it is known.
+    pub(super) fn ranges(&self, element: &FrictionElement<T>, slip_rad_s: Option<[T; 2]>) -> Option<([T; 2], [T; 2])> {
+        let (range, budget) = (self.range.as_ref()?, element.budget.as_ref()?);
+        Some(pressure_and_torque(&element.clutch, budget, range, slip_rad_s))
+    }
+}

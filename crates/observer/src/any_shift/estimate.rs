@@ -1,0 +1,242 @@
+//! What the filter says after a step.
+
+use drivetrain::Real;
+
+use super::elements::ElementState;
+use super::powertrain::{ClutchTorque, dot};
+use super::{
+    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SPRING,
+    ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+};
+use crate::{ChannelHealth, Channels, Health};
+
+/// Share of the valve model's uncertainty above which the speeds have shown nothing of a clutch's torque.
+const HIDDEN: f64 = 0.95;
+
+/// Pressure and torque of one clutch of a shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClutchEstimate<T> {
+    /// The element, by its place in [`super::GearboxTables::elements`].
+    pub element: usize,
+    /// Cylinder pressure, Pa.
+    pub pressure_pa: T,
+    /// Torque, N m, positive when it drives its output side.
+    pub torque_n_m: T,
+    /// Standard deviation of the torque, N m.
+    pub deviation_n_m: T,
+    /// Pressure by the valve model alone, Pa.
+    pub valve_pa: T,
+    /// Torque by valve model and friction alone, N m; of a clutch that holds, the torque up to which it does.
+    pub open_loop_n_m: T,
+    /// Whether it holds.
+    pub holds: bool,
+    /// Whether the speeds show nothing of its torque: the estimate is that of the valve model.
+    pub hidden: bool,
+    /// Lowest and highest pressure, Pa, for errors within the budget.
+    pub pressure_range_pa: Option<[T; 2]>,
+    /// Lowest and highest torque, N m, for errors within the budget.
+    pub torque_range_n_m: Option<[T; 2]>,
+}
+
+/// Output of the filter after one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftEstimate<T> {
+    /// The gear or shift that the filter is in; none while it has only the valve models.
+    pub gear: Option<GearCommand>,
+    /// Which clutches hold.
+    pub phase: Option<ShiftPhase>,
+    /// The offgoing and the oncoming clutch of the shift; none in a gear.
+    pub clutches: Option<[ClutchEstimate<T>; 2]>,
+    /// Pressures of all elements by their valve models, Pa.
+    pub valve_pa: [T; MAX_ELEMENTS],
+    /// Torque at the gearbox input, N m, as corrected.
+    pub turbine_n_m: Option<T>,
+    /// Torque of the drive shafts, N m.
+    pub shaft_n_m: Option<T>,
+    /// Whether the input could be used, and whether the estimate can be believed.
+    pub health: Health,
+    /// What became of the reading of each channel; of the commands the worst.
+    pub channels: Channels<ChannelHealth>,
+}
+
+impl<T: Real> ShiftEstimate<T> {
+    pub(super) fn nothing() -> Self {
+        Self {
+            gear: None,
+            phase: None,
+            clutches: None,
+            valve_pa: [T::zero(); MAX_ELEMENTS],
+            turbine_n_m: None,
+            shaft_n_m: None,
+            health: Health::SpeedsRejected,
+            channels: Channels::all(ChannelHealth::Lost),
+        }
+    }
+}
+
+impl<T: Real> AnyShiftFilter<'_, T> {
+    pub(super) fn conclude(
+        &self,
+        state: &mut AnyShiftState<T>,
+        input: &ShiftInput<T>,
+        channels: &Channels<ChannelHealth>,
+        mut health: Health,
+    ) -> ShiftEstimate<T> {
+        let refused = channels.each().contains(&ChannelHealth::Refused);
+        let lost = channels.each().contains(&ChannelHealth::Lost);
+        health = health.max(match (channels.command == ChannelHealth::Refused, lost, refused) {
+            (true, _, _) => Health::CommandRejected,
+            (_, true, _) => Health::ChannelLost,
+            (_, _, true) => Health::ReadingRefused,
+            _ => Health::Good,
+        });
+        let valve_pa = state.elements.map(|element| element.map_or(T::zero(), |element| element.valve_pa));
+        let estimate = &mut state.estimate;
+        *estimate = ShiftEstimate { valve_pa, channels: *channels, ..ShiftEstimate::nothing() };
+        match &state.running {
+            Some(running) => {
+                let (x, line) = (&running.x.mean, &self.driveline);
+                let damper = line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
+                let turbine_n_m = running.torques.map_or(running.slow_n_m, |torques| torques.turbine_n_m);
+                estimate.gear = Some(match &running.shift {
+                    Some(shift) => GearCommand { from: shift.from, to: shift.to },
+                    None => GearCommand { from: running.gear, to: running.gear },
+                });
+                estimate.phase = Some(running.phase.phase);
+                estimate.shaft_n_m = Some(x[SPRING] + damper);
+                estimate.turbine_n_m = Some(turbine_n_m + x[SHARE] * running.slow_n_m);
+                let speeds = self.then_and_now(&state.newest, Some(running));
+                estimate.clutches = running.shift.map(|shift| {
+                    [0, 1].map(|c| {
+                        let estimate = self.of_clutch(running, &state.elements, &shift, c);
+                        self.in_range(estimate, &state.elements, &shift.clutches[c.min(1)], speeds)
+                    })
+                });
+            }
+            None => {
+                health = health.max(Health::SpeedsRejected);
+                let speeds = self.then_and_now(&state.newest, None);
+                estimate.clutches =
+                    self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
+                        |shift| {
+                            shift.clutches.map(|clutch| {
+                                let estimate = self.by_valve(&state.elements, &clutch, speeds[0]);
+                                self.in_range(estimate, &state.elements, &clutch, speeds)
+                            })
+                        },
+                    );
+            }
+        }
+        state.estimate.health = health;
+        state.estimate
+    }
+
+    /// A clutch by its valve model alone, where the speeds cannot be used.
+    fn by_valve(
+        &self,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        clutch: &ShiftClutch<T>,
+        speeds: [T; 2],
+    ) -> ClutchEstimate<T> {
+        let slip = self.slip(clutch.ratio, speeds);
+        let torque = self.element(elements, clutch.element).map_or(ClutchTorque::none(), |(memory, element)| {
+            memory.torque(element, clutch, &self.uncertainty, slip.value, slip.direction())
+        });
+        let valve_pa = elements.get(clutch.element).copied().flatten().map_or(T::zero(), |memory| memory.valve_pa);
+        let open_loop_n_m = torque.base_n_m / clutch.alpha;
+        ClutchEstimate {
+            element: clutch.element,
+            pressure_pa: valve_pa,
+            torque_n_m: open_loop_n_m,
+            deviation_n_m: (torque.per_friction_n_m.hypot(torque.per_pressure_n_m) / clutch.alpha).abs(),
+            valve_pa,
+            open_loop_n_m,
+            holds: false,
+            hidden: true,
+            pressure_range_pa: None,
+            torque_range_n_m: None,
+        }
+    }
+
+    fn of_clutch(
+        &self,
+        running: &super::Running<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        shift: &ShiftRow<T>,
+        c: usize,
+    ) -> ClutchEstimate<T> {
+        let (u, x, zero, one) = (&self.uncertainty, &running.x, T::zero(), T::one());
+        let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
+        let Some(torques) = running.torques else {
+            return self.by_valve(elements, clutch, [x.mean[0], x.mean[1]]);
+        };
+        let own = torques.clutches[c];
+        let holds = running.phase.phase.holding() == Some(c);
+        let mut row = [zero; N];
+        let mut rest = own.base_n_m;
+        if holds {
+            (row, rest) = self.held_torque(shift, c, &torques);
+        } else {
+            row[FRICTION[c]] = own.per_friction_n_m;
+            row[PRESSURE[c]] = own.per_pressure_n_m;
+        }
+        let mut torque = dot(&row, &x.mean) + rest;
+        // Without pressure error the direction would be lost at the kiss point.
+        let direction = own.base_n_m + own.per_pressure_n_m;
+        if !holds && torque * direction <= zero {
+            // A slipping clutch does not push.
+            torque = zero;
+        }
+        let deviation = x.variance(&row).sqrt();
+        let alone = own.per_friction_n_m.hypot(own.per_pressure_n_m);
+        let (valve_pa, correction) =
+            self.element(elements, clutch.element).map_or((zero, zero), |(memory, element)| {
+                let pack = &element.clutch;
+                let above_kiss = (memory.valve_pa - pack.kiss_pressure()).max(zero);
+                // The part of the torque's error that is the valve's gain, and the error of the pressure itself.
+                let gain = above_kiss * u.torque_share * u.gain_part * x.mean[FRICTION[c]];
+                let per_pa = own.base_n_m / above_kiss.max(one);
+                let itself = if per_pa == zero { zero } else { own.per_pressure_n_m / per_pa * x.mean[PRESSURE[c]] };
+                (memory.valve_pa, gain + if holds { zero } else { itself })
+            });
+        ClutchEstimate {
+            element: clutch.element,
+            pressure_pa: self.limits.possible_pressure(valve_pa + correction),
+            torque_n_m: torque / clutch.alpha,
+            deviation_n_m: (deviation / clutch.alpha).abs(),
+            valve_pa,
+            open_loop_n_m: own.base_n_m / clutch.alpha,
+            holds,
+            hidden: !holds && deviation >= T::of(HIDDEN) * alone,
+            pressure_range_pa: None,
+            torque_range_n_m: None,
+        }
+    }
+
+    /// Brings an estimate into the guaranteed ranges, where there are some.
+    fn in_range(
+        &self,
+        mut estimate: ClutchEstimate<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        clutch: &ShiftClutch<T>,
+        speeds: [[T; 2]; 2],
+    ) -> ClutchEstimate<T> {
+        // Since the readings were taken the slip has gone on, and may have ended.
+        let (then, now) = (self.slip(clutch.ratio, speeds[0]), self.slip(clutch.ratio, speeds[1]));
+        let threshold = now.threshold();
+        let error = (clutch.alpha * (threshold + threshold)).abs()
+            + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
+        let known = [clutch.alpha * now.value, error];
+        let ranges = self
+            .element(elements, clutch.element)
+            .and_then(|(memory, element)| memory.ranges(element, Some(known).filter(|[slip, _]| slip.is_finite())));
+        if let Some((pressure, torque)) = ranges {
+            let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
+            estimate.pressure_pa = nearest(pressure, estimate.pressure_pa);
+            estimate.torque_n_m = nearest(torque, estimate.torque_n_m);
+            estimate.pressure_range_pa = Some(pressure);
+            estimate.torque_range_n_m = Some(torque);
+        }
+        estimate
+    }
+}

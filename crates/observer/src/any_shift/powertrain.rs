@@ -1,0 +1,309 @@
+//! What the powertrain does over one step, for any shift.
+//!
+//! ```text
+//! (w_t', w_o') = G (X, Y)         X = (1 + b) T_t - U_off - U_on,   Y = -T_o + i_off U_off + i_on U_on
+//! T_o = (T_s + C_s (w_o/i_df - w_w + r))/i_df
+//! w_w' = (T_s - T_L)/J            T_s' = K_s (w_o/i_df - w_w + r)
+//! ```
+//!
+//! `G` is the inverse of the mass while no clutch holds; while one holds with the ratio `i`, the torques of turbine and
+//! output act on one inertia, and the torque of that clutch is left out.
+
+use drivetrain::{Driveline, Real};
+
+use super::{FRICTION, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SPEEDS, SPRING, TURBINE, WHEEL};
+
+/// States with a law of their own.
+pub(super) const CORE: usize = 4;
+/// What drives them: torque on the turbine side, on the output side, load at the wheels, rate error of the twist.
+const DRIVES: usize = 4;
+/// Terms of the series of the exponential: a step is at most [`super::PIECE_S`] long, which is less than a quarter of the
+/// fastest swing of the shafts, so the terms left out are below 1e-7.
+const TERMS: usize = 14;
+
+/// Accelerations of turbine and output per torque on either side, rad/s^2 per N m.
+pub(super) type Response<T> = [[T; 2]; 2];
+
+/// The response while no clutch holds.
+pub(super) fn free<T: Real>(mass: &[[T; 2]; 2]) -> Response<T> {
+    let [[a, b], [c, d]] = *mass;
+    let per = (a * d - b * c).recip();
+    [[d * per, -b * per], [-c * per, a * per]]
+}
+
+/// The response while one clutch ties both speeds with a ratio; the inertia is that at the output.
+pub(super) fn tied<T: Real>(ratio: T, inertia_kg_m2: T) -> Response<T> {
+    let per = inertia_kg_m2.recip();
+    [[ratio * ratio * per, ratio * per], [ratio * per, per]]
+}
+
+/// Torque of a shift clutch at the turbine: `U = base + f per_friction + x per_pressure`, N m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ClutchTorque<T> {
+    pub(super) ratio: T,
+    pub(super) base_n_m: T,
+    pub(super) per_friction_n_m: T,
+    pub(super) per_pressure_n_m: T,
+}
+
+impl<T: Real> ClutchTorque<T> {
+    pub(super) fn none() -> Self {
+        let zero = T::zero();
+        Self { ratio: zero, base_n_m: zero, per_friction_n_m: zero, per_pressure_n_m: zero }
+    }
+
+    fn mean(&self, other: &Self) -> Self {
+        let half = T::of(0.5);
+        Self {
+            ratio: self.ratio,
+            base_n_m: half * (self.base_n_m + other.base_n_m),
+            per_friction_n_m: half * (self.per_friction_n_m + other.per_friction_n_m),
+            per_pressure_n_m: half * (self.per_pressure_n_m + other.per_pressure_n_m),
+        }
+    }
+}
+
+/// Torques that act at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Torques<T> {
+    /// Turbine torque by its sources, N m.
+    pub(super) turbine_n_m: T,
+    /// The same low-passed: what the share `b` multiplies. With the raw one the noise of the speeds would be in reading
+    /// and factor, which pulls the share to one side.
+    pub(super) share_n_m: T,
+    pub(super) clutches: [ClutchTorque<T>; 2],
+}
+
+impl<T: Real> Torques<T> {
+    /// The mean of those at two times.
+    pub(super) fn mean(&self, other: &Self) -> Self {
+        let half = T::of(0.5);
+        Self {
+            turbine_n_m: half * (self.turbine_n_m + other.turbine_n_m),
+            share_n_m: half * (self.share_n_m + other.share_n_m),
+            clutches: [self.clutches[0].mean(&other.clutches[0]), self.clutches[1].mean(&other.clutches[1])],
+        }
+    }
+
+    /// Without the torque of a clutch that holds.
+    pub(super) fn without(mut self, holding: Option<usize>) -> Self {
+        for (c, clutch) in self.clutches.iter_mut().enumerate() {
+            if holding == Some(c) {
+                *clutch = ClutchTorque { ratio: clutch.ratio, ..ClutchTorque::none() };
+            }
+        }
+        self
+    }
+
+    /// A quantity that depends on the torques on either side by `per`, as a row over the states that these torques depend
+    /// on, and what is left beside them.
+    pub(super) fn row(&self, per: [T; 2]) -> ([T; N], T) {
+        let mut row = [T::zero(); N];
+        let mut rest = per[0] * self.turbine_n_m;
+        row[SHARE] = per[0] * self.share_n_m;
+        for (c, clutch) in self.clutches.iter().enumerate() {
+            let per_clutch = clutch.ratio * per[1] - per[0];
+            rest = rest + per_clutch * clutch.base_n_m;
+            row[FRICTION[c]] = per_clutch * clutch.per_friction_n_m;
+            row[PRESSURE[c]] = per_clutch * clutch.per_pressure_n_m;
+        }
+        (row, rest)
+    }
+}
+
+/// Rates of turbine, output and wheel speed as rows over the states, and what is left beside them, rad/s^2.
+pub(super) struct Rates<T> {
+    pub(super) rows: [[T; N]; SPEEDS],
+    pub(super) rest: [T; SPEEDS],
+}
+
+impl<T: Real> Rates<T> {
+    pub(super) fn new(g: &Response<T>, torques: &Torques<T>, line: &Driveline<T>, wheels_kg_m2: T) -> Self {
+        let mut rates = Self { rows: [[T::zero(); N]; SPEEDS], rest: [T::zero(); SPEEDS] };
+        let (i, damping) = (line.final_ratio, line.shaft_damping_n_m_s_rad);
+        for k in [TURBINE, OUTPUT] {
+            let (mut row, rest) = torques.row(g[k]);
+            let per_output_torque = -g[k][1];
+            row[SPRING] = per_output_torque / i;
+            row[OUTPUT] = per_output_torque * damping / (i * i);
+            row[WHEEL] = -per_output_torque * damping / i;
+            row[RATE] = per_output_torque * damping / i;
+            (rates.rows[k], rates.rest[k]) = (row, rest);
+        }
+        rates.rows[WHEEL][SPRING] = wheels_kg_m2.recip();
+        rates.rows[WHEEL][LOAD] = -wheels_kg_m2.recip();
+        rates
+    }
+
+    /// The rates at this mean, rad/s^2.
+    pub(super) fn at(&self, mean: &[T; N]) -> [T; SPEEDS] {
+        core::array::from_fn(|k| dot(&self.rows[k], mean) + self.rest[k])
+    }
+}
+
+/// The sum of the products of two rows.
+#[inline]
+pub(super) fn dot<T: Real>(a: &[T; N], b: &[T; N]) -> T {
+    a.iter().zip(b).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
+}
+
+/// The solution over one step under constant torques.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Motion<T> {
+    /// The response and the step that it was made for, s.
+    pub(super) of: (Response<T>, T),
+    phi: [[T; CORE]; CORE],
+    /// Its integral times what drives the states.
+    gamma: [[T; DRIVES]; CORE],
+}
+
+impl<T: Real> Motion<T> {
+    /// By the series of the matrix exponential.
+    pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T) -> Self {
+        let (zero, one) = (T::zero(), T::one());
+        let (i, damping, stiffness) = (line.final_ratio, line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad);
+        let mut a = [[zero; CORE]; CORE];
+        let mut b = [[zero; DRIVES]; CORE];
+        for k in [TURBINE, OUTPUT] {
+            a[k][SPRING] = -g[k][1] / i;
+            a[k][OUTPUT] = -g[k][1] * damping / (i * i);
+            a[k][WHEEL] = g[k][1] * damping / i;
+            b[k] = [g[k][0], g[k][1], zero, -g[k][1] * damping / i];
+        }
+        a[WHEEL][SPRING] = wheels_kg_m2.recip();
+        b[WHEEL][2] = -wheels_kg_m2.recip();
+        a[SPRING][OUTPUT] = stiffness / i;
+        a[SPRING][WHEEL] = -stiffness;
+        b[SPRING][3] = stiffness;
+        // sum of (A h)^n/n!, and of h (A h)^n/(n+1)!.
+        let mut power = [[zero; CORE]; CORE];
+        for (k, row) in power.iter_mut().enumerate() {
+            row[k] = one;
+        }
+        let (mut phi, mut integral) = (power, power.map(|row| row.map(|x| x * dt_s)));
+        for n in 1..TERMS {
+            let per = dt_s / T::of(n as f64);
+            let mut next = [[zero; CORE]; CORE];
+            for (next, row) in next.iter_mut().zip(&power) {
+                for (c, x) in next.iter_mut().enumerate() {
+                    *x = per * row.iter().zip(&a).fold(zero, |sum, (p, a)| sum + *p * a[c]);
+                }
+            }
+            power = next;
+            let share = dt_s / T::of((n + 1) as f64);
+            for ((phi, integral), power) in phi.iter_mut().zip(&mut integral).zip(&power) {
+                for ((phi, integral), power) in phi.iter_mut().zip(integral.iter_mut()).zip(power) {
+                    *phi = *phi + *power;
+                    *integral = *integral + share * *power;
+                }
+            }
+        }
+        let mut gamma = [[zero; DRIVES]; CORE];
+        for (gamma, integral) in gamma.iter_mut().zip(&integral) {
+            for (c, x) in gamma.iter_mut().enumerate() {
+                *x = integral.iter().zip(&b).fold(zero, |sum, (i, b)| sum + *i * b[c]);
+            }
+        }
+        Self { of: (g, dt_s), phi, gamma }
+    }
+
+    /// The first states at the end as rows over all states, and what is left beside them.
+    pub(super) fn rows(&self, torques: &Torques<T>) -> ([[T; N]; CORE], [T; CORE]) {
+        let mut rows = [[T::zero(); N]; CORE];
+        let mut rest = [T::zero(); CORE];
+        for k in 0..CORE {
+            let gamma = &self.gamma[k];
+            (rows[k], rest[k]) = torques.row([gamma[0], gamma[1]]);
+            rows[k][..CORE].copy_from_slice(&self.phi[k]);
+            rows[k][LOAD] = gamma[2];
+            rows[k][RATE] = gamma[3];
+        }
+        (rows, rest)
+    }
+
+    /// Change of the first states per torque on the turbine side, each per N m.
+    pub(super) fn per_turbine_torque(&self) -> [T; CORE] {
+        self.gamma.map(|row| row[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINE: Driveline<f64> = Driveline {
+        final_ratio: 3.0,
+        shaft_stiffness_n_m_rad: 13_000.0,
+        shaft_damping_n_m_s_rad: 20.0,
+        wheel_inertia_kg_m2: 2.4,
+    };
+    const WHEELS_KG_M2: f64 = 137.4;
+    const MASS: [[f64; 2]; 2] = [[0.08, 0.009], [0.009, 0.289]];
+
+    fn torques() -> Torques<f64> {
+        let clutch = |ratio, base_n_m| ClutchTorque {
+            ratio,
+            base_n_m,
+            per_friction_n_m: 0.12 * base_n_m,
+            per_pressure_n_m: 3.0,
+        };
+        Torques { turbine_n_m: 120.0, share_n_m: 115.0, clutches: [clutch(4.7, -20.0), clutch(3.13, 90.0)] }
+    }
+
+    fn state() -> [f64; N] {
+        [300.0, 70.0, 23.2, 900.0, 700.0, 0.05, -0.04, 0.5, -0.7, 0.3, 1.1]
+    }
+
+    /// A step as a whole is what many small ones by the rates are.
+    #[test]
+    fn a_step_is_the_solution_of_the_rates() {
+        for g in [free(&MASS), tied(4.7, MASS[1][1] + 2.0 * 4.7 * MASS[0][1] + 4.7 * 4.7 * MASS[0][0])] {
+            let torques = torques();
+            let (rows, rest) = Motion::new(g, &LINE, WHEELS_KG_M2, 0.01).rows(&torques);
+            let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
+            let mut x = state();
+            for _ in 0..100_000 {
+                let speeds = rates.at(&x);
+                let twist = x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE];
+                for k in 0..SPEEDS {
+                    x[k] += 1e-7 * speeds[k];
+                }
+                x[SPRING] += 1e-7 * LINE.shaft_stiffness_n_m_rad * twist;
+            }
+            for k in 0..CORE {
+                let whole = dot(&rows[k], &state()) + rest[k];
+                assert!((whole - x[k]).abs() < 2e-4 * (1.0 + x[k].abs()), "{k}: {whole} {}", x[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn tied_speeds_accelerate_in_their_ratio() {
+        let g = tied(2.5_f64, 0.7);
+        assert!((g[0][0] - 2.5 * g[1][0]).abs() < 1e-12 && (g[0][1] - 2.5 * g[1][1]).abs() < 1e-12);
+        // Turbine torque times ratio on the inertia at the output.
+        assert!((g[1][0] - 2.5 / 0.7).abs() < 1e-12 && (g[1][1] - 1.0 / 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn power_is_conserved_while_both_slip() {
+        let (torques, g) = (torques(), free(&MASS));
+        let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
+        let x = state();
+        let [turbine, output, _] = rates.at(&x);
+        let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
+            + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
+        let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);
+        let input = (torques.turbine_n_m + x[SHARE] * torques.share_n_m) * x[TURBINE];
+        let heat: f64 = (0..2)
+            .map(|c| {
+                let clutch = &torques.clutches[c];
+                let torque = clutch.base_n_m
+                    + x[FRICTION[c]] * clutch.per_friction_n_m
+                    + x[PRESSURE[c]] * clutch.per_pressure_n_m;
+                torque * (x[TURBINE] - clutch.ratio * x[OUTPUT])
+            })
+            .sum();
+        assert!((input - shaft / LINE.final_ratio * x[OUTPUT] - heat - kinetic).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,140 @@
+//! What the filter knows of a gearbox, made once at the start.
+//!
+//! With `U_c = alpha_c T_c`, the torque of an element referred to the turbine, every shift of every gear train is
+//!
+//! ```text
+//! M11 w_t' + M12 w_o' =  T_t - U_off - U_on
+//! M12 w_t' + M22 w_o' = -T_o + i_off U_off + i_on U_on          slip of element c = alpha_c (w_t - i_c w_o)
+//! ```
+
+use drivetrain::{Clutch, Real, ReducedShift};
+
+use crate::{Budget, ValveModel};
+
+/// Most clutches and brakes of a gearbox.
+pub const MAX_ELEMENTS: usize = 8;
+
+/// A clutch or brake with its valve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionElement<T> {
+    /// Plates and piston.
+    pub clutch: Clutch<T>,
+    /// The valve as the filter knows it.
+    pub valve: ValveModel<T>,
+    /// Largest errors, for the guaranteed ranges; without it there are none.
+    pub budget: Option<Budget<T>>,
+}
+
+/// A gear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GearRow<T> {
+    /// Turbine speed over output speed; negative in reverse.
+    pub ratio: T,
+    /// Inertia of the gearbox in this gear, at its output, kg m^2.
+    pub inertia_kg_m2: T,
+}
+
+/// An element that changes in a shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftClutch<T> {
+    /// Its place in [`GearboxTables::elements`].
+    pub element: usize,
+    /// Its slip per turbine speed, `alpha`: the turbine feels `alpha` times its torque.
+    pub alpha: T,
+    /// The ratio `i` of the gear in which it holds.
+    pub ratio: T,
+}
+
+/// A shift between two elements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftRow<T> {
+    /// The gear before, by its place in [`GearboxTables::gears`].
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// The element that opens, then the one that closes.
+    pub clutches: [ShiftClutch<T>; 2],
+    /// Mass `M` in turbine and output speed, kg m^2.
+    pub mass_kg_m2: [[T; 2]; 2],
+}
+
+/// The tables of a gearbox.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GearboxTables<'a, T> {
+    /// Its clutches and brakes, at most [`MAX_ELEMENTS`]; more are not used.
+    pub elements: &'a [FrictionElement<T>],
+    /// Its gears.
+    pub gears: &'a [GearRow<T>],
+    /// Its shifts between two elements.
+    pub shifts: &'a [ShiftRow<T>],
+}
+
+impl<T: Real> ShiftRow<T> {
+    /// The shift between two gears with these offgoing and oncoming elements.
+    pub fn new(gears: [usize; 2], elements: [usize; 2], reduced: &ReducedShift<T>) -> Self {
+        let clutch = |element: usize, slip: [T; 2]| ShiftClutch { element, alpha: slip[0], ratio: -slip[1] / slip[0] };
+        Self {
+            from: gears[0],
+            to: gears[1],
+            clutches: [clutch(elements[0], reduced.slip_offgoing), clutch(elements[1], reduced.slip_oncoming)],
+            mass_kg_m2: reduced.mass_kg_m2,
+        }
+    }
+
+    /// Inertia at the output while both speeds are tied by a ratio, kg m^2.
+    pub fn inertia_at(&self, ratio: T) -> T {
+        let m = &self.mass_kg_m2;
+        m[1][1] + ratio * (m[0][1] + m[1][0]) + ratio * ratio * m[0][0]
+    }
+
+    /// By how much an error of the gearbox output torque shows in a clutch torque while the other clutch holds, both at
+    /// the turbine: `1/|i_off - i_on|`.
+    pub fn output_error_gain(&self) -> T {
+        (self.clutches[0].ratio - self.clutches[1].ratio).abs().recip()
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> ShiftRow<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        ShiftRow {
+            from: self.from,
+            to: self.to,
+            clutches: self.clutches.map(|clutch| ShiftClutch {
+                element: clutch.element,
+                alpha: to(clutch.alpha),
+                ratio: to(clutch.ratio),
+            }),
+            mass_kg_m2: self.mass_kg_m2.map(|row| row.map(to)),
+        }
+    }
+}
+
+impl<T: Real> GearRow<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> GearRow<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        GearRow { ratio: to(self.ratio), inertia_kg_m2: to(self.inertia_kg_m2) }
+    }
+}
+
+impl<T: Real> FrictionElement<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> FrictionElement<U> {
+        FrictionElement {
+            clutch: self.clutch.cast(),
+            valve: self.valve.cast(),
+            budget: self.budget.as_ref().map(Budget::cast),
+        }
+    }
+}
+
+impl<T: Real> GearboxTables<'_, T> {
+    /// The shift between two gears, if it is one between two known elements.
+    pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
+        let known = |row: &&ShiftRow<T>| {
+            (row.from, row.to) == (from, to)
+                && row.clutches.iter().all(|clutch| clutch.element < self.elements.len().min(MAX_ELEMENTS))
+        };
+        self.shifts.iter().find(known)
+    }
+}

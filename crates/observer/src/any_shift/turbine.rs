@@ -1,0 +1,98 @@
+//! The torque at the gearbox input, from the converter's maps and from the torque that the engine's controller reports.
+//!
+//! ```text
+//! by the maps       T_1 = t(lambda) C(lambda) w_e^2
+//! by the engine     T_2 = T_e - I_e w_e' + (t - 1) T_p        whatever the lock-up clutch does
+//! ```
+//!
+//! Where both are known the mean is taken, weighted by their variances. With the lock-up clutch applied only the second
+//! holds. Without a converter the engine is on the input shaft: its inertia belongs to the mass of the shifts.
+
+use drivetrain::{Converter, Real};
+
+/// The torque below which an error is no longer a share of it, N m.
+const LEAST_N_M: f64 = 10.0;
+
+/// What is known of the torque at the gearbox input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurbineTorque<T> {
+    /// The converter, if there is one.
+    pub converter: Option<Converter<T>>,
+    /// Inertia of engine and pump in front of the converter, kg m^2.
+    pub engine_inertia_kg_m2: T,
+    /// Standard deviation of the torque by the maps, as a share.
+    pub converter_share: T,
+    /// Standard deviation of the torque that the engine's controller reports, as a share.
+    pub engine_share: T,
+}
+
+/// What is known at a time.
+pub(super) struct InputSide<T> {
+    /// Engine speed, rad/s, its variance, (rad/s)^2, and acceleration, rad/s^2; none without a reading.
+    pub(super) engine: Option<[T; 3]>,
+    /// Turbine speed, rad/s, and its variance.
+    pub(super) turbine: [T; 2],
+    /// Reported engine torque, N m.
+    pub(super) reported_n_m: Option<T>,
+    pub(super) lock_up_applied: bool,
+}
+
+/// The torque, N m, and its variance from the noise of the speeds.
+pub(super) struct Found<T> {
+    pub(super) turbine_n_m: T,
+    pub(super) noise: T,
+}
+
+impl<T: Real> TurbineTorque<T> {
+    /// The torque at the gearbox input, if it is known.
+    #[inline]
+    pub(super) fn at(&self, side: &InputSide<T>) -> Option<Found<T>> {
+        let (zero, one, least) = (T::zero(), T::one(), T::of(LEAST_N_M));
+        let Some(converter) = &self.converter else {
+            return side.reported_n_m.map(|turbine_n_m| Found { turbine_n_m, noise: zero });
+        };
+        let square = |x: T| x * x;
+        let [engine, engine_variance, acceleration] = side.engine?;
+        let [turbine, turbine_variance] = side.turbine;
+        let torques = converter.torques(engine, turbine);
+        let (by_maps, slope) = converter.turbine_with_slope(engine, turbine);
+        // The torque is of second degree in both speeds (Euler's theorem).
+        let per_engine = (T::of(2.0) * by_maps - turbine * slope) / engine.max(one);
+        let noise = square(slope) * turbine_variance + square(per_engine) * engine_variance;
+        let maps = Found { turbine_n_m: by_maps, noise };
+        let Some(reported) = side.reported_n_m else {
+            return (!side.lock_up_applied).then_some(maps);
+        };
+        let pump = if side.lock_up_applied { zero } else { torques.turbine_n_m - torques.pump_n_m };
+        let by_engine = reported - self.engine_inertia_kg_m2 * acceleration + pump;
+        if side.lock_up_applied {
+            return Some(Found { turbine_n_m: by_engine, noise: zero });
+        }
+        let maps_variance = square(self.converter_share * by_maps.abs().max(least));
+        let engine_variance = square(self.engine_share * reported.abs().max(least));
+        let share = engine_variance / (engine_variance + maps_variance);
+        let turbine_n_m = share * by_maps + (one - share) * by_engine;
+        Some(Found { turbine_n_m, noise: square(share) * noise })
+    }
+
+    /// Standard deviation of the torque, as a share, with or without the reported engine torque.
+    pub(super) fn share(&self, reported: bool) -> T {
+        let square = |x: T| x * x;
+        match (self.converter.is_some(), reported) {
+            (true, false) => self.converter_share,
+            (false, _) => self.engine_share,
+            (true, true) => (square(self.converter_share).recip() + square(self.engine_share).recip()).recip().sqrt(),
+        }
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> TurbineTorque<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        TurbineTorque {
+            converter: self.converter.as_ref().map(Converter::cast),
+            engine_inertia_kg_m2: to(self.engine_inertia_kg_m2),
+            converter_share: to(self.converter_share),
+            engine_share: to(self.engine_share),
+        }
+    }
+}

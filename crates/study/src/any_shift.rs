@@ -1,0 +1,320 @@
+//! How well the filter for any shift estimates both clutches of a shift, beside the valve models alone.
+//!
+//! A shift is simulated in a car that differs from the one that filter and controller know; the filter sees it through
+//! toothed wheels. Errors are counted by what the true clutches do: in the *torque phase* one of them holds and the other
+//! carries torque while it slips; in the *inertia phase* both slip.
+
+use config::{Car, Sensors};
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::Real;
+use observer::any_shift::{AnyShiftFilter, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
+use observer::{Health, Reading};
+use plant::TrainError;
+use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
+use plant::sensors::{Channel, Rows, read_speed};
+use thiserror::Error;
+
+/// Sample time of the records that toothed wheels are read from, s.
+pub const RECORD_S: f64 = 0.001;
+/// Sample time of the filter, s.
+pub const SAMPLE_S: f64 = 0.01;
+/// Torque below which a clutch carries nothing but drag, N m.
+const CARRIES_N_M: f64 = 2.0;
+/// Pressure that counts as outside its range only beyond rounding, Pa.
+const ROUNDING_PA: f64 = 1.0;
+/// Drag of an open clutch, which the range leaves out, N m.
+const DRAG_N_M: f64 = 1.2;
+
+/// Why a shift could not be scored.
+#[derive(Debug, Error)]
+pub enum AnyShiftError {
+    /// The simulation failed.
+    #[error("the shift cannot be simulated: {0}")]
+    Car(#[from] CarError),
+    /// The car cannot be prepared.
+    #[error("the car cannot be simulated: {0}")]
+    Train(#[from] TrainError),
+    /// There are more clutches than the filter has room for.
+    #[error("the gearbox has {0} clutches and brakes, and the filter has room for {MAX_ELEMENTS}")]
+    TooManyElements(usize),
+}
+
+/// How a car differs from the one that is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftDraw {
+    /// Factor on the friction of each element.
+    pub friction: Vec<f64>,
+    /// Factor on the gain of each element's valve.
+    pub valve_gain: Vec<f64>,
+    /// Factor on the converter's capacity.
+    pub converter: f64,
+}
+
+impl ShiftDraw {
+    /// The known car.
+    pub fn none(car: &Car) -> Self {
+        let ones = vec![1.0; car.clutches.len()];
+        Self { friction: ones.clone(), valve_gain: ones, converter: 1.0 }
+    }
+
+    /// Within the bounds, each factor by a number from 0 to 1.
+    pub fn within(car: &Car, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
+        let mut factor = |share: f64| 1.0 + share * (2.0 * uniform() - 1.0);
+        let friction = car.clutches.iter().map(|_| factor(errors.friction)).collect();
+        let valve_gain = car.clutches.iter().map(|_| factor(errors.valve_gain)).collect();
+        Self { friction, valve_gain, converter: factor(errors.converter) }
+    }
+
+    /// The car that differs from this one so.
+    pub fn car(&self, known: &Car) -> Car {
+        let mut car = known.clone();
+        let factors = self.friction.iter().zip(&self.valve_gain);
+        for (clutch, (friction, gain)) in car.clutches.iter_mut().zip(factors) {
+            let Some(clutch) = clutch else { continue };
+            clutch.clutch.friction = clutch.clutch.friction.scaled(*friction);
+            clutch.clutch.static_friction *= friction;
+            clutch.valve = clutch.valve.changed(1.0, *gain, None);
+        }
+        if let Some(converter) = &mut car.converter {
+            converter.capacity_n_m_s2 = converter.capacity_n_m_s2.scaled(self.converter);
+        }
+        car
+    }
+}
+
+/// Truth and estimates of one clutch at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClutchRow {
+    /// Torque, N m: true, estimated, by the valve model alone.
+    pub torque_n_m: [f64; 3],
+    /// Pressure, Pa: true, estimated, by the valve model alone.
+    pub pressure_pa: [f64; 3],
+    /// Whether it truly sticks.
+    pub sticks: bool,
+    /// The guaranteed range of the torque, N m.
+    pub torque_range_n_m: Option<[f64; 2]>,
+    /// Whether the truth is within the guaranteed ranges.
+    pub in_range: bool,
+}
+
+/// A row of a shift.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShiftScoreRow {
+    /// Time, s.
+    pub time_s: f64,
+    /// Offgoing and oncoming clutch.
+    pub clutches: [ClutchRow; 2],
+    /// Torque at the gearbox input, N m: true and estimated.
+    pub turbine_n_m: [f64; 2],
+    /// True speeds of engine, turbine, output and wheels, rad/s.
+    pub speeds_rad_s: [f64; 4],
+    /// Phase by the filter.
+    pub phase: &'static str,
+    /// What the filter says of itself.
+    pub health: Health,
+}
+
+/// What the clutches of a shift truly do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TruePhase {
+    /// One holds, the other carries torque while it slips.
+    Torque,
+    /// Both slip.
+    Inertia,
+}
+
+impl ShiftScoreRow {
+    /// What the clutches truly do; `None` where neither phase is on.
+    pub fn phase(&self) -> Option<TruePhase> {
+        match self.clutches.map(|clutch| clutch.sticks) {
+            [false, false] => Some(TruePhase::Inertia),
+            [true, true] => None,
+            [off, _] => {
+                let slipping = &self.clutches[usize::from(off)];
+                (slipping.torque_n_m[0].abs() > CARRIES_N_M).then_some(TruePhase::Torque)
+            }
+        }
+    }
+}
+
+/// Squared errors of a clutch's torque over the rows of a phase.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SquaredErrors {
+    /// Sum of the squares of the estimate's errors, (N m)^2.
+    pub estimate: f64,
+    /// The same by the valve model alone.
+    pub open_loop: f64,
+    /// Sum of the true torque's size, N m.
+    pub torque: f64,
+    /// Number of rows.
+    pub rows: f64,
+}
+
+impl SquaredErrors {
+    /// Adds those of more rows.
+    pub fn add(&mut self, more: &Self) {
+        self.estimate += more.estimate;
+        self.open_loop += more.open_loop;
+        self.torque += more.torque;
+        self.rows += more.rows;
+    }
+
+    /// Root mean square errors, N m: of the estimate, and of the valve model alone.
+    pub fn rms_n_m(&self) -> [f64; 2] {
+        [self.estimate, self.open_loop].map(|sum| (sum / self.rows.max(1.0)).sqrt())
+    }
+
+    /// The errors of one clutch in one phase.
+    pub fn of(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
+        let mut sum = Self::default();
+        for row in rows.iter().filter(|row| row.phase() == Some(phase) && !row.clutches[clutch].sticks) {
+            let [truth, estimate, open_loop] = row.clutches[clutch].torque_n_m;
+            sum.estimate += (truth - estimate).powi(2);
+            sum.open_loop += (truth - open_loop).powi(2);
+            sum.torque += truth.abs();
+            sum.rows += 1.0;
+        }
+        sum
+    }
+}
+
+/// Simulates a shift of the car `known` that truly is `truth`, and lets the filter estimate it.
+///
+/// # Errors
+/// The gears have no shift between two clutches, or the simulation fails.
+pub fn score_shift(
+    known: &Car,
+    truth: &Car,
+    shift: &CarShift,
+    sensors: &Sensors,
+    seed: u64,
+) -> Result<Vec<ShiftScoreRow>, AnyShiftError> {
+    let samples = simulated(known, truth, shift)?;
+    let errors = ShiftErrors::STANDARD;
+    let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
+    let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
+    let inputs = inputs(known, &tables, &samples, sensors, seed);
+    Ok(score_samples(&tables, &filter, &samples, &inputs))
+}
+
+/// A shift of the car `known` that truly is `truth`, recorded as [`inputs`] needs it.
+///
+/// # Errors
+/// The gears have no shift between two clutches, or the simulation fails.
+pub fn simulated(known: &Car, truth: &Car, shift: &CarShift) -> Result<Vec<CarSample>, AnyShiftError> {
+    let model = CarModel::new(truth.clone())?;
+    let mut samples = Vec::new();
+    let shift = CarShift { sample_time_s: RECORD_S, ..*shift };
+    simulate_car_shift(&model, known, CarCalibration::STANDARD, &shift, |sample| samples.push(*sample))?;
+    Ok(samples)
+}
+
+/// What the filter is shown of a drive that was recorded every [`RECORD_S`], every [`SAMPLE_S`]; each with the place of its sample.
+pub fn inputs(
+    car: &Car,
+    tables: &ShiftTables<f64>,
+    samples: &[CarSample],
+    sensors: &Sensors,
+    seed: u64,
+) -> Vec<(usize, ShiftInput<f64>)> {
+    let every = (SAMPLE_S / RECORD_S).round().max(1.0).whole();
+    let places: Vec<usize> = (0..samples.len()).step_by(every).collect();
+    let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s).collect();
+    let at_s: Vec<f64> = places.iter().map(|&at| time_s[at]).collect();
+    let rows = Rows { at_s: &at_s, offset_s: at_s.first().copied().unwrap_or(0.0), shift_s: [0.0; 2], seed };
+    let read = |name: &str, sensor, of: &dyn Fn(&CarSample) -> f64| {
+        let values: Vec<f64> = samples.iter().map(of).collect();
+        read_speed(sensor, Channel { name, time_s: &time_s, values: &values }, rows)
+    };
+    let speeds = [
+        read("engine", &sensors.engine, &|sample| sample.torques.engine_rad_s),
+        read("turbine", &sensors.turbine, &|sample| sample.torques.turbine_rad_s),
+        read("output", &sensors.output, &|sample| sample.torques.output_rad_s),
+        read("wheel", &sensors.wheel, &|sample| sample.wheel_rad_s),
+    ];
+    let mut inputs = Vec::new();
+    for (row, &at) in places.iter().enumerate() {
+        let sample = &samples[at];
+        let reading = |channel: usize| {
+            let (value, age_s) = (speeds[channel].values[row], speeds[channel].age_s[row]);
+            (!value.is_nan()).then_some(Reading { value, age_s })
+        };
+        let mut commands = [None; MAX_ELEMENTS];
+        for (element, &command) in sample.commands.iter().enumerate() {
+            if let Some(place) = tables.place(element) {
+                commands[place] = Some(Reading::now(command));
+            }
+        }
+        let gear = match &sample.shift {
+            Some(shift) => GearCommand { from: shift.from, to: shift.to },
+            None => GearCommand { from: sample.gear, to: sample.gear },
+        };
+        // Without a converter nothing else tells the torque at the gearbox input.
+        let engine_n_m = sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s;
+        inputs.push((
+            at,
+            ShiftInput {
+                dt_s: SAMPLE_S,
+                engine_rad_s: reading(0),
+                turbine_rad_s: reading(1),
+                output_rad_s: reading(2),
+                wheel_rad_s: reading(3),
+                engine_n_m: car.converter.is_none().then_some(Reading::now(engine_n_m)),
+                lock_up_applied: false,
+                commands,
+                gear,
+            },
+        ));
+    }
+    inputs
+}
+
+/// Truth and estimates of a recorded drive while its shifts are under way.
+pub fn score_samples(
+    tables: &ShiftTables<f64>,
+    filter: &AnyShiftFilter<'_, f64>,
+    samples: &[CarSample],
+    inputs: &[(usize, ShiftInput<f64>)],
+) -> Vec<ShiftScoreRow> {
+    let mut state = filter.start();
+    let mut rows = Vec::new();
+    for (at, input) in inputs {
+        let estimate = filter.step(&mut state, input);
+        rows.extend(row(tables, &samples[*at], &estimate));
+    }
+    rows
+}
+
+fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f64>) -> Option<ShiftScoreRow> {
+    let under_way = sample.shift.as_ref()?;
+    let clutches = estimate.clutches.as_ref()?;
+    let of = |c: usize| {
+        let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
+        (Some(found.element) == tables.place(truth.element)).then(|| {
+            let within = |range: Option<[f64; 2]>, value: f64, tolerance: f64| {
+                range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
+            };
+            ClutchRow {
+                torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
+                pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
+                sticks: truth.sticks,
+                torque_range_n_m: found.torque_range_n_m,
+                in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
+                    && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
+            }
+        })
+    };
+    Some(ShiftScoreRow {
+        time_s: sample.time_s,
+        clutches: [of(0)?, of(1)?],
+        turbine_n_m: [sample.turbine_n_m, estimate.turbine_n_m.unwrap_or(f64::NAN)],
+        speeds_rad_s: [
+            sample.torques.engine_rad_s,
+            sample.torques.turbine_rad_s,
+            sample.torques.output_rad_s,
+            sample.wheel_rad_s,
+        ],
+        phase: estimate.phase.map_or("-", |phase| phase.name()),
+        health: estimate.health,
+    })
+}

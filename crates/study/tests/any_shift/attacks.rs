@@ -1,0 +1,333 @@
+//! What a real car does to the filter: lost readings, other throttles, other inertias, an element that slips, single
+//! precision, and input without sense.
+
+use config::Car;
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::ShiftKind;
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput, ShiftRow};
+use observer::{Health, Reading};
+use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
+use study::any_shift::{
+    RECORD_S, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, inputs, score_samples, simulated,
+};
+
+use crate::cars::{Random, cars, sensors, shifts};
+use crate::controlling;
+
+const ERRORS: ShiftErrors = ShiftErrors::STANDARD;
+
+fn draw(car: &Car, seed: u64) -> Car {
+    let mut random = Random(seed);
+    ShiftDraw::within(car, &ERRORS, || random.uniform()).car(car)
+}
+
+/// A shift with a throttle that is moved a time after the request.
+fn moved_throttle(known: &Car, truth: &Car, shift: &CarShift, after_s: f64, throttle: f64) -> Vec<CarSample> {
+    let model = CarModel::new(truth.clone()).unwrap();
+    let state = model.in_gear(shift.from, Some(shift.to), shift.vehicle_m_s, shift.throttle).unwrap();
+    let driver = |throttle: f64| Driver { throttle, brake: 0.0, grade_rad: 0.0 };
+    let start = (driver(shift.throttle), RECORD_S);
+    let mut run = CarRun::new(&model, known, CarCalibration::STANDARD, shift.from, state, start).unwrap();
+    run.preselect(Some(shift.to));
+    let mut samples = Vec::new();
+    let mut requested = false;
+    while run.time_s() < shift.duration_s - 1e-9 {
+        if !requested && run.time_s() >= shift.request_s - 1e-9 {
+            run.request(shift.to).unwrap();
+            requested = true;
+        }
+        // Over 0.1 s.
+        let moved = ((run.time_s() - shift.request_s - after_s) / 0.1).clamp(0.0, 1.0);
+        let now = driver(shift.throttle + moved * (throttle - shift.throttle));
+        run.advance(now, |_| {}, |sample| samples.push(*sample)).unwrap();
+    }
+    samples
+}
+
+fn rows(known: &Car, samples: &[CarSample], seed: u64, change: impl Fn(&mut ShiftInput<f64>)) -> Vec<ShiftScoreRow> {
+    let tables = ShiftTables::of_car(known, &ERRORS).unwrap();
+    let sensors = sensors();
+    let filter = any_shift_filter(known, &tables, &ERRORS, Some(&sensors));
+    let mut inputs = inputs(known, &tables, samples, &sensors, seed);
+    inputs.iter_mut().for_each(|(_, input)| change(input));
+    score_samples(&tables, &filter, samples, &inputs)
+}
+
+/// Ratio of the errors to the open loop's, of both clutches while both slip, over some shifts of the first car.
+fn pooled(mut rows_of: impl FnMut(&Car, &CarShift, ShiftKind) -> Vec<ShiftScoreRow>) -> [f64; 4] {
+    let car = &cars()[0];
+    let mut sums = [SquaredErrors::default(); 4];
+    for (from, to, throttle) in shifts(car) {
+        let gears = &car.gearbox.gears;
+        let kind = ShiftKind::of(throttle - 0.01, gears[from].ratio, gears[to].ratio).unwrap();
+        let shift = CarShift::usual(car, from, to, throttle);
+        let rows = rows_of(car, &shift, kind);
+        let at = ShiftKind::ALL.iter().position(|&other| other == kind).unwrap();
+        sums[at].add(&SquaredErrors::of(&rows, TruePhase::Inertia, controlling(kind)));
+    }
+    sums.map(|sum| {
+        let [estimate, open_loop] = sum.rms_n_m();
+        estimate / open_loop
+    })
+}
+
+fn seed_of(shift: &CarShift) -> u64 {
+    1000 + 37 * shift.from as u64 + shift.to as u64
+}
+
+/// Ratios of the kinds in their order, for a car of the budget.
+fn as_usual() -> [f64; 4] {
+    pooled(|car, shift, _| {
+        let samples = simulated(car, &draw(car, seed_of(shift)), shift).unwrap();
+        rows(car, &samples, 1, |_| {})
+    })
+}
+
+#[test]
+fn lost_readings_cost_little() {
+    let usual = as_usual();
+    let lost = pooled(|car, shift, _| {
+        let samples = simulated(car, &draw(car, seed_of(shift)), shift).unwrap();
+        let random = std::cell::RefCell::new(Random(seed_of(shift)));
+        rows(car, &samples, 1, |input| {
+            let lost = || random.borrow_mut().uniform() < 0.05;
+            for reading in
+                [&mut input.engine_rad_s, &mut input.turbine_rad_s, &mut input.output_rad_s, &mut input.wheel_rad_s]
+            {
+                if lost() {
+                    *reading = None;
+                }
+            }
+        })
+    });
+    println!("usual {usual:.2?}, 5 % of the readings lost {lost:.2?}");
+    assert!(usual.iter().zip(&lost).all(|(usual, lost)| lost - usual < 0.15), "{usual:?} {lost:?}");
+}
+
+#[test]
+fn single_outliers_cost_little() {
+    let usual = as_usual();
+    let wrong = pooled(|car, shift, _| {
+        let samples = simulated(car, &draw(car, seed_of(shift)), shift).unwrap();
+        let random = std::cell::RefCell::new(Random(seed_of(shift)));
+        rows(car, &samples, 1, |input| {
+            let mut random = random.borrow_mut();
+            for reading in [&mut input.turbine_rad_s, &mut input.output_rad_s, &mut input.wheel_rad_s] {
+                if random.uniform() < 0.01
+                    && let Some(reading) = reading
+                {
+                    reading.value += 5.0;
+                }
+            }
+        })
+    });
+    println!("usual {usual:.2?}, 1 % outliers of 5 rad/s {wrong:.2?}");
+    assert!(usual.iter().zip(&wrong).all(|(usual, wrong)| wrong - usual < 0.3), "{usual:?} {wrong:?}");
+}
+
+#[test]
+fn a_throttle_that_moves_in_the_shift_swaps_the_roles_of_the_clutches() {
+    let usual = as_usual();
+    let mut all = [[0.0; 4]; 3];
+    for (ratios, after_s) in all.iter_mut().zip([0.3, 0.45, 0.6]) {
+        *ratios = pooled(|car, shift, _| {
+            let throttle = if shift.throttle > 0.0 { 0.0 } else { 0.2 };
+            let samples = moved_throttle(car, &draw(car, seed_of(shift)), shift, after_s, throttle);
+            rows(car, &samples, 1, |_| {})
+        });
+    }
+    println!("usual {usual:.2?}, throttle moved 0.3, 0.45, 0.6 s after the request {all:.2?}");
+    assert!(all.iter().flatten().all(|&ratio| ratio < 1.0), "{all:?}");
+}
+
+#[test]
+fn an_inertia_that_is_wrong_by_a_fifth_leaves_the_filter_below_the_open_loop() {
+    let [low, high] = [0.8, 1.2].map(|factor| {
+        pooled(|car, shift, _| {
+            let samples = simulated(car, &draw(car, seed_of(shift)), shift).unwrap();
+            let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+            let sensors = sensors();
+            let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+            let mut wrong: Vec<ShiftRow<f64>> = filter.tables.shifts.to_vec();
+            wrong.iter_mut().for_each(|row| row.mass_kg_m2[0][0] *= factor);
+            let mut filter = filter;
+            filter.tables.shifts = &wrong;
+            let inputs = inputs(car, &tables, &samples, &sensors, 1);
+            score_samples(&tables, &filter, &samples, &inputs)
+        })
+    });
+    println!("M11 20 % low {low:.2?}, high {high:.2?}");
+    assert!(low.iter().chain(&high).all(|&ratio| ratio < 1.0), "{low:?} {high:?}");
+}
+
+#[test]
+fn an_element_of_the_gear_that_slips_is_said() {
+    let car = &cars()[0];
+    let gear = |name: &str| car.gearbox.gear(name).unwrap();
+    let shift = CarShift::usual(car, gear("2"), gear("3"), 0.3);
+    // B is held from 2nd to 3rd gear.
+    let held = car.gearbox.elements.iter().position(|element| element.name == "B").unwrap();
+    let said = |factor: f64| {
+        let mut truth = car.clone();
+        if let Some(clutch) = &mut truth.clutches[held] {
+            clutch.clutch.friction = clutch.clutch.friction.scaled(factor);
+            clutch.clutch.static_friction *= factor;
+        }
+        let samples = simulated(car, &truth, &shift).unwrap();
+        let slips = samples.iter().filter(|sample| sample.slips_rad_s[held].abs() > 5.0).count();
+        let rows = rows(car, &samples, 1, |_| {});
+        (slips, rows.iter().filter(|row| row.health == Health::HeldClutchSlips).count())
+    };
+    let (sound, slipping) = (said(1.0), said(0.1));
+    println!(
+        "samples with slip and rows that say so: sound {sound:?}, friction of a held brake at a tenth {slipping:?}"
+    );
+    assert_eq!(sound.0, 0);
+    assert!(slipping.0 > 50, "the brake does not slip");
+    assert!(sound.1 <= 2 && slipping.1 > 20, "{sound:?} {slipping:?}");
+}
+
+#[test]
+fn single_precision_estimates_the_same() {
+    let mut largest = 0.0_f64;
+    let mut square = [0.0, 0.0];
+    let (mut steps, mut time_s) = (0.0, 0.0);
+    for car in cars() {
+        let tables = ShiftTables::of_car(&car, &ERRORS).unwrap();
+        let single_tables = tables.cast::<f32>();
+        let sensors = sensors();
+        let filter = any_shift_filter(&car, &tables, &ERRORS, Some(&sensors));
+        let single = filter.cast(single_tables.tables());
+        for (from, to, throttle) in shifts(&car).into_iter().step_by(3) {
+            let shift = CarShift::usual(&car, from, to, throttle);
+            let samples = simulated(&car, &draw(&car, seed_of(&shift)), &shift).unwrap();
+            let (mut state, mut single_state) = (filter.start(), single.start());
+            let inputs = inputs(&car, &tables, &samples, &sensors, 1);
+            let begun = std::time::Instant::now();
+            let estimates: Vec<_> = inputs.iter().map(|(_, input)| filter.step(&mut state, input)).collect();
+            time_s += begun.elapsed().as_secs_f64();
+            steps += inputs.len() as f64;
+            for ((_, input), estimate) in inputs.iter().zip(estimates) {
+                let rounded = single.step(&mut single_state, &cast(input));
+                if let (Some(clutches), Some(others)) = (estimate.clutches, rounded.clutches) {
+                    for (clutch, other) in clutches.iter().zip(&others) {
+                        let difference = clutch.torque_n_m - f64::from(other.torque_n_m);
+                        largest = largest.max(difference.abs());
+                        square[0] += difference * difference;
+                        square[1] += 1.0;
+                    }
+                }
+            }
+        }
+    }
+    let rms = (square[0] / square[1]).sqrt();
+    println!("{:.2} us for a step with ranges", 1e6 * time_s / steps);
+    println!("single from double precision: RMS {rms:.3} N m, largest {largest:.2} N m");
+    assert!(rms < 0.5, "{rms} {largest}");
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
+    let to = |reading: Option<Reading<f64>>| {
+        reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })
+    };
+    ShiftInput {
+        dt_s: input.dt_s as f32,
+        engine_rad_s: to(input.engine_rad_s),
+        turbine_rad_s: to(input.turbine_rad_s),
+        output_rad_s: to(input.output_rad_s),
+        wheel_rad_s: to(input.wheel_rad_s),
+        engine_n_m: to(input.engine_n_m),
+        lock_up_applied: input.lock_up_applied,
+        commands: input.commands.map(to),
+        gear: input.gear,
+    }
+}
+
+/// Forty seconds of driving off through several gears: one filter without a new start.
+#[test]
+fn one_filter_serves_a_whole_drive() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml");
+    let mut drive = config::Drive::read(&path).unwrap();
+    drive.segments.truncate(4);
+    (drive.repetitions, drive.sample_time_s) = (1, RECORD_S);
+    let car = &cars()[0];
+    let model = CarModel::new(draw(car, 3)).unwrap();
+    let mut samples = Vec::new();
+    let summary =
+        plant::car::simulate_car_drive(&model, car, CarCalibration::STANDARD, &drive, |sample| samples.push(*sample))
+            .unwrap();
+    let rows = rows(car, &samples, 1, |_| {});
+    let restarts = rows.iter().filter(|row| row.health == Health::Restarted).count();
+    let slips = rows.iter().filter(|row| row.health == Health::HeldClutchSlips).count();
+    let mut sums = [SquaredErrors::default(); 2];
+    for (c, sum) in sums.iter_mut().enumerate() {
+        sum.add(&SquaredErrors::of(&rows, TruePhase::Inertia, c));
+    }
+    let ratios = sums.map(|sum| {
+        let [estimate, open_loop] = sum.rms_n_m();
+        estimate / open_loop
+    });
+    println!(
+        "{} shifts, {} rows, new starts {restarts}, slip said {slips}, both slip: offgoing {:.2}, oncoming {:.2}",
+        summary.shifts,
+        rows.len(),
+        ratios[0],
+        ratios[1]
+    );
+    assert!(summary.shifts >= 3);
+    assert_eq!(restarts, 0);
+    // A clutch that grips hard may look so for a few samples.
+    assert!(100 * slips <= rows.len(), "{slips} of {}", rows.len());
+    assert!(ratios[1] < 0.8, "{ratios:?}");
+}
+
+/// Whatever comes in, what comes out are numbers within limits; and after it the filter works again.
+#[test]
+fn input_without_sense_gives_numbers_and_a_word() {
+    let car = &cars()[0];
+    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let sensors = sensors();
+    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let gear = |name: &str| car.gearbox.gear(name).unwrap();
+    let shift = CarShift::usual(car, gear("2"), gear("3"), 0.15);
+    let samples = simulated(car, car, &shift).unwrap();
+    let clean = inputs(car, &tables, &samples, &sensors, 1);
+    let mut random = Random(5);
+    let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e300, -1e300, 1e-300, 1e9, -500.0];
+    for _ in 0..200 {
+        let mut state = filter.start();
+        for (at, (_, input)) in clean.iter().enumerate() {
+            let mut input = *input;
+            if at < 250 && random.uniform() < 0.2 {
+                let value = odd[(random.uniform() * odd.len() as f64) as usize];
+                let reading = Some(Reading { value, age_s: if random.uniform() < 0.5 { 0.0 } else { value } });
+                match (random.uniform() * 9.0) as usize {
+                    0 => input.dt_s = value,
+                    1 => input.engine_rad_s = reading,
+                    2 => input.turbine_rad_s = reading,
+                    3 => input.output_rad_s = reading,
+                    4 => input.wheel_rad_s = reading,
+                    5 => input.engine_n_m = reading,
+                    6 => input.commands = [reading; MAX_ELEMENTS],
+                    7 => input.lock_up_applied = true,
+                    _ => {
+                        let any = |random: &mut Random| (random.uniform() * 12.0) as usize;
+                        input.gear = GearCommand { from: any(&mut random), to: any(&mut random) };
+                    }
+                }
+            }
+            let estimate = filter.step(&mut state, &input);
+            for clutch in estimate.clutches.iter().flatten() {
+                let limits = &filter.limits;
+                assert!((0.0..=limits.pressure_max_pa).contains(&clutch.pressure_pa), "{clutch:?}");
+                assert!(clutch.torque_n_m.is_finite() && clutch.deviation_n_m >= 0.0, "{clutch:?}");
+            }
+            assert!(estimate.shaft_n_m.is_none_or(f64::is_finite), "{estimate:?}");
+            assert!(estimate.turbine_n_m.is_none_or(f64::is_finite), "{estimate:?}");
+            if at == clean.len() - 1 {
+                assert_eq!(estimate.health, Health::Good, "after half a second of clean input");
+            }
+        }
+    }
+}
