@@ -1,0 +1,143 @@
+//! The vehicle file of a fit: the text of the given one with other values.
+
+use config::{Source, Vehicle};
+use drivetrain::CommandKind;
+
+use crate::car::slope_factor;
+use crate::vehicle_text::{Step, VehicleText, keys, shaft_inertia};
+use crate::{Fit, FitError, Parameter};
+
+/// Standard deviations on either side of a stated interval.
+pub(crate) const SIDES: f64 = 2.0;
+
+impl Fit {
+    /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
+    /// error budget follows from the intervals; everything else is as in the file.
+    ///
+    /// # Errors
+    /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
+    pub fn vehicle_file(&self, vehicle: &Vehicle) -> Result<Vehicle, FitError> {
+        let mut text = VehicleText::new(&vehicle.source.text)?;
+        let (offgoing, oncoming) = clutch_names(&vehicle.source.text)?;
+        for prior in &self.priors {
+            let parameter = prior.parameter;
+            let clutch = if parameter == Parameter::OffgoingFriction { &offgoing } else { &oncoming };
+            self.write(&mut text, vehicle, clutch, parameter)?;
+        }
+        self.write_budget(&mut text, vehicle)?;
+        let source = Source { path: vehicle.source.path.clone(), text: text.finish() };
+        Ok(Vehicle::from_source(source)?)
+    }
+
+    fn write(&self, text: &mut VehicleText, vehicle: &Vehicle, clutch: &str, parameter: Parameter) -> Result<(), FitError> {
+        let Some(value) = self.value(parameter) else { return Ok(()) };
+        let comment = self.comment(parameter);
+        let comment = Some(comment.as_str());
+        let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
+        let is_current = vehicle.oncoming.valve.command_kind() == CommandKind::Current;
+        match parameter {
+            Parameter::Capacity => text.map(&keys(&["converter", "capacity_n_m_s2"]), |c| value * c, comment),
+            Parameter::TorqueRatio => {
+                text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
+            }
+            Parameter::Friction => {
+                let slope = self.value(Parameter::FrictionSlope).unwrap_or(0.0);
+                let friction = of_clutch(&["friction", "coefficient"]);
+                let slips = text.numbers(&of_clutch(&["friction", "slip_rad_s"]))?;
+                let values = text.numbers(&friction)?;
+                let fitted: Vec<f64> =
+                    slips.iter().zip(values).map(|(slip, mu)| value * slope_factor(slope, *slip) * mu).collect();
+                text.set(&friction, &fitted, comment)?;
+                // A clutch that sticks holds at least what it carries as it begins to slip.
+                let at_rest = fitted.first().copied().unwrap_or(0.0);
+                let more = "keeps its ratio to the fitted friction, and is not below it";
+                text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
+            }
+            Parameter::FrictionSlope => Ok(()),
+            Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
+            Parameter::Gain => {
+                let (own, observer) = if is_current {
+                    (of_clutch(&["valve", "gain", "gain_pa_a"]), keys(&["observer", "valve", "gain_pa_a"]))
+                } else {
+                    (of_clutch(&["valve", "line_pressure_pa"]), keys(&["observer", "valve", "line_pressure_pa"]))
+                };
+                text.map(&own, |gain| value * gain, comment)?;
+                text.map(&observer, |gain| value * gain, comment)
+            }
+            Parameter::Lag => {
+                let (own, observer, power) = if is_current {
+                    (of_clutch(&["valve", "lag", "time_constant_s"]), keys(&["observer", "valve", "time_constant_s"]), 1.0)
+                } else {
+                    (of_clutch(&["valve", "flow_sqrt_pa_s"]), keys(&["observer", "valve", "flow_sqrt_pa_s"]), -1.0)
+                };
+                let factor = value.powf(power);
+                text.map(&own, |lag| factor * lag, comment)?;
+                text.map(&observer, |lag| factor * lag, comment)
+            }
+            Parameter::CommandDelay => {
+                text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
+            }
+            Parameter::Inertia(shaft) => text.map(&shaft_inertia(shaft), |inertia| value * inertia, comment),
+            Parameter::Stiffness => {
+                text.map(&keys(&["driveline", "shaft_stiffness_n_m_rad"]), |stiffness| value * stiffness, comment)
+            }
+            Parameter::Damping => {
+                text.map(&keys(&["driveline", "shaft_damping_n_m_s_rad"]), |damping| value * damping, comment)
+            }
+            Parameter::Tyre => text.map(&keys(&["tyre", "slip_scale"]), |slip| value * slip, comment),
+            Parameter::Mass => text.map(&keys(&["vehicle", "mass_kg"]), |mass| value * mass, comment),
+            Parameter::EngineInertia => text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment),
+            // Friction that holds is not what is fitted: it only ever slips for a moment.
+            Parameter::OffgoingFriction => Ok(()),
+            _ => Ok(()),
+        }
+    }
+
+    /// What a fitted value says of itself.
+    fn comment(&self, parameter: Parameter) -> String {
+        let (value, sd) = (self.value(parameter).unwrap_or(1.0), self.sd(parameter).unwrap_or(0.0));
+        let shifts = self.shifts;
+        let told = self.verdict(parameter).name();
+        if parameter.is_delay() {
+            let half_ms = 1e3 * SIDES * crate::parameters::DELAY_UNIT_S * sd;
+            return format!("fitted to {shifts} shifts: {:+.1} ms +- {half_ms:.1} ms, {told}", 1e3 * value);
+        }
+        let (least, greatest) = (value * (-SIDES * sd).exp(), value * (SIDES * sd).exp());
+        format!("fitted to {shifts} shifts: x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
+    }
+
+    /// The error budget: what the fit leaves open of each parameter.
+    fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
+        let comment = format!("what the fit to {} shifts leaves open, 95 %", self.shifts);
+        let budget = |key: &str| keys(&["design", "error_bounds", key]);
+        let half = |parameter: Parameter| SIDES * self.sd(parameter).unwrap_or(0.0);
+        let factors = |parameter: Parameter| [(-half(parameter)).exp(), half(parameter).exp()];
+        let mut set = |path: Vec<Step>, values: &[f64]| {
+            // Keys that the file leaves at their defaults stay there.
+            if text.has(&path) { text.set(&path, values, Some(&comment)) } else { Ok(()) }
+        };
+        set(budget("turbine_torque_share"), &[half(Parameter::Capacity).clamp(0.01, 1.0)])?;
+        set(budget("friction_factor"), &factors(Parameter::Friction))?;
+        set(budget("valve_gain_factor"), &factors(Parameter::Gain))?;
+        set(budget("valve_lag_factor"), &factors(Parameter::Lag))?;
+        set(budget("shaft_stiffness_factor"), &factors(Parameter::Stiffness))?;
+        set(budget("mass_kg"), &[half(Parameter::Mass) * self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg])?;
+        if let Some(delay_s) = self.value(Parameter::CommandDelay) {
+            let half_s = crate::parameters::DELAY_UNIT_S * half(Parameter::CommandDelay);
+            let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
+            let (one, other) = (delay(0.0), delay(vehicle.limits.command_max));
+            set(budget("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
+        }
+        Ok(())
+    }
+}
+
+/// Names of the offgoing and the oncoming clutch.
+fn clutch_names(text: &str) -> Result<(String, String), FitError> {
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
+    let name = |key: &str| {
+        let name = table.get("gear_train").and_then(|train| train.get(key)).and_then(toml::Value::as_str);
+        name.map(str::to_owned).ok_or_else(|| FitError::input(format!("the vehicle file has no `gear_train.{key}`")))
+    };
+    Ok((name("offgoing")?, name("oncoming")?))
+}
