@@ -111,25 +111,12 @@ pub fn fit(
     let at = Unknowns { shared: first.shared, own: models.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
     let (at, weights) = problem.solve(&models, at, weights, (4, 12), &mut say)?;
-    let precision = intervals::precision(&problem, &models, &at, &weights)?;
-    let residuals = problem.residuals(&models, &at);
-    if std::env::var("FIT_DEBUG").is_ok() {
-        for (model, rows) in models.iter().zip(&residuals) {
-            let mut errors = rows.clone();
-            weights.errors(&model.blocks, errors.as_mut_slice());
-            let mut line = format!("{:10}", model.record.name);
-            for block in &model.blocks {
-                let part = &errors.as_slice()[block.rows.clone()];
-                let rms = (part.iter().map(|e| e * e).sum::<f64>() / part.len() as f64).sqrt();
-                line += &format!(" {:?} {rms:.2}", block.channel);
-            }
-            eprintln!("{line} {:?}", model.record.segments.iter().map(|s| s.span_s).collect::<Vec<_>>());
-        }
-    }
+    let precision = intervals::precision(&problem, &models, &at, &weights, available.pressure)?;
+    let unknowns = scaled_by_priors(&priors, at.shared);
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
     let channels = channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect();
-    Ok(Fit { unknowns: at.shared, precision, available, shifts: models.len(), unusable, channels, priors })
+    Ok(Fit { unknowns, precision, available, shifts: models.len(), unusable, channels, priors })
 }
 
 /// At most so many of the shifts, evenly over all.
@@ -154,35 +141,28 @@ impl Fit {
         self.place(parameter).map(|i| self.precision.stated[(i, i)].sqrt())
     }
 
-    /// Standard deviation of a combination of unknowns as it is stated.
-    pub fn combination_sd(&self, factors: &[(Parameter, f64)]) -> f64 {
-        let direction = self.direction(factors);
-        direction.dot(&(&self.precision.stated * &direction)).max(0.0).sqrt()
-    }
-
-    /// The same before the fit.
-    pub fn combination_prior_sd(&self, factors: &[(Parameter, f64)]) -> f64 {
-        let direction = self.direction(factors);
-        direction.iter().zip(&self.priors).map(|(d, prior)| (d * prior.sd).powi(2)).sum::<f64>().sqrt()
-    }
-
-    fn direction(&self, factors: &[(Parameter, f64)]) -> DVector<f64> {
-        let mut direction = DVector::zeros(self.priors.len());
-        for (parameter, factor) in factors {
+    /// Standard deviation of the logarithm of a product of powers of factors: what is known before, and now.
+    pub fn combination_sd(&self, powers: &[(Parameter, f64)]) -> [f64; 2] {
+        let mut along = DVector::zeros(self.priors.len());
+        for (parameter, power) in powers {
             if let Some(i) = self.place(*parameter) {
-                direction[i] = *factor;
+                along[i] = *power;
             }
         }
-        direction
+        let before: f64 = along.iter().zip(&self.priors).map(|(power, prior)| (power * prior.sd).powi(2)).sum();
+        [before.sqrt(), self.precision.combination_sd(&along)]
     }
 
-    /// Standard deviation of the factor that all torques have in common: what the priors alone say, and what is known now. The
-    /// speeds alone say nothing of it; data that fix all ratios of torques leave it as it was.
-    pub fn torque_scale_sd(&self) -> (f64, f64) {
-        let power = |prior: &Prior| prior.parameter.power_of_torque() / (prior.sd * prior.sd);
-        let along = DVector::from_iterator(self.priors.len(), self.priors.iter().map(power));
-        let precision: f64 = self.priors.iter().map(|p| (p.parameter.power_of_torque() / p.sd).powi(2)).sum();
-        let after = along.dot(&(&self.precision.auto * &along)).max(0.0).sqrt() / precision;
-        (precision.sqrt().recip(), after)
+    /// Standard deviation of the logarithm of the factor that all torques have in common.
+    pub fn torque_scale_sd(&self) -> f64 {
+        intervals::torque_scale(&self.priors).1.sqrt().recip()
     }
+}
+
+/// Moves the unknowns along the factor of all torques to where the priors want it. What data seem to say of it rests on
+/// loads that the file takes as exact, see [`intervals`].
+fn scaled_by_priors(priors: &[Prior], unknowns: Vec<f64>) -> Vec<f64> {
+    let (weights, _) = intervals::torque_scale(priors);
+    let off: f64 = (priors.iter().zip(&unknowns).zip(weights.iter())).map(|((p, x), w)| w * (x - p.mean)).sum();
+    (priors.iter().zip(unknowns)).map(|(prior, x)| x - off * prior.parameter.power_of_torque()).collect()
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::parameters::DELAY_UNIT_S;
+use crate::parameters::{DELAY_UNIT_S, Prior};
 use crate::shift_model::ShiftModel;
 use crate::solver::{NO_INFLATION, Problem, Unknowns};
 use crate::weights::{Weights, correlation_factor};
@@ -23,8 +23,15 @@ pub struct Precision {
     pub stated: DMatrix<f64>,
     /// Covariance with the correlation of the residuals, without factor and floor.
     pub auto: DMatrix<f64>,
-    /// Covariance for independent errors, without factor and floor.
-    pub plain: DMatrix<f64>,
+}
+
+impl Precision {
+    /// Standard deviation of a combination of unknowns as it is stated.
+    pub(crate) fn combination_sd(&self, along: &DVector<f64>) -> f64 {
+        /// Least one: what the model leaves out does not shrink with more shifts.
+        const FLOOR: f64 = 0.005;
+        (FACTOR * along.dot(&(&self.auto * along)).max(0.0).sqrt()).hypot(FLOOR)
+    }
 }
 
 /// Least standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
@@ -45,6 +52,7 @@ pub(crate) fn precision(
     shifts: &[ShiftModel],
     at: &Unknowns,
     weights: &Weights,
+    has_pressure: bool,
 ) -> Result<Precision, FitError> {
     let lines = problem.linearised(shifts, at);
     let plain = problem.normal(shifts, &lines, at, weights, &NO_INFLATION, 0.0)?;
@@ -63,12 +71,11 @@ pub(crate) fn precision(
     // Each parameter takes the larger variance; the correlations are those of "auto".
     let scale: Vec<f64> = (0..count)
         .map(|j| {
-            let auto = stated[(j, j)];
-            let larger = auto.max(cluster[(j, j)]);
-            let found = FACTOR * larger.sqrt();
+            let auto = auto_covariance[(j, j)];
+            let found = FACTOR * auto.max(cluster[(j, j)]).sqrt();
             let prior = &problem.priors[j];
             // No fit knows less than was known before.
-            (found.hypot(floor(prior.parameter)).min(prior.sd)) / auto.sqrt()
+            found.hypot(floor(prior.parameter)).min(prior.sd) / auto.sqrt()
         })
         .collect();
     for i in 0..count {
@@ -76,7 +83,47 @@ pub(crate) fn precision(
             stated[(i, j)] *= scale[i] * scale[j];
         }
     }
-    Ok(Precision { stated, auto: auto_covariance, plain: plain_covariance })
+    let mut auto = auto_covariance;
+    for covariance in [&mut auto, &mut stated] {
+        for (weights, variance) in untold(problem.priors, has_pressure) {
+            forget(covariance, &weights, variance);
+        }
+    }
+    Ok(Precision { stated, auto })
+}
+
+/// Combinations of the unknowns of which data may say nothing, with the variance that the priors leave them.
+///
+/// The factor of all torques: what speeds seem to say of it comes from rolling resistance, drag and the inertia of
+/// the wheels, which the file takes as exact. The gain of the valve, where no pressure is measured: what speeds seem to say
+/// of it comes from the shape of its lag over pressure.
+fn untold(priors: &[Prior], has_pressure: bool) -> Vec<(DVector<f64>, f64)> {
+    let (scale, precision) = torque_scale(priors);
+    let mut combinations = vec![(scale, precision.recip())];
+    let gain = priors.iter().position(|prior| prior.parameter == Parameter::Gain);
+    if let Some(gain) = gain.filter(|_| !has_pressure) {
+        let mut only = DVector::zeros(priors.len());
+        only[gain] = 1.0;
+        combinations.push((only, priors[gain].sd.powi(2)));
+    }
+    combinations
+}
+
+/// The logarithm of the factor of all torques as a combination of the unknowns, and its precision, by the priors alone.
+pub(crate) fn torque_scale(priors: &[Prior]) -> (DVector<f64>, f64) {
+    let power = |prior: &Prior| prior.parameter.power_of_torque();
+    let precision: f64 = priors.iter().map(|prior| (power(prior) / prior.sd).powi(2)).sum();
+    let weights = priors.iter().map(|prior| power(prior) / (prior.sd * prior.sd * precision));
+    (DVector::from_iterator(priors.len(), weights), precision)
+}
+
+/// Gives a combination of unknowns at least this variance; what is known of the others when it is known stays as it is.
+fn forget(covariance: &mut DMatrix<f64>, weights: &DVector<f64>, variance: f64) {
+    let with = &*covariance * weights;
+    let now = weights.dot(&with);
+    if now < variance {
+        *covariance += &with * with.transpose() * ((variance - now) / (now * now));
+    }
 }
 
 /// The sandwich over shifts: how much the shifts disagree.

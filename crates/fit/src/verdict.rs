@@ -40,9 +40,8 @@ impl Fit {
         Verdict::of(self.sd(parameter).unwrap_or(f64::INFINITY), self.priors[place].sd)
     }
 
-    /// What the logs tell of the factor that all torques have in common.
+    /// What the logs tell of the factor that all torques have in common: an engine torque signal is a measurement of it.
     pub fn torque_scale_verdict(&self) -> Verdict {
-        let (before, after) = self.torque_scale_sd();
-        Verdict::of(after, before)
+        if self.available.engine_torque { Verdict::Partly } else { Verdict::NotTold }
     }
 }

@@ -97,8 +97,8 @@ fn many_cars() {
                 prior.sd
             );
         }
-        let (before, after) = outcomes[0].0.torque_scale_sd();
-        println!("all held {:.3}; torque scale {after:.4} of {before:.4}", inside as f64 / all as f64);
+        let scale = outcomes[0].0.torque_scale_sd();
+        println!("all held {:.3}; torque scale {scale:.4}", inside as f64 / all as f64);
         println!("channels {:?}", outcomes[0].0.channels);
     }
 }
