@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Design(options) => commands::design(&options),
         Command::Inspect(options) => commands::inspect(&options),
         Command::Estimate(options) => commands::estimate(&options),
+        Command::Fit(options) => commands::fit(&options),
         Command::Reproduce(options) => commands::reproduce(&options),
         Command::Bench(options) => commands::bench(&options),
         Command::Study(options) => commands::study(&options),

@@ -26,7 +26,12 @@ impl Fit {
         }
         self.write_budget(&mut text, vehicle)?;
         let source = Source { path: vehicle.source.path.clone(), text: text.finish() };
-        Ok(Vehicle::from_source(source)?)
+        Vehicle::from_source(source).map_err(|error| {
+            FitError::Work(format!(
+                "the fitted values are not those of a possible car: {error}\n\
+                 hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
+            ))
+        })
     }
 
     fn write(&self, text: &mut VehicleText, vehicle: &Vehicle, clutch: &str, parameter: Parameter) -> Result<(), FitError> {

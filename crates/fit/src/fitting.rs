@@ -34,6 +34,7 @@ pub struct Fit {
     pub unusable: Vec<String>,
     /// One-step scale of each channel, and its gain `g`; zero for a channel without readings.
     pub channels: Vec<(Channel, f64, f64)>,
+    pub(crate) weights: Weights,
 }
 
 /// How far a fit is.
@@ -116,7 +117,7 @@ pub fn fit(
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
     let channels = channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect();
-    Ok(Fit { unknowns, precision, available, shifts: models.len(), unusable, channels, priors })
+    Ok(Fit { unknowns, precision, available, shifts: models.len(), unusable, channels, weights, priors })
 }
 
 /// At most so many of the shifts, evenly over all.

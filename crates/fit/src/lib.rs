@@ -6,6 +6,7 @@
 //! ([`Precision`]); what the readings cannot tell keeps what was known before, and the report says so.
 
 mod car;
+pub mod collect;
 pub mod error;
 mod fitted_file;
 pub mod fitting;
@@ -15,20 +16,25 @@ pub mod open_loop;
 pub mod parameters;
 mod pressure;
 pub mod record;
+pub mod report;
 pub mod series;
 pub mod shift_model;
 mod solver;
+pub mod validation;
 mod vehicle_text;
 pub mod verdict;
 mod weights;
 
 pub use car::ReadingAges;
+pub use collect::{Collected, collect};
 pub use error::FitError;
 pub use fitting::{Fit, Progress, SHIFTS_MAX, available, check_vehicle, fit};
 pub use intervals::Precision;
 pub use open_loop::{OpenLoop, open_loop};
 pub use parameters::{Available, Parameter, Prior};
 pub use record::{Segment, SegmentKind, ShiftRecord};
+pub use report::ReportRow;
 pub use series::Series;
 pub use shift_model::Channel;
+pub use validation::HeldOut;
 pub use verdict::Verdict;

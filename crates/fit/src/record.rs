@@ -44,7 +44,7 @@ pub struct Segment {
 }
 
 /// The readings of one shift. Times count from the beginning of its inertia phase.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ShiftRecord {
     /// The log and the time of the shift in it, for messages.
     pub name: String,
