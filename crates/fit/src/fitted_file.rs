@@ -4,7 +4,7 @@ use config::{Source, Vehicle};
 use drivetrain::CommandKind;
 
 use crate::car::slope_factor;
-use crate::vehicle_text::{Step, VehicleText, keys, shaft_inertia};
+use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{Fit, FitError, Parameter};
 
 /// Standard deviations on either side of a stated interval.
@@ -12,11 +12,11 @@ pub(crate) const SIDES: f64 = 2.0;
 
 impl Fit {
     /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
-    /// error budget follows from the intervals; everything else is as in the file.
+    /// error budget follows from the intervals; everything else is as in the file. `logs` are named at the head of the file.
     ///
     /// # Errors
     /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
-    pub fn vehicle_file(&self, vehicle: &Vehicle) -> Result<Vehicle, FitError> {
+    pub fn vehicle_file(&self, vehicle: &Vehicle, logs: &str) -> Result<Vehicle, FitError> {
         let mut text = VehicleText::new(&vehicle.source.text)?;
         let (offgoing, oncoming) = clutch_names(&vehicle.source.text)?;
         for prior in &self.priors {
@@ -25,7 +25,9 @@ impl Fit {
             self.write(&mut text, vehicle, clutch, parameter)?;
         }
         self.write_budget(&mut text, vehicle)?;
-        let source = Source { path: vehicle.source.path.clone(), text: text.finish() };
+        let logs = logs.replace(char::is_control, " ");
+        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
+        let source = Source { path: vehicle.source.path.clone(), text: head + &text.finish() };
         Vehicle::from_source(source).map_err(|error| {
             FitError::Work(format!(
                 "the fitted values are not those of a possible car: {error}\n\
@@ -101,25 +103,24 @@ impl Fit {
     /// What a fitted value says of itself.
     fn comment(&self, parameter: Parameter) -> String {
         let (value, sd) = (self.value(parameter).unwrap_or(1.0), self.sd(parameter).unwrap_or(0.0));
-        let shifts = self.shifts;
         let told = self.verdict(parameter).name();
         if parameter.is_delay() {
             let half_ms = 1e3 * SIDES * crate::parameters::DELAY_UNIT_S * sd;
-            return format!("fitted to {shifts} shifts: {:+.1} ms +- {half_ms:.1} ms, {told}", 1e3 * value);
+            return format!("{:+.1} ms, 95 % +- {half_ms:.1} ms, {told}", 1e3 * value);
         }
         let (least, greatest) = (value * (-SIDES * sd).exp(), value * (SIDES * sd).exp());
-        format!("fitted to {shifts} shifts: x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
+        format!("x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
     }
 
     /// The error budget: what the fit leaves open of each parameter.
     fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
-        let comment = format!("what the fit to {} shifts leaves open, 95 %", self.shifts);
+        let comment = "what is left open, 95 %";
         let budget = |key: &str| keys(&["design", "error_bounds", key]);
         let half = |parameter: Parameter| SIDES * self.sd(parameter).unwrap_or(0.0);
         let factors = |parameter: Parameter| [(-half(parameter)).exp(), half(parameter).exp()];
         let mut set = |path: Vec<Step>, values: &[f64]| {
             // Keys that the file leaves at their defaults stay there.
-            if text.has(&path) { text.set(&path, values, Some(&comment)) } else { Ok(()) }
+            if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
         };
         set(budget("turbine_torque_share"), &[half(Parameter::Capacity).clamp(0.01, 1.0)])?;
         set(budget("friction_factor"), &factors(Parameter::Friction))?;

@@ -4,6 +4,9 @@ use toml::de::{DeTable, DeValue};
 
 use crate::FitError;
 
+/// How the comment of a fitted value begins.
+pub(crate) const FITTED: &str = "# fit: ";
+
 /// A step of the way to a value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Step {
@@ -78,11 +81,17 @@ impl VehicleText {
         } else {
             values.first().map_or_else(String::new, |value| number(*value))
         };
-        self.edits.push((span, text));
         if let Some(comment) = comment {
+            let before = &self.text[span.clone()];
+            let was = if before.starts_with('[') { String::new() } else { format!("; before: {before}") };
             let line_at = self.text[..key_at].rfind('\n').map_or(0, |end| end + 1);
-            self.edits.push((line_at..line_at, format!("# {comment}\n")));
+            // The comment of a fit before says nothing of the new value.
+            let above_at = self.text[..line_at.saturating_sub(1)].rfind('\n').map_or(0, |end| end + 1);
+            let stale = self.text[above_at..line_at].starts_with(FITTED);
+            let at = if stale { above_at..line_at } else { line_at..line_at };
+            self.edits.push((at, format!("{FITTED}{comment}{was}\n")));
         }
+        self.edits.push((span, text));
         Ok(())
     }
 
@@ -174,11 +183,14 @@ mod tests {
     fn a_value_is_replaced_and_everything_else_stays() {
         let text = "# head\n[a.b]\nx = 2 # [chapter]\ny = { p = [1.0, 2.0], q = [3.0,\n  4.0] }\n[[s]]\nz = 5\n[[s]]\nz = 6\n";
         let mut edited = VehicleText::new(text).unwrap();
-        edited.map(&keys(&["a", "b", "x"]), |x| 1.5 * x, Some("fitted")).unwrap();
+        edited.map(&keys(&["a", "b", "x"]), |x| 1.5 * x, Some("x 1.5")).unwrap();
         edited.scale(&keys(&["a", "b", "y", "q"]), 2.0).unwrap();
         edited.scale(&[Step::Key("s".into()), Step::Item(1), Step::Key("z".into())], 0.5).unwrap();
-        let expected = "# head\n[a.b]\n# fitted\nx = 3.0 # [chapter]\ny = { p = [1.0, 2.0], q = [6.0, 8.0] }\n[[s]]\nz = 5\n[[s]]\nz = 3.0\n";
+        let expected = "# head\n[a.b]\n# fit: x 1.5; before: 2\nx = 3.0 # [chapter]\ny = { p = [1.0, 2.0], q = [6.0, 8.0] }\n[[s]]\nz = 5\n[[s]]\nz = 3.0\n";
         assert_eq!(edited.finish(), expected);
+        let mut again = VehicleText::new(expected).unwrap();
+        again.map(&keys(&["a", "b", "x"]), |x| 2.0 * x, Some("x 2")).unwrap();
+        assert_eq!(again.finish(), expected.replace("# fit: x 1.5; before: 2\nx = 3.0", "# fit: x 2; before: 3.0\nx = 6.0"));
         assert!(VehicleText::new(text).unwrap().scale(&keys(&["a", "c"]), 2.0).is_err());
     }
 }

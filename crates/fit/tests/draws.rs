@@ -25,7 +25,7 @@ fn outcome(seed: u64, logs: Logs, count: u64) -> (fit::Fit, Outcome) {
     let mut iterations = 0;
     let fit = fit::fit(&car.file, &records, car.ages(), &mut |_| iterations += 1).unwrap();
     let seconds = begin.elapsed().as_secs_f64();
-    let fitted = fit.vehicle_file(&car.file).unwrap();
+    let fitted = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let held_out: Vec<TestShift> = (100..108).map(|number| car.shift(number, logs)).collect();
     let mean = |vehicle, at: usize| {
         (held_out.iter().map(|shift: &TestShift| shift.errors(vehicle)[at]).sum::<f64>() / 8.0).sqrt()

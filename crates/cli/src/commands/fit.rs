@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::output;
 
 /// Fewer shifts are all fitted.
-const LEAST_FOR_HELD_OUT: usize = 6;
+const LEAST_FOR_HELD_OUT: usize = 8;
 /// Least number of shifts that are held out.
 const HELD_OUT_MIN: usize = 3;
 /// Reasons that are printed one by one.
@@ -43,7 +43,8 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     })?;
     bar.set_message("checking on shifts that were held out");
     reasons("not fitted", &found.unusable);
-    let fitted = found.vehicle_file(&vehicle)?;
+    let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
+    let fitted = found.vehicle_file(&vehicle, &names.join(", "))?;
     let checked = found.validate(&vehicle, &fitted, &held_out, ages)?;
     bar.finish_and_clear();
     table(&found.report())?;

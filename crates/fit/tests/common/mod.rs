@@ -181,6 +181,34 @@ impl TestCar {
         panic!("no drive of this car has a shift");
     }
 
+    /// A log of a shift as a table with the names of the program, and the same with the truth behind it.
+    pub(crate) fn logs(&mut self, number: u64, logs: Logs) -> [Trace; 2] {
+        let mut names = vec![
+            signal::ENGINE_SPEED,
+            signal::TURBINE_SPEED,
+            signal::OUTPUT_SPEED,
+            signal::WHEEL_SPEED,
+            signal::ONCOMING_CURRENT,
+            signal::OFFGOING_CURRENT,
+        ];
+        if logs == Logs::TorqueAndOnePressure {
+            names.push(signal::ENGINE_TORQUE);
+        }
+        loop {
+            let whole = self.drive();
+            let read = self.readings(&whole, number);
+            if self.record(&whole, &read, number, logs).is_some() {
+                let mut measured = read.clone();
+                measured.columns.retain(|column| names.contains(&column.name.as_str()));
+                let mut truth = study::sampling::sampled(&whole, 0.01);
+                truth.columns.retain(|column| {
+                    [signal::ONCOMING_TORQUE, signal::ONCOMING_PRESSURE, signal::TRUE_PHASE].contains(&column.name.as_str())
+                });
+                return [measured, truth];
+            }
+        }
+    }
+
     fn record(&self, whole: &Trace, read: &Trace, number: u64, logs: Logs) -> Option<TestShift> {
         let phases = study::true_phases(whole)?;
         let inertia = phases.iter().position(|phase| *phase == observer::Phase::InertiaPhase)?;
