@@ -116,6 +116,14 @@ pub(crate) enum Command {
     ///   wetclutch fit drive1.mf4 drive2.mf4 --map map.toml --vehicle car.toml -o fitted.toml
     #[command(verbatim_doc_comment)]
     Fit(Fit),
+    /// Write a first vehicle file for a car from a few numbers
+    ///
+    /// Writes a vehicle file for one upshift. What is not given is a default, scaled to the car where it depends on its size; each
+    /// value says where it is from. `fit` then finds the values from logs.
+    ///
+    ///   wetclutch init --mass-kg 1650 --wheel-radius-m 0.32 --ratios 4.17,2.34 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
+    #[command(verbatim_doc_comment)]
+    Init(Init),
     /// Run the source chapter's experiments and compare the results with its statements
     ///
     /// Runs experiments E1 to E4 of the source chapter on the built-in car, and again in the settings that the
@@ -361,6 +369,31 @@ pub(crate) struct Estimate {
     /// File for the estimate; default: standard output
     #[arg(short, long, value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Init {
+    /// Name of the car
+    #[arg(long, default_value = "my car")]
+    pub(crate) name: String,
+    /// Mass with driver, kg
+    #[arg(long, value_name = "KG", value_parser = within(200.0..=60e3))]
+    pub(crate) mass_kg: f64,
+    /// Rolling radius of the driven wheels, m
+    #[arg(long, value_name = "M", value_parser = within(0.1..=1.0))]
+    pub(crate) wheel_radius_m: f64,
+    /// Ratios of the gears before and after the shift, such as 4.17,2.34
+    #[arg(long, required = true, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, value_parser = within(0.6..=20.0))]
+    pub(crate) ratios: Vec<f64>,
+    /// Ratio from gearbox output to wheels
+    #[arg(long, value_name = "RATIO", value_parser = within(0.5..=10.0))]
+    pub(crate) final_ratio: f64,
+    /// Greatest engine torque, N m
+    #[arg(long, value_name = "N_M", value_parser = within(20.0..=2000.0))]
+    pub(crate) engine_torque_n_m: f64,
+    /// The vehicle file
+    #[arg(short, long, value_name = "CAR.toml")]
+    pub(crate) output: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -23,6 +23,7 @@ fn main() -> ExitCode {
         Command::Inspect(options) => commands::inspect(&options),
         Command::Estimate(options) => commands::estimate(&options),
         Command::Fit(options) => commands::fit(&options),
+        Command::Init(options) => commands::init(&options),
         Command::Reproduce(options) => commands::reproduce(&options),
         Command::Bench(options) => commands::bench(&options),
         Command::Study(options) => commands::study(&options),

@@ -121,3 +121,81 @@ fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
     println!("torque of the valve maps: RMS error {before:.2} N m, fitted {after:.2} N m");
     assert!(after < 0.35 * before, "{before} {after}");
 }
+
+/// A table of one shift as text.
+fn one_shift(seed: u64) -> String {
+    let [measured, _] = TestCar::drawn(seed).logs(0, Logs::SpeedsAndCurrent);
+    let mut text = format!("time_s,{}\n", measured.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(","));
+    for (i, time_s) in measured.time_s.iter().enumerate() {
+        let cells = measured.columns.iter().map(|column| measured.get(&column.name).unwrap()[i].to_string());
+        text += &format!("{time_s},{}\n", cells.collect::<Vec<_>>().join(","));
+    }
+    text
+}
+
+#[test]
+fn what_a_log_lacks_is_said_and_no_file_is_written() {
+    let folder = Folder::new("lacks");
+    let text = one_shift(1);
+    let head = |rows: usize| text.lines().take(rows).map(|line| format!("{line}\n")).collect::<String>();
+    let lines = text.lines().count();
+    let cases = [
+        ("no rows", head(1), "there are no rows"),
+        ("one row", head(2), "have no power-on upshift from ratio 2.500 to 1.000"),
+        ("no shift", head(lines / 4), "have no power-on upshift"),
+        ("no turbine", text.replace("turbine_speed_rad_s", "x"), "there is no turbine_speed"),
+        ("no command", text.replace("oncoming_current_a", "x"), "--channel oncoming_current=NAME"),
+        ("wrong unit", text.replace("engine_speed_rad_s", "engine_speed_rpm"), "it looks like rad/s"),
+        ("ages", text.replace("offgoing_current_a", "engine_speed_age_s"), "has ages of readings"),
+    ];
+    let fitted = folder.path("fitted.toml");
+    for (case, text, expected) in cases {
+        let log = folder.write("log.csv", &text);
+        let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
+        assert_eq!(output.status.code(), Some(2), "{case}: {}", stderr(&output));
+        assert!(stderr(&output).contains(expected), "{case}: {}", stderr(&output));
+        assert!(!std::path::Path::new(&fitted).exists(), "{case}");
+    }
+}
+
+#[test]
+fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is() {
+    let folder = Folder::new("one");
+    // Every fifth engine speed and every seventh wheel speed are lost, and there is no command of the offgoing clutch.
+    let whole = one_shift(1);
+    let lossy = whole.lines().enumerate().map(|(i, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if i > 0 && i % 5 == 0 {
+            cells[1] = "";
+        }
+        if i > 0 && i % 7 == 0 {
+            cells[4] = "nan";
+        }
+        cells.pop();
+        cells.join(",") + "\n"
+    });
+    let log = folder.write("log.csv", &lossy.collect::<String>());
+    let fitted = folder.path("fitted.toml");
+    let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
+    let said = stdout(&output);
+    assert!(said.contains("one shift only"), "{said}");
+    assert!(said.contains("no shift is held out"), "{said}");
+    stdout(&wetclutch(&["check", &fitted]));
+    let output = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &fitted]);
+    assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_new_vehicle_file_can_be_used_and_is_not_written_over() {
+    let folder = Folder::new("init");
+    let car = folder.path("car.toml");
+    let numbers = ["--mass-kg", "1650", "--wheel-radius-m", "0.32", "--final-ratio", "3.2", "--engine-torque-n-m", "250"];
+    let init = |ratios: &str| wetclutch(&[&["init", "--ratios", ratios, "-o", &car], &numbers[..]].concat());
+    let output = init("2.34,4.17");
+    assert!(stderr(&output).contains("which is no upshift"), "{}", stderr(&output));
+    assert!(stderr(&init("4.17")).contains("two ratios"));
+    assert!(!init("nan,2").status.success());
+    stdout(&init("4.17,2.34"));
+    stdout(&wetclutch(&["check", &car]));
+    assert!(stderr(&init("4.17,2.34")).contains("is there already"));
+}

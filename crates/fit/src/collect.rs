@@ -59,12 +59,6 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Colle
         return Err(FitError::input("a fit reads a log twice\nhint: give a file in place of standard input"));
     }
     let ratios = vec![vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
-    if ratios[0] <= ratios[1] {
-        return Err(FitError::input(format!(
-            "{}: the shift of this vehicle is a downshift, and only power-on upshifts can be fitted",
-            vehicle.source.path.display()
-        )));
-    }
     let mut log = Log::open(path, &map.open)?;
     let mut map = if map.channels.is_empty() {
         ChannelMap { open: map.open.clone(), ..own_names(&log)? }
@@ -106,11 +100,11 @@ fn needed(path: &Path, map: &ChannelMap, command: Role) -> Result<(), FitError> 
     match needed.into_iter().find(|role| !map.has(*role)) {
         None => Ok(()),
         Some(missing) => Err(FitError::input(format!(
-            "{}: there is no {}, and a fit needs {}\n\
-             hint: say which channel it is with --map or `--channel {0}=NAME`; `wetclutch inspect` lists the channels",
+            "{}: there is no {role}, and a fit needs {}\n\
+             hint: say which channel it is with --map or `--channel {role}=NAME`; `wetclutch inspect` lists the channels",
             path.display(),
-            missing.name(),
             needed.map(Role::name).join(", "),
+            role = missing.name(),
         ))),
     }
 }

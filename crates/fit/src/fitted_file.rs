@@ -7,6 +7,9 @@ use crate::car::slope_factor;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{Fit, FitError, Parameter};
 
+/// Least error of the turbine torque, as a share \[chosen\].
+const CONVERTER_SHARE_MIN: f64 = 0.03;
+
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
 
@@ -122,7 +125,11 @@ impl Fit {
             // Keys that the file leaves at their defaults stay there.
             if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
         };
-        set(budget("turbine_torque_share"), &[half(Parameter::Capacity).clamp(0.01, 1.0)])?;
+        // The shape of the converter's maps is not fitted.
+        let share = half(Parameter::Capacity).clamp(CONVERTER_SHARE_MIN, 1.0);
+        let given = &vehicle.error_bounds;
+        set(budget("turbine_torque_share"), &[share])?;
+        set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
         set(budget("friction_factor"), &factors(Parameter::Friction))?;
         set(budget("valve_gain_factor"), &factors(Parameter::Gain))?;
         set(budget("valve_lag_factor"), &factors(Parameter::Lag))?;

@@ -10,6 +10,7 @@ pub mod collect;
 pub mod error;
 mod fitted_file;
 pub mod fitting;
+pub mod init;
 pub mod intervals;
 mod motion;
 pub mod open_loop;

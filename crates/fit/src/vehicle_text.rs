@@ -149,7 +149,7 @@ fn missing(path: &[Step]) -> FitError {
 }
 
 /// A number with five digits as TOML has it.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     const DIGITS: i32 = 5;
     if value == 0.0 || !value.is_finite() {
         return format!("{value:.1}");

@@ -58,7 +58,8 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     }
     output::line(&said_of(checked.as_ref()))?;
     write_text(&options.output, &fitted.source.text)?;
-    output::note(&format!("fitted to {} shifts: {}", found.shifts, options.output.display()));
+    let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
+    output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
     Ok(())
 }
 
