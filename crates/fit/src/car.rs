@@ -5,7 +5,7 @@ use drivetrain::{
     Clutch, ClutchValve, Converter, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Table1, Tyre,
 };
 
-use crate::parameters::{Prior, SLOPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
+use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
 use crate::record::SegmentKind;
 use crate::Parameter;
 
@@ -116,8 +116,11 @@ impl Car {
                 self.clutch.friction = self.clutch.friction.scaled(value);
                 self.clutch.static_friction *= value;
             }
+            Parameter::FrictionAtRest => {
+                self.clutch.friction = mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([value, 0.0], slip));
+            }
             Parameter::FrictionSlope => {
-                self.clutch.friction = mapped(&self.clutch.friction, |slip, mu| mu * slope_factor(value, slip));
+                self.clutch.friction = mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([0.0, value], slip));
             }
             Parameter::Spring => self.clutch.return_spring_n *= value,
             Parameter::Gain => self.valve = self.valve.changed(1.0, value, None),
@@ -158,10 +161,11 @@ impl Car {
     }
 }
 
-/// Factor on the friction at a slip of a friction slope.
-pub(crate) fn slope_factor(slope: f64, slip_rad_s: f64) -> f64 {
-    let furthest = SLOPE_MIDDLE_RAD_S + SLOPE_SPAN_RAD_S;
-    1.0 + slope * (slip_rad_s.min(furthest) - SLOPE_MIDDLE_RAD_S) / SLOPE_SPAN_RAD_S
+/// Factor on the friction at a slip, of its changes at rest and above the middle slip.
+pub(crate) fn friction_shape([at_rest, slope]: [f64; 2], slip_rad_s: f64) -> f64 {
+    let below = (1.0 - slip_rad_s / SHAPE_MIDDLE_RAD_S).max(0.0);
+    let above = ((slip_rad_s - SHAPE_MIDDLE_RAD_S) / SLOPE_SPAN_RAD_S).clamp(0.0, 1.0);
+    (1.0 + at_rest * below) * (1.0 + slope * above)
 }
 
 /// The table with other values on its axis.

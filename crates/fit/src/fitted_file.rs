@@ -3,7 +3,7 @@
 use config::{Source, Vehicle};
 use drivetrain::CommandKind;
 
-use crate::car::slope_factor;
+use crate::car::friction_shape;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{Fit, FitError, Parameter};
 
@@ -21,11 +21,9 @@ impl Fit {
     /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
     pub fn vehicle_file(&self, vehicle: &Vehicle, logs: &str) -> Result<Vehicle, FitError> {
         let mut text = VehicleText::new(&vehicle.source.text)?;
-        let (offgoing, oncoming) = clutch_names(&vehicle.source.text)?;
+        let oncoming = oncoming_name(&vehicle.source.text)?;
         for prior in &self.priors {
-            let parameter = prior.parameter;
-            let clutch = if parameter == Parameter::OffgoingFriction { &offgoing } else { &oncoming };
-            self.write(&mut text, vehicle, clutch, parameter)?;
+            self.write(&mut text, vehicle, &oncoming, prior.parameter)?;
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
@@ -51,19 +49,18 @@ impl Fit {
                 text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
             }
             Parameter::Friction => {
-                let slope = self.value(Parameter::FrictionSlope).unwrap_or(0.0);
+                let shape = [Parameter::FrictionAtRest, Parameter::FrictionSlope].map(|p| self.value(p).unwrap_or(0.0));
                 let friction = of_clutch(&["friction", "coefficient"]);
                 let slips = text.numbers(&of_clutch(&["friction", "slip_rad_s"]))?;
                 let values = text.numbers(&friction)?;
                 let fitted: Vec<f64> =
-                    slips.iter().zip(values).map(|(slip, mu)| value * slope_factor(slope, *slip) * mu).collect();
+                    slips.iter().zip(values).map(|(slip, mu)| value * friction_shape(shape, *slip) * mu).collect();
                 text.set(&friction, &fitted, comment)?;
                 // A clutch that sticks holds at least what it carries as it begins to slip.
                 let at_rest = fitted.first().copied().unwrap_or(0.0);
                 let more = "keeps its ratio to the fitted friction, and is not below it";
                 text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
             }
-            Parameter::FrictionSlope => Ok(()),
             Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
             Parameter::Gain => {
                 let (own, observer) = if is_current {
@@ -97,8 +94,7 @@ impl Fit {
             Parameter::Tyre => text.map(&keys(&["tyre", "slip_scale"]), |slip| value * slip, comment),
             Parameter::Mass => text.map(&keys(&["vehicle", "mass_kg"]), |mass| value * mass, comment),
             Parameter::EngineInertia => text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment),
-            // Friction that holds is not what is fitted: it only ever slips for a moment.
-            Parameter::OffgoingFriction => Ok(()),
+            // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
             _ => Ok(()),
         }
     }
@@ -145,12 +141,9 @@ impl Fit {
     }
 }
 
-/// Names of the offgoing and the oncoming clutch.
-fn clutch_names(text: &str) -> Result<(String, String), FitError> {
+/// Name of the oncoming clutch.
+fn oncoming_name(text: &str) -> Result<String, FitError> {
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
-    let name = |key: &str| {
-        let name = table.get("gear_train").and_then(|train| train.get(key)).and_then(toml::Value::as_str);
-        name.map(str::to_owned).ok_or_else(|| FitError::input(format!("the vehicle file has no `gear_train.{key}`")))
-    };
-    Ok((name("offgoing")?, name("oncoming")?))
+    let name = table.get("gear_train").and_then(|train| train.get("oncoming")).and_then(toml::Value::as_str);
+    name.map(str::to_owned).ok_or_else(|| FitError::input("the vehicle file has no `gear_train.oncoming`"))
 }

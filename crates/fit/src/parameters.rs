@@ -7,9 +7,9 @@ use crate::FitError;
 
 /// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
-/// The slip at which the friction does not depend on the friction slope, rad/s, and the range of slip of the slope.
-pub(crate) const SLOPE_MIDDLE_RAD_S: f64 = 100.0;
-/// The friction slope is the change over this slip, rad/s.
+/// The slip at which the shape of the friction changes nothing, rad/s.
+pub(crate) const SHAPE_MIDDLE_RAD_S: f64 = 100.0;
+/// The friction slope is the change over this slip above it, rad/s.
 pub(crate) const SLOPE_SPAN_RAD_S: f64 = 200.0;
 
 /// A quantity of the car or of its signals that is the same in all shifts.
@@ -21,7 +21,9 @@ pub enum Parameter {
     TorqueRatio,
     /// Factor on the friction of the oncoming clutch.
     Friction,
-    /// Relative change of its friction over 200 rad/s of slip, around 100 rad/s.
+    /// Relative change of its friction at zero slip; linear to none at 100 rad/s.
+    FrictionAtRest,
+    /// Relative change of its friction from 100 to 300 rad/s of slip.
     FrictionSlope,
     /// Factor on the force of its return spring.
     Spring,
@@ -62,7 +64,12 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// Whether it is a delay; all others but [`Self::FrictionSlope`] are factors.
+    /// Whether it is a relative change of the shape of the friction.
+    pub fn is_shape(self) -> bool {
+        matches!(self, Self::FrictionAtRest | Self::FrictionSlope)
+    }
+
+    /// Whether it is a delay; all others but the shape of the friction are factors.
     pub fn is_delay(self) -> bool {
         matches!(self, Self::CommandDelay | Self::OutputDelay | Self::WheelDelay | Self::EngineDelay | Self::EngineTorqueDelay)
     }
@@ -101,7 +108,7 @@ impl Parameter {
     pub(crate) fn value(self, x: f64) -> f64 {
         match self {
             _ if self.is_delay() => DELAY_UNIT_S * x,
-            Self::FrictionSlope => x,
+            _ if self.is_shape() => x,
             _ => x.exp(),
         }
     }
@@ -179,7 +186,8 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         (P::Capacity, "converter capacity", 0.0, uniform(budget.turbine_torque_share)),
         (P::TorqueRatio, "converter torque ratio above 1", 0.0, uniform(0.1)),
         (P::Friction, "friction of the oncoming clutch", 0.0, between(budget.friction_factor)),
-        (P::FrictionSlope, "friction slope over 200 rad/s", 0.0, uniform(0.1)),
+        (P::FrictionAtRest, "friction near zero slip", 0.0, uniform(0.1)),
+        (P::FrictionSlope, "friction slope, 100 to 300 rad/s", 0.0, uniform(0.1)),
         (P::Spring, "return spring", 0.0, uniform(0.2)),
         (P::Gain, "valve gain", 0.0, between(budget.valve_gain_factor)),
         (P::Lag, "valve lag", 0.0, between(budget.valve_lag_factor)),

@@ -42,7 +42,7 @@ impl Fit {
             let sd = self.precision.stated[(i, i)].sqrt();
             let kind = match prior.parameter {
                 p if p.is_delay() => Kind::Delay,
-                P::FrictionSlope => Kind::Share,
+                p if p.is_shape() => Kind::Share,
                 _ => Kind::Factor,
             };
             row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), kind)

@@ -17,13 +17,46 @@ struct Outcome {
     iterations: u32,
 }
 
-fn outcome(seed: u64, logs: Logs, count: u64) -> (fit::Fit, Outcome) {
-    let mut car = TestCar::drawn(seed);
+/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`; all others are cars of the two-speed file.
+fn car_of(case: &str, seed: u64) -> TestCar {
+    let mut car = match case {
+        "other car" => {
+            let facts = fit::init::Facts {
+                name: "another car".to_owned(),
+                mass_kg: 1800.0,
+                wheel_radius_m: 0.33,
+                ratio_before: 4.17,
+                ratio_after: 2.34,
+                final_ratio: 3.2,
+                engine_torque_n_m: 250.0,
+            };
+            TestCar::of(fit::init::vehicle_file(&facts).unwrap(), seed)
+        }
+        _ => TestCar::drawn(seed),
+    };
+    if case == "lossy" {
+        for sensor in [&mut car.sensors.engine, &mut car.sensors.turbine, &mut car.sensors.output, &mut car.sensors.wheel] {
+            sensor.errors.missing_share = 0.03;
+            sensor.errors.outliers = 1.0;
+        }
+    }
+    if case == "other shape" {
+        let friction = &mut car.car.oncoming.clutch.friction;
+        let values: Vec<f64> =
+            friction.axis().iter().zip(friction.values()).map(|(slip, mu)| mu * (1.0 - 0.25 * (slip / 150.0).min(1.0).sqrt())).collect();
+        *friction = drivetrain::Table1::new(friction.axis(), &values).unwrap();
+    }
+    car
+}
+
+fn outcome(case: &str, seed: u64, logs: Logs, count: u64) -> (fit::Fit, Outcome) {
+    let mut car = car_of(case, seed);
+    let ages = if case == "sensors unknown" { fit::ReadingAges::default() } else { car.ages() };
     let shifts: Vec<TestShift> = (0..count).map(|number| car.shift(number, logs)).collect();
     let records: Vec<_> = shifts.iter().map(|shift| shift.record.clone()).collect();
     let begin = std::time::Instant::now();
     let mut iterations = 0;
-    let fit = fit::fit(&car.file, &records, car.ages(), &mut |_| iterations += 1).unwrap();
+    let fit = fit::fit(&car.file, &records, ages, &mut |_| iterations += 1).unwrap();
     let seconds = begin.elapsed().as_secs_f64();
     let fitted = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let held_out: Vec<TestShift> = (100..108).map(|number| car.shift(number, logs)).collect();
@@ -46,14 +79,16 @@ fn outcome(seed: u64, logs: Logs, count: u64) -> (fit::Fit, Outcome) {
     (fit, outcome)
 }
 
-/// Prints the statistics of many cars: `FIT_CARS=200 cargo test --release -p fit --test draws -- --ignored --nocapture`.
+/// Prints the statistics of many cars: `FIT_CARS=200 cargo test --release -p fit --test draws -- --ignored --nocapture`, with
+/// `FIT_CASE=lossy` those of a case of [`car_of`].
 #[test]
 #[ignore = "minutes"]
 fn many_cars() {
     let cars: u64 = std::env::var("FIT_CARS").map_or(10, |text| text.parse().unwrap());
+    let case = std::env::var("FIT_CASE").unwrap_or_default();
     let first: u64 = std::env::var("FIT_FIRST").map_or(0, |text| text.parse().unwrap());
     for (title, logs) in [("speeds and current", Logs::SpeedsAndCurrent), ("with engine torque, and pressure in one shift", Logs::TorqueAndOnePressure)] {
-        let outcomes: Vec<(fit::Fit, Outcome)> = (first..first + cars).map(|seed| outcome(seed, logs, 20)).collect();
+        let outcomes: Vec<(fit::Fit, Outcome)> = (first..first + cars).map(|seed| outcome(&case, seed, logs, 20)).collect();
         let rms = |of: &dyn Fn(&Outcome) -> f64| {
             (outcomes.iter().map(|(_, outcome)| of(outcome).powi(2)).sum::<f64>() / cars as f64).sqrt()
         };

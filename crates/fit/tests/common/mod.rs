@@ -70,7 +70,11 @@ fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Table1<f64> {
 
 impl TestCar {
     pub(crate) fn drawn(seed: u64) -> Self {
-        let file = Vehicle::two_speed_at().unwrap();
+        Self::of(Vehicle::two_speed_at().unwrap(), seed)
+    }
+
+    /// A car that differs from this file.
+    pub(crate) fn of(file: Vehicle, seed: u64) -> Self {
         let mut draw = Draw::new(seed);
         let mut truth = Vec::new();
         let mut factor = |draw: &mut Draw, parameter: Parameter, least: f64, greatest: f64| {
@@ -78,14 +82,23 @@ impl TestCar {
             truth.push((parameter, factor.ln()));
             factor
         };
-        let mut with_inertias = file.source.text.clone();
-        for (shaft, line) in ["inertia_kg_m2 = 0.06 #", "inertia_kg_m2 = 0.01 #", "inertia_kg_m2 = 0.15 #"].into_iter().enumerate() {
-            let nominal: f64 = line[16..20].parse().unwrap();
-            let factor = factor(&mut draw, Parameter::Inertia(shaft), 0.8, 1.2);
-            assert_eq!(with_inertias.matches(line).count(), 1);
-            with_inertias = with_inertias.replace(line, &format!("inertia_kg_m2 = {} #", factor * nominal));
+        let mut shaft = 0;
+        let mut with_inertias = String::new();
+        let (_, train) = file.source.text.split_once("[gear_train]").unwrap();
+        let head = &file.source.text[..file.source.text.len() - train.len()];
+        for line in train.lines() {
+            match line.strip_prefix("inertia_kg_m2 = ") {
+                Some(value) => {
+                    let nominal: f64 = value.split(' ').next().unwrap().parse().unwrap();
+                    let factor = factor(&mut draw, Parameter::Inertia(shaft), 0.8, 1.2);
+                    with_inertias += &format!("inertia_kg_m2 = {}\n", factor * nominal);
+                    shaft += 1;
+                }
+                None => with_inertias += &format!("{line}\n"),
+            }
         }
-        let mut car = Vehicle::from_source(Source { text: with_inertias, ..file.source.clone() }).unwrap();
+        let source = Source { text: head.to_owned() + &with_inertias, ..file.source.clone() };
+        let mut car = Vehicle::from_source(source).unwrap();
         let friction = factor(&mut draw, Parameter::Friction, 0.8, 1.2);
         car.oncoming.clutch.friction = car.oncoming.clutch.friction.scaled(friction);
         car.oncoming.clutch.static_friction *= friction;
@@ -105,9 +118,12 @@ impl TestCar {
         let (gain, lag) = (factor(&mut draw, Parameter::Gain, 0.9, 1.1), factor(&mut draw, Parameter::Lag, 0.7, 1.4));
         car.oncoming.valve = car.oncoming.valve.changed(lag, gain, None);
         let slope = draw.between(-0.08, 0.08);
+        let rest = draw.between(-0.06, 0.06);
         car.oncoming.clutch.friction = mapped(&car.oncoming.clutch.friction, |slip, mu| {
-            mu * (1.0 + slope * (slip.min(300.0) - 100.0) / 200.0)
+            let (below, above) = ((1.0 - slip / 100.0).max(0.0), ((slip - 100.0) / 200.0).clamp(0.0, 1.0));
+            mu * (1.0 + rest * below) * (1.0 + slope * above)
         });
+        truth.push((Parameter::FrictionAtRest, rest));
         let at_rest = car.oncoming.clutch.friction.at(0.0);
         car.oncoming.clutch.static_friction = car.oncoming.clutch.static_friction.max(1.0001 * at_rest);
         truth.push((Parameter::FrictionSlope, slope));
