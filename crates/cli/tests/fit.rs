@@ -97,7 +97,6 @@ fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
     arguments.extend(["--vehicle", VEHICLE, "--sensors", SENSORS, "-o", &fitted]);
     let output = wetclutch(&arguments);
     let said = stdout(&output);
-    println!("{said}{}", stderr(&output));
     let valve_gain = said.lines().find(|line| line.starts_with("valve gain ")).unwrap();
     assert!(valve_gain.ends_with("not told by these logs"), "{valve_gain}");
     assert!(said.contains("torque scale: not told by these logs"), "{said}");
@@ -118,14 +117,14 @@ fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
         })
         .collect();
     let [before, after] = [VEHICLE, &fitted].map(|vehicle| torque_error(&folder, vehicle, &others));
-    println!("torque of the valve maps: RMS error {before:.2} N m, fitted {after:.2} N m");
     assert!(after < 0.35 * before, "{before} {after}");
 }
 
 /// A table of one shift as text.
 fn one_shift(seed: u64) -> String {
     let [measured, _] = TestCar::drawn(seed).logs(0, Logs::SpeedsAndCurrent);
-    let mut text = format!("time_s,{}\n", measured.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(","));
+    let mut text =
+        format!("time_s,{}\n", measured.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(","));
     for (i, time_s) in measured.time_s.iter().enumerate() {
         let cells = measured.columns.iter().map(|column| measured.get(&column.name).unwrap()[i].to_string());
         text += &format!("{time_s},{}\n", cells.collect::<Vec<_>>().join(","));
@@ -189,7 +188,8 @@ fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is
 fn a_new_vehicle_file_can_be_used_and_is_not_written_over() {
     let folder = Folder::new("init");
     let car = folder.path("car.toml");
-    let numbers = ["--mass-kg", "1650", "--wheel-radius-m", "0.32", "--final-ratio", "3.2", "--engine-torque-n-m", "250"];
+    let numbers =
+        ["--mass-kg", "1650", "--wheel-radius-m", "0.32", "--final-ratio", "3.2", "--engine-torque-n-m", "250"];
     let init = |ratios: &str| wetclutch(&[&["init", "--ratios", ratios, "-o", &car], &numbers[..]].concat());
     let output = init("2.34,4.17");
     assert!(stderr(&output).contains("which is no upshift"), "{}", stderr(&output));

@@ -5,9 +5,9 @@ use drivetrain::{
     Clutch, ClutchValve, Converter, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Table1, Tyre,
 };
 
+use crate::Parameter;
 use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
 use crate::record::SegmentKind;
-use crate::Parameter;
 
 /// How far a speed wheel turns while a reading ages, rad: a reading is the mean over some teeth, and the last of them passed
 /// half a tooth ago. Zero where the sensor is not known; its delay then takes the mean.
@@ -117,10 +117,12 @@ impl Car {
                 self.clutch.static_friction *= value;
             }
             Parameter::FrictionAtRest => {
-                self.clutch.friction = mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([value, 0.0], slip));
+                self.clutch.friction =
+                    mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([value, 0.0], slip));
             }
             Parameter::FrictionSlope => {
-                self.clutch.friction = mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([0.0, value], slip));
+                self.clutch.friction =
+                    mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([0.0, value], slip));
             }
             Parameter::Spring => self.clutch.return_spring_n *= value,
             Parameter::Gain => self.valve = self.valve.changed(1.0, value, None),
@@ -176,5 +178,6 @@ fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Table1<f64> {
 }
 
 fn coefficients(shift: &ReducedShift<f64>) -> [ShiftCoefficients<f64>; 3] {
-    [Engagement::OffgoingStuck, Engagement::BothSlipping, Engagement::OncomingStuck].map(|kind| shift.coefficients(kind))
+    [Engagement::OffgoingStuck, Engagement::BothSlipping, Engagement::OncomingStuck]
+        .map(|kind| shift.coefficients(kind))
 }

@@ -60,11 +60,8 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Colle
     }
     let ratios = vec![vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
     let mut log = Log::open(path, &map.open)?;
-    let mut map = if map.channels.is_empty() {
-        ChannelMap { open: map.open.clone(), ..own_names(&log)? }
-    } else {
-        map.clone()
-    };
+    let mut map =
+        if map.channels.is_empty() { ChannelMap { open: map.open.clone(), ..own_names(&log)? } } else { map.clone() };
     map.gearbox = Gearbox { ratios, ..map.gearbox };
     let commands = commands(vehicle);
     needed(path, &map, commands[0])?;

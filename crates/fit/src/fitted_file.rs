@@ -37,7 +37,13 @@ impl Fit {
         })
     }
 
-    fn write(&self, text: &mut VehicleText, vehicle: &Vehicle, clutch: &str, parameter: Parameter) -> Result<(), FitError> {
+    fn write(
+        &self,
+        text: &mut VehicleText,
+        vehicle: &Vehicle,
+        clutch: &str,
+        parameter: Parameter,
+    ) -> Result<(), FitError> {
         let Some(value) = self.value(parameter) else { return Ok(()) };
         let comment = self.comment(parameter);
         let comment = Some(comment.as_str());
@@ -73,7 +79,11 @@ impl Fit {
             }
             Parameter::Lag => {
                 let (own, observer, power) = if is_current {
-                    (of_clutch(&["valve", "lag", "time_constant_s"]), keys(&["observer", "valve", "time_constant_s"]), 1.0)
+                    (
+                        of_clutch(&["valve", "lag", "time_constant_s"]),
+                        keys(&["observer", "valve", "time_constant_s"]),
+                        1.0,
+                    )
                 } else {
                     (of_clutch(&["valve", "flow_sqrt_pa_s"]), keys(&["observer", "valve", "flow_sqrt_pa_s"]), -1.0)
                 };
@@ -93,7 +103,9 @@ impl Fit {
             }
             Parameter::Tyre => text.map(&keys(&["tyre", "slip_scale"]), |slip| value * slip, comment),
             Parameter::Mass => text.map(&keys(&["vehicle", "mass_kg"]), |mass| value * mass, comment),
-            Parameter::EngineInertia => text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment),
+            Parameter::EngineInertia => {
+                text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment)
+            }
             // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
             _ => Ok(()),
         }
@@ -130,7 +142,10 @@ impl Fit {
         set(budget("valve_gain_factor"), &factors(Parameter::Gain))?;
         set(budget("valve_lag_factor"), &factors(Parameter::Lag))?;
         set(budget("shaft_stiffness_factor"), &factors(Parameter::Stiffness))?;
-        set(budget("mass_kg"), &[half(Parameter::Mass) * self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg])?;
+        set(
+            budget("mass_kg"),
+            &[half(Parameter::Mass) * self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg],
+        )?;
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(Parameter::CommandDelay);
             let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);

@@ -76,7 +76,14 @@ pub(crate) struct Part {
 
 impl Motion {
     /// Runs a segment from a state.
-    pub(crate) fn run(car: &Car, kind: SegmentKind, of: &Circumstances, inputs: &Inputs, part: Part, start: State) -> Self {
+    pub(crate) fn run(
+        car: &Car,
+        kind: SegmentKind,
+        of: &Circumstances,
+        inputs: &Inputs,
+        part: Part,
+        start: State,
+    ) -> Self {
         let mut motion = Self { begin_s: part.begin_s, ..Self::default() };
         for series in [&mut motion.turbine, &mut motion.output, &mut motion.engine] {
             series.reserve(part.steps + 1);
@@ -95,7 +102,11 @@ impl Motion {
                 let (k2, _) = field.rates(&state.plus(&k1, 0.5 * STEP_S), at + 1);
                 let (k3, _) = field.rates(&state.plus(&k2, 0.5 * STEP_S), at + 1);
                 let (k4, _) = field.rates(&state.plus(&k3, STEP_S), at + 2);
-                state = state.plus(&k1, STEP_S / 6.0).plus(&k2, STEP_S / 3.0).plus(&k3, STEP_S / 3.0).plus(&k4, STEP_S / 6.0);
+                state = state
+                    .plus(&k1, STEP_S / 6.0)
+                    .plus(&k2, STEP_S / 3.0)
+                    .plus(&k3, STEP_S / 3.0)
+                    .plus(&k4, STEP_S / 6.0);
             }
         }
         motion
@@ -236,8 +247,7 @@ impl<'a> Field<'a> {
             vehicle_m_s2 = (free_n_m / radius - against_n) / self.moved_kg;
             let force_n = self.mass_kg * vehicle_m_s2 + against_n;
             let slip = 0.5 * tyre.slip_scale * inverse_tanh(force_n / tyre.max_force_n);
-            let rim_m_s =
-                if slip > 0.0 { state.vehicle_m_s / (1.0 - slip) } else { state.vehicle_m_s * (1.0 + slip) };
+            let rim_m_s = if slip > 0.0 { state.vehicle_m_s / (1.0 - slip) } else { state.vehicle_m_s * (1.0 + slip) };
             wheel_rad_s = rim_m_s / radius;
         }
         Wheels { shaft_n_m, wheel_rad_s, vehicle_m_s2 }

@@ -2,8 +2,8 @@
 
 use config::Vehicle;
 
-use crate::vehicle_text;
 use crate::FitError;
+use crate::vehicle_text;
 
 /// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
@@ -71,7 +71,10 @@ impl Parameter {
 
     /// Whether it is a delay; all others but the shape of the friction are factors.
     pub fn is_delay(self) -> bool {
-        matches!(self, Self::CommandDelay | Self::OutputDelay | Self::WheelDelay | Self::EngineDelay | Self::EngineTorqueDelay)
+        matches!(
+            self,
+            Self::CommandDelay | Self::OutputDelay | Self::WheelDelay | Self::EngineDelay | Self::EngineTorqueDelay
+        )
     }
 
     /// The power of the factor with which it grows where all torques of the car grow alike and the speeds stay as they are.

@@ -113,9 +113,8 @@ impl ShiftRecord {
         // One reading beyond the limit is noise, two are a slip.
         let first = slips.windows(2).position(|pair| released(pair[0].1) && released(pair[1].1));
         let lasting = slips.iter().rposition(|(time_s, slip, _)| *time_s < lock_s && slip.abs() <= RELEASED_RAD_S);
-        let locked = slips.iter().rposition(|(time_s, _, oncoming)| {
-            *time_s < lock_s + 0.5 && oncoming.abs() > SLIPPING_RAD_S
-        });
+        let locked =
+            slips.iter().rposition(|(time_s, _, oncoming)| *time_s < lock_s + 0.5 && oncoming.abs() > SLIPPING_RAD_S);
         let (Some(first), Some(lasting), Some(locked)) = (first, lasting, locked) else {
             return Err("the speeds do not show where the clutches slip".to_owned());
         };

@@ -69,7 +69,9 @@ impl Fit {
         lines.extend(self.correlations());
         lines.extend(self.misfits());
         if self.shifts == 1 {
-            lines.push("one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned());
+            lines.push(
+                "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),
+            );
         }
         lines.extend(self.channel_map());
         lines.extend(self.proposals());
@@ -84,7 +86,8 @@ impl Fit {
         let mut strong: Vec<(usize, usize, f64)> =
             pairs.map(|(i, j)| (i, j, of(i, j))).filter(|(.., c)| c.abs() > CORRELATED).collect();
         strong.sort_by(|one, other| other.2.abs().total_cmp(&one.2.abs()));
-        let words = strong.iter().map(|(i, j, c)| format!("{} and {} {c:+.2}", self.priors[*i].name, self.priors[*j].name));
+        let words =
+            strong.iter().map(|(i, j, c)| format!("{} and {} {c:+.2}", self.priors[*i].name, self.priors[*j].name));
         let words: Vec<String> = words.collect();
         (!words.is_empty()).then(|| format!("correlated: {}", words.join("; ")))
     }
@@ -105,7 +108,10 @@ impl Fit {
             let value = self.value(parameter)?;
             let sd = DELAY_UNIT_S * self.sd(parameter)?;
             (value.abs() > SIDES * sd).then(|| {
-                format!("{role} is {:+.1} ms against the turbine speed: `delay_s` of its channel in the channel map", 1e3 * value)
+                format!(
+                    "{role} is {:+.1} ms against the turbine speed: `delay_s` of its channel in the channel map",
+                    1e3 * value
+                )
             })
         };
         let scale = self.value(Parameter::WheelScale).filter(|scale| (scale - 1.0).abs() > 1e-3);
@@ -113,7 +119,9 @@ impl Fit {
             of(Parameter::OutputDelay, "output_speed"),
             of(Parameter::EngineDelay, "engine_speed"),
             of(Parameter::WheelDelay, "wheel_speed"),
-            scale.map(|scale| format!("wheel_speed reads x {scale:.4}: `scale = {:.4}` in the channel map", scale.recip())),
+            scale.map(|scale| {
+                format!("wheel_speed reads x {scale:.4}: `scale = {:.4}` in the channel map", scale.recip())
+            }),
         ]
         .into_iter()
         .flatten()
@@ -162,10 +170,7 @@ enum Kind {
 fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {
     let half = SIDES * sd;
     let (value, interval) = match kind {
-        Kind::Factor => (
-            format!("x {:.3}", x.exp()),
-            format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp()),
-        ),
+        Kind::Factor => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
         Kind::Delay => {
             let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
             (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))

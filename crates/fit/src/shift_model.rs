@@ -274,10 +274,10 @@ impl ShiftModel {
                     - match block.channel {
                         Channel::Turbine => motion.turbine_at(seen(0.0, ages.turbine_rad)),
                         Channel::Output => motion.output_at(seen(car.output_delay_s, ages.output_rad)),
-                        Channel::Wheel => {
-                            car.wheel_scale * motion.wheel_at(seen(car.wheel_delay_s, ages.wheel_rad))
+                        Channel::Wheel => car.wheel_scale * motion.wheel_at(seen(car.wheel_delay_s, ages.wheel_rad)),
+                        Channel::Engine | Channel::Pressure => {
+                            motion.engine_at(seen(car.engine_delay_s, ages.engine_rad))
                         }
-                        Channel::Engine | Channel::Pressure => motion.engine_at(seen(car.engine_delay_s, ages.engine_rad)),
                     };
             }
         }

@@ -140,7 +140,7 @@ impl Problem<'_> {
             progress(iteration);
             // The first residuals are those of the file, whose scale says nothing of the readings.
             if (1..=scaled).contains(&iteration) {
-                weights = weights.from_residuals(shifts, &residuals);
+                weights = weights.following(shifts, &residuals);
             }
             let lines = self.linearised(shifts, &at);
             let cost = self.cost(shifts, &at, &residuals, &weights);

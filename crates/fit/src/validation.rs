@@ -36,10 +36,13 @@ impl Fit {
             return Ok(None);
         }
         // The car is what it is in its file; what is of the signals is that of the fit.
-        let of_file = |i: usize| if self.priors[i].parameter.is_of_signals() { self.unknowns[i] } else { self.priors[i].mean };
+        let of_file =
+            |i: usize| if self.priors[i].parameter.is_of_signals() { self.unknowns[i] } else { self.priors[i].mean };
         let unfitted: Vec<f64> = (0..self.priors.len()).map(of_file).collect();
-        let turbine_rad_s =
-            [self.turbine_error(given, &unfitted, held_out, ages)?, self.turbine_error(given, &self.unknowns, held_out, ages)?];
+        let turbine_rad_s = [
+            self.turbine_error(given, &unfitted, held_out, ages)?,
+            self.turbine_error(given, &self.unknowns, held_out, ages)?,
+        ];
         let pressure = |vehicle: &Vehicle| {
             let errors = held_out.iter().flat_map(|record| {
                 let [from_s, to_s] = [record.pressure.time_s.first(), record.pressure.time_s.last()]
@@ -78,7 +81,10 @@ impl Fit {
             self.weights.errors(&model.blocks, rows.as_mut_slice());
             let turbine = model.blocks.iter().filter(|block| block.channel == Channel::Turbine);
             let scale = self.weights.scale[Channel::Turbine as usize];
-            turbine.flat_map(|block| rows.as_slice()[block.rows.clone()].to_vec()).map(move |e| e * scale).collect::<Vec<_>>()
+            turbine
+                .flat_map(|block| rows.as_slice()[block.rows.clone()].to_vec())
+                .map(move |e| e * scale)
+                .collect::<Vec<_>>()
         });
         Ok(rms(errors))
     }

@@ -172,7 +172,8 @@ mod tests {
 
     #[test]
     fn numbers_keep_five_digits() {
-        let cases = [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
+        let cases =
+            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
         for (value, text) in cases {
             assert_eq!(number(value), text);
             assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
@@ -181,7 +182,8 @@ mod tests {
 
     #[test]
     fn a_value_is_replaced_and_everything_else_stays() {
-        let text = "# head\n[a.b]\nx = 2 # [chapter]\ny = { p = [1.0, 2.0], q = [3.0,\n  4.0] }\n[[s]]\nz = 5\n[[s]]\nz = 6\n";
+        let text =
+            "# head\n[a.b]\nx = 2 # [chapter]\ny = { p = [1.0, 2.0], q = [3.0,\n  4.0] }\n[[s]]\nz = 5\n[[s]]\nz = 6\n";
         let mut edited = VehicleText::new(text).unwrap();
         edited.map(&keys(&["a", "b", "x"]), |x| 1.5 * x, Some("x 1.5")).unwrap();
         edited.scale(&keys(&["a", "b", "y", "q"]), 2.0).unwrap();
@@ -190,7 +192,10 @@ mod tests {
         assert_eq!(edited.finish(), expected);
         let mut again = VehicleText::new(expected).unwrap();
         again.map(&keys(&["a", "b", "x"]), |x| 2.0 * x, Some("x 2")).unwrap();
-        assert_eq!(again.finish(), expected.replace("# fit: x 1.5; before: 2\nx = 3.0", "# fit: x 2; before: 3.0\nx = 6.0"));
+        assert_eq!(
+            again.finish(),
+            expected.replace("# fit: x 1.5; before: 2\nx = 3.0", "# fit: x 2; before: 3.0\nx = 6.0")
+        );
         assert!(VehicleText::new(text).unwrap().scale(&keys(&["a", "c"]), 2.0).is_err());
     }
 }

@@ -39,7 +39,7 @@ impl Weights {
     }
 
     /// Gains and scales that the residuals of all shifts ask for; where a channel has none they stay.
-    pub(crate) fn from_residuals(self, shifts: &[ShiftModel], residuals: &[DVector<f64>]) -> Self {
+    pub(crate) fn following(self, shifts: &[ShiftModel], residuals: &[DVector<f64>]) -> Self {
         let mut weights = self;
         for channel in Channel::ALL {
             let blocks: Vec<&[f64]> = (shifts.iter().zip(residuals))

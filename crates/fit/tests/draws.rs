@@ -1,5 +1,5 @@
 //! Cars whose parameters are all off, fitted to 20 shifts behind sensors.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and this one prints a table")]
 
 mod common;
 
@@ -35,15 +35,21 @@ fn car_of(case: &str, seed: u64) -> TestCar {
         _ => TestCar::drawn(seed),
     };
     if case == "lossy" {
-        for sensor in [&mut car.sensors.engine, &mut car.sensors.turbine, &mut car.sensors.output, &mut car.sensors.wheel] {
+        for sensor in
+            [&mut car.sensors.engine, &mut car.sensors.turbine, &mut car.sensors.output, &mut car.sensors.wheel]
+        {
             sensor.errors.missing_share = 0.03;
             sensor.errors.outliers = 1.0;
         }
     }
     if case == "other shape" {
         let friction = &mut car.car.oncoming.clutch.friction;
-        let values: Vec<f64> =
-            friction.axis().iter().zip(friction.values()).map(|(slip, mu)| mu * (1.0 - 0.25 * (slip / 150.0).min(1.0).sqrt())).collect();
+        let values: Vec<f64> = friction
+            .axis()
+            .iter()
+            .zip(friction.values())
+            .map(|(slip, mu)| mu * (1.0 - 0.25 * (slip / 150.0).min(1.0).sqrt()))
+            .collect();
         *friction = drivetrain::Table1::new(friction.axis(), &values).unwrap();
     }
     car
@@ -87,8 +93,12 @@ fn many_cars() {
     let cars: u64 = std::env::var("FIT_CARS").map_or(10, |text| text.parse().unwrap());
     let case = std::env::var("FIT_CASE").unwrap_or_default();
     let first: u64 = std::env::var("FIT_FIRST").map_or(0, |text| text.parse().unwrap());
-    for (title, logs) in [("speeds and current", Logs::SpeedsAndCurrent), ("with engine torque, and pressure in one shift", Logs::TorqueAndOnePressure)] {
-        let outcomes: Vec<(fit::Fit, Outcome)> = (first..first + cars).map(|seed| outcome(&case, seed, logs, 20)).collect();
+    for (title, logs) in [
+        ("speeds and current", Logs::SpeedsAndCurrent),
+        ("with engine torque, and pressure in one shift", Logs::TorqueAndOnePressure),
+    ] {
+        let outcomes: Vec<(fit::Fit, Outcome)> =
+            (first..first + cars).map(|seed| outcome(&case, seed, logs, 20)).collect();
         let rms = |of: &dyn Fn(&Outcome) -> f64| {
             (outcomes.iter().map(|(_, outcome)| of(outcome).powi(2)).sum::<f64>() / cars as f64).sqrt()
         };

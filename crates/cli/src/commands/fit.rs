@@ -49,8 +49,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     bar.finish_and_clear();
     table(&found.report())?;
     for (channel, scale, gain) in &found.channels {
-        let (scale, unit) =
-            if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
+        let (scale, unit) = if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
         output::line(&format!("{}: one-step error {scale:.3} {unit}, g {gain:.2}", channel.name()))?;
     }
     for statement in found.statements() {
@@ -81,11 +80,8 @@ fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collec
 /// Shifts to fit, and shifts that are held out: the last fifth. Of more than a fit can use, some are left out evenly.
 fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>) {
     let count = shifts.len();
-    let held_out = if count < LEAST_FOR_HELD_OUT {
-        Vec::new()
-    } else {
-        shifts.split_off(count - HELD_OUT_MIN.max(count / 5))
-    };
+    let held_out =
+        if count < LEAST_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
     let some = SHIFTS_MAX.min(shifts.len());
     ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
 }
@@ -121,7 +117,9 @@ fn table(rows: &[ReportRow]) -> Result<(), Failure> {
 /// The result on held-out shifts, in words.
 fn said_of(checked: Option<&HeldOut>) -> String {
     let Some(checked) = checked else {
-        return format!("no shift is held out: fewer than {LEAST_FOR_HELD_OUT} can be used, so nothing checks this fit");
+        return format!(
+            "no shift is held out: fewer than {LEAST_FOR_HELD_OUT} can be used, so nothing checks this fit"
+        );
     };
     let [given, fitted] = checked.turbine_rad_s;
     let mut text = format!(

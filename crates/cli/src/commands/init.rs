@@ -11,7 +11,8 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
     // A file that somebody has filled in is not to be lost by a second call.
     if options.output.exists() {
-        let message = format!("{}: the file is there already\nhint: choose another name after -o", options.output.display());
+        let message =
+            format!("{}: the file is there already\nhint: choose another name after -o", options.output.display());
         return Err(Failure::Input(message));
     }
     let [ratio_before, ratio_after] = options.ratios[..] else {

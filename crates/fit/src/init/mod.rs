@@ -5,7 +5,7 @@ mod train;
 use config::{Source, Vehicle, toml_string};
 
 use crate::FitError;
-use crate::vehicle_text::{keys, number, VehicleText};
+use crate::vehicle_text::{VehicleText, keys, number};
 
 /// What is known of a car without a measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,9 +107,10 @@ pub fn vehicle_file(facts: &Facts) -> Result<Vehicle, FitError> {
     ];
     // The name goes in last, so that braces in it stay what they are.
     let (names, others): (Vec<_>, Vec<_>) = fields.into_iter().partition(|(key, _)| *key == "name");
-    let text = others.into_iter().chain(names).fold(TEMPLATE.to_owned(), |text, (key, value)| {
-        text.replacen(&format!("{{{key}}}"), &value, 1)
-    });
+    let text = others
+        .into_iter()
+        .chain(names)
+        .fold(TEMPLATE.to_owned(), |text, (key, value)| text.replacen(&format!("{{{key}}}"), &value, 1));
     Ok(Vehicle::from_source(Source::built_in("the new vehicle file", &text))?)
 }
 
@@ -135,7 +136,9 @@ mod tests {
 
     #[test]
     fn the_file_has_the_ratios_and_numbers_that_were_given() {
-        for (before, after) in [(4.17, 2.34), (3.0, 2.0), (2.34, 1.52), (1.52, 1.14), (1.14, 1.0), (1.0, 0.87), (0.87, 0.69), (2.5, 1.0)] {
+        for (before, after) in
+            [(4.17, 2.34), (3.0, 2.0), (2.34, 1.52), (1.52, 1.14), (1.14, 1.0), (1.0, 0.87), (0.87, 0.69), (2.5, 1.0)]
+        {
             let vehicle = vehicle_file(&facts(before, after)).unwrap();
             let found = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
             for (found, expected) in found.into_iter().zip([before, after]) {

@@ -218,7 +218,8 @@ impl TestCar {
                 measured.columns.retain(|column| names.contains(&column.name.as_str()));
                 let mut truth = study::sampling::sampled(&whole, 0.01);
                 truth.columns.retain(|column| {
-                    [signal::ONCOMING_TORQUE, signal::ONCOMING_PRESSURE, signal::TRUE_PHASE].contains(&column.name.as_str())
+                    [signal::ONCOMING_TORQUE, signal::ONCOMING_PRESSURE, signal::TRUE_PHASE]
+                        .contains(&column.name.as_str())
                 });
                 return [measured, truth];
             }
