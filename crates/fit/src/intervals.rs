@@ -162,3 +162,22 @@ fn inflation<'a>(
         if blocks.is_empty() { 1.0 } else { correlation_factor(&blocks).max(1.0) }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_forgotten_has_the_variance_of_before_and_the_rest_given_it_stays() {
+        let mut covariance = DMatrix::from_row_slice(2, 2, &[4.0, -3.9, -3.9, 4.0]);
+        let given = |c: &DMatrix<f64>| c[(1, 1)] - c[(0, 1)] * c[(0, 1)] / c[(0, 0)];
+        let before = given(&covariance);
+        let first = DVector::from_vec(vec![1.0, 0.0]);
+        forget(&mut covariance, &first, 16.0);
+        assert!((covariance[(0, 0)] - 16.0).abs() < 1e-12);
+        assert!((given(&covariance) - before).abs() < 1e-12);
+        let same = covariance.clone();
+        forget(&mut covariance, &first, 9.0);
+        assert_eq!(covariance, same);
+    }
+}

@@ -29,7 +29,7 @@ fn inside(car: &TestCar, fit: &Fit) -> (usize, usize) {
 
 #[test]
 fn speeds_and_current_give_the_torque_but_neither_valve_gain_nor_torque_scale() {
-    let (car, fit, ratio) = fitted(3, Logs::SpeedsAndCurrent, 4);
+    let (car, fit, ratio) = fitted(2, Logs::SpeedsAndCurrent, 4);
     assert!(ratio < 0.35, "{ratio}");
     let (held, all) = inside(&car, &fit);
     assert!(held + 2 >= all, "{held} of {all}");
