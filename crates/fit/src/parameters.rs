@@ -118,7 +118,7 @@ impl Parameter {
 }
 
 /// A parameter with what is known of it before the fit: mean and standard deviation of its unknown, which is the logarithm
-/// of a factor, a delay over [`DELAY_UNIT_S`], or a relative change.
+/// of a factor, a delay in units of 10 ms, or a relative change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// What it is.
