@@ -236,6 +236,9 @@ impl Findings {
                 Health::Good => continue,
                 Health::ReadingRefused => "a reading that was refused: it is impossible, or it contradicts all others",
                 Health::ChannelLost => "a channel without usable readings: the estimate is less certain",
+                Health::Flare => {
+                    "a flare: both clutches slip and the turbine runs away; the oncoming clutch carries too little"
+                }
                 // A few are normal while the cylinder fills: there the observers' valve model is faster than the
                 // valve maps.
                 Health::OutsideRange | Health::LimitedToRange if 100 * count <= self.rows => continue,
