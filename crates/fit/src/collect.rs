@@ -40,7 +40,9 @@ pub fn own_names(log: &Log) -> Result<ChannelMap, FitError> {
         )));
     }
     for name in names() {
-        let role = Role::all().filter(|role| name.strip_prefix(role.name()).is_some_and(|rest| rest.starts_with('_')));
+        // The engine torque that a controller reports is called so in tables of the program.
+        let plain = name.strip_prefix("reported_").unwrap_or(name);
+        let role = Role::all().filter(|role| plain.strip_prefix(role.name()).is_some_and(|rest| rest.starts_with('_')));
         let Some(role) = role.max_by_key(|role| role.name().len()) else { continue };
         let unit = Unit::of_name(name).map(|unit| unit.quantity);
         if unit.is_some() && unit == role.quantity() && !map.has(role) {
