@@ -19,6 +19,7 @@ Examples:
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
   wetclutch inspect drive.mf4                        channels, units, rates and gaps of a log
   wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
+  wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml   a vehicle file that fits the car
 
 All files use SI units, which are part of keys and column names. Column names of measured files may also
 end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
@@ -109,6 +110,27 @@ pub(crate) enum Command {
     /// appears when it contains all rows; it may be the log itself.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
+    /// Fit a vehicle file to logs of measured shifts
+    ///
+    /// Finds the power-on upshifts of the vehicle's gears in the logs and fits converter, clutch, valve, inertias, shafts, tyres,
+    /// mass and delays to them. Prints each value with its interval, what these logs cannot tell, and which measurement would. Writes
+    /// the vehicle file with the fitted values; comments and all other keys stay, and the error budget follows from the fit.
+    ///
+    /// Needs engine, turbine and output speed and the command of the oncoming clutch's valve. Used where the log has them:
+    /// wheel speed, command of the offgoing clutch's valve, engine torque, pressure of the oncoming clutch. Columns with
+    /// the names of `estimate` need no channel map. The last fifth of the shifts is held out to check the result.
+    ///
+    ///   wetclutch fit drive1.mf4 drive2.mf4 --map map.toml --vehicle car.toml -o fitted.toml
+    #[command(verbatim_doc_comment)]
+    Fit(Fit),
+    /// Write a first vehicle file for a car from a few numbers
+    ///
+    /// Writes a vehicle file for one upshift. What is not given is a default, scaled to the car where it depends on its size; each
+    /// value says where it is from. `fit` then finds the values from logs.
+    ///
+    ///   wetclutch init --mass-kg 1650 --wheel-radius-m 0.32 --ratios 4.17,2.34 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
+    #[command(verbatim_doc_comment)]
+    Init(Init),
     /// Run the source chapter's experiments and compare the results with its statements
     ///
     /// Runs experiments E1 to E4 of the source chapter on the built-in car, and again in the settings that the
@@ -357,6 +379,49 @@ pub(crate) struct Estimate {
     /// File for the estimate; default: standard output
     #[arg(short, long, value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Init {
+    /// Name of the car
+    #[arg(long, default_value = "my car")]
+    pub(crate) name: String,
+    /// Mass with driver, kg
+    #[arg(long, value_name = "KG", value_parser = within(200.0..=60e3))]
+    pub(crate) mass_kg: f64,
+    /// Rolling radius of the driven wheels, m
+    #[arg(long, value_name = "M", value_parser = within(0.1..=1.0))]
+    pub(crate) wheel_radius_m: f64,
+    /// Ratios of the gears before and after the shift, such as 4.17,2.34
+    #[arg(long, required = true, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, value_parser = within(0.6..=20.0))]
+    pub(crate) ratios: Vec<f64>,
+    /// Ratio from gearbox output to wheels
+    #[arg(long, value_name = "RATIO", value_parser = within(0.5..=10.0))]
+    pub(crate) final_ratio: f64,
+    /// Greatest engine torque, N m
+    #[arg(long, value_name = "N_M", value_parser = within(20.0..=2000.0))]
+    pub(crate) engine_torque_n_m: f64,
+    /// The vehicle file
+    #[arg(short, long, value_name = "CAR.toml")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fit {
+    /// Logs of drives with upshifts
+    #[arg(required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// Vehicle file to start from; its error budget says how far off its values may be
+    #[arg(long)]
+    pub(crate) vehicle: PathBuf,
+    /// File whose table `sensors` describes the teeth of the speed sensors, such as an experiment file
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// The fitted vehicle file
+    #[arg(short, long, value_name = "FITTED.toml")]
+    pub(crate) output: PathBuf,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

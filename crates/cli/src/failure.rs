@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use config::ConfigError;
 use design::DesignError;
+use fit::FitError;
 use logs::LogError;
 use plant::PlantError;
 use report::PageError;
@@ -103,6 +104,15 @@ impl From<StudyError> for Failure {
             StudyError::Plant(error) => error.into(),
             StudyError::Design(error) => error.into(),
             StudyError::Trace(error) => error.into(),
+        }
+    }
+}
+
+impl From<FitError> for Failure {
+    fn from(error: FitError) -> Self {
+        match error {
+            FitError::Work(message) => Self::Work(message),
+            error => Self::Input(error.to_string()),
         }
     }
 }

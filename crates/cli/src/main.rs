@@ -22,6 +22,8 @@ fn main() -> ExitCode {
         Command::Design(options) => commands::design(&options),
         Command::Inspect(options) => commands::inspect(&options),
         Command::Estimate(options) => commands::estimate(&options),
+        Command::Fit(options) => commands::fit(&options),
+        Command::Init(options) => commands::init(&options),
         Command::Reproduce(options) => commands::reproduce(&options),
         Command::Bench(options) => commands::bench(&options),
         Command::Study(options) => commands::study(&options),

@@ -156,7 +156,7 @@ fn name_of(choice: ObserverChoice, method: MethodChoice) -> String {
 }
 
 /// The sensors that a file describes.
-fn sensors(path: &Path) -> Result<Sensors, Failure> {
+pub(super) fn sensors(path: &Path) -> Result<Sensors, Failure> {
     Sensors::read(path)?.ok_or_else(|| {
         let path = path.display();
         Failure::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))

@@ -1,0 +1,146 @@
+//! `wetclutch fit`.
+
+use config::Vehicle;
+use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::args::Fit;
+use crate::commands::estimate::sensors;
+use crate::commands::{channel_map, check_output, not_an_input, shell_quoted, write_text};
+use crate::failure::Failure;
+use crate::output;
+
+/// Fewer shifts are all fitted.
+const LEAST_FOR_HELD_OUT: usize = 8;
+/// Least number of shifts that are held out.
+const HELD_OUT_MIN: usize = 3;
+/// Reasons that are printed one by one.
+const REASONS_MAX: usize = 10;
+
+pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
+    check_output(Some(&options.output))?;
+    not_an_input(Some(&options.output), options.logs.iter().chain(&options.sensors).chain([&options.vehicle]))?;
+    let vehicle = Vehicle::read(&options.vehicle)?;
+    fit::check_vehicle(&vehicle)?;
+    let ages = match options.sensors.as_deref() {
+        Some(path) => ReadingAges::of(&sensors(path)?),
+        None => ReadingAges::default(),
+    };
+    let bar = progress();
+    let collected = collect(options, &vehicle, &bar)?;
+    for note in &collected.notes {
+        output::note(&format!("warning: {note}"));
+    }
+    reasons("not used", &collected.skipped);
+    let (fitted_shifts, held_out) = divided(collected.shifts);
+    if fitted_shifts.is_empty() {
+        bar.finish_and_clear();
+        return Err(no_shift(&vehicle, options));
+    }
+    let found = fit::fit(&vehicle, &fitted_shifts, ages, &mut |progress| {
+        bar.set_message(format!("{} shifts, iteration {}", progress.shifts, progress.iteration + 1));
+        bar.tick();
+    })?;
+    bar.set_message("checking on shifts that were held out");
+    reasons("not fitted", &found.unusable);
+    let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
+    let fitted = found.vehicle_file(&vehicle, &names.join(", "))?;
+    let checked = found.validate(&vehicle, &fitted, &held_out, ages)?;
+    bar.finish_and_clear();
+    table(&found.report())?;
+    for (channel, scale, gain) in &found.channels {
+        let (scale, unit) = if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
+        output::line(&format!("{}: one-step error {scale:.3} {unit}, g {gain:.2}", channel.name()))?;
+    }
+    for statement in found.statements() {
+        output::line(&statement)?;
+    }
+    output::line(&said_of(checked.as_ref()))?;
+    write_text(&options.output, &fitted.source.text)?;
+    let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
+    output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
+    Ok(())
+}
+
+/// The shifts of all logs.
+fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collected, Failure> {
+    let map = channel_map(&options.mapping)?;
+    let mut all = Collected::default();
+    for log in &options.logs {
+        bar.set_message(format!("reading {}", log.display()));
+        bar.tick();
+        let mut one = fit::collect(log, &map, vehicle)?;
+        all.shifts.append(&mut one.shifts);
+        all.skipped.append(&mut one.skipped);
+        all.notes.extend(one.notes.iter().map(|note| format!("{}: {note}", log.display())));
+    }
+    Ok(all)
+}
+
+/// Shifts to fit, and shifts that are held out: the last fifth. Of more than a fit can use, some are left out evenly.
+fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>) {
+    let count = shifts.len();
+    let held_out =
+        if count < LEAST_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
+    let some = SHIFTS_MAX.min(shifts.len());
+    ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
+}
+
+fn no_shift(vehicle: &Vehicle, options: &Fit) -> Failure {
+    let [from, to] = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
+    FitError::Input(format!(
+        "the logs have no power-on upshift from ratio {from:.3} to {to:.3} that can be fitted\n\
+         hint: `wetclutch inspect {} --shifts --ratios {from:.3},{to:.3}` with the same map lists the shifts that it finds",
+        options.logs.first().map(|log| shell_quoted(log)).unwrap_or_default()
+    ))
+    .into()
+}
+
+fn reasons(what: &str, reasons: &[String]) {
+    for reason in reasons.iter().take(REASONS_MAX) {
+        output::note(&format!("{what}: {reason}"));
+    }
+    if let Some(more @ 1..) = reasons.len().checked_sub(REASONS_MAX) {
+        output::note(&format!("{what}: {more} more"));
+    }
+}
+
+fn table(rows: &[ReportRow]) -> Result<(), Failure> {
+    let titles = ["", "value", "95 %", "after / before", ""].map(str::to_owned).to_vec();
+    let cells = rows.iter().map(|row| {
+        let verdict = format!(" {}", row.verdict.name());
+        vec![row.name.clone(), row.value.clone(), row.interval.clone(), row.share.clone(), verdict]
+    });
+    Ok(output::table(1, &[titles].into_iter().chain(cells).collect::<Vec<_>>())?)
+}
+
+/// The result on held-out shifts, in words.
+fn said_of(checked: Option<&HeldOut>) -> String {
+    let Some(checked) = checked else {
+        return format!(
+            "no shift is held out: fewer than {LEAST_FOR_HELD_OUT} can be used, so nothing checks this fit"
+        );
+    };
+    let [given, fitted] = checked.turbine_rad_s;
+    let mut text = format!(
+        "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} with the fitted one",
+        checked.shifts
+    );
+    if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| 1e-3 * error)) {
+        text += &format!("; pressure of the valve maps against the measured one {given:.2} kPa, {fitted:.2} kPa");
+    }
+    if fitted > given {
+        text += "\nwarning: the fitted file is worse on them: do not use it before the reason is known";
+    }
+    text
+}
+
+/// A line on standard error that says what is being done; nothing if standard error is not a terminal.
+fn progress() -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    // The template is a constant.
+    if let Ok(style) = ProgressStyle::with_template("{spinner} fit: {msg}  {elapsed}") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,201 @@
+//! `fit`: from logs of shifts to a vehicle file, and to estimates with it.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+#[path = "../../fit/tests/common/mod.rs"]
+mod common;
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use common::{Logs, TestCar};
+use trace::signal;
+
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
+const SENSORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/bench.toml");
+
+fn wetclutch(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    assert!(output.status.success(), "{}", stderr(output));
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("wetclutch-fit-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if std::env::var_os("FIT_KEEP").is_none() {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+}
+
+/// RMS error of the torque that the valve maps of a vehicle file give, N m, over logs with their truth.
+fn torque_error(folder: &Folder, vehicle: &str, logs: &[(String, trace::Trace)]) -> f64 {
+    let (mut count, mut sum) = (0.0, 0.0);
+    for (log, truth) in logs {
+        let estimate = folder.path("estimate.csv");
+        let arguments = ["estimate", log, "--vehicle", vehicle, "--observer", "open-loop-maps", "-o", &estimate];
+        stdout(&wetclutch(&arguments));
+        let estimate = trace::read_csv(std::path::Path::new(&estimate)).unwrap();
+        let phases = study::true_phases(truth).unwrap();
+        let [estimated, torque] = [(&estimate, signal::TORQUE_ESTIMATE), (truth, signal::ONCOMING_TORQUE)]
+            .map(|(table, name)| table.get(name).unwrap());
+        for i in 0..phases.len() {
+            if matches!(phases[i], observer::Phase::TorquePhase | observer::Phase::InertiaPhase) {
+                count += 1.0;
+                sum += (estimated[i] - torque[i]).powi(2);
+            }
+        }
+    }
+    (sum / count).sqrt()
+}
+
+/// From logs to the fitted file, and with both files over logs that the fit has not seen. The bars of many cars are in the tests
+/// of the crate `fit`; this is one car.
+#[test]
+fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
+    let folder = Folder::new("path");
+    let shifts: u64 = std::env::var("FIT_SHIFTS").map_or(5, |text| text.parse().unwrap());
+    let mut car = TestCar::drawn(3);
+    let logs: Vec<String> = (0..shifts)
+        .map(|number| {
+            let [measured, _] = car.logs(number, Logs::SpeedsAndCurrent);
+            let path = folder.path(&format!("shift_{number:02}.csv"));
+            trace::write_csv(std::path::Path::new(&path), &measured).unwrap();
+            path
+        })
+        .collect();
+    let fitted = folder.path("fitted.toml");
+    let mut arguments = vec!["fit"];
+    arguments.extend(logs.iter().map(String::as_str));
+    arguments.extend(["--vehicle", VEHICLE, "--sensors", SENSORS, "-o", &fitted]);
+    let output = wetclutch(&arguments);
+    let said = stdout(&output);
+    let valve_gain = said.lines().find(|line| line.starts_with("valve gain ")).unwrap();
+    assert!(valve_gain.ends_with("not told by these logs"), "{valve_gain}");
+    assert!(said.contains("torque scale: not told by these logs"), "{said}");
+    assert!(said.contains("weigh the car"), "{said}");
+    let text = std::fs::read_to_string(&fitted).unwrap();
+    let given = std::fs::read_to_string(VEHICLE).unwrap();
+    // Every line of the given file is there, but for those with new values.
+    let lost = given.lines().filter(|line| !text.lines().any(|other| other == *line)).count();
+    assert!(lost < 40, "{lost} lines changed");
+    assert!(text.contains("# fit: x "), "{text}");
+    stdout(&wetclutch(&["check", &fitted]));
+    let others: Vec<(String, trace::Trace)> = (100..103)
+        .map(|number| {
+            let [measured, truth] = car.logs(number, Logs::SpeedsAndCurrent);
+            let path = folder.path(&format!("other_{number}.csv"));
+            trace::write_csv(std::path::Path::new(&path), &measured).unwrap();
+            (path, truth)
+        })
+        .collect();
+    let [before, after] = [VEHICLE, &fitted].map(|vehicle| torque_error(&folder, vehicle, &others));
+    assert!(after < 0.35 * before, "{before} {after}");
+}
+
+/// A table of one shift as text.
+fn one_shift(seed: u64) -> String {
+    let [measured, _] = TestCar::drawn(seed).logs(0, Logs::SpeedsAndCurrent);
+    let mut text =
+        format!("time_s,{}\n", measured.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(","));
+    for (i, time_s) in measured.time_s.iter().enumerate() {
+        let cells = measured.columns.iter().map(|column| measured.get(&column.name).unwrap()[i].to_string());
+        text += &format!("{time_s},{}\n", cells.collect::<Vec<_>>().join(","));
+    }
+    text
+}
+
+#[test]
+fn what_a_log_lacks_is_said_and_no_file_is_written() {
+    let folder = Folder::new("lacks");
+    let text = one_shift(1);
+    let head = |rows: usize| text.lines().take(rows).map(|line| format!("{line}\n")).collect::<String>();
+    let lines = text.lines().count();
+    let cases = [
+        ("no rows", head(1), "there are no rows"),
+        ("one row", head(2), "have no power-on upshift from ratio 2.500 to 1.000"),
+        ("no shift", head(lines / 4), "have no power-on upshift"),
+        ("no turbine", text.replace("turbine_speed_rad_s", "x"), "there is no turbine_speed"),
+        ("no command", text.replace("oncoming_current_a", "x"), "--channel oncoming_current=NAME"),
+        ("wrong unit", text.replace("engine_speed_rad_s", "engine_speed_rpm"), "it looks like rad/s"),
+        ("ages", text.replace("offgoing_current_a", "engine_speed_age_s"), "has ages of readings"),
+    ];
+    let fitted = folder.path("fitted.toml");
+    for (case, text, expected) in cases {
+        let log = folder.write("log.csv", &text);
+        let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
+        assert_eq!(output.status.code(), Some(2), "{case}: {}", stderr(&output));
+        assert!(stderr(&output).contains(expected), "{case}: {}", stderr(&output));
+        assert!(!std::path::Path::new(&fitted).exists(), "{case}");
+    }
+}
+
+#[test]
+fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is() {
+    let folder = Folder::new("one");
+    // Every fifth engine speed and every seventh wheel speed are lost, and there is no command of the offgoing clutch.
+    let whole = one_shift(1);
+    let lossy = whole.lines().enumerate().map(|(i, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if i > 0 && i % 5 == 0 {
+            cells[1] = "";
+        }
+        if i > 0 && i % 7 == 0 {
+            cells[4] = "nan";
+        }
+        cells.pop();
+        cells.join(",") + "\n"
+    });
+    let log = folder.write("log.csv", &lossy.collect::<String>());
+    let fitted = folder.path("fitted.toml");
+    let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
+    let said = stdout(&output);
+    assert!(said.contains("one shift only"), "{said}");
+    assert!(said.contains("no shift is held out"), "{said}");
+    stdout(&wetclutch(&["check", &fitted]));
+    let output = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &fitted]);
+    assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_new_vehicle_file_can_be_used_and_is_not_written_over() {
+    let folder = Folder::new("init");
+    let car = folder.path("car.toml");
+    let numbers =
+        ["--mass-kg", "1650", "--wheel-radius-m", "0.32", "--final-ratio", "3.2", "--engine-torque-n-m", "250"];
+    let init = |ratios: &str| wetclutch(&[&["init", "--ratios", ratios, "-o", &car], &numbers[..]].concat());
+    let output = init("2.34,4.17");
+    assert!(stderr(&output).contains("which is no upshift"), "{}", stderr(&output));
+    assert!(stderr(&init("4.17")).contains("two ratios"));
+    assert!(!init("nan,2").status.success());
+    stdout(&init("4.17,2.34"));
+    stdout(&wetclutch(&["check", &car]));
+    assert!(stderr(&init("4.17,2.34")).contains("is there already"));
+}

@@ -1,0 +1,183 @@
+//! The car of a set of parameters.
+
+use config::{SpeedSensor, Vehicle};
+use drivetrain::{
+    Clutch, ClutchValve, Converter, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Table1, Tyre,
+};
+
+use crate::Parameter;
+use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
+use crate::record::SegmentKind;
+
+/// How far a speed wheel turns while a reading ages, rad: a reading is the mean over some teeth, and the last of them passed
+/// half a tooth ago. Zero where the sensor is not known; its delay then takes the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ReadingAges {
+    /// Engine speed.
+    pub engine_rad: f64,
+    /// Turbine speed.
+    pub turbine_rad: f64,
+    /// Output speed.
+    pub output_rad: f64,
+    /// Wheel speed.
+    pub wheel_rad: f64,
+}
+
+impl ReadingAges {
+    /// Those of described sensors.
+    pub fn of(sensors: &config::Sensors) -> Self {
+        let age = |sensor: &SpeedSensor| 0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth;
+        Self {
+            engine_rad: age(&sensors.engine),
+            turbine_rad: age(&sensors.turbine),
+            output_rad: age(&sensors.output),
+            wheel_rad: age(&sensors.wheel),
+        }
+    }
+}
+
+/// The car of a set of parameters, and how its signals are read.
+#[derive(Debug, Clone)]
+pub(crate) struct Car {
+    pub(crate) converter: Converter<f64>,
+    pub(crate) clutch: Clutch<f64>,
+    pub(crate) offgoing: Clutch<f64>,
+    pub(crate) valve: ClutchValve<f64>,
+    pub(crate) offgoing_valve: ClutchValve<f64>,
+    pub(crate) hysteresis_pa: f64,
+    pub(crate) offgoing_hysteresis_pa: f64,
+    pub(crate) command_delay_s: f64,
+    pub(crate) shift: ReducedShift<f64>,
+    coefficients: [ShiftCoefficients<f64>; 3],
+    pub(crate) driveline: Driveline<f64>,
+    pub(crate) road: RoadLoad<f64>,
+    pub(crate) tyre: Tyre<f64>,
+    pub(crate) engine_inertia_kg_m2: f64,
+    pub(crate) engine_drag_n_m_s: f64,
+    pub(crate) output_delay_s: f64,
+    pub(crate) wheel_delay_s: f64,
+    pub(crate) engine_delay_s: f64,
+    pub(crate) wheel_scale: f64,
+    pub(crate) engine_torque_scale: f64,
+    pub(crate) engine_torque_delay_s: f64,
+    pub(crate) pressure_scale: f64,
+    pub(crate) ages: ReadingAges,
+}
+
+impl Car {
+    /// The car of the file.
+    pub(crate) fn of_file(vehicle: &Vehicle, ages: ReadingAges) -> Self {
+        Self {
+            converter: vehicle.converter,
+            clutch: vehicle.oncoming.clutch,
+            offgoing: vehicle.offgoing.clutch,
+            valve: vehicle.oncoming.valve,
+            offgoing_valve: vehicle.offgoing.valve,
+            hysteresis_pa: vehicle.oncoming.hysteresis_pa,
+            offgoing_hysteresis_pa: vehicle.offgoing.hysteresis_pa,
+            command_delay_s: 0.0,
+            shift: vehicle.shift,
+            coefficients: coefficients(&vehicle.shift),
+            driveline: vehicle.driveline,
+            road: vehicle.road,
+            tyre: vehicle.tyre,
+            engine_inertia_kg_m2: vehicle.engine.inertia_kg_m2,
+            engine_drag_n_m_s: vehicle.engine.drag_n_m_s,
+            output_delay_s: 0.0,
+            wheel_delay_s: 0.0,
+            engine_delay_s: 0.0,
+            wheel_scale: 1.0,
+            engine_torque_scale: 1.0,
+            engine_torque_delay_s: 0.0,
+            pressure_scale: 1.0,
+            ages,
+        }
+    }
+
+    /// The car whose parameters have these unknowns.
+    pub(crate) fn with(&self, shafts: &[Shaft], priors: &[Prior], unknowns: &[f64]) -> Self {
+        let mut car = self.clone();
+        for (prior, x) in priors.iter().zip(unknowns) {
+            car.set(prior.parameter, prior.parameter.value(*x), shafts);
+        }
+        car.coefficients = coefficients(&car.shift);
+        car
+    }
+
+    /// Applies a value to the car of the file.
+    fn set(&mut self, parameter: Parameter, value: f64, shafts: &[Shaft]) {
+        match parameter {
+            Parameter::Capacity => self.converter.capacity_n_m_s2 = self.converter.capacity_n_m_s2.scaled(value),
+            Parameter::TorqueRatio => {
+                let ratio = |ratio: f64| 1.0 + value * (ratio - 1.0);
+                self.converter.torque_ratio = mapped(&self.converter.torque_ratio, |_, t| ratio(t));
+            }
+            Parameter::Friction => {
+                self.clutch.friction = self.clutch.friction.scaled(value);
+                self.clutch.static_friction *= value;
+            }
+            Parameter::FrictionAtRest => {
+                self.clutch.friction =
+                    mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([value, 0.0], slip));
+            }
+            Parameter::FrictionSlope => {
+                self.clutch.friction =
+                    mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([0.0, value], slip));
+            }
+            Parameter::Spring => self.clutch.return_spring_n *= value,
+            Parameter::Gain => self.valve = self.valve.changed(1.0, value, None),
+            Parameter::Lag => self.valve = self.valve.changed(value, 1.0, None),
+            Parameter::CommandDelay => self.command_delay_s = value,
+            Parameter::Inertia(i) => {
+                if let Some(shaft) = shafts.get(i) {
+                    for (row, share) in self.shift.mass_kg_m2.iter_mut().zip(shaft.mass_kg_m2) {
+                        row.iter_mut().zip(share).for_each(|(cell, share)| *cell += (value - 1.0) * share);
+                    }
+                }
+            }
+            Parameter::Stiffness => self.driveline.shaft_stiffness_n_m_rad *= value,
+            Parameter::Damping => self.driveline.shaft_damping_n_m_s_rad *= value,
+            Parameter::Tyre => self.tyre.slip_scale *= value,
+            Parameter::Mass => self.road.mass_kg *= value,
+            Parameter::OffgoingFriction => self.offgoing.friction = self.offgoing.friction.scaled(value),
+            Parameter::OutputDelay => self.output_delay_s = value,
+            Parameter::WheelDelay => self.wheel_delay_s = value,
+            Parameter::EngineDelay => self.engine_delay_s = value,
+            Parameter::WheelScale => self.wheel_scale = value,
+            Parameter::EngineInertia => self.engine_inertia_kg_m2 *= value,
+            Parameter::EngineTorqueScale => self.engine_torque_scale = value,
+            Parameter::EngineTorqueDelay => self.engine_torque_delay_s = value,
+            Parameter::PressureScale => self.pressure_scale = value,
+        }
+    }
+
+    /// Accelerations per torque in a segment.
+    pub(crate) fn coefficients(&self, kind: SegmentKind) -> &ShiftCoefficients<f64> {
+        &self.coefficients[kind as usize]
+    }
+
+    /// Torque of the oncoming clutch while it slips, N m.
+    #[inline]
+    pub(crate) fn oncoming_torque(&self, pressure_pa: f64, slip_rad_s: f64) -> f64 {
+        drivetrain::clutch::direction(slip_rad_s) * self.clutch.torque_capacity(pressure_pa, slip_rad_s)
+    }
+}
+
+/// Factor on the friction at a slip, of its changes at rest and above the middle slip.
+pub(crate) fn friction_shape([at_rest, slope]: [f64; 2], slip_rad_s: f64) -> f64 {
+    let below = (1.0 - slip_rad_s / SHAPE_MIDDLE_RAD_S).max(0.0);
+    let above = ((slip_rad_s - SHAPE_MIDDLE_RAD_S) / SLOPE_SPAN_RAD_S).clamp(0.0, 1.0);
+    (1.0 + at_rest * below) * (1.0 + slope * above)
+}
+
+/// The table with other values on its axis.
+fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Table1<f64> {
+    let values: Vec<f64> = table.axis().iter().zip(table.values()).map(|(x, y)| value(*x, *y)).collect();
+    // The axis is that of a table; only a value that is not finite can be refused, and the fit rejects such a step.
+    Table1::new(table.axis(), &values).unwrap_or(*table)
+}
+
+fn coefficients(shift: &ReducedShift<f64>) -> [ShiftCoefficients<f64>; 3] {
+    [Engagement::OffgoingStuck, Engagement::BothSlipping, Engagement::OncomingStuck]
+        .map(|kind| shift.coefficients(kind))
+}

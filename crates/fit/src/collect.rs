@@ -1,0 +1,188 @@
+//! The shifts of a log that a fit can use.
+
+use std::path::Path;
+
+use config::Vehicle;
+use drivetrain::CommandKind;
+use logs::{ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Readings, Role, Shift, ShiftFinder};
+use trace::{Unit, signal};
+
+use crate::{FitError, Series, ShiftRecord};
+
+/// Readings are kept from so long before the inertia phase on, s: the commands of the torque phase and of the fill.
+const BEFORE_S: f64 = 2.0;
+/// And until so long after it, s.
+const AFTER_S: f64 = 1.5;
+
+/// What was found in a log.
+#[derive(Debug, Clone, Default)]
+pub struct Collected {
+    /// The shifts.
+    pub shifts: Vec<ShiftRecord>,
+    /// Shifts that are not used, each with the reason.
+    pub skipped: Vec<String>,
+    /// What is to be said about the log.
+    pub notes: Vec<String>,
+}
+
+/// The map of a log whose channels have the names of the program: a role and a unit, such as `engine_speed_rad_s`.
+///
+/// # Errors
+/// The log has ages of readings in columns.
+pub fn own_names(log: &Log) -> Result<ChannelMap, FitError> {
+    let mut map = ChannelMap::default();
+    let names = || log.channels().iter().map(|channel| channel.name.as_str());
+    if let Some(age) = names().find(|name| signal::AGES.iter().any(|(_, age)| age == name)) {
+        return Err(FitError::input(format!(
+            "{}: column `{age}` has ages of readings, which a fit does not read\n\
+             hint: give a log in which each channel has its own times, with --map",
+            log.path().display()
+        )));
+    }
+    for name in names() {
+        // The engine torque that a controller reports is called so in tables of the program.
+        let plain = name.strip_prefix("reported_").unwrap_or(name);
+        let role = Role::all().filter(|role| plain.strip_prefix(role.name()).is_some_and(|rest| rest.starts_with('_')));
+        let Some(role) = role.max_by_key(|role| role.name().len()) else { continue };
+        let unit = Unit::of_name(name).map(|unit| unit.quantity);
+        if unit.is_some() && unit == role.quantity() && !map.has(role) {
+            map.channels.push(Mapped::new(role, name));
+        }
+    }
+    Ok(map)
+}
+
+/// Finds the shifts of the vehicle in a log. Without channels in the map, the log has the names of the program.
+///
+/// # Errors
+/// The log cannot be read, or lacks a channel that a fit needs.
+pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Collected, FitError> {
+    if path == Path::new("-") {
+        return Err(FitError::input("a fit reads a log twice\nhint: give a file in place of standard input"));
+    }
+    let ratios = vec![vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
+    let mut log = Log::open(path, &map.open)?;
+    let mut map =
+        if map.channels.is_empty() { ChannelMap { open: map.open.clone(), ..own_names(&log)? } } else { map.clone() };
+    map.gearbox = Gearbox { ratios, ..map.gearbox };
+    let commands = commands(vehicle);
+    needed(path, &map, commands[0])?;
+    let (shifts, mut notes) = find(&mut log, &map)?;
+    let mut collected = Collected::default();
+    let mut usable = Vec::new();
+    for shift in shifts {
+        match reason_against(&shift) {
+            None => usable.push(shift),
+            Some(reason) => collected.skipped.push(format!("{}: {reason}", name(path, shift.start_s()))),
+        }
+    }
+    collected.notes.append(&mut notes);
+    for mut record in read(path, &map, commands, &usable)? {
+        match record.find_segments(&vehicle.shift) {
+            Ok(()) => collected.shifts.push(record),
+            Err(reason) => collected.skipped.push(format!("{}: {reason}", record.name)),
+        }
+    }
+    Ok(collected)
+}
+
+/// Roles of the commands of both valves.
+fn commands(vehicle: &Vehicle) -> [Role; 2] {
+    match vehicle.oncoming.valve.command_kind() {
+        CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
+        CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
+    }
+}
+
+fn needed(path: &Path, map: &ChannelMap, command: Role) -> Result<(), FitError> {
+    let needed = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, command];
+    match needed.into_iter().find(|role| !map.has(*role)) {
+        None => Ok(()),
+        Some(missing) => Err(FitError::input(format!(
+            "{}: there is no {role}, and a fit needs {}\n\
+             hint: say which channel it is with --map or `--channel {role}=NAME`; `wetclutch inspect` lists the channels",
+            path.display(),
+            needed.map(Role::name).join(", "),
+            role = missing.name(),
+        ))),
+    }
+}
+
+/// Why a shift cannot be used, if so.
+fn reason_against(shift: &Shift) -> Option<&'static str> {
+    match shift {
+        Shift { direction: Direction::Down, .. } => Some("a downshift"),
+        Shift { load: Load::PowerOff, .. } => Some("a power-off shift"),
+        Shift { inertia_s: None, .. } => Some("the speeds do not show its inertia phase"),
+        _ => None,
+    }
+}
+
+fn name(path: &Path, time_s: f64) -> String {
+    format!("{} at {time_s:.2} s", path.display())
+}
+
+/// The shifts of a log, and what is to be said about its channels.
+fn find(log: &mut Log, map: &ChannelMap) -> Result<(Vec<Shift>, Vec<String>), FitError> {
+    let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
+    let mut readings = Readings::new(log, map)?;
+    let mut resets = 0;
+    while let Some(reading) = readings.next() {
+        let reading = reading?;
+        if readings.resets() > resets {
+            resets = readings.resets();
+            finder.restart();
+        }
+        finder.push(&reading);
+    }
+    readings.check()?;
+    let mut notes = readings.notes().to_vec();
+    for summary in readings.summary() {
+        let (good, total) = (summary.counts.of(Quality::Good), summary.counts.total());
+        if good < total {
+            let (role, faults) = (summary.role.name(), summary.counts.faults());
+            notes.push(format!("{} of {total} samples of {role} are not used: {faults}", total - good));
+        }
+    }
+    Ok((finder.finish(), notes))
+}
+
+/// The readings around each of these shifts.
+fn read(path: &Path, map: &ChannelMap, commands: [Role; 2], shifts: &[Shift]) -> Result<Vec<ShiftRecord>, LogError> {
+    let mut log = Log::open(path, &map.open)?;
+    let inertia = |shift: &Shift| shift.inertia_s.unwrap_or([shift.start_s(), shift.end_s()]);
+    let mut records: Vec<([f64; 2], ShiftRecord)> = (shifts.iter())
+        .map(|shift| {
+            let [begin_s, end_s] = inertia(shift);
+            let record = ShiftRecord { name: name(path, begin_s), lock_s: end_s - begin_s, ..ShiftRecord::default() };
+            ([begin_s, end_s], record)
+        })
+        .collect();
+    for reading in Readings::new(&mut log, map)? {
+        let reading = reading?;
+        for ([begin_s, end_s], record) in &mut records {
+            if !(*begin_s - BEFORE_S..=*end_s + AFTER_S).contains(&reading.time_s) {
+                continue;
+            }
+            if let Some(series) = place(record, reading.role, commands) {
+                series.push(reading.time_s - *begin_s, reading.value);
+            }
+        }
+    }
+    Ok(records.into_iter().map(|(_, record)| record).collect())
+}
+
+/// Where the readings of a role belong; none if a fit does not use them.
+fn place(record: &mut ShiftRecord, role: Role, [oncoming, offgoing]: [Role; 2]) -> Option<&mut Series> {
+    match role {
+        Role::EngineSpeed => Some(&mut record.engine),
+        Role::TurbineSpeed => Some(&mut record.turbine),
+        Role::OutputSpeed => Some(&mut record.output),
+        Role::WheelSpeed => Some(&mut record.wheel),
+        Role::OncomingPressure => Some(&mut record.pressure),
+        Role::EngineTorque => Some(&mut record.engine_torque),
+        _ if role == oncoming => Some(&mut record.oncoming),
+        _ if role == offgoing => Some(&mut record.offgoing),
+        _ => None,
+    }
+}

@@ -1,0 +1,164 @@
+//! The vehicle file of a fit: the text of the given one with other values.
+
+use config::{Source, Vehicle};
+use drivetrain::CommandKind;
+
+use crate::car::friction_shape;
+use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
+use crate::{Fit, FitError, Parameter};
+
+/// Least error of the turbine torque, as a share \[chosen\].
+const CONVERTER_SHARE_MIN: f64 = 0.03;
+
+/// Standard deviations on either side of a stated interval.
+pub(crate) const SIDES: f64 = 2.0;
+
+impl Fit {
+    /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
+    /// error budget follows from the intervals; everything else is as in the file. `logs` are named at the head of the file.
+    ///
+    /// # Errors
+    /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
+    pub fn vehicle_file(&self, vehicle: &Vehicle, logs: &str) -> Result<Vehicle, FitError> {
+        let mut text = VehicleText::new(&vehicle.source.text)?;
+        let oncoming = oncoming_name(&vehicle.source.text)?;
+        for prior in &self.priors {
+            self.write(&mut text, vehicle, &oncoming, prior.parameter)?;
+        }
+        self.write_budget(&mut text, vehicle)?;
+        let logs = logs.replace(char::is_control, " ");
+        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
+        let source = Source { path: vehicle.source.path.clone(), text: head + &text.finish() };
+        Vehicle::from_source(source).map_err(|error| {
+            FitError::Work(format!(
+                "the fitted values are not those of a possible car: {error}\n\
+                 hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
+            ))
+        })
+    }
+
+    fn write(
+        &self,
+        text: &mut VehicleText,
+        vehicle: &Vehicle,
+        clutch: &str,
+        parameter: Parameter,
+    ) -> Result<(), FitError> {
+        let Some(value) = self.value(parameter) else { return Ok(()) };
+        let comment = self.comment(parameter);
+        let comment = Some(comment.as_str());
+        let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
+        let is_current = vehicle.oncoming.valve.command_kind() == CommandKind::Current;
+        match parameter {
+            Parameter::Capacity => text.map(&keys(&["converter", "capacity_n_m_s2"]), |c| value * c, comment),
+            Parameter::TorqueRatio => {
+                text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
+            }
+            Parameter::Friction => {
+                let shape = [Parameter::FrictionAtRest, Parameter::FrictionSlope].map(|p| self.value(p).unwrap_or(0.0));
+                let friction = of_clutch(&["friction", "coefficient"]);
+                let slips = text.numbers(&of_clutch(&["friction", "slip_rad_s"]))?;
+                let values = text.numbers(&friction)?;
+                let fitted: Vec<f64> =
+                    slips.iter().zip(values).map(|(slip, mu)| value * friction_shape(shape, *slip) * mu).collect();
+                text.set(&friction, &fitted, comment)?;
+                // A clutch that sticks holds at least what it carries as it begins to slip.
+                let at_rest = fitted.first().copied().unwrap_or(0.0);
+                let more = "keeps its ratio to the fitted friction, and is not below it";
+                text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
+            }
+            Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
+            Parameter::Gain => {
+                let (own, observer) = if is_current {
+                    (of_clutch(&["valve", "gain", "gain_pa_a"]), keys(&["observer", "valve", "gain_pa_a"]))
+                } else {
+                    (of_clutch(&["valve", "line_pressure_pa"]), keys(&["observer", "valve", "line_pressure_pa"]))
+                };
+                text.map(&own, |gain| value * gain, comment)?;
+                text.map(&observer, |gain| value * gain, comment)
+            }
+            Parameter::Lag => {
+                let (own, observer, power) = if is_current {
+                    (
+                        of_clutch(&["valve", "lag", "time_constant_s"]),
+                        keys(&["observer", "valve", "time_constant_s"]),
+                        1.0,
+                    )
+                } else {
+                    (of_clutch(&["valve", "flow_sqrt_pa_s"]), keys(&["observer", "valve", "flow_sqrt_pa_s"]), -1.0)
+                };
+                let factor = value.powf(power);
+                text.map(&own, |lag| factor * lag, comment)?;
+                text.map(&observer, |lag| factor * lag, comment)
+            }
+            Parameter::CommandDelay => {
+                text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
+            }
+            Parameter::Inertia(shaft) => text.map(&shaft_inertia(shaft), |inertia| value * inertia, comment),
+            Parameter::Stiffness => {
+                text.map(&keys(&["driveline", "shaft_stiffness_n_m_rad"]), |stiffness| value * stiffness, comment)
+            }
+            Parameter::Damping => {
+                text.map(&keys(&["driveline", "shaft_damping_n_m_s_rad"]), |damping| value * damping, comment)
+            }
+            Parameter::Tyre => text.map(&keys(&["tyre", "slip_scale"]), |slip| value * slip, comment),
+            Parameter::Mass => text.map(&keys(&["vehicle", "mass_kg"]), |mass| value * mass, comment),
+            Parameter::EngineInertia => {
+                text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment)
+            }
+            // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
+            _ => Ok(()),
+        }
+    }
+
+    /// What a fitted value says of itself.
+    fn comment(&self, parameter: Parameter) -> String {
+        let (value, sd) = (self.value(parameter).unwrap_or(1.0), self.sd(parameter).unwrap_or(0.0));
+        let told = self.verdict(parameter).name();
+        if parameter.is_delay() {
+            let half_ms = 1e3 * SIDES * crate::parameters::DELAY_UNIT_S * sd;
+            return format!("{:+.1} ms, 95 % +- {half_ms:.1} ms, {told}", 1e3 * value);
+        }
+        let (least, greatest) = (value * (-SIDES * sd).exp(), value * (SIDES * sd).exp());
+        format!("x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
+    }
+
+    /// The error budget: what the fit leaves open of each parameter.
+    fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
+        let comment = "what is left open, 95 %";
+        let budget = |key: &str| keys(&["design", "error_bounds", key]);
+        let half = |parameter: Parameter| SIDES * self.sd(parameter).unwrap_or(0.0);
+        let factors = |parameter: Parameter| [(-half(parameter)).exp(), half(parameter).exp()];
+        let mut set = |path: Vec<Step>, values: &[f64]| {
+            // Keys that the file leaves at their defaults stay there.
+            if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
+        };
+        // The shape of the converter's maps is not fitted.
+        let share = half(Parameter::Capacity).clamp(CONVERTER_SHARE_MIN, 1.0);
+        let given = &vehicle.error_bounds;
+        set(budget("turbine_torque_share"), &[share])?;
+        set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
+        set(budget("friction_factor"), &factors(Parameter::Friction))?;
+        set(budget("valve_gain_factor"), &factors(Parameter::Gain))?;
+        set(budget("valve_lag_factor"), &factors(Parameter::Lag))?;
+        set(budget("shaft_stiffness_factor"), &factors(Parameter::Stiffness))?;
+        set(
+            budget("mass_kg"),
+            &[half(Parameter::Mass) * self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg],
+        )?;
+        if let Some(delay_s) = self.value(Parameter::CommandDelay) {
+            let half_s = crate::parameters::DELAY_UNIT_S * half(Parameter::CommandDelay);
+            let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
+            let (one, other) = (delay(0.0), delay(vehicle.limits.command_max));
+            set(budget("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
+        }
+        Ok(())
+    }
+}
+
+/// Name of the oncoming clutch.
+fn oncoming_name(text: &str) -> Result<String, FitError> {
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
+    let name = table.get("gear_train").and_then(|train| train.get("oncoming")).and_then(toml::Value::as_str);
+    name.map(str::to_owned).ok_or_else(|| FitError::input("the vehicle file has no `gear_train.oncoming`"))
+}

@@ -1,0 +1,41 @@
+//! Parameters of a vehicle from measured shifts.
+//!
+//! A shift is cut into segments in which it is known which clutches stick ([`ShiftRecord`]). In each of them the equations of
+//! [`drivetrain`] run with the measured engine speed and the commands of the valves, and their speeds are compared with the
+//! readings. [`fit`] finds the parameters of the car that are the same in all shifts, with intervals
+//! ([`Precision`]); what the readings cannot tell keeps what was known before, and the report says so.
+
+mod car;
+pub mod collect;
+pub mod error;
+mod fitted_file;
+pub mod fitting;
+pub mod init;
+pub mod intervals;
+mod motion;
+pub mod open_loop;
+pub mod parameters;
+mod pressure;
+pub mod record;
+pub mod report;
+pub mod series;
+pub mod shift_model;
+mod solver;
+pub mod validation;
+mod vehicle_text;
+pub mod verdict;
+mod weights;
+
+pub use car::ReadingAges;
+pub use collect::{Collected, collect};
+pub use error::FitError;
+pub use fitting::{Fit, Progress, SHIFTS_MAX, available, check_vehicle, fit};
+pub use intervals::Precision;
+pub use open_loop::{OpenLoop, open_loop};
+pub use parameters::{Available, Parameter, Prior};
+pub use record::{Segment, SegmentKind, ShiftRecord};
+pub use report::ReportRow;
+pub use series::Series;
+pub use shift_model::Channel;
+pub use validation::HeldOut;
+pub use verdict::Verdict;

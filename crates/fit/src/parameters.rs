@@ -1,0 +1,233 @@
+//! What is fitted, and what is known of it before.
+
+use config::Vehicle;
+
+use crate::FitError;
+use crate::vehicle_text;
+
+/// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
+pub(crate) const DELAY_UNIT_S: f64 = 0.01;
+/// The slip at which the shape of the friction changes nothing, rad/s.
+pub(crate) const SHAPE_MIDDLE_RAD_S: f64 = 100.0;
+/// The friction slope is the change over this slip above it, rad/s.
+pub(crate) const SLOPE_SPAN_RAD_S: f64 = 200.0;
+
+/// A quantity of the car or of its signals that is the same in all shifts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Parameter {
+    /// Factor on the capacity of the converter.
+    Capacity,
+    /// Factor on what the torque ratio of the converter is above 1.
+    TorqueRatio,
+    /// Factor on the friction of the oncoming clutch.
+    Friction,
+    /// Relative change of its friction at zero slip; linear to none at 100 rad/s.
+    FrictionAtRest,
+    /// Relative change of its friction from 100 to 300 rad/s of slip.
+    FrictionSlope,
+    /// Factor on the force of its return spring.
+    Spring,
+    /// Factor on the gain of its valve.
+    Gain,
+    /// Factor on the lag of its valve.
+    Lag,
+    /// Delay added to that of the file from the reading of the command to the valve, s.
+    CommandDelay,
+    /// Factor on the inertia of a shaft of the gear train, by its place in the file.
+    Inertia(usize),
+    /// Factor on the stiffness of the drive shafts.
+    Stiffness,
+    /// Factor on their damping.
+    Damping,
+    /// Factor on the slip at which the tyres carry a force.
+    Tyre,
+    /// Factor on the mass of the vehicle.
+    Mass,
+    /// Factor on the friction of the offgoing clutch.
+    OffgoingFriction,
+    /// Delay of the output speed against the turbine speed, s.
+    OutputDelay,
+    /// Delay of the wheel speed against the turbine speed, s.
+    WheelDelay,
+    /// Delay of the engine speed against the turbine speed, s.
+    EngineDelay,
+    /// Factor on the reading of the wheel speed.
+    WheelScale,
+    /// Factor on the inertia of the engine.
+    EngineInertia,
+    /// Factor on the engine torque signal.
+    EngineTorqueScale,
+    /// Delay of the engine torque signal against the turbine speed, s.
+    EngineTorqueDelay,
+    /// Factor on the reading of the pressure sensor.
+    PressureScale,
+}
+
+impl Parameter {
+    /// Whether it is a relative change of the shape of the friction.
+    pub fn is_shape(self) -> bool {
+        matches!(self, Self::FrictionAtRest | Self::FrictionSlope)
+    }
+
+    /// Whether it is a delay; all others but the shape of the friction are factors.
+    pub fn is_delay(self) -> bool {
+        matches!(
+            self,
+            Self::CommandDelay | Self::OutputDelay | Self::WheelDelay | Self::EngineDelay | Self::EngineTorqueDelay
+        )
+    }
+
+    /// The power of the factor with which it grows where all torques of the car grow alike and the speeds stay as they are.
+    pub(crate) fn power_of_torque(self) -> f64 {
+        match self {
+            Self::Capacity | Self::Friction | Self::Inertia(_) | Self::Stiffness | Self::Damping | Self::Mass => 1.0,
+            Self::OffgoingFriction | Self::EngineInertia => 1.0,
+            // A softer tyre for a greater force, and a signal that shows less of it.
+            Self::Tyre | Self::EngineTorqueScale => -1.0,
+            _ => 0.0,
+        }
+    }
+
+    /// Whether it acts on the signals and not on the car: it is not part of a vehicle file.
+    pub fn is_of_signals(self) -> bool {
+        matches!(
+            self,
+            Self::OutputDelay
+                | Self::WheelDelay
+                | Self::EngineDelay
+                | Self::WheelScale
+                | Self::EngineTorqueScale
+                | Self::EngineTorqueDelay
+                | Self::PressureScale
+        )
+    }
+
+    /// Whether it acts on readings alone: the motion of the car stays as it is.
+    pub(crate) fn leaves_motion(self) -> bool {
+        matches!(self, Self::OutputDelay | Self::WheelDelay | Self::WheelScale | Self::PressureScale)
+    }
+
+    /// The value in its own unit of the unknown `x`: a factor, s, or a relative change.
+    pub(crate) fn value(self, x: f64) -> f64 {
+        match self {
+            _ if self.is_delay() => DELAY_UNIT_S * x,
+            _ if self.is_shape() => x,
+            _ => x.exp(),
+        }
+    }
+}
+
+/// A parameter with what is known of it before the fit: mean and standard deviation of its unknown, which is the logarithm
+/// of a factor, a delay in units of 10 ms, or a relative change.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// What it is.
+    pub parameter: Parameter,
+    /// A name for tables.
+    pub name: String,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+}
+
+/// What the logs have besides speeds and commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Available {
+    /// Speed of the driven wheels.
+    pub wheel: bool,
+    /// Pressure of the oncoming clutch, in some shift.
+    pub pressure: bool,
+    /// Engine torque signal.
+    pub engine_torque: bool,
+    /// Command of the offgoing clutch's valve.
+    pub offgoing: bool,
+}
+
+/// A shaft of the gear train with what it adds to the mass matrix of the shift.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Shaft {
+    pub(crate) name: String,
+    /// kg m^2 by turbine and output speed.
+    pub(crate) mass_kg_m2: [[f64; 2]; 2],
+}
+
+/// The shafts of a vehicle file: each inertia is doubled in the text, and the change of the mass matrix is its share.
+pub(crate) fn shafts(vehicle: &Vehicle) -> Result<Vec<Shaft>, FitError> {
+    let names = vehicle_text::shaft_names(&vehicle.source.text)?;
+    let shaft = |(i, name): (usize, String)| {
+        let path = vehicle_text::shaft_inertia(i);
+        let mut text = vehicle_text::VehicleText::new(&vehicle.source.text)?;
+        text.scale(&path, 2.0)?;
+        let heavier = Vehicle::from_source(config::Source { path: vehicle.source.path.clone(), text: text.finish() })?;
+        let mut mass_kg_m2 = heavier.shift.mass_kg_m2;
+        for (row, base) in mass_kg_m2.iter_mut().zip(vehicle.shift.mass_kg_m2) {
+            row.iter_mut().zip(base).for_each(|(cell, base)| *cell -= base);
+        }
+        Ok(Shaft { name, mass_kg_m2 })
+    };
+    names.into_iter().enumerate().map(shaft).collect()
+}
+
+/// The standard deviation of a factor that lies anywhere within this share of 1.
+fn uniform(share: f64) -> f64 {
+    share / 3.0_f64.sqrt()
+}
+
+/// The standard deviation of the logarithm of a factor that lies anywhere between these.
+fn between([least, greatest]: [f64; 2]) -> f64 {
+    ((greatest / least).ln() / 12.0_f64.sqrt()).max(1e-3)
+}
+
+/// The parameters of a fit with their priors, from the error budget of the vehicle file; what it does not have is \[chosen\].
+pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec<Prior> {
+    use Parameter as P;
+    let budget = &vehicle.error_bounds;
+    let delay = |seconds: f64| (seconds / DELAY_UNIT_S).max(0.05);
+    let [least_s, greatest_s] = budget.valve_delay_s;
+    let mut list = vec![
+        (P::Capacity, "converter capacity", 0.0, uniform(budget.turbine_torque_share)),
+        (P::TorqueRatio, "converter torque ratio above 1", 0.0, uniform(0.1)),
+        (P::Friction, "friction of the oncoming clutch", 0.0, between(budget.friction_factor)),
+        (P::FrictionAtRest, "friction near zero slip", 0.0, uniform(0.1)),
+        (P::FrictionSlope, "friction slope, 100 to 300 rad/s", 0.0, uniform(0.1)),
+        (P::Spring, "return spring", 0.0, uniform(0.2)),
+        (P::Gain, "valve gain", 0.0, between(budget.valve_gain_factor)),
+        (P::Lag, "valve lag", 0.0, between(budget.valve_lag_factor)),
+        (P::CommandDelay, "delay of the command", 0.0, delay((greatest_s - least_s) / 12.0_f64.sqrt())),
+    ];
+    let mut names: Vec<String> = list.iter().map(|(_, name, ..)| (*name).to_owned()).collect();
+    for (i, shaft) in shafts.iter().enumerate() {
+        list.push((P::Inertia(i), "", 0.0, uniform(0.2)));
+        names.push(format!("inertia of shaft `{}`", shaft.name));
+    }
+    let mut more = vec![
+        (P::Stiffness, "shaft stiffness", 0.0, between(budget.shaft_stiffness_factor)),
+        (P::Damping, "shaft damping", 0.0, between([0.6, 1.65])),
+        (P::Tyre, "tyre slip", 0.0, uniform(0.25)),
+        (P::Mass, "vehicle mass", 0.0, uniform(budget.mass_kg / vehicle.road.mass_kg)),
+    ];
+    if has.offgoing {
+        more.push((P::OffgoingFriction, "friction of the offgoing clutch", 0.0, between(budget.friction_factor)));
+    }
+    more.push((P::OutputDelay, "delay of the output speed", 0.0, delay(uniform(budget.channel_skew_s))));
+    more.push((P::EngineDelay, "delay of the engine speed", 0.0, delay(uniform(budget.channel_skew_s))));
+    if has.wheel {
+        let middle_s = 0.5 * budget.wheel_delay_s;
+        more.push((P::WheelDelay, "delay of the wheel speed", middle_s / DELAY_UNIT_S, delay(uniform(middle_s))));
+        more.push((P::WheelScale, "wheel speed scale", 0.0, uniform(budget.wheel_scale).max(1e-4)));
+    }
+    if has.engine_torque {
+        more.push((P::EngineInertia, "engine inertia", 0.0, uniform(0.1)));
+        more.push((P::EngineTorqueScale, "engine torque signal, scale", 0.0, uniform(0.05)));
+        more.push((P::EngineTorqueDelay, "engine torque signal, delay", 0.0, delay(uniform(budget.channel_skew_s))));
+    }
+    if has.pressure {
+        more.push((P::PressureScale, "pressure sensor, scale", 0.0, 0.005));
+    }
+    names.extend(more.iter().map(|(_, name, ..)| (*name).to_owned()));
+    list.extend(more);
+    (list.into_iter().zip(names))
+        .map(|((parameter, _, mean, sd), name)| Prior { parameter, name, mean, sd: sd.max(1e-4) })
+        .collect()
+}

@@ -1,0 +1,183 @@
+//! What a fit has found, in words.
+
+use crate::fitted_file::SIDES;
+use crate::parameters::DELAY_UNIT_S;
+use crate::{Channel, Fit, Parameter, Verdict};
+
+/// A row of the table of parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportRow {
+    /// The parameter or combination.
+    pub name: String,
+    /// Its value, `x 1.042` or `+3.1 ms`.
+    pub value: String,
+    /// Its interval of 95 %.
+    pub interval: String,
+    /// Standard deviation after the fit over that before.
+    pub share: String,
+    /// What the logs tell of it.
+    pub verdict: Verdict,
+}
+
+/// Correlations above this are stated.
+const CORRELATED: f64 = 0.8;
+/// A one-step gain of the turbine speed above this says that the model does not fit.
+const MISFIT_GAIN: f64 = 0.6;
+
+impl Fit {
+    /// The table: combinations first, then each parameter.
+    pub fn report(&self) -> Vec<ReportRow> {
+        use Parameter as P;
+        let combinations = [
+            ("friction x valve gain", vec![(P::Friction, 1.0), (P::Gain, 1.0)]),
+            ("the same / converter capacity", vec![(P::Friction, 1.0), (P::Gain, 1.0), (P::Capacity, -1.0)]),
+            ("spring / valve gain: command at the kiss point", vec![(P::Spring, 1.0), (P::Gain, -1.0)]),
+        ];
+        let combination = |(name, powers): (&str, Vec<(Parameter, f64)>)| {
+            let value = powers.iter().map(|(p, power)| power * self.unknown(*p)).sum::<f64>();
+            let [before, after] = self.combination_sd(&powers);
+            row(name, value, after, before, Verdict::of(after, before), Kind::Factor)
+        };
+        let single = |(i, prior): (usize, &crate::Prior)| {
+            let sd = self.precision.stated[(i, i)].sqrt();
+            let kind = match prior.parameter {
+                p if p.is_delay() => Kind::Delay,
+                p if p.is_shape() => Kind::Share,
+                _ => Kind::Factor,
+            };
+            row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), kind)
+        };
+        let mut rows: Vec<ReportRow> = combinations.into_iter().map(combination).collect();
+        rows.extend(self.priors.iter().enumerate().map(single));
+        rows
+    }
+
+    fn unknown(&self, parameter: Parameter) -> f64 {
+        self.place(parameter).map_or(0.0, |i| self.unknowns[i])
+    }
+
+    /// What is to be said besides the table: torque scale, correlations, misfit, delays of the channels, and which drive
+    /// would tell more.
+    pub fn statements(&self) -> Vec<String> {
+        let scale = 100.0 * SIDES * self.torque_scale_sd();
+        let anchor = if self.available.engine_torque { "the engine torque signal and the" } else { "the" };
+        let mut lines = vec![format!(
+            "torque scale: {}, +- {scale:.1} %. Speeds fix the ratios of all torques and not their common factor; it comes from \
+             {anchor} ranges of mass, inertias, stiffness and converter in the vehicle file",
+            self.torque_scale_verdict().name()
+        )];
+        lines.extend(self.correlations());
+        lines.extend(self.misfits());
+        if self.shifts == 1 {
+            lines.push(
+                "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),
+            );
+        }
+        lines.extend(self.channel_map());
+        lines.extend(self.proposals());
+        lines
+    }
+
+    fn correlations(&self) -> Option<String> {
+        let covariance = &self.precision.stated;
+        let of = |i: usize, j: usize| covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        let count = self.priors.len();
+        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+        let mut strong: Vec<(usize, usize, f64)> =
+            pairs.map(|(i, j)| (i, j, of(i, j))).filter(|(.., c)| c.abs() > CORRELATED).collect();
+        strong.sort_by(|one, other| other.2.abs().total_cmp(&one.2.abs()));
+        let words =
+            strong.iter().map(|(i, j, c)| format!("{} and {} {c:+.2}", self.priors[*i].name, self.priors[*j].name));
+        let words: Vec<String> = words.collect();
+        (!words.is_empty()).then(|| format!("correlated: {}", words.join("; ")))
+    }
+
+    fn misfits(&self) -> Vec<String> {
+        let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
+        let warn = |_: &(Channel, f64, f64)| {
+            "warning: the model does not follow the turbine speed: its errors last. The maps of converter, friction or valve have \
+             another shape than in the vehicle file, which the fit does not change; the intervals are too small"
+                .to_owned()
+        };
+        self.channels.iter().filter(|channel| wrong(channel)).map(warn).collect()
+    }
+
+    /// Delays and scale of channels, which belong into a channel map.
+    fn channel_map(&self) -> Vec<String> {
+        let of = |parameter: Parameter, role: &str| {
+            let value = self.value(parameter)?;
+            let sd = DELAY_UNIT_S * self.sd(parameter)?;
+            (value.abs() > SIDES * sd).then(|| {
+                format!(
+                    "{role} is {:+.1} ms against the turbine speed: `delay_s` of its channel in the channel map",
+                    1e3 * value
+                )
+            })
+        };
+        let scale = self.value(Parameter::WheelScale).filter(|scale| (scale - 1.0).abs() > 1e-3);
+        [
+            of(Parameter::OutputDelay, "output_speed"),
+            of(Parameter::EngineDelay, "engine_speed"),
+            of(Parameter::WheelDelay, "wheel_speed"),
+            scale.map(|scale| {
+                format!("wheel_speed reads x {scale:.4}: `scale = {:.4}` in the channel map", scale.recip())
+            }),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// Which measurement or drive would tell what these logs do not.
+    fn proposals(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let mut when = |asked: bool, line: &str| {
+            if asked {
+                lines.push(format!("to know more: {line}"));
+            }
+        };
+        when(
+            !self.available.engine_torque,
+            "for the torque scale, weigh the car and narrow `design.error_bounds.mass_kg`, or log an engine torque signal",
+        );
+        when(
+            !self.available.pressure,
+            "for valve gain, spring and friction singly, measure the pressure of the oncoming clutch in one shift; one tells what ten tell",
+        );
+        when(!self.available.wheel, "for shafts, tyres and mass, log the speed of the driven wheels");
+        when(
+            self.verdict(Parameter::TorqueRatio) != Verdict::Measured,
+            "for the torque ratio of the converter, shift early, at low speed, where the engine turns much faster than the turbine",
+        );
+        when(
+            self.verdict(Parameter::Lag) == Verdict::NotTold && self.available.pressure,
+            "for the lag of the valve, shifts with a longer inertia phase",
+        );
+        when(
+            self.shifts < 15,
+            "20 upshifts: 6 at light throttle (0.15), 6 early ones from low speed, 4 at medium throttle, 4 with a tip-in at the shift",
+        );
+        lines
+    }
+}
+
+enum Kind {
+    Factor,
+    Delay,
+    Share,
+}
+
+fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {
+    let half = SIDES * sd;
+    let (value, interval) = match kind {
+        Kind::Factor => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
+        Kind::Delay => {
+            let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
+            (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))
+        }
+        Kind::Share => {
+            (format!("{:+.1} %", 100.0 * x), format!("{:+.1} to {:+.1} %", 100.0 * (x - half), 100.0 * (x + half)))
+        }
+    };
+    ReportRow { name: name.to_owned(), value, interval, share: format!("{:.2}", sd / before), verdict }
+}

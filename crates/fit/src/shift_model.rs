@@ -1,0 +1,391 @@
+//! A shift as the fit sees it: its readings against the motion of a car, and their derivatives.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::car::Car;
+use crate::motion::{Circumstances, Inputs, Motion, Part, STEP_S, State};
+use crate::parameters::{Prior, Shaft};
+use crate::pressure::{Grid, pressures};
+use crate::record::{Segment, SegmentKind, ShiftRecord, age_s};
+use crate::{Parameter, Series};
+
+/// Steps of the differences for derivatives, in the unit of the unknown.
+const DIFFERENCE: f64 = 1e-3;
+/// Readings at the beginning of a segment may be of the time before it, s: those of the shafts, and those of the wheels.
+const FIRST_READING_S: f64 = 0.005;
+const FIRST_WHEEL_READING_S: f64 = 0.025;
+
+/// A signal that is compared with the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channel {
+    /// Turbine speed.
+    Turbine,
+    /// Output speed.
+    Output,
+    /// Wheel speed.
+    Wheel,
+    /// Engine speed, where the engine torque is known.
+    Engine,
+    /// Pressure of the oncoming clutch.
+    Pressure,
+}
+
+impl Channel {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Turbine, Self::Output, Self::Wheel, Self::Engine, Self::Pressure];
+
+    /// A name for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Turbine => "turbine speed",
+            Self::Output => "output speed",
+            Self::Wheel => "wheel speed",
+            Self::Engine => "engine speed",
+            Self::Pressure => "pressure",
+        }
+    }
+}
+
+/// Readings of a channel in sequence, as a part of the rows of a shift.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Block {
+    pub(crate) channel: Channel,
+    /// None for a pressure, which does not depend on the motion.
+    segment: Option<usize>,
+    pub(crate) rows: std::ops::Range<usize>,
+    readings: Vec<(f64, f64)>,
+}
+
+/// An unknown of one shift: what it starts from, the standard deviation around it, and its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OwnUnknown {
+    pub(crate) mean: f64,
+    pub(crate) sd: f64,
+    /// The segment whose start it is; none if it counts in all.
+    segment: Option<usize>,
+}
+
+/// Standard deviations \[chosen\] of what differs from shift to shift.
+const MASS_SHARE_SD: f64 = 0.035;
+const LOAD_UNIT_N: f64 = 500.0;
+const ENGINE_TORQUE_SHARE_SD: f64 = 0.01;
+/// The start of a segment is not known before: these are wide.
+const SPEED_SD_RAD_S: f64 = 20.0;
+const TWIST_UNIT_RAD: f64 = 0.01;
+const TWIST_SD: f64 = 10.0;
+const VEHICLE_UNIT_M_S: f64 = 0.1;
+const VEHICLE_SD: f64 = 20.0;
+
+/// A shift with its layout of rows and unknowns.
+#[derive(Debug, Clone)]
+pub(crate) struct ShiftModel {
+    pub(crate) record: ShiftRecord,
+    half_steps: Grid,
+    parts: Vec<Part>,
+    pub(crate) blocks: Vec<Block>,
+    pub(crate) rows: usize,
+    pub(crate) own: Vec<OwnUnknown>,
+    has_engine_torque: bool,
+    offgoing_pa: Vec<f64>,
+}
+
+/// Residuals and their derivatives by the parameters and by the shift's own unknowns.
+#[derive(Debug, Clone)]
+pub(crate) struct Linearised {
+    pub(crate) residuals: DVector<f64>,
+    pub(crate) by_parameter: DMatrix<f64>,
+    pub(crate) by_own: DMatrix<f64>,
+}
+
+impl ShiftModel {
+    /// Lays out a shift that is seen from the car of the file.
+    pub(crate) fn new(record: ShiftRecord, car: &Car) -> Self {
+        let segments = record.segments.clone();
+        let begin_s = segments.iter().map(|segment| segment.span_s[0]).fold(f64::INFINITY, f64::min);
+        let end_s = segments.iter().map(|segment| segment.span_s[1]).fold(f64::NEG_INFINITY, f64::max);
+        let steps = |span_s: f64| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
+            let steps = (span_s / STEP_S).round().max(0.0) as usize;
+            steps
+        };
+        let part = |segment: &Segment| {
+            let before = steps(segment.span_s[0] - begin_s);
+            Part {
+                begin_s: begin_s + STEP_S * before as f64,
+                first: 2 * before,
+                steps: steps(segment.span_s[1] - segment.span_s[0]).max(1),
+            }
+        };
+        let parts: Vec<Part> = segments.iter().map(part).collect();
+        let points = 1 + 2 * steps(end_s - begin_s).max(1) + 4;
+        let half_steps = Grid { begin_s, step_s: 0.5 * STEP_S, points };
+        let offgoing_pa = if record.offgoing.is_empty() {
+            Vec::new()
+        } else {
+            pressures(&car.offgoing_valve, car.offgoing_hysteresis_pa, 0.0, &record.offgoing, half_steps)
+        };
+        let has_engine_torque = !record.engine_torque.is_empty();
+        let mut model = Self {
+            half_steps,
+            parts,
+            blocks: Vec::new(),
+            rows: 0,
+            own: Vec::new(),
+            has_engine_torque,
+            offgoing_pa,
+            record,
+        };
+        model.lay_out_rows(&segments);
+        model.lay_out_unknowns(&segments, car);
+        model
+    }
+
+    fn lay_out_rows(&mut self, segments: &[Segment]) {
+        let mut blocks = Vec::new();
+        for (i, segment) in segments.iter().enumerate() {
+            let [from_s, to_s] = segment.span_s;
+            let mut block = |channel, series: &Series, after_s: f64| {
+                let readings = series.between([from_s + after_s, to_s]).collect();
+                blocks.push(Block { channel, segment: Some(i), rows: 0..0, readings });
+            };
+            block(Channel::Turbine, &self.record.turbine, FIRST_READING_S);
+            block(Channel::Output, &self.record.output, FIRST_READING_S);
+            block(Channel::Wheel, &self.record.wheel, FIRST_WHEEL_READING_S);
+            if self.has_engine_torque {
+                block(Channel::Engine, &self.record.engine, FIRST_READING_S);
+            }
+        }
+        let until_s = self.half_steps.time_s(self.half_steps.points - 1);
+        let readings = self.record.pressure.between([self.half_steps.begin_s, until_s]).collect();
+        blocks.push(Block { channel: Channel::Pressure, segment: None, rows: 0..0, readings });
+        blocks.retain(|block| !block.readings.is_empty());
+        for block in &mut blocks {
+            block.rows = self.rows..self.rows + block.readings.len();
+            self.rows = block.rows.end;
+        }
+        self.blocks = blocks;
+    }
+
+    fn lay_out_unknowns(&mut self, segments: &[Segment], car: &Car) {
+        let mut own = vec![
+            OwnUnknown { mean: 0.0, sd: MASS_SHARE_SD, segment: None },
+            OwnUnknown { mean: 0.0, sd: 1.0, segment: None },
+        ];
+        if self.has_engine_torque {
+            own.push(OwnUnknown { mean: 0.0, sd: ENGINE_TORQUE_SHARE_SD, segment: None });
+        }
+        for (i, segment) in segments.iter().enumerate() {
+            let begin_s = self.parts[i].begin_s;
+            let record = &self.record;
+            let (engine, turbine, output) =
+                (start(&record.engine, begin_s), start(&record.turbine, begin_s), start(&record.output, begin_s));
+            let ratio = match segment.kind {
+                SegmentKind::Locked => car.shift.ratio_oncoming(),
+                _ => car.shift.ratio_offgoing(),
+            };
+            let shaft_n_m = car.converter.torques(engine, turbine).turbine_n_m * ratio * car.driveline.final_ratio;
+            let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad;
+            let vehicle_m_s = output / car.driveline.final_ratio * car.road.wheel_radius_m;
+            let mut push = |mean, sd| own.push(OwnUnknown { mean, sd, segment: Some(i) });
+            push(turbine, SPEED_SD_RAD_S);
+            if segment.kind == SegmentKind::Slipping {
+                push(output, SPEED_SD_RAD_S);
+            }
+            push(twist_rad / TWIST_UNIT_RAD, TWIST_SD);
+            push(vehicle_m_s / VEHICLE_UNIT_M_S, VEHICLE_SD);
+            if self.has_engine_torque {
+                push(engine, SPEED_SD_RAD_S);
+            }
+        }
+        self.own = own;
+    }
+
+    /// Where the own unknowns start.
+    pub(crate) fn start(&self) -> Vec<f64> {
+        self.own.iter().map(|unknown| unknown.mean).collect()
+    }
+
+    /// The readings that drive the motion of a car.
+    pub(crate) fn inputs(&self, car: &Car) -> Inputs {
+        Inputs {
+            engine_rad_s: self.engine(car),
+            oncoming_pa: self.oncoming(car),
+            offgoing_pa: self.offgoing_pa.clone(),
+            engine_n_m: self.engine_torque(car),
+        }
+    }
+
+    pub(crate) fn oncoming(&self, car: &Car) -> Vec<f64> {
+        pressures(&car.valve, car.hysteresis_pa, car.command_delay_s, &self.record.oncoming, self.half_steps)
+    }
+
+    fn engine(&self, car: &Car) -> Vec<f64> {
+        let late = |speed: f64| car.engine_delay_s + age_s(car.ages.engine_rad, speed);
+        (0..self.half_steps.points)
+            .map(|i| {
+                let time_s = self.half_steps.time_s(i);
+                let near = self.record.engine.at(time_s);
+                self.record.engine.at(time_s + late(near))
+            })
+            .collect()
+    }
+
+    fn engine_torque(&self, car: &Car) -> Vec<f64> {
+        if !self.has_engine_torque {
+            return Vec::new();
+        }
+        let late_s = car.engine_torque_delay_s;
+        (0..self.half_steps.points).map(|i| self.record.engine_torque.at(self.half_steps.time_s(i) + late_s)).collect()
+    }
+
+    /// Readings less what the model says.
+    pub(crate) fn residuals(&self, car: &Car, inputs: &Inputs, own: &[f64]) -> DVector<f64> {
+        self.compared(car, inputs, &self.motions(car, inputs, own))
+    }
+
+    /// The motion in each segment.
+    fn motions(&self, car: &Car, inputs: &Inputs, own: &[f64]) -> Vec<Motion> {
+        (0..self.parts.len()).map(|i| self.motion(i, car, inputs, own)).collect()
+    }
+
+    fn motion(&self, i: usize, car: &Car, inputs: &Inputs, own: &[f64]) -> Motion {
+        let kind = self.record.segments[i].kind;
+        let (of, start) = self.circumstances(i, kind, car, own);
+        Motion::run(car, kind, &of, inputs, self.parts[i], start)
+    }
+
+    /// Readings less what these motions say.
+    fn compared(&self, car: &Car, inputs: &Inputs, motions: &[Motion]) -> DVector<f64> {
+        let mut rows = DVector::zeros(self.rows);
+        for (i, motion) in motions.iter().enumerate() {
+            self.segment(i, car, motion, &mut rows);
+        }
+        self.pressure(car, inputs, &mut rows);
+        rows
+    }
+
+    /// The rows of one segment.
+    fn segment(&self, i: usize, car: &Car, motion: &Motion, rows: &mut DVector<f64>) {
+        let ages = car.ages;
+        for block in self.blocks.iter().filter(|block| block.segment == Some(i)) {
+            for (row, (time_s, reading)) in block.rows.clone().zip(&block.readings) {
+                let seen = |delay_s: f64, age_rad: f64| time_s - delay_s - age_s(age_rad, *reading);
+                rows[row] = reading
+                    - match block.channel {
+                        Channel::Turbine => motion.turbine_at(seen(0.0, ages.turbine_rad)),
+                        Channel::Output => motion.output_at(seen(car.output_delay_s, ages.output_rad)),
+                        Channel::Wheel => car.wheel_scale * motion.wheel_at(seen(car.wheel_delay_s, ages.wheel_rad)),
+                        Channel::Engine | Channel::Pressure => {
+                            motion.engine_at(seen(car.engine_delay_s, ages.engine_rad))
+                        }
+                    };
+            }
+        }
+    }
+
+    fn pressure(&self, car: &Car, inputs: &Inputs, rows: &mut DVector<f64>) {
+        for block in self.blocks.iter().filter(|block| block.segment.is_none()) {
+            for (row, (time_s, reading)) in block.rows.clone().zip(&block.readings) {
+                rows[row] = reading - car.pressure_scale * self.on_grid(&inputs.oncoming_pa, *time_s);
+            }
+        }
+    }
+
+    /// A value between the half steps.
+    pub(crate) fn on_grid(&self, values: &[f64], time_s: f64) -> f64 {
+        let steps = ((time_s - self.half_steps.begin_s) / self.half_steps.step_s).max(0.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the points")]
+        let i = (steps as usize).min(values.len().saturating_sub(2));
+        let share = (steps - i as f64).min(1.0);
+        values[i] + share * (values[i + 1] - values[i])
+    }
+
+    /// What the own unknowns say of a segment.
+    fn circumstances(&self, segment: usize, kind: SegmentKind, car: &Car, own: &[f64]) -> (Circumstances, State) {
+        let mut of = Circumstances { mass_share: own[0], load_n: LOAD_UNIT_N * own[1], engine_torque_share: 0.0 };
+        if self.has_engine_torque {
+            of.engine_torque_share = own[2];
+        }
+        let mut starts =
+            self.own.iter().zip(own).filter(|(unknown, _)| unknown.segment == Some(segment)).map(|(_, value)| *value);
+        let mut next = || starts.next().unwrap_or(0.0);
+        let turbine_rad_s = next();
+        let output_rad_s = match kind {
+            SegmentKind::Held => turbine_rad_s / car.shift.ratio_offgoing(),
+            SegmentKind::Locked => turbine_rad_s / car.shift.ratio_oncoming(),
+            SegmentKind::Slipping => next(),
+        };
+        let (twist_rad, vehicle_m_s) = (TWIST_UNIT_RAD * next(), VEHICLE_UNIT_M_S * next());
+        let engine_rad_s = if self.has_engine_torque { next() } else { 0.0 };
+        (of, State { turbine_rad_s, output_rad_s, twist_rad, vehicle_m_s, engine_rad_s })
+    }
+
+    /// Residuals and their derivatives, by forward differences.
+    pub(crate) fn linearised(
+        &self,
+        file: &Car,
+        shafts: &[Shaft],
+        priors: &[Prior],
+        unknowns: &[f64],
+        own: &[f64],
+    ) -> Linearised {
+        let car = file.with(shafts, priors, unknowns);
+        let inputs = self.inputs(&car);
+        let motions = self.motions(&car, &inputs, own);
+        let residuals = self.compared(&car, &inputs, &motions);
+        let mut by_parameter = DMatrix::zeros(self.rows, priors.len());
+        let mut moved = unknowns.to_vec();
+        for (j, prior) in priors.iter().enumerate() {
+            moved[j] += DIFFERENCE;
+            let other = file.with(shafts, priors, &moved);
+            moved[j] = unknowns[j];
+            let mut changed = None;
+            match prior.parameter {
+                Parameter::Gain | Parameter::Lag | Parameter::CommandDelay => {
+                    changed.get_or_insert_with(|| inputs.clone()).oncoming_pa = self.oncoming(&other);
+                }
+                Parameter::EngineDelay => {
+                    changed.get_or_insert_with(|| inputs.clone()).engine_rad_s = self.engine(&other);
+                }
+                Parameter::EngineTorqueDelay => {
+                    changed.get_or_insert_with(|| inputs.clone()).engine_n_m = self.engine_torque(&other);
+                }
+                _ => {}
+            }
+            let rows = if prior.parameter.leaves_motion() {
+                self.compared(&other, &inputs, &motions)
+            } else {
+                self.residuals(&other, changed.as_ref().unwrap_or(&inputs), own)
+            };
+            by_parameter.set_column(j, &((rows - &residuals) / DIFFERENCE));
+        }
+        let by_own = self.by_own(&car, &inputs, own, &residuals);
+        Linearised { residuals, by_parameter, by_own }
+    }
+
+    /// Derivatives by the own unknowns.
+    fn by_own(&self, car: &Car, inputs: &Inputs, own: &[f64], residuals: &DVector<f64>) -> DMatrix<f64> {
+        let mut by_own = DMatrix::zeros(self.rows, self.own.len());
+        let mut moved = own.to_vec();
+        for (j, unknown) in self.own.iter().enumerate() {
+            moved[j] += DIFFERENCE;
+            let mut rows = residuals.clone();
+            match unknown.segment {
+                Some(i) => self.segment(i, car, &self.motion(i, car, inputs, &moved), &mut rows),
+                None => rows = self.residuals(car, inputs, &moved),
+            }
+            moved[j] = own[j];
+            by_own.set_column(j, &((rows - residuals) / DIFFERENCE));
+        }
+        by_own
+    }
+}
+
+/// The value of a noisy series at a time: the middle of the readings around it.
+fn start(series: &Series, time_s: f64) -> f64 {
+    const AROUND_S: f64 = 0.02;
+    let (count, sum) = series
+        .between([time_s - AROUND_S, time_s + AROUND_S])
+        .fold((0.0, 0.0), |(count, sum), (_, value)| (count + 1.0, sum + value));
+    if count > 0.0 { sum / count } else { series.at(time_s) }
+}

@@ -1,0 +1,202 @@
+//! Gauss-Newton with Levenberg's damping over many shifts.
+//!
+//! Each shift has unknowns of its own (load, start of each segment). They are eliminated by their Schur complement, so the
+//! cost grows linearly with the shifts, and the step has only as many unknowns as there are parameters. A general solver would factor
+//! one matrix of all shifts' rows and unknowns, and would not know of scales that change between steps.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::car::Car;
+use crate::parameters::{Prior, Shaft};
+use crate::shift_model::{Linearised, ShiftModel};
+use crate::weights::{HUBER, Weights};
+use crate::{Channel, FitError};
+
+/// A step that changes no unknown by more than this share of its standard deviation ends the fit.
+const CONVERGED: f64 = 0.02;
+/// Dampings tried in one iteration.
+const TRIES: u32 = 8;
+
+/// What does not change during a fit.
+pub(crate) struct Problem<'a> {
+    pub(crate) file: &'a Car,
+    pub(crate) shafts: &'a [Shaft],
+    pub(crate) priors: &'a [Prior],
+}
+
+/// The unknowns of a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Unknowns {
+    pub(crate) shared: Vec<f64>,
+    /// Of each shift.
+    pub(crate) own: Vec<Vec<f64>>,
+}
+
+/// Normal equations of the parameters with the shifts' own unknowns eliminated.
+pub(crate) struct Normal {
+    /// Information of the data, without the priors.
+    pub(crate) information: DMatrix<f64>,
+    /// Half the gradient of the data by the parameters, of each shift.
+    pub(crate) scores: Vec<DVector<f64>>,
+    eliminated: Vec<Eliminated>,
+}
+
+/// What is needed to find the own unknowns of a shift when the parameters are known.
+struct Eliminated {
+    own: Cholesky<f64, Dyn>,
+    gradient: DVector<f64>,
+    mixed: DMatrix<f64>,
+}
+
+impl Problem<'_> {
+    /// Residuals of each shift.
+    pub(crate) fn residuals(&self, shifts: &[ShiftModel], at: &Unknowns) -> Vec<DVector<f64>> {
+        let car = self.file.with(self.shafts, self.priors, &at.shared);
+        (shifts.iter().zip(&at.own)).map(|(shift, own)| shift.residuals(&car, &shift.inputs(&car), own)).collect()
+    }
+
+    /// Half the robust sum of squares, priors included.
+    fn cost(&self, shifts: &[ShiftModel], at: &Unknowns, residuals: &[DVector<f64>], weights: &Weights) -> f64 {
+        let prior: f64 = (self.priors.iter().zip(&at.shared)).map(|(p, x)| ((x - p.mean) / p.sd).powi(2)).sum();
+        let data = shifts.iter().zip(residuals).zip(&at.own).map(|((shift, rows), own)| {
+            let mut errors = rows.clone();
+            weights.errors(&shift.blocks, errors.as_mut_slice());
+            let huber = |e: f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
+            let own: f64 = shift.own.iter().zip(own).map(|(u, x)| ((x - u.mean) / u.sd).powi(2)).sum();
+            own + errors.iter().map(|e| huber(*e)).sum::<f64>()
+        });
+        0.5 * (prior + data.sum::<f64>())
+    }
+
+    pub(crate) fn linearised(&self, shifts: &[ShiftModel], at: &Unknowns) -> Vec<Linearised> {
+        let linearised = |(shift, own): (&ShiftModel, &Vec<f64>)| {
+            shift.linearised(self.file, self.shafts, self.priors, &at.shared, own)
+        };
+        shifts.iter().zip(&at.own).map(linearised).collect()
+    }
+
+    /// The normal equations; the information of each channel is divided by its inflation.
+    pub(crate) fn normal(
+        &self,
+        shifts: &[ShiftModel],
+        lines: &[Linearised],
+        at: &Unknowns,
+        weights: &Weights,
+        inflation: &[f64; Channel::ALL.len()],
+        damping: f64,
+    ) -> Result<Normal, FitError> {
+        let count = self.priors.len();
+        let mut normal =
+            Normal { information: DMatrix::zeros(count, count), scores: Vec::new(), eliminated: Vec::new() };
+        for ((shift, lines), own) in shifts.iter().zip(lines).zip(&at.own) {
+            let mut all = DMatrix::zeros(shift.rows, count + own.len());
+            all.columns_mut(0, count).copy_from(&lines.by_parameter);
+            all.columns_mut(count, own.len()).copy_from(&lines.by_own);
+            let mut errors = lines.residuals.clone();
+            weights.errors(&shift.blocks, errors.as_mut_slice());
+            for mut column in all.column_iter_mut() {
+                weights.errors(&shift.blocks, column.as_mut_slice());
+            }
+            for block in &shift.blocks {
+                for row in block.rows.clone() {
+                    let robust = (HUBER / errors[row].abs()).min(1.0);
+                    let root = (robust / inflation[block.channel as usize]).sqrt();
+                    errors[row] *= root;
+                    all.row_mut(row).iter_mut().for_each(|cell| *cell *= root);
+                }
+            }
+            let squares = all.tr_mul(&all);
+            let gradient = all.tr_mul(&errors);
+            let own_count = own.len();
+            let mut own_square = squares.view((count, count), (own_count, own_count)).into_owned();
+            let mut own_gradient = gradient.rows(count, own_count).into_owned();
+            for (j, (unknown, x)) in shift.own.iter().zip(own).enumerate() {
+                let precision = unknown.sd.powi(-2);
+                own_square[(j, j)] = (own_square[(j, j)] + precision) * (1.0 + damping);
+                own_gradient[j] += precision * (x - unknown.mean);
+            }
+            let cholesky = own_square.cholesky().ok_or_else(|| not_finite(&shift.record.name))?;
+            let mixed = squares.view((count, 0), (own_count, count)).into_owned();
+            let shared = squares.view((0, 0), (count, count));
+            normal.information += shared - mixed.tr_mul(&cholesky.solve(&mixed));
+            normal.scores.push(gradient.rows(0, count) - mixed.tr_mul(&cholesky.solve(&own_gradient)));
+            normal.eliminated.push(Eliminated { own: cholesky, gradient: own_gradient, mixed });
+        }
+        Ok(normal)
+    }
+
+    /// Goes on from unknowns until a step is small. The scales follow the residuals in the first `scaled` iterations.
+    pub(crate) fn solve(
+        &self,
+        shifts: &[ShiftModel],
+        mut at: Unknowns,
+        mut weights: Weights,
+        (scaled, most): (u32, u32),
+        progress: &mut dyn FnMut(u32),
+    ) -> Result<(Unknowns, Weights), FitError> {
+        let mut damping = 1e-3;
+        let mut residuals = self.residuals(shifts, &at);
+        for iteration in 0..most {
+            progress(iteration);
+            // The first residuals are those of the file, whose scale says nothing of the readings.
+            if (1..=scaled).contains(&iteration) {
+                weights = weights.following(shifts, &residuals);
+            }
+            let lines = self.linearised(shifts, &at);
+            let cost = self.cost(shifts, &at, &residuals, &weights);
+            if !cost.is_finite() {
+                return Err(not_finite("the shifts"));
+            }
+            let mut largest = f64::INFINITY;
+            for _ in 0..TRIES {
+                let normal = self.normal(shifts, &lines, &at, &weights, &NO_INFLATION, damping)?;
+                let (next, size) = self.step(&at, &normal, damping)?;
+                let next_residuals = self.residuals(shifts, &next);
+                if self.cost(shifts, &next, &next_residuals, &weights) <= cost {
+                    (at, residuals, largest) = (next, next_residuals, size);
+                    damping = (damping / 10.0).max(1e-8);
+                    break;
+                }
+                damping = (damping * 8.0).max(1e-6);
+                // Nothing smaller can be found.
+                largest = size.min(CONVERGED);
+            }
+            if largest < CONVERGED && iteration > scaled {
+                break;
+            }
+        }
+        Ok((at, weights))
+    }
+
+    /// The unknowns after a step, and its largest size in standard deviations after the fit.
+    fn step(&self, at: &Unknowns, normal: &Normal, damping: f64) -> Result<(Unknowns, f64), FitError> {
+        let mut matrix = normal.information.clone();
+        let mut gradient: DVector<f64> = normal.scores.iter().sum();
+        for (j, (prior, x)) in self.priors.iter().zip(&at.shared).enumerate() {
+            let precision = prior.sd.powi(-2);
+            matrix[(j, j)] = (matrix[(j, j)] + precision) * (1.0 + damping);
+            gradient[j] += precision * (x - prior.mean);
+        }
+        let cholesky = matrix.cholesky().ok_or_else(|| not_finite("the parameters"))?;
+        let step = -cholesky.solve(&gradient);
+        let inverse = cholesky.inverse();
+        let size = (0..step.len()).map(|j| step[j].abs() / inverse[(j, j)].sqrt()).fold(0.0, f64::max);
+        let shared = at.shared.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect();
+        let own = (at.own.iter().zip(&normal.eliminated))
+            .map(|(own, eliminated)| {
+                let step = -eliminated.own.solve(&(&eliminated.gradient + &eliminated.mixed * &step));
+                own.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect()
+            })
+            .collect();
+        Ok((Unknowns { shared, own }, size))
+    }
+}
+
+/// No channel counts less than its scale says.
+pub(crate) const NO_INFLATION: [f64; Channel::ALL.len()] = [1.0; Channel::ALL.len()];
+
+fn not_finite(what: &str) -> FitError {
+    FitError::Work(format!(
+        "the fit left the range in which the model of {what} can be computed\nhint: check units and signs of the channels with `wetclutch inspect`"
+    ))
+}

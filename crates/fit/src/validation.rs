@@ -1,0 +1,96 @@
+//! Shifts that were not fitted, with the given and with the fitted vehicle.
+
+use config::Vehicle;
+
+use crate::car::Car;
+use crate::parameters::{self, Prior};
+use crate::shift_model::ShiftModel;
+use crate::solver::{Problem, Unknowns};
+use crate::{Channel, Fit, FitError, ReadingAges, ShiftRecord, open_loop};
+
+/// Errors over shifts that were held out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldOut {
+    /// How many.
+    pub shifts: usize,
+    /// RMS of the one-step errors of the turbine speed, rad/s, with the given file and with the fitted one. Loads and starts are found
+    /// anew with either; the delays of the channels are those of the fit.
+    pub turbine_rad_s: [f64; 2],
+    /// RMS error of the open loop's pressure where it was measured, Pa.
+    pub pressure_pa: Option<[f64; 2]>,
+}
+
+impl Fit {
+    /// Compares both vehicles on shifts that were not fitted; none if there are none.
+    ///
+    /// # Errors
+    /// A shift cannot be computed with either vehicle.
+    pub fn validate(
+        &self,
+        given: &Vehicle,
+        fitted: &Vehicle,
+        held_out: &[ShiftRecord],
+        ages: ReadingAges,
+    ) -> Result<Option<HeldOut>, FitError> {
+        if held_out.is_empty() {
+            return Ok(None);
+        }
+        // The car is what it is in its file; what is of the signals is that of the fit.
+        let of_file =
+            |i: usize| if self.priors[i].parameter.is_of_signals() { self.unknowns[i] } else { self.priors[i].mean };
+        let unfitted: Vec<f64> = (0..self.priors.len()).map(of_file).collect();
+        let turbine_rad_s = [
+            self.turbine_error(given, &unfitted, held_out, ages)?,
+            self.turbine_error(given, &self.unknowns, held_out, ages)?,
+        ];
+        let pressure = |vehicle: &Vehicle| {
+            let errors = held_out.iter().flat_map(|record| {
+                let [from_s, to_s] = [record.pressure.time_s.first(), record.pressure.time_s.last()]
+                    .map(|time_s| time_s.copied().unwrap_or(f64::NAN));
+                let points = open_loop(vehicle, record).into_iter();
+                let measured = points.filter(move |point| (from_s..=to_s).contains(&point.time_s));
+                measured.map(|point| point.pressure_pa - record.pressure.at(point.time_s))
+            });
+            rms(errors)
+        };
+        let pressure_pa = pressure(given).zip(pressure(fitted)).map(|(given, fitted)| [given, fitted]);
+        let turbine_rad_s = turbine_rad_s.map(|error| error.unwrap_or(f64::NAN));
+        Ok(Some(HeldOut { shifts: held_out.len(), turbine_rad_s, pressure_pa }))
+    }
+
+    /// RMS of the one-step errors of the turbine speed with these parameters.
+    fn turbine_error(
+        &self,
+        vehicle: &Vehicle,
+        unknowns: &[f64],
+        held_out: &[ShiftRecord],
+        ages: ReadingAges,
+    ) -> Result<Option<f64>, FitError> {
+        /// A parameter that is held.
+        const HELD_SD: f64 = 1e-7;
+        let file = Car::of_file(vehicle, ages);
+        let shafts = parameters::shafts(vehicle)?;
+        let held = |(prior, x): (&Prior, &f64)| Prior { mean: *x, sd: HELD_SD, ..prior.clone() };
+        let priors: Vec<Prior> = self.priors.iter().zip(unknowns).map(held).collect();
+        let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
+        let models: Vec<ShiftModel> = held_out.iter().map(|record| ShiftModel::new(record.clone(), &file)).collect();
+        let start = Unknowns { shared: unknowns.to_vec(), own: models.iter().map(ShiftModel::start).collect() };
+        let (at, _) = problem.solve(&models, start, self.weights, (0, 6), &mut |_| {})?;
+        let residuals = problem.residuals(&models, &at);
+        let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {
+            self.weights.errors(&model.blocks, rows.as_mut_slice());
+            let turbine = model.blocks.iter().filter(|block| block.channel == Channel::Turbine);
+            let scale = self.weights.scale[Channel::Turbine as usize];
+            turbine
+                .flat_map(|block| rows.as_slice()[block.rows.clone()].to_vec())
+                .map(move |e| e * scale)
+                .collect::<Vec<_>>()
+        });
+        Ok(rms(errors))
+    }
+}
+
+fn rms(errors: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = errors.fold((0.0, 0.0), |(count, sum), error| (count + 1.0, sum + error * error));
+    (count > 0.0).then(|| (sum / count).sqrt())
+}

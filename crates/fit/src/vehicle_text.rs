@@ -1,0 +1,201 @@
+//! Changes of values in the text of a vehicle file; everything else stays as it is.
+
+use toml::de::{DeTable, DeValue};
+
+use crate::FitError;
+
+/// How the comment of a fitted value begins.
+pub(crate) const FITTED: &str = "# fit: ";
+
+/// A step of the way to a value.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Step {
+    Key(String),
+    Item(usize),
+}
+
+/// The way to a value by keys.
+pub(crate) fn keys(keys: &[&str]) -> Vec<Step> {
+    keys.iter().map(|key| Step::Key((*key).to_owned())).collect()
+}
+
+/// The inertia of a shaft by its place.
+pub(crate) fn shaft_inertia(shaft: usize) -> Vec<Step> {
+    let mut path = keys(&["gear_train", "shaft"]);
+    path.extend([Step::Item(shaft), Step::Key("inertia_kg_m2".to_owned())]);
+    path
+}
+
+/// The text of a vehicle file on its way to another.
+pub(crate) struct VehicleText {
+    text: String,
+    /// Replacements and insertions by their places in the text.
+    edits: Vec<(std::ops::Range<usize>, String)>,
+}
+
+impl VehicleText {
+    pub(crate) fn new(text: &str) -> Result<Self, FitError> {
+        DeTable::parse(text).map_err(|error| FitError::input(error.to_string()))?;
+        Ok(Self { text: text.to_owned(), edits: Vec::new() })
+    }
+
+    /// Whether there is a value.
+    pub(crate) fn has(&self, path: &[Step]) -> bool {
+        self.place(path).is_ok()
+    }
+
+    /// The numbers of a value: one, or those of an array.
+    pub(crate) fn numbers(&self, path: &[Step]) -> Result<Vec<f64>, FitError> {
+        let (span, _) = self.place(path)?;
+        let value: toml::Value = (format!("v = {}", &self.text[span]).parse::<toml::Table>().ok())
+            .and_then(|mut table| table.remove("v"))
+            .ok_or_else(|| missing(path))?;
+        let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|i| i as f64));
+        match &value {
+            toml::Value::Array(items) => items.iter().map(|item| number(item).ok_or_else(|| missing(path))).collect(),
+            other => Ok(vec![number(other).ok_or_else(|| missing(path))?]),
+        }
+    }
+
+    /// Multiplies a number, or every number of an array.
+    pub(crate) fn scale(&mut self, path: &[Step], factor: f64) -> Result<(), FitError> {
+        self.map(path, |value| factor * value, None)
+    }
+
+    /// Replaces a number, or every number of an array, and says why in a comment on the line above.
+    pub(crate) fn map(
+        &mut self,
+        path: &[Step],
+        change: impl Fn(f64) -> f64,
+        comment: Option<&str>,
+    ) -> Result<(), FitError> {
+        let values: Vec<f64> = self.numbers(path)?.into_iter().map(change).collect();
+        self.set(path, &values, comment)
+    }
+
+    /// Puts numbers in place of a number or of an array of as many.
+    pub(crate) fn set(&mut self, path: &[Step], values: &[f64], comment: Option<&str>) -> Result<(), FitError> {
+        let (span, key_at) = self.place(path)?;
+        let text = if self.text[span.clone()].starts_with('[') {
+            format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
+        } else {
+            values.first().map_or_else(String::new, |value| number(*value))
+        };
+        if let Some(comment) = comment {
+            let before = &self.text[span.clone()];
+            let was = if before.starts_with('[') { String::new() } else { format!("; before: {before}") };
+            let line_at = self.text[..key_at].rfind('\n').map_or(0, |end| end + 1);
+            // The comment of a fit before says nothing of the new value.
+            let above_at = self.text[..line_at.saturating_sub(1)].rfind('\n').map_or(0, |end| end + 1);
+            let stale = self.text[above_at..line_at].starts_with(FITTED);
+            let at = if stale { above_at..line_at } else { line_at..line_at };
+            self.edits.push((at, format!("{FITTED}{comment}{was}\n")));
+        }
+        self.edits.push((span, text));
+        Ok(())
+    }
+
+    /// The text with all changes.
+    pub(crate) fn finish(mut self) -> String {
+        // From the end on, so that the places before stay right; a comment goes before a value on its line.
+        self.edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+        for (span, text) in self.edits {
+            self.text.replace_range(span, &text);
+        }
+        self.text
+    }
+
+    /// Where a value is, and where its key begins.
+    fn place(&self, path: &[Step]) -> Result<(std::ops::Range<usize>, usize), FitError> {
+        let table = DeTable::parse(&self.text).map_err(|error| FitError::input(error.to_string()))?;
+        let mut span = table.span();
+        let mut key_at = 0;
+        let root = DeValue::Table(table.into_inner());
+        let mut value = &root;
+        for step in path {
+            let next = match (step, value) {
+                (Step::Key(key), DeValue::Table(table)) => {
+                    let found = table.iter().find(|(name, _)| name.get_ref().as_ref() == key.as_str());
+                    found.map(|(name, value)| {
+                        key_at = name.span().start;
+                        value
+                    })
+                }
+                (Step::Item(i), DeValue::Array(items)) => items.get(*i),
+                _ => None,
+            };
+            let next = next.ok_or_else(|| missing(path))?;
+            span = next.span();
+            value = next.get_ref();
+        }
+        Ok((span, key_at))
+    }
+}
+
+/// Names of the shafts of the gear train, in the order of the file.
+pub(crate) fn shaft_names(text: &str) -> Result<Vec<String>, FitError> {
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
+    let shafts = table.get("gear_train").and_then(|train| train.get("shaft")).and_then(toml::Value::as_array);
+    let name = |shaft: &toml::Value| shaft.get("name").and_then(toml::Value::as_str).unwrap_or("").to_owned();
+    Ok(shafts.into_iter().flatten().map(name).collect())
+}
+
+fn missing(path: &[Step]) -> FitError {
+    let steps = path.iter().map(|step| match step {
+        Step::Key(key) => key.clone(),
+        Step::Item(i) => i.to_string(),
+    });
+    FitError::input(format!("the vehicle file has no numbers at `{}`", steps.collect::<Vec<_>>().join(".")))
+}
+
+/// A number with five digits as TOML has it.
+pub(crate) fn number(value: f64) -> String {
+    const DIGITS: i32 = 5;
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value:.1}");
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "the exponent of a number is small")]
+    let exponent = value.abs().log10().floor() as i32;
+    if (-3..6).contains(&exponent) {
+        let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
+        let text = format!("{value:.decimals$}");
+        let trimmed = text.trim_end_matches('0');
+        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_five_digits() {
+        let cases =
+            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+            assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
+        }
+    }
+
+    #[test]
+    fn a_value_is_replaced_and_everything_else_stays() {
+        let text =
+            "# head\n[a.b]\nx = 2 # [chapter]\ny = { p = [1.0, 2.0], q = [3.0,\n  4.0] }\n[[s]]\nz = 5\n[[s]]\nz = 6\n";
+        let mut edited = VehicleText::new(text).unwrap();
+        edited.map(&keys(&["a", "b", "x"]), |x| 1.5 * x, Some("x 1.5")).unwrap();
+        edited.scale(&keys(&["a", "b", "y", "q"]), 2.0).unwrap();
+        edited.scale(&[Step::Key("s".into()), Step::Item(1), Step::Key("z".into())], 0.5).unwrap();
+        let expected = "# head\n[a.b]\n# fit: x 1.5; before: 2\nx = 3.0 # [chapter]\ny = { p = [1.0, 2.0], q = [6.0, 8.0] }\n[[s]]\nz = 5\n[[s]]\nz = 3.0\n";
+        assert_eq!(edited.finish(), expected);
+        let mut again = VehicleText::new(expected).unwrap();
+        again.map(&keys(&["a", "b", "x"]), |x| 2.0 * x, Some("x 2")).unwrap();
+        assert_eq!(
+            again.finish(),
+            expected.replace("# fit: x 1.5; before: 2\nx = 3.0", "# fit: x 2; before: 3.0\nx = 6.0")
+        );
+        assert!(VehicleText::new(text).unwrap().scale(&keys(&["a", "c"]), 2.0).is_err());
+    }
+}

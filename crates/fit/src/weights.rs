@@ -1,0 +1,110 @@
+//! How residuals are weighed: one-step prediction errors of "white noise and a random walk", robustly.
+//!
+//! `e_k = r_k - s_(k-1)`, `s_k = s_(k-1) + g e_k`: `g = 0` is the error of the output, `g = 1` that of its changes. The errors of engine
+//! speed and maps act as torques and add up in the speeds; how much they do so, `g` is found from the residuals themselves.
+
+use nalgebra::DVector;
+
+use crate::Channel;
+use crate::shift_model::{Block, ShiftModel};
+
+/// Beyond so many scales a residual counts linearly.
+pub(crate) const HUBER: f64 = 2.5;
+/// Standard deviation of a normal distribution over the median of its sizes.
+const MAD: f64 = 1.4826;
+const CHANNELS: usize = Channel::ALL.len();
+/// The values that `g` is chosen from.
+const GAINS: [f64; 14] = [0.0, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8];
+
+/// Gain and scale of each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Weights {
+    /// `g`.
+    pub(crate) gain: [f64; CHANNELS],
+    /// Standard deviation of a one-step error, in the unit of the channel.
+    pub(crate) scale: [f64; CHANNELS],
+}
+
+impl Weights {
+    /// Where a fit starts: what is usual for each channel.
+    pub(crate) const START: Self = Self { gain: [0.3, 0.03, 0.03, 0.3, 0.3], scale: [0.5, 0.3, 0.1, 1.0, 3e3] };
+
+    /// One-step errors of the residuals, or of a column of their derivatives, in scales.
+    pub(crate) fn errors(&self, blocks: &[Block], column: &mut [f64]) {
+        for block in blocks {
+            let channel = block.channel as usize;
+            one_step(&mut column[block.rows.clone()], self.gain[channel]);
+            column[block.rows.clone()].iter_mut().for_each(|error| *error /= self.scale[channel]);
+        }
+    }
+
+    /// Gains and scales that the residuals of all shifts ask for; where a channel has none they stay.
+    pub(crate) fn following(self, shifts: &[ShiftModel], residuals: &[DVector<f64>]) -> Self {
+        let mut weights = self;
+        for channel in Channel::ALL {
+            let blocks: Vec<&[f64]> = (shifts.iter().zip(residuals))
+                .flat_map(|(shift, rows)| {
+                    let of_channel = shift.blocks.iter().filter(|block| block.channel == channel);
+                    of_channel.map(|block| &rows.as_slice()[block.rows.clone()])
+                })
+                .collect();
+            let best = GAINS.into_iter().map(|gain| (gain, spread(&blocks, gain)));
+            if let Some((gain, (_, scale))) = best.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
+                && scale > 0.0
+            {
+                weights.gain[channel as usize] = gain;
+                weights.scale[channel as usize] = scale;
+            }
+        }
+        weights
+    }
+}
+
+/// Turns residuals into one-step errors. The first is the residual itself.
+pub(crate) fn one_step(residuals: &mut [f64], gain: f64) {
+    let mut state = 0.0;
+    for residual in residuals {
+        *residual -= state;
+        state += gain * *residual;
+    }
+}
+
+/// Robust sum of squares of the one-step errors with this gain, and their scale.
+fn spread(blocks: &[&[f64]], gain: f64) -> (f64, f64) {
+    let mut errors: Vec<f64> = blocks
+        .iter()
+        .flat_map(|block| {
+            let mut errors = block.to_vec();
+            one_step(&mut errors, gain);
+            errors
+        })
+        .collect();
+    if errors.is_empty() {
+        return (f64::INFINITY, 0.0);
+    }
+    let middle = errors.len() / 2;
+    errors.iter_mut().for_each(|error| *error = error.abs());
+    let (_, median, _) = errors.select_nth_unstable_by(middle, f64::total_cmp);
+    let scale = MAD * *median;
+    (errors.iter().map(|error| error.min(3.0 * HUBER * scale).powi(2)).sum(), scale)
+}
+
+/// Factor by which the variance of a mean of errors that are alike in sequence exceeds that of independent ones.
+pub(crate) fn correlation_factor(blocks: &[&[f64]]) -> f64 {
+    const LAGS: usize = 30;
+    let limited = |error: f64| error.clamp(-HUBER, HUBER);
+    let variance: f64 = blocks.iter().copied().flatten().map(|error| limited(*error).powi(2)).sum();
+    let mut factor = 1.0;
+    for lag in 1..=LAGS {
+        let product: f64 = (blocks.iter())
+            .flat_map(|block| block.iter().zip(block.iter().skip(lag)).map(|(a, b)| limited(*a) * limited(*b)))
+            .sum();
+        let correlation = product / variance.max(f64::MIN_POSITIVE);
+        // Beyond the first lag without correlation there is only noise.
+        if correlation < 0.02 {
+            break;
+        }
+        factor += 2.0 * correlation;
+    }
+    factor
+}

@@ -1,0 +1,283 @@
+//! Cars drawn at random, their shifts behind sensors, and what a fit is compared with.
+#![allow(dead_code, clippy::unwrap_used, reason = "shared by several tests; a test may panic")]
+
+use config::{Experiment, Sensors, Source, Vehicle};
+use drivetrain::{ClutchValve, Table1};
+use fit::{Parameter, ReadingAges, Series, ShiftRecord};
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_pcg::Pcg64Mcg;
+use study::sampling::through_sensors;
+use study::simulate_shift;
+use trace::{Trace, signal};
+
+/// Random numbers of one car.
+pub(crate) struct Draw(Pcg64Mcg);
+
+impl Draw {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Pcg64Mcg::new(0xa5a5_1234_0000_0000_1111 ^ (u128::from(seed) << 20) | 1))
+    }
+
+    /// Between two numbers.
+    pub(crate) fn between(&mut self, least: f64, greatest: f64) -> f64 {
+        let share: f64 = StandardUniform.sample(&mut self.0);
+        least + share * (greatest - least)
+    }
+
+    fn factor(&mut self, share: f64) -> f64 {
+        self.between(1.0 - share, 1.0 + share)
+    }
+
+    fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+}
+
+/// What the logs have besides speeds and commands.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Logs {
+    /// Nothing.
+    SpeedsAndCurrent,
+    /// An engine torque signal with an error of up to 5 %, and in the first shift a pressure sensor.
+    TorqueAndOnePressure,
+}
+
+/// A car that differs from its file in every parameter.
+pub(crate) struct TestCar {
+    pub(crate) file: Vehicle,
+    pub(crate) car: Vehicle,
+    pub(crate) sensors: Sensors,
+    /// The unknowns of a perfect fit.
+    pub(crate) truth: Vec<(Parameter, f64)>,
+    torque_signal_scale: f64,
+    pressure_scale: f64,
+    draw: Draw,
+}
+
+/// Readings of a shift with the truth behind them.
+pub(crate) struct TestShift {
+    pub(crate) record: ShiftRecord,
+    /// Times at which the clutch slips and carries torque, s.
+    pub(crate) slipping_s: [f64; 2],
+    pub(crate) torque_n_m: Series,
+    pub(crate) pressure_pa: Series,
+}
+
+fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Table1<f64> {
+    let values: Vec<f64> = table.axis().iter().zip(table.values()).map(|(x, y)| value(*x, *y)).collect();
+    Table1::new(table.axis(), &values).unwrap()
+}
+
+impl TestCar {
+    pub(crate) fn drawn(seed: u64) -> Self {
+        Self::of(Vehicle::two_speed_at().unwrap(), seed)
+    }
+
+    /// A car that differs from this file.
+    pub(crate) fn of(file: Vehicle, seed: u64) -> Self {
+        let mut draw = Draw::new(seed);
+        let mut truth = Vec::new();
+        let mut factor = |draw: &mut Draw, parameter: Parameter, least: f64, greatest: f64| {
+            let factor = draw.between(least, greatest);
+            truth.push((parameter, factor.ln()));
+            factor
+        };
+        let mut shaft = 0;
+        let mut with_inertias = String::new();
+        let (_, train) = file.source.text.split_once("[gear_train]").unwrap();
+        let head = &file.source.text[..file.source.text.len() - train.len()];
+        for line in train.lines() {
+            match line.strip_prefix("inertia_kg_m2 = ") {
+                Some(value) => {
+                    let nominal: f64 = value.split(' ').next().unwrap().parse().unwrap();
+                    let factor = factor(&mut draw, Parameter::Inertia(shaft), 0.8, 1.2);
+                    with_inertias += &format!("inertia_kg_m2 = {}\n", factor * nominal);
+                    shaft += 1;
+                }
+                None => with_inertias += &format!("{line}\n"),
+            }
+        }
+        let source = Source { text: head.to_owned() + &with_inertias, ..file.source.clone() };
+        let mut car = Vehicle::from_source(source).unwrap();
+        let friction = factor(&mut draw, Parameter::Friction, 0.8, 1.2);
+        car.oncoming.clutch.friction = car.oncoming.clutch.friction.scaled(friction);
+        car.oncoming.clutch.static_friction *= friction;
+        let offgoing = factor(&mut draw, Parameter::OffgoingFriction, 0.9, 1.1);
+        car.offgoing.clutch.friction = car.offgoing.clutch.friction.scaled(offgoing);
+        car.offgoing.clutch.static_friction *= offgoing;
+        car.oncoming.clutch.return_spring_n *= factor(&mut draw, Parameter::Spring, 0.8, 1.2);
+        car.driveline.shaft_stiffness_n_m_rad *= factor(&mut draw, Parameter::Stiffness, 0.8, 1.2);
+        car.driveline.shaft_damping_n_m_s_rad *= factor(&mut draw, Parameter::Damping, 0.6, 1.65);
+        car.tyre.slip_scale *= factor(&mut draw, Parameter::Tyre, 0.75, 1.25);
+        car.road.mass_kg *= factor(&mut draw, Parameter::Mass, 0.88, 1.12);
+        car.engine.inertia_kg_m2 *= factor(&mut draw, Parameter::EngineInertia, 0.9, 1.1);
+        let capacity = factor(&mut draw, Parameter::Capacity, 0.85, 1.15);
+        car.converter.capacity_n_m_s2 = car.converter.capacity_n_m_s2.scaled(capacity);
+        let above = factor(&mut draw, Parameter::TorqueRatio, 0.9, 1.1);
+        car.converter.torque_ratio = mapped(&car.converter.torque_ratio, |_, t| 1.0 + above * (t - 1.0));
+        let (gain, lag) = (factor(&mut draw, Parameter::Gain, 0.9, 1.1), factor(&mut draw, Parameter::Lag, 0.7, 1.4));
+        car.oncoming.valve = car.oncoming.valve.changed(lag, gain, None);
+        let slope = draw.between(-0.08, 0.08);
+        let rest = draw.between(-0.06, 0.06);
+        car.oncoming.clutch.friction = mapped(&car.oncoming.clutch.friction, |slip, mu| {
+            let (below, above) = ((1.0 - slip / 100.0).max(0.0), ((slip - 100.0) / 200.0).clamp(0.0, 1.0));
+            mu * (1.0 + rest * below) * (1.0 + slope * above)
+        });
+        truth.push((Parameter::FrictionAtRest, rest));
+        let at_rest = car.oncoming.clutch.friction.at(0.0);
+        car.oncoming.clutch.static_friction = car.oncoming.clutch.static_friction.max(1.0001 * at_rest);
+        truth.push((Parameter::FrictionSlope, slope));
+        let mut sensors = Experiment::bench().unwrap().sensors.unwrap();
+        let valve_late_s = draw.between(0.0, 0.015);
+        if let ClutchValve::Proportional(maps) = &mut car.oncoming.valve {
+            maps.delay_s = mapped(&maps.delay_s, |_, delay_s| delay_s + valve_late_s);
+        }
+        truth.push((Parameter::CommandDelay, valve_late_s / 0.01));
+        sensors.output.delay_s = draw.between(0.0, 0.01);
+        sensors.engine.delay_s = draw.between(0.0, 0.01);
+        sensors.wheel.delay_s = draw.between(0.0, 0.03);
+        sensors.wheel.errors.scale = draw.factor(0.02);
+        truth.push((Parameter::OutputDelay, sensors.output.delay_s / 0.01));
+        truth.push((Parameter::EngineDelay, sensors.engine.delay_s / 0.01));
+        truth.push((Parameter::WheelDelay, sensors.wheel.delay_s / 0.01));
+        truth.push((Parameter::WheelScale, sensors.wheel.errors.scale.ln()));
+        let (torque_signal_scale, pressure_scale) = (draw.factor(0.05), 1.0 + 0.005 * draw.normal());
+        truth.push((Parameter::EngineTorqueScale, torque_signal_scale.ln()));
+        // The plant holds the throttle for 10 ms: a line between the readings is late by half of it.
+        truth.push((Parameter::EngineTorqueDelay, -0.5));
+        truth.push((Parameter::PressureScale, pressure_scale.ln()));
+        Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, draw }
+    }
+
+    /// What the log says of the sensors.
+    pub(crate) fn ages(&self) -> ReadingAges {
+        ReadingAges::of(&self.sensors)
+    }
+
+    /// One drive, whose shift is recorded at full rate: throttle, mass, grade and speed are drawn.
+    pub(crate) fn drive(&mut self) -> Trace {
+        let mut experiment = Experiment::e1().unwrap();
+        let throttle = self.draw.between(0.15, 0.6);
+        let speed_m_s = self.draw.between(4.0, 7.0);
+        experiment.throttle = Table1::new(&[0.0, 0.2, 0.6], &[0.1, 0.1, throttle]).unwrap();
+        experiment.initial_vehicle_m_s = speed_m_s;
+        experiment.initial_engine_rad_s = 30.0 * speed_m_s;
+        experiment.shift.request_s = 2.5;
+        experiment.duration_s = 6.0;
+        let mut car = self.car.clone();
+        car.road.mass_kg *= self.draw.factor(0.06);
+        car.road.grade_rad = self.draw.between(-0.05, 0.05);
+        simulate_shift(&car, &self.file, &experiment, 1.2).unwrap()
+    }
+
+    /// The readings of a drive at 100 Hz.
+    pub(crate) fn readings(&mut self, whole: &Trace, number: u64) -> Trace {
+        let sensors = Sensors { seed: self.sensors.seed + number, ..self.sensors };
+        let mut read = through_sensors(whole, 0.01, &sensors, &self.file);
+        let mut noisy = |name: &str, scale: f64, noise: f64| {
+            let values: Vec<f64> =
+                read.get(name).unwrap().iter().map(|value| scale * value + noise * self.draw.normal()).collect();
+            let column = read.columns.iter_mut().find(|column| column.name == name).unwrap();
+            column.values = trace::Values::Numbers(values);
+        };
+        noisy(signal::ENGINE_TORQUE, self.torque_signal_scale, 1.0);
+        noisy(signal::ONCOMING_PRESSURE, self.pressure_scale, 1e3);
+        read
+    }
+
+    /// A shift that can be fitted. Drives whose shift is not like a power-on upshift are drawn again.
+    pub(crate) fn shift(&mut self, number: u64, logs: Logs) -> TestShift {
+        for _ in 0..20 {
+            let whole = self.drive();
+            let read = self.readings(&whole, number);
+            if let Some(shift) = self.record(&whole, &read, number, logs) {
+                return shift;
+            }
+        }
+        panic!("no drive of this car has a shift");
+    }
+
+    /// A log of a shift as a table with the names of the program, and the same with the truth behind it.
+    pub(crate) fn logs(&mut self, number: u64, logs: Logs) -> [Trace; 2] {
+        let mut names = vec![
+            signal::ENGINE_SPEED,
+            signal::TURBINE_SPEED,
+            signal::OUTPUT_SPEED,
+            signal::WHEEL_SPEED,
+            signal::ONCOMING_CURRENT,
+            signal::OFFGOING_CURRENT,
+        ];
+        if logs == Logs::TorqueAndOnePressure {
+            names.push(signal::ENGINE_TORQUE);
+        }
+        loop {
+            let whole = self.drive();
+            let read = self.readings(&whole, number);
+            if self.record(&whole, &read, number, logs).is_some() {
+                let mut measured = read.clone();
+                measured.columns.retain(|column| names.contains(&column.name.as_str()));
+                let mut truth = study::sampling::sampled(&whole, 0.01);
+                truth.columns.retain(|column| {
+                    [signal::ONCOMING_TORQUE, signal::ONCOMING_PRESSURE, signal::TRUE_PHASE]
+                        .contains(&column.name.as_str())
+                });
+                return [measured, truth];
+            }
+        }
+    }
+
+    fn record(&self, whole: &Trace, read: &Trace, number: u64, logs: Logs) -> Option<TestShift> {
+        let phases = study::true_phases(whole)?;
+        let inertia = phases.iter().position(|phase| *phase == observer::Phase::InertiaPhase)?;
+        let lock = phases.iter().position(|phase| *phase == observer::Phase::AfterShift)?;
+        let torque = phases.iter().position(|phase| *phase == observer::Phase::TorquePhase)?;
+        let zero_s = whole.time_s[inertia];
+        let series = |name: &str, from: &Trace| {
+            let mut series = Series::default();
+            for (time_s, value) in from.time_s.iter().zip(from.get(name).unwrap()) {
+                if value.is_finite() {
+                    series.push(time_s - zero_s, *value);
+                }
+            }
+            series
+        };
+        let more = logs == Logs::TorqueAndOnePressure;
+        let some = |has: bool, name: &str| if has { series(name, read) } else { Series::default() };
+        let mut record = ShiftRecord {
+            name: format!("shift {number}"),
+            engine: series(signal::ENGINE_SPEED, read),
+            turbine: series(signal::TURBINE_SPEED, read),
+            output: series(signal::OUTPUT_SPEED, read),
+            wheel: series(signal::WHEEL_SPEED, read),
+            oncoming: series(signal::ONCOMING_CURRENT, read),
+            offgoing: series(signal::OFFGOING_CURRENT, read),
+            pressure: some(more && number == 0, signal::ONCOMING_PRESSURE),
+            engine_torque: some(more, signal::ENGINE_TORQUE),
+            lock_s: whole.time_s[lock] - zero_s,
+            segments: Vec::new(),
+        };
+        record.find_segments(&self.file.shift).ok()?;
+        Some(TestShift {
+            record,
+            slipping_s: [whole.time_s[torque] - zero_s, whole.time_s[lock] - zero_s],
+            torque_n_m: series(signal::ONCOMING_TORQUE, whole),
+            pressure_pa: series(signal::ONCOMING_PRESSURE, whole),
+        })
+    }
+}
+
+impl TestShift {
+    /// Mean squares of the errors of the open loop of a vehicle file: torque and pressure.
+    pub(crate) fn errors(&self, vehicle: &Vehicle) -> [f64; 2] {
+        let points: Vec<_> = (fit::open_loop(vehicle, &self.record).into_iter())
+            .filter(|point| (self.slipping_s[0]..self.slipping_s[1]).contains(&point.time_s))
+            .collect();
+        let mean = |error: &dyn Fn(&fit::OpenLoop) -> f64| {
+            points.iter().map(|point| error(point).powi(2)).sum::<f64>() / points.len() as f64
+        };
+        [
+            mean(&|point| point.torque_n_m - self.torque_n_m.at(point.time_s)),
+            mean(&|point| point.pressure_pa - self.pressure_pa.at(point.time_s)),
+        ]
+    }
+}
