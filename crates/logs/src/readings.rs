@@ -149,7 +149,12 @@ impl<'a> Readings<'a> {
     /// A unit is wrong by all appearances.
     pub fn check_units(&self) -> Result<(), LogError> {
         match plausibility::findings(&self.summary()).into_iter().next() {
-            Some(finding) => Err(LogError::map(finding)),
+            Some(finding) => {
+                let (name, message) = (finding.role.name(), finding.message);
+                Err(LogError::map(format!(
+                    "{message}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`"
+                )))
+            }
             None => Ok(()),
         }
     }
