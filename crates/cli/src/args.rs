@@ -327,8 +327,9 @@ pub(crate) struct Inspect {
 
 #[derive(Debug, Args)]
 pub(crate) struct Estimate {
-    /// File of measured signals
-    pub(crate) log: PathBuf,
+    /// Logs; `-` is standard input. Several are estimated at a time, each into a file of its own
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
     /// Vehicle file
@@ -344,9 +345,75 @@ pub(crate) struct Estimate {
     /// their noise and lag; without the file they assume small noise and no lag
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// File for the estimate; default: standard output
-    #[arg(short, long, value_name = "OUT.csv")]
+    /// File for the estimate, by its ending CSV, .parquet or .mf4; of several logs the folder for their files. Default:
+    /// standard output, as CSV
+    #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
+    /// Columns of the estimate, in this order; time_s is always the first
+    #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
+    pub(crate) columns: Vec<String>,
+    /// Only the Nth shift of the log: its estimates, quality and figure
+    #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) shift: Option<u32>,
+    /// Only shifts between these gears, such as 1-2,2-3
+    #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
+    pub(crate) shifts: Vec<GearPair>,
+    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
+    #[arg(long)]
+    pub(crate) follow: bool,
+    /// Format of the files of several logs
+    #[arg(long, value_enum, default_value_t = FormatChoice::Csv)]
+    pub(crate) format: FormatChoice,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatChoice {
+    /// Comma-separated text
+    Csv,
+    /// Parquet
+    Parquet,
+    /// ASAM MDF 4.10
+    Mf4,
+}
+
+impl FormatChoice {
+    /// The ending of its files.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mf4 => "mf4",
+        }
+    }
+}
+
+/// The gears of a shift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct GearPair {
+    /// The gear before, from 1.
+    pub(crate) from: u32,
+    /// The gear after.
+    pub(crate) to: u32,
+}
+
+impl FromStr for GearPair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let gears = text.trim().split_once('-').and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+        match gears {
+            Some((from, to)) if from != to && from > 0 && to > 0 => Ok(Self { from, to }),
+            _ => Err("expected two gears from 1, such as 1-2".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for GearPair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.from, self.to)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

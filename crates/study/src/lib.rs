@@ -28,7 +28,7 @@ pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use consistency::Consistency;
 pub use drive::{DriveColumns, DriveRow, simulate_drive, simulate_shift, true_phases};
 pub use error_bound::{ErrorBound, error_bound};
-pub use estimates::{EstimateColumns, estimates_trace};
+pub use estimates::{EstimateColumns, OutputColumn, estimates_trace};
 pub use log::{Log, LogRow};
 pub use observers::AnyObserver;
 pub use overview::Overview;

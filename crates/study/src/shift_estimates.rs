@@ -8,8 +8,9 @@ use std::collections::VecDeque;
 
 use config::Vehicle;
 use drivetrain::ReducedShift;
-use logs::Shift;
+use logs::{Load, Shift};
 use observer::{Estimate, Health, Input, Phase, Reading};
+use trace::Cell;
 
 /// A step of a log with its estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,6 +146,97 @@ impl ShiftEstimate {
     }
 }
 
+impl ShiftEstimate {
+    /// Keeps at most so many samples, of those that lie together the one with the worst health.
+    pub fn thin(&mut self, most: usize) {
+        if most == 0 {
+            self.samples = Vec::new();
+            return;
+        }
+        let together = self.samples.len().div_ceil(most).max(1);
+        let worst = |samples: &[LogSample]| samples.iter().max_by_key(|sample| sample.estimate.health).copied();
+        self.samples = self.samples.chunks(together).filter_map(worst).collect();
+    }
+
+    /// When it began, s: with its command, else with the torque phase, else with what the finder saw first.
+    pub fn begin_s(&self) -> f64 {
+        let torque_phase_s = self.estimated.as_ref().map(|estimated| estimated.torque_phase_s[0]);
+        self.shift.command_s.or(torque_phase_s).unwrap_or(self.shift.start_s())
+    }
+
+    /// When it was over, s.
+    pub fn end_s(&self) -> f64 {
+        let lock_up_s = self.estimated.as_ref().and_then(|estimated| estimated.lock_up_s);
+        lock_up_s.unwrap_or(self.shift.end_s())
+    }
+}
+
+/// A column of the table of shifts: its name, and what a shift writes into it. The time before them is the begin of the shift.
+type Column = (&'static str, fn(&ShiftEstimate) -> Cell<'static>);
+
+/// The columns of the table of shifts, in SI.
+pub const COLUMNS: &[Column] = &[
+    ("number", |s| Cell::Whole(s.number as u64)),
+    ("from_gear", |s| Cell::Whole(u64::from(s.shift.from))),
+    ("to_gear", |s| Cell::Whole(u64::from(s.shift.to))),
+    ("load", |s| {
+        Cell::Word(match s.shift.load {
+            Load::PowerOn => "power_on",
+            Load::PowerOff => "power_off",
+            Load::Unknown => "unknown",
+        })
+    }),
+    ("of_vehicle", |s| Cell::Word(if s.of_vehicle { "yes" } else { "no" })),
+    ("end_s", |s| Cell::Number(s.end_s())),
+    ("command_s", |s| number(s.shift.command_s)),
+    ("gear_signal_s", |s| number(s.shift.gear_s)),
+    ("ratio_begin_s", |s| number(s.shift.inertia_s.map(|inertia_s| inertia_s[0]))),
+    ("ratio_end_s", |s| number(s.shift.inertia_s.map(|inertia_s| inertia_s[1]))),
+    ("torque_phase_begin_s", |s| estimated(s, |e| Some(e.torque_phase_s[0]))),
+    ("inertia_phase_begin_s", |s| estimated(s, |e| Some(e.torque_phase_s[1]))),
+    ("lock_up_s", |s| estimated(s, |e| e.lock_up_s)),
+    ("flare_rad_s", |s| number(s.shift.quality.flare_rad_s)),
+    ("jerk_m_s3", |s| number(s.shift.quality.jerk_m_s3)),
+    ("oncoming_pressure_mean_pa", |s| estimated(s, |e| Some(e.pressure_pa.value))),
+    ("oncoming_pressure_mean_least_pa", |s| estimated(s, |e| e.pressure_pa.end(0))),
+    ("oncoming_pressure_mean_greatest_pa", |s| estimated(s, |e| e.pressure_pa.end(1))),
+    ("oncoming_torque_mean_n_m", |s| estimated(s, |e| Some(e.torque_n_m.value))),
+    ("oncoming_torque_mean_least_n_m", |s| estimated(s, |e| e.torque_n_m.end(0))),
+    ("oncoming_torque_mean_greatest_n_m", |s| estimated(s, |e| e.torque_n_m.end(1))),
+    ("least_shaft_torque_n_m", |s| estimated(s, |e| e.least_shaft_n_m)),
+    ("friction_work_j", |s| estimated(s, |e| Some(e.friction_work_j.value))),
+    ("friction_work_least_j", |s| estimated(s, |e| e.friction_work_j.end(0))),
+    ("friction_work_greatest_j", |s| estimated(s, |e| e.friction_work_j.end(1))),
+    ("pressure_error_rms_pa", |s| estimated(s, |e| Some(e.pressure_error_pa?.rms))),
+    ("pressure_error_mean_pa", |s| estimated(s, |e| Some(e.pressure_error_pa?.mean))),
+    ("pressure_error_peak_pa", |s| estimated(s, |e| Some(e.pressure_error_pa?.peak))),
+    ("pressure_inside_range", |s| estimated(s, |e| e.pressure_error_pa?.inside)),
+    ("torque_error_rms_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.rms))),
+    ("torque_error_mean_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.mean))),
+    ("torque_error_peak_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.peak))),
+    ("torque_inside_range", |s| estimated(s, |e| e.torque_error_n_m?.inside)),
+    ("good_share", |s| estimated(s, |e| Some(1.0 - e.unhealthy.iter().map(|(_, share)| share).sum::<f64>()))),
+    ("worst_health", |s| {
+        let worst = s.estimated.as_ref().map(|e| e.unhealthy.first().map_or(Health::Good, |(health, _)| *health));
+        Cell::Word(worst.map_or("", Health::name))
+    }),
+];
+
+fn number(value: Option<f64>) -> Cell<'static> {
+    Cell::Number(value.unwrap_or(f64::NAN))
+}
+
+fn estimated(shift: &ShiftEstimate, value: fn(&EstimatedShift) -> Option<f64>) -> Cell<'static> {
+    number(shift.estimated.as_ref().and_then(value))
+}
+
+impl Ranged {
+    /// The lower (0) or upper (1) end of its range.
+    pub fn end(&self, end: usize) -> Option<f64> {
+        self.range.map(|range| range[end])
+    }
+}
+
 impl EstimatedShift {
     /// None if the observer saw no shift at this time.
     fn of(shift: &Shift, samples: &[LogSample], reduced: &ReducedShift<f64>) -> Option<Self> {
@@ -164,9 +256,6 @@ impl EstimatedShift {
         let end = samples[within..].iter().position(after).map_or(samples.len(), |length| within + length);
         let lock_up_s = samples.get(end).filter(|s| phase(s) == Phase::AfterShift).map(|sample| sample.time_s);
         let in_inertia = samples[inertia..end].iter().filter(|sample| phase(sample) == Phase::InertiaPhase);
-        let pressures = in_inertia
-            .clone()
-            .map(|s| Ranged { value: s.estimate.pressure_pa, range: s.estimate.bounds.map(|b| b.pressure_pa) });
         let of_shift = &samples[begin..end];
         let shaft = of_shift.iter().filter_map(|sample| sample.estimate.shaft_torque_n_m);
         let measured = |value: fn(&LogSample) -> Option<Reading<f64>>, estimate: fn(&LogSample) -> Ranged| {
@@ -175,7 +264,7 @@ impl EstimatedShift {
         Some(Self {
             torque_phase_s: [samples[begin].time_s, samples[inertia].time_s],
             lock_up_s,
-            pressure_pa: mean(pressures)?,
+            pressure_pa: mean(in_inertia.clone().map(pressure))?,
             torque_n_m: mean(in_inertia.map(torque))?,
             least_shaft_n_m: shaft.reduce(f64::min),
             friction_work_j: friction_work(samples, begin..end, reduced),

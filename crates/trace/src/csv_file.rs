@@ -136,6 +136,11 @@ impl CsvRows {
         })
     }
 
+    /// What the cells of a column are multiplied by: 1 where the name has its unit in SI.
+    pub fn factor(&self, column: usize) -> f64 {
+        self.columns[column].1
+    }
+
     /// The number in a column of this row, in SI; NaN where the cell is empty.
     ///
     /// # Errors

@@ -8,7 +8,6 @@ mod error_bound;
 mod estimate;
 mod gearbox;
 mod inspect;
-mod measured;
 mod reproduce;
 mod sensitivity;
 mod simulate;
