@@ -17,6 +17,9 @@ pub struct Extremes {
     sizes: [u32; SIZES],
 }
 
+/// A shaft that never turns faster says nothing about its sign, rad/s. A car in reverse is slower.
+const SMALL_RAD_S: f64 = 60.0;
+
 /// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has.
 const SIZES: usize = 64;
 
@@ -51,6 +54,16 @@ impl Extremes {
         None
     }
 
+    /// Whether nearly nothing is negative.
+    fn is_forward(&self) -> bool {
+        self.greatest > SMALL_RAD_S && self.least > -0.1 * self.greatest
+    }
+
+    /// Whether nearly nothing is positive.
+    fn is_backward(&self) -> bool {
+        self.least < -SMALL_RAD_S && self.greatest < -0.1 * self.least
+    }
+
     /// The greatest size.
     fn size(&self) -> f64 {
         self.greatest.abs().max(self.least.abs())
@@ -62,10 +75,19 @@ impl Extremes {
 pub struct Finding {
     /// The signal.
     pub role: Role,
-    /// What is wrong, with the likely unit.
+    /// What is wrong, with what is likely.
     pub message: String,
-    /// The likely unit; may be several, or words.
-    pub likely: &'static str,
+    /// What is likely.
+    pub likely: Likely,
+}
+
+/// What is likely where a unit cannot be right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Likely {
+    /// A unit; may be several, or words.
+    Unit(&'static str),
+    /// The other sign.
+    OtherSign,
 }
 
 /// What cannot be right.
@@ -92,12 +114,21 @@ pub fn findings(summary: &[RoleSummary]) -> Vec<Finding> {
             let why = format!("its greatest value is {ratio:.2} times that of {reference}; it looks like {likely}");
             findings.push(finding(entry, unit, &why, likely));
         }
+        if of.extremes.is_forward() && entry.extremes.is_backward() {
+            let (name, reference) = (entry.role.name(), of.role.name());
+            let message = format!("{name} is negative and {reference} positive: its sign is the other way round");
+            findings.push(Finding { role, message, likely: Likely::OtherSign });
+        }
     }
     findings
 }
 
 fn finding(entry: &RoleSummary, found: &str, why: &str, likely: &'static str) -> Finding {
-    Finding { role: entry.role, message: format!("{} cannot be in {found}: {why}", entry.role.name()), likely }
+    Finding {
+        role: entry.role,
+        message: format!("{} cannot be in {found}: {why}", entry.role.name()),
+        likely: Likely::Unit(likely),
+    }
 }
 
 /// What cannot be right by the values of the signal alone.
@@ -106,6 +137,10 @@ fn alone(entry: &RoleSummary) -> Option<Finding> {
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
     let say = |text: String, likely| Some(finding(entry, unit, &format!("{text}; it looks like {likely}"), likely));
     match entry.role.quantity()? {
+        Quantity::Current | Quantity::Share if entry.extremes.greatest <= 0.0 && entry.extremes.least < 0.0 => {
+            let message = format!("{} is never positive: its sign is the other way round", entry.role.name());
+            Some(Finding { role: entry.role, message, likely: Likely::OtherSign })
+        }
         Quantity::Rotation
             if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) =>
         {
@@ -205,7 +240,9 @@ mod tests {
         ];
         let log = |unit: &str, wrong: Option<(Role, f64)>| {
             let value = |role, value| value * wrong.filter(|wrong| wrong.0 == role).map_or(1.0, |wrong| wrong.1);
-            findings(&speeds.map(|(role, most)| summary(role, unit, &[0.2 * value(role, most), value(role, most)])))
+            findings(
+                &speeds.map(|(role, most)| summary(role, unit, &[0.0, 0.2 * value(role, most), value(role, most)])),
+            )
         };
         let rpm = 30.0 / std::f64::consts::PI;
         for (unit, role, factor, likely) in [
@@ -215,8 +252,13 @@ mod tests {
             ("rad/s", Role::WheelSpeed, rpm, "rpm"),
         ] {
             let found = log(unit, Some((role, factor)));
-            assert!(found.iter().any(|found| found.role == role && found.likely == likely), "{role:?}: {found:?}");
+            assert!(
+                found.iter().any(|found| found.role == role && found.likely == Likely::Unit(likely)),
+                "{role:?}: {found:?}"
+            );
         }
         assert_eq!((log("rad/s", None), log("rpm", None)), (Vec::new(), Vec::new()));
+        let found = log("rad/s", Some((Role::OutputSpeed, -1.0)));
+        assert_eq!((found[0].role, found[0].likely), (Role::OutputSpeed, Likely::OtherSign));
     }
 }

@@ -17,10 +17,12 @@ use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 use crate::tables::{coverage, number};
 
-/// Shifts that are drawn; the table has them all.
+/// Shifts that are drawn.
 pub const MOST_DRAWN: usize = 200;
+/// Rows of the table on the page; the files beside it have them all.
+const MOST_ROWS: usize = 1000;
 /// Points of the curves of all drawn shifts together: a point takes about a dozen bytes of the page.
-const POINTS: usize = 240_000;
+const POINTS: usize = 140_000;
 /// Curves in the figure of a shift, about.
 const CURVES: usize = 12;
 
@@ -57,11 +59,11 @@ impl LogPage<'_> {
                 title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
                 at => format!("{:.2}", shift.begin_s()),
                 remark => remark(shift),
-                svg => inline(&shift_figure(shift, self.vehicle.observer_valve.command_kind(), points).svg()),
+                svg => inline(&compact(&shift_figure(shift, self.vehicle.observer_valve.command_kind(), points).svg())),
             }
         });
         let figures: Vec<Value> = figures.collect();
-        let (titles, rows) = shift_rows(self.shifts);
+        let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)]);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         Ok(templates()?.get_template("log.html")?.render(context! {
             name => file,
@@ -72,16 +74,42 @@ impl LogPage<'_> {
             log => self.log.display().to_string(),
             shifts_of_log => self.shifts_of_log,
             shown => self.shifts.len(),
-            drawn => drawn.len(),
+            undrawn => self.shifts.len() - drawn.len(),
             findings => self.findings.to_vec(),
             overview => inline(&overview_figure(self.overview, self.shifts).svg()),
             titles => titles,
-            rows => rows,
+            left_out => self.shifts.len() - rows.len(),
+            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn.len() }).collect::<Vec<_>>(),
             figures => figures,
             others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
             inputs => origin(&[&self.vehicle.source]),
         })?)
     }
+}
+
+/// The same figure with its curves to a tenth of a pixel, which is half of their text.
+fn compact(svg: &str) -> String {
+    let mut parts = svg.split(" d=\"");
+    let mut compact = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (path, rest) = part.split_once('"').unwrap_or((part, ""));
+        compact.push_str(" d=\"");
+        for word in path.split(' ') {
+            match word.parse::<f64>() {
+                Ok(number) => {
+                    if compact.ends_with(|c: char| c.is_ascii_digit()) {
+                        compact.push(' ');
+                    }
+                    let text = format!("{number:.1}");
+                    compact.push_str(text.strip_suffix(".0").unwrap_or(&text));
+                }
+                Err(_) => compact.push_str(word),
+            }
+        }
+        compact.push('"');
+        compact.push_str(rest);
+    }
+    compact
 }
 
 fn kind(shift: &ShiftEstimate) -> String {
@@ -183,8 +211,8 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
     };
     let ends = |end: usize| overview.intervals().map(|([from_s, _], i)| (from_s, mpa(i.range_pa[end]))).collect();
     let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: ends(0), upper: ends(1) };
-    let healths: Vec<(f64, Option<Health>)> =
-        overview.intervals().flat_map(|([from_s, to_s], i)| [(from_s, i.health), (to_s, i.health)]).collect();
+    let healths: Vec<(f64, [bool; HEALTHS])> =
+        overview.intervals().flat_map(|([from_s, to_s], i)| [(from_s, i.healths), (to_s, i.healths)]).collect();
     let first_s = overview.intervals().next().map_or(0.0, |([from_s, _], _)| from_s);
     let last_s = overview.intervals().last().map_or(1.0, |([_, to_s], _)| to_s);
     let spans = shifts.iter().map(|shift| Span {
@@ -286,7 +314,8 @@ fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> F
         let points = measured(&|sample| Some(sample.input.command?.value));
         let command = Series { label: "oncoming valve".to_owned(), stroke: Stroke::SIGNAL, points };
         panels.push(panel(title, 70.0, vec![command]));
-        let healths: Vec<_> = samples.iter().map(|sample| (sample.time_s, Some(sample.estimate.health))).collect();
+        let is = |sample: &LogSample| Health::ALL.map(|health| health == sample.estimate.health);
+        let healths: Vec<_> = samples.iter().map(|sample| (sample.time_s, is(sample))).collect();
         panels.extend(health_panel(&healths));
     }
     let [from_s, to_s] = shift.window_s;
@@ -311,11 +340,14 @@ fn phases(shift: &ShiftEstimate) -> Vec<Span> {
     }
 }
 
+/// Kinds of health.
+const HEALTHS: usize = Health::ALL.len();
+
 /// A line for each health that was met: where it holds. None if all is good.
-fn health_panel(healths: &[(f64, Option<Health>)]) -> Option<Panel> {
-    const COLOURS: [&str; 10] =
+fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> {
+    const COLOURS: [&str; HEALTHS] =
         ["#009E73", "#E69F00", "#B8A50A", "#CC79A7", "#CC79A7", "#D55E00", "#882255", "#D55E00", "#000000", "#D55E00"];
-    let met = |wanted: &Health| healths.iter().any(|(_, health)| health.as_ref() == Some(wanted));
+    let met = |wanted: &Health| healths.iter().any(|(_, healths)| healths[*wanted as usize]);
     let met: Vec<Health> = Health::ALL.into_iter().filter(met).collect();
     if met.iter().all(|health| *health == Health::Good) {
         return None;
@@ -334,8 +366,22 @@ fn health_panel(healths: &[(f64, Option<Health>)]) -> Option<Panel> {
 }
 
 /// A line at this height where a health holds. One sample of it is drawn until the next.
-fn held(healths: &[(f64, Option<Health>)], wanted: Health, height: f64) -> Vec<(f64, f64)> {
-    let is = |at: usize| healths[at].1 == Some(wanted);
+fn held(healths: &[(f64, [bool; HEALTHS])], wanted: Health, height: f64) -> Vec<(f64, f64)> {
+    let is = |at: usize| healths[at].1[wanted as usize];
     let shown = |at: usize| is(at) || at > 0 && is(at - 1);
     (0..healths.len()).map(|at| (healths[at].0, if shown(at) { height } else { f64::NAN })).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_compact_figure_has_its_curves_to_a_tenth_of_a_pixel() {
+        let svg =
+            r#"<svg><path d="M 74.81 36.25 L 83.04 -35.000000004 Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
+        let expected = r#"<svg><path d="M74.8 36.2L83 -35Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
+        assert_eq!(compact(svg), expected);
+        assert_eq!(compact("<svg></svg>"), "<svg></svg>");
+    }
 }

@@ -21,12 +21,16 @@ pub struct Interval {
     pub pressure_pa: Extremes,
     /// Ends of its range, Pa.
     pub range_pa: Extremes,
-    /// The worst health; none without a sample.
-    pub health: Option<Health>,
+    /// Which healths its samples have, in the order of [`Health::ALL`]; none without a sample.
+    pub healths: [bool; Health::ALL.len()],
 }
 
-const EMPTY: Interval =
-    Interval { speeds_rad_s: [[f64::NAN; 2]; 3], pressure_pa: [f64::NAN; 2], range_pa: [f64::NAN; 2], health: None };
+const EMPTY: Interval = Interval {
+    speeds_rad_s: [[f64::NAN; 2]; 3],
+    pressure_pa: [f64::NAN; 2],
+    range_pa: [f64::NAN; 2],
+    healths: [false; Health::ALL.len()],
+};
 
 /// The lowest and highest of both.
 fn joined(a: Extremes, b: Extremes) -> Extremes {
@@ -39,7 +43,7 @@ impl Interval {
             speeds_rad_s: std::array::from_fn(|i| joined(self.speeds_rad_s[i], other.speeds_rad_s[i])),
             pressure_pa: joined(self.pressure_pa, other.pressure_pa),
             range_pa: joined(self.range_pa, other.range_pa),
-            health: self.health.max(other.health),
+            healths: std::array::from_fn(|i| self.healths[i] || other.healths[i]),
         }
     }
 
@@ -50,7 +54,7 @@ impl Interval {
             speeds_rad_s: speeds.map(|reading| [reading.map_or(f64::NAN, |reading| reading.value); 2]),
             pressure_pa: [estimate.pressure_pa; 2],
             range_pa: estimate.bounds.map_or([f64::NAN; 2], |bounds| bounds.pressure_pa),
-            health: Some(estimate.health),
+            healths: Health::ALL.map(|health| health == estimate.health),
         }
     }
 }
@@ -130,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_drive_keeps_its_extremes_and_its_worst_health() {
+    fn a_long_drive_keeps_its_extremes_and_every_health() {
         let mut overview = Overview::default();
         for i in 0..100_000 {
             let odd = i == 77_777;
@@ -139,7 +143,7 @@ mod tests {
         }
         let intervals: Vec<_> = overview.intervals().collect();
         assert!((MOST / 2..=MOST).contains(&intervals.len()));
-        let odd: Vec<_> = intervals.iter().filter(|(_, i)| i.health == Some(Health::SpeedsRejected)).collect();
+        let odd: Vec<_> = intervals.iter().filter(|(_, i)| i.healths[Health::SpeedsRejected as usize]).collect();
         assert_eq!(odd.len(), 1);
         let ([from_s, to_s], interval) = odd[0];
         assert!((*from_s..*to_s).contains(&(1e9 + 777.77)) && interval.speeds_rad_s[0] == [100.0, 900.0]);
@@ -152,6 +156,6 @@ mod tests {
         for time_s in [0.0, 0.01, 1e9] {
             overview.push(&sample(time_s, 1.0, Health::Good));
         }
-        assert_eq!(overview.intervals().filter(|(_, interval)| interval.health.is_some()).count(), 2);
+        assert_eq!(overview.intervals().filter(|(_, interval)| interval.healths.contains(&true)).count(), 2);
     }
 }

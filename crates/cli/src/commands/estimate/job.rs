@@ -130,11 +130,20 @@ fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
     if more > 0 {
         say.note(&format!("and {more} more shifts"));
     }
-    for shift in shifts.found.iter().filter(|shift| !shift.of_vehicle).take(1) {
-        let others = shifts.found.iter().filter(|shift| !shift.of_vehicle).count();
+    let others: Vec<_> = shifts.found.iter().filter(|shift| !shift.of_vehicle).collect();
+    if let Some(first) = others.first() {
         say.note(&format!(
-            "{others} shifts are not the one of the vehicle file, as {}-{}: of these no pressure is estimated",
-            shift.shift.from, shift.shift.to
+            "{} shifts are not the one of the vehicle file, as {}-{}: of these no pressure is estimated",
+            others.len(),
+            first.shift.from,
+            first.shift.to
         ));
+    }
+    match shifts.found.iter().filter(|shift| shift.of_vehicle && shift.estimated.is_none()).count() {
+        0 => {}
+        unseen => say.note(&format!(
+            "warning: {unseen} shifts of the vehicle file are in the speeds and not in the command of the valve, which stays below \
+             the kiss point\nhint: check unit and scale of the command, and whether it is that of the oncoming clutch"
+        )),
     }
 }

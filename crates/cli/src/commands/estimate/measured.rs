@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::plausibility::{Extremes, findings};
+use logs::plausibility::{Extremes, Likely, findings};
 use logs::{
     ChannelMap, Gearbox, Log, LogError, Quality, QualityCounts, Reading, Readings, Role, RoleSummary, Shift,
     ShiftFinder, Steps,
@@ -317,18 +317,24 @@ impl Rows {
     /// Refuses a unit that cannot be right.
     fn check_units(&self) -> Result<(), Failure> {
         let Some(finding) = findings(&self.summary).into_iter().next() else { return Ok(()) };
+        let (message, name) = (finding.message, finding.role.name());
         let ending = match finding.likely {
-            "rpm" => "rpm",
-            "rad/s" => "rad_s",
-            "mA" => "ma",
-            "A" => "a",
-            "%" => "percent",
-            _ => "its unit",
+            Likely::Unit("rpm") => "rpm",
+            Likely::Unit("rad/s") => "rad_s",
+            Likely::Unit("mA") => "ma",
+            Likely::Unit("A") => "a",
+            Likely::Unit("%") => "percent",
+            Likely::Unit(_) => {
+                let hint = "give the unit and the scale in a channel map, see `wetclutch inspect --suggest`";
+                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+            }
+            Likely::OtherSign => {
+                let hint = "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`";
+                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+            }
         };
-        let name = finding.role.name();
         Err(Failure::Input(format!(
-            "{}\nhint: the end of the column's name says the unit: call it `{name}_{ending}`",
-            finding.message
+            "{message}\nhint: the end of the column's name says the unit: call it `{name}_{ending}`"
         )))
     }
 
