@@ -3,51 +3,86 @@
 use drivetrain::Real;
 
 use super::past::{CLONES, PASTS, SPEEDS};
-use super::powertrain::{COLUMNS, LAWS};
-use super::{GAIN, N, OFFGOING, PRESSURE, SHARE};
+use super::powertrain::{COLUMNS, LAWS, Tangent};
+use super::{N, OFFGOING, SHARE};
 
-/// Covariance of the states, of the speeds at earlier times with the states, and of those speeds.
+/// The states, and after them the speeds at earlier times.
+pub(super) const ALL: usize = N + CLONES;
+
+/// States of which a correction may take a share only: the last ones, from [`SHARE`] on.
+pub(super) const CONSIDERED: usize = N - SHARE;
+
+/// Covariance of the states and, after them, of the speeds at earlier times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Covariance<T> {
-    pub(super) states: [[T; N]; N],
-    pub(super) across: [[T; N]; CLONES],
-    pub(super) within: [[T; CLONES]; CLONES],
+    /// Kept up to date on and above the diagonal.
+    upper: [[T; ALL]; ALL],
 }
 
-/// A scalar measurement: covariance of the states and of the earlier speeds with it, and its variance.
+/// A scalar measurement: the covariance of all with it, and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Measured<T> {
-    pub(super) states: [T; N],
-    pub(super) earlier: [T; CLONES],
+    pub(super) with: [T; ALL],
     pub(super) variance: T,
 }
 
-/// Which of the remembered speeds is the speed `k` at the earlier time `n`.
+/// The place of the speed `k` at a point in time, counted from 0 for now.
 #[inline]
-fn clone_of(k: usize, n: usize) -> usize {
-    (SPEEDS * n + k).min(CLONES - 1)
+pub(super) fn speed_at(k: usize, point: usize) -> usize {
+    match point.checked_sub(1) {
+        None => k,
+        Some(n) => (N + SPEEDS * n + k).min(ALL - 1),
+    }
 }
 
 impl<T: Real> Covariance<T> {
     /// Independent states with these standard deviations, without a past.
     pub(super) fn of(deviations: [T; N]) -> Self {
-        let mut states = [[T::zero(); N]; N];
+        let mut covariance = Self { upper: [[T::zero(); ALL]; ALL] };
         for (i, deviation) in deviations.into_iter().enumerate() {
-            states[i][i] = deviation * deviation;
+            covariance.upper[i][i] = deviation * deviation;
         }
-        Self { states, across: [[T::zero(); N]; CLONES], within: [[T::zero(); CLONES]; CLONES] }
+        covariance
+    }
+
+    /// One entry.
+    #[inline]
+    pub(super) fn at(&self, i: usize, j: usize) -> T {
+        self.upper[i.min(j).min(ALL - 1)][i.max(j).min(ALL - 1)]
+    }
+
+    /// Replaces one entry.
+    #[inline]
+    pub(super) fn set(&mut self, i: usize, j: usize, value: T) {
+        self.upper[i.min(j).min(ALL - 1)][i.max(j).min(ALL - 1)] = value;
+    }
+
+    /// Adds a multiple of a row.
+    #[inline]
+    pub(super) fn add_row(&self, sum: &mut [T; ALL], row: usize, weight: T) {
+        if weight == T::zero() {
+            return;
+        }
+        let row = row.min(ALL - 1);
+        let (before, after) = sum.split_at_mut(row);
+        for (sum, above) in before.iter_mut().zip(&self.upper) {
+            *sum = *sum + weight * above[row];
+        }
+        for (sum, value) in after.iter_mut().zip(&self.upper[row][row..]) {
+            *sum = *sum + weight * *value;
+        }
     }
 
     /// A past of these ages: the speeds were as uncertain as now, and have changed by accelerations with these variances.
     pub(super) fn steady_past(&mut self, ages: [T; PASTS], acceleration_variances: [T; SPEEDS]) {
-        for (m, across) in self.across.iter_mut().enumerate() {
-            *across = self.states[m % SPEEDS];
-        }
-        for (m, row) in self.within.iter_mut().enumerate() {
+        for m in 0..CLONES {
             let (age_s, k) = (ages[m / SPEEDS], m % SPEEDS);
-            for (l, value) in row.iter_mut().enumerate() {
+            for i in 0..N {
+                self.set(i, N + m, self.at(i, k));
+            }
+            for l in 0..=m {
                 let same = if l % SPEEDS == k { acceleration_variances[k] } else { T::zero() };
-                *value = self.states[k][l % SPEEDS] + same * age_s * ages[l / SPEEDS];
+                self.set(N + l, N + m, self.at(k, l % SPEEDS) + same * age_s * ages[l / SPEEDS]);
             }
         }
     }
@@ -55,96 +90,50 @@ impl<T: Real> Covariance<T> {
     /// The speeds of now become the newest of the past.
     #[inline]
     pub(super) fn remember(&mut self) {
-        for m in (SPEEDS..CLONES).rev() {
-            for l in (SPEEDS..CLONES).rev() {
-                self.within[m][l] = self.within[m - SPEEDS][l - SPEEDS];
+        let p = &mut self.upper;
+        for row in p.iter_mut().take(N) {
+            row.copy_within(N..ALL - SPEEDS, N + SPEEDS);
+        }
+        for m in (N + SPEEDS..ALL).rev() {
+            for l in (m..ALL).rev() {
+                p[m][l] = p[m - SPEEDS][l - SPEEDS];
             }
         }
         for k in 0..SPEEDS {
-            for l in SPEEDS..CLONES {
-                let value = self.across[l - SPEEDS][k];
-                self.within[k][l] = value;
-                self.within[l][k] = value;
+            let now = p[k];
+            p[N + k][N + k..N + SPEEDS].copy_from_slice(&now[k..SPEEDS]);
+            p[N + k][N + SPEEDS..].copy_from_slice(&now[N + SPEEDS..]);
+            for i in 0..N {
+                p[i][N + k] = p[i.min(k)][i.max(k)];
             }
-            for l in 0..SPEEDS {
-                self.within[k][l] = self.states[k][l];
-            }
-        }
-        self.across.copy_within(..CLONES - SPEEDS, SPEEDS);
-        self.across[..SPEEDS].copy_from_slice(&self.states[..SPEEDS]);
-    }
-
-    /// Covariances of the speed `k` at a point in time, counted from 0 for now, with all states.
-    #[inline]
-    pub(super) fn of_speed(&self, k: usize, point: usize) -> &[T; N] {
-        match point.checked_sub(1) {
-            None => &self.states[k],
-            Some(n) => &self.across[clone_of(k, n)],
         }
     }
 
-    /// The same with the remembered speeds.
+    /// `P = F P F'` of a step: the first states have a law, two others fade, the rest stands.
     #[inline]
-    pub(super) fn of_speed_with_past(&self, k: usize, point: usize) -> [T; CLONES] {
-        match point.checked_sub(1) {
-            None => core::array::from_fn(|m| self.across[m][k]),
-            Some(n) => self.within[clone_of(k, n)],
-        }
-    }
-
-    /// `P = F P F'`: the first states have a full row each over the first columns, two others fade, the rest stands.
-    #[inline]
-    pub(super) fn spread(&mut self, f: &[[T; COLUMNS]; LAWS], stay: T, keep: T) {
-        let p = &mut self.states;
-        let mut fp = [[T::zero(); N]; LAWS];
-        for (i, row) in f.iter().enumerate() {
-            if i == PRESSURE {
-                for j in 0..N {
-                    fp[i][j] = row[PRESSURE] * p[PRESSURE][j] + row[GAIN] * p[GAIN][j];
-                }
-                continue;
-            }
-            for (c, weight) in row.iter().enumerate() {
-                for j in 0..N {
-                    fp[i][j] = fp[i][j] + *weight * p[c][j];
-                }
+    pub(super) fn spread(&mut self, step: &Tangent<T>) {
+        let p = &mut self.upper;
+        // The step takes whole rows of the states that it depends on.
+        for i in 1..COLUMNS {
+            let (above, below) = p.split_at_mut(i);
+            for (value, row) in below[0].iter_mut().zip(above) {
+                *value = row[i];
             }
         }
-        for across in &mut self.across {
-            let before = *across;
-            for (value, row) in across.iter_mut().zip(f) {
-                *value = row.iter().zip(&before).fold(T::zero(), |sum, (weight, p)| sum + *weight * *p);
-            }
-            across[SHARE] = stay * before[SHARE];
-            across[OFFGOING] = keep * before[OFFGOING];
+        let Some(rows) = p.first_chunk::<COLUMNS>() else { return };
+        let moved = step.of(rows);
+        let turned: [[T; LAWS]; COLUMNS] = core::array::from_fn(|c| moved.map(|row| row[c]));
+        let laws = step.of(&turned);
+        for i in 0..LAWS {
+            p[i][i..LAWS].copy_from_slice(&laws[i][i..]);
+            p[i][LAWS..].copy_from_slice(&moved[i][LAWS..]);
         }
-        // The states without a law of their own, among each other.
-        for (fading, left) in [(SHARE, stay), (OFFGOING, keep)] {
-            for row in p.iter_mut().skip(LAWS) {
+        for (fading, left) in [(OFFGOING, step.keep), (SHARE, step.stay)] {
+            for row in p.iter_mut().take(fading + 1) {
                 row[fading] = left * row[fading];
             }
-            for x in p[fading].iter_mut().skip(LAWS) {
-                *x = left * *x;
-            }
-        }
-        for i in 0..LAWS {
-            for j in i..LAWS {
-                let value = if j == PRESSURE {
-                    fp[i][PRESSURE] * f[j][PRESSURE] + fp[i][GAIN] * f[j][GAIN]
-                } else {
-                    (0..COLUMNS).fold(T::zero(), |sum, c| sum + fp[i][c] * f[j][c])
-                };
-                p[i][j] = value;
-                p[j][i] = value;
-            }
-            for j in LAWS..N {
-                let value = match j {
-                    SHARE => stay * fp[i][j],
-                    OFFGOING => keep * fp[i][j],
-                    _ => fp[i][j],
-                };
-                p[i][j] = value;
-                p[j][i] = value;
+            for value in p[fading].iter_mut().skip(fading) {
+                *value = left * *value;
             }
         }
     }
@@ -152,66 +141,82 @@ impl<T: Real> Covariance<T> {
     /// Adds to the variance of a state.
     #[inline]
     pub(super) fn add(&mut self, state: usize, variance: T) {
-        self.states[state][state] = self.states[state][state] + variance;
+        self.upper[state][state] = self.upper[state][state] + variance;
     }
 
     /// Keeps the variance of a state from falling below a limit.
     #[inline]
     pub(super) fn hold_above(&mut self, state: usize, variance: T) {
-        let own = &mut self.states[state][state];
+        let own = &mut self.upper[state][state];
         *own = own.max(variance);
     }
 
     /// Makes a state independent of all others, with this standard deviation.
     pub(super) fn renew(&mut self, state: usize, deviation: T) {
-        for i in 0..N {
-            self.states[i][state] = T::zero();
-            self.states[state][i] = T::zero();
+        for i in 0..ALL {
+            self.set(i, state, T::zero());
         }
-        for across in &mut self.across {
-            across[state] = T::zero();
-        }
-        self.states[state][state] = deviation * deviation;
+        self.upper[state][state] = deviation * deviation;
     }
 
-    /// Corrects for a measurement by Joseph's form, which holds for any gain: `P - K S' - S K' + K V K'`. Of the best gain
-    /// each state gets a share; with none its uncertainty is accounted for and stays.
+    /// Corrects for a measurement by Joseph's form `P - K S' - S K' + K V K'`, which holds for any gain, and returns the gain.
+    /// Of the best gain each of the considered states gets a share; with none its uncertainty is accounted for and stays.
+    ///
+    /// With `K = a S/V`, each entry of `S` with its own share `a`, the form is `P - (S S' - R R')/V` with `R = (1 - a) S`.
     #[inline]
-    pub(super) fn correct(&mut self, measured: &Measured<T>, shares: &[T; N]) -> ([T; N], [T; CLONES]) {
-        let per_variance = measured.variance.recip();
-        let gain: [T; N] = core::array::from_fn(|i| shares[i] * measured.states[i] * per_variance);
-        let earlier = measured.earlier.map(|with| with * per_variance);
-        let half_variance = T::of(0.5) * measured.variance;
-        // K w' + w K' with w = K V/2 - S.
-        let weight: [T; N] = core::array::from_fn(|i| half_variance * gain[i] - measured.states[i]);
-        let earlier_weight: [T; CLONES] = core::array::from_fn(|m| half_variance * earlier[m] - measured.earlier[m]);
-        // Whole rows: both halves come out the same, and the processor does several columns at once.
-        for i in 0..N {
-            let (g, w) = (gain[i], weight[i]);
-            for ((p, gain), weight) in self.states[i].iter_mut().zip(&gain).zip(&weight) {
-                *p = *p + (g * *weight + w * *gain);
+    pub(super) fn correct(&mut self, measured: &Measured<T>, shares: &[T; CONSIDERED]) -> [T; ALL] {
+        let per_deviation = measured.variance.sqrt().recip();
+        let scaled = measured.with.map(|with| with * per_deviation);
+        subtract_square(&mut self.upper, &scaled);
+        let mut gain = scaled.map(|scaled| scaled * per_deviation);
+        let mut rest = [T::zero(); CONSIDERED];
+        for (a, share) in shares.iter().enumerate() {
+            rest[a] = (T::one() - *share) * scaled[SHARE + a];
+            gain[SHARE + a] = *share * gain[SHARE + a];
+        }
+        for a in 0..CONSIDERED {
+            for b in a..CONSIDERED {
+                self.upper[SHARE + a][SHARE + b] = self.upper[SHARE + a][SHARE + b] + rest[a] * rest[b];
             }
         }
-        for l in 0..CLONES {
-            let (g, w) = (earlier[l], earlier_weight[l]);
-            for ((p, gain), weight) in self.across[l].iter_mut().zip(&gain).zip(&weight) {
-                *p = *p + (g * *weight + w * *gain);
-            }
-            for ((p, earlier), weight) in self.within[l].iter_mut().zip(&earlier).zip(&earlier_weight) {
-                *p = *p + (g * *weight + w * *earlier);
-            }
-        }
-        (gain, earlier)
+        gain
     }
 
     /// The covariance of some states.
     pub(super) fn block<const K: usize>(&self, states: [usize; K]) -> [[T; K]; K] {
-        states.map(|i| states.map(|j| self.states[i][j]))
+        states.map(|i| states.map(|j| self.at(i, j)))
     }
 
-    /// Whether all of it are numbers, and no variance is negative.
+    /// Whether all variances are numbers and none is negative.
     #[inline]
     pub(super) fn is_sound(&self) -> bool {
-        self.states.iter().enumerate().all(|(i, row)| row[i] >= T::zero() && row[i].is_finite())
+        let (mut sum, mut least) = (T::zero(), T::zero());
+        for i in 0..N {
+            let own = self.upper[i][i];
+            sum = sum + own;
+            least = least.min(own);
+        }
+        // A sum with a number that is not finite is not finite.
+        least >= T::zero() && sum.is_finite()
     }
+}
+
+/// Subtracts `x x'` on and above the diagonal.
+///
+/// Most of the filter's time is spent here. Each row has its own length, known at compile time, so that the compiler writes
+/// it without a loop.
+fn subtract_square<T: Real>(upper: &mut [[T; ALL]; ALL], x: &[T; ALL]) {
+    #[inline(always)]
+    fn row<T: Real, const I: usize>(row: &mut [T; ALL], x: &[T; ALL]) {
+        for j in I..ALL {
+            row[j] = row[j] - x[I] * x[j];
+        }
+    }
+    macro_rules! rows {
+        ($($i:literal)*) => {
+            const { assert!(ALL == [$($i),*].len(), "one row each") };
+            $(row::<T, $i>(&mut upper[$i], x);)*
+        };
+    }
+    rows!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18);
 }

@@ -5,9 +5,9 @@
 //! | `w_t`, `w_0`, `w_w` | momentum | speeds of turbine, output and driven wheels, rad/s |
 //! | `T_k` | `K_s (w_0/i_df - w_w)` | torque of the shafts' spring, N m |
 //! | `p` | the valve's maps, times `1 + g` | pressure of the oncoming clutch, Pa |
-//! | `e` | fades in seconds | share by which the turbine torque differs from the converter's maps |
 //! | `T_ca` | random walk; once released it fades | torque of the offgoing clutch, N m |
 //! | `T_L` | random walk | all that the wheels' equation leaves out: road, grade, mass, tyre slip, N m |
+//! | `e` | fades in seconds | share by which the turbine torque differs from the converter's maps |
 //! | `f`, `g` | constant | share by which the friction and the valve's gain differ from their maps |
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
@@ -54,9 +54,9 @@ const OUTPUT: usize = 1;
 const WHEEL: usize = 2;
 const SPRING: usize = 3;
 const PRESSURE: usize = 4;
-const SHARE: usize = 5;
-const OFFGOING: usize = 6;
-const LOAD: usize = 7;
+const OFFGOING: usize = 5;
+const LOAD: usize = 6;
+const SHARE: usize = 7;
 const FRICTION: usize = 8;
 const GAIN: usize = 9;
 const SCALE: usize = 10;
@@ -300,7 +300,7 @@ impl<T: Real> KalmanFilter<T> {
             // The first command is taken to have stood for long.
             state.valve_pa = self.limits.possible_pressure(settled_pa);
         }
-        state.commands.send(reading.age_s, settled_pa);
+        state.commands.send(reading.age_s, settled_pa, self.valve.needed_s(T::of(PIECE_S)));
         ChannelHealth::Good
     }
 
@@ -524,9 +524,9 @@ pub const STATES: [(&str, &str); N] = [
     ("wheel speed", "rad/s"),
     ("spring torque of the shafts", "N m"),
     ("pressure", "Pa"),
-    ("share of the turbine torque", "1"),
     ("torque of the offgoing clutch", "N m"),
     ("load of the wheels", "N m"),
+    ("share of the turbine torque", "1"),
     ("share of the friction", "1"),
     ("share of the valve's gain", "1"),
     ("scale of the wheel speed", "1"),
@@ -538,7 +538,7 @@ impl<T: Real> KalmanState<T> {
     /// Mean and standard deviation of each of the [`STATES`], while the filter runs.
     pub fn states(&self) -> Option<[(T, T); N]> {
         let running = self.running.as_ref()?;
-        Some(core::array::from_fn(|i| (running.mean[i], running.covariance.states[i][i].max(T::zero()).sqrt())))
+        Some(core::array::from_fn(|i| (running.mean[i], running.covariance.at(i, i).max(T::zero()).sqrt())))
     }
 
     /// Squared innovations over their variances of the readings of turbine, output and wheel speed that were taken in the last

@@ -78,12 +78,12 @@ impl<T: Real> Past<T> {
         core::array::from_fn(|n| self.points[n].age_s)
     }
 
-    /// Moves the remembered speeds.
+    /// Moves the remembered speeds, in the order of [`super::covariance::speed_at`], by a gain each times an innovation.
     #[inline]
-    pub(super) fn correct(&mut self, by: &[T; CLONES]) {
-        for (point, by) in self.points.iter_mut().zip(by.chunks_exact(SPEEDS)) {
-            for (speed, by) in point.speeds.iter_mut().zip(by) {
-                *speed = *speed + *by;
+    pub(super) fn correct(&mut self, gains: &[T], innovation: T) {
+        for (point, gains) in self.points.iter_mut().zip(gains.chunks_exact(SPEEDS)) {
+            for (speed, gain) in point.speeds.iter_mut().zip(gains) {
+                *speed = *speed + *gain * innovation;
             }
         }
     }

@@ -2,15 +2,14 @@
 
 use drivetrain::{AccelerationRow, Real, ValveStep};
 
-use super::{DELAY, FRICTION, GAIN, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SHARE, SPRING, TURBINE, WHEEL};
+use super::{FRICTION, GAIN, LOAD, N, OFFGOING, OUTPUT, PRESSURE, SHARE, SPRING, TURBINE, WHEEL};
 
 /// Number of the states that have a law of their own; the others stand or fade.
 pub(super) const LAWS: usize = 5;
 /// The states that these laws depend on are the first ones.
 pub(super) const COLUMNS: usize = GAIN + 1;
 const _: () = assert!(TURBINE < LAWS && OUTPUT < LAWS && WHEEL < LAWS && SPRING < LAWS && PRESSURE < LAWS);
-const _: () =
-    assert!(SHARE < COLUMNS && OFFGOING < COLUMNS && LOAD < COLUMNS && FRICTION < COLUMNS && DELAY >= COLUMNS);
+const _: () = assert!(SHARE < COLUMNS && OFFGOING < COLUMNS && LOAD < COLUMNS && FRICTION < COLUMNS);
 
 /// One step of the powertrain with frozen coefficients.
 ///
@@ -111,55 +110,94 @@ impl<T: Real> Step<T> {
         next
     }
 
-    /// Derivatives of the first five states at the end, which are `next`, by those that they depend on.
+    /// What the step makes of a small change of the states, of which `x` became `next`.
     #[inline]
-    pub(super) fn jacobian(&self, x: &[T; N], next: &[T; N]) -> [[T; COLUMNS]; LAWS] {
+    pub(super) fn tangent(&self, x: &[T; N], next: &[T; N]) -> Tangent<T> {
         let (zero, one, half, dt) = (T::zero(), T::one(), T::of(0.5), self.dt_s);
-        let friction = one + x[FRICTION];
         let slope_n_m_s = if self.held { zero } else { self.turbine[1] };
         let mean_turbine_n_m = self.turbine[0] + half * self.turbine[1] * (next[TURBINE] - x[TURBINE]);
-        let k = self.shaft_per_twist();
-        // Of the wheel speed at the middle.
-        let per_torque = half * dt / self.inertia;
-        let mut middle = [zero; COLUMNS];
-        middle[WHEEL] = one - per_torque * self.damping;
-        middle[OUTPUT] = per_torque * self.damping / self.ratio;
-        middle[SPRING] = per_torque;
-        middle[LOAD] = -per_torque;
-        // Of the shaft torque, as far as it does not depend on the output speed at the end.
-        let mut held = middle.map(|by| -k * by);
-        held[OUTPUT] = held[OUTPUT] + k / self.ratio;
-        held[SPRING] = held[SPRING] + one;
-        let explicit = |row: &AccelerationRow<T>| {
-            let mut by = held.map(|held| dt * row.per_output_torque / self.ratio * held);
-            let per_pressure = dt * row.per_oncoming_torque * self.per_pressure;
-            by[PRESSURE] = per_pressure * friction * self.above_kiss[1];
-            by[FRICTION] = per_pressure * self.above_kiss[0];
-            by[SHARE] = dt * row.per_turbine_torque * mean_turbine_n_m;
-            by[TURBINE] = dt * row.per_turbine_torque * (one + x[SHARE]) * slope_n_m_s;
-            by[OFFGOING] = dt * row.per_offgoing_torque;
-            by
-        };
-        let (implicit, by_turbine, by_output) =
-            (self.implicit(x[SHARE], slope_n_m_s), explicit(&self.rows[0]), explicit(&self.rows[1]));
-        let mut f = [[zero; COLUMNS]; LAWS];
-        for c in 0..COLUMNS {
-            let [turbine, output] = implicit.solve([by_turbine[c], by_output[c]]);
-            let same = if c == OUTPUT { one } else { zero };
-            let twist = (same + half * output) / self.ratio - middle[c];
-            let shaft = k * twist + if c == SPRING { one } else { zero };
-            f[TURBINE][c] = turbine;
-            f[OUTPUT][c] = output;
-            f[SPRING][c] = self.stiffness * dt * twist;
-            f[WHEEL][c] = dt / self.inertia * shaft;
+        let implicit = self.implicit(x[SHARE], slope_n_m_s);
+        let [t, o] = &self.rows;
+        let per = |t: T, o: T| implicit.solve([dt * t, dt * o]);
+        Tangent {
+            dt_s: dt,
+            per_ratio: self.ratio.recip(),
+            stiffness: self.stiffness,
+            damping: self.damping,
+            per_inertia: dt / self.inertia,
+            shaft_per_twist: self.shaft_per_twist(),
+            per_turbine_torque: per(t.per_turbine_torque, o.per_turbine_torque),
+            per_oncoming_torque: per(t.per_oncoming_torque, o.per_oncoming_torque),
+            per_offgoing_torque: per(t.per_offgoing_torque, o.per_offgoing_torque),
+            per_output_torque: per(t.per_output_torque, o.per_output_torque),
+            turbine_per_share: mean_turbine_n_m,
+            turbine_per_speed: (one + x[SHARE]) * slope_n_m_s,
+            oncoming_per_pressure: self.per_pressure * (one + x[FRICTION]) * self.above_kiss[1],
+            oncoming_per_friction: self.per_pressure * self.above_kiss[0],
+            phi: self.valve.phi,
+            per_gain: self.per_gain(),
+            stay: self.stay,
+            keep: self.keep,
         }
-        for state in [TURBINE, OUTPUT, WHEEL, SPRING] {
-            f[state][state] = f[state][state] + one;
+    }
+}
+
+/// A step's derivative, as what it makes of a small change of the states: a change of a torque first, then of the speeds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tangent<T> {
+    dt_s: T,
+    per_ratio: T,
+    stiffness: T,
+    damping: T,
+    per_inertia: T,
+    shaft_per_twist: T,
+    /// Changes of turbine and output speed per torque.
+    per_turbine_torque: [T; 2],
+    per_oncoming_torque: [T; 2],
+    per_offgoing_torque: [T; 2],
+    per_output_torque: [T; 2],
+    /// Torques per state.
+    turbine_per_share: T,
+    turbine_per_speed: T,
+    oncoming_per_pressure: T,
+    oncoming_per_friction: T,
+    /// Of the pressure.
+    phi: T,
+    per_gain: T,
+    /// What is left of the turbine's share and of the offgoing torque.
+    pub(super) stay: T,
+    pub(super) keep: T,
+}
+
+impl<T: Real> Tangent<T> {
+    /// Changes of the states that have a law at the end, of changes of the states that it depends on, for several changes
+    /// side by side.
+    #[inline]
+    pub(super) fn of<const W: usize>(&self, x: &[[T; W]; COLUMNS]) -> [[T; W]; LAWS] {
+        let half = T::of(0.5);
+        let mut next = [[T::zero(); W]; LAWS];
+        for c in 0..W {
+            let (output, wheel, spring) = (x[OUTPUT][c], x[WHEEL][c], x[SPRING][c]);
+            let twist = output * self.per_ratio - wheel;
+            let middle = wheel + half * self.per_inertia * (spring + self.damping * twist - x[LOAD][c]);
+            let held = (spring + self.shaft_per_twist * (output * self.per_ratio - middle)) * self.per_ratio;
+            let turbine_torque = self.turbine_per_share * x[SHARE][c] + self.turbine_per_speed * x[TURBINE][c];
+            let oncoming = self.oncoming_per_pressure * x[PRESSURE][c] + self.oncoming_per_friction * x[FRICTION][c];
+            let by = |end: usize| {
+                self.per_turbine_torque[end] * turbine_torque
+                    + self.per_oncoming_torque[end] * oncoming
+                    + self.per_offgoing_torque[end] * x[OFFGOING][c]
+                    + self.per_output_torque[end] * held
+            };
+            let mean_twist = (output + half * by(1)) * self.per_ratio - middle;
+            let shaft = spring + self.shaft_per_twist * mean_twist;
+            next[TURBINE][c] = x[TURBINE][c] + by(0);
+            next[OUTPUT][c] = output + by(1);
+            next[WHEEL][c] = wheel + self.per_inertia * (shaft - x[LOAD][c]);
+            next[SPRING][c] = spring + self.stiffness * self.dt_s * mean_twist;
+            next[PRESSURE][c] = self.phi * x[PRESSURE][c] + self.per_gain * x[GAIN][c];
         }
-        f[WHEEL][LOAD] = f[WHEEL][LOAD] - dt / self.inertia;
-        f[PRESSURE][PRESSURE] = self.valve.phi;
-        f[PRESSURE][GAIN] = self.per_gain();
-        f
+        next
     }
 }
 
@@ -207,11 +245,25 @@ mod tests {
     }
 
     #[test]
-    fn the_jacobian_is_the_derivative_of_the_step() {
+    fn the_tangent_is_the_derivative_of_the_step() {
         let step = step();
         let mut x = [0.0; N];
-        x[..COLUMNS].copy_from_slice(&[300.0, 120.0, 40.5, 900.0, 0.2e6, 0.03, 60.0, 700.0, -0.1, 0.04]);
-        let f = step.jacobian(&x, &step.propagate(&x));
+        for (state, value) in [
+            (TURBINE, 300.0),
+            (OUTPUT, 120.0),
+            (WHEEL, 40.5),
+            (SPRING, 900.0),
+            (PRESSURE, 0.2e6),
+            (SHARE, 0.03),
+            (OFFGOING, 60.0),
+            (LOAD, 700.0),
+            (FRICTION, -0.1),
+            (GAIN, 0.04),
+        ] {
+            x[state] = value;
+        }
+        let unit = core::array::from_fn(|i| core::array::from_fn(|c| if i == c { 1.0 } else { 0.0 }));
+        let f: [[f64; COLUMNS]; LAWS] = step.tangent(&x, &step.propagate(&x)).of(&unit);
         for c in 0..COLUMNS {
             let small = 1e-5 * x[c].abs().max(1e-2);
             let moved = |by: f64| {

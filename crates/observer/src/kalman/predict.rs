@@ -82,14 +82,13 @@ impl<T: Real> KalmanFilter<T> {
         let mut covariance = Covariance::of(deviations);
         // An error of the turbine torque is one of the shaft torque in balance with it.
         let shared = u.turbine_share * u.turbine_share * shaft;
-        covariance.states[SPRING][SHARE] = shared;
-        covariance.states[SHARE][SPRING] = shared;
+        covariance.set(SPRING, SHARE, shared);
         covariance.add(SPRING, shared * shaft);
         if let Some((learnt, block)) = &state.learnt {
             for (a, i) in LEARNT.into_iter().enumerate() {
                 mean[i] = learnt[a];
                 for (b, j) in LEARNT.into_iter().enumerate() {
-                    covariance.states[i][j] = block[a][b];
+                    covariance.set(i, j, block[a][b]);
                 }
             }
         }
@@ -153,8 +152,7 @@ impl<T: Real> KalmanFilter<T> {
         let x = running.mean;
         let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
         running.mean = step.propagate(&x);
-        let f = step.jacobian(&x, &running.mean);
-        running.covariance.spread(&f, step.stay, step.keep);
+        running.covariance.spread(&step.tangent(&x, &running.mean));
         self.add_noise(running, engine, &step, &x, settled_pa);
         running.past.pass(dt_s);
         for silent_s in &mut running.silent_s {
@@ -181,7 +179,7 @@ impl<T: Real> KalmanFilter<T> {
         let valve = self.valve.step(settled_pa, x[PRESSURE], dt_s);
         let per_start = valve.psi / dt_s;
         let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s / dt_s;
-        let sigma_pa = running.covariance.states[PRESSURE][PRESSURE].max(zero).sqrt();
+        let sigma_pa = running.covariance.at(PRESSURE, PRESSURE).max(zero).sqrt();
         let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), sigma_pa);
         let (turbine_n_m, slope_n_m_s) =
             rigid.converter.turbine_with_slope(engine.speed_before(left_s + half * dt_s), x[TURBINE]);

@@ -2,9 +2,9 @@
 
 use drivetrain::Real;
 
-use super::covariance::Measured;
+use super::covariance::{ALL, CONSIDERED, Measured, speed_at};
 use super::gate::Verdict;
-use super::past::{CLONES, PASTS, Place, SPEEDS};
+use super::past::Place;
 use super::{DELAY, FRICTION, GAIN, KalmanFilter, N, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
 use crate::{ChannelHealth, Phase, Reading};
 
@@ -118,44 +118,43 @@ impl<T: Real> KalmanFilter<T> {
     #[inline]
     pub(super) fn tie(&self, running: &mut Running<T>, dt_s: T) {
         let ratio = self.model.shift.ratio_offgoing();
-        let p = &running.covariance;
-        let of = |row: &[T; N]| row[TURBINE] - ratio * row[OUTPUT];
-        let states: [T; N] = core::array::from_fn(|i| of(&p.states[i]));
-        let earlier = core::array::from_fn(|m| p.across[m][TURBINE] - ratio * p.across[m][OUTPUT]);
+        let mut with = [T::zero(); ALL];
+        running.covariance.add_row(&mut with, TURBINE, T::one());
+        running.covariance.add_row(&mut with, OUTPUT, -ratio);
         let deviation = self.readings[TURBINE].deviation_rad_s;
-        let variance = (states[TURBINE] - ratio * states[OUTPUT]).max(T::zero()) + deviation * deviation;
+        let variance = (with[TURBINE] - ratio * with[OUTPUT]).max(T::zero()) + deviation * deviation;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
-        self.apply(running, &Measured { states, earlier, variance }, innovation, dt_s);
+        self.apply(running, &Measured { with, variance }, innovation, dt_s);
     }
 
     /// Corrects mean and covariance for a measurement, that comes `since_s` after the last of its kind.
     #[inline]
     fn apply(&self, running: &mut Running<T>, measured: &Measured<T>, innovation: T, since_s: T) {
         let u = &self.uncertainty;
-        let mut shares = [T::one(); N];
+        let mut shares = [T::one(); CONSIDERED];
         // Before both clutches slip an error of the turbine torque cancels in the clutch torque, and a cylinder that fills late
         // looks like a clutch with less friction or a valve with less gain.
         if running.acting != Phase::InertiaPhase {
             for state in [SHARE, FRICTION, GAIN] {
-                shares[state] = T::zero();
+                shares[state - SHARE] = T::zero();
             }
         }
         // What is known as well as it can be is corrected slowly: the errors of many readings are alike, and the model would
         // claim more than is true.
         let least = [(SCALE, u.scale_least), (DELAY, u.delay_least_s), (SKEW, u.delay_least_s)];
         for (state, least) in least {
-            if running.covariance.states[state][state] <= least * least {
-                shares[state] = (since_s / T::of(SLOWLY_S)).min(T::one());
+            if running.covariance.at(state, state) <= least * least {
+                shares[state - SHARE] = (since_s / T::of(SLOWLY_S)).min(T::one());
             }
         }
-        let (gain, earlier) = running.covariance.correct(measured, &shares);
+        let gain = running.covariance.correct(measured, &shares);
         for (state, least) in least {
             running.covariance.hold_above(state, least * least);
         }
-        for (x, gain) in running.mean.iter_mut().zip(gain) {
-            *x = *x + gain * innovation;
+        for (x, gain) in running.mean.iter_mut().zip(&gain) {
+            *x = *x + *gain * innovation;
         }
-        running.past.correct(&earlier.map(|gain| gain * innovation));
+        running.past.correct(&gain[N..], innovation);
         let [least, most] = u.wheel_delay_s;
         let x = &mut running.mean;
         x[DELAY] = x[DELAY].max(least).min(most);
@@ -166,37 +165,22 @@ impl<T: Real> KalmanFilter<T> {
 /// Variance of the change of a speed between two points in time.
 #[inline]
 fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2]) -> T {
-    let [late, early] = points.map(|point| SPEEDS * point.saturating_sub(1).min(PASTS - 1) + k);
-    let within = |m: usize, l: usize| running.covariance.within[m.min(CLONES - 1)][l.min(CLONES - 1)];
-    (within(late, late) - T::of(2.0) * within(late, early) + within(early, early)).max(T::zero())
+    let [late, early] = points.map(|point| speed_at(k, point));
+    let p = &running.covariance;
+    (p.at(late, late) - T::of(2.0) * p.at(late, early) + p.at(early, early)).max(T::zero())
 }
 
 /// What a reading of the speed `k` at a place in time has to do with the states: it also depends on scale, wheel delay and
 /// skew as `by` says.
 #[inline]
 fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
-    let p = &running.covariance;
-    let ([late, early], [a, b]) = (place.between, place.shares);
-    let with_states = [p.of_speed(k, late), p.of_speed(k, early)];
-    let by_states = [&p.states[SCALE], &p.states[DELAY], &p.states[SKEW]];
-    let states: [T; N] = core::array::from_fn(|i| {
-        let speed = a * with_states[0][i] + b * with_states[1][i];
-        speed + by[0] * by_states[0][i] + by[1] * by_states[1][i] + by[2] * by_states[2][i]
-    });
-    let with_past = [p.of_speed_with_past(k, late), p.of_speed_with_past(k, early)];
-    let earlier: [T; CLONES] = core::array::from_fn(|m| {
-        let row = &p.across[m];
-        a * with_past[0][m] + b * with_past[1][m] + by[0] * row[SCALE] + by[1] * row[DELAY] + by[2] * row[SKEW]
-    });
-    // Of the reading without its noise with the speed at a point.
-    let with_point = |point: usize| match point.checked_sub(1) {
-        None => states[k],
-        Some(n) => earlier[(SPEEDS * n + k).min(CLONES - 1)],
-    };
-    let total = a * with_point(late)
-        + b * with_point(early)
-        + by[0] * states[SCALE]
-        + by[1] * states[DELAY]
-        + by[2] * states[SKEW];
-    Measured { states, earlier, variance: total.max(T::zero()) + noise }
+    let points = place.between.map(|point| speed_at(k, point));
+    let [late, early] = points;
+    let weights = [(late, place.shares[0]), (early, place.shares[1]), (SCALE, by[0]), (DELAY, by[1]), (SKEW, by[2])];
+    let mut with = [T::zero(); ALL];
+    for (row, weight) in weights {
+        running.covariance.add_row(&mut with, row, weight);
+    }
+    let total = weights.into_iter().fold(T::zero(), |sum, (row, weight)| sum + weight * with[row]);
+    Measured { with, variance: total.max(T::zero()) + noise }
 }

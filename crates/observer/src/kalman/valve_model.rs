@@ -47,12 +47,13 @@ impl<T: Real> Commands<T> {
         }
     }
 
-    /// Takes a command that was sent `age_s` ago.
+    /// Takes a command that was sent `age_s` ago. Those that were replaced more than `needed_s` ago are forgotten.
     #[inline]
-    pub(crate) fn send(&mut self, age_s: T, settled_pa: T) {
+    pub(crate) fn send(&mut self, age_s: T, settled_pa: T, needed_s: T) {
         // Commands arrive in their order; the oldest one gives way.
         let age_s = self.sent.iter().take(self.count.min(1)).fold(age_s, |age, newest| age.min(newest.age_s));
-        let kept = self.count.min(REMEMBERED - 1);
+        let oldest = self.sent.iter().take(self.count).position(|sent| sent.age_s >= needed_s);
+        let kept = oldest.map_or(self.count, |at| at + 1).min(REMEMBERED - 1);
         let mut moved = Sent { age_s, settled_pa };
         for sent in self.sent.iter_mut().take(kept + 1) {
             core::mem::swap(sent, &mut moved);
@@ -91,6 +92,12 @@ impl<T: Real> ValveModel<T> {
         commands.mean_pa(self.delay_s, dt_s).unwrap_or_else(T::zero)
     }
 
+    /// How long a command is needed after the next one was sent, for steps up to `dt_s`, s.
+    #[inline]
+    pub(crate) fn needed_s(&self, dt_s: T) -> T {
+        self.delay_s + dt_s
+    }
+
     /// The valve over `dt_s` on its way from `pressure_pa` to `settled_pa`.
     #[inline]
     pub(crate) fn step(&self, settled_pa: T, pressure_pa: T, dt_s: T) -> ValveStep<T> {
@@ -111,11 +118,11 @@ mod tests {
     fn a_command_is_in_effect_after_the_delay_and_for_as_long_as_it_stood() {
         let mut commands = Commands::<f64>::new();
         assert_eq!(commands.mean_pa(0.015, 0.01), None);
-        commands.send(0.0, 1.0);
+        commands.send(0.0, 1.0, 0.025);
         // The first command has stood for ever.
         assert!((commands.mean_pa(0.015, 0.01).unwrap() - 1.0).abs() < 1e-12);
         commands.pass(0.01);
-        commands.send(0.0, 3.0);
+        commands.send(0.0, 3.0, 0.025);
         commands.pass(0.01);
         // Sent 10 ms ago: not in effect yet.
         assert!((commands.mean_pa(0.015, 0.01).unwrap() - 1.0).abs() < 1e-12);
@@ -130,7 +137,7 @@ mod tests {
     fn more_commands_than_are_remembered_do_no_harm() {
         let mut commands = Commands::<f32>::new();
         for i in 0..100_u8 {
-            commands.send(0.0, f32::from(i));
+            commands.send(0.0, f32::from(i), 1.0);
             commands.pass(0.001);
         }
         // Number 84 was sent 16 ms ago, and 83 before it.
