@@ -97,9 +97,19 @@ pub(crate) enum Command {
     /// A log with other names, or of another format (Parquet, MDF 4, CAN with a DBC), needs a channel map, see `inspect
     /// --suggest`; every reading then comes with its own time.
     ///
+    /// Every shift of the log is found by the gears that the speeds show, and by gear signals where a channel map has
+    /// them. For the shifts of the vehicle file the summary gives pressure, torque and friction work with their range, the
+    /// lowest shaft torque, and the error where pressure or torque was measured. With -o OUT.csv there are also
+    ///
+    ///   OUT_report.html   the drive and each shift as figures; opens from disk
+    ///   OUT_shifts.csv, OUT_shifts.json   the shifts as numbers
+    ///
+    /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
+    ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
-    /// appears when it contains all rows; it may be the log itself.
+    /// appears when it contains all rows; it may be the log itself. A log of which a signal is unusable in most samples,
+    /// or in another unit by all appearances, is an error.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
     /// Run the source chapter's experiments and compare the results with its statements

@@ -112,18 +112,18 @@ fn every_shift_has_its_estimate_quality_and_error() {
         let [begin_s, lock_up_s] = ["torque_phase_begin_s", "lock_up_s"].map(number);
         assert!((begin_s - 12.0 * i as f64 - 7.71).abs() < 0.02 && (lock_up_s - begin_s - 0.63).abs() < 0.02);
         // The same from the tables themselves.
-        let (mut squares, mut count, mut work_j) = (0.0, 0.0, 0.0);
+        let (mut squares, mut count, mut work_j) = (0.0, 0_u32, 0.0);
         for (estimate, truth) in estimates.iter().zip(&truth) {
             let value = |row: &std::collections::HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
             let time_s = value(truth, "time_s");
             if (begin_s..lock_up_s - 0.001).contains(&time_s) {
                 let error = value(truth, "oncoming_pressure_pa") - value(estimate, "oncoming_pressure_estimate_pa");
                 squares += error * error;
-                count += 1.0;
+                count += 1;
                 work_j += 0.01 * value(truth, "oncoming_torque_n_m") * value(truth, "oncoming_slip_rad_s");
             }
         }
-        let rms = (squares / count as f64).sqrt();
+        let rms = (squares / f64::from(count)).sqrt();
         assert!((number("pressure_error_rms_pa") / rms - 1.0).abs() < 1e-9, "{rms}");
         assert!((number("friction_work_j") / work_j - 1.0).abs() < 0.06, "{work_j}");
         assert!(number("friction_work_least_j") < work_j && work_j < number("friction_work_greatest_j"));

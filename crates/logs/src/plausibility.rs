@@ -137,7 +137,10 @@ fn alone(entry: &RoleSummary) -> Option<Finding> {
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
     let say = |text: String, likely| Some(finding(entry, unit, &format!("{text}; it looks like {likely}"), likely));
     match entry.role.quantity()? {
-        Quantity::Current | Quantity::Share if entry.extremes.greatest <= 0.0 && entry.extremes.least < 0.0 => {
+        // An offset of a command that is off is small.
+        Quantity::Current | Quantity::Share
+            if entry.role.is_command() && entry.extremes.greatest <= 0.0 && entry.extremes.least < -0.05 =>
+        {
             let message = format!("{} is never positive: its sign is the other way round", entry.role.name());
             Some(Finding { role: entry.role, message, likely: Likely::OtherSign })
         }
@@ -224,6 +227,8 @@ mod tests {
             summary(Role::Throttle, "%", &[0.0, 0.14]),
             summary(Role::OncomingPressure, "bar", &[0.0, 1.6e6]),
             summary(Role::OncomingCurrent, "A", &[0.0]),
+            summary(Role::OncomingCurrent, "A", &[-0.002, -0.001]),
+            summary(Role::Throttle, "1", &[-0.2]),
         ];
         for entry in fine {
             assert_eq!(findings(std::slice::from_ref(&entry)), Vec::new());

@@ -31,11 +31,11 @@ impl TableFormat {
 /// Writes a table row by row into a file, whole or not at all.
 pub enum TableWriter {
     /// Comma-separated text.
-    Csv(CsvWriter<WholeFile>),
+    Csv(Box<CsvWriter<WholeFile>>),
     /// Parquet.
     Parquet(Box<ParquetWriter<WholeFile>>),
     /// ASAM MDF 4.10.
-    Mdf(MdfWriter<WholeFile>),
+    Mdf(Box<MdfWriter<WholeFile>>),
 }
 
 impl TableWriter {
@@ -46,12 +46,12 @@ impl TableWriter {
     pub fn create<'a>(path: &Path, columns: impl IntoIterator<Item = (&'a str, ColumnKind)>) -> io::Result<Self> {
         let file = WholeFile::create(path)?;
         Ok(match TableFormat::of(path) {
-            TableFormat::Csv => Self::Csv(CsvWriter::new(file, columns.into_iter().map(|(name, _)| name))?),
+            TableFormat::Csv => Self::Csv(Box::new(CsvWriter::new(file, columns.into_iter().map(|(name, _)| name))?)),
             TableFormat::Parquet => {
                 let time = std::iter::once((signal::TIME, ColumnKind::Number));
                 Self::Parquet(Box::new(ParquetWriter::new(file, time.chain(columns))?))
             }
-            TableFormat::Mdf if file.is_replacement() => Self::Mdf(MdfWriter::new(file, columns)?),
+            TableFormat::Mdf if file.is_replacement() => Self::Mdf(Box::new(MdfWriter::new(file, columns)?)),
             TableFormat::Mdf => {
                 let message = "MDF cannot be written to a pipe or device\nhint: name a file";
                 return Err(io::Error::new(io::ErrorKind::InvalidInput, message));

@@ -35,8 +35,8 @@ pub(super) fn chosen(columns: EstimateColumns, names: &[String]) -> Result<Vec<O
 
 /// The table of the estimates.
 pub(super) enum Output {
-    File(Box<TableWriter>, PathBuf),
-    Standard(CsvWriter<BufWriter<io::Stdout>>),
+    File(TableWriter, PathBuf),
+    Standard(Box<CsvWriter<BufWriter<io::Stdout>>>),
 }
 
 impl Output {
@@ -46,11 +46,11 @@ impl Output {
             Some(path) => {
                 let named = columns.iter().map(|column| (column.name, column.kind()));
                 let writer = TableWriter::create(path, named).map_err(|error| Failure::writing(path, &error))?;
-                Ok(Self::File(Box::new(writer), path.to_owned()))
+                Ok(Self::File(writer, path.to_owned()))
             }
             None => {
                 let names = columns.iter().map(|column| column.name);
-                Ok(Self::Standard(CsvWriter::new(BufWriter::new(io::stdout()), names)?))
+                Ok(Self::Standard(Box::new(CsvWriter::new(BufWriter::new(io::stdout()), names)?)))
             }
         }
     }
