@@ -142,8 +142,8 @@ const AFTER_S: f64 = 0.6;
 const COMMAND_S: f64 = 5.0;
 /// A change of the gear signal and one of the ratio are one shift if they are at most so far apart, s.
 const SAME_S: f64 = 3.0;
-/// Nothing that comes so much later changes a shift, s: a gear signal may come [`SAME_S`] before a change of the ratio, which may
-/// take as long as [`ratio::LONGEST_S`].
+/// Nothing that comes so much later changes a shift, s: a gear signal may come three seconds before a change of the ratio, and
+/// that may take three seconds.
 pub const SETTLED_S: f64 = SAME_S + ratio::LONGEST_S + AFTER_S;
 /// A shift begins at most so much before its end, s.
 pub const LONGEST_S: f64 = COMMAND_S + ratio::LONGEST_S;
