@@ -2,8 +2,8 @@
 
 use config::{Sensors, SpeedSensor, Vehicle};
 use observer::{
-    EngineNoise, ExtendedFilter, FilterNoise, KalmanFilter, Readings, SpeedReading, Uncertainty, UnscentedFilter,
-    ValveModel,
+    EngineNoise, ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, SpeedReading,
+    Uncertainty, UnscentedFilter, ValveModel,
 };
 
 use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
@@ -20,11 +20,17 @@ const ENGINE_CHANGE_S: f64 = 0.05;
 /// Largest torque that accelerates the engine, N m: twice what an engine of this size gives \[chosen\].
 const ENGINE_MOST_N_M: f64 = 400.0;
 
+/// Error of a reported engine torque beside its share, N m \[chosen\]: accessories, and friction that the temperature changes.
+const ENGINE_BESIDE_N_M: f64 = 5.0;
+
 /// Share of the budget's shaft torque by which the load of the wheels may change in a gear: mass, and slip of the
 /// tyres \[chosen\].
 const LOAD_IN_GEAR: f64 = 0.3;
 /// Time of such a change, s \[chosen\].
 const LOAD_IN_GEAR_S: f64 = 0.05;
+
+/// Time after which friction and valve gain may be others, s \[chosen\]: a few shifts of city driving.
+const CLUTCH_S: f64 = 20.0;
 
 /// The scale is known no better than this \[chosen\]: scale and delay of the wheel trade with each other while the
 /// acceleration stands. A test of the combined study holds the errors after a launch against it.
@@ -90,6 +96,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         valve_gain: deviation_within(budget.valve_gain_factor),
         rate_s: told.valve_rate_s,
         friction: deviation_within(budget.friction_factor),
+        clutch_s: CLUTCH_S,
         offgoing_n_m: told.offgoing_n_m,
         offgoing_release_s: told.offgoing_release_s,
         load_shifting_n_m: budget.shaft_torque_n_m / quarter_swing_s.sqrt(),
@@ -106,9 +113,20 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         acceleration_walk: ENGINE_CHANGE_N_M / vehicle.engine.inertia_kg_m2 / ENGINE_CHANGE_S.sqrt(),
         acceleration_max_rad_s2: ENGINE_MOST_N_M / vehicle.engine.inertia_kg_m2,
     };
+    let valve_model = |valve| ValveModel { valve, delay_s: 0.5 * (delay_least_s + delay_most_s) };
+    let offgoing = OffgoingClutch {
+        valve: valve_model(vehicle.offgoing.valve),
+        clutch: vehicle.offgoing.clutch,
+        open_n_m: budget.offgoing_torque_n_m,
+    };
+    let reported = ReportedTorque {
+        engine_kg_m2: vehicle.engine.inertia_kg_m2,
+        share: deviation_of(budget.engine_torque_share),
+        beside_n_m: ENGINE_BESIDE_N_M,
+    };
     KalmanFilter::new(
         model,
-        ValveModel { valve: vehicle.oncoming.valve, delay_s: 0.5 * (delay_least_s + delay_most_s) },
+        valve_model(vehicle.oncoming.valve),
         uncertainty,
         [
             speed_reading(sensors.map(|sensors| &sensors.turbine)),
@@ -116,6 +134,8 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
             speed_reading(sensors.map(|sensors| &sensors.wheel)),
         ],
         (speed_reading(sensors.map(|sensors| &sensors.engine)), engine),
+        offgoing,
+        reported,
         vehicle.supervisor,
         vehicle.limits,
     )

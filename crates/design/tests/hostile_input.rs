@@ -56,6 +56,8 @@ fn at<T: Real>(sample: &Sample) -> Input<T> {
         output_rad_s: reading(turbine - 0.6 * slip),
         wheel_rad_s: reading(wheel),
         command: reading(command),
+        offgoing_command: reading(wheel),
+        engine_torque_n_m: reading(engine),
     }
 }
 

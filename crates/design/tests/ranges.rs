@@ -24,6 +24,8 @@ fn rolling(vehicle: &Vehicle, command: f64) -> Input<f64> {
         output_rad_s: Some(Reading::now(output)),
         wheel_rad_s: Some(Reading::now(output / vehicle.driveline.final_ratio)),
         command: Some(Reading::now(command)),
+        offgoing_command: None,
+        engine_torque_n_m: None,
     }
 }
 

@@ -100,6 +100,8 @@ fn sample<T: Real>([dt_s, engine, turbine, output, wheel, command, age_s]: [T; N
         output_rad_s: reading(output),
         wheel_rad_s: reading(wheel),
         command: reading(command),
+        offgoing_command: reading(wheel),
+        engine_torque_n_m: reading(engine),
     }
 }
 

@@ -34,11 +34,22 @@ struct Open {
     output: Option<Reading>,
     wheel: Option<Reading>,
     command: Option<Reading>,
+    offgoing_command: Option<Reading>,
+    engine_torque: Option<Reading>,
 }
 
 impl Open {
     fn new(time_s: f64) -> Self {
-        Self { time_s, engine: None, turbine: None, output: None, wheel: None, command: None }
+        Self {
+            time_s,
+            engine: None,
+            turbine: None,
+            output: None,
+            wheel: None,
+            command: None,
+            offgoing_command: None,
+            engine_torque: None,
+        }
     }
 
     /// Where a reading belongs; none if no observer reads it.
@@ -49,6 +60,8 @@ impl Open {
             Role::OutputSpeed => Some(&mut self.output),
             Role::WheelSpeed => Some(&mut self.wheel),
             Role::OncomingCurrent | Role::OncomingDuty => Some(&mut self.command),
+            Role::OffgoingCurrent | Role::OffgoingDuty => Some(&mut self.offgoing_command),
+            Role::EngineTorque => Some(&mut self.engine_torque),
             _ => None,
         }
     }
@@ -66,6 +79,8 @@ impl Open {
                 output_rad_s: measured(self.output),
                 wheel_rad_s: measured(self.wheel),
                 command: measured(self.command),
+                offgoing_command: measured(self.offgoing_command),
+                engine_torque_n_m: measured(self.engine_torque),
             },
         }
     }

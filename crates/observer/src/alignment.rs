@@ -116,7 +116,10 @@ impl<T: Real> Alignment<T> {
             wheel_rad_s,
             command: refused.or(state.command).unwrap_or_else(T::nan),
         };
-        (sample, Channels { engine, turbine, output, wheel, command })
+        let unused = ChannelHealth::Absent;
+        let channels =
+            Channels { engine, turbine, output, wheel, command, offgoing_command: unused, engine_torque: unused };
+        (sample, channels)
     }
 }
 

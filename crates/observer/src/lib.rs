@@ -36,7 +36,9 @@ pub use compliant_model::{CompliantModel, CompliantSpeedModel};
 pub use extended::{ExtendedFilter, ExtendedState, FilterNoise, Readings};
 pub use fill_range::{FillBudget, PistonRange};
 pub use inversion::{Inversion, InversionState};
-pub use kalman::{EngineNoise, KalmanFilter, KalmanState, SpeedReading, Uncertainty, ValveModel};
+pub use kalman::{
+    EngineNoise, KalmanFilter, KalmanState, OffgoingClutch, ReportedTorque, SpeedReading, Uncertainty, ValveModel,
+};
 pub use pressure_range::PressureRange;
 pub use rigid::{RigidGains, RigidObserver, RigidSample, RigidState};
 pub use rigid_model::{RigidModel, SpeedModel};

@@ -37,6 +37,11 @@ pub struct Input<T> {
     pub wheel_rad_s: Option<Reading<T>>,
     /// Command of the oncoming clutch's valve: current in A, or duty cycle in %.
     pub command: Option<Reading<T>>,
+    /// Command of the offgoing clutch's valve, in the same unit. A log may do without.
+    pub offgoing_command: Option<Reading<T>>,
+    /// Torque of the engine as its controller reports it, N m: that of combustion less its friction, before the inertia. A log
+    /// may do without.
+    pub engine_torque_n_m: Option<Reading<T>>,
 }
 
 impl<T: Real> Input<T> {
@@ -50,6 +55,8 @@ impl<T: Real> Input<T> {
             output_rad_s: now(shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s)),
             wheel_rad_s: now(sample.wheel_rad_s),
             command: now(sample.command),
+            offgoing_command: None,
+            engine_torque_n_m: None,
         }
     }
 }
@@ -145,6 +152,9 @@ pub enum Health {
     ReadingRefused,
     /// A channel has given no usable reading for long: the estimate is less certain.
     ChannelLost,
+    /// Both clutches slip and the turbine runs away from the old gear in the direction of its torque: the oncoming clutch
+    /// carries too little. It fills late, is starved or has too little friction, or the offgoing one let go too early.
+    Flare,
     /// The estimate is outside its range: the observer has a large error, or the car is outside its error budget.
     OutsideRange,
     /// The estimate was outside its guaranteed range, and is the nearest end of it.
@@ -164,10 +174,11 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
+        Self::Flare,
         Self::OutsideRange,
         Self::LimitedToRange,
         Self::CommandRejected,
@@ -183,6 +194,7 @@ impl Health {
             Self::Good => "good",
             Self::ReadingRefused => "reading_refused",
             Self::ChannelLost => "channel_lost",
+            Self::Flare => "flare",
             Self::OutsideRange => "outside_range",
             Self::LimitedToRange => "limited_to_range",
             Self::CommandRejected => "command_rejected",
@@ -232,17 +244,29 @@ pub struct Channels<V> {
     pub wheel: V,
     /// Command of the oncoming clutch's valve.
     pub command: V,
+    /// Command of the offgoing clutch's valve.
+    pub offgoing_command: V,
+    /// Reported engine torque.
+    pub engine_torque: V,
 }
 
 impl<V: Copy> Channels<V> {
     /// The same for every channel.
     pub fn all(value: V) -> Self {
-        Self { engine: value, turbine: value, output: value, wheel: value, command: value }
+        Self {
+            engine: value,
+            turbine: value,
+            output: value,
+            wheel: value,
+            command: value,
+            offgoing_command: value,
+            engine_torque: value,
+        }
     }
 
     /// In the order of the fields.
-    pub fn each(&self) -> [V; 5] {
-        [self.engine, self.turbine, self.output, self.wheel, self.command]
+    pub fn each(&self) -> [V; 7] {
+        [self.engine, self.turbine, self.output, self.wheel, self.command, self.offgoing_command, self.engine_torque]
     }
 }
 

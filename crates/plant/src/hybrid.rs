@@ -74,12 +74,9 @@ impl Segment<'_> {
 /// Time, state and mode of the plant, and how to carry them on.
 #[derive(Debug, Clone)]
 pub struct HybridIntegrator {
-    /// Time, s.
-    pub time_s: f64,
-    /// Continuous state.
-    pub state: State,
-    /// Discrete state.
-    pub mode: Mode,
+    time_s: f64,
+    state: State,
+    mode: Mode,
     step_s: f64,
     relative_tolerance: f64,
     /// What the last step found at its end, where that still holds.
@@ -106,6 +103,21 @@ impl<const N: usize> Rates<N> {
 }
 
 impl HybridIntegrator {
+    /// Time, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Continuous state.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Discrete state.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
     /// Starts at this time and state. A clutch without slip sticks if it can hold.
     pub fn new(powertrain: &Powertrain, time_s: f64, state: State, inputs: &Inputs) -> Result<Self, PlantError> {
         Self::with_tolerance(powertrain, time_s, state, inputs, RELATIVE_TOLERANCE)

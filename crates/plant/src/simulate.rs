@@ -95,7 +95,7 @@ impl<'a> Simulation<'a> {
 
     /// Time reached, s.
     pub fn time_s(&self) -> f64 {
-        self.plant.time_s
+        self.plant.time_s()
     }
 
     /// What the shift controller is about.
@@ -131,15 +131,15 @@ impl<'a> Simulation<'a> {
     ) -> Result<(), PlantError> {
         let period_s = self.experiment.shift.control_period_s;
         let until_s = until_s.min(self.experiment.duration_s);
-        while self.plant.time_s < until_s - SAME_INSTANT_S {
-            if self.plant.time_s >= self.periods * period_s {
+        while self.plant.time_s() < until_s - SAME_INSTANT_S {
+            if self.plant.time_s() >= self.periods * period_s {
                 self.control(self.periods * period_s);
                 self.periods = self.next_change(self.periods);
             }
             let stage = self.controller.stage();
             let end_s = (self.periods * period_s).min(until_s);
-            while self.plant.time_s < end_s {
-                let inputs = arrived(self.powertrain, &mut self.valves, self.plant.time_s, self.commands.throttle);
+            while self.plant.time_s() < end_s {
+                let inputs = arrived(self.powertrain, &mut self.valves, self.plant.time_s(), self.commands.throttle);
                 let arrival = self.valves.iter().filter_map(|valve| valve.line.next_arrival_s()).fold(end_s, f64::min);
                 let (powertrain, commands, recorder) = (self.powertrain, &self.commands, &mut self.recorder);
                 self.plant.advance(powertrain, &inputs, arrival, &mut |segment| {
@@ -154,7 +154,7 @@ impl<'a> Simulation<'a> {
     /// The next period in which the commands of the controller may change. Before a shift they depend on the time
     /// alone, so no step has to end while the throttle is constant.
     fn next_change(&self, period: f64) -> f64 {
-        let now_s = self.plant.time_s;
+        let now_s = self.plant.time_s();
         let next = period + 1.0;
         let Stage::Before = self.controller.stage() else { return next };
         let throttle = &self.throttle;
@@ -170,7 +170,7 @@ impl<'a> Simulation<'a> {
 
     /// One step of the shift controller, whose commands set out to the valves.
     fn control(&mut self, now_s: f64) {
-        self.commands = self.controller.step(now_s, self.throttle.at(now_s), &measure(&self.plant.state));
+        self.commands = self.controller.step(now_s, self.throttle.at(now_s), &measure(self.plant.state()));
         let v = &self.powertrain.vehicle;
         let [offgoing, oncoming] = &mut self.valves;
         let commands = &self.commands;

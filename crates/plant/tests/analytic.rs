@@ -39,9 +39,9 @@ fn two_inertias_lock_when_and_at_the_speed_they_should() {
         })
         .unwrap();
     assert!((slipping_until - lock_time).abs() < 1e-10, "{slipping_until} {lock_time}");
-    assert_eq!(plant.mode.oncoming, Contact::Stuck);
-    assert!((plant.state.turbine_rad_s - expected.0).abs() < 1e-9);
-    assert!((plant.state.output_rad_s - expected.1).abs() < 1e-9);
+    assert_eq!(plant.mode().oncoming, Contact::Stuck);
+    assert!((plant.state().turbine_rad_s - expected.0).abs() < 1e-9);
+    assert!((plant.state().output_rad_s - expected.1).abs() < 1e-9);
 }
 
 /// Gear train in first gear, shaft and wheel without tyre: two inertias on a spring,
@@ -59,13 +59,13 @@ fn the_drive_shaft_swings_at_its_natural_frequency() {
     let inputs = Inputs { throttle: 0.0, offgoing_settled_pa: 1e6, oncoming_settled_pa: 0.0 };
     let start = State { twist_rad: 0.01, offgoing_valve_pa: 1e6, ..state(0.0, 0.0) };
     let mut plant = HybridIntegrator::with_tolerance(&powertrain, 0.0, start, &inputs, 1e-9).unwrap();
-    assert_eq!(plant.mode.offgoing, Contact::Stuck);
+    assert_eq!(plant.mode().offgoing, Contact::Stuck);
     // The twist is a cosine; follow it over ten periods.
     let period = std::f64::consts::TAU / expected;
     for n in 1..=40 {
         plant.advance(&powertrain, &inputs, f64::from(n) * period / 4.0, &mut |_| {}).unwrap();
         let expected_twist = [0.0, -0.01, 0.0, 0.01][(n as usize - 1) % 4];
-        assert!((plant.state.twist_rad - expected_twist).abs() < 1e-6, "{n}: {}", plant.state.twist_rad);
+        assert!((plant.state().twist_rad - expected_twist).abs() < 1e-6, "{n}: {}", plant.state().twist_rad);
     }
 }
 

@@ -160,7 +160,7 @@ fn a_cylinder_without_stroke_and_capacity_has_the_pressure_of_the_valve() {
         (1..=40_u32)
             .flat_map(|n| {
                 plant.advance(&powertrain, &inputs, 0.005 * f64::from(n), &mut |_| {}).unwrap();
-                powertrain.pressures(&plant.state)
+                powertrain.pressures(plant.state())
             })
             .collect::<Vec<f64>>()
     };

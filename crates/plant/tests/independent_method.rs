@@ -36,7 +36,7 @@ fn assert_agreement(from_s: f64, duration_s: f64) {
     let c = start.commands;
     let inputs = Inputs::arrived(&powertrain.vehicle, c.throttle, c.offgoing, c.oncoming);
     let mut plant = HybridIntegrator::with_tolerance(&powertrain, 0.0, start.state, &inputs, TOLERANCE).unwrap();
-    let mode = plant.mode;
+    let mode = plant.mode();
     plant
         .advance(&powertrain, &inputs, duration_s, &mut |step| assert_eq!(step.mode, mode, "the phase is not smooth"))
         .unwrap();
@@ -47,7 +47,7 @@ fn assert_agreement(from_s: f64, duration_s: f64) {
         .solve()
         .unwrap();
     let reference = reference.y.last().unwrap();
-    for (i, (ours, theirs)) in plant.state.to_array().iter().zip(reference).enumerate() {
+    for (i, (ours, theirs)) in plant.state().to_array().iter().zip(reference).enumerate() {
         // A hundred times the tolerance of a step, for the growth of the error along the phase.
         assert!(
             (ours - theirs).abs() < 100.0 * TOLERANCE * (State::SCALE.to_array()[i] + theirs.abs()),

@@ -126,6 +126,8 @@ fn samples() -> Vec<Input<f64>> {
             output_rad_s: now(output),
             wheel_rad_s: now(output / 3.0),
             command: now(0.25),
+            offgoing_command: now(0.1),
+            engine_torque_n_m: None,
         }
     };
     (0..STEPS).map(sample).collect()

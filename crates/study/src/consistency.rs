@@ -142,5 +142,7 @@ fn narrowed(input: &Input<f64>) -> Input<f32> {
         output_rad_s: reading(input.output_rad_s),
         wheel_rad_s: reading(input.wheel_rad_s),
         command: reading(input.command),
+        offgoing_command: reading(input.offgoing_command),
+        engine_torque_n_m: reading(input.engine_torque_n_m),
     }
 }

@@ -118,6 +118,8 @@ mod tests {
                 output_rad_s: none,
                 wheel_rad_s: none,
                 command: none,
+                offgoing_command: none,
+                engine_torque_n_m: none,
             },
             estimate: Estimate {
                 pressure_pa: 1.0,

@@ -15,6 +15,8 @@ pub struct Signals<C> {
     output: Output<C>,
     wheel_rad_s: Option<Channel<C>>,
     command: Channel<C>,
+    offgoing_command: Option<Channel<C>>,
+    engine_torque_n_m: Option<Channel<C>>,
     shift: ReducedShift<f64>,
 }
 
@@ -59,7 +61,9 @@ impl<C: Copy> Signals<C> {
         require: impl Fn(&str) -> Result<C, TraceError>,
     ) -> Result<Self, TraceError> {
         let required = |name: &str| require(name).map(|value| Channel::new(name, value, &find));
-        let command_name = command(vehicle.observer_valve.command_kind(), &find, &require)?;
+        let found = |name: &str| find(name).map(|value| Channel::new(name, value, &find));
+        let kind = vehicle.observer_valve.command_kind();
+        let command_name = command(kind, &find, &require)?;
         Ok(Self {
             turbine_rad_s: required(signal::TURBINE_SPEED)?,
             output: match (find(signal::OUTPUT_SPEED), find(signal::ONCOMING_SLIP)) {
@@ -67,8 +71,10 @@ impl<C: Copy> Signals<C> {
                 _ => Output::Speed(required(signal::OUTPUT_SPEED)?),
             },
             engine_rad_s: required(signal::ENGINE_SPEED)?,
-            wheel_rad_s: find(signal::WHEEL_SPEED).map(|value| Channel::new(signal::WHEEL_SPEED, value, &find)),
+            wheel_rad_s: found(signal::WHEEL_SPEED),
             command: required(command_name)?,
+            offgoing_command: found(command_signals(kind).1),
+            engine_torque_n_m: found(signal::REPORTED_ENGINE_TORQUE),
             shift: vehicle.shift,
         })
     }
@@ -93,13 +99,16 @@ impl<C: Copy> Signals<C> {
                 known.map(|turbine| Reading { value: self.shift.output_speed(turbine.value, slip), ..turbine })
             }
         };
+        let optional = |channel: Option<Channel<C>>| channel.map_or(Ok(None), |channel| channel.reading(&value));
         Ok(Input {
             dt_s,
             engine_rad_s: self.engine_rad_s.reading(&value)?,
             turbine_rad_s,
             output_rad_s,
-            wheel_rad_s: self.wheel_rad_s.map_or(Ok(None), |wheel| wheel.reading(&value))?,
+            wheel_rad_s: optional(self.wheel_rad_s)?,
             command: self.command.reading(&value)?,
+            offgoing_command: optional(self.offgoing_command)?,
+            engine_torque_n_m: optional(self.engine_torque_n_m)?,
         })
     }
 }

@@ -69,8 +69,10 @@ pub fn through_sensors(whole: &Trace, period_s: f64, sensors: &Sensors, vehicle:
             arrive(&mut measured, name, read_speed(&sensor, truth, rows));
         }
     }
-    if let (Some(sensor), Some(truth)) = (&sensors.current, channel(signal::ONCOMING_CURRENT)) {
-        arrive(&mut measured, signal::ONCOMING_CURRENT, read_current(sensor, truth, rows));
+    for name in [signal::ONCOMING_CURRENT, signal::OFFGOING_CURRENT] {
+        if let (Some(sensor), Some(truth)) = (&sensors.current, channel(name)) {
+            arrive(&mut measured, name, read_current(sensor, truth, rows));
+        }
     }
     if let (Some(turbine), Some(output)) = (measured.get(signal::TURBINE_SPEED), measured.get(signal::OUTPUT_SPEED)) {
         let slip = turbine.iter().zip(output).map(|(&t, &o)| vehicle.shift.oncoming_slip(t, o)).collect();

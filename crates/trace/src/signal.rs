@@ -20,6 +20,8 @@ pub const OFFGOING_CURRENT: &str = "offgoing_current_a";
 pub const ONCOMING_DUTY: &str = "oncoming_duty_percent";
 /// Commanded duty cycle of the offgoing clutch's valve, %.
 pub const OFFGOING_DUTY: &str = "offgoing_duty_percent";
+/// Engine torque as the engine controller reports it, N m.
+pub const REPORTED_ENGINE_TORQUE: &str = "reported_engine_torque_n_m";
 /// Throttle, 0 to 1.
 pub const THROTTLE: &str = "throttle";
 
@@ -36,11 +38,21 @@ pub const AGES: &[(&str, &str)] = &[
     (OUTPUT_SPEED, "output_speed_age_s"),
     (WHEEL_SPEED, "wheel_speed_age_s"),
     (ONCOMING_CURRENT, "oncoming_current_age_s"),
+    (OFFGOING_CURRENT, "offgoing_current_age_s"),
+    (REPORTED_ENGINE_TORQUE, "reported_engine_torque_age_s"),
 ];
 
-/// What became of the reading of engine, turbine, output and wheel speed and of the oncoming clutch's command.
-pub const READINGS: [&str; 5] =
-    ["engine_reading", "turbine_reading", "output_reading", "wheel_reading", "oncoming_command_reading"];
+/// What became of the reading of engine, turbine, output and wheel speed, of the commands of both clutches, and of the
+/// reported engine torque.
+pub const READINGS: [&str; 7] = [
+    "engine_reading",
+    "turbine_reading",
+    "output_reading",
+    "wheel_reading",
+    "oncoming_command_reading",
+    "offgoing_command_reading",
+    "engine_torque_reading",
+];
 
 /// True pressure of the oncoming clutch, Pa.
 pub const ONCOMING_PRESSURE: &str = "oncoming_pressure_pa";
@@ -76,6 +88,7 @@ pub const MEASURABLE: &[&str] = &[
     OFFGOING_CURRENT,
     ONCOMING_DUTY,
     OFFGOING_DUTY,
+    REPORTED_ENGINE_TORQUE,
     THROTTLE,
 ];
 

@@ -154,6 +154,8 @@ pub struct ErrorBounds {
     pub wheel_delay_s: f64,
     /// Largest delay of the turbine speed and of the output speed, each against the other, s.
     pub channel_skew_s: f64,
+    /// Error of the torque that the engine controller reports, as a share.
+    pub engine_torque_share: f64,
     /// Least and greatest factor on the stiffness of the drive shafts.
     pub shaft_stiffness_factor: [f64; 2],
     /// Twist over which the driveline carries no torque, rad at the wheels.
@@ -542,6 +544,8 @@ fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigEr
 const WHEEL_SCALE: f64 = 0.02;
 /// Filter and bus of the brakes' controller.
 const WHEEL_DELAY_S: f64 = 0.03;
+/// Error of a reported engine torque [chosen].
+const ENGINE_TORQUE_SHARE: f64 = 0.08;
 /// One cycle of a bus.
 const CHANNEL_SKEW_S: f64 = 0.01;
 const SHAFT_STIFFNESS_FACTOR: [f64; 2] = [0.8, 1.2];
@@ -580,6 +584,7 @@ fn error_bounds(
         wheel_scale: optional("wheel_scale", &raw.wheel_scale, 0.0..=0.2, WHEEL_SCALE)?,
         wheel_delay_s: optional("wheel_delay_s", &raw.wheel_delay_s, 0.0..=0.2, WHEEL_DELAY_S)?,
         channel_skew_s: optional("channel_skew_s", &raw.channel_skew_s, 0.0..=0.1, CHANNEL_SKEW_S)?,
+        engine_torque_share: optional("engine_torque_share", &raw.engine_torque_share, 0.0..=1.0, ENGINE_TORQUE_SHARE)?,
         shaft_stiffness_factor: match &raw.shaft_stiffness_factor {
             Some(factors) => factor("shaft_stiffness_factor", factors, 0.2..=5.0)?,
             None => SHAFT_STIFFNESS_FACTOR,

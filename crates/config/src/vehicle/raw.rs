@@ -285,6 +285,7 @@ pub(super) struct RawErrorBounds {
     pub(super) wheel_scale: Option<Number>,
     pub(super) wheel_delay_s: Option<Number>,
     pub(super) channel_skew_s: Option<Number>,
+    pub(super) engine_torque_share: Option<Number>,
     pub(super) shaft_stiffness_factor: Option<Numbers>,
     pub(super) backlash_rad: Option<Number>,
 }

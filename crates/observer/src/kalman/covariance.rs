@@ -4,7 +4,7 @@ use drivetrain::Real;
 
 use super::past::{CLONES, PASTS, SPEEDS};
 use super::powertrain::{COLUMNS, LAWS, Tangent};
-use super::{N, OFFGOING, SHARE};
+use super::{FRICTION, GAIN, N, OFFGOING, SHARE};
 
 /// The states, and after them the speeds at earlier times.
 pub(super) const ALL: usize = N + CLONES;
@@ -109,7 +109,7 @@ impl<T: Real> Covariance<T> {
         }
     }
 
-    /// `P = F P F'` of a step: the first states have a law, two others fade, the rest stands.
+    /// `P = F P F'` of a step: the first states have a law, four others fade, the rest stands.
     #[inline]
     pub(super) fn spread(&mut self, step: &Tangent<T>) {
         let p = &mut self.upper;
@@ -128,7 +128,8 @@ impl<T: Real> Covariance<T> {
             p[i][i..LAWS].copy_from_slice(&laws[i][i..]);
             p[i][LAWS..].copy_from_slice(&moved[i][LAWS..]);
         }
-        for (fading, left) in [(OFFGOING, step.keep), (SHARE, step.stay)] {
+        let fading = [(OFFGOING, step.keep), (SHARE, step.stay), (FRICTION, step.last), (GAIN, step.last)];
+        for (fading, left) in fading {
             for row in p.iter_mut().take(fading + 1) {
                 row[fading] = left * row[fading];
             }

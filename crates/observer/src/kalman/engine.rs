@@ -57,6 +57,12 @@ impl<T: Real> Engine<T> {
         self.mean[0] - time_s * self.mean[1]
     }
 
+    /// Acceleration, rad/s^2, and its standard deviation.
+    #[inline]
+    pub(crate) fn acceleration(&self) -> (T, T) {
+        (self.mean[1], self.acceleration_variance.max(T::zero()).sqrt())
+    }
+
     /// Variance of the speed now, (rad/s)^2.
     #[inline]
     pub(crate) fn variance(&self) -> T {

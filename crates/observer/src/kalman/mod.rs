@@ -8,13 +8,13 @@
 //! | `T_ca` | random walk; once released it fades | torque of the offgoing clutch, N m |
 //! | `T_L` | random walk | all that the wheels' equation leaves out: road, grade, mass, tyre slip, N m |
 //! | `e` | fades in seconds | share by which the turbine torque differs from the converter's maps |
-//! | `f`, `g` | constant | share by which the friction and the valve's gain differ from their maps |
+//! | `f`, `g` | fade in tens of seconds | share by which the friction and the valve's gain differ from their maps |
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
 //! with the speed at the time at which it was measured, which lies between two steps or before both. Before the shift
-//! the gear ratio ties turbine to output speed: with it, scale and delays are found. They, friction and gain are
-//! kept from shift to shift.
+//! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
+//! friction and gain are kept for some shifts and then forgotten.
 //!
 //! A reading that contradicts all the others is refused once; one that goes on to do so is believed. The share `e` is
 //! only corrected while both clutches slip (a consider state, S. F. Schmidt 1966): before, an error that shaft
@@ -25,7 +25,9 @@
 
 mod covariance;
 mod engine;
+mod engine_torque;
 mod gate;
+mod offgoing;
 mod past;
 mod phases;
 mod powertrain;
@@ -41,11 +43,15 @@ use crate::{
 };
 use covariance::Covariance;
 use engine::Engine;
+use engine_torque::LastTorque;
 use gate::Gate;
+use offgoing::OffgoingPressure;
 use past::Past;
 use valve_model::Commands;
 
 pub use engine::EngineNoise;
+pub use engine_torque::ReportedTorque;
+pub use offgoing::OffgoingClutch;
 pub use valve_model::ValveModel;
 
 const N: usize = 13;
@@ -106,6 +112,9 @@ pub struct Uncertainty<T> {
     pub rate_s: T,
     /// Of the friction, as a share.
     pub friction: T,
+    /// Time after which friction and gain are others, s: errors of the model that shifts have in common would otherwise make
+    /// the filter surer of both with every shift.
+    pub clutch_s: T,
     /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
     pub offgoing_n_m: T,
     /// Time constant with which it goes once the clutch has let go, s.
@@ -145,6 +154,10 @@ pub struct KalmanFilter<T> {
     pub readings: [SpeedReading<T>; 3],
     /// How the engine speed is read.
     pub engine: (SpeedReading<T>, EngineNoise<T>),
+    /// The offgoing clutch, for logs with its command.
+    pub offgoing: OffgoingClutch<T>,
+    /// The reported engine torque, for logs with it.
+    pub reported: ReportedTorque<T>,
     /// The phase supervisor.
     pub supervisor: Supervisor<T>,
     /// What counts as a measurement.
@@ -158,6 +171,8 @@ pub struct KalmanState<T> {
     /// Pressure by the valve model alone, Pa.
     valve_pa: T,
     commands: Commands<T>,
+    offgoing: OffgoingPressure<T>,
+    reported: Option<LastTorque<T>>,
     supervisor: SupervisorState<T>,
     engine: Option<Engine<T>>,
     /// The newest readings of turbine, output and wheel: value, and age in s.
@@ -192,18 +207,21 @@ struct Running<T> {
 
 impl<T: Real> KalmanFilter<T> {
     /// The filter of this powertrain.
+    #[expect(clippy::too_many_arguments, reason = "the parts of the filter, each with a type of its own")]
     pub fn new(
         model: CompliantModel<T>,
         valve: ValveModel<T>,
         uncertainty: Uncertainty<T>,
         readings: [SpeedReading<T>; 3],
         engine: (SpeedReading<T>, EngineNoise<T>),
+        offgoing: OffgoingClutch<T>,
+        reported: ReportedTorque<T>,
         supervisor: Supervisor<T>,
         limits: InputLimits<T>,
     ) -> Self {
         let of = |engagement| model.shift.coefficients(engagement);
         let (both, locked) = (of(Engagement::BothSlipping), of(Engagement::OncomingStuck));
-        Self { both, locked, model, valve, uncertainty, readings, engine, supervisor, limits }
+        Self { both, locked, model, valve, uncertainty, readings, engine, offgoing, reported, supervisor, limits }
     }
 }
 
@@ -215,6 +233,8 @@ impl<T: Real> Estimator<T> for KalmanFilter<T> {
             started: false,
             valve_pa: T::zero(),
             commands: Commands::new(),
+            offgoing: OffgoingPressure::new(),
+            reported: None,
             supervisor: SupervisorState::new(),
             engine: None,
             newest: [None; 3],
@@ -251,6 +271,11 @@ impl<T: Real> Estimator<T> for KalmanFilter<T> {
         channels.engine = self.take_engine(state, input);
         let speeds = self.take_speeds(state, input, dt_s);
         [channels.turbine, channels.output, channels.wheel] = speeds;
+        channels.offgoing_command = state.offgoing.take(&self.offgoing, &self.limits, input.offgoing_command);
+        channels.engine_torque = self.take_engine_torque(state, input, dt_s);
+        if let Some(running) = &mut state.running {
+            self.limit_offgoing(running, &state.offgoing);
+        }
         let sound = self.settle(state);
         self.find_phase(state, dt_s);
         self.conclude(state, &channels, sound)
@@ -275,6 +300,7 @@ impl<T: Real> KalmanFilter<T> {
         let piece_s = dt_s / T::of(pieces as f64);
         for _ in 0..pieces {
             state.commands.pass(piece_s);
+            state.offgoing.pass(&self.offgoing, &self.limits, piece_s);
             let settled_pa = self.valve.target_pa(&state.commands, piece_s);
             let step = self.valve.step(settled_pa, state.valve_pa, piece_s);
             state.valve_pa = self.limits.possible_pressure(step.phi * state.valve_pa + step.drift_pa);
@@ -443,6 +469,9 @@ impl<T: Real> KalmanFilter<T> {
                 let shaft = x[SPRING] + line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
                 let slip = self.model.shift.oncoming_slip(x[TURBINE], x[OUTPUT]);
                 let engine = state.engine.map_or(x[TURBINE], |engine| engine.speed_before(T::zero()));
+                if self.flares(running, engine) {
+                    health = health.max(Health::Flare);
+                }
                 estimate.pressure_pa = x[PRESSURE];
                 estimate.shaft_torque_n_m = Some(shaft.max(-limit).min(limit));
                 estimate.clutch_torque_n_m = if running.acting == Phase::AfterShift {
@@ -487,6 +516,8 @@ impl<T: Real> KalmanFilter<T> {
             self.uncertainty.cast(),
             self.readings.map(|reading| reading.cast()),
             (sensor.cast(), noise),
+            self.offgoing.cast(),
+            self.reported.cast(),
             self.supervisor.cast(),
             self.limits.cast(),
         )
@@ -510,6 +541,15 @@ fn holds_offgoing<T: Real>(
 }
 
 impl<T: Real> Running<T> {
+    /// Moves states and remembered speeds by a gain each times an innovation.
+    #[inline]
+    fn shift_by(&mut self, gain: &[T; covariance::ALL], innovation: T) {
+        for (x, gain) in self.mean.iter_mut().zip(gain) {
+            *x = *x + *gain * innovation;
+        }
+        self.past.correct(&gain[N..], innovation);
+    }
+
     /// Whether mean and covariance are numbers, and no variance is negative.
     #[inline]
     fn is_sound(&self) -> bool {
@@ -582,6 +622,7 @@ impl<T: Real> Uncertainty<T> {
             valve_gain: to(self.valve_gain),
             rate_s: to(self.rate_s),
             friction: to(self.friction),
+            clutch_s: to(self.clutch_s),
             offgoing_n_m: to(self.offgoing_n_m),
             offgoing_release_s: to(self.offgoing_release_s),
             load_shifting_n_m: to(self.load_shifting_n_m),

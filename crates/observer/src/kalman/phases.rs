@@ -61,6 +61,19 @@ impl<T: Real> KalmanFilter<T> {
         running.acting = acting;
     }
 
+    /// Whether the turbine runs away from the old gear in the direction of its torque.
+    #[inline]
+    pub(super) fn flares(&self, running: &Running<T>, engine_rad_s: T) -> bool {
+        if running.acting != Phase::InertiaPhase {
+            return false;
+        }
+        let (turbine, output) = (running.mean[TURBINE], running.mean[OUTPUT]);
+        let slip = self.model.shift.offgoing_slip(turbine, output);
+        let torque = self.model.rigid.converter.torques(engine_rad_s, turbine).turbine_n_m;
+        let ahead = if torque < T::zero() { -slip } else { slip };
+        ahead > self.supervisor.release_slip_rad_s
+    }
+
     /// The phase whose equations hold. A clutch whose slip ends is locked. Only a slip the other way that lasts has turned
     /// round: one that the speeds show for a moment is an error of theirs.
     #[inline]

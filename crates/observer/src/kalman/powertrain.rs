@@ -47,9 +47,10 @@ pub(super) struct Step<T> {
     pub(super) damping: T,
     /// Of wheels and vehicle, kg m^2.
     pub(super) inertia: T,
-    /// What is left of the turbine's share and of the offgoing torque.
+    /// What is left of the turbine's share, of the offgoing torque, and of friction and gain.
     pub(super) stay: T,
     pub(super) keep: T,
+    pub(super) last: T,
 }
 
 impl<T: Real> Step<T> {
@@ -107,6 +108,8 @@ impl<T: Real> Step<T> {
         next[PRESSURE] = self.valve.phi * x[PRESSURE] + self.valve.drift_pa + self.per_gain() * x[GAIN];
         next[SHARE] = self.stay * x[SHARE];
         next[OFFGOING] = self.keep * x[OFFGOING];
+        next[FRICTION] = self.last * x[FRICTION];
+        next[GAIN] = self.last * x[GAIN];
         next
     }
 
@@ -138,6 +141,7 @@ impl<T: Real> Step<T> {
             per_gain: self.per_gain(),
             stay: self.stay,
             keep: self.keep,
+            last: self.last,
         }
     }
 }
@@ -164,9 +168,10 @@ pub(super) struct Tangent<T> {
     /// Of the pressure.
     phi: T,
     per_gain: T,
-    /// What is left of the turbine's share and of the offgoing torque.
+    /// What is left of the turbine's share, of the offgoing torque, and of friction and gain.
     pub(super) stay: T,
     pub(super) keep: T,
+    pub(super) last: T,
 }
 
 impl<T: Real> Tangent<T> {
@@ -241,6 +246,7 @@ mod tests {
             inertia: 137.0,
             stay: 0.997,
             keep: 0.75,
+            last: 0.999,
         }
     }
 

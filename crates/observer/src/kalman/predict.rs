@@ -203,6 +203,7 @@ impl<T: Real> KalmanFilter<T> {
             inertia: rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2,
             stay: lasting(dt_s, u.turbine_share_s),
             keep: if released { lasting(dt_s, u.offgoing_release_s) } else { one },
+            last: lasting(dt_s, u.clutch_s),
         }
     }
 
@@ -228,6 +229,9 @@ impl<T: Real> KalmanFilter<T> {
         p.add(SPRING, two * dt * u.rate_s * square(stiffness_share * step.stiffness * twist_rate));
         p.add(PRESSURE, two * dt * u.rate_s * square(u.valve_share * running.motion_pa_s));
         p.add(SHARE, square(u.turbine_share) * (one - square(step.stay)));
+        for (state, deviation) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {
+            p.add(state, square(deviation) * (one - square(step.last)));
+        }
         // How fast it drains is not known: the rate may be wrong by its own size for as long as it lasts.
         let offgoing =
             if released { two * dt / u.offgoing_release_s * square(x[OFFGOING]) } else { dt * square(u.offgoing_n_m) };

@@ -5,7 +5,7 @@ use drivetrain::Real;
 use super::covariance::{ALL, CONSIDERED, Measured, speed_at};
 use super::gate::Verdict;
 use super::past::Place;
-use super::{DELAY, FRICTION, GAIN, KalmanFilter, N, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
+use super::{DELAY, FRICTION, GAIN, KalmanFilter, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
 use crate::{ChannelHealth, Phase, Reading};
 
 /// Standard deviation of a uniform distribution, in its width.
@@ -151,10 +151,7 @@ impl<T: Real> KalmanFilter<T> {
         for (state, least) in least {
             running.covariance.hold_above(state, least * least);
         }
-        for (x, gain) in running.mean.iter_mut().zip(&gain) {
-            *x = *x + *gain * innovation;
-        }
-        running.past.correct(&gain[N..], innovation);
+        running.shift_by(&gain, innovation);
         let [least, most] = u.wheel_delay_s;
         let x = &mut running.mean;
         x[DELAY] = x[DELAY].max(least).min(most);

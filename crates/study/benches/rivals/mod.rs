@@ -22,7 +22,7 @@ struct FirstGear<'a> {
 
 impl ODE<f64, [f64; STATES]> for FirstGear<'_> {
     fn diff(&self, _time: f64, x: &[f64; STATES], slope: &mut [f64; STATES]) {
-        *slope = self.powertrain.derivative(self.mode, x, &INPUTS);
+        *slope = self.powertrain.derivative(self.mode(), x, &INPUTS);
     }
 }
 
@@ -44,13 +44,13 @@ type Solve<'a> = &'a dyn Fn() -> Option<[f64; STATES]>;
 
 pub(crate) fn integrators(page: &mut String) {
     let powertrain = Powertrain::new(vehicle());
-    let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode;
+    let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
     let problem = FirstGear { powertrain: &powertrain, mode };
     let start = START.to_array();
     let ours = |tolerance: f64| {
         let mut plant = HybridIntegrator::with_tolerance(&powertrain, 0.0, START, &INPUTS, tolerance).unwrap();
         plant.advance(&powertrain, &INPUTS, SPAN_S, &mut |_| {}).unwrap();
-        plant.state.to_array()
+        plant.state().to_array()
     };
     macro_rules! library {
         ($method:expr) => {
@@ -127,7 +127,7 @@ fn lsoda(powertrain: &Powertrain) -> Option<(f64, [f64; STATES])> {
     let mut next = || numbers.next()?.ok();
     let seconds = next()?;
     // The equations in Python are ours: their derivative at the start is the same.
-    let mode = HybridIntegrator::new(powertrain, 0.0, START, &INPUTS).ok()?.mode;
+    let mode = HybridIntegrator::new(powertrain, 0.0, START, &INPUTS).ok()?.mode();
     for slope in powertrain.derivative(mode, &START.to_array(), &INPUTS) {
         let theirs = next()?;
         assert!((slope - theirs).abs() <= 1e-9 * slope.abs().max(1.0), "{slope}, but {theirs} in Python");

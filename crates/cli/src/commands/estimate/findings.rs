@@ -1,7 +1,7 @@
 //! What is said about the estimates of a log.
 
 use logs::Role;
-use observer::{ChannelHealth, Estimate as Sample, Health, Input};
+use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::phase_name;
 use study::{ErrorScore, Passages};
 use trace::units;
@@ -26,7 +26,7 @@ pub(super) struct Findings {
 }
 
 /// The channels of an observer, and the role of each.
-const CHANNELS: usize = 5;
+const CHANNELS: usize = 7;
 
 impl Findings {
     pub(super) fn new() -> Self {
@@ -48,8 +48,16 @@ impl Findings {
         }
         self.rows += 1;
         self.last_s = row.time_s;
-        let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, command, .. } = row.input;
-        let readings = [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, command];
+        let input = &row.input;
+        let readings = [
+            input.engine_rad_s,
+            input.turbine_rad_s,
+            input.output_rad_s,
+            input.wheel_rad_s,
+            input.command,
+            input.offgoing_command,
+            input.engine_torque_n_m,
+        ];
         for (at, (reading, health)) in readings.iter().zip(estimate.channels.each()).enumerate() {
             self.came[at] += u64::from(reading.is_some());
             self.taken[at] += u64::from(reading.is_some() && health == ChannelHealth::Good);
@@ -69,11 +77,16 @@ impl Findings {
     ///
     /// # Errors
     /// More than half of the readings of a channel were refused, or none came.
-    pub(super) fn check(&self, command: Role, needs_wheel: bool) -> Result<(), Failure> {
-        let roles = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed, command];
-        for (at, role) in roles.into_iter().enumerate() {
+    pub(super) fn check(&self, commands: [Role; 2], needs_wheel: bool) -> Result<(), Failure> {
+        let speeds = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+        let roles = speeds.into_iter().chain(commands).chain([Role::EngineTorque]);
+        for (at, role) in roles.enumerate() {
             let (came, taken, name) = (self.came[at], self.taken[at], role.name());
-            let is_needed = role != Role::WheelSpeed || needs_wheel;
+            let is_needed = match role {
+                Role::WheelSpeed => needs_wheel,
+                Role::OffgoingCurrent | Role::OffgoingDuty | Role::EngineTorque => false,
+                _ => true,
+            };
             if came == 0 && is_needed {
                 return Err(Failure::Input(format!(
                     "{name} has no value in any of {} samples\nhint: look at the log with `wetclutch inspect`",
@@ -101,6 +114,9 @@ impl Findings {
                 Health::Good => continue,
                 Health::ReadingRefused => "a reading that was refused: it is impossible, or it contradicts all others",
                 Health::ChannelLost => "a channel without usable readings: the estimate is less certain",
+                Health::Flare => {
+                    "a flare: both clutches slip and the turbine runs away; the oncoming clutch carries too little"
+                }
                 // A few are normal while the cylinder fills: there the observers' valve model is faster than the
                 // valve maps.
                 Health::OutsideRange | Health::LimitedToRange if 100 * count <= self.rows => continue,

@@ -77,12 +77,12 @@ pub(super) fn estimate(
         table.flush()?;
     }
     log.finish(say)?;
-    let command = match vehicle.observer_valve.command_kind() {
-        CommandKind::Current => Role::OncomingCurrent,
-        CommandKind::DutyCycle => Role::OncomingDuty,
+    let commands = match vehicle.observer_valve.command_kind() {
+        CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
+        CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
     };
     let without_wheel = [ObserverKind::Rigid, ObserverKind::OpenLoop, ObserverKind::OpenLoopMaps];
-    findings.check(command, log.has_wheel_speed() && !without_wheel.contains(&chosen_observer.kind))?;
+    findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&chosen_observer.kind))?;
     shifts.check()?;
     table.finish()?;
     let sentences = findings.sentences();

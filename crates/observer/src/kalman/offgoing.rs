@@ -1,0 +1,116 @@
+//! What the offgoing clutch can carry at most, where the command of its valve is known.
+
+use drivetrain::{Clutch, Real};
+
+use super::covariance::{ALL, CONSIDERED, Measured};
+use super::valve_model::Commands;
+use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
+use crate::{ChannelHealth, InputLimits, Reading};
+
+/// The offgoing clutch as the filter knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OffgoingClutch<T> {
+    /// Its valve.
+    pub valve: ValveModel<T>,
+    /// Geometry and friction.
+    pub clutch: Clutch<T>,
+    /// Torque that it may carry open, N m.
+    pub open_n_m: T,
+}
+
+/// Its pressure by the valve model, from the first command on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct OffgoingPressure<T> {
+    commands: Commands<T>,
+    /// Pressure now, and the one that the commands in effect end at, Pa.
+    pressure_pa: T,
+    settled_pa: T,
+}
+
+impl<T: Real> OffgoingPressure<T> {
+    /// Before the first command.
+    pub(super) fn new() -> Self {
+        Self { commands: Commands::new(), pressure_pa: T::zero(), settled_pa: T::zero() }
+    }
+
+    /// Lets time pass.
+    #[inline]
+    pub(super) fn pass(&mut self, offgoing: &OffgoingClutch<T>, limits: &InputLimits<T>, dt_s: T) {
+        if self.commands.newest_pa().is_none() {
+            return;
+        }
+        self.commands.pass(dt_s);
+        self.settled_pa = offgoing.valve.target_pa(&self.commands, dt_s);
+        if self.settled_pa == self.pressure_pa {
+            return;
+        }
+        let step = offgoing.valve.step(self.settled_pa, self.pressure_pa, dt_s);
+        self.pressure_pa = limits.possible_pressure(step.phi * self.pressure_pa + step.drift_pa);
+    }
+
+    /// Takes a command.
+    #[inline]
+    pub(super) fn take(
+        &mut self,
+        offgoing: &OffgoingClutch<T>,
+        limits: &InputLimits<T>,
+        reading: Option<Reading<T>>,
+    ) -> ChannelHealth {
+        // A log without this channel misses nothing, and one command stands until the next.
+        let Some(reading) = reading else { return ChannelHealth::Absent };
+        if !(limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
+            return ChannelHealth::Refused;
+        }
+        let settled_pa = offgoing.valve.valve.settled_pressure(reading.value);
+        if self.commands.newest_pa().is_none() {
+            // The first command is taken to have stood for long.
+            self.pressure_pa = limits.possible_pressure(settled_pa);
+            self.settled_pa = self.pressure_pa;
+        }
+        self.commands.send(reading.age_s, settled_pa, offgoing.valve.needed_s(T::of(PIECE_S)));
+        ChannelHealth::Good
+    }
+}
+
+impl<T: Real> KalmanFilter<T> {
+    /// Takes in that the offgoing clutch carries no more than its capacity. A capacity is a limit and no reading: only a
+    /// torque that is beyond it by more than its own deviation is corrected, and towards that.
+    #[inline]
+    pub(super) fn limit_offgoing(&self, running: &mut Running<T>, offgoing: &OffgoingPressure<T>) {
+        let u = &self.uncertainty;
+        if offgoing.commands.newest_pa().is_none() {
+            return;
+        }
+        let clutch = &self.offgoing.clutch;
+        let pressure_pa = offgoing.pressure_pa;
+        let (torque, capacity) = (running.mean[OFFGOING], clutch.static_capacity(pressure_pa));
+        if torque.abs() <= capacity {
+            return;
+        }
+        // Lag and delay err in proportion to what the pressure still has to go.
+        let by_valve = (u.valve_gain * pressure_pa).hypot(u.valve_share * (pressure_pa - offgoing.settled_pa));
+        let per_pa = clutch.static_friction * clutch.lever() * clutch.piston_area_m2;
+        let deviation = (u.friction * capacity).hypot(per_pa * by_valve) + self.offgoing.open_n_m;
+        let most = capacity + deviation;
+        if torque.abs() <= most {
+            return;
+        }
+        let mut with = [T::zero(); ALL];
+        running.covariance.add_row(&mut with, OFFGOING, T::one());
+        let variance = with[OFFGOING].max(T::zero()) + deviation * deviation;
+        let beyond = if torque > T::zero() { most - torque } else { -most - torque };
+        let gain = running.covariance.correct(&Measured { with, variance }, &[T::one(); CONSIDERED]);
+        running.shift_by(&gain, beyond);
+    }
+}
+
+impl<T: Real> OffgoingClutch<T> {
+    /// The same clutch in another precision.
+    pub fn cast<U: Real>(&self) -> OffgoingClutch<U> {
+        OffgoingClutch {
+            valve: self.valve.cast(),
+            clutch: self.clutch.cast(),
+            open_n_m: U::of(self.open_n_m.to_f64_exact()),
+        }
+    }
+}
