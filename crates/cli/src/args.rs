@@ -105,9 +105,19 @@ pub(crate) enum Command {
     /// A log with other names, or of another format (Parquet, MDF 4, CAN with a DBC), needs a channel map, see `inspect
     /// --suggest`; every reading then comes with its own time.
     ///
+    /// Every shift of the log is found by the gears that the speeds show, and by gear signals where a channel map has
+    /// them. For the shifts of the vehicle file the summary gives pressure, torque and friction work with their range, the
+    /// lowest shaft torque, and the error where pressure or torque was measured. With -o OUT.csv there are also
+    ///
+    ///   OUT_report.html   the drive and each shift as figures; opens from disk
+    ///   OUT_shifts.csv, OUT_shifts.json   the shifts as numbers
+    ///
+    /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
+    ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
-    /// appears when it contains all rows; it may be the log itself.
+    /// appears when it contains all rows; it may be the log itself. A log of which a signal is unusable in most samples,
+    /// or in another unit by all appearances, is an error.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),
     /// Fit a vehicle file to logs of measured shifts
@@ -359,8 +369,9 @@ pub(crate) struct Inspect {
 
 #[derive(Debug, Args)]
 pub(crate) struct Estimate {
-    /// File of measured signals
-    pub(crate) log: PathBuf,
+    /// Logs; `-` is standard input. Several are estimated at a time, each into a file of its own
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) mapping: Mapping,
     /// Vehicle file
@@ -376,9 +387,75 @@ pub(crate) struct Estimate {
     /// their noise and lag; without the file they assume small noise and no lag
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// File for the estimate; default: standard output
-    #[arg(short, long, value_name = "OUT.csv")]
+    /// File for the estimate, by its ending CSV, .parquet or .mf4; of several logs the folder for their files. Default:
+    /// standard output, as CSV
+    #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
+    /// Columns of the estimate, in this order; time_s is always the first
+    #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
+    pub(crate) columns: Vec<String>,
+    /// Only the Nth shift of the log: its estimates, quality and figure
+    #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) shift: Option<u32>,
+    /// Only shifts between these gears, such as 1-2,2-3
+    #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
+    pub(crate) shifts: Vec<GearPair>,
+    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
+    #[arg(long)]
+    pub(crate) follow: bool,
+    /// Format of the files of several logs
+    #[arg(long, value_enum, default_value_t = FormatChoice::Csv)]
+    pub(crate) format: FormatChoice,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatChoice {
+    /// Comma-separated text
+    Csv,
+    /// Parquet
+    Parquet,
+    /// ASAM MDF 4.10
+    Mf4,
+}
+
+impl FormatChoice {
+    /// The ending of its files.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mf4 => "mf4",
+        }
+    }
+}
+
+/// The gears of a shift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct GearPair {
+    /// The gear before, from 1.
+    pub(crate) from: u32,
+    /// The gear after.
+    pub(crate) to: u32,
+}
+
+impl FromStr for GearPair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let gears = text.trim().split_once('-').and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+        match gears {
+            Some((from, to)) if from != to && from > 0 && to > 0 => Ok(Self { from, to }),
+            _ => Err("expected two gears from 1, such as 1-2".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for GearPair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.from, self.to)
+    }
 }
 
 #[derive(Debug, Args)]

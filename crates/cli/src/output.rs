@@ -27,20 +27,25 @@ fn coloured_hints(message: &str) -> String {
     message.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A table on standard output: the first `left` columns to the left, the others to the right.
+/// A table on standard output, see [`lines`].
 pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
+    let mut stdout = io::stdout().lock();
+    lines(left, rows).iter().try_for_each(|line| writeln!(stdout, "{line}"))
+}
+
+/// The lines of a table: the first `left` columns to the left, the others to the right.
+pub(crate) fn lines(left: usize, rows: &[Vec<String>]) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| cell.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut stdout = io::stdout().lock();
-    for row in rows {
+    let line = |row: &Vec<String>| {
         let cells =
             row.iter().zip(&widths).enumerate().map(|(j, (cell, &width))| {
                 if j < left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
             });
-        writeln!(stdout, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;
-    }
-    Ok(())
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
 }
 
 /// A line on standard output.

@@ -26,6 +26,8 @@ pub(crate) struct CsvLog {
     /// Column of each channel.
     columns: Vec<usize>,
     width: usize,
+    /// Rows in a batch: one where each is wanted as it comes.
+    batch: usize,
     notes: Vec<String>,
 }
 
@@ -44,6 +46,7 @@ impl CsvLog {
         head: Vec<u8>,
         rest: Box<dyn Read>,
         time: Option<&TimeColumn>,
+        is_followed: bool,
     ) -> Result<(Self, Vec<Channel>), LogError> {
         let start = if head.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
         let dialect = Dialect::of(path, &text(&head[start..]))?;
@@ -79,8 +82,9 @@ impl CsvLog {
             .iter()
             .map(|&i| Channel { name: names[i].0.clone(), unit: names[i].1.clone(), group: String::new() })
             .collect();
-        let log =
-            Self { path: path.to_owned(), dialect, reader: Some(reader), time, columns, width: titles.len(), notes };
+        let batch = if is_followed { 1 } else { BATCH };
+        let (path, width) = (path.to_owned(), titles.len());
+        let log = Self { path, dialect, reader: Some(reader), time, columns, width, batch, notes };
         Ok((log, channels))
     }
 
@@ -148,7 +152,7 @@ impl Rows<'_> {
 
 impl Stream for Rows<'_> {
     fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
-        for _ in 0..BATCH {
+        for _ in 0..self.log.batch {
             if !read_row(&self.log.path, &mut self.reader, self.log.dialect.preamble, &mut self.row)? {
                 if self.rows == 0 {
                     return Err(LogError::file(&self.log.path, "there are no rows"));

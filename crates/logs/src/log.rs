@@ -3,6 +3,10 @@
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use trace::Following;
 
 use crate::can::{CanLog, Database};
 use crate::csv_log::CsvLog;
@@ -64,11 +68,25 @@ impl Log {
     /// # Errors
     /// The file cannot be read, or is none of the known formats.
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Self, LogError> {
-        let io = LogError::io(path);
-        let mut reader: Box<dyn Read> = match path.to_str() {
+        let reader: Box<dyn Read> = match path.to_str() {
             Some("-") => Box::new(io::stdin()),
-            _ => Box::new(File::open(path).map_err(&io)?),
+            _ => Box::new(File::open(path).map_err(LogError::io(path))?),
         };
+        Self::of(path, options, reader, false)
+    }
+
+    /// Opens a log that is still being written: CSV or text of a CAN log. Its samples come as its lines do, until `stop` is
+    /// set or its pipe ends.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn follow(path: &Path, options: &OpenOptions, stop: Arc<AtomicBool>) -> Result<Self, LogError> {
+        let reader = Following::open(path, stop).map_err(LogError::io(path))?;
+        Self::of(path, options, Box::new(reader), true)
+    }
+
+    fn of(path: &Path, options: &OpenOptions, mut reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
+        let io = LogError::io(path);
         let head = head(&mut reader).map_err(&io)?;
         if head.is_empty() {
             return Err(LogError::file(path, "the file is empty"));
@@ -76,6 +94,12 @@ impl Log {
         let database = options.dbc.as_deref().map(Database::read).transpose()?;
         let is_file = path != Path::new("-");
         let (source, channels) = match Format::of(&head) {
+            Format::Mdf | Format::Parquet | Format::Can(CanKind::Blf) if is_followed => {
+                return Err(LogError::file(
+                    path,
+                    "MDF, Parquet and BLF files cannot be followed while they are written\nhint: follow CSV, candump or ASC; read this file when it is complete",
+                ));
+            }
             Format::Mdf if is_file => {
                 MdfLog::open(path, database).map(|(log, channels)| (Source::Mdf(Box::new(log)), channels))?
             }
@@ -105,9 +129,9 @@ impl Log {
                     )
                 })?;
                 let channels = database.channels().to_vec();
-                (Source::Can(CanLog::new(path, kind, head, reader, database)), channels)
+                (Source::Can(CanLog::new(path, kind, head, reader, database, is_followed)), channels)
             }
-            Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref())
+            Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref(), is_followed)
                 .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
         };
         Ok(Self { path: path.to_owned(), channels, source })

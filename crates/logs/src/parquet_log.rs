@@ -116,7 +116,7 @@ fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -
 
 fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
     let hint = match error.to_string().contains("Disabled feature") {
-        true => "\nhint: this compression is not built in; write the file with snappy, gzip or none",
+        true => "\nhint: this compression is not built in; write the file with snappy, gzip, lz4 or none",
         false => "",
     };
     LogError::damaged(path, position, format!("{error}{hint}"))

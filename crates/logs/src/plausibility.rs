@@ -17,6 +17,9 @@ pub struct Extremes {
     sizes: [u32; SIZES],
 }
 
+/// A shaft that never turns faster says nothing about its sign, rad/s. A car in reverse is slower.
+const SMALL_RAD_S: f64 = 60.0;
+
 /// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has.
 const SIZES: usize = 64;
 
@@ -51,51 +54,96 @@ impl Extremes {
         None
     }
 
+    /// Whether nearly nothing is negative.
+    fn is_forward(&self) -> bool {
+        self.greatest > SMALL_RAD_S && self.least > -0.1 * self.greatest
+    }
+
+    /// Whether nearly nothing is positive.
+    fn is_backward(&self) -> bool {
+        self.least < -SMALL_RAD_S && self.greatest < -0.1 * self.least
+    }
+
     /// The greatest size.
     fn size(&self) -> f64 {
         self.greatest.abs().max(self.least.abs())
     }
 }
 
-/// What cannot be right, each with a hint.
-pub fn findings(summary: &[RoleSummary]) -> Vec<String> {
+/// A unit that cannot be right.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// The signal.
+    pub role: Role,
+    /// What is wrong, with what is likely.
+    pub message: String,
+    /// What is likely.
+    pub likely: Likely,
+}
+
+/// What is likely where a unit cannot be right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Likely {
+    /// A unit; may be several, or words.
+    Unit(&'static str),
+    /// The other sign.
+    OtherSign,
+}
+
+/// What cannot be right.
+pub fn findings(summary: &[RoleSummary]) -> Vec<Finding> {
     let turning =
         |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.size() > 1.0);
-    let mut findings: Vec<String> = summary.iter().filter_map(alone).collect();
-    // A turbine reaches nearly the speed of the engine; in another unit it is ten times off.
-    if let (Some(engine), Some(turbine), true) =
-        (turning(Role::EngineSpeed), turning(Role::TurbineSpeed), findings.is_empty())
-    {
-        let ratio = turbine.extremes.size() / engine.extremes.size();
-        let off = |found: &str, likely: &str| {
-            finding(
-                turbine,
-                found,
-                &format!("its greatest value is {ratio:.2} times that of the engine speed; it looks like {likely}"),
-            )
-        };
-        if (0.08..0.13).contains(&ratio) && turbine.unit_name == "rpm" {
-            findings.push(off("rpm", "rad/s"));
-        } else if (7.5..12.5).contains(&ratio) && turbine.unit_name == "rad/s" {
-            findings.push(off("rad/s", "rpm"));
+    let mut findings: Vec<Finding> = summary.iter().filter_map(alone).collect();
+    if !findings.is_empty() {
+        return findings;
+    }
+    // A turbine reaches nearly the speed of the engine; in another unit it is ten times off. Wheels are slower than the
+    // gearbox output, and this is at most three times as fast as the turbine.
+    let pairs: [(Role, Role, &str, f64, f64, &'static str); 4] = [
+        (Role::EngineSpeed, Role::TurbineSpeed, "rpm", 0.08, 0.13, "rad/s"),
+        (Role::EngineSpeed, Role::TurbineSpeed, "rad/s", 7.5, 12.5, "rpm"),
+        (Role::TurbineSpeed, Role::OutputSpeed, "rad/s", 3.2, 20.0, "rpm"),
+        (Role::OutputSpeed, Role::WheelSpeed, "rad/s", 1.7, 20.0, "rpm"),
+    ];
+    for (of, role, unit, least, most, likely) in pairs {
+        let (Some(of), Some(entry)) = (turning(of), turning(role)) else { continue };
+        let ratio = entry.extremes.size() / of.extremes.size();
+        if entry.unit_name == unit && (least..most).contains(&ratio) {
+            let reference = of.role.name();
+            let why = format!("its greatest value is {ratio:.2} times that of {reference}; it looks like {likely}");
+            findings.push(finding(entry, unit, &why, likely));
+        }
+        if of.extremes.is_forward() && entry.extremes.is_backward() {
+            let (name, reference) = (entry.role.name(), of.role.name());
+            let message = format!("{name} is negative and {reference} positive: its sign is the other way round");
+            findings.push(Finding { role, message, likely: Likely::OtherSign });
         }
     }
     findings
 }
 
-fn finding(entry: &RoleSummary, found: &str, why: &str) -> String {
-    let name = entry.role.name();
-    format!(
-        "{name} cannot be in {found}: {why}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`"
-    )
+fn finding(entry: &RoleSummary, found: &str, why: &str, likely: &'static str) -> Finding {
+    Finding {
+        role: entry.role,
+        message: format!("{} cannot be in {found}: {why}", entry.role.name()),
+        likely: Likely::Unit(likely),
+    }
 }
 
 /// What cannot be right by the values of the signal alone.
-fn alone(entry: &RoleSummary) -> Option<String> {
+fn alone(entry: &RoleSummary) -> Option<Finding> {
     let middle = entry.extremes.middle()?;
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
-    let say = |text: String, likely: &str| Some(finding(entry, unit, &format!("{text}; it looks like {likely}")));
+    let say = |text: String, likely| Some(finding(entry, unit, &format!("{text}; it looks like {likely}"), likely));
     match entry.role.quantity()? {
+        // An offset of a command that is off is small.
+        Quantity::Current | Quantity::Share
+            if entry.role.is_command() && entry.extremes.greatest <= 0.0 && entry.extremes.least < -0.05 =>
+        {
+            let message = format!("{} is never positive: its sign is the other way round", entry.role.name());
+            Some(Finding { role: entry.role, message, likely: Likely::OtherSign })
+        }
         Quantity::Rotation
             if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) =>
         {
@@ -164,7 +212,7 @@ mod tests {
         ];
         for (role, unit, values, likely) in cases {
             let found = findings(&[summary(role, unit, &values)]);
-            assert!(found.len() == 1 && found[0].contains(&format!("looks like {likely}")), "{found:?}");
+            assert!(found.len() == 1 && found[0].message.contains(&format!("looks like {likely}")), "{found:?}");
         }
     }
 
@@ -179,16 +227,43 @@ mod tests {
             summary(Role::Throttle, "%", &[0.0, 0.14]),
             summary(Role::OncomingPressure, "bar", &[0.0, 1.6e6]),
             summary(Role::OncomingCurrent, "A", &[0.0]),
+            summary(Role::OncomingCurrent, "A", &[-0.002, -0.001]),
+            summary(Role::Throttle, "1", &[-0.2]),
         ];
         for entry in fine {
-            assert_eq!(findings(std::slice::from_ref(&entry)), Vec::<String>::new());
+            assert_eq!(findings(std::slice::from_ref(&entry)), Vec::new());
         }
     }
 
     #[test]
-    fn a_turbine_in_another_unit_than_the_engine_is_found() {
-        let engine = summary(Role::EngineSpeed, "rpm", &[80.0, 400.0]);
-        let turbine = summary(Role::TurbineSpeed, "rpm", &[0.0, 39.0]);
-        assert!(findings(&[engine, turbine])[0].contains("it looks like rad/s"));
+    fn a_shaft_in_another_unit_than_the_one_before_it_is_found() {
+        let speeds = [
+            (Role::EngineSpeed, 400.0),
+            (Role::TurbineSpeed, 390.0),
+            (Role::OutputSpeed, 330.0),
+            (Role::WheelSpeed, 100.0),
+        ];
+        let log = |unit: &str, wrong: Option<(Role, f64)>| {
+            let value = |role, value| value * wrong.filter(|wrong| wrong.0 == role).map_or(1.0, |wrong| wrong.1);
+            findings(
+                &speeds.map(|(role, most)| summary(role, unit, &[0.0, 0.2 * value(role, most), value(role, most)])),
+            )
+        };
+        let rpm = 30.0 / std::f64::consts::PI;
+        for (unit, role, factor, likely) in [
+            ("rpm", Role::TurbineSpeed, 1.0 / rpm, "rad/s"),
+            ("rad/s", Role::TurbineSpeed, 9.0, "rpm"),
+            ("rad/s", Role::OutputSpeed, 6.0, "rpm"),
+            ("rad/s", Role::WheelSpeed, rpm, "rpm"),
+        ] {
+            let found = log(unit, Some((role, factor)));
+            assert!(
+                found.iter().any(|found| found.role == role && found.likely == Likely::Unit(likely)),
+                "{role:?}: {found:?}"
+            );
+        }
+        assert_eq!((log("rad/s", None), log("rpm", None)), (Vec::new(), Vec::new()));
+        let found = log("rad/s", Some((Role::OutputSpeed, -1.0)));
+        assert_eq!((found[0].role, found[0].likely), (Role::OutputSpeed, Likely::OtherSign));
     }
 }

@@ -10,7 +10,7 @@
 //!   the turbine.
 
 use crate::map::Resolved;
-use crate::plausibility::Extremes;
+use crate::plausibility::{Extremes, Likely};
 use crate::samples::{Quality, QualityCounts};
 use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
 
@@ -149,7 +149,15 @@ impl<'a> Readings<'a> {
     /// A unit is wrong by all appearances.
     pub fn check_units(&self) -> Result<(), LogError> {
         match plausibility::findings(&self.summary()).into_iter().next() {
-            Some(finding) => Err(LogError::map(finding)),
+            Some(finding) => {
+                let (name, message) = (finding.role.name(), finding.message);
+                Err(LogError::map(match finding.likely {
+                    Likely::Unit(_) => {
+                        format!("{message}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`")
+                    }
+                    Likely::OtherSign => format!("{message}\nhint: set `channel.{name}.scale` to a negative number"),
+                }))
+            }
             None => Ok(()),
         }
     }

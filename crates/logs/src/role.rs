@@ -102,6 +102,11 @@ impl Role {
         Self::all().find(|role| role.name() == name)
     }
 
+    /// Whether it is the command of a valve.
+    pub fn is_command(self) -> bool {
+        matches!(self, Self::OncomingCurrent | Self::OffgoingCurrent | Self::OncomingDuty | Self::OffgoingDuty)
+    }
+
     /// Whether it is the speed of a shaft or of the car.
     pub fn is_speed(self) -> bool {
         matches!(

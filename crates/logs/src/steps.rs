@@ -104,10 +104,10 @@ impl<'a> Steps<'a> {
     }
 }
 
-impl Iterator for Steps<'_> {
-    type Item = Result<Step, LogError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
+impl Steps<'_> {
+    /// The next step; `seen` takes every reading that was met on the way, also those that no observer reads. A reading that
+    /// begins the step after is among them.
+    pub fn next_seeing(&mut self, mut seen: impl FnMut(Reading)) -> Option<Result<Step, LogError>> {
         while !self.ended {
             let reading = match self.readings.next() {
                 None => {
@@ -120,6 +120,7 @@ impl Iterator for Steps<'_> {
                 }
                 Some(Ok(reading)) => reading,
             };
+            seen(reading);
             let mut open = self.open.unwrap_or(Open::new(reading.stamp_s));
             let Some(place) = open.place(reading.role) else { continue };
             if place.is_some() {
@@ -136,5 +137,13 @@ impl Iterator for Steps<'_> {
             self.open = Some(open);
         }
         self.open.take().map(|open| Ok(self.close(open)))
+    }
+}
+
+impl Iterator for Steps<'_> {
+    type Item = Result<Step, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_seeing(drop)
     }
 }

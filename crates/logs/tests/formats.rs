@@ -133,7 +133,7 @@ fn can_fd_frames_are_read() {
 
 #[test]
 fn parquet_gives_numbers_and_leaves_out_what_is_absent() {
-    for file in ["snappy.parquet", "gzip.parquet", "stamps.parquet"] {
+    for file in ["snappy.parquet", "gzip.parquet", "lz4.parquet", "stamps.parquet"] {
         let (log, samples, notes) = read(&data(file), &OpenOptions::default()).unwrap();
         let came: Vec<u32> = (0..ROWS).filter(|i| i % 7 != 2).collect();
         let engine = came.iter().map(|&i| good(f64::from(i) * 0.01, 800.0 + 10.0 * f64::from(i)));

@@ -105,9 +105,20 @@ impl Drive {
 }
 
 fn found(gearbox: &Gearbox, roles: &[Role], readings: &[Reading]) -> Vec<Shift> {
-    let mut finder = ShiftFinder::new(gearbox, |role| roles.contains(&role)).unwrap();
+    let new = || ShiftFinder::new(gearbox, |role| roles.contains(&role)).unwrap();
+    let mut finder = new();
     readings.iter().for_each(|reading| finder.push(reading));
-    finder.finish()
+    let at_the_end = finder.finish();
+    // Shifts that are taken out on the way are the same.
+    let mut finder = new();
+    let mut on_the_way = Vec::new();
+    for reading in readings {
+        finder.push(reading);
+        on_the_way.extend(finder.take_settled(reading.stamp_s));
+    }
+    on_the_way.extend(finder.finish());
+    assert_eq!(on_the_way, at_the_end);
+    at_the_end
 }
 
 fn gears(shifts: &[Shift]) -> Vec<(u32, u32)> {

@@ -9,6 +9,8 @@ pub enum Axis {
     Within(f64, f64),
     /// From the first to the second value, whatever there is to show.
     Fixed(f64, f64),
+    /// The same without ticks, where the height of a curve means nothing.
+    Unmarked(f64, f64),
 }
 
 /// Room that a shaded range may take beyond the curves, as a share of their height.
@@ -35,7 +37,9 @@ impl Axis {
     /// The axis for curves of this lowest and highest value and a shaded range of those, with about `ticks` ticks.
     pub(crate) fn scale(self, curves: Option<(f64, f64)>, range: Option<(f64, f64)>, ticks: f64) -> Scale {
         let (low, high) = match (self, curves) {
-            (Self::Fixed(low, high), _) => return Scale { low, high, step: nice_step((high - low) / ticks) },
+            (Self::Fixed(low, high) | Self::Unmarked(low, high), _) => {
+                return Scale { low, high, step: nice_step((high - low) / ticks) };
+            }
             (Self::Within(low, high), None) => (low, high),
             (Self::Within(least, most), Some((low, high))) => (low.clamp(least, most), high.clamp(least, most)),
             (Self::All, None) => (0.0, 1.0),

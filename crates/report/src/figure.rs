@@ -240,6 +240,9 @@ impl Figure {
             .with_label_size(LABEL_SIZE)
             .with_grid_line_width(0.5)
             .with_axis_line_width(0.8);
+        if placed.is_unmarked() {
+            layout = layout.with_y_tick_format(TickFormat::Custom(Arc::new(|_| String::new())));
+        }
         layout.suppress_x_ticks = !last;
         layout.show_legend = false;
         for span in &self.spans {
@@ -309,7 +312,14 @@ impl Placed<'_> {
 
     /// Width of the labels of the ticks.
     fn ticks(&self) -> f64 {
+        if self.is_unmarked() {
+            return TICKS;
+        }
         width(&self.scale.text(self.scale.low)).max(width(&self.scale.text(self.scale.high))) + TICKS
+    }
+
+    fn is_unmarked(&self) -> bool {
+        matches!(self.panel.axis, Axis::Unmarked(..))
     }
 
     #[expect(clippy::cast_precision_loss, reason = "a few lines")]

@@ -6,6 +6,7 @@ pub mod error_bound_page;
 pub mod figure;
 pub mod gearbox_figure;
 mod legend;
+pub mod log_page;
 pub mod map_figures;
 pub mod page;
 pub mod palette;
@@ -17,6 +18,7 @@ pub mod tables;
 
 pub use bench_page::bench_page;
 pub use error_bound_page::error_bound_page;
+pub use log_page::LogPage;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;
 pub use sensitivity_page::sensitivity_page;

@@ -8,9 +8,9 @@ use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke, extremes};
 use crate::palette::{RANGE, main_observer, observer_strokes};
 
 /// Colour of the torque phase.
-const TORQUE_PHASE: &str = "#fbf0d0";
+pub(crate) const TORQUE_PHASE: &str = "#fbf0d0";
 /// Colour of the inertia phase.
-const INERTIA_PHASE: &str = "#ededed";
+pub(crate) const INERTIA_PHASE: &str = "#ededed";
 /// How much is shown before the load transfer and after lock-up, over the time between them.
 const MARGIN: f64 = 0.55;
 /// Smallest range of pressures that an axis is made for, MPa.

@@ -1,7 +1,7 @@
 //! Estimates as columns of a table.
 
 use observer::Estimate;
-use trace::{Cell, Trace, signal};
+use trace::{Cell, ColumnKind, Trace, signal};
 
 /// A column of numbers: its name, and its value where there is one.
 type Number = (&'static str, fn(&Estimate<f64>) -> Option<f64>);
@@ -46,17 +46,46 @@ impl EstimateColumns {
             .chain(or_none(self.shaft_range, &SHAFT_RANGE))
     }
 
-    /// Their names, without the time.
-    pub fn names(self) -> impl Iterator<Item = &'static str> {
-        self.numbers().map(|(name, _)| *name).chain([signal::PHASE, signal::HEALTH]).chain(signal::READINGS)
+    /// The columns, without the time.
+    pub fn columns(self) -> Vec<OutputColumn> {
+        let numbers = self.numbers().map(|&(name, value)| OutputColumn { name, content: Content::Number(value) });
+        let words = [(signal::PHASE, Content::Phase), (signal::HEALTH, Content::Health)].into_iter();
+        let readings = signal::READINGS.into_iter().enumerate().map(|(at, name)| (name, Content::Reading(at)));
+        numbers.chain(words.chain(readings).map(|(name, content)| OutputColumn { name, content })).collect()
+    }
+}
+
+/// A column of a table of estimates.
+#[derive(Debug, Clone, Copy)]
+pub struct OutputColumn {
+    /// Its name.
+    pub name: &'static str,
+    content: Content,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Content {
+    Number(fn(&Estimate<f64>) -> Option<f64>),
+    Phase,
+    Health,
+    /// What became of the reading of a channel, by its place in [`signal::READINGS`].
+    Reading(usize),
+}
+
+impl OutputColumn {
+    /// Numbers or words.
+    pub fn kind(&self) -> ColumnKind {
+        if matches!(self.content, Content::Number(_)) { ColumnKind::Number } else { ColumnKind::Word }
     }
 
-    /// What an estimate writes into them.
-    pub fn cells(self, estimate: &Estimate<f64>) -> impl Iterator<Item = Cell<'static>> {
-        let number = |(_, value): &Number| Cell::Number(value(estimate).unwrap_or(f64::NAN));
-        let words = [estimate.phase.name(), estimate.health.name()].map(Cell::Word);
-        let channels = estimate.channels.each().map(|channel| Cell::Word(channel.name()));
-        self.numbers().map(number).chain(words).chain(channels)
+    /// What an estimate writes into it.
+    pub fn cell(&self, estimate: &Estimate<f64>) -> Cell<'static> {
+        match self.content {
+            Content::Number(value) => Cell::Number(value(estimate).unwrap_or(f64::NAN)),
+            Content::Phase => Cell::Word(estimate.phase.name()),
+            Content::Health => Cell::Word(estimate.health.name()),
+            Content::Reading(at) => Cell::Word(estimate.channels.each()[at].name()),
+        }
     }
 }
 

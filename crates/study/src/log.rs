@@ -13,11 +13,11 @@ use crate::Signals;
 pub const FIRST_LOOK: usize = 10_000;
 
 /// The samples of a log. However long it is, only its first rows are held in memory, until they have been used.
-#[derive(Debug)]
 pub struct Log {
     rows: CsvRows,
     signals: Signals<usize>,
     truth: Option<TruthColumns>,
+    beside: [Option<usize>; BESIDE.len()],
     last_s: Option<f64>,
     looked_at: VecDeque<(Input<f64>, LogRow)>,
     median_step_s: f64,
@@ -37,7 +37,36 @@ pub struct LogRow {
     pub time_s: f64,
     /// The true values, if the log has them.
     pub truth: Option<Truth>,
+    /// What else the row holds.
+    pub beside: Beside,
 }
+
+/// Signals that no observer reads; NaN where the log has none. They tell how a shift was and how far an estimate is off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beside {
+    /// Pressure of the oncoming clutch, Pa.
+    pub pressure_pa: f64,
+    /// Torque of the oncoming clutch, N m.
+    pub torque_n_m: f64,
+    /// Engine torque, N m.
+    pub engine_n_m: f64,
+    /// Throttle, 0 to 1.
+    pub throttle: f64,
+    /// Speed of the car, m/s.
+    pub vehicle_m_s: f64,
+    /// Acceleration of the car, m/s^2.
+    pub vehicle_m_s2: f64,
+}
+
+/// The columns of [`Beside`].
+const BESIDE: [&str; 6] = [
+    signal::ONCOMING_PRESSURE,
+    signal::ONCOMING_TORQUE,
+    signal::ENGINE_TORQUE,
+    signal::THROTTLE,
+    signal::VEHICLE_SPEED,
+    signal::VEHICLE_ACCELERATION,
+];
 
 /// The truth at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,13 +83,21 @@ impl Log {
     /// # Errors
     /// The file cannot be read, lacks a signal, or one of its first rows is wrong.
     pub fn open(path: &Path, vehicle: &Vehicle) -> Result<Self, TraceError> {
-        let rows = CsvRows::open(path)?;
+        Self::of(CsvRows::open(path)?, vehicle, FIRST_LOOK)
+    }
+
+    /// The same of rows from anywhere; looks at the first `look` of them.
+    ///
+    /// # Errors
+    /// A signal is missing, or one of the first rows is wrong.
+    pub fn of(rows: CsvRows, vehicle: &Vehicle, look: usize) -> Result<Self, TraceError> {
         let signals = Signals::choose(vehicle, |name| rows.find(name), |name| rows.require(name))?;
         let truth = rows.find(signal::TRUE_PHASE).zip(rows.find(signal::ONCOMING_PRESSURE));
         let truth = truth.map(|(phase, pressure)| TruthColumns { phase, pressure });
-        let looked_at = VecDeque::with_capacity(FIRST_LOOK);
-        let mut log = Self { rows, signals, truth, last_s: None, looked_at, median_step_s: f64::NAN };
-        while log.looked_at.len() < FIRST_LOOK
+        let beside = BESIDE.map(|name| rows.find(name));
+        let looked_at = VecDeque::with_capacity(look);
+        let mut log = Self { rows, signals, truth, beside, last_s: None, looked_at, median_step_s: f64::NAN };
+        while log.looked_at.len() < look
             && let Some(sample) = log.read()?
         {
             log.looked_at.push_back(sample);
@@ -68,6 +105,16 @@ impl Log {
         let steps = log.looked_at.iter().skip(1).map(|(input, _)| input.dt_s);
         log.median_step_s = trace::median_step_s(steps.collect());
         Ok(log)
+    }
+
+    /// The first rows, which wait to be used.
+    pub fn looked_at(&self) -> impl Iterator<Item = &(Input<f64>, LogRow)> {
+        self.looked_at.iter()
+    }
+
+    /// Which of the signals in [`Beside`] there are, by their names.
+    pub fn has_beside(&self, name: &str) -> bool {
+        BESIDE.iter().zip(self.beside).any(|(known, column)| *known == name && column.is_some())
     }
 
     /// Where the signals are.
@@ -101,7 +148,11 @@ impl Log {
             let phase = Phase::ALL.into_iter().find(|phase| phase.name() == word)?;
             Some(rows.number(columns.pressure).map(|pressure_pa| Truth { phase, pressure_pa }))
         });
-        Ok(Some((input, LogRow { time_s, truth: truth.transpose()? })))
+        // A word in a signal that is not needed is no error.
+        let [pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2] =
+            self.beside.map(|column| column.and_then(|column| rows.number(column).ok()).unwrap_or(f64::NAN));
+        let beside = Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 };
+        Ok(Some((input, LogRow { time_s, truth: truth.transpose()?, beside })))
     }
 }
 

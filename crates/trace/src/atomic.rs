@@ -7,7 +7,7 @@
 
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
@@ -54,6 +54,11 @@ impl WholeFile {
         Ok(file)
     }
 
+    /// Whether a regular file will have this content; otherwise the bytes go directly to a device or pipe.
+    pub fn is_replacement(&self) -> bool {
+        self.replaces.is_some()
+    }
+
     /// Gives the file its name.
     ///
     /// # Errors
@@ -83,6 +88,12 @@ impl WholeFile {
         self.writer.flush()?;
         // A device or pipe has no disk to reach.
         if self.replaces.is_some() { self.writer.get_ref().sync_all() } else { Ok(()) }
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.writer.seek(to)
     }
 }
 

@@ -19,7 +19,6 @@ const READ_AT_ONCE: usize = 64 << 10;
 
 /// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
 /// them and rise. An empty cell, or `nan`, is a reading that did not come, and becomes NaN. A column without a name is passed over.
-#[derive(Debug)]
 pub struct CsvRows {
     path: PathBuf,
     reader: csv::Reader<RowByRow>,
@@ -37,11 +36,19 @@ impl CsvRows {
     /// The file cannot be read, has no time, or two columns of the same signal.
     pub fn open(path: &Path) -> Result<Self, TraceError> {
         let file = File::open(path).map_err(|source| TraceError::Io { path: path.to_owned(), source })?;
+        Self::of(path, Box::new(file))
+    }
+
+    /// The same from anywhere; `path` is for messages.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .buffer_capacity(READ_AT_ONCE)
-            .from_reader(RowByRow { file, left: LONGEST_ROW });
+            .from_reader(RowByRow { input, left: LONGEST_ROW });
         let row = csv::ByteRecord::new();
         let mut rows = Self { path: path.to_owned(), reader, columns: Vec::new(), time_at: 0, row, time_s: None };
         if !rows.read_row()? {
@@ -129,6 +136,11 @@ impl CsvRows {
         })
     }
 
+    /// What the cells of a column are multiplied by: 1 where the name has its unit in SI.
+    pub fn factor(&self, column: usize) -> f64 {
+        self.columns[column].1
+    }
+
     /// The number in a column of this row, in SI; NaN where the cell is empty.
     ///
     /// # Errors
@@ -177,10 +189,9 @@ impl CsvRows {
     }
 }
 
-/// A file of which no row may be longer than what is left.
-#[derive(Debug)]
+/// An input of which no row may be longer than what is left.
 struct RowByRow {
-    file: File,
+    input: Box<dyn Read>,
     left: usize,
 }
 
@@ -190,7 +201,7 @@ impl Read for RowByRow {
             return Err(io::ErrorKind::InvalidData.into());
         }
         let most = buffer.len().min(self.left);
-        let read = self.file.read(&mut buffer[..most])?;
+        let read = self.input.read(&mut buffer[..most])?;
         self.left -= read;
         Ok(read)
     }
@@ -241,6 +252,8 @@ pub fn write_csv(path: &Path, trace: &Trace) -> io::Result<()> {
 pub enum Cell<'a> {
     /// A number; NaN becomes an empty cell.
     Number(f64),
+    /// A whole number from 0.
+    Whole(u64),
     /// A word.
     Word(&'a str),
 }
@@ -270,6 +283,7 @@ impl<W: Write> CsvWriter<W> {
         for cell in std::iter::once(Cell::Number(time_s)).chain(cells) {
             match cell {
                 Cell::Word(word) => self.writer.write_field(word),
+                Cell::Whole(number) => self.writer.write_field(number.to_string()),
                 Cell::Number(number) => {
                     self.text.clear();
                     if !number.is_nan() {
@@ -282,6 +296,14 @@ impl<W: Write> CsvWriter<W> {
             .map_err(into_io)?;
         }
         self.writer.write_record(None::<&[u8]>).map_err(into_io)
+    }
+
+    /// Hands the rows so far to the writer below, and flushes it.
+    ///
+    /// # Errors
+    /// What the writer meets.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
     }
 
     /// Hands back the writer, to which every row has gone.

@@ -7,9 +7,12 @@
 pub mod atomic;
 pub mod csv_file;
 pub mod error;
+pub mod follow;
+pub mod mdf_file;
 pub mod parquet_file;
 pub mod rows;
 pub mod signal;
+pub mod table;
 pub mod units;
 
 use std::borrow::Cow;
@@ -18,8 +21,11 @@ use std::path::PathBuf;
 pub use atomic::{WholeFile, check_target, write_whole};
 pub use csv_file::{Cell, CsvRows, CsvWriter, read_csv, write_csv};
 pub use error::TraceError;
-pub use parquet_file::{ColumnKind, write_parquet};
+pub use follow::Following;
+pub use mdf_file::MdfWriter;
+pub use parquet_file::{ColumnKind, ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
+pub use table::{TableFormat, TableWriter};
 pub use units::{Quantity, Unit};
 
 /// A word of a column; the program's own cost nothing to copy.

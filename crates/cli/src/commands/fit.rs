@@ -5,7 +5,7 @@ use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, Shif
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Fit;
-use crate::commands::estimate::sensors;
+use crate::commands::estimate::observer::sensors;
 use crate::commands::{channel_map, check_output, not_an_input, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;

@@ -10,7 +10,6 @@ mod fit;
 mod gearbox;
 mod init;
 mod inspect;
-mod measured;
 mod reproduce;
 mod sensitivity;
 mod simulate;

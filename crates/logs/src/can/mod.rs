@@ -56,12 +56,23 @@ pub(crate) struct CanLog {
     kind: CanKind,
     input: Option<Box<dyn Read>>,
     database: Database,
+    /// Frames in a batch: one where each is wanted as it comes.
+    batch: usize,
 }
 
 impl CanLog {
-    pub(crate) fn new(path: &Path, kind: CanKind, head: Vec<u8>, rest: Box<dyn Read>, database: Database) -> Self {
+    pub(crate) fn new(
+        path: &Path,
+        kind: CanKind,
+        head: Vec<u8>,
+        rest: Box<dyn Read>,
+        database: Database,
+        is_followed: bool,
+    ) -> Self {
+        const FRAMES: usize = 64;
         let input: Box<dyn Read> = Box::new(Cursor::new(head).chain(rest));
-        Self { path: path.to_owned(), kind, input: Some(input), database }
+        let batch = if is_followed { 1 } else { FRAMES };
+        Self { path: path.to_owned(), kind, input: Some(input), database, batch }
     }
 
     pub(crate) fn format(&self) -> &'static str {
@@ -79,6 +90,7 @@ impl CanLog {
         Ok(Box::new(Signals {
             frames: frames(&self.path, self.kind, input)?,
             decoder: Decoder::new(&self.database, wanted),
+            batch: self.batch,
         }))
     }
 }
@@ -94,12 +106,12 @@ fn frames(path: &Path, kind: CanKind, input: Box<dyn Read>) -> Result<Box<dyn Fr
 struct Signals<'a> {
     frames: Box<dyn Frames>,
     decoder: Decoder<'a>,
+    batch: usize,
 }
 
 impl Stream for Signals<'_> {
     fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
-        const FRAMES: usize = 64;
-        for _ in 0..FRAMES {
+        for _ in 0..self.batch {
             let Some(frame) = self.frames.next_frame()? else { return Ok(false) };
             self.decoder.decode(&frame, batch);
         }

@@ -142,6 +142,11 @@ const AFTER_S: f64 = 0.6;
 const COMMAND_S: f64 = 5.0;
 /// A change of the gear signal and one of the ratio are one shift if they are at most so far apart, s.
 const SAME_S: f64 = 3.0;
+/// Nothing that comes so much later changes a shift, s: a gear signal may come three seconds before a change of the ratio, and
+/// that may take three seconds.
+pub const SETTLED_S: f64 = SAME_S + ratio::LONGEST_S + AFTER_S;
+/// A shift begins at most so much before its end, s.
+pub const LONGEST_S: f64 = COMMAND_S + ratio::LONGEST_S;
 
 /// Finds the shifts of a drive.
 pub struct ShiftFinder {
@@ -247,27 +252,43 @@ impl ShiftFinder {
         self.commands.clear();
     }
 
-    /// The shifts, in the order of their beginning.
+    /// Takes out the shifts that nothing after `now_s` can change, in the order of their beginning; each is given once.
+    pub fn take_settled(&mut self, now_s: f64) -> Vec<Shift> {
+        if self.found.is_empty() && self.by_signal.is_empty() {
+            return Vec::new();
+        }
+        self.join_signals();
+        let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
+        let (open, mut settled): (Vec<_>, Vec<_>) = std::mem::take(&mut self.found).into_iter().partition(is_open);
+        self.found = open;
+        let (open, alone): (Vec<_>, Vec<_>) = std::mem::take(&mut self.by_signal).into_iter().partition(is_open);
+        self.by_signal = open;
+        settled.extend(alone);
+        settled.sort_by(|one, other| one.start_s().total_cmp(&other.start_s()));
+        settled
+    }
+
+    /// The shifts that were not taken out yet, in the order of their beginning.
     pub fn finish(mut self) -> Vec<Shift> {
         self.settle(f64::INFINITY);
-        let mut shifts = self.found;
-        for by_signal in self.by_signal {
+        self.take_settled(f64::INFINITY)
+    }
+
+    /// Gives each shift that the ratio showed the gear signal that belongs to it.
+    fn join_signals(&mut self) {
+        let found = &mut self.found;
+        self.by_signal.retain(|by_signal| {
             let same = |shift: &&mut Shift| {
                 let near = |gear_s: f64| (shift.start_s() - SAME_S..=shift.end_s() + SAME_S).contains(&gear_s);
                 shift.gear_s.is_none()
                     && (shift.from, shift.to) == (by_signal.from, by_signal.to)
                     && by_signal.gear_s.is_some_and(near)
             };
-            match shifts.iter_mut().find(same) {
-                Some(shift) => {
-                    shift.gear_s = by_signal.gear_s;
-                    shift.command_s = shift.command_s.or(by_signal.command_s);
-                }
-                None => shifts.push(by_signal),
-            }
-        }
-        shifts.sort_by(|one, other| one.start_s().total_cmp(&other.start_s()));
-        shifts
+            let Some(shift) = found.iter_mut().find(same) else { return true };
+            shift.gear_s = by_signal.gear_s;
+            shift.command_s = shift.command_s.or(by_signal.command_s);
+            false
+        });
     }
 
     /// A forward gear; none for neutral, reverse and what stands for no gear.

@@ -16,7 +16,7 @@ const BAND_MAX: f64 = 0.04;
 const IN_GEAR_S: f64 = 0.1;
 const IN_GEAR_POINTS: u32 = 5;
 /// A change that takes longer is none: a neutral, or a converter in place of a turbine, s.
-const LONGEST_S: f64 = 3.0;
+pub(super) const LONGEST_S: f64 = 3.0;
 /// Readings further apart than this are a hole, s: what happens in it is not seen.
 const HOLE_S: f64 = 0.3;
 /// Points of which the middle one is taken.

@@ -209,6 +209,7 @@ def parquet():
     })
     pq.write_table(table, HERE / "snappy.parquet", row_group_size=16)
     pq.write_table(table, HERE / "gzip.parquet", compression="gzip", use_dictionary=False, data_page_version="2.0")
+    pq.write_table(table, HERE / "lz4.parquet", compression="lz4")
     stamps = table.set_column(0, "when", pa.array(i * 10_000, pa.timestamp("us")))
     pq.write_table(stamps, HERE / "stamps.parquet", compression="none")
 

@@ -1,0 +1,167 @@
+//! What is said about the estimates of a log.
+
+use logs::Role;
+use observer::{ChannelHealth, Estimate as Sample, Health};
+use report::tables::phase_name;
+use study::{ErrorScore, Passages};
+use trace::units;
+
+use super::measured::Step;
+use crate::failure::Failure;
+use crate::output;
+
+/// Summary of the estimates for the user, updated with each estimate.
+pub(super) struct Findings {
+    rows: u64,
+    first_s: f64,
+    last_s: f64,
+    passages: Passages,
+    /// Samples of each health that was seen.
+    health: Vec<(Health, u64)>,
+    /// None if a row has no true value.
+    errors: Option<ErrorScore>,
+    /// Readings that came, and those of them that were taken, of each channel.
+    came: [u64; CHANNELS],
+    taken: [u64; CHANNELS],
+}
+
+/// The channels of an observer, and the role of each.
+const CHANNELS: usize = 7;
+
+impl Findings {
+    pub(super) fn new() -> Self {
+        Self {
+            rows: 0,
+            first_s: f64::NAN,
+            last_s: f64::NAN,
+            passages: Passages::default(),
+            health: Vec::new(),
+            errors: Some(ErrorScore::new(0.0)),
+            came: [0; CHANNELS],
+            taken: [0; CHANNELS],
+        }
+    }
+
+    pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
+        if self.rows == 0 {
+            self.first_s = row.time_s;
+        }
+        self.rows += 1;
+        self.last_s = row.time_s;
+        let input = &row.input;
+        let readings = [
+            input.engine_rad_s,
+            input.turbine_rad_s,
+            input.output_rad_s,
+            input.wheel_rad_s,
+            input.command,
+            input.offgoing_command,
+            input.engine_torque_n_m,
+        ];
+        for (at, (reading, health)) in readings.iter().zip(estimate.channels.each()).enumerate() {
+            self.came[at] += u64::from(reading.is_some());
+            self.taken[at] += u64::from(reading.is_some() && health == ChannelHealth::Good);
+        }
+        self.passages.push(row.time_s, estimate.phase);
+        match self.health.iter_mut().find(|(health, _)| *health == estimate.health) {
+            Some((_, count)) => *count += 1,
+            None => self.health.push((estimate.health, 1)),
+        }
+        self.errors = self.errors.take().zip(row.truth).map(|(mut errors, truth)| {
+            errors.push(row.time_s, truth.phase, truth.pressure_pa, estimate.pressure_pa);
+            errors
+        });
+    }
+
+    /// Refuses a log of which a channel is unusable in most samples.
+    ///
+    /// # Errors
+    /// More than half of the readings of a channel were refused, or none came.
+    pub(super) fn check(&self, commands: [Role; 2], needs_wheel: bool) -> Result<(), Failure> {
+        let speeds = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
+        let roles = speeds.into_iter().chain(commands).chain([Role::EngineTorque]);
+        for (at, role) in roles.enumerate() {
+            let (came, taken, name) = (self.came[at], self.taken[at], role.name());
+            let is_needed = match role {
+                Role::WheelSpeed => needs_wheel,
+                Role::OffgoingCurrent | Role::OffgoingDuty | Role::EngineTorque => false,
+                _ => true,
+            };
+            if came == 0 && is_needed {
+                return Err(Failure::Input(format!(
+                    "{name} has no value in any of {} samples\nhint: look at the log with `wetclutch inspect`",
+                    output::grouped(self.rows)
+                )));
+            }
+            if 2 * taken < came {
+                return Err(Failure::Input(format!(
+                    "{} of {} readings of {name} were refused: they are impossible for this car, or contradict the other \
+                     signals\nhint: check the unit, scale and sign of {name}, and whether the vehicle file is of this car; \
+                     `wetclutch inspect` shows least and greatest values",
+                    output::grouped(came - taken),
+                    output::grouped(came)
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// What was found, in sentences.
+    pub(super) fn sentences(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        for (health, count) in &self.health {
+            let meaning = match health {
+                Health::Good => continue,
+                Health::ReadingRefused => "a reading that was refused: it is impossible, or it contradicts all others",
+                Health::ChannelLost => "a channel without usable readings: the estimate is less certain",
+                Health::HeldClutchSlips => "a slip of a clutch that should hold: the estimate is less certain",
+                Health::Flare => {
+                    "a flare: both clutches slip and the turbine runs away; the oncoming clutch carries too little"
+                }
+                // A few are normal while the cylinder fills: there the observers' valve model is faster than the
+                // valve maps.
+                Health::OutsideRange | Health::LimitedToRange if 100 * count <= self.rows => continue,
+                Health::OutsideRange => {
+                    "an estimate outside its range: the observer has a large error, or the car is outside its error budget"
+                }
+                Health::LimitedToRange => {
+                    "an estimate outside its guaranteed range, replaced by the nearest end: the observer has a large error, or the car is outside its error budget"
+                }
+                Health::CommandRejected => "an unusable valve command: the last usable command is used",
+                Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
+                Health::SpeedsRejected => "an unusable speed: the estimate is from the valve model alone",
+                Health::Restarted => "a restart: the observer lost its state and starts again",
+                Health::TimeRejected => "an unusable time step: the estimate is that of the sample before",
+            };
+            said.push(format!("{} of {} samples have {meaning}", output::grouped(*count), output::grouped(self.rows)));
+        }
+        let scores = self.errors.as_ref().map(ErrorScore::finish).unwrap_or_default();
+        for score in scores.iter().filter(|score| score.samples > 0) {
+            said.push(format!(
+                "error against the true pressure, {}: peak {:.4} MPa, RMS {:.4} MPa",
+                phase_name(score.phase),
+                units::mpa(score.peak),
+                units::mpa(score.rms),
+            ));
+        }
+        let rows = output::grouped(self.rows);
+        said.push(format!("rows: {rows}, from {:.3} to {:.3} s", self.first_s, self.last_s));
+        said.push(format!("shifts: {}", self.shifts()));
+        #[expect(clippy::cast_precision_loss, reason = "a share to a tenth of a percent")]
+        let share = |count: u64| 100.0 * count as f64 / self.rows as f64;
+        let shares = self.health.iter().map(|(health, count)| format!("{} {:.1} %", health.name(), share(*count)));
+        said.push(format!("health: {}", shares.collect::<Vec<_>>().join(", ")));
+        said
+    }
+
+    fn shifts(&self) -> String {
+        let Passages { count, first_s, .. } = &self.passages;
+        let times = first_s.iter().map(|[from_s, to_s]| format!("{from_s:.3} to {to_s:.3} s"));
+        let mut parts: Vec<String> = times.collect();
+        match count - parts.len() as u64 {
+            0 => {}
+            more => parts.push(format!("and {} more", output::grouped(more))),
+        }
+        if parts.is_empty() { "none".to_owned() } else { format!("{} ({})", output::grouped(*count), parts.join(", ")) }
+    }
+}

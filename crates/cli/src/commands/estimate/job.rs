@@ -1,0 +1,149 @@
+//! The estimate of one log.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use config::ObserverKind;
+use drivetrain::CommandKind;
+use logs::{Log, Role};
+use report::log_page::{LogPage, shift_rows};
+use study::LogSample;
+
+use super::findings::Findings;
+use super::measured::{Measured, Step};
+use super::outputs::{Output, beside, chosen};
+use super::shifts::{self, Shifts};
+use super::{Messages, Setup, observer};
+use crate::commands::write_text;
+use crate::failure::Failure;
+use crate::output;
+
+/// Estimates a log, and says what was found and where it is.
+pub(super) fn estimate(
+    setup: &Setup<'_>,
+    path: &Path,
+    output: Option<&Path>,
+    say: &mut Messages,
+) -> Result<(), Failure> {
+    let Setup { options, vehicle, map, .. } = setup;
+    let stop = options.follow.then(|| Arc::clone(&setup.stop));
+    let mut opened = None;
+    let mut log = if map.channels.is_empty() {
+        Measured::rows(path, vehicle, stop)?
+    } else {
+        let is_followed = stop.is_some();
+        let log = match stop {
+            Some(stop) => Log::follow(path, &map.open, stop)?,
+            None => Log::open(path, &map.open)?,
+        };
+        Measured::channels(opened.insert(log), map, vehicle, is_followed)?
+    };
+    let chosen_observer = observer::choose(options, vehicle, &log, say)?;
+    let columns = chosen(chosen_observer.observer.columns(log.has_wheel_speed()), &options.columns)?;
+    let mut table = Output::create(output, &columns)?;
+    let mut shifts = Shifts::new(options, vehicle, &log.ratios);
+    let mut findings = Findings::new();
+    let is_selective = shifts.is_selective();
+    // Of shifts that lie close together, a row is written once.
+    let mut written_s = f64::NEG_INFINITY;
+    let mut write_shift = |table: &mut Output, samples: &[LogSample]| -> Result<(), Failure> {
+        for sample in samples.iter().filter(|_| is_selective) {
+            if sample.time_s > written_s {
+                written_s = sample.time_s;
+                table.row(sample.time_s, &sample.estimate, &columns)?;
+            }
+        }
+        if options.follow { table.flush() } else { Ok(()) }
+    };
+    chosen_observer.observer.run_over(Some(vehicle), &mut log, |step: Step, estimate| {
+        findings.push(&step, &estimate);
+        let Step { time_s, input, pressure_pa, torque_n_m, .. } = step;
+        shifts.push(LogSample { time_s, input, estimate, pressure_pa, torque_n_m });
+        for shift in step.shifts {
+            shifts.take(shift, |samples| write_shift(&mut table, samples))?;
+        }
+        if !is_selective {
+            table.row(time_s, &estimate, &columns)?;
+            if options.follow {
+                table.flush()?;
+            }
+        }
+        Ok(())
+    })?;
+    for shift in log.last_shifts() {
+        shifts.take(shift, |samples| write_shift(&mut table, samples))?;
+    }
+    if output.is_none() {
+        table.flush()?;
+    }
+    log.finish(say)?;
+    let commands = match vehicle.observer_valve.command_kind() {
+        CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
+        CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
+    };
+    let without_wheel = [ObserverKind::Rigid, ObserverKind::OpenLoop, ObserverKind::OpenLoopMaps];
+    findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&chosen_observer.kind))?;
+    shifts.check()?;
+    table.finish()?;
+    let sentences = findings.sentences();
+    sentences.iter().for_each(|sentence| say.note(sentence));
+    report_shifts(&shifts, say);
+    say.note(&format!("observer: {}", chosen_observer.name));
+    let Some(output) = output else {
+        say.note("estimate: on standard output");
+        return Ok(());
+    };
+    say.note(&format!("estimate: {}", output.display()));
+    let places = ["_shifts.csv", "_shifts.json", "_report.html"].map(|ending| beside(output, ending));
+    if let ([Some(csv), Some(json), Some(page)], false) = (places, shifts.found.is_empty()) {
+        shifts::write(&shifts.found, &csv, &json)?;
+        let html = LogPage {
+            log: path,
+            vehicle,
+            observer: &chosen_observer.name,
+            overview: &shifts.overview,
+            shifts: &shifts.found,
+            shifts_of_log: shifts.seen,
+            findings: &sentences,
+        }
+        .html()?;
+        write_text(&page, &html)?;
+        say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
+        say.note(&format!("report: {}", page.display()));
+    }
+    Ok(())
+}
+
+/// The shifts as a table, if there are any.
+fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
+    if shifts.found.is_empty() {
+        return;
+    }
+    /// Rows that a terminal shows.
+    const SHOWN: usize = 40;
+    let (titles, rows) = shift_rows(&shifts.found);
+    let more = rows.len().saturating_sub(SHOWN);
+    let table = std::iter::once(titles).chain(rows.into_iter().take(SHOWN)).collect::<Vec<_>>();
+    for line in output::lines(3, &table) {
+        say.note(&line);
+    }
+    if more > 0 {
+        say.note(&format!("and {more} more shifts"));
+    }
+    let others: Vec<_> = shifts.found.iter().filter(|shift| !shift.of_vehicle).collect();
+    if let Some(first) = others.first() {
+        say.note(&format!(
+            "{} shifts are not the one of the vehicle file, as {}-{}: of these no pressure is estimated",
+            others.len(),
+            first.shift.from,
+            first.shift.to
+        ));
+    }
+    match shifts.found.iter().filter(|shift| shift.of_vehicle && shift.estimated.is_none()).count() {
+        0 => {}
+        unseen => say.note(&format!(
+            "warning: {unseen} shifts of the vehicle file are in the speeds and not in the command of the valve, which stays below \
+             the kiss point\nhint: check unit and scale of the command, and whether it is that of the oncoming clutch"
+        )),
+    }
+}

@@ -1,0 +1,385 @@
+//! A log as the observers read it, with the shifts that were found in it.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use config::Vehicle;
+use drivetrain::CommandKind;
+use logs::plausibility::{Extremes, Likely, findings};
+use logs::{
+    ChannelMap, Gearbox, Log, LogError, Quality, QualityCounts, Reading, Readings, Role, RoleSummary, Shift,
+    ShiftFinder, Steps,
+};
+use observer::{Input, Reading as Measurement};
+use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
+use trace::{CsvRows, Following, signal};
+
+use super::Messages;
+use crate::failure::Failure;
+use crate::output;
+
+/// Steps of a followed log that are looked at before the first estimate.
+const FOLLOWED_LOOK: usize = 50;
+
+/// A log with its shifts.
+pub(super) struct Measured<'a> {
+    source: Source<'a>,
+    finder: ShiftFinder,
+    /// Ratios of the gears that the finder numbers, 1st first.
+    pub(super) ratios: Vec<f64>,
+    resets: u32,
+}
+
+/// Rows of signals with the names of the program, or channels with clocks of their own.
+enum Source<'a> {
+    Rows(Box<Rows>),
+    Channels(Box<Channels<'a>>),
+}
+
+struct Rows {
+    log: study::log::Log,
+    /// Values of the signals in their columns, to tell wrong units.
+    summary: Vec<RoleSummary>,
+    rows: u64,
+}
+
+/// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
+struct Channels<'a> {
+    steps: Steps<'a>,
+    looked_at: VecDeque<Step>,
+    median_step_s: f64,
+    has_wheel_speed: bool,
+}
+
+/// What is known at one time.
+pub(super) struct Step {
+    /// Time of the step, s.
+    pub(super) time_s: f64,
+    /// What the observer is given.
+    pub(super) input: Input<f64>,
+    /// The truth, in a simulated log.
+    pub(super) truth: Option<Truth>,
+    /// Every reading that came.
+    readings: Vec<Reading>,
+    resets: u32,
+    /// Measured pressure of the oncoming clutch, Pa.
+    pub(super) pressure_pa: Option<Measurement<f64>>,
+    /// Measured torque of the oncoming clutch, N m.
+    pub(super) torque_n_m: Option<Measurement<f64>>,
+    /// Shifts that ended some seconds ago, and are known now.
+    pub(super) shifts: Vec<Shift>,
+}
+
+impl Step {
+    fn new(time_s: f64, input: Input<f64>, readings: Vec<Reading>) -> Self {
+        let newest = |role: Role| {
+            let reading = readings.iter().rev().find(|reading| reading.role == role)?;
+            Some(Measurement { value: reading.value, age_s: (time_s - reading.time_s).max(0.0) })
+        };
+        let (pressure_pa, torque_n_m) = (newest(Role::OncomingPressure), newest(Role::OncomingTorque));
+        Self { time_s, input, truth: None, readings, resets: 0, pressure_pa, torque_n_m, shifts: Vec::new() }
+    }
+
+    /// A row of a table with the names of the program.
+    fn of_row(input: Input<f64>, row: &LogRow) -> Self {
+        let Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 } = row.beside;
+        let now = |value: f64| Some(Measurement::now(value)).filter(|_| !value.is_nan());
+        let readings = [
+            (Role::EngineSpeed, input.engine_rad_s),
+            (Role::TurbineSpeed, input.turbine_rad_s),
+            (Role::OutputSpeed, input.output_rad_s),
+            (Role::OncomingPressure, now(pressure_pa)),
+            (Role::OncomingTorque, now(torque_n_m)),
+            (Role::EngineTorque, now(engine_n_m)),
+            (Role::Throttle, now(throttle)),
+            (Role::VehicleSpeed, now(vehicle_m_s)),
+            (Role::VehicleAcceleration, now(vehicle_m_s2)),
+        ];
+        let reading = |(role, reading): (Role, Option<Measurement<f64>>)| {
+            let Measurement { value, age_s } = reading.filter(|reading| reading.value.is_finite())?;
+            Some(Reading { role, time_s: row.time_s - age_s, stamp_s: row.time_s, value })
+        };
+        let readings = readings.into_iter().filter_map(reading).collect();
+        Self { truth: row.truth, ..Self::new(row.time_s, input, readings) }
+    }
+}
+
+impl<'a> Measured<'a> {
+    /// A table with the names of the program. `stop` ends one that is followed.
+    pub(super) fn rows(path: &Path, vehicle: &Vehicle, stop: Option<Arc<AtomicBool>>) -> Result<Self, Failure> {
+        let is_pipe = path == Path::new("-");
+        if !is_pipe && logs::needs_map(path)? {
+            return Err(Failure::Input(format!(
+                "{}: this log needs a channel map\nhint: `wetclutch inspect` with --suggest writes a first one, for --map",
+                path.display()
+            )));
+        }
+        let look = if stop.is_some() { FOLLOWED_LOOK } else { FIRST_LOOK };
+        let opening = |source| LogError::Io { path: path.to_owned(), source };
+        let input: Box<dyn Read> = match stop {
+            Some(stop) => Box::new(Following::open(path, stop).map_err(opening)?),
+            None if is_pipe => Box::new(io::stdin()),
+            None => Box::new(File::open(path).map_err(opening)?),
+        };
+        let rows = CsvRows::of(path, input)?;
+        let summary = summary(&rows, vehicle);
+        let log = study::log::Log::of(rows, vehicle, look)?;
+        let mut rows = Rows { log, summary, rows: 0 };
+        let looked_at: Vec<Input<f64>> = rows.log.looked_at().map(|(input, _)| *input).collect();
+        looked_at.iter().for_each(|input| watch(&mut rows.summary, input));
+        rows.check_units()?;
+        let gearbox = of_vehicle(vehicle);
+        // Turbine and output speed are there, and tell shifts.
+        let finder = ShiftFinder::new(&gearbox, |role| has(&rows.log, role))?;
+        let source = Source::Rows(Box::new(rows));
+        Ok(Self { source, finder, ratios: gearbox.ratios, resets: 0 })
+    }
+
+    /// Channels of a log by a map.
+    pub(super) fn channels(
+        log: &'a mut Log,
+        map: &ChannelMap,
+        vehicle: &Vehicle,
+        is_followed: bool,
+    ) -> Result<Self, Failure> {
+        let command = match vehicle.observer_valve.command_kind() {
+            CommandKind::Current => Role::OncomingCurrent,
+            CommandKind::DutyCycle => Role::OncomingDuty,
+        };
+        if !map.has(command) {
+            return Err(Failure::Input(format!(
+                "the channel map has no {0}, the command of this vehicle's valve: without it no pressure can be estimated\n\
+                 hint: add `[channel.{0}]` or --channel {0}=NAME if the log has it",
+                command.name()
+            )));
+        }
+        let needed = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, command];
+        if let Some(missing) = needed.into_iter().find(|role| !map.has(*role)) {
+            return Err(Failure::Input(format!(
+                "the channel map has no {}\nhint: an estimate needs {}; add `[channel.{}]` or --channel {0}=NAME",
+                missing.name(),
+                needed.map(Role::name).join(", "),
+                missing.name(),
+            )));
+        }
+        // The other kind of command is no reading of this valve.
+        let mut map = map.clone();
+        map.channels
+            .retain(|entry| entry.role == command || !matches!(entry.role, Role::OncomingCurrent | Role::OncomingDuty));
+        let own = of_vehicle(vehicle);
+        let gearbox = Gearbox {
+            ratios: if map.gearbox.ratios.len() >= 2 { map.gearbox.ratios.clone() } else { own.ratios },
+            output_rad_per_m: map.gearbox.output_rad_per_m.or(own.output_rad_per_m),
+            wheel_radius_m: map.gearbox.wheel_radius_m,
+        };
+        let finder = ShiftFinder::new(&gearbox, |role| map.has(role))?;
+        let look = if is_followed { FOLLOWED_LOOK } else { FIRST_LOOK };
+        let mut channels = Channels {
+            steps: Steps::new(Readings::new(log, &map)?),
+            looked_at: VecDeque::new(),
+            median_step_s: f64::NAN,
+            has_wheel_speed: map.has(Role::WheelSpeed),
+        };
+        while channels.looked_at.len() < look
+            && let Some(step) = channels.read()
+        {
+            channels.looked_at.push_back(step?);
+        }
+        // Wrong units are an error before the first estimate.
+        channels.steps.readings().check_units()?;
+        let steps_s = channels.looked_at.iter().skip(1).map(|step| step.input.dt_s);
+        channels.median_step_s = trace::median_step_s(steps_s.collect());
+        Ok(Self { source: Source::Channels(Box::new(channels)), finder, ratios: gearbox.ratios, resets: 0 })
+    }
+
+    pub(super) fn has_wheel_speed(&self) -> bool {
+        match &self.source {
+            Source::Rows(rows) => rows.log.signals().has_wheel_speed(),
+            Source::Channels(channels) => channels.has_wheel_speed,
+        }
+    }
+
+    /// Refuses a log without the wheel speed.
+    pub(super) fn require_wheel_speed(&self) -> Result<(), Failure> {
+        match &self.source {
+            Source::Rows(rows) => Ok(rows.log.require_wheel_speed()?),
+            Source::Channels(channels) if channels.has_wheel_speed => Ok(()),
+            Source::Channels(_) => Err(Failure::Input(
+                "the channel map has no wheel_speed, which this observer needs\nhint: add `[channel.wheel_speed]`, or use `--observer rigid`"
+                    .to_owned(),
+            )),
+        }
+    }
+
+    pub(super) fn median_step_s(&self) -> f64 {
+        match &self.source {
+            Source::Rows(rows) => rows.log.median_step_s(),
+            Source::Channels(channels) => channels.median_step_s,
+        }
+    }
+
+    /// The shifts that were not given with a step, after the last step.
+    pub(super) fn last_shifts(&mut self) -> Vec<Shift> {
+        self.finder.restart();
+        self.finder.take_settled(f64::INFINITY)
+    }
+
+    /// Says what was met in the log, after its last step.
+    ///
+    /// # Errors
+    /// Most samples of a channel could not be used, or a unit is wrong by all appearances.
+    pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
+        let channels = match &self.source {
+            Source::Rows(rows) => return rows.check_units(),
+            Source::Channels(channels) => channels,
+        };
+        let readings = channels.steps.readings();
+        for role in readings.summary() {
+            let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+            if good < total {
+                say.note(&format!(
+                    "{} of {} samples of {} are not used: {}",
+                    output::grouped(total - good),
+                    output::grouped(total),
+                    role.role.name(),
+                    role.counts.faults()
+                ));
+            }
+        }
+        for note in readings.notes() {
+            say.note(&format!("warning: {note}"));
+        }
+        Ok(readings.check()?)
+    }
+}
+
+/// What the vehicle file says about the gearbox.
+fn of_vehicle(vehicle: &Vehicle) -> Gearbox {
+    Gearbox {
+        ratios: vec![vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
+        output_rad_per_m: Some(vehicle.driveline.final_ratio / vehicle.road.wheel_radius_m),
+        wheel_radius_m: None,
+    }
+}
+
+/// Whether a table with the names of the program has a role that the shift finder reads.
+fn has(log: &study::log::Log, role: Role) -> bool {
+    match role {
+        Role::EngineSpeed | Role::TurbineSpeed | Role::OutputSpeed => true,
+        Role::EngineTorque => log.has_beside(signal::ENGINE_TORQUE),
+        Role::Throttle => log.has_beside(signal::THROTTLE),
+        Role::VehicleSpeed => log.has_beside(signal::VEHICLE_SPEED),
+        Role::VehicleAcceleration => log.has_beside(signal::VEHICLE_ACCELERATION),
+        _ => false,
+    }
+}
+
+/// The signals that observers read, as roles with the units of their columns; no values yet.
+fn summary(rows: &CsvRows, vehicle: &Vehicle) -> Vec<RoleSummary> {
+    let command = match vehicle.observer_valve.command_kind() {
+        CommandKind::Current => (Role::OncomingCurrent, signal::ONCOMING_CURRENT),
+        CommandKind::DutyCycle => (Role::OncomingDuty, signal::ONCOMING_DUTY),
+    };
+    let speeds = [
+        (Role::EngineSpeed, signal::ENGINE_SPEED),
+        (Role::TurbineSpeed, signal::TURBINE_SPEED),
+        (Role::OutputSpeed, signal::OUTPUT_SPEED),
+        (Role::WheelSpeed, signal::WHEEL_SPEED),
+    ];
+    let entry = |(role, name): (Role, &str)| {
+        let in_si = rows.find(name).is_none_or(|column| rows.factor(column) == 1.0);
+        let unit_name = match role {
+            _ if in_si => role.unit(),
+            Role::OncomingCurrent => "mA",
+            _ => "rpm",
+        };
+        let (counts, extremes) = (QualityCounts::default(), Extremes::default());
+        RoleSummary { role, counts, extremes, unit_name: unit_name.to_owned() }
+    };
+    speeds.into_iter().chain([command]).map(entry).collect()
+}
+
+/// Takes the values of a row; the entries are those of [`summary`].
+fn watch(summary: &mut [RoleSummary], input: &Input<f64>) {
+    let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.command];
+    for (entry, reading) in summary.iter_mut().zip(readings) {
+        if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
+            entry.extremes.push(reading.value);
+        }
+    }
+}
+
+impl Rows {
+    /// Refuses a unit that cannot be right.
+    fn check_units(&self) -> Result<(), Failure> {
+        let Some(finding) = findings(&self.summary).into_iter().next() else { return Ok(()) };
+        let (message, name) = (finding.message, finding.role.name());
+        let ending = match finding.likely {
+            Likely::Unit("rpm") => "rpm",
+            Likely::Unit("rad/s") => "rad_s",
+            Likely::Unit("mA") => "ma",
+            Likely::Unit("A") => "a",
+            Likely::Unit("%") => "percent",
+            Likely::Unit(_) => {
+                let hint = "give the unit and the scale in a channel map, see `wetclutch inspect --suggest`";
+                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+            }
+            Likely::OtherSign => {
+                let hint = "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`";
+                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+            }
+        };
+        Err(Failure::Input(format!(
+            "{message}\nhint: the end of the column's name says the unit: call it `{name}_{ending}`"
+        )))
+    }
+
+    fn read(&mut self) -> Option<Result<Step, Failure>> {
+        /// Rows after the first look of which one is watched for its units.
+        const EVERY: u64 = 32;
+        let row = self.log.next()?;
+        self.rows += 1;
+        Some(row.map_err(Failure::from).map(|(input, row)| {
+            if self.rows > FIRST_LOOK as u64 && self.rows.is_multiple_of(EVERY) {
+                watch(&mut self.summary, &input);
+            }
+            Step::of_row(input, &row)
+        }))
+    }
+}
+
+impl Channels<'_> {
+    fn read(&mut self) -> Option<Result<Step, Failure>> {
+        let mut readings = Vec::new();
+        let step = self.steps.next_seeing(|reading| readings.push(reading))?;
+        let resets = self.steps.readings().resets();
+        Some(step.map_err(Failure::from).map(|step| Step { resets, ..Step::new(step.time_s, step.input, readings) }))
+    }
+}
+
+impl Iterator for Measured<'_> {
+    type Item = Result<(Input<f64>, Step), Failure>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let step = match &mut self.source {
+            Source::Rows(rows) => rows.read()?,
+            Source::Channels(channels) => match channels.looked_at.pop_front() {
+                Some(step) => Ok(step),
+                None => channels.read()?,
+            },
+        };
+        Some(step.map(|mut step| {
+            if step.resets > self.resets {
+                self.resets = step.resets;
+                self.finder.restart();
+            }
+            step.readings.iter().for_each(|reading| self.finder.push(reading));
+            step.shifts = self.finder.take_settled(step.time_s);
+            (step.input, step)
+        }))
+    }
+}

@@ -1,0 +1,161 @@
+//! `wetclutch estimate`: one log, or several at a time.
+
+mod findings;
+mod job;
+mod measured;
+pub(super) mod observer;
+mod outputs;
+mod shifts;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use config::Vehicle;
+use logs::ChannelMap;
+
+use crate::args::Estimate;
+use crate::commands::{channel_map, check_output, not_an_input};
+use crate::failure::Failure;
+use crate::output;
+
+pub(super) use observer::{best, kind};
+
+/// What is common to all logs of a command.
+struct Setup<'a> {
+    options: &'a Estimate,
+    vehicle: Vehicle,
+    map: ChannelMap,
+    /// Set when a log that is followed is to end.
+    stop: Arc<AtomicBool>,
+}
+
+/// Messages of one log: shown as they come, or together when it is done.
+struct Messages {
+    held: Option<Vec<String>>,
+}
+
+impl Messages {
+    fn note(&mut self, message: &str) {
+        match &mut self.held {
+            None => output::note(message),
+            Some(held) => held.push(message.to_owned()),
+        }
+    }
+}
+
+pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    observer::check_options(options)?;
+    match options.logs.as_slice() {
+        [log] => {
+            check_output(options.output.as_ref())?;
+            not_an_input(options.output.as_ref(), options.sensors.iter().chain([&options.vehicle]))?;
+            let setup = setup(options)?;
+            job::estimate(&setup, log, options.output.as_deref(), &mut Messages { held: None })
+        }
+        logs => several(options, logs),
+    }
+}
+
+fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
+    let setup = Setup {
+        options,
+        vehicle: Vehicle::read(&options.vehicle)?,
+        map: channel_map(&options.mapping)?,
+        stop: Arc::new(AtomicBool::new(false)),
+    };
+    if options.follow {
+        end_on_signals(&setup.stop)?;
+    }
+    Ok(setup)
+}
+
+/// The first interrupt ends the log that is followed, a second one the program.
+fn end_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(stop))?;
+        signal_hook::flag::register(signal, Arc::clone(stop))?;
+    }
+    Ok(())
+}
+
+/// Several logs, each into a file of its own. One that fails does not stop the others.
+fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
+    let Some(folder) = &options.output else {
+        return Err(Failure::Input(
+            "several logs need a folder for their estimates\nhint: name one with -o; each log gets a file in it"
+                .to_owned(),
+        ));
+    };
+    if options.follow {
+        return Err(Failure::Input("--follow takes one log\nhint: start the command once for each".to_owned()));
+    }
+    let outputs = names_in(folder, logs, options.format.ending())?;
+    crate::commands::writable(folder, &[])?;
+    for output in &outputs {
+        check_output(Some(output))?;
+        not_an_input(Some(output), logs.iter().chain(&options.sensors).chain([&options.vehicle]))?;
+    }
+    let setup = setup(options)?;
+    let next = AtomicUsize::new(0);
+    let failures: Mutex<Vec<(usize, Failure)>> = Mutex::new(Vec::new());
+    let work = || {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let (Some(log), Some(output)) = (logs.get(at), outputs.get(at)) else { return };
+            let mut messages = Messages { held: Some(vec![format!("log: {}", log.display())]) };
+            let result = job::estimate(&setup, log, Some(output), &mut messages);
+            output::note(&(messages.held.unwrap_or_default().join("\n") + "\n"));
+            if let Err(failure) = result {
+                output::error(&failure.to_string());
+                failures.lock().unwrap_or_else(PoisonError::into_inner).push((at, failure));
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..options.threads.count().min(logs.len()) {
+            scope.spawn(work);
+        }
+        work();
+    });
+    let mut failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if failures.is_empty() {
+        return Ok(());
+    }
+    failures.sort_by_key(|(at, _)| *at);
+    let failed: Vec<String> = failures.iter().map(|(at, _)| logs[*at].display().to_string()).collect();
+    let message = format!("{} of {} logs have no estimate: {}", failed.len(), logs.len(), failed.join(", "));
+    Err(match failures.iter().any(|(_, failure)| matches!(failure, Failure::Work(_))) {
+        true => Failure::Work(message),
+        false => Failure::Input(message),
+    })
+}
+
+/// A file in the folder for each log, with the log's name.
+fn names_in(folder: &Path, logs: &[PathBuf], ending: &str) -> Result<Vec<PathBuf>, Failure> {
+    let mut taken: HashMap<PathBuf, &PathBuf> = HashMap::new();
+    logs.iter()
+        .map(|log| {
+            let stem = log.file_stem().filter(|_| log.as_path() != Path::new("-")).ok_or_else(|| {
+                let log = log.display();
+                Failure::Input(format!("{log}: this is no file\nhint: standard input can only be the one log"))
+            })?;
+            let mut name = stem.to_owned();
+            name.push(".");
+            name.push(ending);
+            let output = folder.join(name);
+            match taken.insert(output.clone(), log) {
+                None => Ok(output),
+                Some(other) => Err(Failure::Input(format!(
+                    "{} and {} would both give {}\nhint: estimate them one by one",
+                    other.display(),
+                    log.display(),
+                    output.display()
+                ))),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,153 @@
+//! Which observer estimates a log.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use config::{ObserverKind, Sensors, Vehicle};
+use design::{compliant_open_loop_phases, rigid_open_loop_phases};
+use report::tables::phase_name;
+use study::AnyObserver;
+
+use super::Messages;
+use super::measured::Measured;
+use crate::args::{Estimate, MethodChoice, ObserverChoice};
+use crate::failure::Failure;
+
+/// An observer for a log.
+pub(super) struct Chosen {
+    pub(super) observer: AnyObserver,
+    pub(super) kind: ObserverKind,
+    /// The observer and how its gains were found, in words.
+    pub(super) name: String,
+}
+
+/// Refuses options that have no effect together.
+pub(super) fn check_options(options: &Estimate) -> Result<(), Failure> {
+    let designed = matches!(options.observer, ObserverChoice::Rigid | ObserverChoice::Compliant);
+    if options.method.is_some() && !designed {
+        return Err(Failure::Input(
+            "--method has no effect with this observer\n\
+             hint: use it with `--observer rigid` or `--observer compliant`"
+                .to_owned(),
+        ));
+    }
+    // Without a wheel speed the best observer is another; that is told when the log is known.
+    if options.sensors.is_some() && options.observer != ObserverChoice::Best && !is_filter(kind(options.observer)) {
+        return Err(sensors_without_effect());
+    }
+    Ok(())
+}
+
+fn sensors_without_effect() -> Failure {
+    Failure::Input(
+        "--sensors has no effect with this observer\nhint: use it with `--observer` kalman, extended or unscented"
+            .to_owned(),
+    )
+}
+
+fn is_filter(kind: ObserverKind) -> bool {
+    [ObserverKind::Kalman, ObserverKind::Extended, ObserverKind::Unscented].contains(&kind)
+}
+
+/// The observer for a log, with what is to be said about it.
+pub(super) fn choose(
+    options: &Estimate,
+    vehicle: &Vehicle,
+    log: &Measured<'_>,
+    say: &mut Messages,
+) -> Result<Chosen, Failure> {
+    let has_wheel = log.has_wheel_speed();
+    let (choice, method) = match options.observer {
+        ObserverChoice::Best => best(has_wheel),
+        chosen => (chosen, options.method.unwrap_or(MethodChoice::Iss)),
+    };
+    if options.observer == ObserverChoice::Best {
+        say.note(if has_wheel {
+            "observer: kalman, because the log has a wheel speed"
+        } else {
+            "observer: rigid with peak-to-peak gains, because the log has no wheel_speed_rad_s, which kalman needs"
+        });
+    }
+    let kind = kind(choice);
+    if options.sensors.is_some() && !is_filter(kind) {
+        return Err(sensors_without_effect());
+    }
+    if is_filter(kind) || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
+        log.require_wheel_speed()?;
+    }
+    let sensors = options.sensors.as_deref().map(sensors).transpose()?;
+    let step_s = log.median_step_s();
+    let (observer, missed) = AnyObserver::best(vehicle, kind, method.into(), step_s, sensors.as_ref())?;
+    for missed in &missed {
+        say.note(&format!("warning: continuing with the best certified gain\n{missed}"));
+    }
+    if step_s > observer.sample_max_s() && !matches!(kind, ObserverKind::OpenLoop | ObserverKind::OpenLoopMaps) {
+        say.note(&format!(
+            "the sample time is {:.0} ms, and this observer corrects over at most {:.0} ms: using the open loop\n\
+             hint: `--observer rigid --method peak-to-peak` designs gains for the sample time of the log",
+            1e3 * step_s,
+            1e3 * observer.sample_max_s(),
+        ));
+    }
+    let open_loop = match &observer {
+        AnyObserver::Rigid(rigid) if kind == ObserverKind::Rigid => {
+            rigid_open_loop_phases(vehicle, &rigid.gains, step_s)
+        }
+        AnyObserver::Compliant(compliant) => compliant_open_loop_phases(vehicle, &compliant.gains, step_s),
+        _ => Vec::new(),
+    };
+    for phase in open_loop {
+        say.note(&match method {
+            MethodChoice::Iss => {
+                format!("{}: the gain is the open loop: the valve alone has the required decay", phase_name(phase))
+            }
+            _ => format!("{}: the gain is the open loop: no gain reduces the bound", phase_name(phase)),
+        });
+    }
+    Ok(Chosen { observer, kind, name: name_of(choice, method) })
+}
+
+/// The observer for a log, if the user names none.
+pub(in crate::commands) fn best(has_wheel_speed: bool) -> (ObserverChoice, MethodChoice) {
+    if has_wheel_speed {
+        (ObserverChoice::Kalman, MethodChoice::Iss)
+    } else {
+        (ObserverChoice::Rigid, MethodChoice::PeakToPeak)
+    }
+}
+
+/// The kind of observer of a choice; the best is that of a log with a wheel speed.
+pub(in crate::commands) fn kind(choice: ObserverChoice) -> ObserverKind {
+    match choice {
+        ObserverChoice::Best | ObserverChoice::Kalman => ObserverKind::Kalman,
+        ObserverChoice::Rigid => ObserverKind::Rigid,
+        ObserverChoice::Compliant => ObserverKind::Compliant,
+        ObserverChoice::Sliding => ObserverKind::Sliding,
+        ObserverChoice::Extended => ObserverKind::Extended,
+        ObserverChoice::Unscented => ObserverKind::Unscented,
+        ObserverChoice::SuperTwisting => ObserverKind::SuperTwisting,
+        ObserverChoice::Inversion => ObserverKind::Inversion,
+        ObserverChoice::OpenLoop => ObserverKind::OpenLoop,
+        ObserverChoice::OpenLoopMaps => ObserverKind::OpenLoopMaps,
+    }
+}
+
+/// An observer and how its gains were found.
+fn name_of(choice: ObserverChoice, method: MethodChoice) -> String {
+    let name = |value: Option<clap::builder::PossibleValue>| value.map(|value| value.get_name().to_owned());
+    let observer = name(choice.to_possible_value()).unwrap_or_default();
+    match choice {
+        ObserverChoice::Rigid | ObserverChoice::Compliant => {
+            format!("{observer}, gains by the method {}", name(method.to_possible_value()).unwrap_or_default())
+        }
+        _ => observer,
+    }
+}
+
+/// The sensors that a file describes.
+pub(in crate::commands) fn sensors(path: &Path) -> Result<Sensors, Failure> {
+    Sensors::read(path)?.ok_or_else(|| {
+        let path = path.display();
+        Failure::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))
+    })
+}

@@ -1,0 +1,96 @@
+//! Where estimates are written.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use observer::Estimate;
+use study::{EstimateColumns, OutputColumn};
+use trace::{CsvWriter, TableWriter};
+
+use crate::failure::Failure;
+
+/// The columns of these names, or all.
+pub(super) fn chosen(columns: EstimateColumns, names: &[String]) -> Result<Vec<OutputColumn>, Failure> {
+    let all = columns.columns();
+    if names.is_empty() {
+        return Ok(all);
+    }
+    let mut chosen: Vec<OutputColumn> = Vec::new();
+    for name in names.iter().map(|name| name.trim()).filter(|name| *name != trace::signal::TIME) {
+        let Some(column) = all.iter().find(|column| column.name == name) else {
+            let known: Vec<&str> = all.iter().map(|column| column.name).collect();
+            return Err(Failure::Input(format!(
+                "--columns: there is no column `{}` with this observer\nhint: the columns are {}; time_s is always there",
+                name.escape_debug(),
+                known.join(", ")
+            )));
+        };
+        if chosen.iter().any(|earlier| earlier.name == name) {
+            return Err(Failure::Input(format!("--columns: `{name}` is there twice\nhint: name each column once")));
+        }
+        chosen.push(*column);
+    }
+    Ok(chosen)
+}
+
+/// The table of the estimates.
+pub(super) enum Output {
+    File(TableWriter, PathBuf),
+    Standard(Box<CsvWriter<BufWriter<io::Stdout>>>),
+}
+
+impl Output {
+    /// Begins a file, or the table on standard output.
+    pub(super) fn create(path: Option<&Path>, columns: &[OutputColumn]) -> Result<Self, Failure> {
+        match path {
+            Some(path) => {
+                let named = columns.iter().map(|column| (column.name, column.kind()));
+                let writer = TableWriter::create(path, named).map_err(|error| Failure::writing(path, &error))?;
+                Ok(Self::File(writer, path.to_owned()))
+            }
+            None => {
+                let names = columns.iter().map(|column| column.name);
+                Ok(Self::Standard(Box::new(CsvWriter::new(BufWriter::new(io::stdout()), names)?)))
+            }
+        }
+    }
+
+    pub(super) fn row(
+        &mut self,
+        time_s: f64,
+        estimate: &Estimate<f64>,
+        columns: &[OutputColumn],
+    ) -> Result<(), Failure> {
+        let cells = columns.iter().map(|column| column.cell(estimate));
+        match self {
+            Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Failure::writing(path, &error)),
+            Self::Standard(writer) => Ok(writer.row(time_s, cells)?),
+        }
+    }
+
+    /// Hands the rows so far to their reader.
+    pub(super) fn flush(&mut self) -> Result<(), Failure> {
+        match self {
+            Self::File(writer, path) => writer.flush().map_err(|error| Failure::writing(path, &error)),
+            Self::Standard(writer) => Ok(writer.flush()?),
+        }
+    }
+
+    /// Completes the table.
+    pub(super) fn finish(self) -> Result<(), Failure> {
+        match self {
+            Self::File(writer, path) => writer.finish().map_err(|error| Failure::writing(&path, &error)),
+            Self::Standard(writer) => Ok(writer.finish()?.flush()?),
+        }
+    }
+}
+
+/// Where a file beside an output goes: `drive.csv` has `drive_report.html`. None beside a device or pipe.
+pub(super) fn beside(output: &Path, ending: &str) -> Option<PathBuf> {
+    if std::fs::metadata(output).is_ok_and(|there| !there.is_file()) {
+        return None;
+    }
+    let mut name = output.file_stem()?.to_owned();
+    name.push(ending);
+    Some(output.with_file_name(name))
+}

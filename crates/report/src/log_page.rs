@@ -1,0 +1,389 @@
+//! The page of a log: the whole drive, the table of its shifts, each shift drawn.
+
+use std::path::Path;
+
+use config::Vehicle;
+use drivetrain::CommandKind;
+use logs::{Direction, Load};
+use minijinja::{Value, context};
+use observer::Health;
+use study::shift_estimates::{EstimatedShift, Ranged};
+use study::{LogSample, Overview, ShiftEstimate};
+use trace::units::{mpa, rpm};
+
+use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
+use crate::page::{PageError, inline, origin, templates};
+use crate::palette::{RANGE, Weight};
+use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
+use crate::tables::{coverage, number};
+
+/// Shifts that are drawn.
+pub const MOST_DRAWN: usize = 200;
+/// Rows of the table on the page; the files beside it have them all.
+const MOST_ROWS: usize = 1000;
+/// Points of the curves of all drawn shifts together: a point takes about a dozen bytes of the page.
+const POINTS: usize = 140_000;
+/// Curves in the figure of a shift, about.
+const CURVES: usize = 12;
+
+/// What a page is made from.
+pub struct LogPage<'a> {
+    /// The log.
+    pub log: &'a Path,
+    /// The vehicle.
+    pub vehicle: &'a Vehicle,
+    /// The observer and how its gains were found, in words.
+    pub observer: &'a str,
+    /// The whole drive.
+    pub overview: &'a Overview,
+    /// The shifts that are shown.
+    pub shifts: &'a [ShiftEstimate],
+    /// How many shifts the log has.
+    pub shifts_of_log: usize,
+    /// What else was found, in sentences.
+    pub findings: &'a [String],
+}
+
+impl LogPage<'_> {
+    /// The page; it needs nothing but itself.
+    ///
+    /// # Errors
+    /// None in a released program; the tests render the template.
+    pub fn html(&self) -> Result<String, PageError> {
+        let drawn: Vec<&ShiftEstimate> =
+            self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
+        let points = POINTS / CURVES / drawn.len().max(1);
+        let figures = drawn.iter().map(|shift| {
+            context! {
+                number => shift.number,
+                title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
+                at => format!("{:.2}", shift.begin_s()),
+                remark => remark(shift),
+                svg => inline(&compact(&shift_figure(shift, self.vehicle.observer_valve.command_kind(), points).svg())),
+            }
+        });
+        let figures: Vec<Value> = figures.collect();
+        let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)]);
+        let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
+        Ok(templates()?.get_template("log.html")?.render(context! {
+            name => file,
+            title => "estimate",
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &self.vehicle.name,
+            observer => self.observer,
+            log => self.log.display().to_string(),
+            shifts_of_log => self.shifts_of_log,
+            shown => self.shifts.len(),
+            undrawn => self.shifts.len() - drawn.len(),
+            findings => self.findings.to_vec(),
+            overview => inline(&overview_figure(self.overview, self.shifts).svg()),
+            titles => titles,
+            left_out => self.shifts.len() - rows.len(),
+            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn.len() }).collect::<Vec<_>>(),
+            figures => figures,
+            others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
+            inputs => origin(&[&self.vehicle.source]),
+        })?)
+    }
+}
+
+/// The same figure with its curves to a tenth of a pixel, which is half of their text.
+fn compact(svg: &str) -> String {
+    let mut parts = svg.split(" d=\"");
+    let mut compact = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (path, rest) = part.split_once('"').unwrap_or((part, ""));
+        compact.push_str(" d=\"");
+        for word in path.split(' ') {
+            match word.parse::<f64>() {
+                Ok(number) => {
+                    if compact.ends_with(|c: char| c.is_ascii_digit()) {
+                        compact.push(' ');
+                    }
+                    let text = format!("{number:.1}");
+                    compact.push_str(text.strip_suffix(".0").unwrap_or(&text));
+                }
+                Err(_) => compact.push_str(word),
+            }
+        }
+        compact.push('"');
+        compact.push_str(rest);
+    }
+    compact
+}
+
+fn kind(shift: &ShiftEstimate) -> String {
+    let load = match shift.shift.load {
+        Load::PowerOn => "power-on ",
+        Load::PowerOff => "power-off ",
+        Load::Unknown => "",
+    };
+    format!("{load}{}", if shift.shift.direction == Direction::Up { "up" } else { "down" })
+}
+
+/// Titles and rows of the table of shifts. Columns that no shift fills are left out.
+pub fn shift_rows(shifts: &[ShiftEstimate]) -> (Vec<String>, Vec<Vec<String>>) {
+    /// A title and its cell.
+    type Column = (&'static str, fn(&ShiftEstimate) -> String);
+    const COLUMNS: &[Column] = &[
+        ("#", |s| s.number.to_string()),
+        ("shift", |s| format!("{}-{}", s.shift.from, s.shift.to)),
+        ("kind", kind),
+        ("begin s", |s| format!("{:.2}", s.begin_s())),
+        ("torque phase s", |s| of(s, |e| Some(number(e.torque_phase_s[1] - e.torque_phase_s[0], 2)))),
+        ("inertia phase s", |s| match s.estimated.as_ref().and_then(|e| Some(e.lock_up_s? - e.torque_phase_s[1])) {
+            Some(length_s) => number(length_s, 2),
+            None => s.shift.inertia_s.map_or(String::new(), |[from_s, to_s]| number(to_s - from_s, 2)),
+        }),
+        ("pressure MPa", |s| of(s, |e| Some(ranged(&e.pressure_pa, 1e-6, 3)))),
+        ("clutch torque N m", |s| of(s, |e| Some(ranged(&e.torque_n_m, 1.0, 0)))),
+        ("friction work kJ", |s| of(s, |e| Some(ranged(&e.friction_work_j, 1e-3, 1)))),
+        ("lowest shaft N m", |s| of(s, |e| Some(number(e.least_shaft_n_m?, 0)))),
+        ("flare rpm", |s| s.shift.quality.flare_rad_s.map_or(String::new(), |rad_s| number(rpm(rad_s), 0))),
+        ("jerk m/s^3", |s| s.shift.quality.jerk_m_s3.map_or(String::new(), |jerk| number(jerk, 1))),
+        ("pressure RMS error kPa", |s| of(s, |e| Some(number(1e-3 * e.pressure_error_pa?.rms, 1)))),
+        ("in range", |s| of(s, |e| Some(coverage(e.pressure_error_pa?.inside?)))),
+        ("torque RMS error N m", |s| of(s, |e| Some(number(e.torque_error_n_m?.rms, 1)))),
+        ("health", |s| of(s, |e| Some(health(e)))),
+    ];
+    let cells: Vec<Vec<String>> =
+        shifts.iter().map(|shift| COLUMNS.iter().map(|(_, cell)| cell(shift)).collect()).collect();
+    let filled = |column: &usize| cells.iter().any(|row| !row[*column].is_empty());
+    let columns: Vec<usize> = (0..COLUMNS.len()).filter(filled).collect();
+    let titles = columns.iter().map(|column| COLUMNS[*column].0.to_owned()).collect();
+    (titles, cells.iter().map(|row| columns.iter().map(|column| row[*column].clone()).collect()).collect())
+}
+
+/// A cell of an estimated shift; empty for others.
+fn of(shift: &ShiftEstimate, cell: fn(&EstimatedShift) -> Option<String>) -> String {
+    shift.estimated.as_ref().and_then(cell).unwrap_or_default()
+}
+
+/// A value with its range, in another unit.
+fn ranged(ranged: &Ranged, unit: f64, decimals: usize) -> String {
+    let text = |value: f64| number(unit * value, decimals);
+    let value = text(ranged.value);
+    ranged.range.map_or(value.clone(), |[low, high]| format!("{value} ({}–{})", text(low), text(high)))
+}
+
+/// The worst health and its share.
+fn health(estimated: &EstimatedShift) -> String {
+    estimated.unhealthy.first().map_or("good".to_owned(), |(health, share)| {
+        format!("{} {:.0} %", health.name().replace('_', " "), (100.0 * share).max(1.0))
+    })
+}
+
+/// Why a shift has no estimate.
+fn remark(shift: &ShiftEstimate) -> &'static str {
+    match (&shift.estimated, shift.of_vehicle) {
+        (Some(_), _) => "",
+        (None, true) => "The observer did not see this shift: the command of the valve does not belong to it.",
+        (None, false) => "Not the shift of the vehicle file: no pressure is estimated.",
+    }
+}
+
+const SPEEDS: [(&str, Stroke); 3] =
+    [("engine", Stroke::THIRD), ("turbine", Stroke::SIGNAL), ("gearbox output", Stroke::SECOND)];
+const ESTIMATE: Stroke = Stroke { colour: RANGE, weight: Weight::Equal, dash: None };
+
+fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
+    Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
+}
+
+/// The whole drive. Each interval gives its lowest and its highest value.
+fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
+    let both = |value: &dyn Fn(&study::overview::Interval) -> [f64; 2], unit: fn(f64) -> f64| -> Vec<(f64, f64)> {
+        let points = |([from_s, to_s], interval): ([f64; 2], &study::overview::Interval)| {
+            let [low, high] = value(interval).map(unit);
+            [(from_s, low), (0.5 * (from_s + to_s), high)]
+        };
+        overview.intervals().flat_map(points).collect()
+    };
+    let speeds = SPEEDS.iter().enumerate().map(|(i, (label, stroke))| Series {
+        label: (*label).to_owned(),
+        stroke: Stroke { weight: Weight::Rival, ..*stroke },
+        points: both(&|interval| interval.speeds_rad_s[i], rpm),
+    });
+    let pressure = Series {
+        label: "estimate".to_owned(),
+        stroke: Stroke { weight: Weight::Rival, ..ESTIMATE },
+        points: both(&|interval| interval.pressure_pa, mpa),
+    };
+    let ends = |end: usize| overview.intervals().map(|([from_s, _], i)| (from_s, mpa(i.range_pa[end]))).collect();
+    let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: ends(0), upper: ends(1) };
+    let healths: Vec<(f64, [bool; HEALTHS])> =
+        overview.intervals().flat_map(|([from_s, to_s], i)| [(from_s, i.healths), (to_s, i.healths)]).collect();
+    let first_s = overview.intervals().next().map_or(0.0, |([from_s, _], _)| from_s);
+    let last_s = overview.intervals().last().map_or(1.0, |([_, to_s], _)| to_s);
+    let spans = shifts.iter().map(|shift| Span {
+        label: String::new(),
+        start: shift.begin_s(),
+        end: shift.end_s(),
+        colour: TORQUE_PHASE,
+    });
+    Figure {
+        x_label: "time (s)",
+        x_range: (first_s, last_s),
+        spans: spans.take(MOST_DRAWN).collect(),
+        panels: [
+            panel("speed (rpm)", 150.0, speeds.collect()),
+            Panel { band: Some(band), ..panel("clutch pressure (MPa)", 110.0, vec![pressure]) },
+        ]
+        .into_iter()
+        .chain(health_panel(&healths))
+        .collect(),
+    }
+}
+
+/// A shift with some time around it.
+fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> Figure {
+    let mut shift = shift.clone();
+    shift.thin(points.max(1));
+    let samples = &shift.samples;
+    let of = |value: &dyn Fn(&LogSample) -> f64| -> Vec<(f64, f64)> {
+        samples.iter().map(|sample| (sample.time_s, value(sample))).collect()
+    };
+    // A channel that is slower than the steps has readings with gaps between them.
+    let measured = |value: &dyn Fn(&LogSample) -> Option<f64>| -> Vec<(f64, f64)> {
+        samples.iter().filter_map(|sample| Some((sample.time_s, value(sample)?))).collect()
+    };
+    let readings = |i: usize| {
+        measured(&|sample: &LogSample| {
+            let input = &sample.input;
+            let reading = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s][i]?;
+            Some(rpm(reading.value))
+        })
+    };
+    let speeds = SPEEDS.iter().enumerate().map(|(i, (label, stroke))| Series {
+        label: (*label).to_owned(),
+        stroke: *stroke,
+        points: readings(i),
+    });
+    let mut panels = vec![panel("speed (rpm)", 110.0, speeds.collect())];
+    let estimate = |points| Series { label: "estimate".to_owned(), stroke: ESTIMATE, points };
+    let truth = |points: Vec<(f64, f64)>| {
+        let measured = Series { label: "measured".to_owned(), stroke: Stroke::TRUTH, points };
+        (!measured.points.is_empty()).then_some(measured)
+    };
+    let band = |range: &dyn Fn(&LogSample) -> Option<[f64; 2]>| {
+        let end = |end: usize| of(&|sample| range(sample).map_or(f64::NAN, |range| range[end]));
+        Some(Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) })
+    };
+    if let Some(estimated) = &shift.estimated {
+        // After lock-up the pressure rises to that of the line, which no speed tells.
+        let until_s = estimated.lock_up_s.unwrap_or(f64::INFINITY);
+        let most = |value: &dyn Fn(&LogSample) -> f64| {
+            let until = samples.iter().filter(|sample| sample.time_s <= until_s);
+            until.map(value).filter(|value| value.is_finite()).fold(0.0, f64::max)
+        };
+        let pressure_most = most(&|sample| {
+            let measured = sample.pressure_pa.map_or(0.0, |reading| reading.value);
+            mpa(sample.estimate.bounds.map_or(sample.estimate.pressure_pa, |b| b.pressure_pa[1]).max(measured))
+        });
+        let pressures = [
+            truth(measured(&|sample| Some(mpa(sample.pressure_pa?.value)))),
+            Some(estimate(of(&|sample| mpa(sample.estimate.pressure_pa)))),
+        ];
+        panels.push(Panel {
+            band: band(&|sample| Some(sample.estimate.bounds?.pressure_pa.map(mpa))),
+            axis: Axis::Within(0.0, 1.1 * pressure_most.max(0.01)),
+            ..panel("clutch pressure (MPa)", 150.0, pressures.into_iter().flatten().collect())
+        });
+        let torque_most = most(&|sample| {
+            let measured = sample.torque_n_m.map_or(0.0, |reading| reading.value);
+            let estimate = &sample.estimate;
+            estimate.bounds.map_or(estimate.clutch_torque_n_m, |b| b.clutch_torque_n_m[1]).max(measured)
+        });
+        let torques = [
+            truth(measured(&|sample| Some(sample.torque_n_m?.value))),
+            Some(estimate(of(&|sample| sample.estimate.clutch_torque_n_m))),
+        ];
+        panels.push(Panel {
+            band: band(&|sample| Some(sample.estimate.bounds?.clutch_torque_n_m)),
+            axis: Axis::Within(-0.1 * torque_most.max(1.0), 1.1 * torque_most.max(1.0)),
+            ..panel("clutch torque (N\u{a0}m)", 120.0, torques.into_iter().flatten().collect())
+        });
+        let shaft = measured(&|sample| sample.estimate.shaft_torque_n_m);
+        if !shaft.is_empty() {
+            panels.push(panel("shaft torque (N\u{a0}m)", 100.0, vec![estimate(shaft)]));
+        }
+        let title = match command {
+            CommandKind::Current => "current (A)",
+            CommandKind::DutyCycle => "duty cycle (%)",
+        };
+        let points = measured(&|sample| Some(sample.input.command?.value));
+        let command = Series { label: "oncoming valve".to_owned(), stroke: Stroke::SIGNAL, points };
+        panels.push(panel(title, 70.0, vec![command]));
+        let is = |sample: &LogSample| Health::ALL.map(|health| health == sample.estimate.health);
+        let healths: Vec<_> = samples.iter().map(|sample| (sample.time_s, is(sample))).collect();
+        panels.extend(health_panel(&healths));
+    }
+    let [from_s, to_s] = shift.window_s;
+    Figure { x_label: "time (s)", x_range: (from_s, to_s), spans: phases(&shift), panels }
+}
+
+/// The phases, as the observer saw them or else as the ratio shows them.
+fn phases(shift: &ShiftEstimate) -> Vec<Span> {
+    let span = |label: &str, [start, end]: [f64; 2], colour| Span { label: label.to_owned(), start, end, colour };
+    match &shift.estimated {
+        Some(estimated) => {
+            let [begin_s, inertia_s] = estimated.torque_phase_s;
+            vec![
+                span("torque phase", [begin_s, inertia_s], TORQUE_PHASE),
+                span("inertia phase", [inertia_s, shift.end_s()], INERTIA_PHASE),
+            ]
+        }
+        None => {
+            let inertia_s = shift.shift.inertia_s.into_iter();
+            inertia_s.map(|inertia_s| span("ratio changes", inertia_s, INERTIA_PHASE)).collect()
+        }
+    }
+}
+
+/// Kinds of health.
+const HEALTHS: usize = Health::ALL.len();
+
+/// A line for each health that was met: where it holds. None if all is good.
+fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> {
+    const COLOURS: [&str; HEALTHS] = [
+        "#009E73", "#E69F00", "#B8A50A", "#56B4E9", "#0072B2", "#CC79A7", "#CC79A7", "#D55E00", "#882255", "#AA4499",
+        "#D55E00", "#000000",
+    ];
+    let met = |wanted: &Health| healths.iter().any(|(_, healths)| healths[*wanted as usize]);
+    let met: Vec<Health> = Health::ALL.into_iter().filter(met).collect();
+    if met.iter().all(|health| *health == Health::Good) {
+        return None;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a handful of lines")]
+    let series = met.iter().enumerate().map(|(line, health)| Series {
+        label: health.name().replace('_', " "),
+        stroke: Stroke { colour: COLOURS[*health as usize], weight: Weight::Main, dash: None },
+        points: held(healths, *health, -(line as f64)),
+    });
+    let series: Vec<Series> = series.collect();
+    #[expect(clippy::cast_precision_loss, reason = "a handful of lines")]
+    let lines = series.len() as f64;
+    let axis = Axis::Unmarked(0.5 - lines, 0.5);
+    Some(Panel { y_label: "health".to_owned(), height: 18.0 * lines + 8.0, series, band: None, axis })
+}
+
+/// A line at this height where a health holds. One sample of it is drawn until the next.
+fn held(healths: &[(f64, [bool; HEALTHS])], wanted: Health, height: f64) -> Vec<(f64, f64)> {
+    let is = |at: usize| healths[at].1[wanted as usize];
+    let shown = |at: usize| is(at) || at > 0 && is(at - 1);
+    (0..healths.len()).map(|at| (healths[at].0, if shown(at) { height } else { f64::NAN })).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_compact_figure_has_its_curves_to_a_tenth_of_a_pixel() {
+        let svg =
+            r#"<svg><path d="M 74.81 36.25 L 83.04 -35.000000004 Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
+        let expected = r#"<svg><path d="M74.8 36.2L83 -35Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
+        assert_eq!(compact(svg), expected);
+        assert_eq!(compact("<svg></svg>"), "<svg></svg>");
+    }
+}

@@ -1,0 +1,163 @@
+//! A whole drive in a few hundred numbers, however long it is.
+
+use observer::Health;
+
+use crate::shift_estimates::LogSample;
+
+/// Intervals of time in an overview, at most.
+const MOST: usize = 600;
+/// The first interval, s. It doubles when the drive has filled the most of them.
+const FIRST_S: f64 = 0.01;
+
+/// Lowest and highest value of a signal in an interval; NaN if it had none.
+pub type Extremes = [f64; 2];
+
+/// Signals of an interval of time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Engine, turbine and output speed, rad/s.
+    pub speeds_rad_s: [Extremes; 3],
+    /// Estimated pressure, Pa.
+    pub pressure_pa: Extremes,
+    /// Ends of its range, Pa.
+    pub range_pa: Extremes,
+    /// Which healths its samples have, in the order of [`Health::ALL`]; none without a sample.
+    pub healths: [bool; Health::ALL.len()],
+}
+
+const EMPTY: Interval = Interval {
+    speeds_rad_s: [[f64::NAN; 2]; 3],
+    pressure_pa: [f64::NAN; 2],
+    range_pa: [f64::NAN; 2],
+    healths: [false; Health::ALL.len()],
+};
+
+/// The lowest and highest of both.
+fn joined(a: Extremes, b: Extremes) -> Extremes {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+impl Interval {
+    fn joined(&self, other: &Self) -> Self {
+        Self {
+            speeds_rad_s: std::array::from_fn(|i| joined(self.speeds_rad_s[i], other.speeds_rad_s[i])),
+            pressure_pa: joined(self.pressure_pa, other.pressure_pa),
+            range_pa: joined(self.range_pa, other.range_pa),
+            healths: std::array::from_fn(|i| self.healths[i] || other.healths[i]),
+        }
+    }
+
+    fn of(sample: &LogSample) -> Self {
+        let LogSample { input, estimate, .. } = sample;
+        let speeds = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
+        Self {
+            speeds_rad_s: speeds.map(|reading| [reading.map_or(f64::NAN, |reading| reading.value); 2]),
+            pressure_pa: [estimate.pressure_pa; 2],
+            range_pa: estimate.bounds.map_or([f64::NAN; 2], |bounds| bounds.pressure_pa),
+            healths: Health::ALL.map(|health| health == estimate.health),
+        }
+    }
+}
+
+/// A drive in intervals of equal length. Times may jump; they do not fall.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overview {
+    first_s: f64,
+    interval_s: f64,
+    intervals: Vec<Interval>,
+}
+
+impl Default for Overview {
+    fn default() -> Self {
+        Self { first_s: f64::NAN, interval_s: FIRST_S, intervals: Vec::new() }
+    }
+}
+
+impl Overview {
+    /// Takes the next sample.
+    pub fn push(&mut self, sample: &LogSample) {
+        if self.intervals.is_empty() {
+            self.first_s = sample.time_s;
+        }
+        let place = |interval_s: f64| (sample.time_s - self.first_s) / interval_s;
+        #[expect(clippy::cast_precision_loss, reason = "a small count")]
+        while place(self.interval_s) >= MOST as f64 {
+            self.interval_s *= 2.0;
+            self.intervals =
+                self.intervals.chunks(2).map(|pair| pair[0].joined(pair.get(1).unwrap_or(&EMPTY))).collect();
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the most intervals")]
+        let at = place(self.interval_s) as usize;
+        if self.intervals.len() <= at {
+            self.intervals.resize(at + 1, EMPTY);
+        }
+        self.intervals[at] = self.intervals[at].joined(&Interval::of(sample));
+    }
+
+    /// The intervals with the times of their beginnings and ends, s.
+    pub fn intervals(&self) -> impl Iterator<Item = ([f64; 2], &Interval)> {
+        #[expect(clippy::cast_precision_loss, reason = "a small count")]
+        let time_s = |at: usize| self.first_s + at as f64 * self.interval_s;
+        self.intervals.iter().enumerate().map(move |(at, interval)| ([time_s(at), time_s(at + 1)], interval))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use observer::{ChannelHealth, Channels, Estimate, Input, Phase, Reading};
+
+    fn sample(time_s: f64, engine_rad_s: f64, health: Health) -> LogSample {
+        let none = None::<Reading<f64>>;
+        LogSample {
+            time_s,
+            input: Input {
+                dt_s: 0.01,
+                engine_rad_s: Some(Reading::now(engine_rad_s)),
+                turbine_rad_s: none,
+                output_rad_s: none,
+                wheel_rad_s: none,
+                command: none,
+                offgoing_command: none,
+                engine_torque_n_m: none,
+            },
+            estimate: Estimate {
+                pressure_pa: 1.0,
+                clutch_torque_n_m: 0.0,
+                shaft_torque_n_m: None,
+                phase: Phase::BeforeShift,
+                health,
+                channels: Channels::all(ChannelHealth::Good),
+                bounds: None,
+            },
+            pressure_pa: none,
+            torque_n_m: none,
+        }
+    }
+
+    #[test]
+    fn a_long_drive_keeps_its_extremes_and_every_health() {
+        let mut overview = Overview::default();
+        for i in 0..100_000 {
+            let odd = i == 77_777;
+            let health = if odd { Health::SpeedsRejected } else { Health::Good };
+            overview.push(&sample(1e9 + f64::from(i) * 0.01, if odd { 900.0 } else { 100.0 }, health));
+        }
+        let intervals: Vec<_> = overview.intervals().collect();
+        assert!((MOST / 2..=MOST).contains(&intervals.len()));
+        let odd: Vec<_> = intervals.iter().filter(|(_, i)| i.healths[Health::SpeedsRejected as usize]).collect();
+        assert_eq!(odd.len(), 1);
+        let ([from_s, to_s], interval) = odd[0];
+        assert!((*from_s..*to_s).contains(&(1e9 + 777.77)) && interval.speeds_rad_s[0] == [100.0, 900.0]);
+        assert!(interval.speeds_rad_s[1][0].is_nan());
+    }
+
+    #[test]
+    fn a_jump_over_years_is_a_hole() {
+        let mut overview = Overview::default();
+        for time_s in [0.0, 0.01, 1e9] {
+            overview.push(&sample(time_s, 1.0, Health::Good));
+        }
+        assert_eq!(overview.intervals().filter(|(_, interval)| interval.healths.contains(&true)).count(), 2);
+    }
+}

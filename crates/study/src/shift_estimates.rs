@@ -1,0 +1,377 @@
+//! The shifts of a log with their estimates.
+//!
+//! The finder of `logs` says when a shift was, [`RecentSamples`] holds the last seconds of estimates, and [`ShiftEstimate`] is what
+//! both say about one shift. Pressures and torques are given for the shift that the vehicle file describes; of other shifts only
+//! the speeds tell something.
+
+use std::collections::VecDeque;
+
+use config::Vehicle;
+use drivetrain::ReducedShift;
+use logs::{Load, Shift};
+use observer::{Estimate, Health, Input, Phase, Reading};
+use trace::Cell;
+
+/// A step of a log with its estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogSample {
+    /// Time of the step, s.
+    pub time_s: f64,
+    /// What the observer was given.
+    pub input: Input<f64>,
+    /// What it estimates.
+    pub estimate: Estimate<f64>,
+    /// Measured pressure of the oncoming clutch, Pa.
+    pub pressure_pa: Option<Reading<f64>>,
+    /// Measured torque of the oncoming clutch, N m.
+    pub torque_n_m: Option<Reading<f64>>,
+}
+
+/// Time before and after a shift that belongs to it, s.
+const BEFORE_S: f64 = 0.6;
+const AFTER_S: f64 = 0.9;
+/// What is held: a shift is known so long after it began, and no observer runs ahead of its log.
+const HELD_S: f64 = logs::shifts::LONGEST_S + logs::shifts::SETTLED_S + BEFORE_S + 1.0;
+/// No more samples are held, whatever their rate.
+const MOST_HELD: usize = 500_000;
+
+/// The last seconds of a log.
+#[derive(Debug, Clone, Default)]
+pub struct RecentSamples {
+    samples: VecDeque<LogSample>,
+}
+
+impl RecentSamples {
+    /// Takes the next sample.
+    pub fn push(&mut self, sample: LogSample) {
+        self.samples.push_back(sample);
+        while self.samples.front().is_some_and(|first| sample.time_s - first.time_s > HELD_S)
+            || self.samples.len() > MOST_HELD
+        {
+            self.samples.pop_front();
+        }
+    }
+
+    /// The samples from one time to another, with the one before them.
+    fn between(&self, [from_s, to_s]: [f64; 2]) -> Vec<LogSample> {
+        let first = self.samples.partition_point(|sample| sample.time_s < from_s).saturating_sub(1);
+        self.samples.range(first..).take_while(|sample| sample.time_s <= to_s).copied().collect()
+    }
+}
+
+/// A value with its range: of an estimate the mean over a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ranged {
+    /// The value.
+    pub value: f64,
+    /// Lowest and highest, where there is a range.
+    pub range: Option<[f64; 2]>,
+}
+
+/// Error of an estimate against what was measured: measured minus estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredError {
+    /// Measured values.
+    pub samples: usize,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Largest size.
+    pub peak: f64,
+    /// Share of the values within the guaranteed range, 0 to 1, where there is one.
+    pub inside: Option<f64>,
+}
+
+/// What an observer says about the shift of its vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatedShift {
+    /// Torque phase: from the kiss point until the offgoing clutch slips, s.
+    pub torque_phase_s: [f64; 2],
+    /// When the oncoming clutch was locked, s; none if it was not seen.
+    pub lock_up_s: Option<f64>,
+    /// Mean pressure in the inertia phase, Pa.
+    pub pressure_pa: Ranged,
+    /// Mean clutch torque in the inertia phase, N m.
+    pub torque_n_m: Ranged,
+    /// Lowest drive-shaft torque of the shift, N m: its tie-up, or the hole in its torque; where the observer estimates it.
+    pub least_shaft_n_m: Option<f64>,
+    /// Work of friction in the oncoming clutch, J, and what the range of its torque allows.
+    pub friction_work_j: Ranged,
+    /// Error of the pressure from the torque phase to lock-up, Pa, where it was measured.
+    pub pressure_error_pa: Option<MeasuredError>,
+    /// The same of the clutch torque, N m.
+    pub torque_error_n_m: Option<MeasuredError>,
+    /// Share of the samples of each health but good, 0 to 1, worst first.
+    pub unhealthy: Vec<(Health, f64)>,
+}
+
+/// A shift of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShiftEstimate {
+    /// Its place among the shifts of the log, from 1.
+    pub number: usize,
+    /// What the speeds and gears say.
+    pub shift: Shift,
+    /// What the observer says; none if it is not the shift of the vehicle file, or the observer did not see it.
+    pub estimated: Option<EstimatedShift>,
+    /// Whether it is the shift of the vehicle file.
+    pub of_vehicle: bool,
+    /// The time that belongs to it, s.
+    pub window_s: [f64; 2],
+    /// The samples in that time.
+    pub samples: Vec<LogSample>,
+}
+
+/// Ratios this close are the same.
+const SAME_RATIO: f64 = 0.03;
+
+/// Whether a shift between gears of these ratios, 1st first, is the one of a vehicle file.
+pub fn is_of_vehicle(shift: &Shift, ratios: &[f64], vehicle: &Vehicle) -> bool {
+    let of = |gear: u32| usize::try_from(gear).ok().and_then(|gear| ratios.get(gear.checked_sub(1)?));
+    let same = |ratio: Option<&f64>, own: f64| ratio.is_some_and(|ratio| (ratio / own - 1.0).abs() < SAME_RATIO);
+    same(of(shift.from), vehicle.shift.ratio_offgoing()) && same(of(shift.to), vehicle.shift.ratio_oncoming())
+}
+
+impl ShiftEstimate {
+    /// A shift of the recent samples; `of_vehicle` as of [`is_of_vehicle`].
+    pub fn of(number: usize, shift: Shift, of_vehicle: bool, recent: &RecentSamples, vehicle: &Vehicle) -> Self {
+        let around_s = [shift.start_s() - BEFORE_S - logs::shifts::LONGEST_S, shift.end_s() + AFTER_S];
+        let samples = recent.between(around_s);
+        let estimated = of_vehicle.then(|| EstimatedShift::of(&shift, &samples, &vehicle.shift)).flatten();
+        let begin_s = estimated.as_ref().map_or(shift.start_s(), |e| e.torque_phase_s[0].min(shift.start_s()));
+        let end_s = estimated.as_ref().and_then(|e| e.lock_up_s).map_or(shift.end_s(), |s| s.max(shift.end_s()));
+        let window_s = [begin_s - BEFORE_S, end_s + AFTER_S];
+        Self { number, shift, estimated, of_vehicle, window_s, samples: recent.between(window_s) }
+    }
+}
+
+impl ShiftEstimate {
+    /// Keeps at most so many samples, of those that lie together the one with the worst health.
+    pub fn thin(&mut self, most: usize) {
+        if most == 0 {
+            self.samples = Vec::new();
+            return;
+        }
+        let together = self.samples.len().div_ceil(most).max(1);
+        let worst = |samples: &[LogSample]| samples.iter().max_by_key(|sample| sample.estimate.health).copied();
+        self.samples = self.samples.chunks(together).filter_map(worst).collect();
+    }
+
+    /// When it began, s: with its command, else with the torque phase, else with what the finder saw first.
+    pub fn begin_s(&self) -> f64 {
+        let torque_phase_s = self.estimated.as_ref().map(|estimated| estimated.torque_phase_s[0]);
+        self.shift.command_s.or(torque_phase_s).unwrap_or(self.shift.start_s())
+    }
+
+    /// When it was over, s.
+    pub fn end_s(&self) -> f64 {
+        let lock_up_s = self.estimated.as_ref().and_then(|estimated| estimated.lock_up_s);
+        lock_up_s.unwrap_or(self.shift.end_s())
+    }
+}
+
+/// A column of the table of shifts: its name, and what a shift writes into it. The time before them is the begin of the shift.
+type Column = (&'static str, fn(&ShiftEstimate) -> Cell<'static>);
+
+/// The columns of the table of shifts, in SI.
+pub const COLUMNS: &[Column] = &[
+    ("number", |s| Cell::Whole(s.number as u64)),
+    ("from_gear", |s| Cell::Whole(u64::from(s.shift.from))),
+    ("to_gear", |s| Cell::Whole(u64::from(s.shift.to))),
+    ("load", |s| {
+        Cell::Word(match s.shift.load {
+            Load::PowerOn => "power_on",
+            Load::PowerOff => "power_off",
+            Load::Unknown => "unknown",
+        })
+    }),
+    ("of_vehicle", |s| Cell::Word(if s.of_vehicle { "yes" } else { "no" })),
+    ("end_s", |s| Cell::Number(s.end_s())),
+    ("command_s", |s| number(s.shift.command_s)),
+    ("gear_signal_s", |s| number(s.shift.gear_s)),
+    ("ratio_begin_s", |s| number(s.shift.inertia_s.map(|inertia_s| inertia_s[0]))),
+    ("ratio_end_s", |s| number(s.shift.inertia_s.map(|inertia_s| inertia_s[1]))),
+    ("torque_phase_begin_s", |s| estimated(s, |e| Some(e.torque_phase_s[0]))),
+    ("inertia_phase_begin_s", |s| estimated(s, |e| Some(e.torque_phase_s[1]))),
+    ("lock_up_s", |s| estimated(s, |e| e.lock_up_s)),
+    ("flare_rad_s", |s| number(s.shift.quality.flare_rad_s)),
+    ("jerk_m_s3", |s| number(s.shift.quality.jerk_m_s3)),
+    ("oncoming_pressure_mean_pa", |s| estimated(s, |e| Some(e.pressure_pa.value))),
+    ("oncoming_pressure_mean_least_pa", |s| estimated(s, |e| e.pressure_pa.end(0))),
+    ("oncoming_pressure_mean_greatest_pa", |s| estimated(s, |e| e.pressure_pa.end(1))),
+    ("oncoming_torque_mean_n_m", |s| estimated(s, |e| Some(e.torque_n_m.value))),
+    ("oncoming_torque_mean_least_n_m", |s| estimated(s, |e| e.torque_n_m.end(0))),
+    ("oncoming_torque_mean_greatest_n_m", |s| estimated(s, |e| e.torque_n_m.end(1))),
+    ("least_shaft_torque_n_m", |s| estimated(s, |e| e.least_shaft_n_m)),
+    ("friction_work_j", |s| estimated(s, |e| Some(e.friction_work_j.value))),
+    ("friction_work_least_j", |s| estimated(s, |e| e.friction_work_j.end(0))),
+    ("friction_work_greatest_j", |s| estimated(s, |e| e.friction_work_j.end(1))),
+    ("pressure_error_rms_pa", |s| estimated(s, |e| Some(e.pressure_error_pa?.rms))),
+    ("pressure_error_mean_pa", |s| estimated(s, |e| Some(e.pressure_error_pa?.mean))),
+    ("pressure_error_peak_pa", |s| estimated(s, |e| Some(e.pressure_error_pa?.peak))),
+    ("pressure_inside_range", |s| estimated(s, |e| e.pressure_error_pa?.inside)),
+    ("torque_error_rms_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.rms))),
+    ("torque_error_mean_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.mean))),
+    ("torque_error_peak_n_m", |s| estimated(s, |e| Some(e.torque_error_n_m?.peak))),
+    ("torque_inside_range", |s| estimated(s, |e| e.torque_error_n_m?.inside)),
+    ("good_share", |s| estimated(s, |e| Some(1.0 - e.unhealthy.iter().map(|(_, share)| share).sum::<f64>()))),
+    ("worst_health", |s| {
+        let worst = s.estimated.as_ref().map(|e| e.unhealthy.first().map_or(Health::Good, |(health, _)| *health));
+        Cell::Word(worst.map_or("", Health::name))
+    }),
+];
+
+fn number(value: Option<f64>) -> Cell<'static> {
+    Cell::Number(value.unwrap_or(f64::NAN))
+}
+
+fn estimated(shift: &ShiftEstimate, value: fn(&EstimatedShift) -> Option<f64>) -> Cell<'static> {
+    number(shift.estimated.as_ref().and_then(value))
+}
+
+impl Ranged {
+    /// The lower (0) or upper (1) end of its range.
+    pub fn end(&self, end: usize) -> Option<f64> {
+        self.range.map(|range| range[end])
+    }
+}
+
+impl EstimatedShift {
+    /// None if the observer saw no shift at this time.
+    fn of(shift: &Shift, samples: &[LogSample], reduced: &ReducedShift<f64>) -> Option<Self> {
+        let phase = |sample: &LogSample| sample.estimate.phase;
+        // From the inertia phase back to where the clutch began to carry torque, and on to its lock-up.
+        let [inertia_from_s, inertia_to_s] = shift.inertia_s.unwrap_or([shift.start_s(), shift.end_s()]);
+        let seen = |sample: &LogSample| {
+            phase(sample) == Phase::InertiaPhase && (inertia_from_s..=inertia_to_s).contains(&sample.time_s)
+        };
+        let within = samples.iter().position(seen)?;
+        let begin = samples[..within]
+            .iter()
+            .rposition(|sample| matches!(phase(sample), Phase::BeforeShift | Phase::AfterShift))
+            .map_or(0, |before| before + 1);
+        let inertia = begin + samples[begin..].iter().position(|sample| phase(sample) == Phase::InertiaPhase)?;
+        let after = |sample: &LogSample| matches!(phase(sample), Phase::AfterShift | Phase::BeforeShift);
+        let end = samples[within..].iter().position(after).map_or(samples.len(), |length| within + length);
+        let lock_up_s = samples.get(end).filter(|s| phase(s) == Phase::AfterShift).map(|sample| sample.time_s);
+        let in_inertia = samples[inertia..end].iter().filter(|sample| phase(sample) == Phase::InertiaPhase);
+        let of_shift = &samples[begin..end];
+        let shaft = of_shift.iter().filter_map(|sample| sample.estimate.shaft_torque_n_m);
+        let measured = |value: fn(&LogSample) -> Option<Reading<f64>>, estimate: fn(&LogSample) -> Ranged| {
+            MeasuredError::of(samples, begin..end, value, estimate)
+        };
+        Some(Self {
+            torque_phase_s: [samples[begin].time_s, samples[inertia].time_s],
+            lock_up_s,
+            pressure_pa: mean(in_inertia.clone().map(pressure))?,
+            torque_n_m: mean(in_inertia.map(torque))?,
+            least_shaft_n_m: shaft.reduce(f64::min),
+            friction_work_j: friction_work(samples, begin..end, reduced),
+            pressure_error_pa: measured(|s| s.pressure_pa, pressure),
+            torque_error_n_m: measured(|s| s.torque_n_m, torque),
+            unhealthy: unhealthy(of_shift),
+        })
+    }
+}
+
+fn pressure(sample: &LogSample) -> Ranged {
+    Ranged { value: sample.estimate.pressure_pa, range: sample.estimate.bounds.map(|bounds| bounds.pressure_pa) }
+}
+
+fn torque(sample: &LogSample) -> Ranged {
+    let range = sample.estimate.bounds.map(|bounds| bounds.clutch_torque_n_m);
+    Ranged { value: sample.estimate.clutch_torque_n_m, range }
+}
+
+/// Mean of values and of the ends of their ranges.
+fn mean(values: impl Iterator<Item = Ranged>) -> Option<Ranged> {
+    let (mut count, mut sum, mut ends) = (0.0, 0.0, Some([0.0; 2]));
+    for Ranged { value, range } in values {
+        count += 1.0;
+        sum += value;
+        ends = ends.zip(range).map(|([low, high], range)| [low + range[0], high + range[1]]);
+    }
+    (count > 0.0).then(|| Ranged { value: sum / count, range: ends.map(|ends| ends.map(|end| end / count)) })
+}
+
+/// Torque times slip over time. A channel that is slower than the steps stands for as long as its last reading.
+fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: &ReducedShift<f64>) -> Ranged {
+    let (mut turbine_rad_s, mut output_rad_s) = (f64::NAN, f64::NAN);
+    let mut power = Vec::with_capacity(shift.end);
+    for sample in &samples[..shift.end] {
+        turbine_rad_s = sample.input.turbine_rad_s.map_or(turbine_rad_s, |reading| reading.value);
+        output_rad_s = sample.input.output_rad_s.map_or(output_rad_s, |reading| reading.value);
+        let slip_rad_s = reduced.oncoming_slip(turbine_rad_s, output_rad_s);
+        let Ranged { value, range } = torque(sample);
+        let ends = range.map(|range| {
+            let [a, b] = range.map(|n_m| n_m * slip_rad_s);
+            [a.min(b), a.max(b)]
+        });
+        power.push((sample.time_s, Ranged { value: value * slip_rad_s, range: ends }));
+    }
+    let mut work = Ranged { value: 0.0, range: Some([0.0; 2]) };
+    for pair in power[shift].windows(2) {
+        let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
+        let half_s = 0.5 * (to_s - from_s);
+        work.value += half_s * (from.value + to.value);
+        work.range = work
+            .range
+            .zip(from.range.zip(to.range))
+            .map(|(work, (from, to))| [work[0] + half_s * (from[0] + to[0]), work[1] + half_s * (from[1] + to[1])]);
+    }
+    work
+}
+
+impl MeasuredError {
+    /// The error in a part of the samples. A measured value is compared with the estimate of its own time, by a line between
+    /// the estimates around it; its range is that of the step that brought it.
+    fn of(
+        samples: &[LogSample],
+        part: std::ops::Range<usize>,
+        measured: impl Fn(&LogSample) -> Option<Reading<f64>>,
+        estimate: impl Fn(&LogSample) -> Ranged,
+    ) -> Option<Self> {
+        let (mut count, mut sum, mut squares, mut peak) = (0_u32, 0.0, 0.0, 0.0_f64);
+        let (mut inside, mut ranged) = (0_u32, 0_u32);
+        for at in part {
+            let Some(reading) = measured(&samples[at]) else { continue };
+            let time_s = samples[at].time_s - reading.age_s;
+            let before = samples[..at].iter().rposition(|sample| sample.time_s <= time_s);
+            let now = estimate(&samples[before.map_or(at, |before| before + 1)]).value;
+            let value = before.map_or(now, |before| {
+                let [from_s, to_s] = [samples[before].time_s, samples[before + 1].time_s];
+                let share = ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0);
+                let from = estimate(&samples[before]).value;
+                from + share * (now - from)
+            });
+            let error = reading.value - value;
+            count += 1;
+            sum += error;
+            squares += error * error;
+            peak = peak.max(crate::score::size(error));
+            if let Some([low, high]) = estimate(&samples[at]).range {
+                ranged += 1;
+                inside += u32::from((low..=high).contains(&reading.value));
+            }
+        }
+        let all = f64::from(count);
+        (count > 0).then(|| Self {
+            samples: usize::try_from(count).unwrap_or(usize::MAX),
+            rms: (squares / all).sqrt(),
+            mean: sum / all,
+            peak,
+            inside: (ranged > 0).then(|| f64::from(inside) / f64::from(ranged)),
+        })
+    }
+}
+
+fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
+    let share = |health: Health| {
+        #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+        let share = samples.iter().filter(|sample| sample.estimate.health == health).count() as f64
+            / samples.len().max(1) as f64;
+        (health, share)
+    };
+    Health::ALL.into_iter().skip(1).rev().map(share).filter(|(_, share)| *share > 0.0).collect()
+}
