@@ -129,13 +129,20 @@ impl<T: Real> Covariance<T> {
             p[i][LAWS..].copy_from_slice(&moved[i][LAWS..]);
         }
         let fading = [(OFFGOING, step.keep), (SHARE, step.stay), (FRICTION, step.last), (GAIN, step.last)];
-        for (fading, left) in fading {
-            for row in p.iter_mut().take(fading + 1) {
-                row[fading] = left * row[fading];
-            }
-            for value in p[fading].iter_mut().skip(fading) {
-                *value = left * *value;
-            }
+        for (state, left) in fading {
+            self.fade(state, left);
+        }
+    }
+
+    /// Leaves a share of a state.
+    #[inline]
+    fn fade(&mut self, state: usize, left: T) {
+        let state = state.min(ALL - 1);
+        for row in self.upper.iter_mut().take(state + 1) {
+            row[state] = left * row[state];
+        }
+        for value in &mut self.upper[state][state..] {
+            *value = left * *value;
         }
     }
 
