@@ -1,0 +1,122 @@
+//! Begin and end of the filter.
+
+use super::{
+    AnyShiftFilter, AnyShiftState, FIRST_S, FRICTION, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT,
+    N, OUTPUT, PRESSURE, PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SPEEDS, SPRING, ShiftInput,
+    ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+};
+use drivetrain::Real;
+
+impl<T: Real> AnyShiftFilter<'_, T> {
+    /// Ends a filter whose state is not possible, or whose gear does not fit; begins one in a gear.
+    pub(super) fn settle(
+        &self,
+        state: &mut AnyShiftState<T>,
+        input: &ShiftInput<T>,
+        torque: Option<&turbine::Found<T>>,
+    ) -> Health {
+        let mut health = Health::Good;
+        let speeds = self.measured(&state.newest, state.running.as_ref());
+        if let Some(running) = &state.running {
+            let lost = T::of(LOST_S);
+            let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > lost;
+            let slow = running.x.mean[OUTPUT].abs() <= self.uncertainty.output_least_rad_s;
+            let possible = running.x.is_sound()
+                && self.limits.shaft_torque_possible(running.x.mean[SPRING])
+                && running.x.mean[..SPEEDS].iter().all(|&speed| self.limits.speed_valid(speed));
+            let ratio = self.tied_ratio(running).filter(|_| running.shift.is_none());
+            let unfit = ratio.is_some_and(|ratio| self.slip(ratio, speeds).is_over());
+            state.unfit = if unfit { state.unfit.saturating_add(1) } else { 0 };
+            if running.misfit > T::of(MISFIT) {
+                health = Health::HeldClutchSlips;
+            }
+            let slips = state.unfit >= SLIPS_IN_GEAR;
+            if blind || slow || !possible || slips {
+                state.lose();
+                state.lost = blind || !possible;
+            }
+        }
+        if state.running.is_none() {
+            let (running, slips) = self.begin(state, input, torque);
+            state.running = running.filter(|running| running.x.is_sound());
+            state.slips = state.running.is_none() && (state.slips || slips);
+            if state.slips {
+                health = Health::HeldClutchSlips;
+            }
+            if state.running.is_some() && core::mem::take(&mut state.lost) {
+                health = Health::Restarted;
+            }
+        }
+        health
+    }
+
+    /// The first state, once the speeds are known and are those of a gear; and whether they are known and no gear fits.
+    pub(super) fn begin(
+        &self,
+        state: &AnyShiftState<T>,
+        input: &ShiftInput<T>,
+        torque: Option<&turbine::Found<T>>,
+    ) -> (Option<Running<T>>, bool) {
+        let (u, line, gear) = (&self.uncertainty, &self.driveline, input.gear);
+        let first =
+            |k: usize| state.newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
+        let (Some(turbine), Some(output), Some(torque)) = (first(TURBINE), first(OUTPUT), torque) else {
+            return (None, false);
+        };
+        if output.abs() <= u.output_least_rad_s {
+            return (None, false);
+        }
+        let shift = self.tables.shift(gear.from, gear.to).copied().filter(|_| gear.from != gear.to);
+        let held = [(gear.from, ShiftPhase::OffgoingHolds), (gear.to, ShiftPhase::OncomingHolds)].into_iter().find_map(
+            |(gear, phase)| {
+                let ratio = self.tables.gears.get(gear)?.ratio;
+                (!self.slip(ratio, [turbine, output]).is_over()).then_some((ratio, phase))
+            },
+        );
+        let Some((ratio, phase)) = held else { return (None, gear.from == gear.to) };
+        if gear.from != gear.to && shift.is_none() {
+            return (None, false);
+        }
+        let phase = if shift.is_some() { phase } else { ShiftPhase::InGear };
+        let shaft = torque.turbine_n_m * ratio * line.final_ratio;
+        let wheel = output / line.final_ratio;
+        let mut mean = [T::zero(); N];
+        (mean[TURBINE], mean[OUTPUT], mean[WHEEL]) = (ratio * output, output, first(WHEEL).unwrap_or(wheel));
+        (mean[SPRING], mean[LOAD]) = (shaft, shaft);
+        let mut deviations = [T::zero(); N];
+        deviations[OUTPUT] = self.readings[OUTPUT].deviation_rad_s;
+        deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
+        deviations[SPRING] = at_start(SHAFT_START, shaft);
+        deviations[LOAD] = at_start(LOAD_START, shaft);
+        deviations[RATE] = u.rate_rad_s;
+        let share = self.turbine.share(state.reported.is_some());
+        deviations[SHARE] = share;
+        let mut x = Gaussian::of(mean, deviations);
+        for c in 0..2 {
+            x.renew(FRICTION[c], T::zero(), T::one());
+            x.renew(PRESSURE[c], T::zero(), T::one());
+        }
+        // Turbine and output are tied.
+        let output_variance = square(deviations[OUTPUT]);
+        x.add(TURBINE, TURBINE, ratio * ratio * output_variance);
+        x.add(TURBINE, OUTPUT, ratio * output_variance);
+        // An error of the turbine torque is one of the shaft torque in balance with it.
+        x.add(SPRING, SPRING, square(share * shaft));
+        x.add(SPRING, SHARE, share * share * shaft);
+        let mut running = Running {
+            x,
+            gear: gear.from,
+            shift: None,
+            phase: PhaseMemory::new(phase),
+            torques: None,
+            slow_n_m: torque.turbine_n_m,
+            motion: None,
+            rates: [[T::zero(); SPEEDS]; 2],
+            gates: [Gate::new(GATE); SPEEDS],
+            silent_s: [T::zero(); SPEEDS],
+            misfit: T::one(),
+        };
+        running.shift = shift;
+        (Some(running), false)
+    }
+}

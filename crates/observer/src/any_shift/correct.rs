@@ -1,0 +1,79 @@
+//! Corrections by the readings of turbine, output and wheel speed.
+
+use super::{
+    AnyShiftFilter, ChannelHealth, Channels, MISFIT_S, Measured, Rates, Reading, Running, SPEEDS, ShiftInput, TOOTH,
+    Verdict, WHEEL, square,
+};
+use drivetrain::Real;
+
+impl<T: Real> AnyShiftFilter<'_, T> {
+    /// Takes the readings of turbine, output and wheel, each against the speed at its time.
+    pub(super) fn take_speeds(
+        &self,
+        running: &mut Running<T>,
+        input: &ShiftInput<T>,
+        channels: &Channels<ChannelHealth>,
+        speeds: [T; 2],
+    ) -> [ChannelHealth; SPEEDS] {
+        let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        let mut health = [channels.turbine, channels.output, channels.wheel];
+        let unseen = self.may_slip_unseen(running, speeds);
+        let Some(torques) = running.torques else { return health };
+        let torques = torques.without(running.phase.phase.holding());
+        let rates = Rates::new(&self.response(running), &torques, &self.driveline, self.wheels_kg_m2);
+        for k in 0..SPEEDS {
+            let Some(reading) = given[k].filter(|_| health[k] == ChannelHealth::Good) else { continue };
+            if unseen && k != WHEEL {
+                running.silent_s[k] = T::zero();
+                continue;
+            }
+            health[k] = self.correct(running, k, &reading, &rates);
+        }
+        running.rates = [rates.at(&running.x.mean), running.rates[0]];
+        health
+    }
+
+    /// Whether a clutch that is taken to hold may have begun to slip.
+    pub(super) fn may_slip_unseen(&self, running: &Running<T>, speeds: [T; 2]) -> bool {
+        match (&running.shift, running.phase.phase.holding()) {
+            (Some(shift), Some(held)) => {
+                let slip = self.slip(shift.clutches[held.min(1)].ratio, speeds);
+                slip.may_be()
+            }
+            (None, _) => self.tied_ratio(running).is_some_and(|ratio| self.slip(ratio, speeds).is_over()),
+            _ => false,
+        }
+    }
+
+    pub(super) fn correct(
+        &self,
+        running: &mut Running<T>,
+        k: usize,
+        reading: &Reading<T>,
+        rates: &Rates<T>,
+    ) -> ChannelHealth {
+        let sensor = &self.readings[k];
+        let age_s = self.age(sensor, reading);
+        let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.uncertainty.output_least_rad_s);
+        let rate = rates.at(&running.x.mean)[k];
+        // The speed at the time of the reading: `w - age w'`.
+        let mut row = rates.rows[k].map(|x| -age_s * x);
+        row[k] = row[k] + T::one();
+        let bent = T::of(0.5) * age_s * (rate - running.rates[0][k]);
+        let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
+        let measured = Measured { row, value: reading.value + age_s * rates.rest[k], noise };
+        let [innovation, variance] = running.x.innovation(&measured);
+        if k != WHEEL {
+            let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
+            running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);
+        }
+        match running.gates[k].judge(innovation, variance) {
+            Verdict::Refused => return ChannelHealth::Refused,
+            Verdict::Jumped => running.x.add(k, k, innovation * innovation),
+            Verdict::Taken => {}
+        }
+        running.x.correct(&measured);
+        running.silent_s[k] = T::zero();
+        ChannelHealth::Good
+    }
+}

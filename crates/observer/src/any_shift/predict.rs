@@ -1,0 +1,197 @@
+//! The prediction over a step, and the phase.
+
+use super::{
+    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, LOAD, MAX_ELEMENTS,
+    MODEL_SHARE, MOST_PIECES, Measured, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE,
+    SHARE_S, ShiftRow, TURBINE, Torques, WHEEL, free, powertrain, square, tied, turbine,
+};
+use drivetrain::Real;
+
+impl<T: Real> AnyShiftFilter<'_, T> {
+    /// Response of turbine and output in the phase of the moment.
+    pub(super) fn response(&self, running: &Running<T>) -> Response<T> {
+        match (&running.shift, running.phase.phase.holding()) {
+            (Some(shift), None) => free(&shift.mass_kg_m2),
+            (Some(shift), Some(held)) => {
+                let ratio = shift.clutches[held.min(1)].ratio;
+                tied(ratio, shift.inertia_at(ratio))
+            }
+            (None, _) => match self.tables.gears.get(running.gear) {
+                Some(gear) => tied(gear.ratio, gear.inertia_kg_m2),
+                None => [[T::zero(); 2]; 2],
+            },
+        }
+    }
+
+    /// The torques now.
+    pub(super) fn torques(
+        &self,
+        running: &Running<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        turbine_n_m: T,
+        speeds: [T; 2],
+    ) -> Torques<T> {
+        let mut clutches = [ClutchTorque::none(); 2];
+        if let Some(shift) = &running.shift {
+            for (c, (torque, clutch)) in clutches.iter_mut().zip(&shift.clutches).enumerate() {
+                let slip = self.slip(clutch.ratio, speeds);
+                let direction = running.phase.direction(c, &slip);
+                if let Some((memory, element)) = self.element(elements, clutch.element) {
+                    *torque = memory.torque(element, clutch, &self.uncertainty, slip.value, direction);
+                }
+            }
+        }
+        Torques { turbine_n_m, share_n_m: running.slow_n_m, clutches }
+    }
+
+    pub(super) fn element<'s>(
+        &'s self,
+        elements: &'s [Option<ElementState<T>>; MAX_ELEMENTS],
+        at: usize,
+    ) -> Option<(&'s ElementState<T>, &'s FrictionElement<T>)> {
+        elements.get(at)?.as_ref().zip(self.tables.elements.get(at))
+    }
+
+    /// Predicts over the step, and decides which clutches hold.
+    pub(super) fn advance(
+        &self,
+        running: &mut Running<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        torque: &turbine::Found<T>,
+        speeds: [T; 2],
+        dt_s: T,
+    ) {
+        let share = dt_s / (dt_s + T::of(SHARE_S));
+        running.slow_n_m = running.slow_n_m + share * (torque.turbine_n_m - running.slow_n_m);
+        let now = self.torques(running, elements, torque.turbine_n_m, speeds);
+        let mean = running.torques.map_or(now, |before| before.mean(&now)).without(running.phase.phase.holding());
+        if dt_s > T::zero() {
+            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+            for _ in 0..pieces {
+                self.predict(running, &mean, torque.noise, dt_s / T::of(pieces as f64));
+            }
+        }
+        for silent_s in &mut running.silent_s {
+            *silent_s = *silent_s + dt_s;
+        }
+        self.find_phase(running, elements, &now, speeds);
+        // The phase may have changed the direction of a torque.
+        running.torques = Some(self.torques(running, elements, torque.turbine_n_m, speeds));
+    }
+
+    pub(super) fn predict(&self, running: &mut Running<T>, torques: &Torques<T>, torque_noise: T, dt_s: T) {
+        let (u, response) = (&self.uncertainty, self.response(running));
+        let motion = match running.motion {
+            Some(motion) if motion.of == (response, dt_s) => motion,
+            _ => Motion::new(response, &self.driveline, self.wheels_kg_m2, dt_s),
+        };
+        running.motion = Some(motion);
+        let (rows, rest) = motion.rows(torques);
+        let mut stay = [T::one(); N];
+        let (friction, pressure) = ((-dt_s / u.torque_share_s).exp(), (-dt_s / u.pressure_s).exp());
+        for c in 0..2 {
+            stay[FRICTION[c]] = friction;
+            stay[PRESSURE[c]] = pressure;
+        }
+        let x = &mut running.x;
+        x.pass(&rows, &rest, &stay);
+        for c in 0..2 {
+            x.add(FRICTION[c], FRICTION[c], T::one() - friction * friction);
+            x.add(PRESSURE[c], PRESSURE[c], T::one() - pressure * pressure);
+        }
+        for (state, walk) in [(LOAD, u.load_walk), (RATE, u.rate_walk), (SHARE, u.turbine_walk)] {
+            x.add(state, state, walk * walk * dt_s);
+        }
+        let by_torque = motion.per_turbine_torque();
+        for i in 0..CORE {
+            for j in i..CORE {
+                x.add(i, j, torque_noise * by_torque[i] * by_torque[j]);
+            }
+        }
+        // What the model leaves out moves both speeds alike while a clutch ties them.
+        let model =
+            |k: usize| T::of(MODEL_SHARE * MODEL_SHARE * 100.0) * dt_s * square(self.readings[k].deviation_rad_s);
+        x.add(WHEEL, WHEEL, model(WHEEL));
+        x.add(OUTPUT, OUTPUT, model(OUTPUT));
+        match self.tied_ratio(running) {
+            Some(ratio) => {
+                running.x.add(TURBINE, TURBINE, ratio * ratio * model(OUTPUT));
+                running.x.add(TURBINE, OUTPUT, ratio * model(OUTPUT));
+            }
+            None => running.x.add(TURBINE, TURBINE, model(TURBINE)),
+        }
+    }
+
+    /// The ratio that ties turbine and output now.
+    pub(super) fn tied_ratio(&self, running: &Running<T>) -> Option<T> {
+        match (&running.shift, running.phase.phase.holding()) {
+            (Some(shift), held) => held.map(|held| shift.clutches[held.min(1)].ratio),
+            (None, _) => self.tables.gears.get(running.gear).map(|gear| gear.ratio),
+        }
+    }
+
+    /// Decides which clutches hold, and what follows for the speeds.
+    pub(super) fn find_phase(
+        &self,
+        running: &mut Running<T>,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        torques: &Torques<T>,
+        speeds: [T; 2],
+    ) {
+        let Some(shift) = running.shift else { return };
+        let contact = |c: usize| {
+            let clutch = &shift.clutches[c];
+            let holds_n_m = self
+                .element(elements, clutch.element)
+                .map_or([T::zero(); 2], |(memory, element)| memory.holds(element, clutch, &self.uncertainty));
+            let (row, rest) = self.held_torque(&shift, c, torques);
+            let needed_n_m = powertrain::dot(&row, &running.x.mean) + rest;
+            Contact { slip: self.slip(clutch.ratio, speeds), needed_n_m, holds_n_m }
+        };
+        let contacts = [contact(0), contact(1)];
+        let before = running.phase.phase;
+        running.phase.step(&contacts);
+        let after = running.phase.phase;
+        if before == after {
+            return;
+        }
+        if let Some(held) = before.holding() {
+            // The slip has begun unseen.
+            let (y, ratio) = (contacts[held.min(1)].slip.value, shift.clutches[held.min(1)].ratio);
+            running.x.add(TURBINE, TURBINE, y * y);
+            running.x.add(OUTPUT, OUTPUT, square(y / ratio));
+        }
+        if let Some(held) = after.holding() {
+            let held = held.min(1);
+            self.tie(running, shift.clutches[held].ratio, contacts[held].slip.deviation);
+        }
+    }
+
+    /// Makes turbine and output speed those of a ratio.
+    pub(super) fn tie(&self, running: &mut Running<T>, ratio: T, deviation: T) {
+        let mut row = [T::zero(); N];
+        (row[TURBINE], row[OUTPUT]) = (T::one(), -ratio);
+        let tie = Measured { row, value: T::zero(), noise: square(T::of(MODEL_SHARE) * deviation) };
+        let [slip, _] = running.x.innovation(&tie);
+        // The slip that is left goes where the inertia is small.
+        running.x.add(TURBINE, TURBINE, slip * slip);
+        running.x.correct(&tie);
+    }
+
+    /// The torque at the turbine with which a clutch holds, as a row over the states and what is left beside them:
+    /// `U = X - M11 w_t' - M12 w_o'`.
+    pub(super) fn held_torque(&self, shift: &ShiftRow<T>, held: usize, torques: &Torques<T>) -> ([T; N], T) {
+        let ratio = shift.clutches[held.min(1)].ratio;
+        let torques = torques.without(Some(held));
+        let rates = Rates::new(&tied(ratio, shift.inertia_at(ratio)), &torques, &self.driveline, self.wheels_kg_m2);
+        let (mut row, mut rest) = torques.row([T::one(), T::zero()]);
+        for k in [TURBINE, OUTPUT] {
+            let mass = shift.mass_kg_m2[0][k];
+            rest = rest - mass * rates.rest[k];
+            for (x, rate) in row.iter_mut().zip(&rates.rows[k]) {
+                *x = *x - mass * *rate;
+            }
+        }
+        (row, rest)
+    }
+}

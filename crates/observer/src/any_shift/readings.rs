@@ -1,0 +1,154 @@
+//! What a step gives: commands, readings, and from them slip and torque at the gearbox input.
+
+use super::{
+    AnyShiftFilter, AnyShiftState, ChannelHealth, Channels, Engine, FIRST_S, InputSide, LOST_S, MOST_PIECES, Newest,
+    OUTPUT, PIECE_S, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, turbine,
+};
+use drivetrain::Real;
+
+impl<T: Real> AnyShiftFilter<'_, T> {
+    /// Lets the valve models go on and takes the commands. The health of the worst of those that came.
+    pub(super) fn pass_elements(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>, dt_s: T) -> ChannelHealth {
+        let u = &self.uncertainty;
+        let stay = (-dt_s / u.torque_share_s).exp();
+        let (mut came, mut refused) = (false, false);
+        let elements = state.elements.iter_mut().zip(self.tables.elements).zip(&input.commands);
+        for ((memory, element), command) in elements {
+            let Some(memory) = memory else { continue };
+            let health = memory.step(element, &self.limits, *command, dt_s);
+            came = came || health == ChannelHealth::Good;
+            refused = refused || health == ChannelHealth::Refused;
+            memory.friction = [stay * memory.friction[0], T::one() - stay * stay * (T::one() - memory.friction[1])];
+        }
+        match (refused, came) {
+            (true, _) => ChannelHealth::Refused,
+            (false, true) => ChannelHealth::Good,
+            (false, false) => ChannelHealth::Absent,
+        }
+    }
+
+    pub(super) fn take_engine(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>, dt_s: T) -> ChannelHealth {
+        let (sensor, noise) = &self.engine;
+        let lost = T::of(LOST_S);
+        if let Some(engine) = &mut state.engine {
+            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+            for _ in 0..pieces {
+                engine.predict(noise, dt_s / T::of(pieces as f64));
+            }
+            if engine.silent_s > lost {
+                state.engine = None;
+            }
+        }
+        if let Some((_, age_s)) = &mut state.reported {
+            *age_s = *age_s + dt_s;
+        }
+        let torque_max = T::of(10.0) * self.limits.speed_max_rad_s;
+        if let Some(reading) = input.engine_n_m {
+            // A torque without sense is none.
+            let usable = reading.value.abs() <= torque_max && reading.age_s >= T::zero() && reading.age_s <= lost;
+            if usable {
+                state.reported = Some((reading.value, reading.age_s));
+            }
+        }
+        state.reported = state.reported.filter(|(_, age_s)| *age_s <= lost);
+        let Some(reading) = input.engine_rad_s else {
+            return if state.engine.is_some() { ChannelHealth::Absent } else { ChannelHealth::Lost };
+        };
+        if !(self.limits.speed_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s <= lost) {
+            return ChannelHealth::Refused;
+        }
+        let age_s = self.age(sensor, &reading);
+        match &mut state.engine {
+            None => state.engine = Some(Engine::new(reading.value, noise)),
+            Some(engine) => {
+                if engine.take(noise, reading.value, age_s) == Verdict::Refused {
+                    return ChannelHealth::Refused;
+                }
+                if !engine.is_sound(&self.limits) {
+                    state.engine = Some(Engine::new(reading.value, noise));
+                }
+            }
+        }
+        ChannelHealth::Good
+    }
+
+    /// Age of the middle of a reading, s.
+    pub(super) fn age(&self, sensor: &SpeedReading<T>, reading: &Reading<T>) -> T {
+        let size = reading.value.abs().max(self.uncertainty.output_least_rad_s);
+        reading.age_s + sensor.delay_s + sensor.lag_rad / size
+    }
+
+    /// Keeps the newest readings of turbine, output and wheel.
+    pub(super) fn take_newest(
+        &self,
+        state: &mut AnyShiftState<T>,
+        input: &ShiftInput<T>,
+        dt_s: T,
+        channels: &mut Channels<ChannelHealth>,
+    ) {
+        let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        let health = [&mut channels.turbine, &mut channels.output, &mut channels.wheel];
+        for (((newest, reading), health), sensor) in state.newest.iter_mut().zip(given).zip(health).zip(&self.readings)
+        {
+            if let Some(newest) = newest {
+                newest.pass(dt_s);
+            }
+            let Some(reading) = reading else {
+                let lost = newest.is_none_or(|newest| newest.age_s > T::of(LOST_S));
+                *health = if lost { ChannelHealth::Lost } else { ChannelHealth::Absent };
+                continue;
+            };
+            let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
+            let taken = self.limits.speed_valid(reading.value)
+                && aged
+                && Newest::take(newest, reading.value, self.age(sensor, &reading), sensor.deviation_rad_s);
+            *health = if taken { ChannelHealth::Good } else { ChannelHealth::Refused };
+        }
+    }
+
+    /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.
+    pub(super) fn measured(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
+        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
+        let older_s = |k: usize| fresh(k).map_or(T::zero(), |newest| newest.age_s);
+        let age_s = older_s(TURBINE).max(older_s(OUTPUT));
+        [TURBINE, OUTPUT].map(|k| match (fresh(k), running) {
+            (Some(newest), _) => newest.at(age_s),
+            (None, Some(running)) => running.x.mean[k],
+            (None, None) => T::zero(),
+        })
+    }
+
+    /// Speeds of turbine and output at the time of the older reading, and on the same lines now.
+    pub(super) fn then_and_now(
+        &self,
+        newest: &[Option<Newest<T>>; SPEEDS],
+        running: Option<&Running<T>>,
+    ) -> [[T; 2]; 2] {
+        let then = self.measured(newest, running);
+        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
+        [then, [TURBINE, OUTPUT].map(|k| fresh(k).map_or(then[k], |newest| newest.at(T::zero())))]
+    }
+
+    /// The torque at the gearbox input now, if it is known.
+    pub(super) fn input_torque(&self, state: &AnyShiftState<T>, input: &ShiftInput<T>) -> Option<turbine::Found<T>> {
+        let turbine = match (state.newest[TURBINE], &state.running) {
+            (Some(newest), _) if newest.age_s <= T::of(FIRST_S) => newest.at(T::zero()),
+            (_, Some(running)) => running.x.mean[TURBINE],
+            (Some(newest), None) => newest.value,
+            (None, None) => return None,
+        };
+        let engine = state.engine.as_ref().map(|engine| {
+            let now = engine.speed_before(T::zero());
+            [now, engine.variance(), now - engine.speed_before(T::one())]
+        });
+        let deviation = self.readings[TURBINE].deviation_rad_s;
+        let reported_n_m = state.reported.map(|(torque, _)| torque);
+        let turbine = [turbine, deviation * deviation];
+        self.turbine.at(&InputSide { engine, turbine, reported_n_m, lock_up_applied: input.lock_up_applied })
+    }
+
+    pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {
+        let deviation = self.readings[TURBINE].deviation_rad_s.hypot(ratio * self.readings[OUTPUT].deviation_rad_s);
+        Slip { value: turbine - ratio * output, deviation }
+    }
+}
