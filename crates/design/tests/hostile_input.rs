@@ -105,6 +105,7 @@ fn survives<T: Real>(
         Health::Good
             | Health::ReadingRefused
             | Health::ChannelLost
+            | Health::Flare
             | Health::OutsideRange
             | Health::LimitedToRange
             | Health::PressureLimited

@@ -59,8 +59,10 @@ impl Findings {
             input.engine_torque_n_m,
         ];
         for (at, (reading, health)) in readings.iter().zip(estimate.channels.each()).enumerate() {
-            self.came[at] += u64::from(reading.is_some());
-            self.taken[at] += u64::from(reading.is_some() && health == ChannelHealth::Good);
+            // An observer that does without a channel refuses none of its readings.
+            let came = reading.is_some() && health != ChannelHealth::Unused;
+            self.came[at] += u64::from(came);
+            self.taken[at] += u64::from(came && health == ChannelHealth::Good);
         }
         self.passages.push(row.time_s, estimate.phase);
         match self.health.iter_mut().find(|(health, _)| *health == estimate.health) {
