@@ -377,11 +377,14 @@ impl<T: Real> KalmanFilter<T> {
                 health[k] = ChannelHealth::Refused;
                 continue;
             }
-            state.newest[k] = Some((reading.value, reading.age_s));
             health[k] = match &mut state.running {
                 Some(running) => self.correct(running, k, reading),
                 None => ChannelHealth::Good,
             };
+            // What the filter refuses shows no slip either.
+            if health[k] == ChannelHealth::Good {
+                state.newest[k] = Some((reading.value, reading.age_s));
+            }
         }
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
