@@ -61,7 +61,8 @@ impl<T: Real> KalmanFilter<T> {
         let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
         let place = Place { shares: line.place.shares.map(|share| scale * share), ..line.place };
-        let mut measured = with_reading(running, k, &place, by, noise);
+        let mut measured = Measured { with: [zero; ALL], variance: noise };
+        with_reading(&mut measured, running, k, &place, by);
         let verdict = running.gates[k].judge(innovation, measured.variance);
         match verdict {
             Verdict::Refused => {
@@ -70,7 +71,8 @@ impl<T: Real> KalmanFilter<T> {
             }
             Verdict::Jumped => {
                 running.covariance.add(k, innovation * innovation);
-                measured = with_reading(running, k, &place, by, noise);
+                measured = Measured { with: [zero; ALL], variance: noise };
+                with_reading(&mut measured, running, k, &place, by);
             }
             Verdict::Taken => {}
         }
@@ -167,17 +169,15 @@ fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2])
     (p.at(late, late) - T::of(2.0) * p.at(late, early) + p.at(early, early)).max(T::zero())
 }
 
-/// What a reading of the speed `k` at a place in time has to do with the states: it also depends on scale, wheel delay and
-/// skew as `by` says.
+/// Adds to a measurement that is noise so far what a reading of the speed `k` at a place in time has to do with the states: it
+/// also depends on scale, wheel delay and skew as `by` says.
 #[inline]
-fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
-    let points = place.between.map(|point| speed_at(k, point));
-    let [late, early] = points;
+fn with_reading<T: Real>(measured: &mut Measured<T>, running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3]) {
+    let [late, early] = place.between.map(|point| speed_at(k, point));
     let weights = [(late, place.shares[0]), (early, place.shares[1]), (SCALE, by[0]), (DELAY, by[1]), (SKEW, by[2])];
-    let mut with = [T::zero(); ALL];
     for (row, weight) in weights {
-        running.covariance.add_row(&mut with, row, weight);
+        running.covariance.add_row(&mut measured.with, row, weight);
     }
-    let total = weights.into_iter().fold(T::zero(), |sum, (row, weight)| sum + weight * with[row]);
-    Measured { with, variance: total.max(T::zero()) + noise }
+    let total = weights.into_iter().fold(T::zero(), |sum, (row, weight)| sum + weight * measured.with[row]);
+    measured.variance = measured.variance + total.max(T::zero());
 }
