@@ -7,6 +7,9 @@ use super::valve_model::Commands;
 use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
 use crate::{ChannelHealth, InputLimits, Reading};
 
+/// A pressure this near to what the commands end at is there, Pa.
+const SETTLED_PA: f64 = 1.0;
+
 /// The offgoing clutch as the filter knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffgoingClutch<T> {
@@ -41,7 +44,9 @@ impl<T: Real> OffgoingPressure<T> {
         }
         self.commands.pass(dt_s);
         self.settled_pa = offgoing.valve.target_pa(&self.commands, dt_s);
-        if self.settled_pa == self.pressure_pa {
+        // Most of a drive it is full or empty.
+        if (self.settled_pa - self.pressure_pa).abs() < T::of(SETTLED_PA) {
+            self.pressure_pa = limits.possible_pressure(self.settled_pa);
             return;
         }
         let step = offgoing.valve.step(self.settled_pa, self.pressure_pa, dt_s);

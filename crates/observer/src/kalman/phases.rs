@@ -69,8 +69,8 @@ impl<T: Real> KalmanFilter<T> {
         }
         let (turbine, output) = (running.mean[TURBINE], running.mean[OUTPUT]);
         let slip = self.model.shift.offgoing_slip(turbine, output);
-        let torque = self.model.rigid.converter.torques(engine_rad_s, turbine).turbine_n_m;
-        let ahead = if torque < T::zero() { -slip } else { slip };
+        // In overrun the torque is negative.
+        let ahead = if turbine > engine_rad_s { -slip } else { slip };
         ahead > self.supervisor.release_slip_rad_s
     }
 
