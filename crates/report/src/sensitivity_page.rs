@@ -3,7 +3,7 @@
 use config::Vehicle;
 use minijinja::{Value, context};
 use study::PhaseSensitivity;
-use study::sensitivity::{ShaftEffect, ValveEffect};
+use study::sensitivity::{ShaftEffect, ValveEffect, View};
 
 use crate::page::{PageError, origin, templates};
 
@@ -40,12 +40,18 @@ pub fn sensitivity_page(
             effects => effects,
         }
     });
+    let torque_phase = phases.iter().filter(|phase| phase.phase == "torque_phase" && phase.view == View::ShaftKnown);
+    let hidden_pa = (torque_phase.flat_map(|phase| &phase.effects))
+        .filter(|effect| effect.error != "friction")
+        .map(|effect| (effect.bound * effect.pressure_pa_per_unit).abs())
+        .fold(0.0, f64::max);
     Ok(templates()?.get_template("sensitivity.html")?.render(context! {
         name => "Sensitivity",
         title => "Sensitivity of the estimated pressure to errors",
         version => env!("CARGO_PKG_VERSION"),
         vehicle_name => &vehicle.name,
         phases => rows.collect::<Vec<_>>(),
+        hidden_kpa => format!("{:.0}", 1e-3 * hidden_pa),
         valve => valve
             .iter()
             .map(|effect| context! { error => effect.error, kpa => format!("{:.1}", 1e-3 * effect.pressure_pa) })
