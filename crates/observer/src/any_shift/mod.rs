@@ -280,6 +280,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         state.started = true;
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);
+        // Each element has a command of its own, and the engine torque is one of the sources of the turbine torque.
+        (channels.offgoing_command, channels.engine_torque) = (ChannelHealth::Unused, ChannelHealth::Unused);
         channels.command = self.pass_elements(state, input, dt_s);
         channels.engine = self.take_engine(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);

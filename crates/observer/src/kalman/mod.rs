@@ -16,6 +16,9 @@
 //! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
 //! friction and gain are kept for some shifts and then forgotten.
 //!
+//! Where a log has the command of the offgoing clutch, its valve model limits `T_ca`; where it has the torque that the engine's
+//! controller reports, that is a second source of the turbine torque.
+//!
 //! A reading that contradicts all the others is refused once; one that goes on to do so is believed. The share `e` is
 //! only corrected while both clutches slip (a consider state, S. F. Schmidt 1966): before, an error that shaft
 //! and turbine torque share cancels in the clutch torque, and no speed shows it.
