@@ -120,6 +120,12 @@ impl<T: Real> InputLimits<T> {
         command >= T::zero() && command <= self.command_max
     }
 
+    /// Whether a reading of a valve command can be used.
+    #[inline]
+    pub(crate) fn usable_command(&self, reading: &Reading<T>) -> bool {
+        self.command_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s.is_finite()
+    }
+
     /// Whether a drive-shaft torque is a number within its limit.
     #[inline]
     pub fn shaft_torque_possible(&self, torque_n_m: T) -> bool {

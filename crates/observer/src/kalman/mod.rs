@@ -321,7 +321,7 @@ impl<T: Real> KalmanFilter<T> {
         let Some(reading) = input.command else {
             return if state.commands.newest_pa().is_some() { ChannelHealth::Absent } else { ChannelHealth::Lost };
         };
-        if !(self.limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
+        if !self.limits.usable_command(&reading) {
             return ChannelHealth::Refused;
         }
         let settled_pa = self.valve.valve.settled_pressure(reading.value);

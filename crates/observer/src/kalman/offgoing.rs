@@ -66,7 +66,7 @@ impl<T: Real> OffgoingPressure<T> {
             let known = self.commands.newest_pa().is_some();
             return if known { ChannelHealth::Absent } else { ChannelHealth::Unused };
         };
-        if !(limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
+        if !limits.usable_command(&reading) {
             return ChannelHealth::Refused;
         }
         let settled_pa = offgoing.valve.valve.settled_pressure(reading.value);
