@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use config::{Experiment, Study, Vehicle};
-use design::{kalman_filter, open_loop_maps, rigid_observer};
+use design::{bounded, kalman_filter, open_loop_maps, rigid_observer};
 use observer::{ChannelHealth, Estimate, Estimator, Health, Input, Phase, Reading, RigidGains};
 use study::sampling::through_sensors;
 use study::{Campaign, Consistency, RunColumns, simulate_drive, true_phases};
@@ -112,6 +112,31 @@ fn what_is_missing_or_refused_is_said_of_its_channel() {
     assert_eq!((channels(3).command, estimates[at + 3].health), (ChannelHealth::Refused, Health::CommandRejected));
     assert_eq!(channels(11).wheel, ChannelHealth::Absent);
     assert_eq!((channels(45).wheel, estimates[at + 45].health), (ChannelHealth::Lost, Health::ChannelLost));
+}
+
+#[test]
+fn a_command_that_is_late_or_slow_leaves_a_range_of_use() {
+    let field = Field::new();
+    let filter = bounded(&field.vehicle, kalman_filter(&field.vehicle, field.experiment.sensors_told.as_ref()));
+    let rows = field.rows("nominal");
+    let with = |command: &dyn Fn(usize) -> Option<Reading<f64>>| {
+        let of =
+            |(step, &(input, phase, truth)): (usize, &Row)| (Input { command: command(step), ..input }, phase, truth);
+        rows.iter().enumerate().map(of).collect::<Vec<Row>>()
+    };
+    let logged = |step: usize| rows[step].0.command;
+    let late = |step: usize| Some(Reading { age_s: SAMPLE_S, ..logged(step.checked_sub(1)?)? });
+    let slow = |step: usize| logged(step).filter(|_| step.is_multiple_of(2));
+    // Mean widths over the last two seconds, MPa; by the budget any command may have been sent right after a reading.
+    for (name, rows, most_mpa) in
+        [("as sent", with(&logged), 0.25), ("late", with(&late), 0.9), ("slow", with(&slow), 0.6)]
+    {
+        let estimates = field.estimates(&filter, &rows);
+        let ranges = || estimates.iter().map(|estimate| estimate.bounds.unwrap().pressure_pa);
+        let outside = ranges().zip(&rows).filter(|([low, high], (.., truth))| !(low..=high).contains(&truth)).count();
+        let mean_mpa = ranges().rev().take(200).map(|[low, high]| (high - low) / 1e6).sum::<f64>() / 200.0;
+        assert!(outside == 0 && mean_mpa < most_mpa, "{name}: {outside} outside, {mean_mpa} MPa wide");
+    }
 }
 
 #[test]
