@@ -384,7 +384,7 @@ pub(crate) struct Estimate {
     #[arg(long, value_enum)]
     pub(crate) method: Option<MethodChoice>,
     /// File whose table `sensors` describes the sensors of the log, such as an experiment file. The Kalman filters use
-    /// their noise and lag; without the file they assume small noise and no lag
+    /// their noise and lag; without the file they assume the noise of the error budget and no lag
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
     /// File for the estimate, by its ending CSV, .parquet or .mf4; of several logs the folder for their files. Default:

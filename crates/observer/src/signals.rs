@@ -216,6 +216,9 @@ impl Health {
     }
 }
 
+/// Time without a reading after which a channel is lost, and without any speed after which a filter begins anew, s.
+pub const LOST_S: f64 = 0.25;
+
 /// What became of a channel in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ChannelHealth {
@@ -332,6 +335,9 @@ impl<T, O: Estimator<T>> Estimator<T> for &O {
 pub trait SampleEstimator<T> {
     /// What it remembers from one sample to the next.
     type SampleState;
+
+    /// Whether it reads the speed of the driven wheels.
+    const READS_WHEEL: bool;
 
     /// Its checks, valve and phase.
     fn tracker(&self) -> &Tracker<T>;

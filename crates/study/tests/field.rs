@@ -115,6 +115,47 @@ fn what_is_missing_or_refused_is_said_of_its_channel() {
 }
 
 #[test]
+fn a_command_that_stays_away_is_lost() {
+    let field = Field::new();
+    let mut rows = field.rows("nominal");
+    let at = rows.len() - 60;
+    rows[at..].iter_mut().for_each(|row| row.0.command = None);
+    let rigid = field.estimates(&rigid_observer(&field.vehicle, RigidGains::open_loop()), &rows);
+    for estimates in [field.kalman(&rows), rigid] {
+        let said = |step: usize| (estimates[at + step].channels.command, estimates[at + step].health);
+        assert_eq!(said(20), (ChannelHealth::Absent, Health::Good));
+        assert_eq!(said(30), (ChannelHealth::Lost, Health::CommandRejected));
+    }
+}
+
+#[test]
+fn an_observer_says_unused_of_a_wheel_speed_that_it_does_not_read() {
+    let field = Field::new();
+    let mut rows = field.rows("nominal");
+    rows.iter_mut().for_each(|row| row.0.wheel_rad_s = None);
+    let rigid = field.estimates(&rigid_observer(&field.vehicle, RigidGains::open_loop()), &rows);
+    for estimates in [field.estimates(&open_loop_maps(&field.vehicle), &rows), rigid] {
+        assert!(estimates.iter().all(|estimate| estimate.channels.wheel == ChannelHealth::Unused));
+        assert_eq!(estimates.last().unwrap().health, Health::Good);
+    }
+    assert_eq!(field.kalman(&rows).last().unwrap().channels.wheel, ChannelHealth::Lost);
+}
+
+#[test]
+fn one_wrong_turbine_speed_is_no_flare() {
+    let field = Field::new();
+    let rows = field.rows("nominal");
+    for (at, _) in rows.iter().enumerate().filter(|(_, row)| SHIFT.contains(&row.1)).step_by(2) {
+        for error_rad_s in [3.0, 5.0] {
+            let mut wrong = rows.clone();
+            wrong[at].0.turbine_rad_s.as_mut().unwrap().value += error_rad_s;
+            let flares = field.kalman(&wrong).iter().position(|estimate| estimate.health == Health::Flare);
+            assert_eq!(flares, None, "{error_rad_s} rad/s at step {at}");
+        }
+    }
+}
+
+#[test]
 fn a_command_that_is_late_or_slow_leaves_a_range_of_use() {
     let field = Field::new();
     let filter = bounded(&field.vehicle, kalman_filter(&field.vehicle, field.experiment.sensors_told.as_ref()));
