@@ -158,6 +158,12 @@ pub(crate) enum Command {
     /// built-in bench runs them at 100 Hz with real sensors. Prints the RMS error of each observer in each phase, and its
     /// ratio to the RMS error of the open loop; with -o, also writes them as a page. experiments/field.toml is a bench of
     /// errors of the readings: scale, delays, outliers, lost readings, channels with clocks of their own.
+    ///
+    /// With the vehicle file of a car with a gearbox: every shift between neighbouring gears, up and down, with power and
+    /// without, each in --draws cars, estimated by the filter for any shift and by the open loop. Prints the RMS errors of the
+    /// clutch torques (N m) by phase and their ratio, by shift and by kind; with -o, also writes bench.html and bench.csv.
+    ///
+    ///   wetclutch bench --vehicle vehicles/eight_speed.toml --draws 10 -o out
     #[command(verbatim_doc_comment)]
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
@@ -547,13 +553,29 @@ pub(crate) struct Reproduce {
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
     /// Experiment file with scenario tables; default: the built-in experiments/bench.toml
+    #[arg(conflicts_with = "vehicle")]
     pub(crate) experiment: Option<PathBuf>,
-    /// Folder for the page
+    /// Vehicle file with a gearbox: every shift between its neighbouring gears, in every kind
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Cars drawn for each shift, whose friction, valve gains and converter differ from those of the vehicle file
+    #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "vehicle")]
+    pub(crate) draws: u32,
+    /// Seed of the first car; each next one has the next seed
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
+    pub(crate) seed: u64,
+    /// File whose table `sensors` describes how the speeds are read; default: those of experiments/bench.toml
+    #[arg(long, value_name = "SENSORS.toml", requires = "vehicle")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// Folder for the page, and for the table of shifts (bench.csv)
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
 }
 
 #[derive(Debug, Args)]

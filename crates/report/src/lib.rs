@@ -8,6 +8,7 @@ pub mod gearbox_figure;
 mod legend;
 pub mod log_page;
 pub mod map_figures;
+pub mod matrix_page;
 pub mod page;
 pub mod palette;
 pub mod reproduction;

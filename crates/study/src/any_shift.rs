@@ -4,6 +4,8 @@
 //! toothed wheels. Errors are counted by what the true clutches do: in the *torque phase* one of them holds and the other
 //! carries torque while it slips; in the *inertia phase* both slip.
 
+pub mod matrix;
+
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::Real;
@@ -137,15 +139,15 @@ impl ShiftScoreRow {
     }
 }
 
-/// Squared errors of a clutch's torque over the rows of a phase.
+/// Squared errors of a clutch's torque or pressure over the rows of a phase, in N m or Pa.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SquaredErrors {
-    /// Sum of the squares of the estimate's errors, (N m)^2.
+    /// Sum of the squares of the estimate's errors.
     pub estimate: f64,
     /// The same by the valve model alone.
     pub open_loop: f64,
-    /// Sum of the true torque's size, N m.
-    pub torque: f64,
+    /// Sum of the true value's size.
+    pub size: f64,
     /// Number of rows.
     pub rows: f64,
 }
@@ -155,23 +157,47 @@ impl SquaredErrors {
     pub fn add(&mut self, more: &Self) {
         self.estimate += more.estimate;
         self.open_loop += more.open_loop;
-        self.torque += more.torque;
+        self.size += more.size;
         self.rows += more.rows;
     }
 
-    /// Root mean square errors, N m: of the estimate, and of the valve model alone.
+    /// Root mean square errors of a torque, N m: of the estimate, and of the valve model alone.
     pub fn rms_n_m(&self) -> [f64; 2] {
+        self.rms()
+    }
+
+    /// Root mean square errors of a pressure, Pa: of the estimate, and of the valve model alone.
+    pub fn rms_pa(&self) -> [f64; 2] {
+        self.rms()
+    }
+
+    fn rms(&self) -> [f64; 2] {
         [self.estimate, self.open_loop].map(|sum| (sum / self.rows.max(1.0)).sqrt())
     }
 
-    /// The errors of one clutch in one phase.
+    /// The error of the estimate over that of the valve model alone; `None` without rows.
+    pub fn ratio(&self) -> Option<f64> {
+        let [estimate, open_loop] = self.rms();
+        (self.rows > 0.0 && open_loop > 0.0).then(|| estimate / open_loop)
+    }
+
+    /// The errors of one clutch's torque in one phase.
     pub fn of(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
+        Self::over(rows, phase, clutch, |clutch| clutch.torque_n_m)
+    }
+
+    /// The errors of one clutch's pressure in one phase.
+    pub fn of_pressure(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
+        Self::over(rows, phase, clutch, |clutch| clutch.pressure_pa)
+    }
+
+    fn over(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize, values: fn(&ClutchRow) -> [f64; 3]) -> Self {
         let mut sum = Self::default();
         for row in rows.iter().filter(|row| row.phase() == Some(phase) && !row.clutches[clutch].sticks) {
-            let [truth, estimate, open_loop] = row.clutches[clutch].torque_n_m;
+            let [truth, estimate, open_loop] = values(&row.clutches[clutch]);
             sum.estimate += (truth - estimate).powi(2);
             sum.open_loop += (truth - open_loop).powi(2);
-            sum.torque += truth.abs();
+            sum.size += truth.abs();
             sum.rows += 1.0;
         }
         sum

@@ -10,6 +10,7 @@ mod fit;
 mod gearbox;
 mod init;
 mod inspect;
+mod matrix;
 mod reproduce;
 mod sensitivity;
 mod simulate;
@@ -36,7 +37,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
-use trace::Trace;
+use trace::{Cell, CsvWriter, Trace, WholeFile};
 
 use crate::args::Mapping;
 use crate::failure::Failure;
@@ -49,6 +50,29 @@ fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
 /// Writes a text file, whole or not at all.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Writes rows of named cells as a comma-separated file, whole or not at all.
+fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Failure> {
+    let write = || -> std::io::Result<()> {
+        let names = rows.first().into_iter().flatten().map(|(name, _)| name.as_str());
+        let mut table = CsvWriter::without_time(WholeFile::create(path)?, names)?;
+        for row in rows {
+            table.cells(row.iter().map(|(_, cell)| *cell))?;
+        }
+        table.finish()?.finish()
+    };
+    write().map_err(|error| Failure::writing(path, &error))
+}
+
+/// Named cells as a JSON object; not a number becomes null.
+fn json_object<'a>(cells: impl IntoIterator<Item = (String, Cell<'a>)>) -> serde_json::Map<String, serde_json::Value> {
+    let value = |cell: Cell<'_>| match cell {
+        Cell::Number(number) => serde_json::Value::from(number),
+        Cell::Whole(number) => serde_json::Value::from(number),
+        Cell::Word(word) => serde_json::Value::from(word),
+    };
+    cells.into_iter().map(|(name, cell)| (name, value(cell))).collect()
 }
 
 /// Checks that these files can be written into a folder, before the work starts. Creates a missing folder.

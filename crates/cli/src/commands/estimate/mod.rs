@@ -21,7 +21,7 @@ use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
 
-pub(super) use observer::{best, kind};
+pub(super) use observer::{best, kind, sensors};
 
 /// What is common to all logs of a command.
 struct Setup<'a> {
