@@ -49,6 +49,18 @@ pub(crate) enum Command {
     ///   trace.csv      every simulated signal, true values included
     ///   measured.csv   only the signals that a car measures
     ///   estimate.csv   the output of `estimate measured.csv`
+    ///
+    /// With the vehicle file of a car with a gearbox: drives through all of its gears, up under power, down coasting, up
+    /// without power, down under power, or through a drive file. The car differs from the vehicle file. The filter for any
+    /// shift sees it through toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
+    /// quality and the errors of filter and open loop, and writes:
+    ///
+    ///   report.html    the drive, the shifts, each shift drawn
+    ///   shifts.csv     the shifts as numbers
+    ///   drive.csv, drive_measured.csv    the signals, as `simulate` writes them
+    ///
+    ///   wetclutch demo --vehicle vehicles/eight_speed.toml -o out
+    ///   wetclutch demo --vehicle vehicles/ten_speed.toml --drive drives/city.toml -o out
     #[command(verbatim_doc_comment)]
     Demo(Demo),
     /// Simulate an experiment and write its signals as CSV
@@ -219,6 +231,15 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
+    /// Vehicle file with a gearbox: a drive through all of its gears
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Drive file in place of the drive through all gears
+    #[arg(long, value_name = "FILE", requires = "vehicle")]
+    pub(crate) drive: Option<PathBuf>,
+    /// Seed of the driven car, whose friction, valve gains and converter differ from those of the vehicle file, and of the noise
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
+    pub(crate) seed: u64,
     /// Folder for the report
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
     pub(crate) output: PathBuf,

@@ -24,7 +24,7 @@ pub fn ratio(errors: &SquaredErrors) -> String {
 }
 
 /// Both errors of a torque, N m: filter / open loop.
-fn torques(errors: &SquaredErrors) -> String {
+pub(crate) fn torques(errors: &SquaredErrors) -> String {
     let [estimate, open_loop] = errors.rms_n_m().map(|n_m| number(n_m, 1));
     if errors.rows > 0.0 { format!("{estimate} / {open_loop}") } else { "–".to_owned() }
 }
@@ -159,7 +159,7 @@ pub fn shift_cells<'a>(row: &MatrixRow, car: &'a Car) -> Vec<(String, Cell<'a>)>
         ("from_gear".to_owned(), gear(row.shift.from)),
         ("to_gear".to_owned(), gear(row.shift.to)),
         ("kind".to_owned(), Cell::Word(row.shift.kind.name())),
-        ("throttle".to_owned(), Cell::Number(row.shift.throttle)),
+        ("throttle".to_owned(), Cell::Number(row.shift.throttle())),
         ("ratio_gain".to_owned(), Cell::Number(row.shift.gain)),
     ];
     for (phase, clutches) in PHASES.iter().zip(&row.errors) {

@@ -4,16 +4,18 @@
 //! toothed wheels. Errors are counted by what the true clutches do: in the *torque phase* one of them holds and the other
 //! carries torque while it slips; in the *inertia phase* both slip.
 
+pub mod drive;
 pub mod matrix;
+pub mod recording;
+pub mod tour;
 
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
-use drivetrain::Real;
-use observer::any_shift::{AnyShiftFilter, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
-use observer::{Health, Reading};
+use observer::Health;
+use observer::any_shift::{AnyShiftFilter, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use plant::TrainError;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
-use plant::sensors::{Channel, Rows, read_speed};
+use recording::{Recording, records_in_a_sample};
 use thiserror::Error;
 
 /// Sample time of the records that toothed wheels are read from, s.
@@ -95,6 +97,8 @@ pub struct ClutchRow {
     pub sticks: bool,
     /// The guaranteed range of the torque, N m.
     pub torque_range_n_m: Option<[f64; 2]>,
+    /// The guaranteed range of the pressure, Pa.
+    pub pressure_range_pa: Option<[f64; 2]>,
     /// Whether the truth is within the guaranteed ranges.
     pub in_range: bool,
 }
@@ -243,56 +247,10 @@ pub fn inputs(
     sensors: &Sensors,
     seed: u64,
 ) -> Vec<(usize, ShiftInput<f64>)> {
-    let every = (SAMPLE_S / RECORD_S).round().max(1.0).whole();
-    let places: Vec<usize> = (0..samples.len()).step_by(every).collect();
-    let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s).collect();
-    let at_s: Vec<f64> = places.iter().map(|&at| time_s[at]).collect();
-    let rows = Rows { at_s: &at_s, offset_s: at_s.first().copied().unwrap_or(0.0), shift_s: [0.0; 2], seed };
-    let read = |name: &str, sensor, of: &dyn Fn(&CarSample) -> f64| {
-        let values: Vec<f64> = samples.iter().map(of).collect();
-        read_speed(sensor, Channel { name, time_s: &time_s, values: &values }, rows)
-    };
-    let speeds = [
-        read("engine", &sensors.engine, &|sample| sample.torques.engine_rad_s),
-        read("turbine", &sensors.turbine, &|sample| sample.torques.turbine_rad_s),
-        read("output", &sensors.output, &|sample| sample.torques.output_rad_s),
-        read("wheel", &sensors.wheel, &|sample| sample.wheel_rad_s),
-    ];
-    let mut inputs = Vec::new();
-    for (row, &at) in places.iter().enumerate() {
-        let sample = &samples[at];
-        let reading = |channel: usize| {
-            let (value, age_s) = (speeds[channel].values[row], speeds[channel].age_s[row]);
-            (!value.is_nan()).then_some(Reading { value, age_s })
-        };
-        let mut commands = [None; MAX_ELEMENTS];
-        for (element, &command) in sample.commands.iter().enumerate() {
-            if let Some(place) = tables.place(element) {
-                commands[place] = Some(Reading::now(command));
-            }
-        }
-        let gear = match &sample.shift {
-            Some(shift) => GearCommand { from: shift.from, to: shift.to },
-            None => GearCommand { from: sample.gear, to: sample.gear },
-        };
-        // Without a converter nothing else tells the torque at the gearbox input.
-        let engine_n_m = sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s;
-        inputs.push((
-            at,
-            ShiftInput {
-                dt_s: SAMPLE_S,
-                engine_rad_s: reading(0),
-                turbine_rad_s: reading(1),
-                output_rad_s: reading(2),
-                wheel_rad_s: reading(3),
-                engine_n_m: car.converter.is_none().then_some(Reading::now(engine_n_m)),
-                lock_up_applied: false,
-                commands,
-                gear,
-            },
-        ));
-    }
-    inputs
+    let mut recording = Recording::default();
+    samples.iter().for_each(|sample| recording.push(sample));
+    let inputs = recording.inputs(car, tables, sensors, seed);
+    inputs.enumerate().map(|(row, input)| (row * records_in_a_sample(), input)).collect()
 }
 
 /// Truth and estimates of a recorded drive while its shifts are under way.
@@ -325,6 +283,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
                 pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
                 sticks: truth.sticks,
                 torque_range_n_m: found.torque_range_n_m,
+                pressure_range_pa: found.pressure_range_pa,
                 in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
                     && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
             }

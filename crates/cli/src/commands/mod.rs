@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod demo;
+mod demo_drive;
 mod design;
 mod error_bound;
 mod estimate;

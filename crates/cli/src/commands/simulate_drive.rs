@@ -23,20 +23,16 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     }
     let name = drive.name.to_lowercase();
     let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
-    let columns = columns(&car);
-    let mut whole = Table::create(options.output.join(format!("{name}.csv")), &columns, |_| true)?;
-    let mut measured =
-        Table::create(options.output.join(format!("{name}_measured.csv")), &columns, |column| column.is_measured)?;
+    let mut tables = DriveTables::create(&options.output, &name, &car)?;
     let mut written = Ok(());
     let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
         // After a write error the simulation continues to its end without writing: this takes seconds.
         if written.is_ok() {
-            written = whole.write(&car, sample).and_then(|()| measured.write(&car, sample));
+            written = tables.write(&car, sample);
         }
     })?;
     written?;
-    let ((whole_file, whole), (measured_file, measured)) = (whole.complete()?, measured.complete()?);
-    WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(&options.output, &error))?;
+    let paths = tables.finish(&options.output)?;
     output::note(&format!(
         "drive: {:.0} s, {:.2} km, {} shifts, at most {:.0} km/h",
         summary.duration_s,
@@ -44,9 +40,40 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         summary.shifts,
         3.6 * summary.fastest_m_s,
     ));
-    output::line(&whole.display().to_string())?;
-    output::line(&measured.display().to_string())?;
+    for path in paths {
+        output::line(&path.display().to_string())?;
+    }
     Ok(())
+}
+
+/// The two files of a drive: every signal, and those that a car measures or commands.
+pub(super) struct DriveTables {
+    whole: Table,
+    measured: Table,
+}
+
+impl DriveTables {
+    /// Begins `NAME.csv` and `NAME_measured.csv`.
+    pub(super) fn create(folder: &Path, name: &str, car: &Car) -> Result<Self, Failure> {
+        let columns = columns(car);
+        Ok(Self {
+            whole: Table::create(folder.join(format!("{name}.csv")), &columns, |_| true)?,
+            measured: Table::create(folder.join(format!("{name}_measured.csv")), &columns, |column| {
+                column.is_measured
+            })?,
+        })
+    }
+
+    pub(super) fn write(&mut self, car: &Car, sample: &CarSample) -> Result<(), Failure> {
+        self.whole.write(car, sample).and_then(|()| self.measured.write(car, sample))
+    }
+
+    /// Gives both files their names.
+    pub(super) fn finish(self, folder: &Path) -> Result<[PathBuf; 2], Failure> {
+        let ((whole_file, whole), (measured_file, measured)) = (self.whole.complete()?, self.measured.complete()?);
+        WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(folder, &error))?;
+        Ok([whole, measured])
+    }
 }
 
 /// A column of the results.

@@ -53,8 +53,6 @@ pub struct MatrixShift {
     pub from: usize,
     /// The gear after.
     pub to: usize,
-    /// Throttle throughout, 0 to 1.
-    pub throttle: f64,
     /// Direction and power.
     pub kind: ShiftKind,
     /// `1/|i_off - i_on|`: by how much an error of the gearbox output torque shows in a clutch torque in the torque phase.
@@ -71,10 +69,20 @@ pub fn neighbouring_shifts(car: &Car, tables: &ShiftTables<f64>) -> (Vec<MatrixS
         let [i_off, i_on] = [from, to].map(|gear| car.gearbox.gears[gear].ratio);
         [POWER_ON, 0.0].into_iter().filter_map(move |throttle| {
             let kind = ShiftKind::of(throttle - KIND_FROM, i_off, i_on)?;
-            Some(MatrixShift { from, to, throttle, kind, gain: (i_off - i_on).abs().recip() })
+            Some(MatrixShift { from, to, kind, gain: (i_off - i_on).abs().recip() })
         })
     });
     (shifts.collect(), unknown)
+}
+
+impl MatrixShift {
+    /// Throttle throughout, 0 to 1.
+    pub fn throttle(&self) -> f64 {
+        match self.kind {
+            ShiftKind::PowerOnUp | ShiftKind::PowerOnDown => POWER_ON,
+            ShiftKind::PowerOffUp | ShiftKind::CoastDown => 0.0,
+        }
+    }
 }
 
 /// The clutch that drives the inertia phase: 0 offgoing, 1 oncoming.
@@ -203,9 +211,9 @@ struct Run {
 }
 
 fn run(known: &Car, shift: &MatrixShift, seed: u64, sensors: &Sensors) -> Run {
-    let MatrixShift { from, to, throttle, kind, .. } = *shift;
+    let MatrixShift { from, to, kind, .. } = *shift;
     let truth = drawn_car(known, from, to, seed);
-    let usual = CarShift::usual(known, from, to, throttle);
+    let usual = CarShift::usual(known, from, to, shift.throttle());
     match score_shift(known, &truth, &usual, sensors, seed) {
         Ok(rows) => {
             let errors = errors_by_phase(&rows, kind);
@@ -218,7 +226,7 @@ fn run(known: &Car, shift: &MatrixShift, seed: u64, sensors: &Sensors) -> Run {
     }
 }
 
-fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCounts {
+pub(super) fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCounts {
     let clutches = || rows.iter().flat_map(|row| row.clutches);
     let main = errors.iter().map(|phase| phase[0].torque).filter(|sum| sum.rows >= COMPARED_ROWS);
     let above = main.clone().filter(|sum| {

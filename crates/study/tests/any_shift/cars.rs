@@ -35,7 +35,7 @@ pub(crate) fn shifts(car: &Car) -> Vec<(usize, usize, f64)> {
     let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
     let (shifts, without_tables) = neighbouring_shifts(car, &tables);
     assert_eq!(without_tables, Vec::<[usize; 2]>::new());
-    shifts.iter().map(|shift| (shift.from, shift.to, shift.throttle)).collect()
+    shifts.iter().map(|shift| (shift.from, shift.to, shift.throttle())).collect()
 }
 
 pub(crate) fn usual(car: &Car, from: usize, to: usize, throttle: f64) -> CarShift {

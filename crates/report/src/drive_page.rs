@@ -1,0 +1,397 @@
+//! The page of a simulated drive of a car with any gearbox: the drive, the table of its shifts, shifts drawn.
+
+use config::{Car, Source};
+use minijinja::{Value, context};
+use observer::Health;
+use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
+use study::any_shift::matrix::ErrorsByPhase;
+use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, TruePhase};
+use trace::Cell;
+use trace::units::{km_h, mpa, rpm};
+
+use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
+use crate::log_page::{ESTIMATE, compact, health_panel, panel};
+use crate::matrix_page::{kind_rows, ratio, torques};
+use crate::page::{PageError, inline, origin, templates};
+use crate::palette::{RANGE, Weight};
+use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
+use crate::tables::{coverage, number};
+
+/// Shifts that are drawn; of a drive with more, the worst.
+pub const MOST_DRAWN: usize = 60;
+/// Worst shifts that are named.
+const WORST: usize = 5;
+/// Time before and after a shift that its figure shows, s.
+const MARGIN_S: [f64; 2] = [0.15, 0.25];
+/// Points of a curve over the whole drive.
+const POINTS: usize = 3000;
+const OPEN_LOOP: Stroke = Stroke { colour: "#767676", weight: Weight::Rival, dash: Some("6 3") };
+
+/// What a page is made from.
+pub struct DrivePage<'a> {
+    /// The name of the drive.
+    pub name: &'a str,
+    /// The car that the filter and the shift controller know.
+    pub car: &'a Car,
+    /// How the driven car differs from it, and the seed of that.
+    pub draw: (&'a ShiftDraw, u64),
+    /// The drive.
+    pub drive: &'a ScoredDrive,
+    /// The files that the drive follows from.
+    pub sources: &'a [&'a Source],
+}
+
+impl DrivePage<'_> {
+    /// The page; it needs nothing but itself.
+    ///
+    /// # Errors
+    /// None in a released program; the tests render the template.
+    pub fn html(&self) -> Result<String, PageError> {
+        let (car, drive) = (self.car, self.drive);
+        let worst = worst_first(&drive.shifts);
+        let mut drawn: Vec<&ScoredShift> = worst.iter().take(MOST_DRAWN).copied().collect();
+        drawn.sort_by_key(|shift| shift.number);
+        let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
+        let (titles, rows) = shift_rows(drive, car);
+        let rows = rows.into_iter().zip(&drive.shifts);
+        let rows: Vec<Value> = rows.map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
+        let (kind_titles, kinds) = kind_rows(&drive.matrix(car));
+        let figures = drawn.iter().map(|shift| {
+            context! {
+                number => shift.number,
+                title => title(shift, car),
+                at => number(shift.time_s[0], 2),
+                clutches => clutch_names(shift, car).join(" opens, ") + " closes",
+                svg => inline(&compact(&shift_figure(shift, drive, car).svg())),
+            }
+        });
+        let named = worst.iter().take(WORST).map(|shift| {
+            context! { number => shift.number, gears => gears(shift, car), error => number(worst_error(shift), 1) }
+        });
+        Ok(templates()?.get_template("drive.html")?.render(context! {
+            name => self.name,
+            title => "drive",
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &car.name,
+            gearbox_name => &car.gearbox.name,
+            overview => inline(&compact(&overview_figure(drive, car).svg())),
+            findings => findings(drive),
+            kind_titles,
+            kinds,
+            titles,
+            rows,
+            figures => figures.collect::<Vec<_>>(),
+            worst => named.collect::<Vec<_>>(),
+            undrawn => drive.shifts.len() - drawn.len(),
+            draw => draw_rows(self.draw.0, car),
+            converter => car.converter.is_some().then(|| number(self.draw.0.converter, 3)),
+            seed => self.draw.1,
+            inputs => origin(self.sources),
+        })?)
+    }
+}
+
+fn name(car: &Car, gear: usize) -> &str {
+    car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str())
+}
+
+fn gears(shift: &ScoredShift, car: &Car) -> String {
+    format!("{}-{}", name(car, shift.from), name(car, shift.to))
+}
+
+fn title(shift: &ScoredShift, car: &Car) -> String {
+    let kind = shift.kind.map_or("shift without torque", |kind| kind.name());
+    format!("{}, {kind}", gears(shift, car))
+}
+
+/// Offgoing and oncoming element.
+fn clutch_names<'a>(shift: &ScoredShift, car: &'a Car) -> [&'a str; 2] {
+    shift.elements.map(|at| car.gearbox.elements.get(at).map_or("?", |element| element.name.as_str()))
+}
+
+/// The largest RMS error of the controlling clutch's torque in a phase, N m.
+fn worst_error(shift: &ScoredShift) -> f64 {
+    let errors = shift.errors().unwrap_or_default();
+    errors.iter().map(|phase| phase[0].torque.rms_n_m()[0]).fold(0.0, f64::max)
+}
+
+/// The shifts with the largest error first.
+fn worst_first(shifts: &[ScoredShift]) -> Vec<&ScoredShift> {
+    let mut worst: Vec<&ScoredShift> = shifts.iter().collect();
+    worst.sort_by(|a, b| worst_error(b).total_cmp(&worst_error(a)));
+    worst
+}
+
+/// Friction and valve gain of each element of the driven car over those of the known one.
+fn draw_rows(draw: &ShiftDraw, car: &Car) -> Vec<Value> {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).zip(draw.friction.iter().zip(&draw.valve_gain));
+    let with_plates = elements.filter(|((_, clutch), _)| clutch.is_some());
+    let row = with_plates.map(|((element, _), (friction, gain))| {
+        context! { element => &element.name, friction => number(*friction, 3), gain => number(*gain, 3) }
+    });
+    row.collect()
+}
+
+/// What happened, in sentences.
+pub fn findings(drive: &ScoredDrive) -> Vec<String> {
+    let shifts = &drive.shifts;
+    let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
+    let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
+    let clutches = || shifts.iter().flat_map(|shift| &shift.rows).flat_map(|row| &row.clutches);
+    let (all, inside) = (2 * clutches().count(), 2 * clutches().filter(|clutch| clutch.in_range).count());
+    let rows = || shifts.iter().flat_map(|shift| &shift.rows);
+    let good = rows().filter(|row| row.health == Health::Good).count();
+    let mut sentences = vec![
+        format!(
+            "{completed} of {} shifts were completed; the longest took {} s.",
+            shifts.len(),
+            number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
+        ),
+        format!(
+            "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s, largest slip of a held element {} rad/s.",
+            number(most(|shift| shift.quality.flare_rad_s), 1),
+            number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
+            number(most(|shift| shift.quality.held_slip_rad_s), 1)
+        ),
+        format!("{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."),
+        format!("Health is good in {good} of {} samples of the shifts.", rows().count()),
+    ];
+    let hidden = shifts.iter().filter(|shift| shift.rows.is_empty()).count();
+    if hidden > 0 {
+        sentences.push(format!("Of {hidden} shifts the filter has no tables: nothing is estimated."));
+    }
+    sentences
+}
+
+/// Titles and rows of the table of shifts.
+pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    let titles = vec![
+        "#",
+        "shift",
+        "kind",
+        "begin s",
+        "time s",
+        "torque phase s",
+        "inertia phase s",
+        "flare rad/s",
+        "beyond rad/s",
+        "jerk m/s^3",
+        "inertia phase",
+        "N m",
+        "torque phase",
+        "N m",
+        "other, inertia",
+        "in range",
+        "health",
+    ];
+    let row = |shift: &ScoredShift| {
+        let quality = &shift.quality;
+        let [[torque, _], [inertia, other]] = shift.errors().unwrap_or_default();
+        vec![
+            shift.number.to_string(),
+            gears(shift, car),
+            shift.kind.map_or("–", |kind| kind.name()).to_owned(),
+            number(shift.time_s[0], 2),
+            number(quality.complete_s.unwrap_or(f64::NAN), 2),
+            number(shift.length_s(TruePhase::Torque), 2),
+            number(shift.length_s(TruePhase::Inertia), 2),
+            number(quality.flare_rad_s, 1),
+            number(quality.past_synchronous_rad_s, 1),
+            number(quality.jerk_m_s3, 0),
+            ratio(&inertia.torque),
+            torques(&inertia.torque),
+            ratio(&torque.torque),
+            torques(&torque.torque),
+            ratio(&other.torque),
+            shift.inside().map_or("–".to_owned(), coverage),
+            shift.worst_health().map_or("no tables".to_owned(), health),
+        ]
+    };
+    (titles, drive.shifts.iter().map(row).collect())
+}
+
+fn health((worst, share): (Health, f64)) -> String {
+    match worst {
+        Health::Good => "good".to_owned(),
+        worst => format!("{} {:.0} %", worst.name().replace('_', " "), (100.0 * share).max(1.0)),
+    }
+}
+
+/// The shifts as named cells in SI units, for files. RMS errors of the torque of the controlling clutch and of the other, N m.
+pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
+    let [offgoing, oncoming] = clutch_names(shift, car);
+    let quality = &shift.quality;
+    let number = |name: &str, value: f64| (name.to_owned(), Cell::Number(value));
+    let word = |name: &str, word: &'a str| (name.to_owned(), Cell::Word(word));
+    let mut cells = vec![
+        ("number".to_owned(), Cell::Whole(shift.number as u64)),
+        number("time_s", shift.time_s[0]),
+        word("from_gear", name(car, shift.from)),
+        word("to_gear", name(car, shift.to)),
+        word("kind", shift.kind.map_or("", |kind| kind.name())),
+        word("offgoing", offgoing),
+        word("oncoming", oncoming),
+        number("complete_s", quality.complete_s.unwrap_or(f64::NAN)),
+        number("torque_phase_s", shift.length_s(TruePhase::Torque)),
+        number("inertia_phase_s", shift.length_s(TruePhase::Inertia)),
+        number("flare_rad_s", quality.flare_rad_s),
+        number("past_synchronous_rad_s", quality.past_synchronous_rad_s),
+        number("held_slip_rad_s", quality.held_slip_rad_s),
+        number("tie_up_n_m", quality.tie_up_n_m),
+        number("jerk_m_s3", quality.jerk_m_s3),
+    ];
+    let errors: ErrorsByPhase = shift.errors().unwrap_or_default();
+    for (phase, clutches) in ["torque_phase", "inertia_phase"].iter().zip(errors) {
+        for (clutch, errors) in ["controlling", "other"].iter().zip(clutches) {
+            let ends = errors.torque.rms_n_m().map(|n_m| if errors.torque.rows > 0.0 { n_m } else { f64::NAN });
+            for (what, value) in ["rms_n_m", "open_loop_rms_n_m"].iter().zip(ends) {
+                cells.push(number(&format!("{phase}_{clutch}_{what}"), value));
+            }
+        }
+    }
+    cells.push(number("inside_range", shift.inside().unwrap_or(f64::NAN)));
+    cells.push(word("worst_health", shift.worst_health().map_or("", |(health, _)| health.name())));
+    cells
+}
+
+/// The gear as a number for an axis: its name where that is a number, else its place among the forward gears.
+fn gear_number(car: &Car, gear: usize) -> f64 {
+    let place = car.gearbox.forward_gears().iter().position(|&forward| forward == gear);
+    #[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
+    let place = place.map_or(0.0, |place| place as f64 + 1.0);
+    name(car, gear).parse().unwrap_or(place)
+}
+
+/// Gear, speeds and pedals over the whole drive.
+fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
+    let states = &drive.states;
+    let every = states.len().div_ceil(POINTS).max(1);
+    let thinned = || states.iter().step_by(every);
+    let curve = |label: &str, stroke: Stroke, value: &dyn Fn(&DriveState) -> f64| Series {
+        label: label.to_owned(),
+        stroke: Stroke { weight: Weight::Rival, ..stroke },
+        points: thinned().map(|state| (state.time_s, value(state))).collect(),
+    };
+    // A gear begins where the shift into it has ended.
+    let mut steps: Vec<(f64, f64)> = Vec::new();
+    for state in states {
+        let gear = gear_number(car, state.gear);
+        if let Some(&(_, before)) = steps.last()
+            && before != gear
+        {
+            steps.push((state.time_s, before));
+        }
+        if steps.last().is_none_or(|last| last.1 != gear) {
+            steps.push((state.time_s, gear));
+        }
+    }
+    let last_s = states.last().map_or(1.0, |state| state.time_s);
+    steps.extend(steps.last().copied().map(|(_, gear)| (last_s, gear)));
+    let gear = Series { label: "gear".to_owned(), stroke: Stroke::SIGNAL, points: steps };
+    let is = |state: &DriveState| Health::ALL.map(|health| health == state.health);
+    let healths: Vec<_> = states.iter().map(|state| (state.time_s, is(state))).collect();
+    let spans = drive.shifts.iter().map(|shift| Span {
+        label: String::new(),
+        start: shift.time_s[0],
+        end: shift.time_s[1],
+        colour: TORQUE_PHASE,
+    });
+    let speeds = ["engine", "turbine"].into_iter().zip([Stroke::THIRD, Stroke::SIGNAL]).enumerate();
+    let speeds = speeds.map(|(i, (label, stroke))| curve(label, stroke, &|state| rpm(state.speeds_rad_s[i])));
+    let pedals = ["throttle", "brake"].into_iter().zip([Stroke::SIGNAL, Stroke::THIRD]).enumerate();
+    let pedals = pedals.map(|(i, (label, stroke))| curve(label, stroke, &|state| state.pedals[i]));
+    let panels = [
+        panel("gear", 120.0, vec![gear]),
+        panel("speed (km/h)", 80.0, vec![curve("vehicle", Stroke::SIGNAL, &|state| km_h(state.vehicle_m_s))]),
+        panel("speed (rpm)", 110.0, speeds.collect()),
+        Panel { axis: Axis::Fixed(0.0, 1.0), ..panel("pedals (0 to 1)", 70.0, pedals.collect()) },
+    ];
+    Figure {
+        x_label: "time (s)",
+        x_range: (states.first().map_or(0.0, |state| state.time_s), last_s),
+        spans: spans.take(4 * MOST_DRAWN).collect(),
+        panels: panels.into_iter().chain(health_panel(&healths)).collect(),
+    }
+}
+
+/// A shift with some time around it.
+fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
+    let [from_s, to_s] = [shift.time_s[0] - MARGIN_S[0], shift.time_s[1] + MARGIN_S[1]];
+    let first = drive.states.partition_point(|state| state.time_s < from_s);
+    let last = drive.states.partition_point(|state| state.time_s <= to_s);
+    let states = &drive.states[first..last];
+    let speed = |label: String, stroke: Stroke, value: &dyn Fn(&DriveState) -> f64| Series {
+        label,
+        stroke,
+        points: states.iter().map(|state| (state.time_s, rpm(value(state)))).collect(),
+    };
+    let in_gear = |gear: usize, stroke: Stroke| {
+        let ratio = car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        speed(format!("turbine in gear {}", name(car, gear)), stroke, &|state| ratio * state.speeds_rad_s[2])
+    };
+    let dotted = |dash| Stroke { weight: Weight::Rival, dash: Some(dash), ..Stroke::SIGNAL };
+    let speeds = vec![
+        speed("engine".to_owned(), Stroke::THIRD, &|state| state.speeds_rad_s[0]),
+        speed("turbine".to_owned(), Stroke::SIGNAL, &|state| state.speeds_rad_s[1]),
+        in_gear(shift.from, dotted("2.5 2")),
+        in_gear(shift.to, dotted("9 2.5 2 2.5")),
+    ];
+    let mut panels = vec![panel("speed (rpm)", 120.0, speeds)];
+    let names = clutch_names(shift, car);
+    for (c, role) in ["offgoing", "oncoming"].into_iter().enumerate() {
+        let label = format!("torque of {}, {role} (N\u{a0}m)", names[c]);
+        panels
+            .extend(clutch_panel(&shift.rows, c, label, 125.0, |clutch| (clutch.torque_n_m, clutch.torque_range_n_m)));
+    }
+    for (c, role) in ["offgoing", "oncoming"].into_iter().enumerate() {
+        let label = format!("pressure of {}, {role} (MPa)", names[c]);
+        let of =
+            |clutch: &ClutchRow| (clutch.pressure_pa.map(mpa), clutch.pressure_range_pa.map(|range| range.map(mpa)));
+        panels.extend(clutch_panel(&shift.rows, c, label, 105.0, of));
+    }
+    let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
+    let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
+    panels.extend(health_panel(&healths));
+    let span = |label: &str, phase, colour| {
+        let [start, end] = shift.span_s(phase)?;
+        Some(Span { label: label.to_owned(), start, end, colour })
+    };
+    let mut spans: Vec<Span> = [
+        span("torque phase", TruePhase::Torque, TORQUE_PHASE),
+        span("inertia phase", TruePhase::Inertia, INERTIA_PHASE),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    spans.sort_by(|a, b| a.start.total_cmp(&b.start));
+    Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
+}
+
+/// Truth, estimate and valve model of one quantity of a clutch, with its guaranteed range. A clutch that holds has no torque by its valve
+/// model. `None` without rows.
+fn clutch_panel(
+    rows: &[ShiftScoreRow],
+    c: usize,
+    label: String,
+    height: f64,
+    of: impl Fn(&ClutchRow) -> ([f64; 3], Option<[f64; 2]>),
+) -> Option<Panel> {
+    let is_torque = label.starts_with("torque");
+    let curve = |which: usize, label: &str, stroke: Stroke| Series {
+        label: label.to_owned(),
+        stroke,
+        points: (rows.iter())
+            .map(|row| {
+                let clutch = &row.clutches[c];
+                let is_capacity = which == 2 && is_torque && clutch.sticks;
+                (row.time_s, if is_capacity { f64::NAN } else { of(clutch).0[which] })
+            })
+            .collect(),
+    };
+    let end =
+        |end: usize| rows.iter().map(|row| (row.time_s, of(&row.clutches[c]).1.map_or(f64::NAN, |r| r[end]))).collect();
+    let series =
+        vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE), curve(2, "valve model", OPEN_LOOP)];
+    let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
+    (!rows.is_empty()).then(|| Panel { y_label: label, height, series, band: Some(band), axis: Axis::All })
+}
