@@ -25,6 +25,13 @@ const WORST: usize = 5;
 const MARGIN_S: [f64; 2] = [0.15, 0.25];
 /// Points of a curve over the whole drive.
 const POINTS: usize = 3000;
+/// Part of the drive that a step of the gear takes in its figure: a pixel.
+const STEP: f64 = 900.0;
+/// Shortest time axis, s.
+const SHORTEST_S: f64 = 0.1;
+/// Room above the pressures of a clutch that slips, and least height of their axis, MPa.
+const PRESSURE_ROOM: f64 = 1.5;
+const LEAST_MPA: f64 = 0.2;
 const OPEN_LOOP: Stroke = Stroke { colour: "#767676", weight: Weight::Rival, dash: Some("6 3") };
 
 /// What a page is made from.
@@ -262,6 +269,22 @@ fn gear_number(car: &Car, gear: usize) -> f64 {
     name(car, gear).parse().unwrap_or(place)
 }
 
+/// The gear over time. A step takes `wide_s`, because a figure draws only one of points that lie closer.
+fn gear_steps(drive: &ScoredDrive, car: &Car, wide_s: f64) -> Vec<(f64, f64)> {
+    let mut steps: Vec<(f64, f64)> = Vec::new();
+    for state in &drive.states {
+        let gear = gear_number(car, state.gear);
+        match steps.last() {
+            Some(&(_, before)) if before == gear => {}
+            Some(&(_, before)) => steps.extend([(state.time_s, before), (state.time_s + wide_s, gear)]),
+            None => steps.push((state.time_s, gear)),
+        }
+    }
+    let last_s = drive.states.last().map_or(0.0, |state| state.time_s);
+    steps.extend(steps.last().copied().map(|(_, gear)| (last_s, gear)));
+    steps
+}
+
 /// Gear, speeds and pedals over the whole drive.
 fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
     let states = &drive.states;
@@ -272,22 +295,12 @@ fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
         stroke: Stroke { weight: Weight::Rival, ..stroke },
         points: thinned().map(|state| (state.time_s, value(state))).collect(),
     };
-    // A gear begins where the shift into it has ended.
-    let mut steps: Vec<(f64, f64)> = Vec::new();
-    for state in states {
-        let gear = gear_number(car, state.gear);
-        if let Some(&(_, before)) = steps.last()
-            && before != gear
-        {
-            steps.push((state.time_s, before));
-        }
-        if steps.last().is_none_or(|last| last.1 != gear) {
-            steps.push((state.time_s, gear));
-        }
-    }
-    let last_s = states.last().map_or(1.0, |state| state.time_s);
-    steps.extend(steps.last().copied().map(|(_, gear)| (last_s, gear)));
-    let gear = Series { label: "gear".to_owned(), stroke: Stroke::SIGNAL, points: steps };
+    let [first_s, last_s] = [states.first(), states.last()].map(|state| state.map_or(0.0, |state| state.time_s));
+    let gear = Series {
+        label: "gear".to_owned(),
+        stroke: Stroke::SIGNAL,
+        points: gear_steps(drive, car, (last_s - first_s) / STEP),
+    };
     let is = |state: &DriveState| Health::ALL.map(|health| health == state.health);
     let healths: Vec<_> = states.iter().map(|state| (state.time_s, is(state))).collect();
     let spans = drive.shifts.iter().map(|shift| Span {
@@ -308,7 +321,7 @@ fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
     ];
     Figure {
         x_label: "time (s)",
-        x_range: (states.first().map_or(0.0, |state| state.time_s), last_s),
+        x_range: (first_s, last_s.max(first_s + SHORTEST_S)),
         spans: spans.take(4 * MOST_DRAWN).collect(),
         panels: panels.into_iter().chain(health_panel(&healths)).collect(),
     }
@@ -338,16 +351,10 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     ];
     let mut panels = vec![panel("speed (rpm)", 120.0, speeds)];
     let names = clutch_names(shift, car);
-    for (c, role) in ["offgoing", "oncoming"].into_iter().enumerate() {
-        let label = format!("torque of {}, {role} (N\u{a0}m)", names[c]);
-        panels
-            .extend(clutch_panel(&shift.rows, c, label, 125.0, |clutch| (clutch.torque_n_m, clutch.torque_range_n_m)));
-    }
-    for (c, role) in ["offgoing", "oncoming"].into_iter().enumerate() {
-        let label = format!("pressure of {}, {role} (MPa)", names[c]);
-        let of =
-            |clutch: &ClutchRow| (clutch.pressure_pa.map(mpa), clutch.pressure_range_pa.map(|range| range.map(mpa)));
-        panels.extend(clutch_panel(&shift.rows, c, label, 105.0, of));
+    if !shift.rows.is_empty() {
+        let roles = || ["offgoing", "oncoming"].into_iter().zip(names).enumerate();
+        panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
+        panels.extend(roles().map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
     }
     let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
     let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
@@ -367,31 +374,45 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
 }
 
-/// Truth, estimate and valve model of one quantity of a clutch, with its guaranteed range. A clutch that holds has no torque by its valve
-/// model. `None` without rows.
+/// Truth, estimate and valve model of a clutch's torque. One that holds has no torque by its valve model, and its range is all
+/// that it can hold: neither is drawn.
+fn torque_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
+    let held = |clutch: &ClutchRow, value: f64| if clutch.sticks { f64::NAN } else { value };
+    let of = |clutch: &ClutchRow| {
+        let [truth, estimate, valve] = clutch.torque_n_m;
+        let range = clutch.torque_range_n_m.map(|range| range.map(|end| held(clutch, end)));
+        ([truth, estimate, held(clutch, valve)], range)
+    };
+    clutch_panel(rows, c, (format!("torque of {clutch} (N\u{a0}m)"), 125.0, Axis::All), of)
+}
+
+/// Truth, estimate and valve model of a clutch's pressure. The axis follows the pressures at which it slips: of one that holds the
+/// speeds show nothing.
+fn pressure_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
+    let slipping = rows.iter().map(|row| &row.clutches[c]).filter(|clutch| !clutch.sticks);
+    let most = slipping.flat_map(|clutch| clutch.pressure_pa).map(mpa).fold(LEAST_MPA, f64::max);
+    let of = |clutch: &ClutchRow| (clutch.pressure_pa.map(mpa), clutch.pressure_range_pa.map(|range| range.map(mpa)));
+    let axis = Axis::Within(0.0, PRESSURE_ROOM * most);
+    clutch_panel(rows, c, (format!("pressure of {clutch} (MPa)"), 110.0, axis), of)
+}
+
 fn clutch_panel(
     rows: &[ShiftScoreRow],
     c: usize,
-    label: String,
-    height: f64,
+    (y_label, height, axis): (String, f64, Axis),
     of: impl Fn(&ClutchRow) -> ([f64; 3], Option<[f64; 2]>),
-) -> Option<Panel> {
-    let is_torque = label.starts_with("torque");
+) -> Panel {
     let curve = |which: usize, label: &str, stroke: Stroke| Series {
         label: label.to_owned(),
         stroke,
-        points: (rows.iter())
-            .map(|row| {
-                let clutch = &row.clutches[c];
-                let is_capacity = which == 2 && is_torque && clutch.sticks;
-                (row.time_s, if is_capacity { f64::NAN } else { of(clutch).0[which] })
-            })
-            .collect(),
+        points: rows.iter().map(|row| (row.time_s, of(&row.clutches[c]).0[which])).collect(),
     };
-    let end =
-        |end: usize| rows.iter().map(|row| (row.time_s, of(&row.clutches[c]).1.map_or(f64::NAN, |r| r[end]))).collect();
+    let end = |end: usize| {
+        let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1.map_or(f64::NAN, |range| range[end]);
+        rows.iter().map(|row| (row.time_s, value(row))).collect()
+    };
     let series =
         vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE), curve(2, "valve model", OPEN_LOOP)];
     let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
-    (!rows.is_empty()).then(|| Panel { y_label: label, height, series, band: Some(band), axis: Axis::All })
+    Panel { y_label, height, series, band: Some(band), axis }
 }

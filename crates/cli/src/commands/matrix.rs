@@ -75,7 +75,7 @@ fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
     output::line(&format!(
         "above the open loop by more than 1 N m: {} of {} phases\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches\n\
-         a held element is wrongly said to slip: {} of {} rows",
+         a held element is said to slip: {} of {} rows",
         counts.above,
         counts.compared,
         output::grouped(counts.outside),
