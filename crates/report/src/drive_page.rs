@@ -4,7 +4,7 @@ use config::{Car, Source};
 use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
-use study::any_shift::matrix::ErrorsByPhase;
+use study::any_shift::matrix::{ErrorsByPhase, controlling};
 use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, TruePhase};
 use trace::Cell;
 use trace::units::{km_h, mpa, rpm};
@@ -40,8 +40,8 @@ pub struct DrivePage<'a> {
     pub name: &'a str,
     /// The car that the filter and the shift controller know.
     pub car: &'a Car,
-    /// How the driven car differs from it, and the seed of that.
-    pub draw: (&'a ShiftDraw, u64),
+    /// How the driven car differs from it, and the seed of that, where the drive was simulated.
+    pub draw: Option<(&'a ShiftDraw, u64)>,
     /// The drive.
     pub drive: &'a ScoredDrive,
     /// The files that the drive follows from.
@@ -90,9 +90,10 @@ impl DrivePage<'_> {
             figures => figures.collect::<Vec<_>>(),
             worst => named.collect::<Vec<_>>(),
             undrawn => drive.shifts.len() - drawn.len(),
-            draw => draw_rows(self.draw.0, car),
-            converter => car.converter.is_some().then(|| number(self.draw.0.converter, 3)),
-            seed => self.draw.1,
+            draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
+            converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
+            seed => self.draw.map(|(_, seed)| seed),
+            has_truth => drive.has_truth(),
             inputs => origin(self.sources),
         })?)
     }
@@ -155,14 +156,17 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
             number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
         ),
         format!(
-            "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s, largest slip of a held element {} rad/s.",
+            "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",
             number(most(|shift| shift.quality.flare_rad_s), 1),
             number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
-            number(most(|shift| shift.quality.held_slip_rad_s), 1)
         ),
-        format!("{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."),
         format!("Health is good in {good} of {} samples of the shifts.", rows().count()),
     ];
+    if drive.has_truth() {
+        sentences.push(format!(
+            "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
+        ));
+    }
     let hidden = shifts.iter().filter(|shift| shift.rows.is_empty()).count();
     if hidden > 0 {
         sentences.push(format!("Of {hidden} shifts the filter has no tables: nothing is estimated."));
@@ -170,51 +174,58 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     sentences
 }
 
-/// Titles and rows of the table of shifts.
+/// Titles and rows of the table of shifts. Errors of the clutch torque where the truth is known, else means of the estimates; columns
+/// that no shift fills are left out.
 pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
-    let titles = vec![
-        "#",
-        "shift",
-        "kind",
-        "begin s",
-        "time s",
-        "torque phase s",
-        "inertia phase s",
-        "flare rad/s",
-        "beyond rad/s",
-        "jerk m/s^3",
-        "inertia phase",
-        "N m",
-        "torque phase",
-        "N m",
-        "other, inertia",
-        "in range",
-        "health",
+    /// A title and its cell.
+    type Column = (&'static str, fn(&ScoredShift, &Car) -> String);
+    const COLUMNS: &[Column] = &[
+        ("#", |s, _| s.number.to_string()),
+        ("shift", gears),
+        ("kind", |s, _| s.kind.map_or("–", |kind| kind.name()).to_owned()),
+        ("begin s", |s, _| number(s.time_s[0], 2)),
+        ("time s", |s, _| number(s.quality.complete_s.unwrap_or(f64::NAN), 2)),
+        ("torque phase s", |s, _| number(s.length_s(TruePhase::Torque), 2)),
+        ("inertia phase s", |s, _| number(s.length_s(TruePhase::Inertia), 2)),
+        ("flare rad/s", |s, _| number(s.quality.flare_rad_s, 1)),
+        ("beyond rad/s", |s, _| number(s.quality.past_synchronous_rad_s, 1)),
+        (
+            "jerk m/s^3",
+            |s, _| if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 0) },
+        ),
+        ("inertia phase", |s, _| scored(s, |[_, [inertia, _]]| ratio(&inertia.torque))),
+        ("N m", |s, _| scored(s, |[_, [inertia, _]]| torques(&inertia.torque))),
+        ("torque phase", |s, _| scored(s, |[[torque, _], _]| ratio(&torque.torque))),
+        ("N m", |s, _| scored(s, |[[torque, _], _]| torques(&torque.torque))),
+        ("other, inertia", |s, _| scored(s, |[_, [_, other]]| ratio(&other.torque))),
+        ("in range", |s, _| if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }),
+        ("controlling", |s, car| unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))),
+        ("pressure MPa", |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3)))),
+        ("torque N m", |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0)))),
+        ("health", |s, _| s.worst_health().map_or("no tables".to_owned(), health)),
     ];
-    let row = |shift: &ScoredShift| {
-        let quality = &shift.quality;
-        let [[torque, _], [inertia, other]] = shift.errors().unwrap_or_default();
-        vec![
-            shift.number.to_string(),
-            gears(shift, car),
-            shift.kind.map_or("–", |kind| kind.name()).to_owned(),
-            number(shift.time_s[0], 2),
-            number(quality.complete_s.unwrap_or(f64::NAN), 2),
-            number(shift.length_s(TruePhase::Torque), 2),
-            number(shift.length_s(TruePhase::Inertia), 2),
-            number(quality.flare_rad_s, 1),
-            number(quality.past_synchronous_rad_s, 1),
-            number(quality.jerk_m_s3, 0),
-            ratio(&inertia.torque),
-            torques(&inertia.torque),
-            ratio(&torque.torque),
-            torques(&torque.torque),
-            ratio(&other.torque),
-            shift.inside().map_or("–".to_owned(), coverage),
-            shift.worst_health().map_or("no tables".to_owned(), health),
-        ]
-    };
-    (titles, drive.shifts.iter().map(row).collect())
+    let cells: Vec<Vec<String>> =
+        drive.shifts.iter().map(|shift| COLUMNS.iter().map(|(_, cell)| cell(shift, car)).collect()).collect();
+    let filled = |column: &usize| cells.iter().any(|row| !row[*column].is_empty());
+    let columns: Vec<usize> = (0..COLUMNS.len()).filter(filled).collect();
+    let titles = columns.iter().map(|column| COLUMNS[*column].0).collect();
+    (titles, cells.iter().map(|row| columns.iter().map(|column| row[*column].clone()).collect()).collect())
+}
+
+/// A cell of a shift whose truth is known.
+fn scored(shift: &ScoredShift, cell: fn(ErrorsByPhase) -> String) -> String {
+    shift.errors().filter(|_| shift.has_truth()).map_or(String::new(), cell)
+}
+
+/// A cell of a shift whose truth is not known.
+fn unscored(shift: &ScoredShift, cell: impl Fn(&ScoredShift) -> Option<String>) -> String {
+    Some(shift).filter(|shift| !shift.has_truth()).and_then(cell).unwrap_or_default()
+}
+
+/// A mean with the means of the ends of its range, in another unit.
+fn ranged([mean, low, high]: &[f64; 3], unit: f64, decimals: usize) -> String {
+    let [mean, low, high] = [mean, low, high].map(|value| number(unit * value, decimals));
+    format!("{mean} ({low}–{high})")
 }
 
 fn health((worst, share): (Health, f64)) -> String {
@@ -224,7 +235,8 @@ fn health((worst, share): (Health, f64)) -> String {
     }
 }
 
-/// The shifts as named cells in SI units, for files. RMS errors of the torque of the controlling clutch and of the other, N m.
+/// The shifts as named cells in SI units, for files. RMS errors of the torque of the controlling clutch and of the
+/// other, N m; means of the inertia phase.
 pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
     let [offgoing, oncoming] = clutch_names(shift, car);
     let quality = &shift.quality;
@@ -256,7 +268,16 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
             }
         }
     }
-    cells.push(number("inside_range", shift.inside().unwrap_or(f64::NAN)));
+    for (c, role) in ["offgoing", "oncoming"].iter().enumerate() {
+        let none = [f64::NAN; 3];
+        let (pressure, torque) = (shift.mean_pressure_pa(c).unwrap_or(none), shift.mean_torque_n_m(c).unwrap_or(none));
+        for (what, at) in [("", 0), ("least_", 1), ("greatest_", 2)] {
+            cells.push(number(&format!("{role}_pressure_mean_{what}pa"), pressure[at]));
+            cells.push(number(&format!("{role}_torque_mean_{what}n_m"), torque[at]));
+        }
+    }
+    let inside = shift.inside().filter(|_| shift.has_truth());
+    cells.push(number("inside_range", inside.unwrap_or(f64::NAN)));
     cells.push(word("worst_health", shift.worst_health().map_or("", |(health, _)| health.name())));
     cells
 }
@@ -359,19 +380,18 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
     let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
     panels.extend(health_panel(&healths));
-    let span = |label: &str, phase, colour| {
-        let [start, end] = shift.span_s(phase)?;
-        Some(Span { label: label.to_owned(), start, end, colour })
-    };
-    let mut spans: Vec<Span> = [
-        span("torque phase", TruePhase::Torque, TORQUE_PHASE),
-        span("inertia phase", TruePhase::Inertia, INERTIA_PHASE),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    let mut spans = phase_spans(shift, "torque phase", TruePhase::Torque, TORQUE_PHASE);
+    spans.extend(phase_spans(shift, "inertia phase", TruePhase::Inertia, INERTIA_PHASE));
     spans.sort_by(|a, b| a.start.total_cmp(&b.start));
     Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
+}
+
+/// The pieces of a phase; the longest has its name.
+fn phase_spans(shift: &ScoredShift, label: &str, phase: TruePhase, colour: &'static str) -> Vec<Span> {
+    let pieces = shift.spans_s(phase);
+    let longest = pieces.iter().map(|[start, end]| end - start).fold(0.0, f64::max);
+    let label = |[start, end]: [f64; 2]| if end - start >= longest { label.to_owned() } else { String::new() };
+    pieces.into_iter().map(|piece| Span { label: label(piece), start: piece[0], end: piece[1], colour }).collect()
 }
 
 /// Truth, estimate and valve model of a clutch's torque. One that holds has no torque by its valve model, and its range is all

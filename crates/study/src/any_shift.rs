@@ -5,6 +5,7 @@
 //! carries torque while it slips; in the *inertia phase* both slip.
 
 pub mod drive;
+pub mod logged;
 pub mod matrix;
 pub mod recording;
 pub mod tour;
@@ -89,11 +90,11 @@ impl ShiftDraw {
 /// Truth and estimates of one clutch at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClutchRow {
-    /// Torque, N m: true, estimated, by the valve model alone.
+    /// Torque, N m: true (not a number where it is not known), estimated, by the valve model alone.
     pub torque_n_m: [f64; 3],
-    /// Pressure, Pa: true, estimated, by the valve model alone.
+    /// Pressure, Pa: true (not a number where it is not known), estimated, by the valve model alone.
     pub pressure_pa: [f64; 3],
-    /// Whether it truly sticks.
+    /// Whether it truly sticks; by the estimate where that is not known.
     pub sticks: bool,
     /// The guaranteed range of the torque, N m.
     pub torque_range_n_m: Option<[f64; 2]>,
@@ -130,14 +131,15 @@ pub enum TruePhase {
 }
 
 impl ShiftScoreRow {
-    /// What the clutches truly do; `None` where neither phase is on.
+    /// What the clutches truly do, by the estimate where that is not known; `None` where neither phase is on.
     pub fn phase(&self) -> Option<TruePhase> {
         match self.clutches.map(|clutch| clutch.sticks) {
             [false, false] => Some(TruePhase::Inertia),
             [true, true] => None,
             [off, _] => {
-                let slipping = &self.clutches[usize::from(off)];
-                (slipping.torque_n_m[0].abs() > CARRIES_N_M).then_some(TruePhase::Torque)
+                let [truth, estimate, _] = self.clutches[usize::from(off)].torque_n_m;
+                let torque_n_m = if truth.is_nan() { estimate } else { truth };
+                (torque_n_m.abs() > CARRIES_N_M).then_some(TruePhase::Torque)
             }
         }
     }
@@ -269,24 +271,24 @@ pub fn score_samples(
     rows
 }
 
+/// Whether a value lies in a range up to a tolerance; what is not known lies in it.
+fn within(range: Option<[f64; 2]>, value: f64, tolerance: f64) -> bool {
+    value.is_nan() || range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
+}
+
 fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f64>) -> Option<ShiftScoreRow> {
     let under_way = sample.shift.as_ref()?;
     let clutches = estimate.clutches.as_ref()?;
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
-        (Some(found.element) == tables.place(truth.element)).then(|| {
-            let within = |range: Option<[f64; 2]>, value: f64, tolerance: f64| {
-                range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
-            };
-            ClutchRow {
-                torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
-                pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
-                sticks: truth.sticks,
-                torque_range_n_m: found.torque_range_n_m,
-                pressure_range_pa: found.pressure_range_pa,
-                in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
-                    && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
-            }
+        (Some(found.element) == tables.place(truth.element)).then(|| ClutchRow {
+            torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
+            pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
+            sticks: truth.sticks,
+            torque_range_n_m: found.torque_range_n_m,
+            pressure_range_pa: found.pressure_range_pa,
+            in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
+                && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
         })
     };
     Some(ShiftScoreRow {

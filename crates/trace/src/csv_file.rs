@@ -183,7 +183,7 @@ impl CsvRows {
     }
 
     /// An error in this row.
-    fn wrong(&self, message: String) -> TraceError {
+    pub fn wrong(&self, message: String) -> TraceError {
         let line = self.row.position().map_or(0, csv::Position::line);
         TraceError::Row { path: self.path.clone(), line, message }
     }

@@ -17,7 +17,7 @@ use trace::Cell;
 use super::matrix::bench_sensors;
 use super::simulate_drive::DriveTables;
 use crate::args::Demo;
-use crate::commands::{writable, write_cells, write_text};
+use crate::commands::{read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -28,7 +28,7 @@ const SHIFTS: &str = "shifts.csv";
 const NAME: &str = "drive";
 
 pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
-    let car = Car::read(vehicle)?;
+    let car = read_car(vehicle)?;
     let drive = options.drive.as_deref().map(Drive::read).transpose()?;
     let folder = &options.output;
     writable(folder, &[PAGE, SHIFTS])?;
@@ -55,7 +55,8 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let cells: Vec<Vec<(String, Cell<'_>)>> = scored.shifts.iter().map(|shift| shift_cells(shift, &car)).collect();
     write_cells(&folder.join(SHIFTS), &cells)?;
     let sources: Vec<&Source> = std::iter::once(&car.source).chain(drive.iter().map(|drive| &drive.source)).collect();
-    let page = DrivePage { name: &name, car: &car, draw: (&draw, options.seed), drive: &scored, sources: &sources };
+    let page =
+        DrivePage { name: &name, car: &car, draw: Some((&draw, options.seed)), drive: &scored, sources: &sources };
     write_text(&folder.join(PAGE), &page.html()?)?;
     print(&scored, &car, &folder.join(PAGE))
 }

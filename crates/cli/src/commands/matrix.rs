@@ -8,7 +8,7 @@ use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::Cell;
 
 use crate::args::Bench;
-use crate::commands::{json_object, progress, writable, write_cells, write_text};
+use crate::commands::{json_object, progress, read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -17,7 +17,7 @@ const PAGE: &str = "bench.html";
 const TABLE: &str = "bench.csv";
 
 pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
-    let car = Car::read(vehicle)?;
+    let car = read_car(vehicle)?;
     let sensors = match &options.sensors {
         Some(path) => super::estimate::sensors(path)?,
         None => bench_sensors()?,

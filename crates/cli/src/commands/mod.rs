@@ -36,6 +36,7 @@ pub(crate) use worst_case::worst_case;
 
 use std::path::{Path, PathBuf};
 
+use config::{Car, Kind, Source};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
 use trace::{Cell, CsvWriter, Trace, WholeFile};
@@ -51,6 +52,17 @@ fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
 /// Writes a text file, whole or not at all.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Reads the vehicle file of a car with a gearbox.
+fn read_car(path: &Path) -> Result<Car, Failure> {
+    if Source::read(path)?.kind()? == Kind::Vehicle {
+        return Err(Failure::Input(format!(
+            "{}: this vehicle file describes one shift, and not a gearbox\nhint: use one with `gearbox`, such as vehicles/eight_speed.toml",
+            path.display()
+        )));
+    }
+    Ok(Car::read(path)?)
 }
 
 /// Writes rows of named cells as a comma-separated file, whole or not at all.

@@ -8,7 +8,7 @@ use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating}
 
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, counts, errors_by_phase};
 use super::recording::Recording;
-use super::{AnyShiftError, SAMPLE_S, ShiftScoreRow, TruePhase, row};
+use super::{AnyShiftError, ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase, row};
 
 /// The drive at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,11 +60,10 @@ impl ScoredShift {
         self.rows.iter().filter(|row| row.phase() == Some(phase)).count() as f64 * SAMPLE_S
     }
 
-    /// Begin and end of a true phase, s; `None` where it does not occur. A phase may be interrupted.
-    pub fn span_s(&self, phase: TruePhase) -> Option<[f64; 2]> {
-        let mut times = self.rows.iter().filter(|row| row.phase() == Some(phase)).map(|row| row.time_s);
-        let first_s = times.next()?;
-        Some([first_s, times.last().unwrap_or(first_s) + SAMPLE_S])
+    /// Begin and end of every piece of a phase, s.
+    pub fn spans_s(&self, phase: TruePhase) -> Vec<[f64; 2]> {
+        let pieces = self.rows.split(|row| row.phase() != Some(phase));
+        pieces.filter_map(|piece| Some([piece.first()?.time_s, piece.last()?.time_s + SAMPLE_S])).collect()
     }
 
     /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without rows.
@@ -73,6 +72,33 @@ impl ScoredShift {
         let clutches = || self.rows.iter().flat_map(|row| &row.clutches);
         let inside = clutches().filter(|clutch| clutch.in_range).count();
         (!self.rows.is_empty()).then(|| inside as f64 / clutches().count() as f64)
+    }
+
+    /// Whether the true pressures and torques are known, as in a simulation.
+    pub fn has_truth(&self) -> bool {
+        self.rows.iter().any(|row| row.clutches[0].torque_n_m[0].is_finite())
+    }
+
+    /// Mean estimate of the inertia phase, and of the ends of its range: pressure of the offgoing (0) or oncoming (1) clutch, Pa.
+    pub fn mean_pressure_pa(&self, clutch: usize) -> Option<[f64; 3]> {
+        self.mean(clutch, |clutch| (clutch.pressure_pa[1], clutch.pressure_range_pa))
+    }
+
+    /// The same of its torque, N m.
+    pub fn mean_torque_n_m(&self, clutch: usize) -> Option<[f64; 3]> {
+        self.mean(clutch, |clutch| (clutch.torque_n_m[1], clutch.torque_range_n_m))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    fn mean(&self, clutch: usize, of: impl Fn(&ClutchRow) -> (f64, Option<[f64; 2]>)) -> Option<[f64; 3]> {
+        let (mut sum, mut count) = ([0.0; 3], 0_usize);
+        for row in self.rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia)) {
+            let (value, range) = of(&row.clutches[clutch.min(1)]);
+            let [low, high] = range.unwrap_or([f64::NAN; 2]);
+            [value, low, high].iter().zip(&mut sum).for_each(|(value, sum)| *sum += value);
+            count += 1;
+        }
+        (count > 0).then(|| sum.map(|sum| sum / count as f64))
     }
 
     /// The worst health and its share of the rows; `None` without rows.
@@ -94,6 +120,11 @@ pub struct ScoredDrive {
 }
 
 impl ScoredDrive {
+    /// Whether the true pressures and torques are known, as in a simulation.
+    pub fn has_truth(&self) -> bool {
+        self.shifts.iter().any(ScoredShift::has_truth)
+    }
+
     /// The shifts as rows of a matrix; those without a kind are left out.
     pub fn matrix(&self, car: &Car) -> Matrix {
         let row = |shift: &ScoredShift| {
@@ -111,36 +142,42 @@ impl ScoredDrive {
     }
 }
 
-/// A shift that is under way.
-struct Open {
-    shift: ScoredShift,
-    rating: CarShiftRating,
+/// Shifts that begin and end while a drive goes by.
+#[derive(Debug, Default)]
+pub(super) struct PassingShifts {
+    pub(super) drive: ScoredDrive,
+    pub(super) open: Option<ScoredShift>,
 }
 
-impl Open {
-    fn new(model: &CarModel, number: usize, sample: &CarSample) -> Option<Self> {
-        let under_way = sample.shift.as_ref()?;
-        let (from, to) = (under_way.from, under_way.to);
-        let ratio = |gear: usize| model.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
-        let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(&model.car, from, to, 0.0) };
-        let shift = ScoredShift {
-            number,
-            from,
-            to,
-            kind: ShiftKind::of(sample.turbine_n_m, ratio(from), ratio(to)),
-            elements: [under_way.offgoing.element, under_way.oncoming.element],
-            time_s: [sample.time_s; 2],
-            quality: CarShiftQuality::default(),
-            rows: Vec::new(),
-        };
-        Some(Self { shift, rating: CarShiftRating::new(model, &begun) })
+impl PassingShifts {
+    /// Whether a shift ends with the first row that is in a gear or in this other shift. A change of mind begins another shift.
+    pub(super) fn ends(&self, gears: Option<[usize; 2]>) -> bool {
+        self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
     }
 
-    /// With the first sample after it.
-    fn end(mut self, after: &CarSample) -> ScoredShift {
-        self.rating.push(after);
-        self.shift.quality = self.rating.quality();
-        self.shift
+    pub(super) fn end(&mut self, quality: CarShiftQuality) {
+        self.drive.shifts.extend(self.open.take().map(|shift| ScoredShift { quality, ..shift }));
+    }
+
+    /// Begins a shift. The turbine torque tells its kind.
+    pub(super) fn begin(
+        &mut self,
+        car: &Car,
+        [from, to]: [usize; 2],
+        elements: [usize; 2],
+        (time_s, turbine_n_m): (f64, f64),
+    ) {
+        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        self.open = Some(ScoredShift {
+            number: self.drive.shifts.len() + 1,
+            from,
+            to,
+            kind: ShiftKind::of(turbine_n_m, ratio(from), ratio(to)),
+            elements,
+            time_s: [time_s; 2],
+            quality: CarShiftQuality::default(),
+            rows: Vec::new(),
+        });
     }
 }
 
@@ -160,37 +197,51 @@ pub fn score_drive(
     let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
     let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
     let mut state = filter.start();
-    let mut drive = ScoredDrive::default();
-    let mut open: Option<Open> = None;
+    let mut passing = PassingShifts::default();
+    let mut rating: Option<CarShiftRating> = None;
     for (sample, input) in recording.samples.iter().zip(recording.inputs(known, &tables, sensors, seed)) {
         let estimate = filter.step(&mut state, &input);
-        let torques = &sample.torques;
-        drive.states.push(DriveState {
-            time_s: sample.time_s,
-            gear: sample.gear,
-            pedals: [sample.driver.throttle, sample.driver.brake],
-            vehicle_m_s: sample.vehicle_m_s,
-            speeds_rad_s: [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s],
-            health: estimate.health,
-        });
-        let goes_on = |open: &mut Open| {
-            sample.shift.as_ref().is_some_and(|shift| (shift.from, shift.to) == (open.shift.from, open.shift.to))
-        };
-        // A change of mind begins another shift.
-        if let Some(ended) = open.take_if(|open| !goes_on(open)) {
-            drive.shifts.push(ended.end(sample));
+        passing.drive.states.push(state_of(sample, estimate.health));
+        let gears = sample.shift.as_ref().map(|shift| [shift.from, shift.to]);
+        if passing.ends(gears) {
+            end(&mut passing, &mut rating, sample);
         }
-        if open.is_none() {
-            open = Open::new(model, drive.shifts.len() + 1, sample);
+        let Some(under_way) = &sample.shift else { continue };
+        let (from, to) = (under_way.from, under_way.to);
+        if passing.open.is_none() {
+            let elements = [under_way.offgoing.element, under_way.oncoming.element];
+            passing.begin(known, [from, to], elements, (sample.time_s, sample.turbine_n_m));
+            let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(known, from, to, 0.0) };
+            rating = Some(CarShiftRating::new(model, &begun));
         }
-        if let Some(Open { shift, rating }) = &mut open {
+        if let (Some(shift), Some(rating)) = (&mut passing.open, &mut rating) {
             rating.push(sample);
             shift.time_s[1] = sample.time_s;
             shift.rows.extend(row(&tables, sample, &estimate));
         }
     }
-    if let (Some(open), Some(last)) = (open, recording.samples.last()) {
-        drive.shifts.push(open.end(last));
+    if let Some(last) = recording.samples.last() {
+        end(&mut passing, &mut rating, last);
     }
-    Ok(drive)
+    Ok(passing.drive)
+}
+
+/// Ends the open shift with the first sample after it.
+fn end(passing: &mut PassingShifts, rating: &mut Option<CarShiftRating>, after: &CarSample) {
+    if let Some(mut rating) = rating.take() {
+        rating.push(after);
+        passing.end(rating.quality());
+    }
+}
+
+fn state_of(sample: &CarSample, health: Health) -> DriveState {
+    let torques = &sample.torques;
+    DriveState {
+        time_s: sample.time_s,
+        gear: sample.gear,
+        pedals: [sample.driver.throttle, sample.driver.brake],
+        vehicle_m_s: sample.vehicle_m_s,
+        speeds_rad_s: [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s],
+        health,
+    }
 }

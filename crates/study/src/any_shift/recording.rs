@@ -88,9 +88,9 @@ fn input(
         Some(shift) => GearCommand { from: shift.from, to: shift.to },
         None => GearCommand { from: sample.gear, to: sample.gear },
     };
-    let lock_up_applied = lock_up_n_m(car, sample).abs() > LOCK_UP_N_M;
+    let lock_up_applied = lock_up_is_applied(car, sample);
     // Without a converter, or where it is locked, nothing else gives the torque at the gearbox input.
-    let engine_n_m = sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s;
+    let engine_n_m = reported_engine_n_m(car, sample);
     ShiftInput {
         dt_s: SAMPLE_S,
         engine_rad_s: reading(0),
@@ -104,8 +104,13 @@ fn input(
     }
 }
 
-/// Torque of the lock-up clutch, N m, which comes after the elements of the gearbox.
-fn lock_up_n_m(car: &Car, sample: &CarSample) -> f64 {
+/// Whether the lock-up clutch carries torque. It comes after the elements of the gearbox.
+pub fn lock_up_is_applied(car: &Car, sample: &CarSample) -> bool {
     let lock_up = car.converter.and_then(|_| sample.torques.elements_n_m.get(car.gearbox.elements.len()));
-    lock_up.copied().unwrap_or(0.0)
+    lock_up.is_some_and(|torque_n_m| torque_n_m.abs() > LOCK_UP_N_M)
+}
+
+/// The engine torque as the engine's controller reports it, N m: at the clutch, less the drag of the engine.
+pub fn reported_engine_n_m(car: &Car, sample: &CarSample) -> f64 {
+    sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s
 }
