@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+mod any_car;
 mod commands;
 mod drives;
 mod equations;

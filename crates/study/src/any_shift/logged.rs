@@ -20,6 +20,10 @@ use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, with
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
 
+/// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
+const RATIO_FROM_RAD_S: f64 = 20.0;
+const RATIO_SHARE: f64 = 0.1;
+
 /// The columns with the commands of the valves: element of the gearbox, and name.
 pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
     let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
@@ -220,6 +224,8 @@ pub struct LoggedDrive<'c> {
     passing: PassingShifts,
     speeds_rad_s: [f64; 3],
     begun_s: f64,
+    /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
+    in_gear: [u64; 2],
 }
 
 impl<'c> LoggedDrive<'c> {
@@ -228,7 +234,7 @@ impl<'c> LoggedDrive<'c> {
         let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, sensors);
         let state = filter.start();
         let (passing, speeds_rad_s) = (PassingShifts::default(), [f64::NAN; 3]);
-        Self { car, tables, filter, state, passing, speeds_rad_s, begun_s: f64::NAN }
+        Self { car, tables, filter, state, passing, speeds_rad_s, begun_s: f64::NAN, in_gear: [0; 2] }
     }
 
     /// The tables of a car.
@@ -261,10 +267,25 @@ impl<'c> LoggedDrive<'c> {
         if self.passing.ends(gears) {
             self.end(step.time_s, from);
         }
-        if gears.is_some() {
-            self.during(step, &estimate);
+        match gears {
+            Some(_) => self.during(step, &estimate),
+            None => self.compare_ratio(from),
         }
         estimate
+    }
+
+    fn compare_ratio(&mut self, gear: usize) {
+        let [_, turbine, output] = self.speeds_rad_s;
+        let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output;
+        if output > RATIO_FROM_RAD_S {
+            self.in_gear[0] += 1;
+            self.in_gear[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
+        }
+    }
+
+    /// Rows in a gear at speed, and those whose turbine and output speed do not fit the ratio of that gear.
+    pub fn rows_in_gear(&self) -> [u64; 2] {
+        self.in_gear
     }
 
     fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {

@@ -2,7 +2,7 @@
 
 use config::Car;
 use design::{ShiftErrors, ShiftTables};
-use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver};
+use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver, idle_throttle};
 
 use super::{AnyShiftError, RECORD_S};
 
@@ -56,6 +56,7 @@ pub fn legs(car: &Car, tables: &ShiftTables<f64>) -> Vec<Leg> {
 
 /// A driver on the way through the legs.
 struct TourDriver<'m> {
+    model: &'m CarModel,
     run: CarRun<'m>,
     throttle: f64,
 }
@@ -64,7 +65,14 @@ impl TourDriver<'_> {
     /// Goes on by one control period towards this throttle.
     fn advance(&mut self, throttle: f64, brake: f64, record: &mut impl FnMut(&CarSample)) -> Result<(), AnyShiftError> {
         let before_s = self.run.time_s();
-        let driver = Driver { throttle: self.throttle, brake, grade_rad: 0.0 };
+        let [engine_rad_s, ..] = self.model.speeds(self.run.state());
+        if engine_rad_s <= 0.0 {
+            return Err(
+                CarError::Request(format!("the engine stalls at {before_s:.2} s: the load is too large")).into()
+            );
+        }
+        let throttle_now = self.throttle.max(idle_throttle(engine_rad_s));
+        let driver = Driver { throttle: throttle_now, brake, grade_rad: 0.0 };
         self.run.advance(driver, |_| {}, record)?;
         let most = (self.run.time_s() - before_s) / PEDAL_S;
         self.throttle += (throttle - self.throttle).clamp(-most, most);
@@ -120,7 +128,7 @@ pub fn drive_tour(
     let start = Driver { throttle: POWER_ON, brake: 0.0, grade_rad: 0.0 };
     let state = model.in_gear(first.from, Some(first.to), start_m_s, start.throttle)?;
     let run = CarRun::new(model, known, CarCalibration::STANDARD, first.from, state, (start, RECORD_S))?;
-    let mut driver = TourDriver { run, throttle: start.throttle };
+    let mut driver = TourDriver { model, run, throttle: start.throttle };
     for leg in &legs {
         driver.run.preselect(Some(leg.to));
         let name = |gear: usize| known.gearbox.gears[gear].name.clone();

@@ -5,6 +5,7 @@
 
 mod attacks;
 mod cars;
+mod drives;
 
 use cars::{cars, sensors, usual};
 use drivetrain::ShiftKind;

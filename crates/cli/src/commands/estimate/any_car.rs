@@ -73,6 +73,7 @@ pub(super) fn estimate(options: &Estimate) -> Result<(), Failure> {
         let row = Row { car: &car, places: &places, gears: [step.input.gear.from, step.input.gear.to], estimate };
         table.cells(step.time_s, columns.iter().map(|column| column.value.cell(&row)))?;
     }
+    check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
     table.finish()?;
     let drive = drive.finish();
     report(&drive, &car);
@@ -82,6 +83,18 @@ pub(super) fn estimate(options: &Estimate) -> Result<(), Failure> {
     };
     output::note(&format!("estimate: {}", output_path.display()));
     write_beside(&drive, &car, path, output_path)
+}
+
+/// Refuses a log whose speeds are not those of the gearbox in most rows.
+fn check_ratios([all, unfit]: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
+    if 2 * unfit <= all {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\n         hint: check the units of both speeds, the gear, and whether this is the vehicle file of the car",
+        log.display(),
+        vehicle.display()
+    )))
 }
 
 /// The table of shifts and the page.
@@ -149,6 +162,11 @@ impl<'a> Row<'a> {
             _ => clutch.open_loop_n_m,
         }
     }
+
+    /// The same without the sign of a zero.
+    fn clutch_cell(&self, which: usize, what: usize) -> Cell<'a> {
+        Cell::Number(self.clutch(which, what) + 0.0)
+    }
 }
 
 /// The columns of a clutch, after `offgoing_` or `oncoming_`.
@@ -177,7 +195,7 @@ impl Value {
     fn cell<'a>(self, row: &Row<'a>) -> Cell<'a> {
         match self {
             Self::Of(value) => value(row),
-            Self::Clutch(which, what) => Cell::Number(row.clutch(which, what)),
+            Self::Clutch(which, what) => row.clutch_cell(which, what),
             Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
         }
     }
