@@ -12,8 +12,10 @@ use design::Quantity;
 const EXAMPLES: &str = "\
 Examples:
   wetclutch demo                                     simulation, design, estimation and report for the built-in car
+  wetclutch demo --vehicle vehicles/eight_speed.toml  a drive through all gears of any car, every shift with its estimate
   wetclutch reproduce                                the source chapter's experiments, statement by statement
   wetclutch bench                                    all observers on many drives, ranked
+  wetclutch bench --vehicle vehicles/eight_speed.toml   every shift of a gearbox, in every kind
   wetclutch study experiments/settings.toml -o out   two thousand shifts: errors and sensitivities
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
@@ -125,6 +127,11 @@ pub(crate) enum Command {
     ///   OUT_shifts.csv, OUT_shifts.json   the shifts as numbers
     ///
     /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
+    ///
+    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a CSV log with the
+    /// columns that `simulate` writes for a drive:
+    ///
+    ///   wetclutch estimate city_measured.csv --vehicle vehicles/eight_speed.toml -o out.csv
     ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
