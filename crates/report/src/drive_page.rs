@@ -202,6 +202,7 @@ pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec
         ("controlling", |s, car| unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))),
         ("pressure MPa", |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3)))),
         ("torque N m", |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0)))),
+        ("hidden", |s, _| s.hidden().map_or("–".to_owned(), |share| format!("{:.0} %", 100.0 * share))),
         ("health", |s, _| s.worst_health().map_or("no tables".to_owned(), health)),
     ];
     let cells: Vec<Vec<String>> =
@@ -276,6 +277,7 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
             cells.push(number(&format!("{role}_torque_mean_{what}n_m"), torque[at]));
         }
     }
+    cells.push(number("hidden_share", shift.hidden().unwrap_or(f64::NAN)));
     let inside = shift.inside().filter(|_| shift.has_truth());
     cells.push(number("inside_range", inside.unwrap_or(f64::NAN)));
     cells.push(word("worst_health", shift.worst_health().map_or("", |(health, _)| health.name())));

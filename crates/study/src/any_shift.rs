@@ -100,6 +100,8 @@ pub struct ClutchRow {
     pub torque_range_n_m: Option<[f64; 2]>,
     /// The guaranteed range of the pressure, Pa.
     pub pressure_range_pa: Option<[f64; 2]>,
+    /// Whether the speeds show nothing of its torque, so that the estimate is that of the valve model.
+    pub hidden: bool,
     /// Whether the truth is within the guaranteed ranges.
     pub in_range: bool,
 }
@@ -287,6 +289,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
             sticks: truth.sticks,
             torque_range_n_m: found.torque_range_n_m,
             pressure_range_pa: found.pressure_range_pa,
+            hidden: found.hidden,
             in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
                 && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
         })

@@ -126,7 +126,7 @@ fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is
         cells.pop();
         cells.join(",") + "\n"
     });
-    let log = folder.write("log.csv", &lossy.collect::<String>());
+    let log = folder.write("log.csv", lossy.collect::<String>());
     let fitted = folder.path("fitted.toml");
     let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
     let said = printed(&output);

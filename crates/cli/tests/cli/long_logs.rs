@@ -189,7 +189,7 @@ fn a_signal_in_another_unit_than_its_name_says_is_an_error_with_the_likely_one()
         let engine = if i % 3 > 0 { "inf" } else { cells[1] };
         [&[cells[0], engine], &cells[2..]].concat().join(",") + "\n"
     };
-    let log = folder.write("log.csv", &text.lines().enumerate().map(broken).collect::<String>());
+    let log = folder.write("log.csv", text.lines().enumerate().map(broken).collect::<String>());
     let text = refused(&estimate(&log, &["-o", &folder.path("out.csv")]));
     assert!(text.contains("readings of engine_speed were refused"), "{text}");
     assert!(!Path::new(&folder.path("out.csv")).exists());

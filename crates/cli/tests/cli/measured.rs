@@ -38,7 +38,7 @@ fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
     printed(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("")]));
     let log = folder.path("e1_measured.csv");
     let expected = printed(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE]));
-    let map = folder.write("map.toml", &printed(&wetclutch(&["inspect", &log, "--suggest"])));
+    let map = folder.write("map.toml", printed(&wetclutch(&["inspect", &log, "--suggest"])));
     let mapped = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--map", &map]);
     assert!(printed(&mapped) == expected, "{}", stderr(&mapped));
     assert!(stderr(&mapped).contains("shifts: 1 (7.701 to 8.332 s)"), "{}", stderr(&mapped));

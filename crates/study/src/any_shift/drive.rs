@@ -6,7 +6,7 @@ use drivetrain::ShiftKind;
 use observer::Health;
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating};
 
-use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, counts, errors_by_phase};
+use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
 use super::recording::Recording;
 use super::{AnyShiftError, ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase, row};
 
@@ -72,6 +72,17 @@ impl ScoredShift {
         let clutches = || self.rows.iter().flat_map(|row| &row.clutches);
         let inside = clutches().filter(|clutch| clutch.in_range).count();
         (!self.rows.is_empty()).then(|| inside as f64 / clutches().count() as f64)
+    }
+
+    /// Share of the rows of both phases in which the speeds show nothing of the controlling clutch's torque while it slips; `None`
+    /// where there are none.
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    pub fn hidden(&self) -> Option<f64> {
+        let clutch = controlling(self.kind?);
+        let rows = self.rows.iter().filter(|row| row.phase().is_some()).map(|row| &row.clutches[clutch]);
+        let slipping: Vec<bool> = rows.filter(|clutch| !clutch.sticks).map(|clutch| clutch.hidden).collect();
+        let hidden = slipping.iter().filter(|hidden| **hidden).count();
+        (!slipping.is_empty()).then(|| hidden as f64 / slipping.len() as f64)
     }
 
     /// Whether the true pressures and torques are known, as in a simulation.

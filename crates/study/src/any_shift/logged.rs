@@ -345,6 +345,7 @@ fn clutch_row(found: &ClutchEstimate<f64>, [pressure_pa, torque_n_m, slip_rad_s]
         sticks: if slip_rad_s.is_nan() { found.holds } else { slip_rad_s.abs() < STICKS_RAD_S },
         torque_range_n_m: found.torque_range_n_m,
         pressure_range_pa: found.pressure_range_pa,
+        hidden: found.hidden,
         in_range: within(found.pressure_range_pa, pressure_pa, ROUNDING_PA)
             && within(found.torque_range_n_m, torque_n_m, DRAG_N_M),
     }
