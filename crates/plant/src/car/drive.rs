@@ -7,11 +7,8 @@ use super::integrate::CarError;
 use super::model::CarModel;
 use super::run::{CarRun, Driver};
 use super::sample::CarSample;
-use super::start::IDLE_RAD_S;
+use super::start::idle_throttle;
 
-/// Throttle of the idle control per speed below idle, s/rad, and the most that the idle control gives.
-const IDLE_GAIN: f64 = 0.02;
-const IDLE_MOST: f64 = 0.3;
 /// Engine speed below which the engine has stalled, rad/s.
 const STALLED_RAD_S: f64 = 30.0;
 /// The gear below is taken at no more than this share of the speed at which the gear was reached: the hysteresis.
@@ -62,7 +59,7 @@ pub fn simulate_car_drive(
             return Err(stalled(model, now_s, engine_rad_s));
         }
         shifting.step(&mut run, &driver)?;
-        driver.throttle = driver.throttle.max((IDLE_GAIN * (IDLE_RAD_S - engine_rad_s)).clamp(0.0, IDLE_MOST));
+        driver.throttle = driver.throttle.max(idle_throttle(engine_rad_s));
         run.advance(driver, |_| {}, &mut record)?;
         let vehicle_m_s = run.state().vehicle_m_s;
         summary.distance_m += vehicle_m_s * (run.time_s() - now_s);
