@@ -32,6 +32,24 @@ fn a_key_of_the_file_replaces_that_of_the_eight_speed_car() {
 }
 
 #[test]
+fn a_table_fill_gives_the_pistons_a_stroke() {
+    let strokes = |text: &str| -> Vec<Option<f64>> {
+        let mm = |clutch: &config::ShiftClutch| 1e3 * clutch.cylinder.stroke_m3 / clutch.clutch.piston_area_m2;
+        let car = car(text).unwrap();
+        car.clutches.iter().flatten().map(|clutch| clutch.has_stroke.then(|| mm(clutch))).collect()
+    };
+    assert_eq!(strokes(""), [None; 5]);
+    let close = |a: Option<f64>, b: f64| (a.unwrap() - b).abs() < 1e-9;
+    assert!(strokes("[fill]\n").into_iter().all(|stroke| close(stroke, 1.2)));
+    let own = strokes("[fill]\nstroke_m = 1e-3\n[clutch.C.fill]\nstroke_m = 2e-3\n[clutch.D.fill]\nenabled = false\n");
+    assert!(close(own[0], 1.0) && close(own[2], 2.0) && own[3].is_none(), "{own:?}");
+    let cold = car("[fill]\n[oil]\ntemperature_degc = 5\n").unwrap();
+    assert!(cold.clutches[0].unwrap().cylinder.viscosity_m2_s > 1e-4);
+    let shipped = Car::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed_stroke.toml").as_ref());
+    assert_eq!(shipped.unwrap().clutches, car("[fill]\n").unwrap().clutches);
+}
+
+#[test]
 fn a_valve_of_another_kind_replaces_the_shipped_one() {
     let valve = "[valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 2e4\nline_pressure_pa = 1.6e6\n\
                  delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n";
@@ -45,9 +63,14 @@ fn a_valve_of_another_kind_replaces_the_shipped_one() {
 #[test]
 fn the_shipped_vehicle_files_are_right() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/");
-    for (name, elements) in
-        [("eight_speed", 5), ("ten_speed", 6), ("six_speed", 5), ("four_speed", 5), ("dual_clutch", 2)]
-    {
+    for (name, elements) in [
+        ("eight_speed", 5),
+        ("eight_speed_stroke", 5),
+        ("ten_speed", 6),
+        ("six_speed", 5),
+        ("four_speed", 5),
+        ("dual_clutch", 2),
+    ] {
         let path = format!("{folder}{name}.toml");
         let car = Car::read(path.as_ref()).unwrap();
         assert_eq!(car.clutches.iter().flatten().count(), elements, "{name}");
@@ -72,6 +95,8 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
             "[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\non_input_rad_s = 100\noff_input_rad_s = 110\nramp_s = 0.5\n",
             ["car.toml:7", "is 110, not below", ""],
         ),
+        ("[fill]\nstroke_m = 1.2\n", ["car.toml:4", "fill.stroke_m", "expected 0.00001 to 0.02"]),
+        ("[clutch.B.fill]\nleak = 1\n", ["car.toml:4", "unknown field `leak`", ""]),
         ("launch = \"turbo\"\n", ["car.toml:3", "turbo", ""]),
         ("mass = 3\n", ["car.toml:3", "unknown field `mass`", ""]),
         (

@@ -5,11 +5,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use drivetrain::{Clutch, ClutchValve, Converter, Cylinder, Driveline, Engine, RoadLoad, Table1, Tyre};
+use drivetrain::{Clutch, ClutchValve, Converter, Driveline, Engine, RoadLoad, Table1, Tyre};
 use geartrain::{ElementKind, Gearbox};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
 use super::{HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre, valves};
 use crate::check::{Check, Number, Word};
@@ -179,6 +180,7 @@ struct RawCar {
     hydraulics: RawHydraulics,
     friction: RawShape,
     valve: Spanned<RawClutchValve>,
+    fill: Option<RawFill>,
     lock_up: Option<RawLockUp>,
     #[serde(default)]
     clutch: BTreeMap<Spanned<String>, RawElementClutch>,
@@ -237,6 +239,7 @@ struct RawElementClutch {
     static_friction: Option<Number>,
     drag_n_m: Option<Number>,
     valve: Option<Spanned<RawClutchValve>>,
+    fill: Option<RawFill>,
 }
 
 fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) -> Result<LockUp, ConfigError> {
@@ -348,8 +351,13 @@ fn clutches(
             let at = raw.hydraulics.line_pressure_pa.span().start;
             return Err(check.meaning("hydraulics.line_pressure_pa", at, message, None));
         }
-        let cylinder = Cylinder::of_clutch(&clutch).with_oil(oil_degc);
-        Ok(Some(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke: false, drag_n_m }))
+        let (table, fills) = match own.and_then(|own| own.fill.as_ref()) {
+            Some(own) => (key("fill"), Some(own)),
+            None => ("fill".to_owned(), raw.fill.as_ref()),
+        };
+        let (cylinder, has_stroke) = fill::cylinder(check, &table, fills, &clutch, oil_degc)?;
+        let has_stroke = has_stroke && fills.is_some();
+        Ok(Some(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke, drag_n_m }))
     };
     gearbox.elements.iter().map(element).collect()
 }

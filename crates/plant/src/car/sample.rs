@@ -87,9 +87,7 @@ impl CarSample {
         let torques = model.torques(step.contacts, &x, step.inputs);
         let mut pressures_pa = [0.0; MAX_ELEMENTS];
         for (element, pressure) in pressures_pa.iter_mut().enumerate().take(model.lock_up()) {
-            if let Some((slot, _)) = model.friction(element) {
-                *pressure = x.pressures_pa[slot];
-            }
+            *pressure = model.pressure_pa(&x, element);
         }
         let element = |element: usize| ElementSample {
             element,

@@ -58,14 +58,18 @@ impl CarModel {
         };
         // A standing car has been held by its brake.
         let shaft_n_m = turbine_n_m * of_gear.ratio * car.driveline.final_ratio;
-        let mut pressures_pa = [0.0; MAX_PACKS];
+        let mut valves_pa = [0.0; MAX_PACKS];
         for holding in &of_gear.holding {
             if let Some((slot, _)) = self.friction(holding.element) {
-                pressures_pa[slot] = car.line_pressure_pa;
+                valves_pa[slot] = car.line_pressure_pa;
             }
         }
+        let mut volumes_m3 = [0.0; MAX_PACKS];
+        for (slot, clutch) in (0..self.lock_up()).filter_map(|element| self.friction(element)) {
+            volumes_m3[slot] = clutch.cylinder.volume(valves_pa[slot]);
+        }
         let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad + 0.5 * car.backlash_rad * shaft_n_m.signum();
-        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, pressures_pa })
+        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, valves_pa, volumes_m3 })
     }
 
     /// The highest speed at which engine and pump are in balance, rad/s, at least idle speed; without a converter that of the gearbox input.

@@ -65,7 +65,7 @@ fn audit(model: &CarModel, (from, to): (usize, usize), throttle: f64, tolerance:
 #[test]
 fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
     let mut worst: f64 = 0.0;
-    for car in cars() {
+    for car in cars().into_iter().chain(cars().into_iter().map(crate::with_stroke)) {
         let model = CarModel::new(car).unwrap();
         for pair in neighbours(&model.car) {
             for throttle in [0.15, 0.0] {

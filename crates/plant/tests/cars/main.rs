@@ -40,6 +40,12 @@ fn cars() -> Vec<Car> {
     ]
 }
 
+/// The car with pistons that have a stroke.
+fn with_stroke(mut car: Car) -> Car {
+    car.clutches.iter_mut().flatten().for_each(|clutch| clutch.has_stroke = true);
+    car
+}
+
 /// Neighbouring gears in both directions.
 fn neighbours(car: &Car) -> Vec<(usize, usize)> {
     let forward = car.gearbox.forward_gears();

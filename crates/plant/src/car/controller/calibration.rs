@@ -1,5 +1,7 @@
 //! Numbers of the shift controller.
 
+use config::FastFill;
+
 /// Calibration of the shift controller: one set for all gearboxes and all kinds of shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CarCalibration {
@@ -7,12 +9,20 @@ pub struct CarCalibration {
     pub control_period_s: f64,
     /// Time to bring the oncoming clutch to its kiss point and the offgoing one to what it must hold, s.
     pub fill_s: f64,
+    /// The fill of a clutch whose piston has a stroke.
+    pub fast_fill: FastFill,
+    /// Most torque that such a clutch is to carry at the end of its fill, N m at the turbine.
+    pub filled_n_m: f64,
     /// The oncoming clutch waits this far below its kiss point, Pa.
     pub below_kiss_pa: f64,
     /// Torque that the offgoing clutch can hold over what it must, before and during the torque phase.
     pub holding_margin: f64,
     /// Duration of the torque phase, s.
     pub torque_phase_s: f64,
+    /// Slip of the old gear in the wrong direction that counts as a flare, rad/s at the turbine.
+    pub flare_slip_rad_s: f64,
+    /// Gain of such a slip on the torque of the oncoming clutch, 1/s.
+    pub flare_per_s: f64,
     /// Speed of the oncoming ramp when the old gear flares, over that without.
     pub flare_ramp: f64,
     /// Share of the turbine torque that the offgoing clutch holds while the old gear flares.
@@ -21,7 +31,7 @@ pub struct CarCalibration {
     pub sign_n_m: f64,
     /// Time in which the offgoing clutch gives up the turbine torque, until the old gear slips (inertia phase first), s.
     pub release_s: f64,
-    /// Slip of the old gear at which it is left, or counts as a flare, rad/s at the turbine.
+    /// Slip of the old gear at which it is left, rad/s at the turbine.
     pub release_slip_rad_s: f64,
     /// Duration of the inertia phase at 120 rad/s of slip where the turbine torque drives the change and the oncoming clutch
     /// controls it, s.
@@ -79,11 +89,15 @@ impl CarCalibration {
     pub const STANDARD: Self = Self {
         control_period_s: 0.01,
         fill_s: 0.20,
+        fast_fill: FastFill { hold_s: 0.14, ..FastFill::STANDARD },
+        filled_n_m: 6.0,
         below_kiss_pa: 4e3,
         holding_margin: 1.15,
         torque_phase_s: 0.20,
+        flare_slip_rad_s: 1.0,
+        flare_per_s: 30.0,
         flare_ramp: 1.8,
-        flare_holding: 0.25,
+        flare_holding: 0.5,
         sign_n_m: 5.0,
         release_s: 0.5,
         release_slip_rad_s: 3.0,

@@ -15,6 +15,7 @@
 mod calibration;
 mod pressure;
 mod shift;
+mod strokes;
 mod track;
 
 use config::Car;
@@ -23,8 +24,10 @@ use geartrain::{Change, ElementKind};
 use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
 pub use calibration::CarCalibration;
+use pressure::Controlled;
 use shift::ActiveShift;
 pub use shift::ShiftStage;
+use strokes::Strokes;
 use track::Track;
 
 /// What the controller measures.
@@ -81,6 +84,7 @@ pub struct CarShiftController {
     /// Share of its capacity with which the lock-up clutch is closed.
     lock_up_share: f64,
     is_locked_up: bool,
+    strokes: Strokes,
 }
 
 impl CarShiftController {
@@ -103,6 +107,7 @@ impl CarShiftController {
             engine_share: 1.0,
             lock_up_share: 0.0,
             is_locked_up: false,
+            strokes: Strokes::new(car, gear),
         })
     }
 
@@ -141,11 +146,15 @@ impl CarShiftController {
             (Change::Single { offgoing, oncoming, .. }, Some(reduced)) => Some((*offgoing, *oncoming, *reduced)),
             _ => None,
         });
+        let line_pa = self.car.line_pressure_pa;
         let both = single.and_then(|(offgoing, oncoming, reduced)| {
             let clutch = |element: usize| self.car.clutches.get(element).copied().flatten();
-            Some((offgoing, oncoming, clutch(offgoing)?, clutch(oncoming)?, reduced))
+            let offgoing = Controlled::new(offgoing, clutch(offgoing)?, reduced.slip_offgoing, line_pa);
+            let on = Controlled::new(oncoming, clutch(oncoming)?, reduced.slip_oncoming, 0.0);
+            let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
+            Some(([offgoing, oncoming], reduced.mass_kg_m2))
         });
-        let Some((offgoing, oncoming, off, on, reduced)) = both else {
+        let Some((clutches, mass_kg_m2)) = both else {
             let message = format!(
                 "shift {}-{} is not between two clutches; shift through the gears between",
                 names(self.gear),
@@ -153,7 +162,7 @@ impl CarShiftController {
             );
             return Err(CarError::Request(message));
         };
-        self.active = Some(ActiveShift::new(to, (offgoing, off), (oncoming, on), &reduced, &self.car, time_s));
+        self.active = Some(ActiveShift::new(to, clutches, mass_kg_m2, line_pa, time_s));
         Ok(())
     }
 
@@ -192,6 +201,7 @@ impl CarShiftController {
         let step = period_s / self.calibration.engine_ramp_s;
         self.engine_share += (wanted - self.engine_share).clamp(-step, step);
         let lock_up_n_m = self.lock_up(measured);
+        self.strokes.follow(&self.car, &elements, period_s);
         CarCommands { elements, dogs, engine_share: self.engine_share, lock_up_n_m }
     }
 

@@ -1,7 +1,6 @@
 //! One shift: its stages and the pressures of both clutches.
 
-use config::{Car, ShiftClutch};
-use drivetrain::{PhaseOrder, ReducedShift};
+use drivetrain::PhaseOrder;
 
 use super::pressure::Controlled;
 use super::track::Track;
@@ -71,19 +70,18 @@ struct Now {
 impl ActiveShift {
     pub(super) fn new(
         to: usize,
-        (offgoing, off): (usize, ShiftClutch),
-        (oncoming, on): (usize, ShiftClutch),
-        reduced: &ReducedShift<f64>,
-        car: &Car,
+        [offgoing, oncoming]: [Controlled; 2],
+        mass_kg_m2: [[f64; 2]; 2],
+        line_pa: f64,
         time_s: f64,
     ) -> Self {
         Self {
             to,
-            offgoing: Controlled::new(offgoing, off, reduced.slip_offgoing, car.line_pressure_pa),
-            oncoming: Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0),
+            offgoing,
+            oncoming,
             stage: ShiftStage::Fill,
-            mass_kg_m2: reduced.mass_kg_m2,
-            line_pa: car.line_pressure_pa,
+            mass_kg_m2,
+            line_pa,
             begun_s: time_s,
             since_s: time_s,
             transferred: 0.0,
@@ -138,7 +136,12 @@ impl ActiveShift {
         };
         self.slip_before_rad_s = Some(now.z_wheels);
         let [off_pa, on_pa] = torques;
-        [self.offgoing.lead(c, off_pa, self.line_pa), self.oncoming.lead(c, on_pa, self.line_pa)]
+        let on_pa = match (self.stage, self.oncoming.fill) {
+            // The plan of the fill counts with the lag of the valve.
+            (ShiftStage::Fill, Some(_)) => self.oncoming.without_lead(c, on_pa, self.line_pa),
+            _ => self.oncoming.lead(c, on_pa, self.line_pa),
+        };
+        [self.offgoing.lead(c, off_pa, self.line_pa), on_pa]
     }
 
     fn change_stage(&mut self, c: &CarCalibration, now: &Now) {
@@ -150,7 +153,7 @@ impl ActiveShift {
             if now.z.abs() < c.lock_slip_rad_s { self.locked_since_s.or(Some(now.time_s)) } else { None };
         let holds = self.locked_since_s.is_some_and(|since_s| passed(since_s, c.lock_hold_s));
         let next = match self.stage {
-            ShiftStage::Fill if passed(self.since_s, c.fill_s) => match self.order(now.turbine_n_m) {
+            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) => match self.order(now.turbine_n_m) {
                 PhaseOrder::TorqueFirst => ShiftStage::TorquePhase,
                 PhaseOrder::InertiaFirst => ShiftStage::InertiaPhase,
             },
@@ -208,30 +211,44 @@ impl ActiveShift {
         (now.z + c.hand_over_lead_s * rate) * self.direction() <= 0.0
     }
 
+    /// Pressure with which the oncoming clutch waits, Pa: just below its kiss point, or with the piston at the end of its
+    /// stroke.
     fn waiting_pa(&self, c: &CarCalibration) -> f64 {
+        if let Some(plan) = self.oncoming.fill {
+            return plan.pressure(plan.duration_s());
+        }
         (self.oncoming.kiss_pa() - c.below_kiss_pa).max(0.0)
     }
 
+    /// Duration of the fill, s.
+    fn fill_s(&self, c: &CarCalibration) -> f64 {
+        self.oncoming.fill.map_or(c.fill_s, |plan| plan.duration_s().max(plan.arrival_s).max(c.fill_s))
+    }
+
     fn fill(&self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let share = ((now.time_s - self.since_s + c.control_period_s) / c.fill_s).min(1.0);
+        let share = ((now.time_s - self.since_s + c.control_period_s) / self.fill_s(c)).min(1.0);
         let held = self.offgoing.pressure_for(c.holding_margin * now.turbine_n_m, 0.0);
         let offgoing_pa = self.line_pa.min(held + (1.0 - share) * (self.line_pa - held).max(0.0));
+        if let Some(plan) = self.oncoming.fill {
+            return [offgoing_pa, plan.pressure(now.time_s - self.since_s)];
+        }
         // Gently: a command that falls arrives later than the one that rises before it.
         let filled = (std::f64::consts::FRAC_PI_2 * (share / FILLED_AT).min(1.0)).sin();
         [offgoing_pa, filled * self.waiting_pa(c)]
     }
 
     fn transfer(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let flare = now.y * self.direction() > c.release_slip_rad_s;
+        let flare = now.y * self.direction() > c.flare_slip_rad_s;
         self.has_flared |= flare;
         let speed = if self.has_flared { c.flare_ramp } else { 1.0 };
         self.transferred = (self.transferred + speed * c.control_period_s / c.torque_phase_s).min(1.0);
         let (taken, left) = (self.transferred, 1.0 - self.transferred);
         let held = c.holding_margin * left;
         let held = if flare { held.max(c.flare_holding) } else { held };
+        let caught = if flare { c.flare_per_s * self.mass_kg_m2[0][0] * now.y } else { 0.0 };
         [
             self.offgoing.pressure_for(held * now.turbine_n_m, now.y),
-            self.oncoming.pressure_for(taken * now.turbine_n_m, now.z),
+            self.oncoming.pressure_for(taken * now.turbine_n_m + caught, now.z),
         ]
     }
 
