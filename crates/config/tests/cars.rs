@@ -60,6 +60,33 @@ fn a_valve_of_another_kind_replaces_the_shipped_one() {
     assert!(weak.contains("car.toml:3") && weak.contains("less than `hydraulics.line_pressure_pa`"), "{weak}");
 }
 
+const VALVE: &str = "lag = { pressure_pa = [0, 1e6], time_constant_s = [0.1, 0.02] }\n\
+                     gain = { current_a = [0, 1], gain_pa_a = [1.2e6, 1.6e6] }\n\
+                     delay = { current_a = [0, 1], delay_s = [0.03, 0.01] }\n";
+
+#[test]
+fn a_valve_with_a_current_of_zero_pressure_is_normally_high() {
+    let car = |more: &str| car(&format!("[clutch.C.valve]\n{VALVE}{more}"));
+    let high = car("zero_pressure_a = 1.1\n").unwrap();
+    let falls: Vec<bool> = high.clutches.iter().flatten().map(|clutch| clutch.valve.falls()).collect();
+    assert_eq!(falls, [false, false, true, false, false]);
+    let valve = high.clutches[2].unwrap().valve;
+    assert!((valve.settled_pressure(0.1) - 1.6e6).abs() < 1.0 && valve.settled_pressure(1.1) == 0.0);
+    let weak = car("zero_pressure_a = 0.9\n").unwrap_err();
+    assert!(weak.contains("car.toml:7") && weak.contains("without current the pressure is 1.404 MPa"), "{weak}");
+    assert!(weak.contains("line pressure needs 1.000 A"), "{weak}");
+    let pulse = "[valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 2e4\nline_pressure_pa = 1.6e6\nzero_pressure_a = 1\n\
+                 delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n";
+    assert!(crate::car(pulse).unwrap_err().contains("another kind of valve"));
+    let single = include_str!("../../../vehicles/two_speed_at.toml")
+        .replace("[clutch.b.valve]\n", "[clutch.b.valve]\nzero_pressure_a = 1.1\n");
+    let error = config::Vehicle::from_source(Source::built_in("v.toml", &single)).unwrap_err().to_string();
+    assert!(
+        error.contains("clutch.b.valve.zero_pressure_a") && error.contains("for cars with a gearbox file"),
+        "{error}"
+    );
+}
+
 #[test]
 fn the_shipped_vehicle_files_are_right() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/");

@@ -381,6 +381,24 @@ fn reaches(
         ClutchValve::Proportional(maps) => {
             valves::settled_pressure_rises(check, table, valve, raw, maps.current_for(line_pressure_pa))
         }
+        ClutchValve::NormallyHigh { maps, zero_pressure_a } => {
+            valves::settled_pressure_rises(check, table, valve, raw, *zero_pressure_a)?;
+            let most_pa = maps.settled_pressure(*zero_pressure_a);
+            if most_pa >= line_pressure_pa {
+                return Ok(());
+            }
+            let message = format!(
+                "is {zero_pressure_a} A: without current the pressure is {:.3} MPa, less than `hydraulics.line_pressure_pa`, {:.3} MPa",
+                1e-6 * most_pa,
+                1e-6 * line_pressure_pa
+            );
+            let hint = format!(
+                "line pressure needs {:.3} A; the maps of a normally-high valve are over `zero_pressure_a` less the current",
+                maps.current_for(line_pressure_pa)
+            );
+            let at = raw.get_ref().zero_pressure_a.as_ref().map_or(raw.span().start, |zero| zero.span().start);
+            Err(check.meaning(&format!("{table}.zero_pressure_a"), at, message, Some(hint)))
+        }
         ClutchValve::PulseWidth { law, .. } if law.line_pressure_pa < line_pressure_pa => {
             let message = format!(
                 "its line pressure is {} Pa, less than `hydraulics.line_pressure_pa`, {line_pressure_pa} Pa",

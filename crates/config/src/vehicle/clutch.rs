@@ -73,11 +73,17 @@ pub(super) fn check(
         let hint = "with a smaller static friction the clutch could neither stick nor slip".to_owned();
         return Err(check.meaning(&key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
     }
+    let valve = &raw.valve;
+    if let Some(zero) = &valve.get_ref().zero_pressure_a {
+        let message = "is for cars with a gearbox file".to_owned();
+        let hint = "the observers of a single shift know valves only whose pressure rises with the current".to_owned();
+        return Err(check.meaning(&key("valve.zero_pressure_a"), zero.span().start, message, Some(hint)));
+    }
     let (cylinder, has_stroke) = fill::cylinder(check, &key("fill"), raw.fill.as_ref(), &clutch, oil_degc)?;
     Ok(ShiftClutch {
         clutch,
-        valve: valves::clutch_valve(check, &key("valve"), &raw.valve)?,
-        hysteresis_pa: match &raw.valve.get_ref().hysteresis_pa {
+        valve: valves::clutch_valve(check, &key("valve"), valve)?,
+        hysteresis_pa: match &valve.get_ref().hysteresis_pa {
             Some(half_width) => check.number(&key("valve.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         },

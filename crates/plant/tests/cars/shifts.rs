@@ -67,6 +67,30 @@ fn every_shift_with_pistons_that_have_a_stroke_is_good() {
     each_shift("with stroke", cars, 1.0, [1.8, 5.0, 10.0, 50.0, 0.1, 70.0]);
 }
 
+/// The same maps over a mirrored current: the same pressures at the same times.
+#[test]
+fn normally_high_valves_shift_as_normally_low_ones() {
+    let low = cars().swap_remove(0);
+    let mut high = low.clone();
+    for clutch in high.clutches.iter_mut().flatten() {
+        let maps = *clutch.valve.maps().unwrap();
+        clutch.valve = drivetrain::ClutchValve::NormallyHigh { maps, zero_pressure_a: 1.2 };
+    }
+    let recorded = |car: &Car| {
+        let (model, mut samples) = (CarModel::new(car.clone()).unwrap(), Vec::new());
+        let shift = CarShift::usual(car, 2, 3, 0.2);
+        simulate_car_shift(&model, car, CarCalibration::STANDARD, &shift, |sample| samples.push(*sample)).unwrap();
+        samples
+    };
+    for (low, high) in recorded(&low).iter().zip(&recorded(&high)) {
+        for element in 0..5 {
+            let of = |sample: &plant::car::CarSample| sample.pressures_pa[element];
+            assert!((of(low) - of(high)).abs() < 1.0, "{}: {element}", low.time_s);
+            assert!((low.commands[element] + high.commands[element] - 1.2).abs() < 1e-9);
+        }
+    }
+}
+
 /// Pulse-width valves answer to a duty cycle and have a lag that depends on the pressure drop.
 #[test]
 fn pulse_width_valves_shift_too() {

@@ -171,7 +171,9 @@ impl CarShiftController {
         let period_s = self.calibration.control_period_s;
         self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
         let turbine_n_m = self.turbine_torque(throttle, measured);
-        let mut elements = [0.0; MAX_ELEMENTS];
+        let open = |element: usize| self.car.clutches.get(element).and_then(Option::as_ref);
+        let mut elements: [f64; MAX_ELEMENTS] =
+            std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
         // The clutches of a shift get their commands below.
