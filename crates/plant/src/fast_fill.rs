@@ -17,7 +17,7 @@ const STEP_S: f64 = 1e-3;
 pub struct FillPlan {
     kiss_pa: f64,
     calibration: FastFill,
-    /// Length of the pulse, s.
+    /// Length of the pulse, s; less than zero where the ramp is cut short too.
     pub pulse_s: f64,
     /// When the modelled piston ends its stroke, s after the fill began; zero if it does not within the hold and a second.
     pub arrival_s: f64,
@@ -44,7 +44,11 @@ impl FillPlan {
                 shortest = middle
             }
         }
-        let mut plan = plan((shortest * period_s + calibration.offset_s).max(0.0));
+        // A piston that is nearly there takes the hold alone.
+        let hold_alone_s = -calibration.ramp_s;
+        let needs_none = shortest < 1.0 && plan(0.0).arrives_hard(clutch, period_s, state);
+        let pulse_s = if needs_none { hold_alone_s } else { shortest * period_s + calibration.offset_s };
+        let mut plan = plan(pulse_s.max(hold_alone_s));
         plan.arrival_s = plan.arrival(clutch, period_s, state).map_or(0.0, |(time_s, _)| time_s);
         plan
     }
@@ -96,14 +100,14 @@ pub struct StrokeModel {
     time_s: f64,
     line: DelayLine,
     valve_pa: f64,
-    /// From a piston on its stop to plates that touch.
+    /// Oil beyond that of a piston on its stop.
     volume_m3: f64,
 }
 
 impl StrokeModel {
     /// A clutch whose valve has given this pressure for ever, at time zero.
     pub fn new(clutch: &ShiftClutch, settled_pa: f64) -> Self {
-        let volume_m3 = if settled_pa > clutch.cylinder.kiss_pa { clutch.cylinder.stroke_m3 } else { 0.0 };
+        let volume_m3 = clutch.cylinder.volume(settled_pa).max(0.0);
         let line = DelayLine::new(clutch.valve.command_for(settled_pa));
         Self { time_s: 0.0, line, valve_pa: settled_pa, volume_m3 }
     }
@@ -128,8 +132,11 @@ impl StrokeModel {
     /// Whether nothing moves.
     fn rests(&self, clutch: &ShiftClutch) -> bool {
         const AT_REST_PA: f64 = 1.0;
+        /// The leak keeps a full cylinder a little below its valve.
+        const FULL_PA: f64 = 1e3;
         let settled_pa = clutch.valve.settled_pressure(self.line.arrived());
-        let is_full = self.volume_m3 >= clutch.cylinder.stroke_m3 && settled_pa > clutch.cylinder.kiss_pa;
+        let is_full = self.volume_m3 > clutch.cylinder.stroke_m3
+            && (clutch.cylinder.pressure(self.volume_m3) - settled_pa).abs() < FULL_PA;
         let is_empty = self.volume_m3 <= 0.0 && settled_pa < clutch.cylinder.preload_pa;
         let is_settled = self.line.next_arrival_s().is_none() && (self.valve_pa - settled_pa).abs() < AT_REST_PA;
         is_settled && (is_full || is_empty)
@@ -138,8 +145,11 @@ impl StrokeModel {
     fn step(&mut self, clutch: &ShiftClutch, step_s: f64) {
         let cylinder = &clutch.cylinder;
         let settled_pa = clutch.valve.settled_pressure(self.line.arrive(self.time_s));
-        let volume_m3 = self.volume_m3 + step_s * cylinder.volume_rate(self.volume_m3, self.valve_pa);
-        self.volume_m3 = volume_m3.clamp(0.0, cylinder.stroke_m3);
+        let rate = cylinder.volume_rate(self.volume_m3, self.valve_pa);
+        // The oil of a filled cylinder follows the valve faster than the step.
+        let is_filled = self.volume_m3 > cylinder.stroke_m3;
+        let slope = if is_filled { cylinder.volume_rate_slopes(self.volume_m3, self.valve_pa).0 } else { 0.0 };
+        self.volume_m3 = (self.volume_m3 + step_s * rate / (1.0 - step_s * slope)).max(0.0);
         self.valve_pa += step_s * clutch.valve.pressure_rate(self.valve_pa, settled_pa);
         self.time_s += step_s;
     }

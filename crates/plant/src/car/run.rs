@@ -90,12 +90,20 @@ impl<'m> CarRun<'m> {
         &self.plant.state
     }
 
-    /// Asks for a gear.
+    /// Asks for a gear; see [`CarShiftController::request`].
     ///
     /// # Errors
-    /// The shift is not one between two clutches.
+    /// The gear cannot be reached.
     pub fn request(&mut self, to: usize) -> Result<(), CarError> {
         self.controller.request(to, self.time_s())
+    }
+
+    /// Asks for neutral.
+    ///
+    /// # Errors
+    /// A shift is under way, or the gear is neither the lowest nor reverse.
+    pub fn request_neutral(&mut self) -> Result<(), CarError> {
+        self.controller.request_neutral()
     }
 
     /// Puts in the dogs of a gear that is expected next.
@@ -119,7 +127,7 @@ impl<'m> CarRun<'m> {
         self.valves.send(model, now_s, &self.commands.elements);
         self.periods += 1;
         let end_s = self.time_s();
-        let shown = (self.controller.gear(), self.controller.shift());
+        let shown = (self.controller.gear(), self.controller.is_neutral(), self.controller.shift());
         while self.plant.time_s < end_s - SAME_INSTANT_S {
             let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s + SAME_INSTANT_S);
             let until_s = self.valves.next_arrival_s().map_or(end_s, |arrival| arrival.min(end_s));

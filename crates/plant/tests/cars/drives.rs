@@ -149,7 +149,8 @@ fn wrong_requests_get_clear_errors() {
     };
     assert!(error("start = { gear = \"9\" }").contains("no gear \"9\"\nhint: its gears are R, 1, 2"));
     assert!(error("start = { gear = \"1\", vehicle_m_s = 90.0 }").contains("the most is 700 rad/s"));
-    assert!(error("shift = [{ time_s = 1.0, gear = \"4\" }]").contains("shift 1-4 is not between two clutches"));
+    let into_reverse = error("start = { vehicle_m_s = 5.0 }\nshift = [{ time_s = 1.0, gear = \"R\" }]");
+    assert!(into_reverse.contains("gear R can be engaged only at rest"), "{into_reverse}");
 
     let model = CarModel::new(car.clone()).unwrap();
     let nan = model.in_gear(1, None, f64::NAN, 0.1).unwrap_err();

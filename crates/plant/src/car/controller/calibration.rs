@@ -40,6 +40,8 @@ pub struct CarCalibration {
     pub power_on_down_s: f64,
     /// The same of power-off upshifts, s.
     pub power_off_up_s: f64,
+    /// The same from neutral to a gear at rest.
+    pub from_neutral_s: f64,
     /// The reference of the slip ends this far past zero, rad/s.
     pub past_synchronous_rad_s: f64,
     /// Gain of the slip error, 1/s.
@@ -104,6 +106,7 @@ impl CarCalibration {
         inertia_phase_s: 0.40,
         power_on_down_s: 0.72,
         power_off_up_s: 0.70,
+        from_neutral_s: 0.8,
         past_synchronous_rad_s: 2.5,
         proportional_per_s: 9.0,
         integral_per_s2: 25.0,

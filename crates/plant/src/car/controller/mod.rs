@@ -18,7 +18,10 @@ mod shift;
 mod strokes;
 mod track;
 
-use config::Car;
+use std::collections::VecDeque;
+
+use config::{Car, ShiftClutch};
+use drivetrain::ReducedShift;
 use geartrain::{Change, ElementKind};
 
 use super::integrate::CarError;
@@ -29,6 +32,9 @@ use shift::ActiveShift;
 pub use shift::ShiftStage;
 use strokes::Strokes;
 use track::Track;
+
+/// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
+const AT_REST_RAD_S: f64 = 10.0;
 
 /// What the controller measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,6 +84,10 @@ pub struct CarShiftController {
     calibration: CarCalibration,
     gear: usize,
     active: Option<ActiveShift>,
+    /// Gears that follow the shift that is under way.
+    route: VecDeque<usize>,
+    is_neutral: bool,
+    completed: usize,
     preselected: Option<usize>,
     output: Track,
     engine_share: f64,
@@ -102,6 +112,9 @@ impl CarShiftController {
             calibration,
             gear,
             active: None,
+            route: VecDeque::new(),
+            is_neutral: false,
+            completed: 0,
             preselected: None,
             output,
             engine_share: 1.0,
@@ -132,42 +145,152 @@ impl CarShiftController {
         self.preselected = gear.filter(|&gear| gear < self.car.gearbox.gears.len());
     }
 
-    /// Begins a shift to this gear. While another shift is under way nothing happens.
+    /// Shifts that were completed.
+    pub fn completed(&self) -> usize {
+        self.completed
+    }
+
+    /// Whether no gear is engaged.
+    pub fn is_neutral(&self) -> bool {
+        self.is_neutral
+    }
+
+    /// Asks for a gear: through gears between where the shift is not one between two clutches, back where the gear is the one
+    /// that is being left, from neutral, and from one direction to the other at rest.
     ///
     /// # Errors
-    /// The shift is not one between two clutches.
+    /// The gear cannot be reached.
     pub fn request(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
-        if self.active.is_some() || to == self.gear {
+        let Some(ratio) = self.car.gearbox.gears.get(to).map(|gear| gear.ratio) else {
+            return Err(CarError::Request(format!("the gearbox has no gear number {to}")));
+        };
+        let Some(active) = &self.active else {
+            let turns = ratio * self.car.gearbox.gears[self.gear].ratio < 0.0;
+            if turns && self.output.speed_rad_s().abs() > AT_REST_RAD_S {
+                let message = format!("gear {} can be engaged only at rest", self.name(to));
+                return Err(CarError::Request(message));
+            }
+            if self.is_neutral || turns {
+                return self.engage(to, time_s);
+            }
+            self.route = self.way(self.gear, to)?;
+            return Ok(());
+        };
+        if to == self.gear
+            && let Some(mut back) = active.withdrawn(&self.calibration, to, time_s)
+        {
+            let piston = self.strokes.of(back.oncoming.element);
+            back.oncoming = back.oncoming.filled_from(piston, &self.calibration);
+            self.gear = active.to;
+            self.active = Some(back);
+            self.route.clear();
             return Ok(());
         }
-        let names = |gear: usize| self.car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str());
-        let shift = self.car.gearbox.shift(self.gear, to);
-        let single = shift.and_then(|shift| match (&shift.change, &shift.reduced) {
-            (Change::Single { offgoing, oncoming, .. }, Some(reduced)) => Some((*offgoing, *oncoming, *reduced)),
-            _ => None,
-        });
-        let line_pa = self.car.line_pressure_pa;
-        let both = single.and_then(|(offgoing, oncoming, reduced)| {
-            let clutch = |element: usize| self.car.clutches.get(element).copied().flatten();
-            let offgoing = Controlled::new(offgoing, clutch(offgoing)?, reduced.slip_offgoing, line_pa);
-            let on = Controlled::new(oncoming, clutch(oncoming)?, reduced.slip_oncoming, 0.0);
-            let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
-            Some(([offgoing, oncoming], reduced.mass_kg_m2))
-        });
-        let Some((clutches, mass_kg_m2)) = both else {
+        self.route = self.way(active.to, to)?;
+        Ok(())
+    }
+
+    /// Opens the clutch that distinguishes forward from reverse.
+    ///
+    /// # Errors
+    /// A shift is under way, or the gear is neither the lowest nor reverse.
+    pub fn request_neutral(&mut self) -> Result<(), CarError> {
+        if self.is_neutral {
+            return Ok(());
+        }
+        let Some(partner) = self.partner(self.gear).filter(|_| self.active.is_none()) else {
+            let gear = self.name(self.gear);
             let message = format!(
-                "shift {}-{} is not between two clutches; shift through the gears between",
-                names(self.gear),
-                names(to)
+                "no neutral from gear {gear}\nhint: it is reached from the lowest gear or reverse, which differ by one clutch, between shifts"
             );
             return Err(CarError::Request(message));
         };
-        self.active = Some(ActiveShift::new(to, clutches, mass_kg_m2, line_pa, time_s));
+        (self.gear, self.is_neutral) = (partner, true);
         Ok(())
+    }
+
+    fn name(&self, gear: usize) -> &str {
+        self.car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str())
+    }
+
+    /// The gear of the other direction that differs from this one by one clutch: neutral is what they have in common.
+    fn partner(&self, gear: usize) -> Option<usize> {
+        let gears = &self.car.gearbox.gears;
+        let turns = |other: &usize| gears[*other].ratio * gears[gear].ratio < 0.0;
+        let candidates = (0..gears.len()).filter(turns).filter(|&other| self.single(other, gear).is_some());
+        candidates.max_by(|&a, &b| gears[a].ratio.abs().total_cmp(&gears[b].ratio.abs()))
+    }
+
+    /// Engages a gear from neutral.
+    fn engage(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
+        let shift = self.partner(to).and_then(|partner| Some((partner, self.leg(partner, to, time_s)?)));
+        let Some((partner, shift)) = shift else {
+            let message = format!("gear {} does not follow from neutral by one clutch", self.name(to));
+            return Err(CarError::Request(message));
+        };
+        (self.gear, self.is_neutral, self.active) = (partner, false, Some(shift.from_neutral()));
+        Ok(())
+    }
+
+    /// The clutches of a shift between two clutches, offgoing and oncoming, with the reduced shift.
+    fn single(&self, from: usize, to: usize) -> Option<([(usize, ShiftClutch); 2], &ReducedShift<f64>)> {
+        let shift = self.car.gearbox.shift(from, to)?;
+        let (Change::Single { offgoing, oncoming, .. }, Some(reduced)) = (&shift.change, &shift.reduced) else {
+            return None;
+        };
+        let clutch = |element: usize| Some((element, self.car.clutches.get(element).copied().flatten()?));
+        Some(([clutch(*offgoing)?, clutch(*oncoming)?], reduced))
+    }
+
+    /// The gears to go through, each one further on than the one before, by the fewest shifts between two clutches.
+    fn way(&self, from: usize, to: usize) -> Result<VecDeque<usize>, CarError> {
+        let gears = &self.car.gearbox.gears;
+        let ahead =
+            |a: usize, b: usize| (gears[a].ratio - gears[b].ratio) * (gears[from].ratio - gears[to].ratio) > 0.0;
+        let mut ways = VecDeque::from([vec![from]]);
+        let mut seen = vec![false; gears.len()];
+        while let Some(way) = ways.pop_front() {
+            let last = way[way.len() - 1];
+            if last == to {
+                return Ok(way.into_iter().skip(1).collect());
+            }
+            for next in 0..gears.len() {
+                let leads_on = ahead(last, next) && (next == to || ahead(next, to));
+                if leads_on
+                    && !seen[next]
+                    && gears[next].ratio * gears[to].ratio > 0.0
+                    && self.single(last, next).is_some()
+                {
+                    seen[next] = true;
+                    ways.push_back(way.iter().copied().chain([next]).collect());
+                }
+            }
+        }
+        let message = format!(
+            "there is no way from gear {} to gear {} by shifts between two clutches",
+            self.name(from),
+            self.name(to)
+        );
+        Err(CarError::Request(message))
+    }
+
+    /// A shift between two clutches.
+    fn leg(&self, from: usize, to: usize, time_s: f64) -> Option<ActiveShift> {
+        let ([(offgoing, off), (oncoming, on)], reduced) = self.single(from, to)?;
+        let line_pa = self.car.line_pressure_pa;
+        let offgoing = Controlled::new(offgoing, off, reduced.slip_offgoing, line_pa);
+        let on = Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0);
+        let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
+        Some(ActiveShift::new(to, [offgoing, oncoming], reduced.mass_kg_m2, line_pa, time_s))
     }
 
     /// Commands for the period that begins at `time_s`.
     pub fn step(&mut self, time_s: f64, throttle: f64, measured: &CarMeasured) -> CarCommands {
+        if self.active.is_none()
+            && let Some(next) = self.route.pop_front()
+        {
+            self.active = self.leg(self.gear, next, time_s);
+        }
         let period_s = self.calibration.control_period_s;
         self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
         let turbine_n_m = self.turbine_torque(throttle, measured);
@@ -176,13 +299,21 @@ impl CarShiftController {
             std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
+        let opened = if self.is_neutral {
+            self.partner(self.gear).and_then(|partner| self.single(self.gear, partner))
+        } else {
+            None
+        };
+        let opened = opened.map(|(clutches, _)| clutches[0].0);
         // The clutches of a shift get their commands below.
         let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
         for gear in [Some(self.gear), next].into_iter().flatten() {
             for holding in &self.car.gearbox.gears[gear].holding {
                 let element = holding.element;
                 match &self.car.clutches[element] {
-                    Some(clutch) if gear == self.gear => elements[element] = clutch.valve.command_for(line_pa),
+                    Some(clutch) if gear == self.gear && opened != Some(element) => {
+                        elements[element] = clutch.valve.command_for(line_pa)
+                    }
                     Some(_) => (),
                     None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
                 }
@@ -198,6 +329,7 @@ impl CarShiftController {
             if shift.stage == ShiftStage::Done {
                 self.gear = shift.to;
                 self.active = None;
+                self.completed += 1;
             }
         }
         let step = period_s / self.calibration.engine_ramp_s;
