@@ -17,6 +17,7 @@ macro_rules! car {
 
 mod drives;
 mod energy;
+mod garage;
 mod sequences;
 mod shifts;
 mod two_speed;

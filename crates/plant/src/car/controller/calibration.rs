@@ -42,6 +42,8 @@ pub struct CarCalibration {
     pub power_off_up_s: f64,
     /// The same from neutral to a gear at rest.
     pub from_neutral_s: f64,
+    /// Time in neutral between the directions, s: the turbine comes up.
+    pub neutral_s: f64,
     /// The reference of the slip ends this far past zero, rad/s.
     pub past_synchronous_rad_s: f64,
     /// Gain of the slip error, 1/s.
@@ -107,6 +109,7 @@ impl CarCalibration {
         power_on_down_s: 0.72,
         power_off_up_s: 0.70,
         from_neutral_s: 0.8,
+        neutral_s: 0.7,
         past_synchronous_rad_s: 2.5,
         proportional_per_s: 9.0,
         integral_per_s2: 25.0,

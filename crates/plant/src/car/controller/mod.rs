@@ -228,7 +228,8 @@ impl CarShiftController {
             let message = format!("gear {} does not follow from neutral by one clutch", self.name(to));
             return Err(CarError::Request(message));
         };
-        (self.gear, self.is_neutral, self.active) = (partner, false, Some(shift.from_neutral()));
+        let neutral_s = if self.is_neutral { 0.0 } else { self.calibration.neutral_s };
+        (self.gear, self.is_neutral, self.active) = (partner, false, Some(shift.from_neutral(neutral_s)));
         Ok(())
     }
 

@@ -37,8 +37,10 @@ pub(super) struct ActiveShift {
     line_pa: f64,
     /// Positive for an upshift of forward gears, and for a turbine that is slowed down from neutral.
     direction: f64,
-    /// From neutral: no clutch opens.
+    /// From neutral, or from the other direction at rest: the offgoing clutch opens first, and the turbine comes up.
     is_from_neutral: bool,
+    /// Time for that, s.
+    neutral_s: f64,
     begun_s: f64,
     since_s: f64,
     is_filled_by_plan: bool,
@@ -89,6 +91,7 @@ impl ActiveShift {
             oncoming,
             direction,
             is_from_neutral: false,
+            neutral_s: 0.0,
             stage: ShiftStage::Fill,
             mass_kg_m2,
             line_pa,
@@ -110,9 +113,10 @@ impl ActiveShift {
         }
     }
 
-    /// The same from neutral, where the offgoing clutch is open already.
-    pub(super) fn from_neutral(self) -> Self {
-        Self { is_from_neutral: true, direction: 1.0, ..self }
+    /// The same from neutral, where the offgoing clutch is open already, or from the other direction at rest, where it opens in
+    /// the time `neutral_s`.
+    pub(super) fn from_neutral(self, neutral_s: f64) -> Self {
+        Self { is_from_neutral: true, neutral_s, direction: 1.0, ..self }
     }
 
     /// The way back to the gear `from` that is being left: offgoing and oncoming clutch change their roles. `None` where the new
@@ -174,7 +178,7 @@ impl ActiveShift {
             ShiftStage::Lock | ShiftStage::Done => [0.0, self.locked_pa(c, &now)],
         };
         self.slip_before_rad_s = Some(now.z_wheels);
-        let [off_pa, on_pa] = if self.is_from_neutral { [0.0, torques[1]] } else { torques };
+        let [off_pa, on_pa] = if self.is_from_neutral { [self.opening_pa(&now), torques[1]] } else { torques };
         let on_pa = if self.is_filled_by_plan {
             self.oncoming.without_lead(c, on_pa, self.line_pa)
         } else {
@@ -276,7 +280,14 @@ impl ActiveShift {
 
     /// Duration of the fill, s.
     fn fill_s(&self, c: &CarCalibration) -> f64 {
-        self.oncoming.fill.map_or(c.fill_s, |plan| plan.duration_s().max(plan.arrival_s).max(c.fill_s))
+        let fill_s = self.oncoming.fill.map_or(c.fill_s, |plan| plan.duration_s().max(plan.arrival_s).max(c.fill_s));
+        fill_s.max(self.neutral_s)
+    }
+
+    /// Pressure of a clutch that opens into neutral, Pa: its torque goes in the first third of the time.
+    fn opening_pa(&self, now: &Now) -> f64 {
+        let left = 1.0 - 3.0 * (now.time_s - self.begun_s) / self.neutral_s;
+        if left > 0.0 { self.offgoing.pressure_for(left * now.turbine_n_m, 0.0) } else { 0.0 }
     }
 
     fn fill(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
