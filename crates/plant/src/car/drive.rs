@@ -9,11 +9,8 @@ use super::integrate::CarError;
 use super::model::CarModel;
 use super::run::{CarRun, Driver};
 use super::sample::CarSample;
-use super::start::IDLE_RAD_S;
+use super::start::idle_throttle;
 
-/// Throttle of the idle control per speed below idle, s/rad, and the most that the idle control gives.
-const IDLE_GAIN: f64 = 0.02;
-const IDLE_MOST: f64 = 0.3;
 /// Engine speed below which the engine has stalled, rad/s.
 const STALLED_RAD_S: f64 = 30.0;
 /// The gear below is taken at no more than this share of the speed at which the gear was reached: the hysteresis.
@@ -64,10 +61,11 @@ pub fn simulate_car_drive(
         let mut driver = road.at(now_s);
         let [engine_rad_s, ..] = model.speeds(run.state());
         if engine_rad_s < STALLED_RAD_S {
-            return Err(stalled(model, now_s, engine_rad_s));
+            let message = format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large");
+            return Err(CarError::Request(message));
         }
         shifting.step(&mut run, &driver)?;
-        driver.throttle = driver.throttle.max((IDLE_GAIN * (IDLE_RAD_S - engine_rad_s)).clamp(0.0, IDLE_MOST));
+        driver.throttle = driver.throttle.max(idle_throttle(engine_rad_s));
         run.advance(driver, |_| {}, &mut record)?;
         let vehicle_m_s = run.state().vehicle_m_s;
         summary.distance_m += vehicle_m_s * (run.time_s() - now_s);
@@ -75,14 +73,6 @@ pub fn simulate_car_drive(
     }
     summary.shifts = run.controller().completed();
     Ok(summary)
-}
-
-fn stalled(model: &CarModel, now_s: f64, engine_rad_s: f64) -> CarError {
-    let why = match model.car.converter {
-        Some(_) => "the load is too large for the engine",
-        None => "without a converter a launch is not simulated: begin at a speed in a gear, and do not stop",
-    };
-    CarError::Request(format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): {why}"))
 }
 
 /// What driver and road do over time, piece by piece.

@@ -59,7 +59,7 @@ impl<'m> CarRun<'m> {
             return Err(CarError::Request(message));
         }
         let mut controller = CarShiftController::new(nominal, calibration, gear)?;
-        let commands = controller.step(0.0, driver.throttle, &measure(model, &state));
+        let commands = controller.step(0.0, driver.throttle, &measure(model, &state, driver));
         let mut valves = CarValves::new(model, &commands.elements);
         let inputs = inputs(model, &mut valves, &commands, driver, 0.0);
         let plant = CarIntegrator::new(model, 0.0, state, &inputs)?;
@@ -123,7 +123,7 @@ impl<'m> CarRun<'m> {
         mut record: impl FnMut(&CarSample),
     ) -> Result<(), CarError> {
         let (model, now_s) = (self.model, self.time_s());
-        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state));
+        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state, driver));
         self.valves.send(model, now_s, &self.commands.elements);
         self.periods += 1;
         let end_s = self.time_s();
@@ -160,9 +160,9 @@ fn is_same_box(car: &Car, other: &Car) -> bool {
     is_whole && gears(car) == gears(other) && elements(car) == elements(other)
 }
 
-fn measure(model: &CarModel, state: &CarState) -> CarMeasured {
+fn measure(model: &CarModel, state: &CarState, driver: Driver) -> CarMeasured {
     let [engine_rad_s, turbine_rad_s, output_rad_s] = model.speeds(state);
-    CarMeasured { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s: state.wheel_rad_s }
+    CarMeasured { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s: state.wheel_rad_s, brake: driver.brake }
 }
 
 /// Commands that have arrived, and what the driver does.

@@ -80,6 +80,26 @@ pub struct CarCalibration {
     pub engine_ramp_s: f64,
     /// Time in which the lock-up clutch opens, s: less than that of the fill.
     pub unlock_s: f64,
+    /// Speed of the gearbox input below which the clutch of a car without a converter opens, rad/s.
+    pub launch_open_rad_s: f64,
+    /// Engine speed at a launch above idle speed, per throttle, rad/s.
+    pub launch_rad_s: f64,
+    /// The most of it, rad/s.
+    pub launch_most_rad_s: f64,
+    /// Gain of the engine speed at a launch, 1/s.
+    pub launch_per_s: f64,
+    /// Rate at which the launch clutch takes torque, N m/s; it gives it up four times as fast.
+    pub launch_n_m_s: f64,
+    /// Time without slip after which the launch clutch closes, s.
+    pub launch_lock_s: f64,
+    /// Torque of the launch clutch without throttle, N m.
+    pub creep_n_m: f64,
+    /// Brake at which it is none, 0 to 1.
+    pub creep_brake: f64,
+    /// Most torque of the launch clutch, per engine speed over one this far below idle speed, N m s/rad.
+    pub stall_n_m_s_rad: f64,
+    /// How far, rad/s.
+    pub stall_rad_s: f64,
     /// Time constant of the output speed, s.
     pub output_filter_s: f64,
     /// Time constant with which a pressure is made to follow, s.
@@ -128,6 +148,16 @@ impl CarCalibration {
         engine_way: 0.8,
         engine_ramp_s: 0.2,
         unlock_s: 0.12,
+        launch_open_rad_s: 95.0,
+        launch_rad_s: 260.0,
+        launch_most_rad_s: 160.0,
+        launch_per_s: 3.0,
+        launch_n_m_s: 150.0,
+        launch_lock_s: 0.1,
+        creep_n_m: 15.0,
+        creep_brake: 0.02,
+        stall_n_m_s_rad: 8.0,
+        stall_rad_s: 12.0,
         output_filter_s: 0.04,
         pressure_follow_s: 0.02,
         pressure_lead_pa: 0.3e6,

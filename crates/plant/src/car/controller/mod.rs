@@ -13,6 +13,7 @@
 //! the nominal car; it does not know pressures, torques, or the errors of the valves.
 
 mod calibration;
+mod launch;
 mod pressure;
 mod shift;
 mod strokes;
@@ -27,6 +28,7 @@ use geartrain::{Change, ElementKind};
 use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
 pub use calibration::CarCalibration;
+use launch::Launch;
 use pressure::Controlled;
 use shift::ActiveShift;
 pub use shift::ShiftStage;
@@ -47,6 +49,8 @@ pub struct CarMeasured {
     pub output_rad_s: f64,
     /// Driven wheel speed, rad/s.
     pub wheel_rad_s: f64,
+    /// Brake, 0 to 1.
+    pub brake: f64,
 }
 
 /// What the controller commands.
@@ -95,6 +99,8 @@ pub struct CarShiftController {
     lock_up_share: f64,
     is_locked_up: bool,
     strokes: Strokes,
+    /// The clutch of a car without a converter, while it is not closed.
+    launch: Option<Launch>,
 }
 
 impl CarShiftController {
@@ -121,6 +127,7 @@ impl CarShiftController {
             lock_up_share: 0.0,
             is_locked_up: false,
             strokes: Strokes::new(car, gear),
+            launch: None,
         })
     }
 
@@ -174,6 +181,12 @@ impl CarShiftController {
                 return self.engage(to, time_s);
             }
             self.route = self.way(self.gear, to)?;
+            if self.launch.is_some() && to != self.gear {
+                // The clutches are open: the dogs alone change.
+                self.route.clear();
+                self.completed += 1;
+                (self.gear, self.launch) = (to, Launch::of(&self.car, to));
+            }
             return Ok(());
         };
         if to == self.gear
@@ -320,6 +333,15 @@ impl CarShiftController {
                 }
             }
         }
+        self.open_at_low_speed(measured);
+        let c = &self.calibration;
+        if let Some(launch) = &mut self.launch {
+            let (element, command) = launch.step((&self.car, c), time_s, throttle, measured);
+            elements[element] = command;
+            if launch.is_over(c, time_s, measured) {
+                self.launch = None;
+            }
+        }
         let mut wanted = 1.0;
         if let Some(shift) = &mut self.active {
             let pressures = shift.step(&self.calibration, time_s, turbine_n_m, measured, &self.output);
@@ -338,6 +360,21 @@ impl CarShiftController {
         let lock_up_n_m = self.lock_up(measured);
         self.strokes.follow(&self.car, &elements, period_s);
         CarCommands { elements, dogs, engine_share: self.engine_share, lock_up_n_m }
+    }
+
+    /// Without a converter the clutch opens before the engine turns too slowly, in a shift too.
+    fn open_at_low_speed(&mut self, measured: &CarMeasured) {
+        if self.car.converter.is_some() || self.launch.is_some() {
+            return;
+        }
+        let gears = &self.car.gearbox.gears;
+        let slow = |gear: usize| gears[gear].ratio * measured.output_rad_s < self.calibration.launch_open_rad_s;
+        let to = self.active.as_ref().map_or(self.gear, |shift| shift.to);
+        if slow(self.gear) && slow(to) {
+            self.launch = Launch::of(&self.car, to);
+            (self.gear, self.active) = (to, None);
+            self.route.clear();
+        }
     }
 
     /// Torque that the lock-up clutch is to hold, N m. It is open during shifts: their turbine torque is that of the converter.
