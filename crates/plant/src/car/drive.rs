@@ -6,6 +6,7 @@ use config::{Car, Drive, ShiftPlan, ShiftSchedule};
 
 use super::controller::CarCalibration;
 use super::integrate::CarError;
+use super::follow::{Follower, SpeedError};
 use super::model::CarModel;
 use super::run::{CarRun, Driver};
 use super::sample::CarSample;
@@ -29,6 +30,8 @@ pub struct CarDriveSummary {
     pub shifts: usize,
     /// Highest speed, m/s.
     pub fastest_m_s: f64,
+    /// How well the speed was followed, where the drive gives one.
+    pub speed_error: Option<SpeedError>,
 }
 
 /// Simulates a drive and shows every sample to `record`. `nominal` is the car of the shift controller's model.
@@ -42,12 +45,9 @@ pub fn simulate_car_drive(
     drive: &Drive,
     mut record: impl FnMut(&CarSample),
 ) -> Result<CarDriveSummary, CarError> {
-    if drive.segments.is_empty() || drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3) {
-        return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
-    }
-    let mut road = Road::new(drive);
+    let mut road = Road::new(drive)?;
     let mut shifting = Shifting::new(&model.car, drive)?;
-    let driver = road.at(0.0);
+    let driver = road.at_start();
     let state = model.in_gear(shifting.gear, None, drive.start_m_s, driver.throttle)?;
     let start = (driver, drive.sample_time_s);
     let mut run = CarRun::new(model, nominal, calibration, shifting.gear, state, start)?;
@@ -58,7 +58,7 @@ pub fn simulate_car_drive(
     let mut summary = CarDriveSummary { duration_s, ..CarDriveSummary::default() };
     while run.time_s() < duration_s - SAME_INSTANT_S {
         let now_s = run.time_s();
-        let mut driver = road.at(now_s);
+        let mut driver = road.at(now_s, &run);
         let [engine_rad_s, ..] = model.speeds(run.state());
         if engine_rad_s < STALLED_RAD_S {
             let message = format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large");
@@ -72,23 +72,45 @@ pub fn simulate_car_drive(
         summary.fastest_m_s = summary.fastest_m_s.max(vehicle_m_s);
     }
     summary.shifts = run.controller().completed();
+    summary.speed_error = road.follower.map(|follower| follower.error());
     Ok(summary)
 }
 
-/// What driver and road do over time, piece by piece.
+/// What driver and road do over time: piece by piece, or as the speed wants it.
 struct Road<'d> {
     drive: &'d Drive,
     segment: usize,
     begun_s: f64,
+    follower: Option<Follower<'d>>,
 }
 
 impl<'d> Road<'d> {
-    fn new(drive: &'d Drive) -> Self {
-        Self { drive, segment: 0, begun_s: 0.0 }
+    fn new(drive: &'d Drive) -> Result<Self, CarError> {
+        let is_short = drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3);
+        if drive.trace.is_none() && (drive.segments.is_empty() || is_short) {
+            return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
+        }
+        Ok(Self { drive, segment: 0, begun_s: 0.0, follower: drive.trace.as_ref().map(Follower::new) })
+    }
+
+    fn at_start(&mut self) -> Driver {
+        match &self.drive.trace {
+            Some(trace) => Driver { throttle: 0.0, brake: 0.0, grade_rad: trace.grade_rad },
+            None => self.piece(0.0),
+        }
     }
 
     /// At a time that does not fall from call to call.
-    fn at(&mut self, time_s: f64) -> Driver {
+    fn at(&mut self, time_s: f64, run: &CarRun<'_>) -> Driver {
+        match &mut self.follower {
+            Some(follower) => {
+                follower.step(run.model(), run.state(), run.controller().gear(), time_s, run.period_s())
+            }
+            None => self.piece(time_s),
+        }
+    }
+
+    fn piece(&mut self, time_s: f64) -> Driver {
         let segments = &self.drive.segments;
         while time_s >= self.begun_s + segments[self.segment].duration_s - SAME_INSTANT_S {
             self.begun_s += segments[self.segment].duration_s;

@@ -11,7 +11,7 @@ use super::valves::CarValves;
 /// Times closer than this are the same instant, s: sums of periods differ in their last bits.
 const SAME_INSTANT_S: f64 = 1e-9;
 /// Largest torque of the brakes over what the tyres can pass to the road.
-const BRAKE_OVER_TYRES: f64 = 1.0;
+pub(super) const BRAKE_OVER_TYRES: f64 = 1.0;
 
 /// What the driver and the road do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,6 +78,16 @@ impl<'m> CarRun<'m> {
     #[expect(clippy::cast_precision_loss, reason = "a drive has fewer periods than a double has integers")]
     pub fn time_s(&self) -> f64 {
         self.periods as f64 * self.period_s
+    }
+
+    /// Control period, s.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// The simulated car.
+    pub fn model(&self) -> &'m CarModel {
+        self.model
     }
 
     /// The shift controller.

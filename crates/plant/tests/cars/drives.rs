@@ -194,3 +194,21 @@ fn wrong_requests_get_clear_errors() {
     infinite.wheel_rad_s = f64::INFINITY;
     assert!(plant::car::CarRun::new(&model, &car, calibration, 1, infinite, (driver, 0.01)).is_err());
 }
+
+/// The published cycles: their sums and lengths, and every car within the tolerance nearly always.
+#[test]
+fn a_driver_follows_the_published_cycles() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../drives/");
+    for (name, duration_s, distance_m) in [("wltc_3b", 1800.0, 23_266.0), ("ftp_75", 1874.0, 17_769.0)] {
+        let drive = Drive::read(format!("{folder}{name}.toml").as_ref()).unwrap();
+        assert_eq!(drive.duration_s(), duration_s);
+        for car in crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3) {
+            let model = CarModel::new(car.clone()).unwrap();
+            let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |_| {}).unwrap();
+            let error = summary.speed_error.unwrap();
+            println!("{name}, {}: {summary:?}", car.gearbox.name);
+            assert!((summary.distance_m / distance_m - 1.0).abs() < 0.01, "{summary:?}");
+            assert!(error.beyond < 0.02 && error.rms_m_s < 0.5, "{error:?}");
+        }
+    }
+}
