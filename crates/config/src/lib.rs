@@ -21,8 +21,8 @@ pub use experiment::{
     ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
 pub use gearbox::GearboxFile;
-pub use speed_trace::SpeedTrace;
 pub use source::{Kind, Source, toml_string};
+pub use speed_trace::SpeedTrace;
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
     Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,

@@ -30,7 +30,8 @@ impl SpeedTrace {
         let wrong = |at: usize, message: String, hint: &str| {
             Err(check.meaning("time_s, speed", at, message, (!hint.is_empty()).then(|| hint.to_owned())))
         };
-        const HEAD: &str = "the first line is \"time_s,speed_km_h\" (or speed_m_s, speed_mph), then one point in each line";
+        const HEAD: &str =
+            "the first line is \"time_s,speed_km_h\" (or speed_m_s, speed_mph), then one point in each line";
         let mut unit_m_s = None;
         let mut trace = Self { time_s: Vec::new(), speed_m_s: Vec::new(), grade_rad };
         let mut at = 0;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use config::{Car, Drive};
 use drivetrain::CommandKind;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, simulate_car_drive};
+use trace::units::km_h;
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
 use crate::args::Simulate;
@@ -42,8 +43,16 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         summary.duration_s,
         1e-3 * summary.distance_m,
         summary.shifts,
-        3.6 * summary.fastest_m_s,
+        km_h(summary.fastest_m_s),
     ));
+    if let Some(error) = summary.speed_error {
+        output::note(&format!(
+            "speed: error {:.2} km/h (root mean square), at most {:.1} km/h; outside the tolerance of 2 km/h and 1 s for {:.2} % of the time",
+            km_h(error.rms_m_s),
+            km_h(error.largest_m_s),
+            100.0 * error.beyond,
+        ));
+    }
     output::line(&whole.display().to_string())?;
     output::line(&measured.display().to_string())?;
     Ok(())
@@ -85,8 +94,12 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         measured(signal::THROTTLE, |_, s| Cell::Number(s.driver.throttle)),
         measured("brake", |_, s| Cell::Number(s.driver.brake)),
         measured("engine_share", |_, s| Cell::Number(s.engine_share)),
-        measured("gear", |car, s| gear_name(car, s.gear)),
-        measured("target_gear", |car, s| gear_name(car, s.shift.map_or(s.gear, |shift| shift.to))),
+        measured("gear", |car, s| if s.is_neutral { Cell::Word("N") } else { gear_name(car, s.gear) }),
+        measured("target_gear", |car, s| match &s.shift {
+            None if s.is_neutral => Cell::Word("N"),
+            None => gear_name(car, s.gear),
+            Some(shift) => gear_name(car, shift.to),
+        }),
         measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
         measured("offgoing", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.offgoing.element))),
         measured("oncoming", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.oncoming.element))),
@@ -174,10 +187,12 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
     for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
         if let Some(clutch) = clutch {
             output::line(&format!(
-                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure",
+                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure{}{}",
                 element.name,
                 trace::units::mpa(clutch.clutch.kiss_pressure()),
                 clutch.clutch.static_capacity(car.line_pressure_pa),
+                if clutch.valve.falls() { ", valve normally high" } else { "" },
+                if clutch.has_stroke { ", with stroke" } else { "" },
             ))?;
         }
     }
@@ -189,11 +204,14 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
 
 /// Prints what a drive file describes.
 pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> {
+    let given = match &drive.trace {
+        Some(trace) => format!("by {} speeds", trace.points()),
+        None => format!("in {} segments", drive.segments.len()),
+    };
     output::line(&format!(
-        "drive {}: {:.0} s in {} segments, driven {} times",
+        "drive {}: {:.0} s {given}, driven {} times",
         drive.name,
         drive.duration_s(),
-        drive.segments.len(),
         drive.repetitions
     ))?;
     match drive.vehicle {

@@ -38,6 +38,8 @@ pub struct LockUp {
     pub off_rad_s: f64,
     /// Time in which it closes, s.
     pub ramp_s: f64,
+    /// Slip that is kept, rad/s; zero where the clutch is to lock.
+    pub slip_rad_s: f64,
 }
 
 /// A car with all the gears and elements of its gearbox.
@@ -219,6 +221,7 @@ struct RawLockUp {
     on_input_rad_s: Number,
     off_input_rad_s: Number,
     ramp_s: Number,
+    slip_rad_s: Option<Number>,
 }
 
 /// Course of the friction over slip, and drag, of all clutches.
@@ -267,6 +270,7 @@ fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) 
         on_rad_s,
         off_rad_s,
         ramp_s: number("ramp_s", &raw.ramp_s, 0.05..=10.0)?,
+        slip_rad_s: raw.slip_rad_s.as_ref().map_or(Ok(0.0), |slip| number("slip_rad_s", slip, 0.0..=30.0))?,
     })
 }
 

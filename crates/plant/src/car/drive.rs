@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use config::{Car, Drive, ShiftPlan, ShiftSchedule};
 
 use super::controller::CarCalibration;
-use super::integrate::CarError;
 use super::follow::{Follower, SpeedError};
+use super::integrate::CarError;
 use super::model::CarModel;
 use super::run::{CarRun, Driver};
 use super::sample::CarSample;
@@ -103,9 +103,7 @@ impl<'d> Road<'d> {
     /// At a time that does not fall from call to call.
     fn at(&mut self, time_s: f64, run: &CarRun<'_>) -> Driver {
         match &mut self.follower {
-            Some(follower) => {
-                follower.step(run.model(), run.state(), run.controller().gear(), time_s, run.period_s())
-            }
+            Some(follower) => follower.step(run.model(), run.state(), run.controller().gear(), time_s, run.period_s()),
             None => self.piece(time_s),
         }
     }

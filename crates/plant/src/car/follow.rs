@@ -52,11 +52,27 @@ pub(super) struct Follower<'d> {
 impl<'d> Follower<'d> {
     pub(super) fn new(trace: &'d SpeedTrace) -> Self {
         let (squares, largest_m_s) = (0.0, 0.0);
-        Self { trace, integral_m: 0.0, throttle: 0.0, brake: HOLDING_BRAKE, squares, largest_m_s, beyond: 0, periods: 0 }
+        Self {
+            trace,
+            integral_m: 0.0,
+            throttle: 0.0,
+            brake: HOLDING_BRAKE,
+            squares,
+            largest_m_s,
+            beyond: 0,
+            periods: 0,
+        }
     }
 
     /// What the driver does in the period that begins at `time_s`, in this gear.
-    pub(super) fn step(&mut self, model: &CarModel, state: &CarState, gear: usize, time_s: f64, period_s: f64) -> Driver {
+    pub(super) fn step(
+        &mut self,
+        model: &CarModel,
+        state: &CarState,
+        gear: usize,
+        time_s: f64,
+        period_s: f64,
+    ) -> Driver {
         let time_s = time_s % self.trace.duration_s();
         let (wanted, ahead) = (self.trace.at_m_s(time_s), self.trace.at_m_s(time_s + AHEAD_S));
         let error = wanted - state.vehicle_m_s;

@@ -166,6 +166,33 @@ fn the_lock_up_clutch_closes_in_its_gears_and_opens_for_shifts() {
 }
 
 #[test]
+fn a_lock_up_clutch_with_slip_control_keeps_its_slip() {
+    let gearbox = include_str!("../../../../gearboxes/8hp.toml");
+    let text = "name = \"car\"\ngearbox = \"g.toml\"\n[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\n\
+                on_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.6\nslip_rad_s = 4.0\n";
+    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("g.toml", gearbox)).unwrap();
+    // The throttle moves; the car of the controller's model and one whose engine gives a tenth less.
+    let mut weak = car.clone();
+    weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.9);
+    for truth in [car.clone(), weak] {
+        let model = CarModel::new(truth).unwrap();
+        let text = "name = \"d\"\nstart = { gear = \"5\", vehicle_m_s = 20.0 }\nshift = []\n[[segment]]\nduration_s = 12\n\
+                    throttle = [0.1, 0.2]\n[[segment]]\nduration_s = 3\nthrottle = [0.2, 0.12]\n";
+        let mut slips = Vec::new();
+        simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive(text), |sample| {
+            if sample.time_s > 5.0 {
+                slips.push(sample.torques.engine_rad_s - sample.torques.turbine_rad_s);
+            }
+        })
+        .unwrap();
+        let (low, high) =
+            slips.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &slip| (low.min(slip), high.max(slip)));
+        println!("lock-up slip {low:.1} to {high:.1} rad/s for 4.0");
+        assert!(low > 2.0 && high < 6.0, "{low} to {high}");
+    }
+}
+
+#[test]
 fn wrong_requests_get_clear_errors() {
     let car = crate::cars().swap_remove(0);
     let error = |head: &str| {

@@ -80,6 +80,10 @@ pub struct CarCalibration {
     pub engine_ramp_s: f64,
     /// Time in which the lock-up clutch opens, s: less than that of the fill.
     pub unlock_s: f64,
+    /// Gain of the slip of the lock-up clutch, 1/s.
+    pub slip_per_s: f64,
+    /// Gain of its integral, 1/s^2.
+    pub slip_per_s2: f64,
     /// Speed of the gearbox input below which the clutch of a car without a converter opens, rad/s.
     pub launch_open_rad_s: f64,
     /// Engine speed at a launch above idle speed, per throttle, rad/s.
@@ -148,6 +152,8 @@ impl CarCalibration {
         engine_way: 0.8,
         engine_ramp_s: 0.2,
         unlock_s: 0.12,
+        slip_per_s: 12.0,
+        slip_per_s2: 30.0,
         launch_open_rad_s: 95.0,
         launch_rad_s: 260.0,
         launch_most_rad_s: 160.0,

@@ -14,6 +14,7 @@
 
 mod calibration;
 mod launch;
+mod lock_up;
 mod pressure;
 mod shift;
 mod strokes;
@@ -29,6 +30,7 @@ use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
 pub use calibration::CarCalibration;
 use launch::Launch;
+use lock_up::LockUpControl;
 use pressure::Controlled;
 use shift::ActiveShift;
 pub use shift::ShiftStage;
@@ -95,9 +97,7 @@ pub struct CarShiftController {
     preselected: Option<usize>,
     output: Track,
     engine_share: f64,
-    /// Share of its capacity with which the lock-up clutch is closed.
-    lock_up_share: f64,
-    is_locked_up: bool,
+    lock_up: LockUpControl,
     strokes: Strokes,
     /// The clutch of a car without a converter, while it is not closed.
     launch: Option<Launch>,
@@ -124,8 +124,7 @@ impl CarShiftController {
             preselected: None,
             output,
             engine_share: 1.0,
-            lock_up_share: 0.0,
-            is_locked_up: false,
+            lock_up: LockUpControl::default(),
             strokes: Strokes::new(car, gear),
             launch: None,
         })
@@ -357,7 +356,9 @@ impl CarShiftController {
         }
         let step = period_s / self.calibration.engine_ramp_s;
         self.engine_share += (wanted - self.engine_share).clamp(-step, step);
-        let lock_up_n_m = self.lock_up(measured);
+        let engine_n_m = self.engine_torque(throttle, measured.engine_rad_s);
+        let in_gear = self.active.is_none().then_some(self.gear).filter(|_| !self.is_neutral);
+        let lock_up_n_m = self.lock_up.torque_n_m((&self.car, &self.calibration), in_gear, engine_n_m, measured);
         self.strokes.follow(&self.car, &elements, period_s);
         CarCommands { elements, dogs, engine_share: self.engine_share, lock_up_n_m }
     }
@@ -377,29 +378,19 @@ impl CarShiftController {
         }
     }
 
-    /// Torque that the lock-up clutch is to hold, N m. It is open during shifts: their turbine torque is that of the converter.
-    fn lock_up(&mut self, measured: &CarMeasured) -> f64 {
-        let Some(lock_up) = self.car.lock_up else { return 0.0 };
-        let ratio = |gear: usize| self.car.gearbox.gears[gear].ratio;
-        let is_high = ratio(self.gear) > 0.0 && ratio(self.gear) <= ratio(lock_up.first_gear);
-        let fastest = if self.is_locked_up { lock_up.off_rad_s } else { lock_up.on_rad_s };
-        self.is_locked_up = self.active.is_none() && is_high && measured.turbine_rad_s > fastest;
-        let period_s = self.calibration.control_period_s;
-        let step = if self.is_locked_up { period_s / lock_up.ramp_s } else { -period_s / self.calibration.unlock_s };
-        self.lock_up_share = (self.lock_up_share + step).clamp(0.0, 1.0);
-        self.lock_up_share * lock_up.capacity_n_m
-    }
-
     /// Torque on the gearbox input as the nominal maps give it, N m. The engine controller's reductions are known.
     fn turbine_torque(&self, throttle: f64, measured: &CarMeasured) -> f64 {
         match &self.car.converter {
             Some(converter) => converter.torques(measured.engine_rad_s, measured.turbine_rad_s).turbine_n_m,
-            None => {
-                let engine = &self.car.engine;
-                let torque = engine.torque(measured.turbine_rad_s, throttle);
-                let reduced = if torque > 0.0 { torque * self.engine_share } else { torque };
-                reduced - engine.drag_n_m_s * measured.turbine_rad_s
-            }
+            None => self.engine_torque(throttle, measured.turbine_rad_s),
         }
+    }
+
+    /// Torque of the engine less its drag, N m, with the reduction of the transmission controller.
+    fn engine_torque(&self, throttle: f64, engine_rad_s: f64) -> f64 {
+        let engine = &self.car.engine;
+        let torque = engine.torque(engine_rad_s, throttle);
+        let reduced = if torque > 0.0 { torque * self.engine_share } else { torque };
+        reduced - engine.drag_n_m_s * engine_rad_s
     }
 }
