@@ -181,7 +181,11 @@ fn pressure_max_pa(car: &Car, errors: &ShiftErrors) -> f64 {
 /// The largest command of a valve, A or %.
 fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
     let commands = car.clutches.iter().flatten().map(|clutch| match clutch.valve.command_kind() {
-        CommandKind::Current => clutch.valve.command_for(pressure_max_pa(car, errors)),
+        // That of a normally-high valve is the one without pressure.
+        CommandKind::Current => [0.0, pressure_max_pa(car, errors)]
+            .map(|pressure_pa| clutch.valve.command_for(pressure_pa))
+            .into_iter()
+            .fold(0.0, f64::max),
         CommandKind::DutyCycle => 100.0,
     });
     commands.fold(0.0, f64::max)

@@ -207,8 +207,10 @@ impl<T: Real> Budget<T> {
     #[inline]
     fn asked(&self, [low, high]: [T; 2], [lowest, highest]: [T; 2]) -> [T; 2] {
         let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
-        let bottom = settled((lowest - self.command).max(T::zero()), self.gain_factor[0]);
-        let top = settled(highest + self.command, self.gain_factor[1]);
+        let (weakest, strongest) = ((lowest - self.command).max(T::zero()), highest + self.command);
+        let (weakest, strongest) = if self.valve.falls() { (strongest, weakest) } else { (weakest, strongest) };
+        let bottom = settled(weakest, self.gain_factor[0]);
+        let top = settled(strongest, self.gain_factor[1]);
         [bottom.min(low.max(bottom - self.hysteresis_pa)), top.max(high.min(top + self.hysteresis_pa))]
     }
 
@@ -328,6 +330,21 @@ mod tests {
         let settled = |command: f64, gain: f64| gain * b.valve.settled_pressure(command);
         let [low, high] = range.pressure_pa(&b);
         assert!((low - settled(0.295, 0.9)).abs() < 1.0 && (high - settled(0.305, 1.1)).abs() < 1.0, "{low} {high}");
+    }
+
+    #[test]
+    fn a_normally_high_valve_has_the_range_of_the_mirrored_commands() {
+        let low = budget();
+        let Some(&maps) = low.valve.maps() else { panic!("it has maps") };
+        let high = Budget { valve: ClutchValve::NormallyHigh { maps, zero_pressure_a: 1.2 }, ..budget() };
+        let mut ranges = [PressureRange::unknown(&low, 1.2), PressureRange::unknown(&high, 1.2)];
+        for k in 0..80 {
+            let current = [0.0, 0.3, 0.12, 0.5, 0.9, 0.4, 0.05, 0.2][k / 10];
+            ranges[0].step(&low, 0.01, read(current), 1.2);
+            ranges[1].step(&high, 0.01, read(1.2 - current), 1.2);
+            let [a, b] = [ranges[0].pressure_pa(&low), ranges[1].pressure_pa(&high)];
+            assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3, "{k}: {a:?} {b:?}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use drivetrain::CommandKind;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, simulate_car_drive};
 use study::any_shift::logged::element_commands;
 use study::any_shift::recording::{lock_up_is_applied, reported_engine_n_m};
+use trace::units::km_h;
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
 use crate::args::Simulate;
@@ -40,8 +41,16 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         summary.duration_s,
         1e-3 * summary.distance_m,
         summary.shifts,
-        3.6 * summary.fastest_m_s,
+        km_h(summary.fastest_m_s),
     ));
+    if let Some(error) = summary.speed_error {
+        output::note(&format!(
+            "speed: error {:.2} km/h (root mean square), at most {:.1} km/h; outside the tolerance of 2 km/h and 1 s for {:.2} % of the time",
+            km_h(error.rms_m_s),
+            km_h(error.largest_m_s),
+            100.0 * error.beyond,
+        ));
+    }
     for path in paths {
         output::line(&path.display().to_string())?;
     }
@@ -136,8 +145,12 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         measured("engine_share", |_, s| Cell::Number(s.engine_share)),
         measured(signal::REPORTED_ENGINE_TORQUE, |car, s| Cell::Number(reported_engine_n_m(car, s))),
         measured(signal::LOCK_UP_APPLIED, |car, s| Cell::Whole(u64::from(lock_up_is_applied(car, s)))),
-        measured(signal::GEAR, |car, s| gear_name(car, s.gear)),
-        measured(signal::TARGET_GEAR, |car, s| gear_name(car, s.shift.map_or(s.gear, |shift| shift.to))),
+        measured(signal::GEAR, |car, s| if s.is_neutral { Cell::Word("N") } else { gear_name(car, s.gear) }),
+        measured(signal::TARGET_GEAR, |car, s| match &s.shift {
+            None if s.is_neutral => Cell::Word("N"),
+            None => gear_name(car, s.gear),
+            Some(shift) => gear_name(car, shift.to),
+        }),
         measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
         measured("offgoing", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.offgoing.element))),
         measured("oncoming", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.oncoming.element))),
@@ -231,10 +244,12 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
     for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
         if let Some(clutch) = clutch {
             output::line(&format!(
-                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure",
+                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure{}{}",
                 element.name,
                 trace::units::mpa(clutch.clutch.kiss_pressure()),
                 clutch.clutch.static_capacity(car.line_pressure_pa),
+                if clutch.valve.falls() { ", valve normally high" } else { "" },
+                if clutch.has_stroke { ", with stroke" } else { "" },
             ))?;
         }
     }
@@ -246,11 +261,14 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
 
 /// Prints what a drive file describes.
 pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> {
+    let given = match &drive.trace {
+        Some(trace) => format!("by {} speeds", trace.points()),
+        None => format!("in {} segments", drive.segments.len()),
+    };
     output::line(&format!(
-        "drive {}: {:.0} s in {} segments, driven {} times",
+        "drive {}: {:.0} s {given}, driven {} times",
         drive.name,
         drive.duration_s(),
-        drive.segments.len(),
         drive.repetitions
     ))?;
     match drive.vehicle {
