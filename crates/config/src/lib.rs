@@ -11,6 +11,7 @@ pub mod experiment;
 pub mod gearbox;
 pub mod source;
 pub mod study;
+mod tree;
 pub mod vehicle;
 
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};

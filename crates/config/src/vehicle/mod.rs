@@ -20,6 +20,7 @@ use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
+use crate::tree::Tree;
 use crate::{ConfigError, Kind, Source};
 pub use car::{Car, LockUp};
 pub(crate) use clutch::HYSTERESES_PA;
@@ -267,7 +268,8 @@ impl Vehicle {
     }
 
     fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
-        let vehicle = Self::checked(&Layers { source: &source, over: Some(over) })?;
+        let layers = Layers { source: &source, over: Some(over) };
+        let vehicle = Self::checked(&Check { layers }, &layers.parse()?)?;
         let path = format!("{} with {}", source.path.display(), over.path.display());
         Ok(Self { source: Source { path: path.into(), text: source.text + &over.text }, ..vehicle })
     }
@@ -295,26 +297,30 @@ impl Vehicle {
                 "`simulate` of a drive file and `check` take it; observers and designs need a file with [gear_train]";
             return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
         }
-        let vehicle = Self::checked(&Layers { source: &source, over: None })?;
+        let vehicle = Self::checked(&Check::of(&source), &source.parse()?)?;
         Ok(Self { source, ..vehicle })
     }
 
-    /// The vehicle that these files describe, whose source is left to be filled in.
-    fn checked(layers: &Layers<'_>) -> Result<Self, ConfigError> {
-        let raw: RawVehicleFile = layers.parse()?;
-        let check = Check { layers: *layers };
-        let gear = gear_train::check(&check, &raw)?;
-        let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
-        let clutch = |name: &str| clutch::check(&check, name, &raw, oil_temperature_degc);
+    /// The vehicle of a file some of whose values may have been changed.
+    pub(crate) fn from_tree(source: &Source, tree: &Tree) -> Result<Self, ConfigError> {
+        let vehicle = Self::checked(&Check::of(source), &tree.read(source)?)?;
+        Ok(Self { source: source.clone(), ..vehicle })
+    }
+
+    /// The vehicle that these values describe, whose source is left to be filled in.
+    fn checked(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Self, ConfigError> {
+        let gear = gear_train::check(check, raw)?;
+        let oil_temperature_degc = oil_temperature(check, &raw.oil)?;
+        let clutch = |name: &str| clutch::check(check, name, raw, oil_temperature_degc);
         // A clutch that this shift leaves alone is checked like the others.
         for name in raw.clutch.keys() {
             clutch(name)?;
         }
         let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
-        let (driveline, tyre) = (driveline(&check, &raw.driveline)?, tyre(&check, &raw.tyre)?);
+        let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
         let error_bounds =
-            error_bounds(&check, &raw.design.error_bounds, &oncoming, oil_temperature(&check, &raw.oil)?)?;
-        let road = road(&check, &raw.vehicle)?;
+            error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
+        let road = road(check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
         let limits = InputLimits {
             speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.observer.speed_max_rad_s, 100.0..=5e3)?,
@@ -323,42 +329,42 @@ impl Vehicle {
             shaft_torque_max_n_m: SHAFT_OVER_TYRES * tyre.max_force_n * road.wheel_radius_m,
         };
         let command_max = limits.command_max + error_bounds.command;
-        valves::clutch_can_engage(&check, &oncoming, &limits, raw.observer.command_max.span().start)?;
+        valves::clutch_can_engage(check, &oncoming, &limits, raw.observer.command_max.span().start)?;
         for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
             valves::settled_pressure_rises(
-                &check,
+                check,
                 &format!("clutch.{name}.valve"),
                 &clutch.valve,
                 &raw.clutch[name].valve,
                 command_max,
             )?;
         }
-        let observer_valve = valves::observer_valve(&check, &raw.observer.valve, &oncoming.valve)?;
+        let observer_valve = valves::observer_valve(check, &raw.observer.valve, &oncoming.valve)?;
         let command_kind = observer_valve.command_kind();
-        let supervisor = supervisor(&check, &raw.observer, kiss_pressure_pa)?;
+        let supervisor = supervisor(check, &raw.observer, kiss_pressure_pa)?;
         Ok(Self {
             name: raw.name.clone(),
-            engine: engine(&check, &raw.engine)?,
-            converter: converter(&check, &raw.converter)?,
+            engine: engine(check, &raw.engine)?,
+            converter: converter(check, &raw.converter)?,
             shift: gear.reduced,
             output_inertia_kg_m2: gear.output_inertia_kg_m2,
             offgoing,
             oncoming,
             driveline,
-            backlash_rad: backlash(&check, &raw.driveline)?,
+            backlash_rad: backlash(check, &raw.driveline)?,
             oil_temperature_degc,
             tyre,
             road,
             observer_valve,
-            uncertainty: valves::uncertainty(&check, &raw.observer.uncertainty, command_kind)?,
+            uncertainty: valves::uncertainty(check, &raw.observer.uncertainty, command_kind)?,
             supervisor,
             limits,
-            torque_phase: requirement(&check, "design.torque_phase", &raw.design.torque_phase)?,
-            inertia_phase: requirement(&check, "design.inertia_phase", &raw.design.inertia_phase)?,
-            compliant_torque_phase: compliant(&check, "torque_phase", &raw.design.compliant.torque_phase)?,
-            compliant_inertia_phase: compliant(&check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
+            torque_phase: requirement(check, "design.torque_phase", &raw.design.torque_phase)?,
+            inertia_phase: requirement(check, "design.inertia_phase", &raw.design.inertia_phase)?,
+            compliant_torque_phase: compliant(check, "torque_phase", &raw.design.compliant.torque_phase)?,
+            compliant_inertia_phase: compliant(check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
             error_bounds,
-            filter: filter(&check, &raw.observer.filter)?,
+            filter: filter(check, &raw.observer.filter)?,
             shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
             source: Source { path: PathBuf::new(), text: String::new() },
         })
