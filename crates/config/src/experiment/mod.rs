@@ -422,10 +422,10 @@ fn scenario(
     throttle_points: usize,
 ) -> Result<Scenario, ConfigError> {
     let optional = |key: &str, value: &Option<Number>, range| {
-        value.as_ref().map(|value| check.number(&format!("scenario.{key}"), value, range)).transpose()
+        value.as_ref().map(|value| check.number(format_args!("scenario.{key}"), value, range)).transpose()
     };
     let periods = |key: &str, value: &Option<Number>| {
-        value.as_ref().map(|value| check.count(&format!("scenario.{key}"), value, 1.0..=100.0)).transpose()
+        value.as_ref().map(|value| check.count(format_args!("scenario.{key}"), value, 1.0..=100.0)).transpose()
     };
     Ok(Scenario {
         name: check.name("scenario.name", raw.name.get_ref(), raw.name.span().start)?,
@@ -441,7 +441,7 @@ fn scenario(
 }
 
 fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCalibration, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("shift.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("shift.{key}"), value, range);
     let (fill, torque, inertia) = (&raw.fill, &raw.torque_phase, &raw.inertia_phase);
     Ok(ShiftCalibration {
         request_s: number("request_s", &raw.request_s, 0.0..=duration_s)?,
@@ -482,7 +482,7 @@ fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCali
 /// Where the file says nothing, as a production controller does [chosen].
 fn fast_fill(check: &Check<'_>, raw: &RawFill) -> Result<FastFill, ConfigError> {
     let number = |key: &str, value: &Option<Number>, default: f64, range| match value {
-        Some(value) => check.number(&format!("shift.fill.{key}"), value, range),
+        Some(value) => check.number(format_args!("shift.fill.{key}"), value, range),
         None => Ok(default),
     };
     Ok(FastFill {

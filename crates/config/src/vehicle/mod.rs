@@ -318,8 +318,7 @@ impl Vehicle {
         }
         let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
         let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
-        let error_bounds =
-            error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
+        let error_bounds = error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
         let road = road(check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
         let limits = InputLimits {
@@ -380,7 +379,7 @@ fn engine(check: &Check<'_>, raw: &RawEngine) -> Result<Engine<f64>, ConfigError
 }
 
 fn driveline(check: &Check<'_>, raw: &RawDriveline) -> Result<Driveline<f64>, ConfigError> {
-    let number = |key: &str, value: &Number, range| check.number(&format!("driveline.{key}"), value, range);
+    let number = |key: &str, value: &Number, range| check.number(format_args!("driveline.{key}"), value, range);
     Ok(Driveline {
         final_ratio: number("final_ratio", &raw.final_ratio, 0.5..=10.0)?,
         shaft_stiffness_n_m_rad: number("shaft_stiffness_n_m_rad", &raw.shaft_stiffness_n_m_rad, 500.0..=200e3)?,
@@ -410,11 +409,11 @@ fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, Conf
     let key = "engine.torque.torque_n_m";
     let rows = raw.torque_n_m.get_ref();
     for (i, row) in rows.iter().enumerate() {
-        check.numbers(&format!("{key}[{i}]"), row, -2e3..=3e3)?;
+        check.numbers(format_args!("{key}[{i}]"), row, -2e3..=3e3)?;
         if row.get_ref().len() != throttle.len() {
             let message =
                 format!("the row has {} torques, but `throttle` has {} positions", row.get_ref().len(), throttle.len());
-            return Err(check.meaning(&format!("{key}[{i}]"), row.span().start, message, None));
+            return Err(check.meaning(format!("{key}[{i}]"), row.span().start, message, None));
         }
     }
     let values: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
@@ -497,7 +496,7 @@ fn road(check: &Check<'_>, raw: &RawRoad) -> Result<RoadLoad<f64>, ConfigError> 
 fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Result<Supervisor<f64>, ConfigError> {
     let raw = &raw.supervisor;
     let number = |key: &str, value: &crate::check::Number, range| {
-        check.number(&format!("observer.supervisor.{key}"), value, range)
+        check.number(format_args!("observer.supervisor.{key}"), value, range)
     };
     Ok(Supervisor {
         kiss_pressure_pa,
@@ -508,7 +507,7 @@ fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Re
 }
 
 fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<DesignRequirement, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("{table}.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("{table}.{key}"), value, range);
     Ok(DesignRequirement {
         settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
         kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
@@ -522,7 +521,7 @@ fn compliant(
     phase: &str,
     raw: &RawCompliantRequirement,
 ) -> Result<CompliantRequirement, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("design.compliant.{phase}.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("design.compliant.{phase}.{key}"), value, range);
     Ok(CompliantRequirement {
         settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
         kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
@@ -552,7 +551,7 @@ fn error_matrix(check: &Check<'_>, phase: &str, rows: &Spanned<Vec<Numbers>>) ->
 }
 
 fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("observer.filter.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("observer.filter.{key}"), value, range);
     Ok(FilterSettings {
         turbine_share: number("turbine_share", &raw.turbine_share, 1e-4..=1.0)?,
         turbine_share_s: number("turbine_share_s", &raw.turbine_share_s, 0.01..=1e3)?,
@@ -582,9 +581,10 @@ fn error_bounds(
     oil_degc: f64,
 ) -> Result<ErrorBounds, ConfigError> {
     let (at, raw) = (spanned.span().start, spanned.get_ref());
-    let number = |key: &str, value: &Number, range| check.number(&format!("design.error_bounds.{key}"), value, range);
+    let number =
+        |key: &str, value: &Number, range| check.number(format_args!("design.error_bounds.{key}"), value, range);
     let range =
-        |key: &str, values: &Numbers, allowed| check.pair(&format!("design.error_bounds.{key}"), values, allowed);
+        |key: &str, values: &Numbers, allowed| check.pair(format_args!("design.error_bounds.{key}"), values, allowed);
     let factor = |key: &str, values: &Numbers, allowed| {
         let factors = range(key, values, allowed)?;
         if (factors[0]..=factors[1]).contains(&1.0) {
