@@ -1,5 +1,6 @@
 //! Range checks with the place of the value in the file.
 
+use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
 
 use drivetrain::table::{MAX_POINTS, check_axis};
@@ -48,6 +49,19 @@ const LONGEST_NAME: usize = 80;
 /// a slip of the pen, and too steep for a slope in single precision.
 const BREAKPOINTS_APART: f64 = 1e-6;
 
+/// A key in a table of the file. Every value has one, but only an error writes it out.
+#[derive(Clone, Copy)]
+pub(crate) struct Key<'a> {
+    pub(crate) table: &'a str,
+    pub(crate) name: &'a str,
+}
+
+impl Display for Key<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.table, self.name)
+    }
+}
+
 /// Checks the values of a file, or of one with another laid over it.
 pub(crate) struct Check<'a> {
     pub(crate) layers: Layers<'a>,
@@ -65,19 +79,24 @@ impl<'a> Check<'a> {
     }
 
     /// The number, if it is in the range.
-    pub(crate) fn number(&self, key: &str, value: &Number, range: RangeInclusive<f64>) -> Result<f64, ConfigError> {
-        self.in_range(key, *value.get_ref(), value.span().start, &range)
+    pub(crate) fn number(
+        &self,
+        key: impl Display,
+        value: &Number,
+        range: RangeInclusive<f64>,
+    ) -> Result<f64, ConfigError> {
+        self.in_range(&key, *value.get_ref(), value.span().start, &range)
     }
 
     /// The numbers, if all lie in the range.
     pub(crate) fn numbers<'n>(
         &self,
-        key: &str,
+        key: impl Display,
         values: &'n Numbers,
         range: RangeInclusive<f64>,
     ) -> Result<&'n [f64], ConfigError> {
         for (i, &value) in values.get_ref().iter().enumerate() {
-            self.in_range(&format!("{key}[{i}]"), value, values.span().start, &range)?;
+            self.in_range(&format_args!("{key}[{i}]"), value, values.span().start, &range)?;
         }
         Ok(values.get_ref())
     }
@@ -107,52 +126,57 @@ impl<'a> Check<'a> {
     }
 
     /// The number, if it is a whole one in the range: a count of teeth, faces or periods.
-    pub(crate) fn count(&self, key: &str, value: &Number, range: RangeInclusive<f64>) -> Result<f64, ConfigError> {
-        let number = self.number(key, value, range)?;
+    pub(crate) fn count(
+        &self,
+        key: impl Display,
+        value: &Number,
+        range: RangeInclusive<f64>,
+    ) -> Result<f64, ConfigError> {
+        let number = self.number(&key, value, range)?;
         if number.fract() == 0.0 {
             return Ok(number);
         }
-        Err(self.meaning(key, value.span().start, format!("is {number}, expected an integer"), None))
+        Err(self.meaning(&key, value.span().start, format!("is {number}, expected an integer"), None))
     }
 
     /// Least and greatest, if both lie in the range.
     pub(crate) fn pair(
         &self,
-        key: &str,
+        key: impl Display,
         values: &Numbers,
         range: RangeInclusive<f64>,
     ) -> Result<[f64; 2], ConfigError> {
-        match *self.numbers(key, values, range)? {
+        match *self.numbers(&key, values, range)? {
             [least, greatest] if least <= greatest => Ok([least, greatest]),
-            _ => Err(self.meaning(key, values.span().start, "expected [least, greatest]".to_owned(), None)),
+            _ => Err(self.meaning(&key, values.span().start, "expected [least, greatest]".to_owned(), None)),
         }
     }
 
     /// As many numbers as that, if all lie in the range.
     pub(crate) fn array<const N: usize>(
         &self,
-        key: &str,
+        key: impl Display,
         values: &Numbers,
         range: RangeInclusive<f64>,
     ) -> Result<[f64; N], ConfigError> {
-        let numbers = self.numbers(key, values, range)?;
+        let numbers = self.numbers(&key, values, range)?;
         numbers.try_into().map_err(|_| {
             let message = format!("has {} numbers, expected {N}", numbers.len());
-            self.meaning(key, values.span().start, message, None)
+            self.meaning(&key, values.span().start, message, None)
         })
     }
 
     /// The breakpoints of an axis: between 2 and `most` of them, rising within the range.
     pub(crate) fn axis<'n>(
         &self,
-        key: &str,
+        key: impl Display,
         values: &'n Numbers,
         range: RangeInclusive<f64>,
         most: usize,
     ) -> Result<&'n [f64], ConfigError> {
         let apart = BREAKPOINTS_APART * range.end();
-        let points = self.numbers(key, values, range)?;
-        let wrong = |message: String| self.meaning(key, values.span().start, message, None);
+        let points = self.numbers(&key, values, range)?;
+        let wrong = |message: String| self.meaning(&key, values.span().start, message, None);
         check_axis(points, most).map_err(|error| wrong(error.to_string()))?;
         match points.windows(2).position(|pair| pair[1] - pair[0] < apart) {
             None => Ok(points),
@@ -167,19 +191,19 @@ impl<'a> Check<'a> {
     /// A table from two lists whose values lie in their ranges.
     pub(crate) fn table(
         &self,
-        (axis_key, axis, axis_range): (&str, &Numbers, RangeInclusive<f64>),
-        (key, values, range): (&str, &Numbers, RangeInclusive<f64>),
+        (axis_key, axis, axis_range): (impl Display, &Numbers, RangeInclusive<f64>),
+        (key, values, range): (impl Display, &Numbers, RangeInclusive<f64>),
     ) -> Result<Table1<f64>, ConfigError> {
         let axis = self.axis(axis_key, axis, axis_range, MAX_POINTS)?;
         // What is left to be wrong is the number of values.
-        let wrong = |error: TableError| self.meaning(key, values.span().start, error.to_string(), None);
-        Table1::new(axis, self.numbers(key, values, range)?).map_err(wrong)
+        let wrong = |error: TableError| self.meaning(&key, values.span().start, error.to_string(), None);
+        Table1::new(axis, self.numbers(&key, values, range)?).map_err(wrong)
     }
 
     /// A number that must be there.
     pub(crate) fn required<'n, T>(
         &self,
-        table: &str,
+        table: impl Display,
         at: usize,
         key: &str,
         value: Option<&'n T>,
@@ -225,23 +249,36 @@ impl<'a> Check<'a> {
     }
 
     /// An error about what a value means.
-    pub(crate) fn meaning(&self, key: &str, offset: usize, message: String, hint: Option<String>) -> ConfigError {
+    pub(crate) fn meaning(
+        &self,
+        key: impl Display,
+        offset: usize,
+        message: String,
+        hint: Option<String>,
+    ) -> ConfigError {
         let (path, line) = self.layers.place(offset);
-        ConfigError::Meaning { path, line, key: key.to_owned(), message, hint }
+        ConfigError::Meaning { path, line, key: key.to_string(), message, hint }
     }
 
-    fn in_range(&self, key: &str, value: f64, offset: usize, range: &RangeInclusive<f64>) -> Result<f64, ConfigError> {
+    fn in_range(
+        &self,
+        key: &dyn Display,
+        value: f64,
+        offset: usize,
+        range: &RangeInclusive<f64>,
+    ) -> Result<f64, ConfigError> {
         if range.contains(&value) {
             return Ok(value);
         }
         let (path, line) = self.layers.place(offset);
+        let key = key.to_string();
         Err(ConfigError::Range {
             path,
             line,
-            key: key.to_owned(),
             value,
             allowed: format!("{} to {}", range.start(), range.end()),
-            hint: unit_hint(key, value, range),
+            hint: unit_hint(&key, value, range),
+            key,
         })
     }
 }

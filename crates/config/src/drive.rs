@@ -236,7 +236,7 @@ fn check_segment(check: &Check<'_>, raw: &RawSegment) -> Result<DriveSegment, Co
             FromTo::Ramp(ends) => ends,
         };
         for end in ends {
-            check.number(&format!("segment.{name}"), &Spanned::new(value.span(), end), range.clone())?;
+            check.number(format_args!("segment.{name}"), &Spanned::new(value.span(), end), range.clone())?;
         }
         Ok(ends)
     };

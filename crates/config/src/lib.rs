@@ -12,6 +12,7 @@ pub mod gearbox;
 pub mod source;
 mod speed_trace;
 pub mod study;
+mod tree;
 pub mod vehicle;
 
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};

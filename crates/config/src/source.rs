@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
+use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use crate::ConfigError;
@@ -111,6 +112,11 @@ impl Source {
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
         Layers { source: self, over: None }.parse()
     }
+
+    /// The text as a table.
+    pub(crate) fn table(&self) -> Result<Spanned<DeTable<'_>>, ConfigError> {
+        DeTable::parse(&self.text).map_err(|error| Layers { source: self, over: None }.syntax(&error))
+    }
 }
 
 /// A file, and a second file whose values replace those of the first.
@@ -133,13 +139,16 @@ impl Layers<'_> {
         }
     }
 
+    /// An error of the parser with its place.
+    fn syntax(&self, error: &toml::de::Error) -> ConfigError {
+        let (path, line) = self.place(error.span().map_or(0, |span| span.start));
+        ConfigError::Syntax { path, line, message: error.message().to_owned() }
+    }
+
     /// Reads the text into raw types.
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
-        let wrong = |error: toml::de::Error| {
-            let (path, line) = self.place(error.span().map_or(0, |span| span.start));
-            ConfigError::Syntax { path, line, message: error.message().to_owned() }
-        };
-        let mut table = DeTable::parse(&self.source.text).map_err(wrong)?;
+        let wrong = |error| self.syntax(&error);
+        let mut table = self.source.table()?;
         // Blanks before its text put every place of the second file behind those of the first.
         let moved = self.over.map(|over| " ".repeat(self.source.text.len()) + &over.text);
         if let Some(moved) = &moved {

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Deserialize;
-use toml::{Spanned, Table, Value};
+use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers};
+use crate::tree::Tree;
 use crate::{ConfigError, Experiment, ObserverEntry, Source, Vehicle};
-use experiments::{changed_experiment, experiment_table};
+use experiments::{changed_experiment, experiment_tree};
 
 pub use values::{Sometimes, Values};
 
@@ -108,10 +109,11 @@ pub struct Study {
     pub vehicle: Arc<Vehicle>,
     /// The experiment before any change, with the study's observers.
     pub experiment: Arc<Experiment>,
-    tables: [Table; 2],
+    /// The values of vehicle and experiment.
+    trees: [Tree; 2],
 }
 
-/// A run of a study: the files with the factors' values in place.
+/// A run of a study: the files with the factors' values in place. Their sources are the files before the change.
 #[derive(Debug, Clone)]
 pub struct Varied {
     /// The simulated car, before the experiment's `off_nominal` differences.
@@ -219,7 +221,7 @@ impl Study {
         }
         let runs = runs(&check, &raw, &factors)?;
         enough_dimensions(&check, &raw)?;
-        let tables = [vehicle.source.parse()?, experiment_table(&experiment)?];
+        let trees = [Tree::of(&vehicle.source)?, experiment_tree(&experiment)?];
         experiment.scenarios.clear();
         let (vehicle, experiment) = (Arc::new(vehicle), Arc::new(experiment));
         let (plan, seed) = (raw.plan, raw.seed);
@@ -235,7 +237,7 @@ impl Study {
             factors,
             vehicle,
             experiment,
-            tables,
+            trees,
             source,
         };
         study.try_every_factor(&raw)?;
@@ -273,19 +275,21 @@ impl Study {
     /// The files with these factors at these values, and all other values unchanged.
     fn with(&self, changes: &[(&Factor, f64)]) -> Result<Varied, ConfigError> {
         let of = |target| changes.iter().copied().filter(move |(factor, _)| factor.target == target);
-        let [vehicle_table, experiment_table] = &self.tables;
+        let [vehicle_tree, experiment_tree] = &self.trees;
+        let source = &self.vehicle.source;
+        let changed_vehicle =
+            |changes: &mut dyn Iterator<Item = _>| Vehicle::from_tree(source, &changed(source, vehicle_tree, changes)?);
         let vehicle = if of(Target::Vehicle).count() == 0 {
             Arc::clone(&self.vehicle)
         } else {
-            Arc::new(Vehicle::from_source(changed(&self.vehicle.source, vehicle_table, of(Target::Vehicle))?)?)
+            Arc::new(changed_vehicle(&mut of(Target::Vehicle))?)
         };
         let car = if of(Target::Car).count() == 0 {
             Arc::clone(&vehicle)
         } else {
-            let both = of(Target::Vehicle).chain(of(Target::Car));
-            Arc::new(Vehicle::from_source(changed(&self.vehicle.source, vehicle_table, both)?)?)
+            Arc::new(changed_vehicle(&mut of(Target::Vehicle).chain(of(Target::Car)))?)
         };
-        let experiment = changed_experiment(&self.experiment, experiment_table, of(Target::Experiment))?;
+        let experiment = changed_experiment(&self.experiment, experiment_tree, of(Target::Experiment))?;
         experiment.check_observers(&vehicle)?;
         Ok(Varied { car, vehicle, experiment })
     }
@@ -424,15 +428,15 @@ fn factor(check: &Check<'_>, raw: &RawFactor) -> Result<Factor, ConfigError> {
     Ok(Factor { name, key: key.clone(), target, path, change: raw.change, values })
 }
 
-/// The text of a file with changed values.
+/// The values of a file with changes.
 fn changed<'a>(
     source: &Source,
-    table: &Table,
+    tree: &Tree,
     changes: impl Iterator<Item = (&'a Factor, f64)>,
-) -> Result<Source, ConfigError> {
-    let mut root = table.clone();
+) -> Result<Tree, ConfigError> {
+    let mut tree = tree.clone();
     for (factor, value) in changes {
-        place_in_table(&mut root, &factor.path, factor.change, value).map_err(|message| ConfigError::Meaning {
+        tree.change(&factor.path, factor.change, value).map_err(|message| ConfigError::Meaning {
             path: source.path.clone(),
             line: 1,
             key: factor.path.join("."),
@@ -440,58 +444,5 @@ fn changed<'a>(
             hint: None,
         })?;
     }
-    Ok(Source { path: source.path.clone(), text: root.to_string() })
-}
-
-/// Changes the value at a path. Missing tables are created; an unknown key is refused when the file is checked.
-fn place_in_table(table: &mut Table, path: &[String], change: Change, value: f64) -> Result<(), String> {
-    let Some((step, rest)) = path.split_first() else {
-        return Err("the key is a whole table, expected the key of a number".to_owned());
-    };
-    let is_last = rest.is_empty();
-    if is_last && change != Change::Set && !table.contains_key(step) {
-        return Err("the file has no value to change; use `change = \"set\"`".to_owned());
-    }
-    let missing = || if is_last { Value::Float(value) } else { Value::Table(Table::new()) };
-    place(table.entry(step.clone()).or_insert_with(missing), rest, change, value)
-}
-
-fn place(at: &mut Value, path: &[String], change: Change, value: f64) -> Result<(), String> {
-    let Some((step, rest)) = path.split_first() else { return apply(at, change, value) };
-    match at {
-        Value::Table(table) => place_in_table(table, path, change, value),
-        Value::Array(list) => {
-            let named = |item: &Value| item.get("name").and_then(Value::as_str) == Some(step.as_str());
-            let found = list.iter().position(named).or_else(|| step.parse().ok().filter(|&i: &usize| i < list.len()));
-            let index = found.ok_or_else(|| format!("the list has no item `{step}`; items count from 0"))?;
-            place(&mut list[index], rest, change, value)
-        }
-        _ => Err(format!("there is no `{step}`: the key before it is a single value")),
-    }
-}
-
-fn apply(at: &mut Value, change: Change, value: f64) -> Result<(), String> {
-    let new = |old: f64| match change {
-        Change::Set => value,
-        Change::Scale => old * value,
-        Change::Add => old + value,
-    };
-    match at {
-        Value::Float(old) => *old = new(*old),
-        Value::Boolean(old) => {
-            *old = match (change, value) {
-                (Change::Set, 0.0) => false,
-                (Change::Set, 1.0) => true,
-                _ => return Err("a switch is 0 (off) or 1 (on)".to_owned()),
-            }
-        }
-        #[expect(clippy::cast_precision_loss, reason = "a number that a person wrote")]
-        Value::Integer(old) => *at = Value::Float(new(*old as f64)),
-        Value::Array(list) if change != Change::Set => {
-            return list.iter_mut().try_for_each(|item| apply(item, change, value));
-        }
-        Value::Array(_) => return Err("a list cannot be set to a number; use `change = \"scale\"`".to_owned()),
-        _ => return Err("the value is not a number".to_owned()),
-    }
-    Ok(())
+    Ok(tree)
 }

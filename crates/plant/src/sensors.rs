@@ -6,10 +6,12 @@
 //! sample rate.
 
 mod errors;
+mod teeth;
 
 use config::{CurrentSensor, SpeedSensor};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
+use teeth::Teeth;
 
 /// Longest time without a tooth after which the wheel is taken to stand, s.
 const STANDSTILL_S: f64 = 0.2;
@@ -94,11 +96,11 @@ impl Readings {
 /// If there are not as many speeds as times.
 pub fn read_speed(sensor: &SpeedSensor, truth: Channel<'_>, rows: Rows<'_>) -> Readings {
     assert_eq!(truth.time_s.len(), truth.values.len(), "one speed for each time");
-    let edges = tooth_times(sensor, truth.time_s, truth.values);
+    let mut teeth = Teeth::new(sensor, truth);
     let pitch = std::f64::consts::TAU / sensor.teeth;
     let mut noise = Noise::new(rows.seed, truth.name);
     let mut readings = taken(rows, Some(sensor.sample_time_s), sensor.offset_s, |taken_s| {
-        let speed = tooth_speed(sensor, &edges, taken_s - sensor.delay_s, pitch);
+        let speed = tooth_speed(sensor, &mut teeth, taken_s - sensor.delay_s, pitch);
         sensor.errors.scale * speed + sensor.noise_rad_s * noise.normal()
     });
     errors::disturb(&mut readings, &sensor.errors, sensor.outlier_rad_s, truth.name, rows);
@@ -152,53 +154,15 @@ fn taken(rows: Rows<'_>, sample_time_s: Option<f64>, offset_s: f64, mut read: im
     Readings { values, age_s }
 }
 
-/// Times at which teeth pass, in steps of the timer.
-fn tooth_times(sensor: &SpeedSensor, time_s: &[f64], speed_rad_s: &[f64]) -> Vec<f64> {
-    let pitch = std::f64::consts::TAU / sensor.teeth;
-    let ticks_per_s = if sensor.timer_s > 0.0 { 1.0 / sensor.timer_s } else { 0.0 };
-    let tick = |time: f64| if ticks_per_s > 0.0 { (time * ticks_per_s).round() * sensor.timer_s } else { time };
-    let mut edges = before_the_record(sensor, time_s, speed_rad_s, pitch);
-    edges.iter_mut().for_each(|edge| *edge = tick(*edge));
-    // How far the wheel has to turn until the next tooth passes.
-    let mut to_go = pitch;
-    for i in 1..time_s.len() {
-        let (dt, from, to) = (time_s[i] - time_s[i - 1], speed_rad_s[i - 1].abs(), speed_rad_s[i].abs());
-        let turned = 0.5 * (from + to) * dt;
-        let mut next = to_go;
-        while next <= turned {
-            // Within the interval the speed changes linearly: the angle is a quadratic function of time.
-            let bend = (to - from) / dt;
-            let root = (from * from + 2.0 * bend * next).max(0.0).sqrt();
-            edges.push(tick(time_s[i - 1] + 2.0 * next / (from + root)));
-            next += pitch;
-        }
-        to_go = next - turned;
-    }
-    edges
-}
-
-/// Times of the teeth that the first readings need. Before the record begins, the wheel turns as at its beginning.
-fn before_the_record(sensor: &SpeedSensor, time_s: &[f64], speed_rad_s: &[f64], pitch: f64) -> Vec<f64> {
-    let (Some(begin_s), Some(speed)) = (time_s.first(), speed_rad_s.first().map(|speed| speed.abs())) else {
-        return Vec::new();
-    };
-    // The first row has a reading that may be as old as the period of the channel.
-    let oldest_s = sensor.delay_s + sensor.sample_time_s;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of teeth")]
-    let count = (sensor.periods + 1.0 + speed * oldest_s / pitch).ceil() as u32;
-    let turning = speed * STANDSTILL_S > pitch;
-    (0..=count).rev().filter(|_| turning).map(|tooth| begin_s - f64::from(tooth) * pitch / speed).collect()
-}
-
 /// Speed by the teeth that passed until `now`, rad/s.
-fn tooth_speed(sensor: &SpeedSensor, edges: &[f64], now: f64, pitch: f64) -> f64 {
-    let passed = edges.partition_point(|&edge| edge <= now);
+fn tooth_speed(sensor: &SpeedSensor, teeth: &mut Teeth<'_>, now: f64, pitch: f64) -> f64 {
+    let passed = teeth.passed(now);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 1 to 100")]
     let periods = sensor.periods as usize;
     if passed <= periods {
         return 0.0;
     }
-    let (last, first) = (edges[passed - 1], edges[passed - 1 - periods]);
+    let (last, first) = (teeth.time_s(passed - 1), teeth.time_s(passed - 1 - periods));
     if now - last > STANDSTILL_S { 0.0 } else { sensor.periods * pitch / (last - first) }
 }
 

@@ -3,7 +3,7 @@
 use config::{Experiment, Vehicle};
 use observer::Phase;
 use plant::{Contact, Mode, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
-use trace::{Cell, Trace, Word, signal};
+use trace::{Cell, Column, Trace, Values, Word, signal};
 
 use crate::ShiftSample;
 use crate::run::command_signals;
@@ -42,7 +42,7 @@ fn column_names(vehicle: &Vehicle) -> [&'static str; COLUMNS] {
 /// # Errors
 /// See [`PlantError`].
 pub fn simulate_drive(vehicle: &Vehicle, experiment: &Experiment) -> Result<Trace, PlantError> {
-    let mut recording = Recording::new(vehicle);
+    let mut recording = Recording::new(vehicle, Trace::default());
     simulate(vehicle, experiment, |sample| recording.take(sample))?;
     Ok(recording.finish())
 }
@@ -63,10 +63,24 @@ pub fn simulate_shift(
     experiment: &Experiment,
     before_s: f64,
 ) -> Result<Trace, PlantError> {
+    simulate_shift_over(Trace::default(), car, nominal, experiment, before_s)
+}
+
+/// As [`simulate_shift`], in the memory of a trace that is no longer needed.
+///
+/// # Errors
+/// See [`PlantError`].
+pub(crate) fn simulate_shift_over(
+    spare: Trace,
+    car: &Vehicle,
+    nominal: &Vehicle,
+    experiment: &Experiment,
+    before_s: f64,
+) -> Result<Trace, PlantError> {
     let powertrain = Powertrain::new(experiment.simulated_vehicle(car));
     let mut drive = Simulation::new(&powertrain, nominal, experiment)?;
     drive.record_from(experiment.shift.request_s - before_s);
-    let mut recording = Recording::new(car);
+    let mut recording = Recording::new(car, spare);
     let mut until_s = experiment.shift.request_s;
     loop {
         drive.advance(until_s, |sample| recording.take(sample))?;
@@ -83,26 +97,48 @@ const EXPECTED_SAMPLES: usize = 4096;
 
 /// Samples on their way to a trace.
 struct Recording {
-    trace: Trace,
+    names: [&'static str; COLUMNS],
+    time_s: Vec<f64>,
+    columns: [Vec<f64>; COLUMNS],
     phases: Vec<Word>,
 }
 
 impl Recording {
-    fn new(vehicle: &Vehicle) -> Self {
-        let mut trace = Trace::with_columns(&column_names(vehicle));
-        trace.reserve(EXPECTED_SAMPLES);
-        Self { trace, phases: Vec::with_capacity(EXPECTED_SAMPLES) }
+    /// Nothing recorded yet, in the memory of a spare trace.
+    fn new(vehicle: &Vehicle, spare: Trace) -> Self {
+        let (mut numbers, mut phases) = (vec![spare.time_s], Vec::new());
+        for column in spare.columns {
+            match column.values {
+                Values::Numbers(values) => numbers.push(values),
+                Values::Words(words) => phases = words,
+            }
+        }
+        phases.clear();
+        let mut column = || {
+            let mut column = numbers.pop().unwrap_or_default();
+            column.clear();
+            column.reserve(EXPECTED_SAMPLES);
+            column
+        };
+        Self { names: column_names(vehicle), time_s: column(), columns: std::array::from_fn(|_| column()), phases }
     }
 
     fn take(&mut self, sample: &Sample) {
         let row = DriveRow::of(sample);
-        self.trace.push(row.time_s, &row.values);
+        self.time_s.push(row.time_s);
+        for (column, value) in self.columns.iter_mut().zip(row.values) {
+            column.push(value);
+        }
         self.phases.push(row.phase.name().into());
     }
 
-    fn finish(mut self) -> Trace {
-        self.trace.add_words(signal::TRUE_PHASE, self.phases);
-        self.trace
+    fn finish(self) -> Trace {
+        let column = |(name, values): (&str, _)| Column { name: name.to_owned(), values: Values::Numbers(values) };
+        let mut columns = Vec::with_capacity(COLUMNS + 1);
+        columns.extend(self.names.into_iter().zip(self.columns).map(column));
+        let mut trace = Trace { path: None, time_s: self.time_s, columns };
+        trace.add_words(signal::TRUE_PHASE, self.phases);
+        trace
     }
 }
 
@@ -205,6 +241,18 @@ fn phase(sample: &Sample) -> Phase {
 /// The true phases of a simulated trace, if it has them.
 pub fn true_phases(trace: &Trace) -> Option<Vec<Phase>> {
     let column = trace.columns.iter().find(|column| column.name == signal::TRUE_PHASE)?;
-    let trace::Values::Words(words) = &column.values else { return None };
-    words.iter().map(|word| Phase::ALL.into_iter().find(|phase| phase.name() == word)).collect()
+    let Values::Words(words) = &column.values else { return None };
+    let named = |word: &Word| Phase::ALL.into_iter().find(|phase| phase.name() == word);
+    // Nearly every sample is in the phase of the one before, and most often has the very same word.
+    let mut before: Option<(&Word, Phase)> = None;
+    let same = |a: &str, b: &str| std::ptr::eq(a, b) || a == b;
+    (words.iter())
+        .map(|word| {
+            if let Some((_, phase)) = before.filter(|(other, _)| same(other, word)) {
+                return Some(phase);
+            }
+            before = Some((word, named(word)?));
+            before.map(|(_, phase)| phase)
+        })
+        .collect()
 }

@@ -262,6 +262,28 @@ fn an_observer_whose_gain_is_absurd_is_the_open_loop() {
     }
 }
 
+/// A row is made of no more of a run than it scores.
+#[test]
+fn a_row_has_the_scores_of_the_whole_run() {
+    let errors = [("runs = 2000", "runs = 12"), ("seed = 1", "seed = 5")];
+    let campaign = Campaign::new(study_of("settings.toml", &errors)).unwrap();
+    for run in 0..campaign.study.runs {
+        let (row, whole) = (campaign.row(run).unwrap(), campaign.run_in_full(run).unwrap());
+        assert!(row.status.is_scored() && whole.quality.is_some());
+        for (at, observer) in whole.observers.iter().enumerate() {
+            for (place, phase) in PHASES.into_iter().enumerate() {
+                let number = |metric| row.numbers[campaign.layout.score(at, place, metric)];
+                let of_run = observer.pressure_in(phase).unwrap();
+                let range = observer.ranges.iter().find(|range| range.phase == phase).unwrap();
+                assert_eq!(number(Metric::PressureRms), of_run.rms, "run {run}, {}", observer.entry.name);
+                assert_eq!(number(Metric::Chatter), of_run.chatter);
+                assert_eq!(number(Metric::RangeWidth), range.width_pa);
+                assert_eq!(number(Metric::Coverage), range.inside());
+            }
+        }
+    }
+}
+
 /// A row of this campaign, made up: the first observer has these RMS errors in the two phases.
 fn made_up(campaign: &Campaign, run: u64, rms: [f64; 2]) -> study::Row {
     let mut numbers = factor_values(&campaign.study, run);

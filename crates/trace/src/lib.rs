@@ -67,16 +67,6 @@ impl Trace {
         Self { path: None, time_s: Vec::new(), columns: names.iter().map(column).collect() }
     }
 
-    /// Makes room for more rows of numbers.
-    pub fn reserve(&mut self, rows: usize) {
-        self.time_s.reserve(rows);
-        for column in &mut self.columns {
-            if let Values::Numbers(numbers) = &mut column.values {
-                numbers.reserve(rows);
-            }
-        }
-    }
-
     /// Appends a row of numbers in the order of the columns.
     ///
     /// # Panics
@@ -88,6 +78,17 @@ impl Trace {
             match &mut column.values {
                 Values::Numbers(numbers) => numbers.push(value),
                 Values::Words(_) => panic!("column {} holds words", column.name),
+            }
+        }
+    }
+
+    /// Keeps the first rows, at most this many.
+    pub fn truncate(&mut self, rows: usize) {
+        self.time_s.truncate(rows);
+        for column in &mut self.columns {
+            match &mut column.values {
+                Values::Numbers(numbers) => numbers.truncate(rows),
+                Values::Words(words) => words.truncate(rows),
             }
         }
     }

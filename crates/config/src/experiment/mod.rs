@@ -11,6 +11,7 @@ use drivetrain::Table1;
 use observer::Discretisation;
 
 use crate::check::{Check, Number};
+use crate::tree::Tree;
 use crate::{ConfigError, Source, Vehicle};
 use off_nominal::off_nominal;
 use raw::{RawExperiment, RawFill, RawScenario, RawShift};
@@ -209,8 +210,18 @@ impl Experiment {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
-        let raw: RawExperiment = source.parse()?;
-        let check = Check::of(&source);
+        let experiment = Self::checked(&Check::of(&source), &source.parse()?)?;
+        Ok(Self { source, ..experiment })
+    }
+
+    /// The experiment of a file some of whose values may have been changed.
+    pub(crate) fn from_tree(source: &Source, tree: &Tree) -> Result<Self, ConfigError> {
+        let experiment = Self::checked(&Check::of(source), &tree.read(source)?)?;
+        Ok(Self { source: source.clone(), ..experiment })
+    }
+
+    /// The experiment that these values describe, whose source is left to be filled in.
+    fn checked(check: &Check<'_>, raw: &RawExperiment) -> Result<Self, ConfigError> {
         let name = check.file_name("name", &raw.name)?.to_owned();
         let duration_s = check.number("duration_s", &raw.duration_s, 0.1..=600.0)?;
         let sample_time_s = check.number("sample_time_s", &raw.sample_time_s, 1e-5..=0.1)?;
@@ -219,27 +230,27 @@ impl Experiment {
             ("throttle.position", &raw.throttle.position, 0.0..=1.0),
         )?;
         let has_sensors = raw.sensors.is_some();
-        let observers = raw.observer.iter().map(|entry| observers::observer(&check, entry, has_sensors));
+        let observers = raw.observer.iter().map(|entry| observers::observer(check, entry, has_sensors));
         let observers = observers.collect::<Result<Vec<_>, _>>()?;
-        observers::distinct(&check, &raw.observer, &observers)?;
-        let sensors = raw.sensors.as_ref().map(|raw| sensors::sensors(&check, "sensors", raw, None)).transpose()?;
+        observers::distinct(check, &raw.observer, &observers)?;
+        let sensors = raw.sensors.as_ref().map(|raw| sensors::sensors(check, "sensors", raw, None)).transpose()?;
         Ok(Self {
             vehicle: PathBuf::from(raw.vehicle.get_ref()),
             sensors,
             sensors_told: sensors.map(Sensors::without_errors),
             observers,
-            scenarios: scenarios(&check, &raw.scenario, sensors.as_ref(), sample_time_s, throttle.axis().len())?,
-            draws: draws(&check, raw.draws.as_ref())?,
+            scenarios: scenarios(check, &raw.scenario, sensors.as_ref(), sample_time_s, throttle.axis().len())?,
+            draws: draws(check, raw.draws.as_ref())?,
             duration_s,
             sample_time_s,
             initial_engine_rad_s: check.number("initial.engine_rad_s", &raw.initial.engine_rad_s, 0.0..=1e3)?,
             initial_vehicle_m_s: check.number("initial.vehicle_m_s", &raw.initial.vehicle_m_s, 0.0..=100.0)?,
             throttle,
-            off_nominal: off_nominal(&check, &raw.off_nominal, throttle.axis().len())?,
-            shift: shift(&check, &raw.shift, duration_s)?,
+            off_nominal: off_nominal(check, &raw.off_nominal, throttle.axis().len())?,
+            shift: shift(check, &raw.shift, duration_s)?,
             name,
             title: check.title("title", &raw.title)?,
-            source,
+            source: Source { path: PathBuf::new(), text: String::new() },
         })
     }
 
@@ -417,10 +428,10 @@ fn scenario(
     throttle_points: usize,
 ) -> Result<Scenario, ConfigError> {
     let optional = |key: &str, value: &Option<Number>, range| {
-        value.as_ref().map(|value| check.number(&format!("scenario.{key}"), value, range)).transpose()
+        value.as_ref().map(|value| check.number(format_args!("scenario.{key}"), value, range)).transpose()
     };
     let periods = |key: &str, value: &Option<Number>| {
-        value.as_ref().map(|value| check.count(&format!("scenario.{key}"), value, 1.0..=100.0)).transpose()
+        value.as_ref().map(|value| check.count(format_args!("scenario.{key}"), value, 1.0..=100.0)).transpose()
     };
     Ok(Scenario {
         name: check.name("scenario.name", raw.name.get_ref(), raw.name.span().start)?,
@@ -436,7 +447,7 @@ fn scenario(
 }
 
 fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCalibration, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("shift.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("shift.{key}"), value, range);
     let (fill, torque, inertia) = (&raw.fill, &raw.torque_phase, &raw.inertia_phase);
     Ok(ShiftCalibration {
         request_s: number("request_s", &raw.request_s, 0.0..=duration_s)?,
@@ -477,7 +488,7 @@ fn shift(check: &Check<'_>, raw: &RawShift, duration_s: f64) -> Result<ShiftCali
 /// Where the file says nothing, as a production controller does [chosen].
 fn fast_fill(check: &Check<'_>, raw: &RawFill) -> Result<FastFill, ConfigError> {
     let number = |key: &str, value: &Option<Number>, default: f64, range| match value {
-        Some(value) => check.number(&format!("shift.fill.{key}"), value, range),
+        Some(value) => check.number(format_args!("shift.fill.{key}"), value, range),
         None => Ok(default),
     };
     let usual = FastFill::STANDARD;

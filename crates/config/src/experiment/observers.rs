@@ -132,7 +132,7 @@ pub(super) fn observer(
     let at = raw.span().start;
     let raw = raw.get_ref();
     let name = check.name("observer.name", raw.name.get_ref(), raw.name.span().start)?;
-    let wrong = |message: String, hint: String| check.meaning(&format!("observer \"{name}\""), at, message, Some(hint));
+    let wrong = |message: String, hint: String| check.meaning(format!("observer \"{name}\""), at, message, Some(hint));
     let real_sensors = raw.sensors == RawSignals::Real;
     if real_sensors && !has_sensors {
         let hint = "add a [sensors] table, or remove `sensors`".to_owned();
@@ -174,10 +174,10 @@ fn gains(
     let of = format!("observer \"{observer}\"");
     let key = |name: &str| format!("observer.gains.{name}");
     let number = |name: &str, value: &Option<Number>, range| {
-        check.number(&key(name), check.required(&of, at, name, value.as_ref())?, range)
+        check.number(key(name), check.required(&of, at, name, value.as_ref())?, range)
     };
     let pair = |name: &str, value: &Option<Numbers>, range| -> Result<[f64; 2], ConfigError> {
-        check.array(&key(name), check.required(&of, at, name, value.as_ref())?, range)
+        check.array(key(name), check.required(&of, at, name, value.as_ref())?, range)
     };
     let rigid = raw.torque_phase_pa_s_rad.is_some() || raw.inertia_phase_pa_s_rad.is_some();
     let sliding = raw.torque_speed_rad_s2.is_some()

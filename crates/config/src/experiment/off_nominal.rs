@@ -125,7 +125,7 @@ pub(super) fn off_nominal(
     throttle_points: usize,
 ) -> Result<OffNominal, ConfigError> {
     let optional = |key: &str, value: &Option<Number>, range| {
-        value.as_ref().map(|value| check.number(&format!("off_nominal.{key}"), value, range)).transpose()
+        value.as_ref().map(|value| check.number(format_args!("off_nominal.{key}"), value, range)).transpose()
     };
     let factor = |key: &str, value| Ok(optional(key, value, 0.1..=10.0)?.unwrap_or(1.0));
     Ok(OffNominal {

@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::raw::{RawCurrentSensor, RawSensors, RawSensorsFile, RawSpeedSensor};
-use crate::check::{Check, Number};
+use crate::check::{Check, Key, Number};
 use crate::{ConfigError, Source};
 
 /// What goes wrong with the readings of a channel. Observers are not told of it.
@@ -159,7 +159,7 @@ impl Keys<'_> {
         range: RangeInclusive<f64>,
     ) -> Result<f64, ConfigError> {
         match (value, base) {
-            (Some(value), _) => self.check.number(&self.key(key), value, range),
+            (Some(value), _) => self.check.number(self.key(key), value, range),
             (None, Some(base)) => Ok(base),
             (None, None) => Err(self.missing(key)),
         }
@@ -174,7 +174,7 @@ impl Keys<'_> {
         range: RangeInclusive<f64>,
     ) -> Result<f64, ConfigError> {
         match value {
-            Some(value) => self.check.count(&self.key(key), value, range),
+            Some(value) => self.check.count(self.key(key), value, range),
             None => self.number(key, value, base, range),
         }
     }
@@ -197,8 +197,8 @@ impl Keys<'_> {
         })
     }
 
-    fn key(&self, key: &str) -> String {
-        format!("{}.{key}", self.table)
+    fn key<'k>(&'k self, name: &'k str) -> Key<'k> {
+        Key { table: &self.table, name }
     }
 
     fn missing(&self, key: &str) -> ConfigError {
@@ -216,7 +216,7 @@ pub(super) fn sensors(
     let keys = Keys { check, table: table.to_owned(), at: raw.span().start };
     let raw = raw.get_ref();
     let seed = raw.seed.as_ref().map(|seed| *seed.get_ref()).or(base.map(|base| base.seed));
-    let missing_share = raw.missing_share.as_ref().map(|share| check.number(&keys.key("missing_share"), share, SHARES));
+    let missing_share = raw.missing_share.as_ref().map(|share| check.number(keys.key("missing_share"), share, SHARES));
     let missing_share = missing_share.transpose()?;
     let speed = |name: &str, raw: &Option<Spanned<RawSpeedSensor>>, base: Option<&SpeedSensor>| {
         let mut base = base.copied();
@@ -224,7 +224,7 @@ pub(super) fn sensors(
             base.errors.missing_share = share;
         }
         match raw {
-            Some(raw) => speed_sensor(check, keys.key(name), raw, base, missing_share),
+            Some(raw) => speed_sensor(check, keys.key(name).to_string(), raw, base, missing_share),
             None => base.ok_or_else(|| keys.missing(name)),
         }
     };
@@ -235,7 +235,7 @@ pub(super) fn sensors(
     if let Some(raw) = &raw.current {
         // What a scenario changes where the file has no sensor, it changes in an exact one.
         let base = current.or(base.map(|_| CurrentSensor::EXACT));
-        current = Some(current_sensor(check, keys.key("current"), raw, base, missing_share)?);
+        current = Some(current_sensor(check, keys.key("current").to_string(), raw, base, missing_share)?);
     }
     Ok(Sensors {
         seed: seed.ok_or_else(|| keys.missing("seed"))?,
@@ -332,13 +332,13 @@ fn current_sensor(
     let base_of = |value: fn(&CurrentSensor) -> f64| base.as_ref().map(value);
     let or = |value: fn(&CurrentSensor) -> f64, default: f64| Some(base_of(value).unwrap_or(default));
     let sample_time_s = match &raw.sample_time_s {
-        Some(value) => Some(check.number(&keys.key("sample_time_s"), value, 1e-4..=LONGEST_S)?),
+        Some(value) => Some(check.number(keys.key("sample_time_s"), value, 1e-4..=LONGEST_S)?),
         None => base.and_then(|base| base.sample_time_s),
     };
     if let (Some(offset), None) = (&raw.offset_s, sample_time_s) {
         let message = "has no clock of its own without a `sample_time_s`".to_owned();
         let hint = "add `sample_time_s`, or remove `offset_s`".to_owned();
-        return Err(check.meaning(&keys.key("offset_s"), offset.span().start, message, Some(hint)));
+        return Err(check.meaning(keys.key("offset_s"), offset.span().start, message, Some(hint)));
     }
     Ok(CurrentSensor {
         noise_a: keys.number("noise_a", &raw.noise_a, base_of(|s| s.noise_a), 0.0..=1.0)?,

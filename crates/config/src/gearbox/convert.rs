@@ -87,7 +87,8 @@ pub(super) fn stick_diagram(check: &Check<'_>, raw: &RawStickDiagram) -> Result<
 
     let shafts = raw.shaft.get_ref().iter().map(|shaft| {
         let name = name(check, "shaft.name", &shaft.name)?;
-        let inertia_kg_m2 = check.number(&format!("shaft.{name}.inertia_kg_m2"), &shaft.inertia_kg_m2, 1e-5..=50.0)?;
+        let inertia_kg_m2 =
+            check.number(format_args!("shaft.{name}.inertia_kg_m2"), &shaft.inertia_kg_m2, 1e-5..=50.0)?;
         Ok(Shaft { name, inertia_kg_m2 })
     });
     let elements = raw.element.iter().map(|element| {
@@ -238,14 +239,14 @@ fn gear_pair(check: &Check<'_>, raw: &RawGearPair) -> Result<GearPair<String>, C
 
 fn pack(check: &Check<'_>, element: &str, raw: &RawPack) -> Result<Clutch<f64>, ConfigError> {
     let key = |field: &str| format!("element.{element}.pack.{field}");
-    let number = |field: &str, value, range| check.number(&key(field), value, range);
+    let number = |field: &str, value, range| check.number(key(field), value, range);
     let friction = number("friction_coefficient", &raw.friction_coefficient, 0.02..=0.5)?;
     let flat = Table1::new(&SLIPS_RAD_S, &[friction; 2]).map_err(|error| {
-        check.meaning(&key("friction_coefficient"), start(&raw.friction_coefficient), error.to_string(), None)
+        check.meaning(key("friction_coefficient"), start(&raw.friction_coefficient), error.to_string(), None)
     })?;
     Ok(Clutch {
         mean_radius_m: number("mean_radius_m", &raw.mean_radius_m, 0.02..=0.5)?,
-        friction_faces: check.count(&key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
+        friction_faces: check.count(key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
         piston_area_m2: number("piston_area_m2", &raw.piston_area_m2, 0.001..=0.05)?,
         return_spring_n: number("return_spring_n", &raw.return_spring_n, 0.0..=10e3)?,
         static_friction: friction,
@@ -254,17 +255,17 @@ fn pack(check: &Check<'_>, element: &str, raw: &RawPack) -> Result<Clutch<f64>, 
 }
 
 fn ratio(check: &Check<'_>, gear: &str, value: &Number) -> Result<f64, ConfigError> {
-    check.number(&format!("gear.{gear}.ratio"), value, -50.0..=50.0)
+    check.number(format_args!("gear.{gear}.ratio"), value, -50.0..=50.0)
 }
 
 fn turbine_max(check: &Check<'_>, gear: &str, value: Option<&Number>) -> Result<Option<f64>, ConfigError> {
-    value.map(|value| check.number(&format!("gear.{gear}.turbine_max_n_m"), value, 1.0..=1e4)).transpose()
+    value.map(|value| check.number(format_args!("gear.{gear}.turbine_max_n_m"), value, 1.0..=1e4)).transpose()
 }
 
 fn engaged_gear(check: &Check<'_>, raw: &RawEngagedGear) -> Result<EngagedGear, ConfigError> {
     let name = name(check, "gear.name", &raw.name)?;
     let stated = |value: &Number| -> Result<StatedRatio, ConfigError> {
-        let number = check.number(&format!("gear.{name}.stated_ratio"), value, -50.0..=50.0)?;
+        let number = check.number(format_args!("gear.{name}.stated_ratio"), value, -50.0..=50.0)?;
         Ok(StatedRatio { value: number, decimals: decimals(check.text(value.span())) })
     };
     Ok(EngagedGear {
@@ -285,7 +286,7 @@ fn decimals(text: &str) -> i32 {
 
 fn shift_mass(check: &Check<'_>, raw: &Spanned<RawShiftMass>) -> Result<ShiftMass, ConfigError> {
     let mass = raw.get_ref();
-    let number = |key: &str, value, range| check.number(&format!("shift_mass.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("shift_mass.{key}"), value, range);
     let gears: &[String; 2] = mass.gears.as_slice().try_into().map_err(|_| {
         let message = format!("has {} names, expected the two gears of a shift", mass.gears.len());
         check.meaning("shift_mass.gears", start(raw), message, None)

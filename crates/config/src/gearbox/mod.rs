@@ -74,5 +74,5 @@ fn meaning(check: &Check<'_>, spans: &Spans, finding: &Finding) -> ConfigError {
         Part::Mass(at) => ("shift_mass", at),
     };
     let (offset, part) = spans.part(list, at);
-    check.meaning(&format!("{part}.{key}"), offset, finding.to_string(), finding.fault.hint())
+    check.meaning(format!("{part}.{key}"), offset, finding.to_string(), finding.fault.hint())
 }

@@ -1,8 +1,7 @@
 //! The factors of a study in its experiment, and in others.
 
-use toml::Table;
-
 use super::{Factor, Study, Target, changed};
+use crate::tree::Tree;
 use crate::{ConfigError, Experiment, Source, Vehicle};
 
 impl Study {
@@ -22,33 +21,34 @@ impl Study {
     /// # Errors
     /// As [`Self::varied`].
     pub fn varied_experiment(&self, other: &Experiment, values: &[f64]) -> Result<Experiment, ConfigError> {
-        let table = experiment_table(other)?;
+        let tree = experiment_tree(other)?;
         let changes = (self.factors.iter().zip(values.iter().copied()))
-            .filter(|(factor, _)| factor.target == Target::Experiment && table.contains_key(&factor.path[0]));
-        changed_experiment(other, &table, changes)
+            .filter(|(factor, _)| factor.target == Target::Experiment && tree.has(&factor.path[0]));
+        changed_experiment(other, &tree, changes)
     }
 }
 
-/// The table of an experiment file that the runs of a study change. Every run reads it again; tables that no run needs
+/// The values of an experiment file that the runs of a study change. Every run checks them again; tables that no run needs
 /// would only take time.
-pub(super) fn experiment_table(experiment: &Experiment) -> Result<Table, ConfigError> {
-    let mut table: Table = experiment.source.parse()?;
+pub(super) fn experiment_tree(experiment: &Experiment) -> Result<Tree, ConfigError> {
+    let mut tree = Tree::of(&experiment.source)?;
     for unused in ["scenario", "observer"] {
-        table.remove(unused);
+        tree.remove(unused);
     }
-    Ok(table)
+    Ok(tree)
 }
 
 /// The experiment with changed values, and with the observers and what they are told of the sensors as before.
 pub(super) fn changed_experiment<'a>(
     experiment: &Experiment,
-    table: &Table,
+    tree: &Tree,
     changes: impl Iterator<Item = (&'a Factor, f64)>,
 ) -> Result<Experiment, ConfigError> {
     let mut changes = changes.peekable();
     if changes.peek().is_none() {
         return Ok(experiment.clone());
     }
-    let changed = Experiment::from_source(changed(&experiment.source, table, changes)?)?;
+    let source = &experiment.source;
+    let changed = Experiment::from_tree(source, &changed(source, tree, changes)?)?;
     Ok(Experiment { observers: experiment.observers.clone(), sensors_told: experiment.sensors_told, ..changed })
 }

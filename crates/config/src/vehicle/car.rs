@@ -246,7 +246,7 @@ struct RawElementClutch {
 }
 
 fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) -> Result<LockUp, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("lock_up.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("lock_up.{key}"), value, range);
     let at = raw.first_gear.span().start;
     if matches!(car.launch, RawLaunch::Clutch) {
         let message = "the car has no converter".to_owned();
@@ -326,15 +326,15 @@ fn clutches(
             clutch.static_friction = clutch.static_friction.max(clutch.friction.at(0.0));
         }
         if let Some(value) = own.and_then(|own| own.static_friction.as_ref()) {
-            clutch.static_friction = check.number(&key("static_friction"), value, 0.02..=0.5)?;
+            clutch.static_friction = check.number(key("static_friction"), value, 0.02..=0.5)?;
             let sliding = clutch.friction.at(0.0);
             if clutch.static_friction < sliding {
                 let message = format!("is {}, less than the friction at zero slip, {sliding}", clutch.static_friction);
-                return Err(check.meaning(&key("static_friction"), value.span().start, message, None));
+                return Err(check.meaning(key("static_friction"), value.span().start, message, None));
             }
         }
         let drag_n_m = match own.and_then(|own| own.drag_n_m.as_ref()) {
-            Some(drag) => check.number(&key("drag_n_m"), drag, 0.0..=100.0)?,
+            Some(drag) => check.number(key("drag_n_m"), drag, 0.0..=100.0)?,
             None => drag_n_m,
         };
         let (table, (valve_check, spanned)) = match own.and_then(|own| own.valve.as_ref()) {
@@ -344,7 +344,7 @@ fn clutches(
         let valve = valves::clutch_valve(valve_check, &table, spanned)?;
         reaches(valve_check, &table, &valve, spanned, line_pressure_pa)?;
         let hysteresis_pa = match &spanned.get_ref().hysteresis_pa {
-            Some(half_width) => valve_check.number(&format!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            Some(half_width) => valve_check.number(format_args!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         };
         if clutch.kiss_pressure() >= line_pressure_pa {

@@ -5,7 +5,7 @@ use drivetrain::{Clutch, ClutchValve, Cylinder};
 use super::raw::{RawClutch, RawVehicleFile};
 use super::{fill, valves};
 use crate::ConfigError;
-use crate::check::Check;
+use crate::check::{Check, Key};
 
 /// Half-widths of a valve's hysteresis, Pa.
 pub(crate) const HYSTERESES_PA: std::ops::RangeInclusive<f64> = 0.0..=0.2e6;
@@ -54,37 +54,38 @@ pub(super) fn check(
     oil_degc: f64,
 ) -> Result<ShiftClutch, ConfigError> {
     let raw: &RawClutch = &file.clutch[name];
-    let key = |field: &str| format!("clutch.{name}.{field}");
+    let table = format!("clutch.{name}");
+    let key = |name: &'static str| Key { table: &table, name };
     let friction = check.table(
-        (&key("friction.slip_rad_s"), &raw.friction.slip_rad_s, 0.0..=2e3),
-        (&key("friction.coefficient"), &raw.friction.coefficient, 0.02..=0.5),
+        (key("friction.slip_rad_s"), &raw.friction.slip_rad_s, 0.0..=2e3),
+        (key("friction.coefficient"), &raw.friction.coefficient, 0.02..=0.5),
     )?;
     let clutch = Clutch {
-        mean_radius_m: check.number(&key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
-        friction_faces: check.count(&key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
-        piston_area_m2: check.number(&key("piston_area_m2"), &raw.piston_area_m2, 0.001..=0.05)?,
-        return_spring_n: check.number(&key("return_spring_n"), &raw.return_spring_n, 0.0..=10e3)?,
-        static_friction: check.number(&key("static_friction"), &raw.static_friction, 0.02..=0.5)?,
+        mean_radius_m: check.number(key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
+        friction_faces: check.count(key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
+        piston_area_m2: check.number(key("piston_area_m2"), &raw.piston_area_m2, 0.001..=0.05)?,
+        return_spring_n: check.number(key("return_spring_n"), &raw.return_spring_n, 0.0..=10e3)?,
+        static_friction: check.number(key("static_friction"), &raw.static_friction, 0.02..=0.5)?,
         friction,
     };
     let (holding, sliding) = (clutch.static_friction, clutch.friction.at(0.0));
     if holding < sliding {
         let message = format!("is {holding}, less than the value of `friction` at zero slip, {sliding}");
         let hint = "with a smaller static friction the clutch could neither stick nor slip".to_owned();
-        return Err(check.meaning(&key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
+        return Err(check.meaning(key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
     }
     let valve = &raw.valve;
     if let Some(zero) = &valve.get_ref().zero_pressure_a {
         let message = "is for cars with a gearbox file".to_owned();
         let hint = "the observers of a single shift know valves only whose pressure rises with the current".to_owned();
-        return Err(check.meaning(&key("valve.zero_pressure_a"), zero.span().start, message, Some(hint)));
+        return Err(check.meaning(key("valve.zero_pressure_a"), zero.span().start, message, Some(hint)));
     }
-    let (cylinder, has_stroke) = fill::cylinder(check, &key("fill"), raw.fill.as_ref(), &clutch, oil_degc)?;
+    let (cylinder, has_stroke) = fill::cylinder(check, &format!("{table}.fill"), raw.fill.as_ref(), &clutch, oil_degc)?;
     Ok(ShiftClutch {
         clutch,
-        valve: valves::clutch_valve(check, &key("valve"), valve)?,
+        valve: valves::clutch_valve(check, &format!("{table}.valve"), valve)?,
         hysteresis_pa: match &valve.get_ref().hysteresis_pa {
-            Some(half_width) => check.number(&key("valve.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            Some(half_width) => check.number(key("valve.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         },
         cylinder,

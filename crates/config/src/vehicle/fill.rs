@@ -36,9 +36,8 @@ pub(super) fn cylinder(
 ) -> Result<(Cylinder<f64>, bool), ConfigError> {
     let mut cylinder = Cylinder::of_clutch(clutch).with_oil(oil_degc);
     let Some(raw) = raw else { return Ok((cylinder, true)) };
-    let key = |field: &str| format!("{table}.{field}");
     let number = |field: &str, value: &Option<Number>, default: f64, range| match value {
-        Some(value) => check.number(&key(field), value, range),
+        Some(value) => check.number(format_args!("{table}.{field}"), value, range),
         None => Ok(default),
     };
     let stroke_m = cylinder.stroke_m3 / clutch.piston_area_m2;

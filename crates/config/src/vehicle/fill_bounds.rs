@@ -63,7 +63,7 @@ pub(super) fn bounds(
     let given = raw.oil_temperature_degc.as_ref();
     let [cold, hot] = interval(check, "oil_temperature_degc", given, oil_degc, oil, OIL_TEMPERATURES_DEGC)?;
     let number = |key: &str, given: &Option<Number>, default: f64, allowed| match given {
-        Some(given) => check.number(&key_of(key), given, allowed),
+        Some(given) => check.number(key_of(key), given, allowed),
         None => Ok(default),
     };
     let (flow, leak) = (cylinder.flow_max_m3_s, cylinder.leak_m3_s_pa);
@@ -95,14 +95,14 @@ fn interval(
     allowed: RangeInclusive<f64>,
 ) -> Result<[f64; 2], ConfigError> {
     let Some(given) = given else { return Ok(default) };
-    let [least, greatest] = check.pair(&key_of(key), given, allowed)?;
+    let [least, greatest] = check.pair(key_of(key), given, allowed)?;
     if (least..=greatest).contains(&value) {
         return Ok([least, greatest]);
     }
     let message = format!(
         "{least} to {greatest} does not contain {value}: the car of this file would be outside its own error budget"
     );
-    Err(check.meaning(&key_of(key), given.span().start, message, None))
+    Err(check.meaning(key_of(key), given.span().start, message, None))
 }
 
 /// Preload and kiss pressure.
@@ -117,7 +117,7 @@ fn plateau(check: &Check<'_>, raw: &RawFillBounds, cylinder: &Cylinder<f64>) -> 
         Some(place) if preload[0] > kiss[0] || preload[1] > kiss[1] => {
             let message = format!("{preload:?} Pa is above `kiss_pressure_pa`, {kiss:?} Pa");
             let hint = "the return spring is longer with the piston on its stop than at the kiss point".to_owned();
-            Err(check.meaning(&key_of("preload_pressure_pa"), place.span().start, message, Some(hint)))
+            Err(check.meaning(key_of("preload_pressure_pa"), place.span().start, message, Some(hint)))
         }
         _ => Ok([preload, kiss]),
     }

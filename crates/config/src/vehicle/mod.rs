@@ -20,6 +20,7 @@ use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
+use crate::tree::Tree;
 use crate::{ConfigError, Kind, Source};
 pub use car::{Car, LockUp};
 pub(crate) use clutch::HYSTERESES_PA;
@@ -267,7 +268,8 @@ impl Vehicle {
     }
 
     fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
-        let vehicle = Self::checked(&Layers { source: &source, over: Some(over) })?;
+        let layers = Layers { source: &source, over: Some(over) };
+        let vehicle = Self::checked(&Check { layers }, &layers.parse()?)?;
         let path = format!("{} with {}", source.path.display(), over.path.display());
         Ok(Self { source: Source { path: path.into(), text: source.text + &over.text }, ..vehicle })
     }
@@ -294,26 +296,29 @@ impl Vehicle {
             let hint = "`simulate`, `demo`, `bench`, `estimate` and `check` take it; designs, studies and fits need a file with [gear_train]";
             return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
         }
-        let vehicle = Self::checked(&Layers { source: &source, over: None })?;
+        let vehicle = Self::checked(&Check::of(&source), &source.parse()?)?;
         Ok(Self { source, ..vehicle })
     }
 
-    /// The vehicle that these files describe, whose source is left to be filled in.
-    fn checked(layers: &Layers<'_>) -> Result<Self, ConfigError> {
-        let raw: RawVehicleFile = layers.parse()?;
-        let check = Check { layers: *layers };
-        let gear = gear_train::check(&check, &raw)?;
-        let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
-        let clutch = |name: &str| clutch::check(&check, name, &raw, oil_temperature_degc);
+    /// The vehicle of a file some of whose values may have been changed.
+    pub(crate) fn from_tree(source: &Source, tree: &Tree) -> Result<Self, ConfigError> {
+        let vehicle = Self::checked(&Check::of(source), &tree.read(source)?)?;
+        Ok(Self { source: source.clone(), ..vehicle })
+    }
+
+    /// The vehicle that these values describe, whose source is left to be filled in.
+    fn checked(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Self, ConfigError> {
+        let gear = gear_train::check(check, raw)?;
+        let oil_temperature_degc = oil_temperature(check, &raw.oil)?;
+        let clutch = |name: &str| clutch::check(check, name, raw, oil_temperature_degc);
         // A clutch that this shift leaves alone is checked like the others.
         for name in raw.clutch.keys() {
             clutch(name)?;
         }
         let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
-        let (driveline, tyre) = (driveline(&check, &raw.driveline)?, tyre(&check, &raw.tyre)?);
-        let error_bounds =
-            error_bounds(&check, &raw.design.error_bounds, &oncoming, oil_temperature(&check, &raw.oil)?)?;
-        let road = road(&check, &raw.vehicle)?;
+        let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
+        let error_bounds = error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
+        let road = road(check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
         let limits = InputLimits {
             speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.observer.speed_max_rad_s, 100.0..=5e3)?,
@@ -322,42 +327,42 @@ impl Vehicle {
             shaft_torque_max_n_m: SHAFT_OVER_TYRES * tyre.max_force_n * road.wheel_radius_m,
         };
         let command_max = limits.command_max + error_bounds.command;
-        valves::clutch_can_engage(&check, &oncoming, &limits, raw.observer.command_max.span().start)?;
+        valves::clutch_can_engage(check, &oncoming, &limits, raw.observer.command_max.span().start)?;
         for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
             valves::settled_pressure_rises(
-                &check,
+                check,
                 &format!("clutch.{name}.valve"),
                 &clutch.valve,
                 &raw.clutch[name].valve,
                 command_max,
             )?;
         }
-        let observer_valve = valves::observer_valve(&check, &raw.observer.valve, &oncoming.valve)?;
+        let observer_valve = valves::observer_valve(check, &raw.observer.valve, &oncoming.valve)?;
         let command_kind = observer_valve.command_kind();
-        let supervisor = supervisor(&check, &raw.observer, kiss_pressure_pa)?;
+        let supervisor = supervisor(check, &raw.observer, kiss_pressure_pa)?;
         Ok(Self {
             name: raw.name.clone(),
-            engine: engine(&check, &raw.engine)?,
-            converter: converter(&check, &raw.converter)?,
+            engine: engine(check, &raw.engine)?,
+            converter: converter(check, &raw.converter)?,
             shift: gear.reduced,
             output_inertia_kg_m2: gear.output_inertia_kg_m2,
             offgoing,
             oncoming,
             driveline,
-            backlash_rad: backlash(&check, &raw.driveline)?,
+            backlash_rad: backlash(check, &raw.driveline)?,
             oil_temperature_degc,
             tyre,
             road,
             observer_valve,
-            uncertainty: valves::uncertainty(&check, &raw.observer.uncertainty, command_kind)?,
+            uncertainty: valves::uncertainty(check, &raw.observer.uncertainty, command_kind)?,
             supervisor,
             limits,
-            torque_phase: requirement(&check, "design.torque_phase", &raw.design.torque_phase)?,
-            inertia_phase: requirement(&check, "design.inertia_phase", &raw.design.inertia_phase)?,
-            compliant_torque_phase: compliant(&check, "torque_phase", &raw.design.compliant.torque_phase)?,
-            compliant_inertia_phase: compliant(&check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
+            torque_phase: requirement(check, "design.torque_phase", &raw.design.torque_phase)?,
+            inertia_phase: requirement(check, "design.inertia_phase", &raw.design.inertia_phase)?,
+            compliant_torque_phase: compliant(check, "torque_phase", &raw.design.compliant.torque_phase)?,
+            compliant_inertia_phase: compliant(check, "inertia_phase", &raw.design.compliant.inertia_phase)?,
             error_bounds,
-            filter: filter(&check, &raw.observer.filter)?,
+            filter: filter(check, &raw.observer.filter)?,
             shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
             source: Source { path: PathBuf::new(), text: String::new() },
         })
@@ -373,7 +378,7 @@ fn engine(check: &Check<'_>, raw: &RawEngine) -> Result<Engine<f64>, ConfigError
 }
 
 fn driveline(check: &Check<'_>, raw: &RawDriveline) -> Result<Driveline<f64>, ConfigError> {
-    let number = |key: &str, value: &Number, range| check.number(&format!("driveline.{key}"), value, range);
+    let number = |key: &str, value: &Number, range| check.number(format_args!("driveline.{key}"), value, range);
     Ok(Driveline {
         final_ratio: number("final_ratio", &raw.final_ratio, 0.5..=10.0)?,
         shaft_stiffness_n_m_rad: number("shaft_stiffness_n_m_rad", &raw.shaft_stiffness_n_m_rad, 500.0..=200e3)?,
@@ -403,11 +408,11 @@ fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, Conf
     let key = "engine.torque.torque_n_m";
     let rows = raw.torque_n_m.get_ref();
     for (i, row) in rows.iter().enumerate() {
-        check.numbers(&format!("{key}[{i}]"), row, -2e3..=3e3)?;
+        check.numbers(format_args!("{key}[{i}]"), row, -2e3..=3e3)?;
         if row.get_ref().len() != throttle.len() {
             let message =
                 format!("the row has {} torques, but `throttle` has {} positions", row.get_ref().len(), throttle.len());
-            return Err(check.meaning(&format!("{key}[{i}]"), row.span().start, message, None));
+            return Err(check.meaning(format!("{key}[{i}]"), row.span().start, message, None));
         }
     }
     let values: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
@@ -490,7 +495,7 @@ fn road(check: &Check<'_>, raw: &RawRoad) -> Result<RoadLoad<f64>, ConfigError> 
 fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Result<Supervisor<f64>, ConfigError> {
     let raw = &raw.supervisor;
     let number = |key: &str, value: &crate::check::Number, range| {
-        check.number(&format!("observer.supervisor.{key}"), value, range)
+        check.number(format_args!("observer.supervisor.{key}"), value, range)
     };
     Ok(Supervisor {
         kiss_pressure_pa,
@@ -501,7 +506,7 @@ fn supervisor(check: &Check<'_>, raw: &RawObserver, kiss_pressure_pa: f64) -> Re
 }
 
 fn requirement(check: &Check<'_>, table: &str, raw: &RawRequirement) -> Result<DesignRequirement, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("{table}.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("{table}.{key}"), value, range);
     Ok(DesignRequirement {
         settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
         kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
@@ -515,7 +520,7 @@ fn compliant(
     phase: &str,
     raw: &RawCompliantRequirement,
 ) -> Result<CompliantRequirement, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("design.compliant.{phase}.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("design.compliant.{phase}.{key}"), value, range);
     Ok(CompliantRequirement {
         settling_time_s: number("settling_time_s", &raw.settling_time_s, 0.005..=10.0)?,
         kappa1_per_s: raw.kappa1_per_s.as_ref().map(|value| number("kappa1_per_s", value, 0.01..=1e4)).transpose()?,
@@ -545,7 +550,7 @@ fn error_matrix(check: &Check<'_>, phase: &str, rows: &Spanned<Vec<Numbers>>) ->
 }
 
 fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigError> {
-    let number = |key: &str, value, range| check.number(&format!("observer.filter.{key}"), value, range);
+    let number = |key: &str, value, range| check.number(format_args!("observer.filter.{key}"), value, range);
     Ok(FilterSettings {
         turbine_share: number("turbine_share", &raw.turbine_share, 1e-4..=1.0)?,
         turbine_share_s: number("turbine_share_s", &raw.turbine_share_s, 0.01..=1e3)?,
@@ -575,9 +580,10 @@ fn error_bounds(
     oil_degc: f64,
 ) -> Result<ErrorBounds, ConfigError> {
     let (at, raw) = (spanned.span().start, spanned.get_ref());
-    let number = |key: &str, value: &Number, range| check.number(&format!("design.error_bounds.{key}"), value, range);
+    let number =
+        |key: &str, value: &Number, range| check.number(format_args!("design.error_bounds.{key}"), value, range);
     let range =
-        |key: &str, values: &Numbers, allowed| check.pair(&format!("design.error_bounds.{key}"), values, allowed);
+        |key: &str, values: &Numbers, allowed| check.pair(format_args!("design.error_bounds.{key}"), values, allowed);
     let factor = |key: &str, values: &Numbers, allowed| {
         let factors = range(key, values, allowed)?;
         if (factors[0]..=factors[1]).contains(&1.0) {

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::raw::{RawClutchValve, RawErrorBounds, RawUncertainty, RawValve, RawValveKind};
 use super::{ShiftClutch, Uncertainty, ValveUncertainty};
 use crate::ConfigError;
-use crate::check::{Check, Number, Numbers};
+use crate::check::{Check, Key, Number, Numbers};
 
 /// Time constants of a proportional valve, s.
 const TIME_CONSTANTS_S: RangeInclusive<f64> = 0.001..=2.0;
@@ -44,11 +44,14 @@ pub(super) fn clutch_valve(
     spanned: &Spanned<RawClutchValve>,
 ) -> Result<ClutchValve<f64>, ConfigError> {
     let (at, raw) = (spanned.span().start, spanned.get_ref());
-    let key = |name: &str| format!("{table}.{name}");
+    let key = |name: &'static str| Key { table, name };
     let (delay_at, delay) = (raw.delay.span().start, raw.delay.get_ref());
     let delays = |axis: &str, points: &Option<Numbers>, range| {
-        let points = check.required(&key("delay"), delay_at, axis, points.as_ref())?;
-        check.table((&key(&format!("delay.{axis}")), points, range), (&key("delay.delay_s"), &delay.delay_s, 0.0..=0.5))
+        let points = check.required(key("delay"), delay_at, axis, points.as_ref())?;
+        check.table(
+            (format_args!("{table}.delay.{axis}"), points, range),
+            (key("delay.delay_s"), &delay.delay_s, 0.0..=0.5),
+        )
     };
     let hint = "proportional: lag, gain, delay over current_a; pulse-width: flow_sqrt_pa_s, line_pressure_pa, delay \
                 over duty_percent";
@@ -60,12 +63,12 @@ pub(super) fn clutch_valve(
             let gain = check.required(table, at, "gain", raw.gain.as_ref())?.get_ref();
             let maps = ValveMaps {
                 time_constant_s: check.table(
-                    (&key("lag.pressure_pa"), &lag.pressure_pa, 0.0..=10e6),
-                    (&key("lag.time_constant_s"), &lag.time_constant_s, TIME_CONSTANTS_S),
+                    (key("lag.pressure_pa"), &lag.pressure_pa, 0.0..=10e6),
+                    (key("lag.time_constant_s"), &lag.time_constant_s, TIME_CONSTANTS_S),
                 )?,
                 gain_pa_a: check.table(
-                    (&key("gain.current_a"), &gain.current_a, 0.0..=10.0),
-                    (&key("gain.gain_pa_a"), &gain.gain_pa_a, GAINS_PA_A),
+                    (key("gain.current_a"), &gain.current_a, 0.0..=10.0),
+                    (key("gain.gain_pa_a"), &gain.gain_pa_a, GAINS_PA_A),
                 )?,
                 delay_s: delays("current_a", &delay.current_a, 0.0..=10.0)?,
             };
@@ -90,7 +93,7 @@ fn pulse_width(
     line_pressure_pa: &Option<Number>,
 ) -> Result<PulseWidth<f64>, ConfigError> {
     let number = |name: &str, value: &Option<Number>, range| {
-        check.number(&format!("{table}.{name}"), check.required(table, at, name, value.as_ref())?, range)
+        check.number(format_args!("{table}.{name}"), check.required(table, at, name, value.as_ref())?, range)
     };
     Ok(PulseWidth {
         flow_sqrt_pa_s: number("flow_sqrt_pa_s", flow_sqrt_pa_s, FLOWS)?,
@@ -168,7 +171,7 @@ pub(super) fn observer_valve(
     let table = "observer.valve";
     let (at, raw) = (spanned.span().start, spanned.get_ref());
     let number = |name: &str, value: &Option<Number>, range| {
-        check.number(&format!("{table}.{name}"), check.required(table, at, name, value.as_ref())?, range)
+        check.number(format_args!("{table}.{name}"), check.required(table, at, name, value.as_ref())?, range)
     };
     let hint = "proportional: time_constant_s, gain_pa_a; pulse-width: flow_sqrt_pa_s, line_pressure_pa";
     let valve = match raw.kind {
@@ -201,7 +204,7 @@ pub(super) fn uncertainty(
     let table = "observer.uncertainty";
     let (at, raw) = (spanned.span().start, spanned.get_ref());
     let pair = |key: &str, numbers: &Numbers, range| {
-        check.pair(&format!("{table}.{key}"), numbers, range).map(<(f64, f64)>::from)
+        check.pair(format_args!("{table}.{key}"), numbers, range).map(<(f64, f64)>::from)
     };
     let hint = "proportional: time_constant_s; pulse-width: pressure_drop_pa";
     let valve = match kind {
@@ -236,5 +239,5 @@ pub(super) fn command_error(
         CommandKind::DutyCycle => ("duty_percent", &raw.duty_percent, &raw.current_a, DUTY_CYCLES),
     };
     refuse_foreign(check, table, &[place(foreign)], hint)?;
-    check.number(&format!("{table}.{key}"), check.required(table, at, key, value.as_ref())?, range)
+    check.number(format_args!("{table}.{key}"), check.required(table, at, key, value.as_ref())?, range)
 }

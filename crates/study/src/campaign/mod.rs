@@ -12,5 +12,5 @@ pub mod summary;
 pub use execute::{execute, in_order};
 pub use layout::{Layout, Metric, PHASES};
 pub use plan::{factor_values, run_seed};
-pub use row::{Campaign, Row, Run, Status};
+pub use row::{Campaign, Row, Run, Status, keep_scored};
 pub use summary::{COMPARED, Distribution, FactorEffect, Relative, Summary};

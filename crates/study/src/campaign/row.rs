@@ -1,7 +1,9 @@
 //! One run of a study.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use config::study::QUALITY;
 use config::{ConfigError, Study, Varied};
@@ -9,11 +11,11 @@ use design::DesignError;
 use plant::PlantError;
 use trace::Trace;
 
-use super::layout::Layout;
+use super::layout::{Layout, PHASES};
 use super::plan::{factor_values, run_seed};
 use crate::comparison::{ObserverRun, observers, run_observers};
-use crate::drive::simulate_shift;
-use crate::{AnyObserver, ShiftQuality, StudyError};
+use crate::drive::simulate_shift_over;
+use crate::{AnyObserver, ShiftQuality, StudyError, true_phases};
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -84,6 +86,8 @@ pub struct Campaign {
     /// Positions in a row.
     pub layout: Layout,
     observers: Option<Vec<AnyObserver>>,
+    /// Traces of runs that are scored: the memory of the next ones.
+    spare: Mutex<Vec<Trace>>,
 }
 
 /// A run in full, for a closer look.
@@ -115,7 +119,8 @@ impl Campaign {
     pub fn new(study: Study) -> Result<Self, DesignError> {
         let layout = Layout::of(&study);
         let observers = observers(&study.vehicle, &study.experiment)?;
-        Ok(Self { observers: (!study.varies_vehicle()).then_some(observers), layout, study })
+        let observers = (!study.varies_vehicle()).then_some(observers);
+        Ok(Self { observers, layout, study, spare: Mutex::default() })
     }
 
     /// Makes a run. What can go wrong in it is its status.
@@ -134,23 +139,17 @@ impl Campaign {
     pub fn row_at(&self, run: u64, values: &[f64]) -> Result<Row, StudyError> {
         let seed = run_seed(&self.study, run);
         let mut numbers = values.to_vec();
-        let attempt = catch_unwind(AssertUnwindSafe(|| self.full(values, seed)));
+        let attempt = catch_unwind(AssertUnwindSafe(|| self.scored(values, seed)));
         let Ok(attempt) = attempt else {
             numbers.resize(self.layout.width(), f64::NAN);
             return Ok(Row { run, seed, status: Status::Crashed, numbers });
         };
         let status = match attempt {
-            Ok(run) => {
-                let status = match run.quality {
-                    None => Status::NoLockUp,
-                    Some(quality) if quality.least_shaft_torque_n_m < 0.0 => Status::TieUp,
-                    Some(_) => Status::Ok,
-                };
-                if let Some(quality) = &run.quality {
-                    numbers.extend(quality_numbers(quality));
-                    numbers.extend(self.layout.scores(&run.observers));
-                }
-                status
+            Ok(None) => Status::NoLockUp,
+            Ok(Some((quality, observers))) => {
+                numbers.extend(quality_numbers(&quality));
+                numbers.extend(self.layout.scores(&observers));
+                if quality.least_shaft_torque_n_m < 0.0 { Status::TieUp } else { Status::Ok }
             }
             Err(RunError::Refused(_)) => Status::Refused,
             Err(RunError::Plant(_)) => Status::Diverged,
@@ -206,27 +205,64 @@ impl Campaign {
         })
     }
 
+    /// What the row of a run holds; nothing if the shift was not completed.
+    fn scored(&self, values: &[f64], seed: u64) -> Result<Option<(ShiftQuality, Vec<ObserverRun>)>, RunError> {
+        let spare = self.spare().pop().unwrap_or_default();
+        let (varied, ready) = self.prepared(values, seed)?;
+        let mut trace = self.drive(&varied, spare)?;
+        let scored = match ShiftQuality::of(&trace, &varied.vehicle.shift) {
+            None => None,
+            Some(quality) => {
+                keep_scored(&mut trace);
+                Some((quality, observed(&varied, &ready, &trace)?))
+            }
+        };
+        self.spare().push(trace);
+        Ok(scored)
+    }
+
+    /// The whole of a run.
     fn full(&self, values: &[f64], seed: u64) -> Result<Run, RunError> {
+        let (varied, ready) = self.prepared(values, seed)?;
+        let trace = self.drive(&varied, Trace::default())?;
+        let quality = ShiftQuality::of(&trace, &varied.vehicle.shift);
+        Ok(Run { observers: observed(&varied, &ready, &trace)?, trace, quality, varied })
+    }
+
+    /// The files of a run, and its observers.
+    fn prepared(&self, values: &[f64], seed: u64) -> Result<(Varied, Cow<'_, [AnyObserver]>), RunError> {
         let mut varied = self.study.varied(values).map_err(RunError::Refused)?;
         if let Some(sensors) = &mut varied.experiment.sensors {
             sensors.seed = seed;
         }
         varied.experiment.adapt_controller();
-        let designed;
         let ready = match &self.observers {
-            Some(ready) => ready,
-            None => {
-                designed = observers(&varied.vehicle, &varied.experiment).map_err(RunError::Design)?;
-                &designed
-            }
+            Some(ready) => Cow::Borrowed(ready.as_slice()),
+            None => Cow::Owned(observers(&varied.vehicle, &varied.experiment).map_err(RunError::Design)?),
         };
-        let trace = simulate_shift(&varied.car, &varied.vehicle, &varied.experiment, self.study.record_before_s)
-            .map_err(RunError::Plant)?;
-        let quality = ShiftQuality::of(&trace, &varied.vehicle.shift);
-        let observers = run_observers(&varied.vehicle, &varied.experiment, ready, &trace)
-            .map_err(|error| RunError::Other(error.into()))?;
-        Ok(Run { trace, observers, quality, varied })
+        Ok((varied, ready))
     }
+
+    fn drive(&self, varied: &Varied, spare: Trace) -> Result<Trace, RunError> {
+        let before_s = self.study.record_before_s;
+        simulate_shift_over(spare, &varied.car, &varied.vehicle, &varied.experiment, before_s).map_err(RunError::Plant)
+    }
+
+    fn spare(&self) -> MutexGuard<'_, Vec<Trace>> {
+        self.spare.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Cuts a recorded shift off after the last of the phases whose scores a row holds.
+pub fn keep_scored(trace: &mut Trace) {
+    let phases = true_phases(trace).unwrap_or_default();
+    let last = phases.iter().rposition(|phase| PHASES.contains(phase));
+    trace.truncate(last.map_or(0, |last| last + 1));
+}
+
+/// The observers over a recorded shift.
+fn observed(varied: &Varied, ready: &[AnyObserver], trace: &Trace) -> Result<Vec<ObserverRun>, RunError> {
+    run_observers(&varied.vehicle, &varied.experiment, ready, trace).map_err(|error| RunError::Other(error.into()))
 }
 
 /// In the order of [`QUALITY`].

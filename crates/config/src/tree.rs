@@ -1,0 +1,259 @@
+//! The values of a file, read once: the runs of a study take them with some of them changed.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde::de::value::{MapDeserializer, SeqDeserializer};
+use serde::de::{self, DeserializeOwned, Deserializer, IntoDeserializer, Visitor};
+use serde_spanned::de::{SpannedDeserializer, is_spanned};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::study::Change;
+use crate::{ConfigError, Source};
+
+/// The values of a file with their places in it.
+#[derive(Debug, Clone)]
+pub(crate) struct Tree {
+    root: Node,
+}
+
+#[derive(Debug, Clone)]
+struct Node {
+    place: Range<usize>,
+    value: Value,
+}
+
+#[derive(Debug, Clone)]
+enum Value {
+    Float(f64),
+    Integer(i64),
+    Switch(bool),
+    Text(Arc<str>),
+    List(Vec<Node>),
+    Table(Vec<(Arc<str>, Node)>),
+}
+
+impl Tree {
+    /// The values of a file.
+    ///
+    /// # Errors
+    /// The text is not TOML.
+    pub(crate) fn of(source: &Source) -> Result<Self, ConfigError> {
+        let value = table(source.table()?.get_ref()).map_err(|place| ConfigError::Syntax {
+            path: source.path.clone(),
+            line: source.line(place),
+            message: "the number is too large".to_owned(),
+        })?;
+        Ok(Self { root: Node { place: 0..source.text.len(), value } })
+    }
+
+    /// Whether the file has this key outside all tables, or this table.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        matches!(&self.root.value, Value::Table(table) if table.iter().any(|(name, _)| **name == *key))
+    }
+
+    /// Takes a key outside all tables, or a table, out of the file.
+    pub(crate) fn remove(&mut self, key: &str) {
+        if let Value::Table(table) = &mut self.root.value {
+            table.retain(|(name, _)| **name != *key);
+        }
+    }
+
+    /// Changes the value at a path. Missing tables are created; an unknown key is refused when the file is checked.
+    ///
+    /// # Errors
+    /// There is no such value, or it is not a number.
+    pub(crate) fn change(&mut self, path: &[String], change: Change, value: f64) -> Result<(), String> {
+        self.root.change(path, change, value)
+    }
+
+    /// The values as raw types; `source` is the file that they were read from.
+    ///
+    /// # Errors
+    /// A key is unknown, or a value has the wrong type.
+    pub(crate) fn read<T: DeserializeOwned>(&self, source: &Source) -> Result<T, ConfigError> {
+        T::deserialize(&self.root).map_err(|wrong| ConfigError::Syntax {
+            path: source.path.clone(),
+            line: source.line(wrong.place.unwrap_or(0)),
+            message: wrong.message,
+        })
+    }
+}
+
+/// The values of a table, or the place of a number that is too large.
+fn table(table: &DeTable<'_>) -> Result<Value, usize> {
+    let entries = table.iter().map(|(key, value)| Ok((Arc::from(&**key.get_ref()), node(value)?)));
+    entries.collect::<Result<_, usize>>().map(Value::Table)
+}
+
+fn node(spanned: &Spanned<DeValue<'_>>) -> Result<Node, usize> {
+    let place = spanned.span();
+    let value = match spanned.get_ref() {
+        DeValue::Float(number) => Value::Float(number.as_str().parse().map_err(|_| place.start)?),
+        DeValue::Integer(number) => {
+            Value::Integer(i64::from_str_radix(number.as_str(), number.radix()).map_err(|_| place.start)?)
+        }
+        DeValue::Boolean(on) => Value::Switch(*on),
+        DeValue::String(text) => Value::Text(Arc::from(&**text)),
+        DeValue::Datetime(time) => Value::Text(time.to_string().into()),
+        DeValue::Array(list) => Value::List(list.iter().map(node).collect::<Result<_, _>>()?),
+        DeValue::Table(inner) => table(inner)?,
+    };
+    Ok(Node { place, value })
+}
+
+impl Node {
+    fn change(&mut self, path: &[String], change: Change, value: f64) -> Result<(), String> {
+        let Some((step, rest)) = path.split_first() else { return self.value.apply(change, value) };
+        match &mut self.value {
+            Value::Table(table) => {
+                let at = match table.iter().position(|(key, _)| **key == **step) {
+                    Some(at) => at,
+                    None if rest.is_empty() && change != Change::Set => {
+                        return Err("the file has no value to change; use `change = \"set\"`".to_owned());
+                    }
+                    None => {
+                        let missing = if rest.is_empty() { Value::Float(value) } else { Value::Table(Vec::new()) };
+                        table.push((step.as_str().into(), Self { place: self.place.clone(), value: missing }));
+                        table.len() - 1
+                    }
+                };
+                table[at].1.change(rest, change, value)
+            }
+            Value::List(list) => {
+                let named = list.iter().position(|item| item.value.name() == Some(step.as_str()));
+                let found = named.or_else(|| step.parse().ok().filter(|&at: &usize| at < list.len()));
+                let at = found.ok_or_else(|| format!("the list has no item `{step}`; items count from 0"))?;
+                list[at].change(rest, change, value)
+            }
+            Value::Float(_) | Value::Integer(_) | Value::Switch(_) | Value::Text(_) => {
+                Err(format!("there is no `{step}`: the key before it is a single value"))
+            }
+        }
+    }
+}
+
+impl Value {
+    /// The value of the key `name` of a table.
+    fn name(&self) -> Option<&str> {
+        let Self::Table(table) = self else { return None };
+        table.iter().find_map(|(key, node)| match &node.value {
+            Self::Text(text) if **key == *"name" => Some(&**text),
+            _ => None,
+        })
+    }
+
+    fn apply(&mut self, change: Change, value: f64) -> Result<(), String> {
+        let new = |old: f64| match change {
+            Change::Set => value,
+            Change::Scale => old * value,
+            Change::Add => old + value,
+        };
+        match self {
+            Self::Float(old) => *old = new(*old),
+            Self::Switch(old) => {
+                *old = match (change, value) {
+                    (Change::Set, 0.0) => false,
+                    (Change::Set, 1.0) => true,
+                    _ => return Err("a switch is 0 (off) or 1 (on)".to_owned()),
+                }
+            }
+            #[expect(clippy::cast_precision_loss, reason = "a number that a person wrote")]
+            Self::Integer(old) => *self = Self::Float(new(*old as f64)),
+            Self::List(list) if change != Change::Set => {
+                return list.iter_mut().try_for_each(|item| item.value.apply(change, value));
+            }
+            Self::List(_) => return Err("a list cannot be set to a number; use `change = \"scale\"`".to_owned()),
+            Self::Text(_) | Self::Table(_) => return Err("the value is not a number".to_owned()),
+        }
+        Ok(())
+    }
+}
+
+/// Why values are not what a raw type holds.
+#[derive(Debug)]
+struct Wrong {
+    message: String,
+    place: Option<usize>,
+}
+
+impl fmt::Display for Wrong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Wrong {}
+
+impl de::Error for Wrong {
+    fn custom<T: fmt::Display>(message: T) -> Self {
+        Self { message: message.to_string(), place: None }
+    }
+}
+
+impl<'de> IntoDeserializer<'de, Wrong> for &'de Node {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'de> Deserializer<'de> for &'de Node {
+    type Error = Wrong;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Wrong> {
+        let read = match &self.value {
+            Value::Float(number) => visitor.visit_f64(*number),
+            Value::Integer(number) => visitor.visit_i64(*number),
+            Value::Switch(on) => visitor.visit_bool(*on),
+            Value::Text(text) => visitor.visit_str(text),
+            Value::List(list) => visitor.visit_seq(SeqDeserializer::new(list.iter())),
+            Value::Table(table) => {
+                visitor.visit_map(MapDeserializer::new(table.iter().map(|(key, node)| (&**key, node))))
+            }
+        };
+        // The innermost value that is wrong gives the place.
+        read.map_err(|wrong| Wrong { place: wrong.place.or(Some(self.place.start)), ..wrong })
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Wrong> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Wrong> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Wrong> {
+        if is_spanned(name) {
+            visitor.visit_map(SpannedDeserializer::new(self, self.place.clone()))
+        } else {
+            self.deserialize_any(visitor)
+        }
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Wrong> {
+        match &self.value {
+            Value::Text(word) => visitor.visit_enum((&**word).into_deserializer()),
+            _ => self.deserialize_any(visitor),
+        }
+    }
+
+    serde::forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
+        tuple_struct map identifier ignored_any
+    }
+}
