@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use observer::Estimate;
 use study::{EstimateColumns, OutputColumn};
-use trace::{CsvWriter, TableWriter};
+use trace::{Cell, ColumnKind, CsvWriter, TableWriter};
 
 use crate::failure::Failure;
 
@@ -61,7 +61,21 @@ impl Output {
         estimate: &Estimate<f64>,
         columns: &[OutputColumn],
     ) -> Result<(), Failure> {
-        let cells = columns.iter().map(|column| column.cell(estimate));
+        self.cells(time_s, columns.iter().map(|column| column.cell(estimate)))
+    }
+
+    /// A row without an estimate.
+    pub(super) fn empty_row(&mut self, time_s: f64, columns: &[OutputColumn]) -> Result<(), Failure> {
+        self.cells(
+            time_s,
+            columns.iter().map(|column| match column.kind() {
+                ColumnKind::Word => Cell::Word(""),
+                ColumnKind::Number | ColumnKind::Whole => Cell::Number(f64::NAN),
+            }),
+        )
+    }
+
+    fn cells<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Failure> {
         match self {
             Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Failure::writing(path, &error)),
             Self::Standard(writer) => Ok(writer.row(time_s, cells)?),
