@@ -68,6 +68,11 @@ impl Fit {
         )];
         lines.extend(self.correlations());
         lines.extend(self.misfits());
+        if !self.is_converged {
+            lines.push(
+                "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
+            );
+        }
         if self.shifts == 1 {
             lines.push(
                 "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),

@@ -2,6 +2,7 @@
 
 mod axis;
 pub mod bench_page;
+pub mod drive_page;
 pub mod error_bound_page;
 pub mod figure;
 pub mod gearbox_figure;
@@ -17,6 +18,7 @@ pub mod study_page;
 pub mod tables;
 
 pub use bench_page::bench_page;
+pub use drive_page::DrivePage;
 pub use error_bound_page::error_bound_page;
 pub use log_page::LogPage;
 pub use page::{Page, PageError};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::{Direction, Load};
+use logs::{Direction, Load, Shift};
 use minijinja::{Value, context};
 use observer::Health;
 use study::shift_estimates::{EstimatedShift, Ranged};
@@ -88,7 +88,7 @@ impl LogPage<'_> {
 }
 
 /// The same figure with its curves to a tenth of a pixel, which is half of their text.
-fn compact(svg: &str) -> String {
+pub(crate) fn compact(svg: &str) -> String {
     let mut parts = svg.split(" d=\"");
     let mut compact = parts.next().unwrap_or_default().to_owned();
     for part in parts {
@@ -112,13 +112,18 @@ fn compact(svg: &str) -> String {
     compact
 }
 
-fn kind(shift: &ShiftEstimate) -> String {
-    let load = match shift.shift.load {
+/// Load and direction in words.
+pub(crate) fn kind_of(shift: &Shift) -> String {
+    let load = match shift.load {
         Load::PowerOn => "power-on ",
         Load::PowerOff => "power-off ",
         Load::Unknown => "",
     };
-    format!("{load}{}", if shift.shift.direction == Direction::Up { "up" } else { "down" })
+    format!("{load}{}", if shift.direction == Direction::Up { "up" } else { "down" })
+}
+
+fn kind(shift: &ShiftEstimate) -> String {
+    kind_of(&shift.shift)
 }
 
 /// Titles and rows of the table of shifts. Columns that no shift fills are left out.
@@ -186,7 +191,7 @@ const SPEEDS: [(&str, Stroke); 3] =
     [("engine", Stroke::THIRD), ("turbine", Stroke::SIGNAL), ("gearbox output", Stroke::SECOND)];
 const ESTIMATE: Stroke = Stroke { colour: RANGE, weight: Weight::Equal, dash: None };
 
-fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
+pub(crate) fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
     Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
 }
 
