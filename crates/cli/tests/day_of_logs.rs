@@ -148,6 +148,9 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
         assert!(one == other, "the files differ");
     }
 
+    // What a browser opens at once, however long the day was.
+    let page = std::fs::metadata(folder.path("out_report.html")).unwrap().len();
+    assert!(page < 5_000_000, "{page}");
     // Of the shifts of the simulated drive, all but those at walking speed are found by their ratio; no sample is called frozen.
     let found = mdf.1[0].lines().filter(|line| line.contains(" to ") && line.contains("power-")).count();
     assert!(found >= 18 * repetitions as usize, "{}", mdf.1[0]);
@@ -215,6 +218,19 @@ fn faults_of_time_stamps_in_a_table_are_counted_and_read_as_with_a_map() {
     assert!((last(&found) - (last(&expected) + 1.0 - 0.21)).abs() < 1e-6, "{} {}", last(&found), last(&expected));
     let [mapped, _] = estimate("reset.csv", &format!("{}\n{resets}", lines[0]), &["--map", &map]);
     assert!(mapped == found);
+
+    // One time stamp that is far too late. What comes after it is not lost for that, and the shift is estimated.
+    let far: String = (lines.iter().enumerate())
+        .map(|(i, line)| match line.split_once(',') {
+            Some((_, rest)) if i == 300 => format!("1000000,{rest}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let [found, notes] = estimate("far.csv", &far, &[]);
+    assert!(notes.contains("1 time stamps are far too late") && notes.contains("shifts: 1 ("), "{notes}");
+    assert!(!notes.contains("not in the command"), "{notes}");
+    let [mapped, _] = estimate("far.csv", &far, &["--map", &map]);
+    assert!(mapped == found && mapped.lines().count() == lines.len() - 20);
 }
 
 /// The drive with one column changed.

@@ -36,6 +36,8 @@ pub struct Fit {
     pub channels: Vec<(Channel, f64, f64)>,
     /// Whether the last step was small; otherwise the iterations were used up.
     pub is_converged: bool,
+    /// Names of the parameters that ended where nothing beyond is held possible.
+    pub at_limit: Vec<String>,
     pub(crate) weights: Weights,
 }
 
@@ -115,11 +117,24 @@ pub fn fit(
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
     let Solved { at, weights, is_converged } = problem.solve(&models, at, weights, (4, 12), &mut say)?;
     let precision = intervals::precision(&problem, &models, &at, &weights, available.pressure)?;
+    let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
+    let at_limit = at_limit.map(|(prior, _)| prior.name.clone()).collect();
     let unknowns = scaled_by_priors(&priors, at.shared);
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
     let channels = channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect();
-    Ok(Fit { unknowns, precision, available, shifts: models.len(), unusable, channels, is_converged, weights, priors })
+    Ok(Fit {
+        unknowns,
+        precision,
+        available,
+        shifts: models.len(),
+        unusable,
+        channels,
+        is_converged,
+        at_limit,
+        weights,
+        priors,
+    })
 }
 
 /// At most so many of the shifts, evenly over all.

@@ -104,7 +104,14 @@ impl Fit {
              another shape than in the vehicle file, which the fit does not change; the intervals are too small"
                 .to_owned()
         };
-        self.channels.iter().filter(|channel| wrong(channel)).map(warn).collect()
+        let limited = (!self.at_limit.is_empty()).then(|| {
+            format!(
+                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not what the channel map \
+                 says; do not use the fitted file before the reason is known",
+                self.at_limit.join(", ")
+            )
+        });
+        self.channels.iter().filter(|channel| wrong(channel)).map(warn).chain(limited).collect()
     }
 
     /// Delays and scale of channels, which belong into a channel map.

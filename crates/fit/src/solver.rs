@@ -188,10 +188,15 @@ impl Problem<'_> {
             gradient[j] += precision * (x - prior.mean);
         }
         let cholesky = matrix.cholesky().ok_or_else(|| not_finite("the parameters"))?;
-        let step = -cholesky.solve(&gradient);
+        let whole = -cholesky.solve(&gradient);
         let inverse = cholesky.inverse();
+        let limited = |j: usize| {
+            let [least, greatest] = self.priors[j].limits();
+            (at.shared[j] + whole[j]).clamp(least, greatest)
+        };
+        let shared: Vec<f64> = (0..whole.len()).map(limited).collect();
+        let step = DVector::from_fn(whole.len(), |j, _| shared[j] - at.shared[j]);
         let size = (0..step.len()).map(|j| step[j].abs() / inverse[(j, j)].sqrt()).fold(0.0, f64::max);
-        let shared = at.shared.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect();
         let own = (at.own.iter().zip(&normal.eliminated))
             .map(|(own, eliminated)| {
                 let step = -eliminated.own.solve(&(&eliminated.gradient + &eliminated.mixed * &step));

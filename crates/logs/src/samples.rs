@@ -110,7 +110,7 @@ pub(crate) trait Stream {
 }
 
 /// A time stamp this far behind the newest one of its stream is not a matter of order on a bus, s.
-const BEHIND_S: f64 = 0.5;
+pub(crate) const BEHIND_S: f64 = 0.5;
 /// So many rising time stamps behind the newest one are a reset of the clock.
 const RESET_AFTER: u32 = 20;
 /// Time from the last sample before a reset to the first after it: unknown, so this is set, s.
@@ -273,7 +273,7 @@ impl<'a> Samples<'a> {
         &self.notes
     }
 
-    /// Resets of clocks so far.
+    /// How often a clock did not simply go on: resets, and stamps that were far too late.
     pub fn resets(&self) -> u32 {
         self.resets
     }
@@ -318,7 +318,8 @@ impl<'a> Samples<'a> {
         let newest_s = merged.clock.newest_s.unwrap_or(sample.time_s);
         self.resets += merged.clock.resets - resets;
         if merged.clock.wrong_jumps > wrong_jumps {
-            // What came with the wrong stamps is not newer than this.
+            // What came with the wrong stamps is not newer than this; whoever has seen them starts again.
+            self.resets += 1;
             for channel in self.channels.iter_mut().filter(|channel| channel.stream == i) {
                 channel.time_s = channel.time_s.min(newest_s.next_down());
             }

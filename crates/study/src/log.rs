@@ -152,9 +152,9 @@ impl Log {
         self.median_step_s
     }
 
-    /// Resets of the clock so far.
+    /// How often the clock did not simply go on: resets, and stamps that were far too late.
     pub fn resets(&self) -> u32 {
-        self.clock.resets()
+        self.clock.resets() + self.clock.wrong_jumps()
     }
 
     /// What was met in the time stamps, in sentences.

@@ -64,6 +64,10 @@ pub struct RecentSamples {
 impl RecentSamples {
     /// Takes the next sample.
     pub fn push(&mut self, sample: LogSample) {
+        // After a time stamp that was far too late, the time goes back.
+        while self.samples.back().is_some_and(|last| last.time_s > sample.time_s) {
+            self.samples.pop_back();
+        }
         self.samples.push_back(sample);
         while self.samples.front().is_some_and(|first| sample.time_s - first.time_s > HELD_S)
             || self.samples.len() > MOST_HELD

@@ -375,7 +375,7 @@ fn push_number(row: &mut Vec<u8>, number: f64) -> io::Result<()> {
 
 /// A word, in quotation marks where it needs them.
 fn push_word(row: &mut Vec<u8>, word: &str) {
-    if !word.contains([',', '"', '\n', '\r']) {
+    if !word.bytes().any(|byte| matches!(byte, b',' | b'"' | b'\n' | b'\r')) {
         row.extend_from_slice(word.as_bytes());
         return;
     }

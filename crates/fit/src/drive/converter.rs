@@ -39,7 +39,7 @@ pub struct Knot {
     pub speed_ratio: f64,
     /// Capacity, N m s^2.
     pub capacity_n_m_s2: f64,
-    /// Its standard deviation, N m s^2.
+    /// Its standard deviation, N m s^2; the bend of the curve between knots is in it.
     pub sd_n_m_s2: f64,
     /// Time that the drive was near it, s.
     pub time_s: f64,
@@ -90,12 +90,13 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     let Some(sd) = solution.deviations(record, &some, &knots, delay_s) else {
         return Err("the speeds and torques do not fit together".to_owned());
     };
+    let bends = bends(&knots, solution.unknowns.as_slice());
     #[expect(clippy::cast_precision_loss, reason = "a count of moments")]
     let per_moment_s = 0.02 * every as f64;
     let knot = |(i, &speed_ratio): (usize, &f64)| Knot {
         speed_ratio,
         capacity_n_m_s2: solution.unknowns[i],
-        sd_n_m_s2: sd[i],
+        sd_n_m_s2: sd[i].hypot(bends[i]),
         time_s: per_moment_s * shares(&some, &knots, i),
     };
     let coupled = Knot { speed_ratio: 1.0, capacity_n_m_s2: 0.0, sd_n_m_s2: 0.0, time_s: 0.0 };
@@ -130,6 +131,19 @@ impl ConverterFit {
         let capacity = self.capacity(moment.speed_ratio()).filter(|_| !moment.no_slip)?;
         (moment.speed_ratio() < COUPLED).then(|| capacity.map(|value| value * moment.engine_rad_s.powi(2)))
     }
+}
+
+/// How far lines between knots lie from a curve through them, at each knot: of a curve with the second derivative `c`, the lines with the least
+/// squares of distances pass its points at a spacing `h` by `c h^2 / 12`.
+fn bends(knots: &[f64], capacities: &[f64]) -> Vec<f64> {
+    let at = |i: usize| knots.get(i).map_or((1.0, 0.0), |ratio| (*ratio, capacities[i]));
+    let bend = |i: usize| {
+        let ((x0, y0), (x1, y1), (x2, y2)) = (at(i - 1), at(i), at(i + 1));
+        let second = 2.0 * ((y2 - y1) / (x2 - x1) - (y1 - y0) / (x1 - x0)) / (x2 - x0);
+        second.abs() * (0.5 * (x2 - x0)).powi(2) / 12.0
+    };
+    // The first knot has a line on one side only: the bend of the next.
+    (0..knots.len()).map(|i| bend(i.max(1))).collect()
 }
 
 /// The knots that the drive was near to.
