@@ -2,7 +2,6 @@
 
 mod axis;
 pub mod bench_page;
-pub mod drive_page;
 pub mod error_bound_page;
 pub mod figure;
 pub mod gearbox_figure;
@@ -14,14 +13,15 @@ pub mod palette;
 pub mod reproduction;
 pub mod sensitivity_page;
 pub mod shift_figure;
+pub mod speeds_page;
 pub mod study_page;
 pub mod tables;
 
 pub use bench_page::bench_page;
-pub use drive_page::DrivePage;
 pub use error_bound_page::error_bound_page;
 pub use log_page::LogPage;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;
 pub use sensitivity_page::sensitivity_page;
+pub use speeds_page::SpeedsPage;
 pub use study_page::StudyPage;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fit::drive::{DriveRecord, fit_converter};
 use logs::{ChannelMap, Direction, Inspection, Load, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder};
-use report::DrivePage;
+use report::SpeedsPage;
 use trace::units::rpm;
 
 use crate::args::Inspect;
@@ -200,7 +200,7 @@ fn page(
     if record.is_cut {
         faults.push("The page shows the first five hours: the drive is longer.".to_owned());
     }
-    let page = DrivePage {
+    let page = SpeedsPage {
         log: &options.log,
         map: map_file.as_ref(),
         record: &record,

@@ -23,7 +23,7 @@ const SHIFT_POINTS: usize = 300;
 const BIN: f64 = 0.02;
 
 /// What a page is made from.
-pub struct DrivePage<'a> {
+pub struct SpeedsPage<'a> {
     /// The log.
     pub log: &'a Path,
     /// The channel map.
@@ -44,7 +44,7 @@ pub struct DrivePage<'a> {
     pub faults: &'a [String],
 }
 
-impl DrivePage<'_> {
+impl SpeedsPage<'_> {
     /// The page; it needs nothing but itself.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ impl DrivePage<'_> {
         let converter = self.converter.as_ref().ok();
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         let inputs: Vec<&Source> = self.map.into_iter().collect();
-        Ok(templates()?.get_template("drive.html")?.render(context! {
+        Ok(templates()?.get_template("speeds.html")?.render(context! {
             name => file,
             title => "drive",
             version => env!("CARGO_PKG_VERSION"),
