@@ -101,7 +101,7 @@ pub(crate) enum Command {
     ///
     ///   wetclutch inspect drive.mf4
     ///   wetclutch inspect drive.blf --dbc bus.dbc --suggest > map.toml
-    ///   wetclutch inspect drive.blf --map map.toml --shifts
+    ///   wetclutch inspect drive.blf --map map.toml --shifts -o drive.html
     #[command(verbatim_doc_comment)]
     Inspect(Inspect),
     /// Estimate pressure and torque from a file of measured signals
@@ -396,6 +396,9 @@ pub(crate) struct Inspect {
     /// List the shifts; needs --map or --channel
     #[arg(long)]
     pub(crate) shifts: bool,
+    /// With --shifts: a page of the drive, with its shifts, the converter, engine torque and the torque at the turbine
+    #[arg(short, long, value_name = "PAGE.html", requires = "shifts")]
+    pub(crate) output: Option<PathBuf>,
     /// Ratios of the forward gears, 1st first; they replace those of the map
     #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
     pub(crate) ratios: Vec<f64>,
@@ -421,7 +424,7 @@ pub(crate) struct Estimate {
     /// their noise and lag; without the file they assume the noise of the error budget and no lag
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// File for the estimate, by its ending CSV, .parquet or .mf4; of several logs the folder for their files. Default:
+    /// File for the estimate, by its ending CSV, .parquet or .mf4, or an existing folder; of several logs the folder for their files. Default:
     /// standard output, as CSV
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
@@ -437,7 +440,7 @@ pub(crate) struct Estimate {
     /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
     #[arg(long)]
     pub(crate) follow: bool,
-    /// Format of the files of several logs
+    /// Format of files in a folder
     #[arg(long, value_enum, default_value_t = FormatChoice::Csv)]
     pub(crate) format: FormatChoice,
     #[command(flatten)]

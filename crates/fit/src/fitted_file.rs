@@ -12,6 +12,9 @@ const CONVERTER_SHARE_MIN: f64 = 0.03;
 
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
+/// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
+/// of the cars\].
+const BUDGET_SIDES: f64 = 4.0;
 
 impl Fit {
     /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
@@ -125,29 +128,40 @@ impl Fit {
 
     /// The error budget: what the fit leaves open of each parameter.
     fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
-        let comment = "what is left open, 95 %";
+        let comment = "what the fit leaves open: 4 standard deviations, and no more than was known before";
         let budget = |key: &str| keys(&["design", "error_bounds", key]);
-        let half = |parameter: Parameter| SIDES * self.sd(parameter).unwrap_or(0.0);
-        let factors = |parameter: Parameter| [(-half(parameter)).exp(), half(parameter).exp()];
+        let half = |parameters: &[Parameter]| {
+            BUDGET_SIDES * parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
+        };
+        // What was known before is a range around the given value; the fitted one lies elsewhere in it. The 95 % interval stays.
+        let factors = |parameters: &[Parameter], given: [f64; 2]| {
+            let (half, value) = (half(parameters), self.value(parameters[0]).unwrap_or(1.0));
+            let [least, greatest] = given.map(|end| end / value);
+            let stated = half * SIDES / BUDGET_SIDES;
+            [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]
+        };
         let mut set = |path: Vec<Step>, values: &[f64]| {
             // Keys that the file leaves at their defaults stay there.
             if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
         };
-        // The shape of the converter's maps is not fitted.
-        let share = half(Parameter::Capacity).clamp(CONVERTER_SHARE_MIN, 1.0);
         let given = &vehicle.error_bounds;
+        // The shape of the converter's maps is not fitted.
+        let capacity = self.value(Parameter::Capacity).unwrap_or(1.0);
+        let known = given.turbine_torque_share + (capacity - 1.0).abs();
+        let share = half(&[Parameter::Capacity, Parameter::TorqueRatio])
+            .clamp(CONVERTER_SHARE_MIN, known.max(CONVERTER_SHARE_MIN));
         set(budget("turbine_torque_share"), &[share])?;
         set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
-        set(budget("friction_factor"), &factors(Parameter::Friction))?;
-        set(budget("valve_gain_factor"), &factors(Parameter::Gain))?;
-        set(budget("valve_lag_factor"), &factors(Parameter::Lag))?;
-        set(budget("shaft_stiffness_factor"), &factors(Parameter::Stiffness))?;
-        set(
-            budget("mass_kg"),
-            &[half(Parameter::Mass) * self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg],
-        )?;
+        let friction = [Parameter::Friction, Parameter::FrictionAtRest, Parameter::FrictionSlope];
+        set(budget("friction_factor"), &factors(&friction, given.friction_factor))?;
+        set(budget("valve_gain_factor"), &factors(&[Parameter::Gain], given.valve_gain_factor))?;
+        set(budget("valve_lag_factor"), &factors(&[Parameter::Lag], given.valve_lag_factor))?;
+        set(budget("shaft_stiffness_factor"), &factors(&[Parameter::Stiffness], given.shaft_stiffness_factor))?;
+        let mass = self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg;
+        let known_kg = given.mass_kg + (mass - vehicle.road.mass_kg).abs();
+        set(budget("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
-            let half_s = crate::parameters::DELAY_UNIT_S * half(Parameter::CommandDelay);
+            let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
             let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
             let (one, other) = (delay(0.0), delay(vehicle.limits.command_max));
             set(budget("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;

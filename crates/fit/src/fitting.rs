@@ -8,7 +8,7 @@ use crate::intervals::{self, Precision};
 use crate::parameters::{self, Available, Prior};
 use crate::record::OutputClock;
 use crate::shift_model::ShiftModel;
-use crate::solver::{Problem, Unknowns};
+use crate::solver::{Problem, Solved, Unknowns};
 use crate::weights::Weights;
 use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord};
 
@@ -34,6 +34,10 @@ pub struct Fit {
     pub unusable: Vec<String>,
     /// One-step scale of each channel, and its gain `g`; zero for a channel without readings.
     pub channels: Vec<(Channel, f64, f64)>,
+    /// Whether the last step was small; otherwise the iterations were used up.
+    pub is_converged: bool,
+    /// Names of the parameters that ended where nothing beyond is held possible.
+    pub at_limit: Vec<String>,
     pub(crate) weights: Weights,
 }
 
@@ -95,7 +99,7 @@ pub fn fit(
     let shared: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
     let start = Unknowns { shared, own: few.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: few.len(), iteration });
-    let (first, weights) = problem.solve(&few, start, Weights::START, (3, 5), &mut say)?;
+    let Solved { at: first, weights, .. } = problem.solve(&few, start, Weights::START, (3, 5), &mut say)?;
     // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
     let clock = OutputClock { delay_s: file.with(&shafts, &priors, &first.shared).output_delay_s, ages };
     let mut unusable = Vec::new();
@@ -111,13 +115,26 @@ pub fn fit(
     }
     let at = Unknowns { shared: first.shared, own: models.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
-    let (at, weights) = problem.solve(&models, at, weights, (4, 12), &mut say)?;
+    let Solved { at, weights, is_converged } = problem.solve(&models, at, weights, (4, 12), &mut say)?;
     let precision = intervals::precision(&problem, &models, &at, &weights, available.pressure)?;
+    let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
+    let at_limit = at_limit.map(|(prior, _)| prior.name.clone()).collect();
     let unknowns = scaled_by_priors(&priors, at.shared);
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
     let channels = channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect();
-    Ok(Fit { unknowns, precision, available, shifts: models.len(), unusable, channels, weights, priors })
+    Ok(Fit {
+        unknowns,
+        precision,
+        available,
+        shifts: models.len(),
+        unusable,
+        channels,
+        is_converged,
+        at_limit,
+        weights,
+        priors,
+    })
 }
 
 /// At most so many of the shifts, evenly over all.

@@ -7,6 +7,7 @@
 
 mod car;
 pub mod collect;
+pub mod drive;
 pub mod error;
 mod fitted_file;
 pub mod fitting;

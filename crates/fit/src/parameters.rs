@@ -131,6 +131,21 @@ pub struct Prior {
     pub sd: f64,
 }
 
+/// Standard deviations from the mean that a value may be away \[chosen: a value that lies anywhere in a range is at most 1.7 away\].
+const POSSIBLE: f64 = 4.0;
+
+impl Prior {
+    /// Least and greatest value that is held possible.
+    pub(crate) fn limits(&self) -> [f64; 2] {
+        [self.mean - POSSIBLE * self.sd, self.mean + POSSIBLE * self.sd]
+    }
+
+    /// Whether a value is at its limit.
+    pub(crate) fn is_at_limit(&self, x: f64) -> bool {
+        (x - self.mean).abs() >= 0.999 * POSSIBLE * self.sd
+    }
+}
+
 /// What the logs have besides speeds and commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Available {

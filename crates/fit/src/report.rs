@@ -68,6 +68,11 @@ impl Fit {
         )];
         lines.extend(self.correlations());
         lines.extend(self.misfits());
+        if !self.is_converged {
+            lines.push(
+                "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
+            );
+        }
         if self.shifts == 1 {
             lines.push(
                 "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),
@@ -99,7 +104,14 @@ impl Fit {
              another shape than in the vehicle file, which the fit does not change; the intervals are too small"
                 .to_owned()
         };
-        self.channels.iter().filter(|channel| wrong(channel)).map(warn).collect()
+        let limited = (!self.at_limit.is_empty()).then(|| {
+            format!(
+                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not what the channel map \
+                 says; do not use the fitted file before the reason is known",
+                self.at_limit.join(", ")
+            )
+        });
+        self.channels.iter().filter(|channel| wrong(channel)).map(warn).chain(limited).collect()
     }
 
     /// Delays and scale of channels, which belong into a channel map.

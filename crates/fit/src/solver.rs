@@ -32,6 +32,14 @@ pub(crate) struct Unknowns {
     pub(crate) own: Vec<Vec<f64>>,
 }
 
+/// Where a fit ended.
+pub(crate) struct Solved {
+    pub(crate) at: Unknowns,
+    pub(crate) weights: Weights,
+    /// The last step was small; otherwise the iterations were used up.
+    pub(crate) is_converged: bool,
+}
+
 /// Normal equations of the parameters with the shifts' own unknowns eliminated.
 pub(crate) struct Normal {
     /// Information of the data, without the priors.
@@ -133,7 +141,8 @@ impl Problem<'_> {
         mut weights: Weights,
         (scaled, most): (u32, u32),
         progress: &mut dyn FnMut(u32),
-    ) -> Result<(Unknowns, Weights), FitError> {
+    ) -> Result<Solved, FitError> {
+        let mut is_converged = false;
         let mut damping = 1e-3;
         let mut residuals = self.residuals(shifts, &at);
         for iteration in 0..most {
@@ -158,14 +167,15 @@ impl Problem<'_> {
                     break;
                 }
                 damping = (damping * 8.0).max(1e-6);
-                // Nothing smaller can be found.
+                // Where no damping helps, nothing smaller can be found.
                 largest = size.min(CONVERGED);
             }
-            if largest < CONVERGED && iteration > scaled {
+            if largest <= CONVERGED && iteration > scaled {
+                is_converged = true;
                 break;
             }
         }
-        Ok((at, weights))
+        Ok(Solved { at, weights, is_converged })
     }
 
     /// The unknowns after a step, and its largest size in standard deviations after the fit.
@@ -178,10 +188,15 @@ impl Problem<'_> {
             gradient[j] += precision * (x - prior.mean);
         }
         let cholesky = matrix.cholesky().ok_or_else(|| not_finite("the parameters"))?;
-        let step = -cholesky.solve(&gradient);
+        let whole = -cholesky.solve(&gradient);
         let inverse = cholesky.inverse();
+        let limited = |j: usize| {
+            let [least, greatest] = self.priors[j].limits();
+            (at.shared[j] + whole[j]).clamp(least, greatest)
+        };
+        let shared: Vec<f64> = (0..whole.len()).map(limited).collect();
+        let step = DVector::from_fn(whole.len(), |j, _| shared[j] - at.shared[j]);
         let size = (0..step.len()).map(|j| step[j].abs() / inverse[(j, j)].sqrt()).fold(0.0, f64::max);
-        let shared = at.shared.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect();
         let own = (at.own.iter().zip(&normal.eliminated))
             .map(|(own, eliminated)| {
                 let step = -eliminated.own.solve(&(&eliminated.gradient + &eliminated.mixed * &step));

@@ -75,7 +75,7 @@ impl Fit {
         let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
         let models: Vec<ShiftModel> = held_out.iter().map(|record| ShiftModel::new(record.clone(), &file)).collect();
         let start = Unknowns { shared: unknowns.to_vec(), own: models.iter().map(ShiftModel::start).collect() };
-        let (at, _) = problem.solve(&models, start, self.weights, (0, 6), &mut |_| {})?;
+        let at = problem.solve(&models, start, self.weights, (0, 6), &mut |_| {})?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {
             self.weights.errors(&model.blocks, rows.as_mut_slice());

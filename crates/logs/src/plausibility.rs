@@ -4,7 +4,7 @@ use trace::Quantity;
 use trace::units::{mpa, rpm};
 
 use crate::Role;
-use crate::readings::RoleSummary;
+use crate::readings::{COUPLED, FROZEN_CHANGE, RoleSummary};
 
 /// Least and greatest of some values, and the middle of their sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,23 +15,28 @@ pub struct Extremes {
     pub greatest: f64,
     /// Values away from zero by their size: how many lie between two powers of two.
     sizes: [u32; SIZES],
+    count: u64,
 }
 
 /// A shaft that never turns faster says nothing about its sign, rad/s. A car in reverse is slower.
 const SMALL_RAD_S: f64 = 60.0;
+
+/// Wheels of a car that drives at all turn faster, rad/s: 4 m/s.
+const MOVING_RAD_S: f64 = 13.0;
 
 /// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has.
 const SIZES: usize = 64;
 
 impl Default for Extremes {
     fn default() -> Self {
-        Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY, sizes: [0; SIZES] }
+        Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY, sizes: [0; SIZES], count: 0 }
     }
 }
 
 impl Extremes {
     /// Takes a value.
     pub fn push(&mut self, value: f64) {
+        self.count += 1;
         self.least = self.least.min(value);
         self.greatest = self.greatest.max(value);
         if value != 0.0 {
@@ -64,6 +69,12 @@ impl Extremes {
         self.least < -SMALL_RAD_S && self.greatest < -0.1 * self.least
     }
 
+    /// Whether many values are all the same.
+    fn stands_still(&self) -> bool {
+        const MANY: u64 = 100;
+        self.count >= MANY && self.least == self.greatest
+    }
+
     /// The greatest size.
     fn size(&self) -> f64 {
         self.greatest.abs().max(self.least.abs())
@@ -88,6 +99,8 @@ pub enum Likely {
     Unit(&'static str),
     /// The other sign.
     OtherSign,
+    /// Another channel, or a sensor that has failed.
+    OtherChannel,
 }
 
 /// What cannot be right.
@@ -98,6 +111,7 @@ pub fn findings(summary: &[RoleSummary]) -> Vec<Finding> {
     if !findings.is_empty() {
         return findings;
     }
+    findings.extend(summary.iter().filter_map(|entry| stands_still(entry, summary)));
     // A turbine reaches nearly the speed of the engine; in another unit it is ten times off. Wheels are slower than the
     // gearbox output, and this is at most three times as fast as the turbine.
     let pairs: [(Role, Role, &str, f64, f64, &'static str); 4] = [
@@ -121,6 +135,28 @@ pub fn findings(summary: &[RoleSummary]) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// A speed that is the same in all samples, while one changes that takes it along.
+fn stands_still(entry: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding> {
+    let value = Some(entry.extremes.greatest).filter(|_| entry.extremes.stands_still())?;
+    let takes_along: &[Role] = match entry.role {
+        Role::EngineSpeed => &[Role::TurbineSpeed],
+        Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed],
+        Role::OutputSpeed => &[Role::WheelSpeed],
+        Role::WheelSpeed => &[Role::OutputSpeed],
+        _ => &[],
+    };
+    let changes = |other: &&RoleSummary| {
+        let Extremes { least, greatest, .. } = other.extremes;
+        let turns = takes_along.contains(&other.role) && greatest > MOVING_RAD_S;
+        let is_coupled = entry.role != Role::EngineSpeed || greatest > COUPLED * value;
+        turns && is_coupled && greatest - least > FROZEN_CHANGE * greatest
+    };
+    let other = summary.iter().find(changes)?;
+    let (role, name) = (entry.role, entry.role.name());
+    let message = format!("{name} is {value:.3} rad/s in all samples, and {} changes", other.role.name());
+    Some(Finding { role, message, likely: Likely::OtherChannel })
 }
 
 fn finding(entry: &RoleSummary, found: &str, why: &str, likely: &'static str) -> Finding {
@@ -233,6 +269,26 @@ mod tests {
         for entry in fine {
             assert_eq!(findings(std::slice::from_ref(&entry)), Vec::new());
         }
+    }
+
+    #[test]
+    fn a_speed_that_never_changes_while_its_shaft_must_turn_is_found() {
+        let log = |still: Option<Role>, value: f64| {
+            let speeds = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed].map(|role| {
+                let values: Vec<f64> = (0..200_u32).map(|i| 100.0 + f64::from(i)).collect();
+                let stands = [value; 200];
+                summary(role, "rad/s", if still == Some(role) { &stands } else { &values })
+            });
+            findings(&speeds).into_iter().map(|found| (found.role, found.likely)).collect::<Vec<_>>()
+        };
+        assert_eq!(log(None, 0.0), Vec::new());
+        for role in [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed] {
+            assert!(log(Some(role), 180.0).contains(&(role, Likely::OtherChannel)), "{role:?}");
+        }
+        // An engine that turns faster than the turbine can do so at one speed.
+        assert_eq!(log(Some(Role::EngineSpeed), 400.0), Vec::new());
+        let few = [(Role::TurbineSpeed, [180.0; 3]), (Role::OutputSpeed, [100.0, 200.0, 300.0])];
+        assert_eq!(findings(&few.map(|(role, values)| summary(role, "rad/s", &values))), Vec::new());
     }
 
     #[test]

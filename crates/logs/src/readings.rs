@@ -7,7 +7,8 @@
 //! - a speed is frozen that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples
 //!   and three times as many samples as ever before, while a speed that it cannot part from changes by [`FROZEN_CHANGE`]: it is
 //!   not used until it changes. Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from
-//!   the turbine.
+//!   a turbine that is nearly as fast or faster: below that the idle control may hold the engine while the car comes to rest;
+//! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Likely};
@@ -22,6 +23,8 @@ pub const FROZEN_FROM_START_S: f64 = 5.0;
 pub const FROZEN_SAMPLES: u32 = 10;
 /// While a speed that it cannot part from changed by this share of its value.
 pub const FROZEN_CHANGE: f64 = 0.1;
+/// A turbine above this share of the engine's speed takes the engine along when it changes.
+pub const COUPLED: f64 = 0.95;
 
 /// A value of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,6 +89,8 @@ pub struct Readings<'a> {
     pending: Vec<(usize, usize)>,
     sample: Option<crate::Sample>,
     speeds: [Option<f64>; SPEEDS],
+    /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
+    friction_n_m: Option<f64>,
 }
 
 impl<'a> Readings<'a> {
@@ -119,6 +124,7 @@ impl<'a> Readings<'a> {
             pending: Vec::new(),
             sample: None,
             speeds: [None; SPEEDS],
+            friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
     }
 
@@ -155,6 +161,9 @@ impl<'a> Readings<'a> {
                     Likely::Unit(_) => {
                         format!("{message}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`")
                     }
+                    Likely::OtherChannel => format!(
+                        "{message}\nhint: check that `channel.{name}.name` is this signal and that its sensor works; `wetclutch inspect` shows least and greatest values"
+                    ),
                     Likely::OtherSign => format!("{message}\nhint: set `channel.{name}.scale` to a negative number"),
                 }))
             }
@@ -176,7 +185,8 @@ impl<'a> Readings<'a> {
                     "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
                 )));
             }
-            if 2 * good < total {
+            // A request that is rarely made is rightly absent.
+            if 2 * good < total && role.role != Role::TorqueReductionRequest {
                 return Err(LogError::map(format!(
                     "{} of {total} samples of {} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
                     total - good,
@@ -220,11 +230,17 @@ impl<'a> Readings<'a> {
         {
             quality = Quality::OutOfRange;
         }
-        let value = channels.resolved.in_si(value);
+        let mut value = channels.resolved.in_si(value);
+        let kind = entry.role;
+        if kind == Role::EngineTorque {
+            value -= self.friction_n_m.unwrap_or(f64::NAN);
+        }
         if quality == Quality::Good && !value.is_finite() {
             quality = Quality::Missing;
         }
-        let kind = entry.role;
+        if quality == Quality::Good && kind == Role::EngineFrictionTorque {
+            self.friction_n_m = Some(value);
+        }
         let time_s = sample.time_s - entry.delay_s;
         if quality == Quality::Good && kind.is_speed() {
             if channels.is_frozen(value, sample.time_s, &self.speeds) {
@@ -244,7 +260,8 @@ impl<'a> Readings<'a> {
 
 impl Channels {
     fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &[Option<f64>; SPEEDS]) -> bool {
-        let partners: &[Role] = match self.resolved.entry.role {
+        let role = self.resolved.entry.role;
+        let partners: &[Role] = match role {
             Role::EngineSpeed => &[Role::TurbineSpeed],
             Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed, Role::VehicleSpeed],
             Role::OutputSpeed => &[Role::WheelSpeed, Role::VehicleSpeed],
@@ -264,7 +281,10 @@ impl Channels {
         if !still.frozen && value != 0.0 && long {
             still.frozen =
                 partners.iter().any(|partner| match (speeds[*partner as usize], still.others[*partner as usize]) {
-                    (Some(now), Some(then)) => (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs()),
+                    (Some(now), Some(then)) => {
+                        let takes_along = role != Role::EngineSpeed || then.max(now) > COUPLED * value;
+                        takes_along && (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs())
+                    }
                     _ => false,
                 });
         }

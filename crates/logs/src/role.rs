@@ -31,8 +31,12 @@ pub enum Role {
     OncomingPressure,
     /// Measured torque of the oncoming clutch, N m.
     OncomingTorque,
-    /// Engine torque, N m.
+    /// Engine torque, N m; at the flywheel, if its friction is taken off or mapped.
     EngineTorque,
+    /// Friction torque of the engine, N m: it is taken off the engine torque.
+    EngineFrictionTorque,
+    /// Engine torque that the gearbox asks for in a shift, N m, friction included.
+    TorqueReductionRequest,
     /// Throttle, 0 to 1.
     Throttle,
     /// Engaged gear; below 1 it is not a forward gear.
@@ -63,6 +67,8 @@ const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
     (Role::OncomingPressure, "oncoming_pressure", Some(Quantity::Pressure), "Pa"),
     (Role::OncomingTorque, "oncoming_torque", Some(Quantity::Torque), "N m"),
     (Role::EngineTorque, "engine_torque", Some(Quantity::Torque), "N m"),
+    (Role::EngineFrictionTorque, "engine_friction_torque", Some(Quantity::Torque), "N m"),
+    (Role::TorqueReductionRequest, "torque_reduction_request", Some(Quantity::Torque), "N m"),
     (Role::Throttle, "throttle", Some(Quantity::Share), "1"),
     (Role::Gear, "gear", None, ""),
     (Role::TargetGear, "target_gear", None, ""),

@@ -110,7 +110,7 @@ pub(crate) trait Stream {
 }
 
 /// A time stamp this far behind the newest one of its stream is not a matter of order on a bus, s.
-const BEHIND_S: f64 = 0.5;
+pub(crate) const BEHIND_S: f64 = 0.5;
 /// So many rising time stamps behind the newest one are a reset of the clock.
 const RESET_AFTER: u32 = 20;
 /// Time from the last sample before a reset to the first after it: unknown, so this is set, s.
@@ -122,7 +122,7 @@ const RESET_GAP_S: f64 = 1.0;
 /// the clock was reset and the time goes on [`RESET_GAP_S`] after the newest stamp. If they go on after the stamp before the newest, the newest
 /// was wrong, and the time goes on from there without a shift.
 #[derive(Debug, Default)]
-struct Clock {
+pub struct Clock {
     newest_s: Option<f64>,
     /// The last stamp before the largest jump forward so far, since the last reset.
     before_jump_s: f64,
@@ -135,8 +135,30 @@ struct Clock {
 }
 
 impl Clock {
-    /// The time of a stamp; none if it is backward.
-    fn time(&mut self, stamp_s: f64) -> Option<f64> {
+    /// Resets so far.
+    pub fn resets(&self) -> u32 {
+        self.resets
+    }
+
+    /// Stamps so far that were far too late.
+    pub fn wrong_jumps(&self) -> u32 {
+        self.wrong_jumps
+    }
+
+    /// What was met so far, in sentences.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.resets > 0 {
+            notes.push(format!("the clock was reset {} times: the time goes on one second later", self.resets));
+        }
+        if self.wrong_jumps > 0 {
+            notes.push(format!("{} time stamps are far too late: the time goes on before them", self.wrong_jumps));
+        }
+        notes
+    }
+
+    /// The time of a stamp, s; none if it is backward.
+    pub fn time(&mut self, stamp_s: f64) -> Option<f64> {
         let time_s = stamp_s + self.shift_s;
         let Some(newest_s) = self.newest_s else {
             self.newest_s = Some(time_s);
@@ -184,19 +206,6 @@ struct Merged<'a> {
     at: usize,
     /// The sample that is on the heap.
     next: Option<Sample>,
-}
-
-impl Merged<'_> {
-    /// Says once what the clock met.
-    fn say_resets(&mut self, notes: &mut Vec<String>) {
-        let Clock { resets, wrong_jumps, .. } = self.clock;
-        if resets > 0 {
-            notes.push(format!("the clock was reset {resets} times: the time goes on one second later"));
-        }
-        if wrong_jumps > 0 {
-            notes.push(format!("{wrong_jumps} time stamps are far too late: the time goes on before them"));
-        }
-    }
 }
 
 /// Time and stream, earliest first.
@@ -264,7 +273,7 @@ impl<'a> Samples<'a> {
         &self.notes
     }
 
-    /// Resets of clocks so far.
+    /// How often a clock did not simply go on: resets, and stamps that were far too late.
     pub fn resets(&self) -> u32 {
         self.resets
     }
@@ -289,7 +298,7 @@ impl<'a> Samples<'a> {
             // What came with the end or before the damage is given first.
             merged.stream = Box::new(Ended);
             if merged.batch.is_empty() {
-                merged.say_resets(&mut self.notes);
+                self.notes.append(&mut merged.clock.notes());
                 return Ok(false);
             }
         }
@@ -309,7 +318,8 @@ impl<'a> Samples<'a> {
         let newest_s = merged.clock.newest_s.unwrap_or(sample.time_s);
         self.resets += merged.clock.resets - resets;
         if merged.clock.wrong_jumps > wrong_jumps {
-            // What came with the wrong stamps is not newer than this.
+            // What came with the wrong stamps is not newer than this; whoever has seen them starts again.
+            self.resets += 1;
             for channel in self.channels.iter_mut().filter(|channel| channel.stream == i) {
                 channel.time_s = channel.time_s.min(newest_s.next_down());
             }

@@ -6,6 +6,7 @@
 
 use observer::{Input, Reading as Measured};
 
+use crate::samples::BEHIND_S;
 use crate::{LogError, Reading, Readings, Role};
 
 /// An input of an observer and its time.
@@ -126,9 +127,14 @@ impl Steps<'_> {
             if place.is_some() {
                 let mut next = Open::new(reading.stamp_s);
                 next.place(reading.role).map(|place| place.replace(reading));
-                // A reading that came late on the bus has a stamp before the step: the step is of the newest stamp.
-                next.time_s = next.time_s.max(open.time_s);
                 let step = self.close(open);
+                if open.time_s - next.time_s > BEHIND_S {
+                    // The step had a stamp that was far too late: what comes now follows the step before it.
+                    self.last_s = None;
+                } else {
+                    // A reading that came late on the bus has a stamp before the step: the step is of the newest stamp.
+                    next.time_s = next.time_s.max(open.time_s);
+                }
                 self.open = Some(next);
                 return Some(Ok(step));
             }

@@ -127,6 +127,18 @@ const TABLE: &[Words] = &[
         exact: &["tqi", "md_mot", "mmot", "enginetorque", "motormoment"],
     },
     Words {
+        role: Role::EngineFrictionTorque,
+        all: &[TORQUE, &["friction", "reib*", "loss", "verlust", "schlepp*"]],
+        none: &["clutch", "kupplung", "gear", "getriebe"],
+        exact: &[],
+    },
+    Words {
+        role: Role::TorqueReductionRequest,
+        all: &[TORQUE, &["reduction", "red", "eingriff", "intervention"], &["request", "req", "anforderung", "soll"]],
+        none: &["asr", "esp", "tcs"],
+        exact: &[],
+    },
+    Words {
         role: Role::Throttle,
         all: &[&["throttle", "drossel*", "dk", "tps", "accelerator", "fahrpedal", "pedal", "wped"]],
         none: &["target", "soll", "brake", "kick"],

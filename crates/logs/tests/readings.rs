@@ -94,6 +94,27 @@ fn a_speed_that_stands_still_while_another_moves_is_frozen() {
 }
 
 #[test]
+fn an_engine_at_idle_speed_is_not_frozen_while_the_car_comes_to_rest() {
+    let frozen = |motion: &dyn Fn(f64) -> [f64; 2]| {
+        let mut text = "time_s,e_rpm,t_rpm\n".to_owned();
+        for i in 0..600 {
+            let [engine, turbine] = motion(f64::from(i));
+            writeln!(text, "{},{engine},{turbine}", f64::from(i) * 0.01).unwrap();
+        }
+        let (_, summary, _) = readings(&text, &map(&["engine_speed=e_rpm", "turbine_speed=t_rpm"])).unwrap();
+        count(&summary, Quality::Frozen)
+    };
+    // The engine is braked to its idle speed, which the control holds to the digit while the turbine stops.
+    let braked = |i: f64| {
+        if i < 200.0 { [1600.0 - 4.0 * i, 1590.0 - 4.4 * i] } else { [800.0, (710.0 - 2.0 * (i - 200.0)).max(0.0)] }
+    };
+    assert_eq!(frozen(&braked), 0);
+    // The turbine takes an engine along whose sensor has stopped.
+    let stopped = |i: f64| [1600.0 + 8.0 * i.min(300.0), 1590.0 + 7.9 * i];
+    assert!(frozen(&stopped) > 200, "{}", frozen(&stopped));
+}
+
+#[test]
 fn scale_offset_delay_and_range_of_the_map_count_in_this_order() {
     let folder = Folder::new("map");
     let text = "[channel.engine_speed]\nname = \"raw\"\nunit = \"rpm\"\nscale = 0.25\noffset = -10\ndelay_s = 0.02\nvalid_range = [0, 8000]\n";

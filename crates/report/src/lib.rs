@@ -15,6 +15,7 @@ pub mod palette;
 pub mod reproduction;
 pub mod sensitivity_page;
 pub mod shift_figure;
+pub mod speeds_page;
 pub mod study_page;
 pub mod tables;
 
@@ -24,4 +25,5 @@ pub use log_page::LogPage;
 pub use page::{Page, PageError};
 pub use reproduction::Reproduction;
 pub use sensitivity_page::sensitivity_page;
+pub use speeds_page::SpeedsPage;
 pub use study_page::StudyPage;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::{Direction, Load};
+use logs::{Direction, Load, Shift};
 use minijinja::{Value, context};
 use observer::Health;
 use study::shift_estimates::{EstimatedShift, Ranged};
@@ -112,13 +112,18 @@ pub(crate) fn compact(svg: &str) -> String {
     compact
 }
 
-fn kind(shift: &ShiftEstimate) -> String {
-    let load = match shift.shift.load {
+/// Load and direction in words.
+pub(crate) fn kind_of(shift: &Shift) -> String {
+    let load = match shift.load {
         Load::PowerOn => "power-on ",
         Load::PowerOff => "power-off ",
         Load::Unknown => "",
     };
-    format!("{load}{}", if shift.shift.direction == Direction::Up { "up" } else { "down" })
+    format!("{load}{}", if shift.direction == Direction::Up { "up" } else { "down" })
+}
+
+fn kind(shift: &ShiftEstimate) -> String {
+    kind_of(&shift.shift)
 }
 
 /// Titles and rows of the table of shifts. Columns that no shift fills are left out.

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use config::Vehicle;
+use logs::Clock;
 use observer::{Input, Phase};
 use trace::{CsvRows, TraceError, signal};
 
@@ -19,6 +20,10 @@ pub struct Log {
     truth: Option<TruthColumns>,
     beside: [Option<usize>; BESIDE.len()],
     last_s: Option<f64>,
+    clock: Clock,
+    rows_read: u64,
+    repeated: u64,
+    backward: u64,
     looked_at: VecDeque<(Input<f64>, LogRow)>,
     median_step_s: f64,
 }
@@ -96,7 +101,19 @@ impl Log {
         let truth = truth.map(|(phase, pressure)| TruthColumns { phase, pressure });
         let beside = BESIDE.map(|name| rows.find(name));
         let looked_at = VecDeque::with_capacity(look);
-        let mut log = Self { rows, signals, truth, beside, last_s: None, looked_at, median_step_s: f64::NAN };
+        let mut log = Self {
+            rows,
+            signals,
+            truth,
+            beside,
+            last_s: None,
+            clock: Clock::default(),
+            rows_read: 0,
+            repeated: 0,
+            backward: 0,
+            looked_at,
+            median_step_s: f64::NAN,
+        };
         while log.looked_at.len() < look
             && let Some(sample) = log.read()?
         {
@@ -135,12 +152,58 @@ impl Log {
         self.median_step_s
     }
 
+    /// How often the clock did not simply go on: resets, and stamps that were far too late.
+    pub fn resets(&self) -> u32 {
+        self.clock.resets() + self.clock.wrong_jumps()
+    }
+
+    /// What was met in the time stamps, in sentences.
+    ///
+    /// # Errors
+    /// Most rows could not be used.
+    pub fn check_times(&self) -> Result<Vec<String>, TraceError> {
+        let unused = self.repeated + self.backward;
+        let count = |count: u64, what: &str| {
+            (count > 0).then(|| format!("{count} of {} rows {what} and are not used", self.rows_read))
+        };
+        let notes = [
+            count(self.repeated, "have the time of the row before"),
+            count(self.backward, "have a time before that of the row before"),
+        ];
+        let notes: Vec<String> = notes.into_iter().flatten().collect();
+        if 2 * unused > self.rows_read {
+            return Err(self.rows.refused(format!(
+                "{}\nhint: the time has too few digits, or is not in `{}`",
+                notes.join(", "),
+                signal::TIME
+            )));
+        }
+        Ok(notes.into_iter().chain(self.clock.notes()).collect())
+    }
+
+    /// Goes on to the next row whose time is after that of the row before, by the rules of [`Clock`]; its time.
+    fn next_time(&mut self) -> Result<Option<f64>, TraceError> {
+        while self.rows.advance_in_any_order()? {
+            self.rows_read += 1;
+            let wrong_jumps = self.clock.wrong_jumps();
+            let time_s = self.clock.time(self.rows.time_s());
+            if self.clock.wrong_jumps() > wrong_jumps {
+                // The row before was the one with the wrong time.
+                self.last_s = None;
+            }
+            match time_s {
+                Some(time_s) if self.last_s.is_none_or(|last_s| time_s > last_s) => return Ok(Some(time_s)),
+                Some(time_s) if self.last_s == Some(time_s) => self.repeated += 1,
+                _ => self.backward += 1,
+            }
+        }
+        Ok(None)
+    }
+
     /// The next row of the file.
     fn read(&mut self) -> Result<Option<(Input<f64>, LogRow)>, TraceError> {
-        if !self.rows.advance()? {
-            return Ok(None);
-        }
-        let (rows, time_s) = (&self.rows, self.rows.time_s());
+        let Some(time_s) = self.next_time()? else { return Ok(None) };
+        let rows = &self.rows;
         let dt_s = self.last_s.replace(time_s).map_or(0.0, |last_s| time_s - last_s);
         let input = self.signals.input(dt_s, |column| rows.number(column))?;
         let truth = self.truth.and_then(|columns| {

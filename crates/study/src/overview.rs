@@ -54,7 +54,7 @@ impl Interval {
             speeds_rad_s: speeds.map(|reading| [reading.map_or(f64::NAN, |reading| reading.value); 2]),
             pressure_pa: [estimate.pressure_pa; 2],
             range_pa: estimate.bounds.map_or([f64::NAN; 2], |bounds| bounds.pressure_pa),
-            healths: Health::ALL.map(|health| health == estimate.health),
+            healths: Health::ALL.map(|health| sample.is_estimated() && health == estimate.health),
         }
     }
 }

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use config::Vehicle;
 use drivetrain::ReducedShift;
 use logs::{Load, Shift};
-use observer::{Estimate, Health, Input, Phase, Reading};
+use observer::{ChannelHealth, Channels, Estimate, Health, Input, Phase, Reading};
 use trace::Cell;
 
 /// A step of a log with its estimate.
@@ -25,6 +25,26 @@ pub struct LogSample {
     pub pressure_pa: Option<Reading<f64>>,
     /// Measured torque of the oncoming clutch, N m.
     pub torque_n_m: Option<Reading<f64>>,
+}
+
+impl LogSample {
+    /// Whether there is an estimate: none in a gear that the vehicle file does not describe.
+    pub fn is_estimated(&self) -> bool {
+        !self.estimate.pressure_pa.is_nan()
+    }
+}
+
+/// Stands where there is no estimate.
+pub fn no_estimate() -> Estimate<f64> {
+    Estimate {
+        pressure_pa: f64::NAN,
+        clutch_torque_n_m: f64::NAN,
+        shaft_torque_n_m: None,
+        phase: Phase::BeforeShift,
+        health: Health::Good,
+        channels: Channels::all(ChannelHealth::Absent),
+        bounds: None,
+    }
 }
 
 /// Time before and after a shift that belongs to it, s.
@@ -44,6 +64,10 @@ pub struct RecentSamples {
 impl RecentSamples {
     /// Takes the next sample.
     pub fn push(&mut self, sample: LogSample) {
+        // After a time stamp that was far too late, the time goes back.
+        while self.samples.back().is_some_and(|last| last.time_s > sample.time_s) {
+            self.samples.pop_back();
+        }
         self.samples.push_back(sample);
         while self.samples.front().is_some_and(|first| sample.time_s - first.time_s > HELD_S)
             || self.samples.len() > MOST_HELD

@@ -5,7 +5,6 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -90,6 +89,22 @@ impl CsvRows {
     /// The file cannot be read, a row has another length, a time does not come after the one before, or there are no
     /// rows at all.
     pub fn advance(&mut self) -> Result<bool, TraceError> {
+        let before = self.time_s;
+        if !self.advance_in_any_order()? {
+            return Ok(false);
+        }
+        let time_s = self.time_s();
+        match before.filter(|before| time_s <= *before) {
+            None => Ok(true),
+            Some(before) => Err(self.wrong(format!("the time {time_s} s is not after the time before it, {before} s"))),
+        }
+    }
+
+    /// The same of a table whose times may stand still or go back.
+    ///
+    /// # Errors
+    /// See [`Self::advance`].
+    pub fn advance_in_any_order(&mut self) -> Result<bool, TraceError> {
         if !self.read_row()? {
             return match self.time_s {
                 Some(_) => Ok(false),
@@ -106,9 +121,6 @@ impl CsvRows {
             let message =
                 if text.is_empty() { "the time is missing".to_owned() } else { format!("the time is {text}") };
             return Err(self.wrong(message));
-        }
-        if let Some(before) = self.time_s.filter(|before| time_s <= *before) {
-            return Err(self.wrong(format!("the time {time_s} s is not after the time before it, {before} s")));
         }
         self.time_s = Some(time_s);
         Ok(true)
@@ -146,13 +158,14 @@ impl CsvRows {
     /// # Errors
     /// The cell holds something else.
     pub fn number(&self, column: usize) -> Result<f64, TraceError> {
-        let text = self.text(column);
-        if text.is_empty() {
+        let cell = self.row[column].trim_ascii();
+        if cell.is_empty() {
             return Ok(f64::NAN);
         }
         let (name, factor) = &self.columns[column];
-        text.parse::<f64>().map(|number| number * factor).map_err(|_| {
-            let (name, text) = (TraceError::shown(name), TraceError::shown(&text));
+        let number = std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok());
+        number.map(|number| number * factor).ok_or_else(|| {
+            let (name, text) = (TraceError::shown(name), TraceError::shown(&self.text(column)));
             self.wrong(format!(
                 "column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"
             ))
@@ -180,6 +193,11 @@ impl CsvRows {
             },
             _ => TraceError::Io { path: self.path.clone(), source },
         })
+    }
+
+    /// The table cannot be used.
+    pub fn refused(&self, message: String) -> TraceError {
+        TraceError::Table { path: self.path.clone(), message }
     }
 
     /// An error in this row.
@@ -258,11 +276,17 @@ pub enum Cell<'a> {
     Word(&'a str),
 }
 
-/// Writes a comma-separated file row by row. Numbers are written so that reading gives the very same ones.
+/// Writes a comma-separated file row by row. Numbers are written so that reading gives the very same ones, with as few digits as that
+/// needs and without exponents.
 pub struct CsvWriter<W: Write> {
-    writer: csv::Writer<W>,
-    text: String,
+    writer: W,
+    /// Rows that are not yet with the writer.
+    rows: Vec<u8>,
+    columns: usize,
 }
+
+/// Bytes that are handed on at once.
+const WRITTEN_AT_ONCE: usize = 64 << 10;
 
 impl<W: Write> CsvWriter<W> {
     /// Writes the names: time first, then these.
@@ -278,9 +302,17 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// What the writer meets.
     pub fn without_time<'a>(writer: W, names: impl IntoIterator<Item = &'a str>) -> io::Result<Self> {
-        let mut writer = csv::Writer::from_writer(writer);
-        writer.write_record(names).map_err(into_io)?;
-        Ok(Self { writer, text: String::new() })
+        let mut rows = Vec::with_capacity(WRITTEN_AT_ONCE + 4096);
+        let mut columns = 0;
+        for name in names {
+            if columns > 0 {
+                rows.push(b',');
+            }
+            push_word(&mut rows, name);
+            columns += 1;
+        }
+        rows.push(b'\n');
+        Ok(Self { writer, rows, columns })
     }
 
     /// Writes a row.
@@ -296,22 +328,31 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// As [`Self::row`].
     pub fn cells<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
+        let begin = self.rows.len();
+        let mut count = 0;
         for cell in cells {
-            match cell {
-                Cell::Word(word) => self.writer.write_field(word),
-                Cell::Whole(number) => self.writer.write_field(number.to_string()),
-                Cell::Number(number) => {
-                    self.text.clear();
-                    if !number.is_nan() {
-                        // A string takes everything.
-                        let _ = write!(self.text, "{number}");
-                    }
-                    self.writer.write_field(&self.text)
-                }
+            if count > 0 {
+                self.rows.push(b',');
             }
-            .map_err(into_io)?;
+            count += 1;
+            match cell {
+                Cell::Word(word) => push_word(&mut self.rows, word),
+                Cell::Whole(number) => write!(self.rows, "{number}")?,
+                Cell::Number(number) => push_number(&mut self.rows, number)?,
+            }
         }
-        self.writer.write_record(None::<&[u8]>).map_err(into_io)
+        if count != self.columns {
+            self.rows.truncate(begin);
+            return Err(io::Error::other(format!("a row of {count} cells for {} columns", self.columns)));
+        }
+        self.rows.push(b'\n');
+        if self.rows.len() >= WRITTEN_AT_ONCE { self.hand_on() } else { Ok(()) }
+    }
+
+    fn hand_on(&mut self) -> io::Result<()> {
+        let written = self.writer.write_all(&self.rows);
+        self.rows.clear();
+        written
     }
 
     /// Hands the rows so far to the writer below, and flushes it.
@@ -319,6 +360,7 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// What the writer meets.
     pub fn flush(&mut self) -> io::Result<()> {
+        self.hand_on()?;
         self.writer.flush()
     }
 
@@ -326,9 +368,37 @@ impl<W: Write> CsvWriter<W> {
     ///
     /// # Errors
     /// What the writer meets.
-    pub fn finish(self) -> io::Result<W> {
-        self.writer.into_inner().map_err(csv::IntoInnerError::into_error)
+    pub fn finish(mut self) -> io::Result<W> {
+        self.hand_on()?;
+        self.writer.flush()?;
+        Ok(self.writer)
     }
+}
+
+/// A number; NaN leaves the cell empty.
+fn push_number(row: &mut Vec<u8>, number: f64) -> io::Result<()> {
+    if number.is_nan() {
+        return Ok(());
+    }
+    let mut digits = zmij::Buffer::new();
+    let text = digits.format(number).as_bytes();
+    if text.contains(&b'e') {
+        // Very small and very large numbers would have an exponent.
+        return write!(row, "{number}");
+    }
+    row.extend_from_slice(text.strip_suffix(b".0").unwrap_or(text));
+    Ok(())
+}
+
+/// A word, in quotation marks where it needs them.
+fn push_word(row: &mut Vec<u8>, word: &str) {
+    if !word.bytes().any(|byte| matches!(byte, b',' | b'"' | b'\n' | b'\r')) {
+        row.extend_from_slice(word.as_bytes());
+        return;
+    }
+    row.push(b'"');
+    row.extend_from_slice(word.replace('"', "\"\"").as_bytes());
+    row.push(b'"');
 }
 
 /// The error of the file below, with its kind: a broken pipe must stay one.
@@ -403,6 +473,38 @@ mod tests {
         assert!(back.get("b_rad_s").unwrap()[0].is_nan());
         assert_eq!(back.columns[2], trace.columns[2]);
         std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn numbers_have_the_digits_of_display() {
+        let written = |number: f64| {
+            let mut row = Vec::new();
+            push_number(&mut row, number).unwrap();
+            String::from_utf8(row).unwrap()
+        };
+        let some = [0.0, -0.0, 1.0, -1.5, 1e-5, 1.2e-5, 9e15, 1e16, 1.5e300, -5e-324, f64::INFINITY, f64::MIN_POSITIVE];
+        // All sizes, by a generator that needs no crate.
+        let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
+        let random = std::iter::repeat_with(|| {
+            bits ^= bits << 13;
+            bits ^= bits >> 7;
+            bits ^= bits << 17;
+            [f64::from_bits(bits), f64::from_bits(bits >> 12 | 0x3ff0_0000_0000_0000) * 1000.0]
+        });
+        for number in some.into_iter().chain(random.take(100_000).flatten()).filter(|number| !number.is_nan()) {
+            assert_eq!(written(number), number.to_string());
+        }
+        assert_eq!(written(f64::NAN), "");
+    }
+
+    #[test]
+    fn words_with_signs_of_the_format_are_quoted_and_a_row_has_a_cell_for_each_name() {
+        let mut writer = CsvWriter::new(Vec::new(), ["a, b", "c"]).unwrap();
+        writer.row(0.5, [Cell::Word("say \"x\"\n"), Cell::Whole(7)]).unwrap();
+        assert!(writer.row(1.0, [Cell::Number(1.0)]).is_err());
+        writer.row(2.0, [Cell::Number(f64::NAN), Cell::Word("")]).unwrap();
+        let text = String::from_utf8(writer.finish().unwrap()).unwrap();
+        assert_eq!(text, "time_s,\"a, b\",c\n0.5,\"say \"\"x\"\"\n\",7\n2,,\n");
     }
 
     #[test]

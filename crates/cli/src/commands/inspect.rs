@@ -1,10 +1,14 @@
 //! `wetclutch inspect`.
 
-use logs::{Direction, Inspection, Load, Log, Readings, Role, Shift, ShiftFinder};
+use std::path::Path;
+
+use fit::drive::{DriveRecord, fit_converter};
+use logs::{ChannelMap, Direction, Inspection, Load, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder};
+use report::SpeedsPage;
 use trace::units::rpm;
 
 use crate::args::Inspect;
-use crate::commands::channel_map;
+use crate::commands::{channel_map, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -28,7 +32,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
                     .to_owned(),
             ));
         }
-        return shifts(&mut log, &map);
+        check_output(options.output.as_ref())?;
+        not_an_input(options.output.as_ref(), options.mapping.map.iter().chain([&options.log]))?;
+        return shifts(options, &mut log, &map);
     }
     let inspection = logs::inspect(&mut log)?;
     output::line(&format!("{}: {}, {} channels", options.log.display(), log.format(), log.channels().len()))?;
@@ -128,8 +134,9 @@ fn channels(inspection: &Inspection) -> Result<(), Failure> {
     Ok(output::table(if grouped { 3 } else { 2 }, &rows)?)
 }
 
-fn shifts(log: &mut Log, map: &logs::ChannelMap) -> Result<(), Failure> {
+fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Failure> {
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
+    let mut record = DriveRecord::default();
     let mut readings = Readings::new(log, map)?;
     let (mut first_s, mut last_s, mut resets) = (f64::NAN, f64::NAN, 0);
     while let Some(reading) = readings.next() {
@@ -141,19 +148,17 @@ fn shifts(log: &mut Log, map: &logs::ChannelMap) -> Result<(), Failure> {
         first_s = first_s.min(reading.time_s);
         last_s = reading.time_s;
         finder.push(&reading);
+        if options.output.is_some() {
+            record.push(&Reading { time_s: reading.time_s - origin(first_s), ..reading });
+        }
     }
     readings.check()?;
-    let found = finder.finish();
     let origin_s = origin(first_s);
-    for summary in readings.summary().iter().filter(|summary| !summary.counts.faults().is_empty()) {
-        output::note(&format!(
-            "warning: of {} samples of {} some are not used: {}",
-            output::grouped(summary.counts.total()),
-            summary.role.name(),
-            summary.counts.faults()
-        ));
+    let found: Vec<Shift> = finder.finish().iter().map(|shift| shift.earlier_by(origin_s)).collect();
+    let notes = notes(&readings);
+    for note in &notes {
+        output::note(&format!("warning: {note}"));
     }
-    remarks(readings.notes());
     say_origin(origin_s)?;
     output::line(&format!("{} shifts from {:.2} to {:.2} s", found.len(), first_s - origin_s, last_s - origin_s))?;
     if !found.is_empty() {
@@ -168,16 +173,71 @@ fn shifts(log: &mut Log, map: &logs::ChannelMap) -> Result<(), Failure> {
             "jerk m/s^3",
         ];
         let mut rows = vec![titles.map(str::to_owned).to_vec()];
-        rows.extend(found.iter().map(|shift| row(shift, origin_s)));
+        rows.extend(found.iter().map(row));
         output::table(3, &rows)?;
     }
-    if !map.has(Role::OncomingCurrent) && !map.has(Role::OncomingDuty) && !map.has(Role::OncomingPressureCommand) {
+    if !has_command(map) {
         output::note("no valve command is mapped: shifts and speeds can be studied, a pressure cannot be estimated");
     }
+    match &options.output {
+        Some(path) => page(path, options, map, &found, record, notes),
+        None => Ok(()),
+    }
+}
+
+/// Writes the page of the drive.
+fn page(
+    path: &Path,
+    options: &Inspect,
+    map: &ChannelMap,
+    shifts: &[Shift],
+    mut record: DriveRecord,
+    mut faults: Vec<String>,
+) -> Result<(), Failure> {
+    record.complete(map.gearbox.output_rad_per_m);
+    let moments = record.moments();
+    let map_file = options.mapping.map.as_deref().map(config::Source::read).transpose()?;
+    if record.is_cut {
+        faults.push("The page shows the first five hours: the drive is longer.".to_owned());
+    }
+    let page = SpeedsPage {
+        log: &options.log,
+        map: map_file.as_ref(),
+        record: &record,
+        moments: &moments,
+        ratios: &map.gearbox.ratios,
+        shifts,
+        converter: &fit_converter(&record, &moments),
+        has_command: has_command(map),
+        faults: &faults,
+    };
+    write_text(path, &page.html()?)?;
+    for sentence in page.findings(&page.torques()) {
+        output::line(&sentence)?;
+    }
+    output::note(&format!("page: {}", path.display()));
     Ok(())
 }
 
-fn row(shift: &Shift, origin_s: f64) -> Vec<String> {
+fn has_command(map: &ChannelMap) -> bool {
+    [Role::OncomingCurrent, Role::OncomingDuty, Role::OncomingPressureCommand].into_iter().any(|role| map.has(role))
+}
+
+/// What was met in the log, in sentences.
+fn notes(readings: &Readings<'_>) -> Vec<String> {
+    let faulty = readings.summary().into_iter().filter(|summary| !summary.counts.faults().is_empty());
+    let of = |summary: RoleSummary| {
+        format!(
+            "of {} samples of {} some are not used: {}",
+            output::grouped(summary.counts.total()),
+            summary.role.name(),
+            summary.counts.faults()
+        )
+    };
+    faulty.map(of).chain(readings.notes().iter().cloned()).collect()
+}
+
+fn row(shift: &Shift) -> Vec<String> {
     let load = match shift.load {
         Load::PowerOn => "power-on ",
         Load::PowerOff => "power-off ",
@@ -187,7 +247,7 @@ fn row(shift: &Shift, origin_s: f64) -> Vec<String> {
         Direction::Up => "up",
         Direction::Down => "down",
     };
-    let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{:.2}", time_s - origin_s));
+    let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{time_s:.2}"));
     let number =
         |number: Option<f64>, digits: usize| number.map_or(String::new(), |number| format!("{number:.digits$}"));
     let phases: Vec<String> =
@@ -198,9 +258,7 @@ fn row(shift: &Shift, origin_s: f64) -> Vec<String> {
         phases.join(", "),
         time(shift.command_s),
         time(shift.gear_s),
-        shift
-            .inertia_s
-            .map_or(String::new(), |[from_s, to_s]| format!("{:.2} to {:.2}", from_s - origin_s, to_s - origin_s)),
+        shift.inertia_s.map_or(String::new(), |[from_s, to_s]| format!("{from_s:.2} to {to_s:.2}")),
         number(shift.quality.flare_rad_s.map(rpm), 0),
         number(shift.quality.jerk_m_s3, 1),
     ]

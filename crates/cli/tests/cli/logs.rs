@@ -37,7 +37,10 @@ fn a_log_that_is_wrong_is_refused_by_line_and_nothing_is_written() {
     let cases = [
         (String::new(), ": the file is empty"),
         (format!("{NAMES}\n"), ": there are no rows"),
-        (format!("{NAMES}\n0,{row}\n0,{row}\n"), ":3: the time 0 s is not after the time before it, 0 s"),
+        (
+            format!("{NAMES}\n0,{row}\n0,{row}\n0,{row}\n"),
+            ": 2 of 3 rows have the time of the row before and are not used\nhint: the time has too few digits",
+        ),
         (format!("{NAMES}\n0,{row}\ninf,{row}\n"), ":3: the time is inf"),
         (format!("{NAMES}\n0,{row}\n1,{row},\n"), ":3: the row has 6 cells, but the first line names 5 columns"),
         (format!("{NAMES}\n0,{row}\n1,200,n/a,76,0.1\n"), ":3: column `turbine_speed_rad_s` contains `n/a`"),
@@ -128,11 +131,19 @@ fn a_log_may_be_replaced_by_its_own_estimate() {
 }
 
 #[test]
-fn a_folder_as_output_is_refused_before_the_log_is_read() {
+fn an_existing_folder_takes_the_estimate_under_the_name_of_its_log() {
     let folder = Folder::new("target");
-    let output = estimate("no-such-log.csv", &["-o", &folder.path("")]);
+    let path = folder.write("log.csv", log(20));
+    let expected = estimate(&path, &[]).stdout;
+    std::fs::create_dir(folder.path("out")).unwrap();
+    assert!(estimate(&path, &["-o", &folder.path("out")]).status.success());
+    assert!(std::fs::read(folder.path("out/log.csv")).unwrap() == expected);
+    // In its own folder the log would be lost.
+    let output = estimate(&path, &["-o", &folder.path("")]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("this is a folder\nhint: name a file in it"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));
+    let output = estimate("-", &["-o", &folder.path("out")]);
+    assert!(stderr(&output).contains("-: this is no file"), "{}", stderr(&output));
 }
 
 #[cfg(unix)]

@@ -41,7 +41,7 @@ fn element(ratio: f64, shaft: &str) -> Result<Element, FitError> {
         _ => (1.0 / ratio - 1.0, [shaft, "output", "turbine"]),
     };
     let (sun_teeth, ring_teeth) = numbers_of_teeth(teeth).ok_or_else(|| {
-        FitError::input(format!("no planetary set has the ratio {ratio}\nhint: ratios are from 0.6 to 20"))
+        FitError::input(format!("no planetary set has the ratio {ratio}\nhint: ratios are from 0.6 to 20; near 1 only direct drive, 1, has a gear train: give 1, or a ratio below 0.96 or above 1.04"))
     })?;
     let inertia = (BRAKED_KG_M2 * (ratio - 1.0).powi(2)).max(INERTIA_MIN_KG_M2);
     let text = format!(

@@ -6,6 +6,7 @@
 //! Readings go in one by one; some seconds of them are held in memory.
 
 mod gears;
+mod inside;
 mod quality;
 mod ratio;
 mod track;
@@ -13,6 +14,7 @@ mod track;
 use crate::map::check_ratios;
 use crate::{Gearbox, LogError, Reading, Role};
 use gears::{Change, Steady};
+pub use inside::GearsOfShift;
 use ratio::RatioWatch;
 use track::Track;
 
@@ -72,6 +74,17 @@ impl Shift {
     pub fn start_s(&self) -> f64 {
         let first = self.command_s.or(self.inertia_s.map(|inertia_s| inertia_s[0]));
         first.or(self.gear_s).unwrap_or(f64::NAN)
+    }
+
+    /// The same shift on a clock that began at this time of the log's, s.
+    pub fn earlier_by(&self, origin_s: f64) -> Self {
+        let time = |time_s: Option<f64>| time_s.map(|time_s| time_s - origin_s);
+        Self {
+            command_s: time(self.command_s),
+            inertia_s: self.inertia_s.map(|inertia_s| inertia_s.map(|time_s| time_s - origin_s)),
+            gear_s: time(self.gear_s),
+            ..*self
+        }
     }
 
     /// When it ended, s: with the inertia phase, else with the gear signal.

@@ -1,5 +1,6 @@
 //! What is said about the estimates of a log.
 
+use config::Vehicle;
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::phase_name;
@@ -7,12 +8,15 @@ use study::{ErrorScore, Passages};
 use trace::units;
 
 use super::measured::Step;
+use super::ratios::Ratios;
 use crate::failure::Failure;
 use crate::output;
 
 /// Summary of the estimates for the user, updated with each estimate.
 pub(super) struct Findings {
+    ratios: Ratios,
     rows: u64,
+    other_gear: u64,
     first_s: f64,
     last_s: f64,
     passages: Passages,
@@ -29,9 +33,11 @@ pub(super) struct Findings {
 const CHANNELS: usize = 7;
 
 impl Findings {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(vehicle: &Vehicle) -> Self {
         Self {
+            ratios: Ratios::new(vehicle),
             rows: 0,
+            other_gear: 0,
             first_s: f64::NAN,
             last_s: f64::NAN,
             passages: Passages::default(),
@@ -42,12 +48,23 @@ impl Findings {
         }
     }
 
-    pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
-        if self.rows == 0 {
-            self.first_s = row.time_s;
+    /// Takes a step in a gear that the vehicle file does not describe.
+    pub(super) fn push_other_gear(&mut self, time_s: f64) {
+        self.other_gear += 1;
+        self.pass(time_s);
+    }
+
+    fn pass(&mut self, time_s: f64) {
+        if self.first_s.is_nan() {
+            self.first_s = time_s;
         }
+        self.last_s = time_s;
+    }
+
+    pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
+        self.pass(row.time_s);
         self.rows += 1;
-        self.last_s = row.time_s;
+        self.ratios.push(&row.input);
         let input = &row.input;
         let readings = [
             input.engine_rad_s,
@@ -75,11 +92,18 @@ impl Findings {
         });
     }
 
-    /// Refuses a log of which a channel is unusable in most samples.
+    /// Refuses a log of which a channel is unusable in most samples, or that does not belong to the vehicle.
     ///
     /// # Errors
-    /// More than half of the readings of a channel were refused, or none came.
+    /// More than half of the readings of a channel were refused, or none came; or most estimates are outside their range.
     pub(super) fn check(&self, commands: [Role; 2], needs_wheel: bool) -> Result<(), Failure> {
+        if self.rows == 0 && self.other_gear > 0 {
+            return Err(Failure::Input(
+                "the log is never in the gears of the vehicle file's shift\nhint: check `gearbox.ratios` of the channel map and the \
+                 gear train of the vehicle file; `wetclutch inspect --shifts` lists the shifts"
+                    .to_owned(),
+            ));
+        }
         let speeds = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
         let roles = speeds.into_iter().chain(commands).chain([Role::EngineTorque]);
         for (at, role) in roles.enumerate() {
@@ -105,7 +129,26 @@ impl Findings {
                 )));
             }
         }
-        Ok(())
+        self.ratios.check()?;
+        self.check_estimates()
+    }
+
+    /// Most estimates have to be possible.
+    fn check_estimates(&self) -> Result<(), Failure> {
+        let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
+        let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
+        let count: u64 = impossible.iter().map(of).sum();
+        if 2 * count <= self.rows {
+            return Ok(());
+        }
+        let worst = impossible.iter().max_by_key(|health| of(health)).map_or("", |health| health.name());
+        Err(Failure::Input(format!(
+            "{} of {} estimates are impossible for this car, most of them `{worst}`\nhint: a channel with a wrong scale does this, \
+             another car than that of the vehicle file, and a log of other gears; `wetclutch inspect` shows least and greatest values, \
+             and a channel map with `gearbox.ratios` tells the gears apart",
+            output::grouped(count),
+            output::grouped(self.rows)
+        )))
     }
 
     /// What was found, in sentences.
@@ -146,7 +189,13 @@ impl Findings {
                 units::mpa(score.rms),
             ));
         }
-        let rows = output::grouped(self.rows);
+        let rows = output::grouped(self.rows + self.other_gear);
+        if self.other_gear > 0 {
+            said.push(format!(
+                "{} of {rows} samples are in gears that the vehicle file does not describe: they have no estimate",
+                output::grouped(self.other_gear)
+            ));
+        }
         said.push(format!("rows: {rows}, from {:.3} to {:.3} s", self.first_s, self.last_s));
         said.push(format!("shifts: {}", self.shifts()));
         #[expect(clippy::cast_precision_loss, reason = "a share to a tenth of a percent")]

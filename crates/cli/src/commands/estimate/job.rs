@@ -1,13 +1,16 @@
 //! The estimate of one log.
 
+use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
 
+use ::observer::Estimate;
 use config::ObserverKind;
 use drivetrain::CommandKind;
-use logs::{Log, Role};
+use logs::{Log, Role, Shift};
 use report::log_page::{LogPage, shift_rows};
-use study::LogSample;
+use study::shift_estimates::no_estimate;
+use study::{LogSample, OutputColumn};
 
 use super::findings::Findings;
 use super::measured::{Measured, Step};
@@ -40,39 +43,35 @@ pub(super) fn estimate(
     };
     let chosen_observer = observer::choose(options, vehicle, &log, say)?;
     let columns = chosen(chosen_observer.observer.columns(log.has_wheel_speed()), &options.columns)?;
-    let mut table = Output::create(output, &columns)?;
-    let mut shifts = Shifts::new(options, vehicle, &log.ratios);
-    let mut findings = Findings::new();
-    let is_selective = shifts.is_selective();
-    // Of shifts that lie close together, a row is written once.
-    let mut written_s = f64::NEG_INFINITY;
-    let mut write_shift = |table: &mut Output, samples: &[LogSample]| -> Result<(), Failure> {
-        for sample in samples.iter().filter(|_| is_selective) {
-            if sample.time_s > written_s {
-                written_s = sample.time_s;
-                table.row(sample.time_s, &sample.estimate, &columns)?;
+    let rows = RefCell::new(Rows {
+        table: Output::create(output, &columns)?,
+        columns: &columns,
+        shifts: Shifts::new(options, vehicle, &log.ratios),
+        findings: Findings::new(vehicle),
+        written_s: f64::NEG_INFINITY,
+        follow: options.follow,
+    });
+    // The observer gets the steps in the gears of its shift; the others go by it.
+    let in_gears = std::iter::from_fn(|| {
+        loop {
+            match log.next()? {
+                Ok(step) if step.is_other_gear => {
+                    if let Err(failure) = rows.borrow_mut().take(step, None) {
+                        return Some(Err(failure));
+                    }
+                }
+                step => return Some(step.map(|step| (step.input, step))),
             }
         }
-        if options.follow { table.flush() } else { Ok(()) }
-    };
-    chosen_observer.observer.run_over(Some(vehicle), &mut log, |step: Step, estimate| {
-        findings.push(&step, &estimate);
-        let Step { time_s, input, pressure_pa, torque_n_m, .. } = step;
-        shifts.push(LogSample { time_s, input, estimate, pressure_pa, torque_n_m });
-        for shift in step.shifts {
-            shifts.take(shift, |samples| write_shift(&mut table, samples))?;
-        }
-        if !is_selective {
-            table.row(time_s, &estimate, &columns)?;
-            if options.follow {
-                table.flush()?;
-            }
-        }
-        Ok(())
-    })?;
+    });
+    chosen_observer
+        .observer
+        .run_over(Some(vehicle), in_gears, |step, estimate| rows.borrow_mut().take(step, Some(estimate)))?;
+    let mut rows = rows.into_inner();
     for shift in log.last_shifts() {
-        shifts.take(shift, |samples| write_shift(&mut table, samples))?;
+        rows.shift(shift)?;
     }
+    let Rows { mut table, shifts, findings, .. } = rows;
     if output.is_none() {
         table.flush()?;
     }
@@ -112,6 +111,67 @@ pub(super) fn estimate(
         say.note(&format!("report: {}", page.display()));
     }
     Ok(())
+}
+
+/// What becomes of the steps of a log.
+struct Rows<'a> {
+    table: Output,
+    columns: &'a [OutputColumn],
+    shifts: Shifts<'a>,
+    findings: Findings,
+    /// Of shifts that lie close together, a row is written once: the last one that was, s.
+    written_s: f64,
+    follow: bool,
+}
+
+impl Rows<'_> {
+    /// Takes a step with its estimate; none in a gear that the vehicle file does not describe.
+    fn take(&mut self, step: Step, estimate: Option<Estimate<f64>>) -> Result<(), Failure> {
+        match &estimate {
+            Some(estimate) => self.findings.push(&step, estimate),
+            None => self.findings.push_other_gear(step.time_s),
+        }
+        let Step { time_s, input, pressure_pa, torque_n_m, .. } = step;
+        self.shifts.push(LogSample {
+            time_s,
+            input,
+            estimate: estimate.unwrap_or_else(no_estimate),
+            pressure_pa,
+            torque_n_m,
+        });
+        for shift in step.shifts {
+            self.shift(shift)?;
+        }
+        if !self.shifts.is_selective() {
+            match &estimate {
+                Some(estimate) => self.table.row(time_s, estimate, self.columns)?,
+                None => self.table.empty_row(time_s, self.columns)?,
+            }
+            if self.follow {
+                self.table.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a shift that is known now.
+    fn shift(&mut self, shift: Shift) -> Result<(), Failure> {
+        let Self { table, columns, written_s, follow, .. } = self;
+        let is_selective = self.shifts.is_selective();
+        self.shifts.take(shift, |samples| {
+            for sample in samples.iter().filter(|_| is_selective) {
+                if sample.time_s > *written_s {
+                    *written_s = sample.time_s;
+                    if sample.is_estimated() {
+                        table.row(sample.time_s, &sample.estimate, columns)?;
+                    } else {
+                        table.empty_row(sample.time_s, columns)?;
+                    }
+                }
+            }
+            if *follow { table.flush() } else { Ok(()) }
+        })
+    }
 }
 
 /// The shifts as a table, if there are any.

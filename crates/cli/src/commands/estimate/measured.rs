@@ -11,8 +11,8 @@ use config::Vehicle;
 use drivetrain::CommandKind;
 use logs::plausibility::{Extremes, Likely, findings};
 use logs::{
-    ChannelMap, Gearbox, Log, LogError, Quality, QualityCounts, Reading, Readings, Role, RoleSummary, Shift,
-    ShiftFinder, Steps,
+    ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, QualityCounts, Reading, Readings, Role, RoleSummary,
+    Shift, ShiftFinder, Steps,
 };
 use observer::{Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
@@ -32,6 +32,10 @@ pub(super) struct Measured<'a> {
     /// Ratios of the gears that the finder numbers, 1st first.
     pub(super) ratios: Vec<f64>,
     resets: u32,
+    /// The gears of the vehicle's shift among those of the gearbox; none if it has no more.
+    gears: Option<GearsOfShift>,
+    /// Time since the last step in them, s.
+    waited_s: f64,
 }
 
 /// Rows of signals with the names of the program, or channels with clocks of their own.
@@ -45,6 +49,8 @@ struct Rows {
     /// Values of the signals in their columns, to tell wrong units.
     summary: Vec<RoleSummary>,
     rows: u64,
+    /// Rows that were looked at before the first estimate.
+    look: u64,
 }
 
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
@@ -66,6 +72,8 @@ pub(super) struct Step {
     /// Every reading that came.
     readings: Vec<Reading>,
     resets: u32,
+    /// Whether the car is in another gear than those of the vehicle file's shift: its observer is not valid there.
+    pub(super) is_other_gear: bool,
     /// Measured pressure of the oncoming clutch, Pa.
     pub(super) pressure_pa: Option<Measurement<f64>>,
     /// Measured torque of the oncoming clutch, N m.
@@ -81,7 +89,8 @@ impl Step {
             Some(Measurement { value: reading.value, age_s: (time_s - reading.time_s).max(0.0) })
         };
         let (pressure_pa, torque_n_m) = (newest(Role::OncomingPressure), newest(Role::OncomingTorque));
-        Self { time_s, input, truth: None, readings, resets: 0, pressure_pa, torque_n_m, shifts: Vec::new() }
+        let (truth, shifts) = (None, Vec::new());
+        Self { time_s, input, truth, readings, resets: 0, is_other_gear: false, pressure_pa, torque_n_m, shifts }
     }
 
     /// A row of a table with the names of the program.
@@ -128,7 +137,7 @@ impl<'a> Measured<'a> {
         let rows = CsvRows::of(path, input)?;
         let summary = summary(&rows, vehicle);
         let log = study::log::Log::of(rows, vehicle, look)?;
-        let mut rows = Rows { log, summary, rows: 0 };
+        let mut rows = Rows { log, summary, rows: 0, look: look as u64 };
         let looked_at: Vec<Input<f64>> = rows.log.looked_at().map(|(input, _)| *input).collect();
         looked_at.iter().for_each(|input| watch(&mut rows.summary, input));
         rows.check_units()?;
@@ -136,7 +145,7 @@ impl<'a> Measured<'a> {
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&rows.log, role))?;
         let source = Source::Rows(Box::new(rows));
-        Ok(Self { source, finder, ratios: gearbox.ratios, resets: 0 })
+        Ok(Self { source, finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
     }
 
     /// Channels of a log by a map.
@@ -193,7 +202,10 @@ impl<'a> Measured<'a> {
         channels.steps.readings().check_units()?;
         let steps_s = channels.looked_at.iter().skip(1).map(|step| step.input.dt_s);
         channels.median_step_s = trace::median_step_s(steps_s.collect());
-        Ok(Self { source: Source::Channels(Box::new(channels)), finder, ratios: gearbox.ratios, resets: 0 })
+        let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
+        let gears = GearsOfShift::new(&gearbox, shift);
+        let source = Source::Channels(Box::new(channels));
+        Ok(Self { source, finder, ratios: gearbox.ratios, resets: 0, gears, waited_s: 0.0 })
     }
 
     pub(super) fn has_wheel_speed(&self) -> bool {
@@ -234,7 +246,12 @@ impl<'a> Measured<'a> {
     /// Most samples of a channel could not be used, or a unit is wrong by all appearances.
     pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
         let channels = match &self.source {
-            Source::Rows(rows) => return rows.check_units(),
+            Source::Rows(rows) => {
+                for note in rows.log.check_times()? {
+                    say.note(&format!("warning: {note}"));
+                }
+                return rows.check_units();
+            }
             Source::Channels(channels) => channels,
         };
         let readings = channels.steps.readings();
@@ -328,6 +345,10 @@ impl Rows {
                 let hint = "give the unit and the scale in a channel map, see `wetclutch inspect --suggest`";
                 return Err(Failure::Input(format!("{message}\nhint: {hint}")));
             }
+            Likely::OtherChannel => {
+                let hint = "another signal may stand in its column, or its sensor has failed";
+                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+            }
             Likely::OtherSign => {
                 let hint = "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`";
                 return Err(Failure::Input(format!("{message}\nhint: {hint}")));
@@ -344,10 +365,10 @@ impl Rows {
         let row = self.log.next()?;
         self.rows += 1;
         Some(row.map_err(Failure::from).map(|(input, row)| {
-            if self.rows > FIRST_LOOK as u64 && self.rows.is_multiple_of(EVERY) {
+            if self.rows > self.look && self.rows.is_multiple_of(EVERY) {
                 watch(&mut self.summary, &input);
             }
-            Step::of_row(input, &row)
+            Step { resets: self.log.resets(), ..Step::of_row(input, &row) }
         }))
     }
 }
@@ -362,7 +383,7 @@ impl Channels<'_> {
 }
 
 impl Iterator for Measured<'_> {
-    type Item = Result<(Input<f64>, Step), Failure>;
+    type Item = Result<Step, Failure>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let step = match &mut self.source {
@@ -377,9 +398,20 @@ impl Iterator for Measured<'_> {
                 self.resets = step.resets;
                 self.finder.restart();
             }
-            step.readings.iter().for_each(|reading| self.finder.push(reading));
+            for reading in &step.readings {
+                self.finder.push(reading);
+                if let Some(gears) = &mut self.gears {
+                    gears.push(reading);
+                }
+            }
+            step.is_other_gear = self.gears.as_ref().is_some_and(|gears| !gears.is_inside());
+            if step.is_other_gear {
+                self.waited_s += step.input.dt_s;
+            } else {
+                step.input.dt_s += std::mem::take(&mut self.waited_s);
+            }
             step.shifts = self.finder.take_settled(step.time_s);
-            (step.input, step)
+            step
         }))
     }
 }

@@ -6,6 +6,7 @@ mod job;
 mod measured;
 pub(super) mod observer;
 mod outputs;
+mod ratios;
 mod shifts;
 
 use std::collections::HashMap;
@@ -54,10 +55,17 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     observer::check_options(options)?;
     match options.logs.as_slice() {
         [log] => {
-            check_output(options.output.as_ref())?;
-            not_an_input(options.output.as_ref(), options.sensors.iter().chain([&options.vehicle]))?;
+            let folder = options.output.as_ref().filter(|output| output.is_dir());
+            let output = match folder {
+                Some(folder) => names_in(folder, &options.logs, options.format.ending())?.pop(),
+                None => options.output.clone(),
+            };
+            check_output(output.as_ref())?;
+            // A log that is named as its own output is replaced; in a folder that is a mistake.
+            let log_itself = folder.map(|_| log);
+            not_an_input(output.as_ref(), options.sensors.iter().chain([&options.vehicle]).chain(log_itself))?;
             let setup = setup(options)?;
-            job::estimate(&setup, log, options.output.as_deref(), &mut Messages { held: None })
+            job::estimate(&setup, log, output.as_deref(), &mut Messages { held: None })
         }
         logs => several(options, logs),
     }

@@ -71,6 +71,17 @@ impl Output {
         self.cells(time_s, columns.iter().map(|column| column.cell(estimate)))
     }
 
+    /// A row without an estimate.
+    pub(super) fn empty_row(&mut self, time_s: f64, columns: &[OutputColumn]) -> Result<(), Failure> {
+        self.cells(
+            time_s,
+            columns.iter().map(|column| match column.kind() {
+                ColumnKind::Word => Cell::Word(""),
+                ColumnKind::Number | ColumnKind::Whole => Cell::Number(f64::NAN),
+            }),
+        )
+    }
+
     pub(super) fn cells<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Failure> {
         match self {
             Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Failure::writing(path, &error)),

@@ -1,0 +1,133 @@
+//! Whether the speeds of a log are those of the vehicle file's car: ratios that a wrong scale changes.
+
+use config::Vehicle;
+use observer::{Input, Reading};
+
+use crate::failure::Failure;
+
+/// Below this output speed a ratio says nothing, rad/s.
+const OUTPUT_MIN_RAD_S: f64 = 8.0;
+/// A ratio is that of a gear within this share.
+const IN_GEAR: f64 = 0.05;
+/// A car is in gear for most of the time; so little says that its gears are others.
+const IN_GEAR_SHARE: f64 = 0.1;
+/// Wheels differ by so much: tyres, scale and slip are a part of it.
+const WHEEL: f64 = 0.15;
+/// Steps that are needed to judge, and time, s.
+const STEPS: u64 = 200;
+const TIME_S: f64 = 3.0;
+
+/// Ratios of the speeds so far.
+pub(super) struct Ratios {
+    gears: [f64; 2],
+    final_ratio: f64,
+    /// Newest turbine, output and wheel speed, rad/s.
+    newest_rad_s: [f64; 3],
+    moving_s: f64,
+    moving: u64,
+    in_gear: u64,
+    turbine_over_output: Histogram,
+    output_over_wheel: Histogram,
+}
+
+impl Ratios {
+    pub(super) fn new(vehicle: &Vehicle) -> Self {
+        Self {
+            gears: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
+            final_ratio: vehicle.driveline.final_ratio,
+            newest_rad_s: [f64::NAN; 3],
+            moving_s: 0.0,
+            moving: 0,
+            in_gear: 0,
+            turbine_over_output: Histogram::default(),
+            output_over_wheel: Histogram::default(),
+        }
+    }
+
+    pub(super) fn push(&mut self, input: &Input<f64>) {
+        let readings = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        for (newest, reading) in self.newest_rad_s.iter_mut().zip(readings) {
+            if let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) {
+                *newest = value;
+            }
+        }
+        let [turbine, output, wheel] = self.newest_rad_s;
+        if output > OUTPUT_MIN_RAD_S && turbine.is_finite() {
+            self.moving += 1;
+            self.moving_s += input.dt_s.clamp(0.0, 1.0);
+            let ratio = turbine / output;
+            self.in_gear += u64::from(self.gears.iter().any(|gear| (ratio / gear - 1.0).abs() < IN_GEAR));
+            self.turbine_over_output.push(ratio);
+            self.output_over_wheel.push(output / wheel);
+        }
+    }
+
+    /// Refuses speeds that are not of this car.
+    ///
+    /// # Errors
+    /// The car is hardly ever in its gears, or its wheels do not turn with its output.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        if self.moving < STEPS || self.moving_s < TIME_S {
+            return Ok(());
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a share")]
+        let share = self.in_gear as f64 / self.moving as f64;
+        if share < IN_GEAR_SHARE {
+            let [offgoing, oncoming] = self.gears;
+            return Err(Failure::Input(format!(
+                "turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
+                 {oncoming:.3}: the car is in them for {:.0} % of the time\nhint: check unit and scale of turbine_speed and output_speed, and \
+                 whether the vehicle file is of this car; for a log of more gears, a channel map with `gearbox.ratios` tells them apart",
+                self.turbine_over_output.middle(),
+                100.0 * share,
+            )));
+        }
+        let wheel = self.output_over_wheel.middle();
+        if (wheel / self.final_ratio - 1.0).abs() > WHEEL {
+            return Err(Failure::Input(format!(
+                "output_speed over wheel_speed is {wheel:.2} in the middle, and the final ratio of the vehicle file is {:.2}\n\
+                 hint: check unit and scale of wheel_speed and output_speed, and `driveline.final_ratio`",
+                self.final_ratio,
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Counts of ratios from 1/20 to 20 by their logarithm.
+struct Histogram {
+    counts: Vec<u32>,
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self { counts: vec![0; Self::BINS] }
+    }
+}
+
+impl Histogram {
+    const BINS: usize = 600;
+    /// Bins for a factor of e.
+    const FINE: f64 = 100.0;
+
+    fn push(&mut self, ratio: f64) {
+        let place = ratio.ln() * Self::FINE + 300.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
+        if (0.0..600.0).contains(&place) {
+            self.counts[place as usize] = self.counts[place as usize].saturating_add(1);
+        }
+    }
+
+    /// The middle ratio, to half a per cent; not a number without any.
+    fn middle(&self) -> f64 {
+        let all: u64 = self.counts.iter().map(|count| u64::from(*count)).sum();
+        let mut below = 0;
+        for (place, count) in (0_u32..).zip(&self.counts) {
+            below += u64::from(*count);
+            if 2 * below > all {
+                return ((f64::from(place) + 0.5 - 300.0) / Self::FINE).exp();
+            }
+        }
+        f64::NAN
+    }
+}

@@ -1,0 +1,270 @@
+//! The log of a day's drive with an eight-speed gearbox, as asammdf writes it, and tables that recorders leave with faults.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
+const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
+const DAY_LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/day_log.py");
+/// The library that writes the log, in the version that the test was made with.
+const ASAMMDF: &str = "asammdf==8.8.28";
+
+fn wetclutch(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Standard output and standard error of a command that must succeed.
+fn said(output: &Output) -> [String; 2] {
+    assert!(output.status.success(), "{}", stderr(output));
+    [String::from_utf8(output.stdout.clone()).unwrap(), stderr(output)]
+}
+
+/// The standard error of a command whose input must be refused.
+fn refused(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(output));
+    stderr(output)
+}
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("wetclutch-day-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        std::fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.join(name)).unwrap()
+    }
+
+    /// The simulated launch and upshift at 100 Hz.
+    fn drive(&self) -> String {
+        said(&wetclutch(&["simulate", EXPERIMENT, "-o", &self.path("drive")]));
+        let text = self.read("drive/e1_measured.csv");
+        let row = |(i, line): (usize, &str)| (i == 0 || i % 10 == 1).then(|| format!("{line}\n"));
+        text.lines().enumerate().filter_map(row).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A Python with asammdf: that of `WETCLUTCH_PYTHON`, `python3`, or one that pip makes beside the build. None where there is no
+/// pip or no network; where `CI` is set, that is an error.
+fn python() -> Option<PathBuf> {
+    let has = |python: &Path| {
+        Command::new(python).args(["-c", "import asammdf"]).output().is_ok_and(|output| output.status.success())
+    };
+    let own = Path::new(env!("CARGO_TARGET_TMPDIR")).join("asammdf");
+    let own_python = own.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    let named = std::env::var_os("WETCLUTCH_PYTHON").map(PathBuf::from);
+    let known = named.into_iter().chain([PathBuf::from("python3"), own_python.clone()]);
+    if let Some(python) = known.into_iter().find(|python| has(python)) {
+        return Some(python);
+    }
+    let run = |program: &Path, arguments: &[&str]| {
+        Command::new(program).args(arguments).output().is_ok_and(|output| output.status.success())
+    };
+    let made = run(Path::new("python3"), &["-m", "venv", own.to_str().unwrap()])
+        && run(&own_python, &["-m", "pip", "install", "--quiet", ASAMMDF]);
+    if made && has(&own_python) {
+        return Some(own_python);
+    }
+    assert!(std::env::var_os("CI").is_none(), "asammdf cannot be installed: `pip install {ASAMMDF}`");
+    // Past the test runner, which keeps what a passing test prints.
+    let skipped = format!("SKIPPED: no Python with asammdf (pip install {ASAMMDF}; WETCLUTCH_PYTHON names a Python)\n");
+    std::io::stderr().write_all(skipped.as_bytes()).unwrap();
+    None
+}
+
+/// `DAY_REPETITIONS=20` is the whole hour of the drive file, better in a release build.
+#[test]
+fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
+    let Some(python) = python() else { return };
+    let folder = Folder::new("city");
+    let repetitions: u32 = std::env::var("DAY_REPETITIONS").map_or(2, |text| text.parse().unwrap());
+    let drive = std::fs::read_to_string(format!("{ROOT}/drives/city.toml")).unwrap();
+    let drive = drive.replace("repetitions = 20", &format!("repetitions = {repetitions}"));
+    let drive = drive.replace("sample_time_s = 0.01", "sample_time_s = 0.005");
+    let drive = folder.write("city.toml", &drive.replace("../vehicles", &format!("{ROOT}/vehicles")));
+    said(&wetclutch(&["simulate", &drive, "-o", &folder.path("")]));
+    let made = Command::new(python).args([DAY_LOG, &folder.path("city_measured.csv"), &folder.path("log")]).output();
+    said(&made.unwrap());
+
+    let [suggested, _] = said(&wetclutch(&["inspect", &folder.path("log.mf4"), "--suggest"]));
+    let gearbox = "ratios = [4.6957, 3.1304, 2.1039, 1.6667, 1.2845, 1.0, 0.8392, 0.6667]\noutput_rad_per_m = 10.0\n";
+    let valves = "[channel.oncoming_current]\nname = \"I_E\"\n[channel.offgoing_current]\nname = \"I_C\"\n";
+    let map = folder.write("map.toml", &format!("{suggested}\n[gearbox]\n{gearbox}{valves}"));
+    let car = folder.path("car.toml");
+    let numbers = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"];
+    said(&wetclutch(&[&["init", "--ratios", "4.6957,3.1304", "-o", &car], &numbers[..]].concat()));
+
+    let of = |ending: &str| {
+        let log = folder.path(&format!("log.{ending}"));
+        let [channels, _] = said(&wetclutch(&["inspect", &log]));
+        // Groups have names in MDF only.
+        let word =
+            |line: &str| line.replace("TCU_fast", "").replace("TCU ", "").replace("Brakes", "").replace("Slow", "");
+        let channels: Vec<Vec<String>> =
+            (channels.lines().skip(2)).map(|line| word(line).split_whitespace().map(str::to_owned).collect()).collect();
+        let shifts = said(&wetclutch(&["inspect", &log, "--map", &map, "--shifts"]));
+        // Under one name, which stands in the files.
+        let (out, fitted) = (folder.path("out.csv"), folder.path("fitted.toml"));
+        let fit = wetclutch(&["fit", &log, "--map", &map, "--vehicle", &car, "-o", &fitted]);
+        let fit = said(&fit).map(|text| text.replace(&log, "LOG"));
+        let estimate = said(&wetclutch(&["estimate", &log, "--map", &map, "--vehicle", &car, "-o", &out]));
+        let files = ["out.csv", "out_shifts.csv", "out_shifts.json", "fitted.toml"];
+        let files = files.map(|name| folder.read(name).replace(&log, "LOG"));
+        (channels, shifts, fit, estimate, files)
+    };
+    let (mdf, csv) = (of("mf4"), of("csv"));
+    assert_eq!(mdf.0, csv.0);
+    assert_eq!(mdf.1, csv.1);
+    assert_eq!((&mdf.2, &mdf.3), (&csv.2, &csv.3));
+    for (one, other) in mdf.4.iter().zip(&csv.4) {
+        assert!(one == other, "the files differ");
+    }
+
+    // What a browser opens at once, however long the day was.
+    let page = std::fs::metadata(folder.path("out_report.html")).unwrap().len();
+    assert!(page < 5_000_000, "{page}");
+    // Of the shifts of the simulated drive, all but those at walking speed are found by their ratio; no sample is called frozen.
+    let found = mdf.1[0].lines().filter(|line| line.contains(" to ") && line.contains("power-")).count();
+    assert!(found >= 18 * repetitions as usize, "{}", mdf.1[0]);
+    assert!(!mdf.3[1].contains("frozen"), "{}", mdf.3[1]);
+    // In other gears there is no estimate, and what an observer meets there does not spoil the next shift: all of them are alike.
+    assert!(mdf.3[1].contains("samples are in gears that the vehicle file does not describe"), "{}", mdf.3[1]);
+    let shifts: Vec<Vec<String>> = mdf.4[1].lines().map(|line| line.split(',').map(str::to_owned).collect()).collect();
+    let column = |name: &str| shifts[0].iter().position(|title| title == name).unwrap();
+    let (of_vehicle, work) = (column("of_vehicle"), column("friction_work_j"));
+    let works: Vec<f64> = shifts[1..]
+        .iter()
+        .filter(|row| row[of_vehicle] == "yes")
+        .map(|row| row[work].parse().unwrap_or(f64::NAN))
+        .collect();
+    // The simulated clutch takes 1149 J in each; the vehicle file has never seen this car.
+    let upshifts: Vec<f64> = works.into_iter().filter(|work| !work.is_nan()).collect();
+    assert!(upshifts.len() as u32 >= repetitions, "{upshifts:?}");
+    assert!(upshifts.iter().all(|work| (750.0..1300.0).contains(work)), "{upshifts:?}");
+}
+
+#[test]
+fn faults_of_time_stamps_in_a_table_are_counted_and_read_as_with_a_map() {
+    let folder = Folder::new("times");
+    let clean = folder.drive();
+    let lines: Vec<&str> = clean.lines().collect();
+    let (mut text, mut resets) = (format!("{}\n", lines[0]), String::new());
+    for (i, line) in lines.iter().enumerate().skip(1) {
+        writeln!(text, "{line}").unwrap();
+        let (time, rest) = line.split_once(',').unwrap();
+        match i {
+            // The same time again with other values, and rows that come too late.
+            300 => writeln!(text, "{time},1,1,1,1,0.5,0.5,0").unwrap(),
+            400 | 500 => writeln!(text, "{}", lines[i - 3]).unwrap(),
+            _ => {}
+        }
+        let time: f64 = time.parse().unwrap();
+        writeln!(resets, "{},{rest}", if i > 850 { time - 8.0 } else { time }).unwrap();
+    }
+    let columns = lines[0].split(',').count();
+    let text = text.replace(",1,1,1,1,0.5,0.5,0\n", &format!("{}\n", ",1".repeat(columns - 1)));
+    let estimate = |name: &str, text: &str, more: &[&str]| {
+        let log = folder.write(name, text);
+        said(&wetclutch(&[&["estimate", &log, "--vehicle", VEHICLE], more].concat()))
+    };
+    let [expected, _] = estimate("clean.csv", &clean, &[]);
+    let [found, notes] = estimate("faulty.csv", &text, &[]);
+    assert!(found == expected);
+    let rows = lines.len() + 2;
+    for note in [
+        "1 of ROWS rows have the time of the row before and",
+        "2 of ROWS rows have a time before that of the row before and",
+    ] {
+        assert!(notes.contains(&note.replace("ROWS", &rows.to_string())), "{notes}");
+    }
+    let map = folder.path("map.toml");
+    std::fs::write(&map, wetclutch(&["inspect", &folder.path("faulty.csv"), "--suggest"]).stdout).unwrap();
+    let [mapped, _] = estimate("faulty.csv", &text, &["--map", &map]);
+    assert!(mapped == expected);
+
+    // A clock that starts again.
+    let [found, notes] = estimate("reset.csv", &format!("{}\n{resets}", lines[0]), &[]);
+    assert!(notes.contains("the clock was reset 1 times: the time goes on one second later"), "{notes}");
+    let last = |text: &str| text.lines().last().unwrap().split(',').next().unwrap().parse::<f64>().unwrap();
+    // Twenty rows tell the reset.
+    assert!((last(&found) - (last(&expected) + 1.0 - 0.21)).abs() < 1e-6, "{} {}", last(&found), last(&expected));
+    let [mapped, _] = estimate("reset.csv", &format!("{}\n{resets}", lines[0]), &["--map", &map]);
+    assert!(mapped == found);
+
+    // One time stamp that is far too late. What comes after it is not lost for that, and the shift is estimated.
+    let far: String = (lines.iter().enumerate())
+        .map(|(i, line)| match line.split_once(',') {
+            Some((_, rest)) if i == 300 => format!("1000000,{rest}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let [found, notes] = estimate("far.csv", &far, &[]);
+    assert!(notes.contains("1 time stamps are far too late") && notes.contains("shifts: 1 ("), "{notes}");
+    assert!(!notes.contains("not in the command"), "{notes}");
+    let [mapped, _] = estimate("far.csv", &far, &["--map", &map]);
+    assert!(mapped == found && mapped.lines().count() == lines.len() - 20);
+}
+
+/// The drive with one column changed.
+fn changed(drive: &str, column: &str, change: impl Fn(f64) -> f64) -> String {
+    let names = drive.lines().next().unwrap();
+    let at = names.split(',').position(|name| name == column).unwrap();
+    let row = |line: &str| {
+        let cells = line.split(',').enumerate().map(|(i, cell)| match i == at {
+            true => change(cell.parse().unwrap()).to_string(),
+            false => cell.to_owned(),
+        });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    };
+    format!("{names}\n{}", drive.lines().skip(1).map(row).collect::<String>())
+}
+
+#[test]
+fn a_channel_that_cannot_be_the_signal_is_an_error() {
+    let folder = Folder::new("channels");
+    let drive = folder.drive();
+    let map = folder.path("map.toml");
+    for (column, value) in [("turbine_speed_rad_s", 190.0), ("output_speed_rad_s", 70.0), ("wheel_speed_rad_s", 25.0)] {
+        let log = folder.write("log.csv", &changed(&drive, column, |_| value));
+        let out = folder.path("out.csv");
+        let text = refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out]));
+        let name = column.trim_end_matches("_rad_s");
+        assert!(text.contains(&format!("{name} is {value:.3} rad/s in all samples, and ")), "{text}");
+        assert!(text.contains("hint: another signal may stand in its column") && !Path::new(&out).exists(), "{text}");
+        std::fs::write(&map, wetclutch(&["inspect", &log, "--suggest"]).stdout).unwrap();
+        refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out, "--map", &map]));
+    }
+    for (column, factor) in [("turbine_speed_rad_s", 1.5), ("output_speed_rad_s", 0.7), ("wheel_speed_rad_s", 1.4)] {
+        let log = folder.write("log.csv", &changed(&drive, column, |value| factor * value));
+        let text = refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &folder.path("out.csv")]));
+        assert!(text.contains("hint: ") && text.contains("scale"), "{column}: {text}");
+    }
+}

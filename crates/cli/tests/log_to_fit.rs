@@ -1,0 +1,72 @@
+//! The commands of `docs/fit.md`, from a log to an estimate with a fitted file, as they stand there.
+
+#![cfg(unix)]
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+#[path = "../../fit/tests/common/mod.rs"]
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::{Logs, TestCar};
+use config::Vehicle;
+use trace::{Cell, ColumnKind, TableWriter};
+
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/fit.md");
+const SHIFTS: u64 = 5;
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The log of a car that differs from its file in everything, as MDF with the names of the program.
+fn write_log(path: &Path, car: &mut TestCar) {
+    let logs: Vec<trace::Trace> =
+        (0..SHIFTS).map(|number| car.logs(number, Logs::SpeedsAndCurrent)[0].clone()).collect();
+    let names: Vec<String> = logs[0].columns.iter().map(|column| column.name.clone()).collect();
+    let columns = names.iter().map(|name| (name.as_str(), ColumnKind::Number));
+    let mut writer = TableWriter::create(path, columns).unwrap();
+    let mut begin_s = 0.0;
+    for log in &logs {
+        for (i, time_s) in log.time_s.iter().enumerate() {
+            let cells = names.iter().map(|name| Cell::Number(log.get(name).unwrap()[i]));
+            writer.row(begin_s + time_s, cells).unwrap();
+        }
+        // The recorder was off for some seconds.
+        begin_s += log.time_s.last().unwrap() + 4.0;
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
+    let folder = Folder(std::env::temp_dir().join(format!("wetclutch-path-{}", std::process::id())));
+    std::fs::create_dir_all(&folder.0).unwrap();
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let commands: Vec<&str> = page.split("```").nth(1).unwrap().lines().filter(|line| !line.is_empty()).collect();
+    assert!(commands.len() >= 4 && commands.iter().all(|command| command.starts_with("wetclutch ")), "{commands:?}");
+    let program = Path::new(env!("CARGO_BIN_EXE_wetclutch")).parent().unwrap();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+    for command in commands {
+        let shell =
+            Command::new("sh").args(["-c", command]).env("PATH", &path).current_dir(&folder.0).output().unwrap();
+        let said = String::from_utf8(shell.stderr).unwrap();
+        assert!(shell.status.success(), "{command}: {said}");
+        if command.starts_with("wetclutch init") {
+            let mut car = TestCar::of(Vehicle::read(&folder.0.join("car.toml")).unwrap(), 4);
+            write_log(&folder.0.join("drive.mf4"), &mut car);
+        }
+        if command.starts_with("wetclutch estimate") {
+            assert!(said.contains(&format!("shifts: {SHIFTS} (")), "{said}");
+        }
+    }
+    let fitted = std::fs::read_to_string(folder.0.join("fitted.toml")).unwrap();
+    assert!(fitted.contains("# fit: x ") && fitted.contains("what the fit leaves open"), "{fitted}");
+    assert!(folder.0.join("estimate_report.html").exists());
+}

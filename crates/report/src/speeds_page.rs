@@ -1,0 +1,453 @@
+//! The page of a drive without a valve command: what speeds, torques and gears tell of shifts and converter, and what they cannot.
+
+use std::path::Path;
+
+use config::Source;
+use fit::Series as Readings;
+use fit::drive::{ConverterFit, DriveRecord, Moment, ShiftTorque};
+use logs::Shift;
+use minijinja::{Value, context};
+use trace::units::{km_h, rpm};
+
+use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
+use crate::log_page::{MOST_DRAWN, compact, kind_of, panel};
+use crate::page::{PageError, inline, origin, templates};
+use crate::palette::{RANGE, Weight};
+use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
+use crate::tables::number;
+
+/// Points of a curve over the whole drive, and of one over a shift.
+const POINTS: usize = 3000;
+const SHIFT_POINTS: usize = 300;
+/// Width of the bins of measured capacities, speed ratio.
+const BIN: f64 = 0.02;
+
+/// What a page is made from.
+pub struct SpeedsPage<'a> {
+    /// The log.
+    pub log: &'a Path,
+    /// The channel map.
+    pub map: Option<&'a Source>,
+    /// The signals.
+    pub record: &'a DriveRecord,
+    /// Engine and turbine over time.
+    pub moments: &'a [Moment],
+    /// Ratios of the gears, 1st first.
+    pub ratios: &'a [f64],
+    /// The shifts.
+    pub shifts: &'a [Shift],
+    /// The converter, or what the drive lacks for it.
+    pub converter: &'a Result<ConverterFit, String>,
+    /// Whether a command of a valve is mapped.
+    pub has_command: bool,
+    /// What was met in the log, in sentences.
+    pub faults: &'a [String],
+}
+
+impl SpeedsPage<'_> {
+    /// The page; it needs nothing but itself.
+    ///
+    /// # Errors
+    /// None in a released program; the tests render the template.
+    pub fn html(&self) -> Result<String, PageError> {
+        let torques: Vec<Option<ShiftTorque>> = self.torques();
+        let drawn = self.shifts.iter().zip(&torques).take(MOST_DRAWN).enumerate();
+        let figures: Vec<Value> = drawn
+            .map(|(i, (shift, torque))| {
+                context! {
+                    number => i + 1,
+                    title => format!("{}-{}, {}", shift.from, shift.to, kind_of(shift)),
+                    at => number(shift.start_s(), 2),
+                    remark => self.remark(torque.as_ref()),
+                    svg => inline(&compact(&self.shift_figure(shift, torque.as_ref()).svg())),
+                }
+            })
+            .collect();
+        let (titles, rows) = self.table(&torques);
+        let converter = self.converter.as_ref().ok();
+        let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
+        let inputs: Vec<&Source> = self.map.into_iter().collect();
+        Ok(templates()?.get_template("speeds.html")?.render(context! {
+            name => file,
+            title => "drive",
+            version => env!("CARGO_PKG_VERSION"),
+            log => self.log.display().to_string(),
+            shifts => self.shifts.len(),
+            findings => self.findings(&torques),
+            cannot => self.cannot(),
+            faults => self.faults.to_vec(),
+            overview => inline(&compact(&self.overview().svg())),
+            titles, rows, figures,
+            undrawn => self.shifts.len().saturating_sub(MOST_DRAWN),
+            converter => converter.map(|fit| inline(&self.converter_figure(fit).svg())),
+            engine => converter.map(|fit| inline(&compact(&self.engine_figure(fit).svg()))),
+            inputs => origin(&inputs),
+        })?)
+    }
+
+    /// The torques of the shifts; none without a fitted converter.
+    pub fn torques(&self) -> Vec<Option<ShiftTorque>> {
+        let of =
+            |shift| self.converter.as_ref().ok().map(|fit| fit.shift(self.record, self.moments, shift, self.ratios));
+        self.shifts.iter().map(of).collect()
+    }
+
+    /// What was found, in sentences.
+    pub fn findings(&self, torques: &[Option<ShiftTorque>]) -> Vec<String> {
+        let mut said = Vec::new();
+        match self.converter {
+            Err(reason) => said.push(format!("The converter could not be fitted: {reason}.")),
+            Ok(fit) => {
+                let [low, high] =
+                    [fit.knots.first(), fit.knots.iter().rev().nth(1)].map(|k| k.map_or(0.0, |k| k.speed_ratio));
+                said.push(format!(
+                    "Converter: capacity from {:.1} s with slip, speed ratio {low:.2} to {high:.2}. The engine torque signal agrees with it to \
+                     {:.1} N m (1.48 times the median error).",
+                    fit.fitted_s, fit.scale_n_m
+                ));
+                let capacities = fit.knots.iter().filter(|knot| knot.speed_ratio < 1.0);
+                let capacities =
+                    capacities.map(|knot| format!("{:.2} at {}", 1e3 * knot.capacity_n_m_s2, knot.speed_ratio));
+                said.push(format!("Capacity, 10⁻³ N m s²: {}.", capacities.collect::<Vec<_>>().join(", ")));
+                said.push(format!(
+                    "Inertia of engine and pump: {:.2} ± {:.2} kg m². The engine's torque comes {:.0} ms {} its signal.",
+                    fit.inertia_kg_m2,
+                    2.0 * fit.inertia_sd_kg_m2,
+                    1e3 * fit.delay_s.abs(),
+                    if fit.delay_s < 0.0 { "before" } else { "after" },
+                ));
+            }
+        }
+        let spans: Vec<String> = self.no_slip().iter().map(|span| self.no_slip_text(*span)).collect();
+        if !spans.is_empty() {
+            said.push(format!("No slip of the converter, {}.", spans.join("; ")));
+        }
+        let asked = self.shifts.iter().zip(torques).filter_map(|(shift, torque)| {
+            let torque = torque.as_ref()?;
+            let ([least, length_s], error) = (torque.reduction?, torque.reduction_error_n_m?);
+            Some(format!(
+                "{}-{} (to {least:.0} N m for {length_s:.2} s; the engine's torque was {error:.0} N m from it on average)",
+                shift.from, shift.to
+            ))
+        });
+        let asked: Vec<String> = asked.collect();
+        if !asked.is_empty() {
+            said.push(format!("The gearbox asked the engine for less torque in {}.", asked.join(", ")));
+        }
+        said
+    }
+
+    /// What this log cannot tell.
+    fn cannot(&self) -> Vec<&'static str> {
+        let mut said = Vec::new();
+        if !self.has_command {
+            said.push("No pressure: the log has no valve current, duty cycle or pressure command. With one of them and a vehicle file, `wetclutch estimate` gives it with its range.");
+        }
+        said.push("No torque of a clutch itself: ratios alone do not say which share of the turbine's torque a clutch holds. U is that torque as felt at the turbine; friction work does not need the share.");
+        said.push(
+            "Not how offgoing and oncoming clutch divide U while both carry: that needs the torque on the output side.",
+        );
+        if self.converter.is_ok() {
+            said.push("Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the input side's inertia as 0.04 to 0.16 kg m². Both are in the ranges.");
+        }
+        if self.record.vehicle.len() > 1 && self.record.output.value.first() != self.record.vehicle.value.first() {
+            said.push(
+                "The output speed is that of the car times a constant: slip of the tyres is part of the shift's slip.",
+            );
+        }
+        said
+    }
+
+    /// Spans without slip of at least half a second.
+    fn no_slip(&self) -> Vec<[f64; 2]> {
+        const LEAST_S: f64 = 0.5;
+        let spans = self.moments.chunk_by(|a, b| a.no_slip == b.no_slip && b.time_s - a.time_s < LEAST_S);
+        let ends = |span: &[Moment]| Some([span.first()?.time_s, span.last()?.time_s]).filter(|_| span[0].no_slip);
+        spans.filter_map(ends).filter(|[from_s, to_s]| to_s - from_s >= LEAST_S).collect()
+    }
+
+    fn no_slip_text(&self, [from_s, to_s]: [f64; 2]) -> String {
+        /// A converter without slip carries about as much as this, N m.
+        const NOTHING_N_M: f64 = 15.0;
+        let (count, sum) = self
+            .record
+            .engine_torque
+            .between([from_s, to_s])
+            .fold((0.0, 0.0), |(n, sum), (_, value)| (n + 1.0, sum + value));
+        let span = format!("{from_s:.1} to {to_s:.1} s");
+        match sum / count {
+            mean if mean.abs() > NOTHING_N_M => {
+                format!("{span}: lock-up clutch closed, at {mean:.0} N m of the engine")
+            }
+            mean if mean.is_nan() => span,
+            _ => format!("{span}: with nearly no torque, so the lock-up clutch may be open"),
+        }
+    }
+
+    /// Titles and rows of the table of shifts. Columns that no shift fills are left out.
+    fn table(&self, torques: &[Option<ShiftTorque>]) -> (Vec<&'static str>, Vec<Vec<String>>) {
+        let ranged = |value: [f64; 3], unit: f64, decimals: usize| {
+            let [low, middle, high] = value.map(|value| number(unit * value, decimals));
+            format!("{middle} ({low} to {high})")
+        };
+        let optional = |value: Option<f64>, decimals| value.map_or(String::new(), |value| number(value, decimals));
+        let row = |(i, (shift, torque)): (usize, (&Shift, &Option<ShiftTorque>))| {
+            let torque = torque.as_ref();
+            vec![
+                ("#", (i + 1).to_string()),
+                ("shift", format!("{}-{}", shift.from, shift.to)),
+                ("kind", kind_of(shift)),
+                ("begin s", number(shift.start_s(), 2)),
+                ("command to gear s", optional(shift.gear_s.zip(shift.command_s).map(|(end, begin)| end - begin), 2)),
+                ("inertia phase s", optional(shift.inertia_s.map(|[from_s, to_s]| to_s - from_s), 2)),
+                ("flare rpm", optional(shift.quality.flare_rad_s.map(rpm), 0)),
+                ("jerk m/s³", optional(shift.quality.jerk_m_s3, 1)),
+                ("torque asked for N m", optional(torque.and_then(|t| Some(t.reduction?[0])), 0)),
+                ("U, inertia phase N m", torque.and_then(|t| t.mean_n_m).map_or(String::new(), |u| ranged(u, 1.0, 0))),
+                ("friction work kJ", torque.and_then(|t| t.work_j).map_or(String::new(), |work| ranged(work, 1e-3, 2))),
+                (
+                    "converter without slip",
+                    optional(torque.filter(|t| t.mean_n_m.is_some()).map(|t| 100.0 * t.no_slip_share), 0),
+                ),
+            ]
+        };
+        let rows: Vec<Vec<(&str, String)>> = self.shifts.iter().zip(torques).enumerate().map(row).collect();
+        let width = rows.first().map_or(0, Vec::len);
+        let filled: Vec<usize> = (0..width).filter(|j| rows.iter().any(|row| !row[*j].1.is_empty())).collect();
+        let titles = filled.iter().map(|j| rows[0][*j].0).collect();
+        let cells = |row: &Vec<(&str, String)>| filled.iter().map(|j| row[*j].1.clone()).collect();
+        (titles, rows.iter().map(cells).collect())
+    }
+
+    fn remark(&self, torque: Option<&ShiftTorque>) -> &'static str {
+        match torque {
+            Some(torque) if torque.mean_n_m.is_none() => {
+                "The speed ratio of the converter leaves what was fitted, or speeds are missing: the torque at the turbine is not known throughout."
+            }
+            Some(torque) if torque.no_slip_share > 0.5 => {
+                "The converter does not slip in this shift: the engine's inertia is part of what the clutch brakes, and its torque signal gives the turbine's torque."
+            }
+            _ => "",
+        }
+    }
+
+    fn overview(&self) -> Figure {
+        let record = self.record;
+        let span_s = |moments: &[Moment]| Some((moments.first()?.time_s, moments.last()?.time_s));
+        let x_range = span_s(self.moments).unwrap_or((0.0, 1.0));
+        let all = |series: &Readings, unit: fn(f64) -> f64| points(series, [x_range.0, x_range.1], POINTS, unit);
+        let spans = self.shifts.iter().take(MOST_DRAWN).map(|shift| Span {
+            label: String::new(),
+            start: shift.start_s(),
+            end: shift.gear_s.unwrap_or(shift.end_s()).max(shift.end_s()),
+            colour: TORQUE_PHASE,
+        });
+        let slip = |moment: &Moment| (moment.time_s, rpm(moment.engine_rad_s - moment.turbine_rad_s));
+        let every = self.moments.len().div_ceil(POINTS).max(1);
+        let slips = self.moments.iter().step_by(every).map(slip).collect();
+        let panels = vec![
+            panel(
+                "speed (rpm)",
+                140.0,
+                vec![
+                    series("engine", Stroke::THIRD, all(&record.engine, rpm)),
+                    series("turbine", Stroke::SIGNAL, all(&record.turbine, rpm)),
+                ],
+            ),
+            panel("car (km/h)", 70.0, vec![series("car", Stroke::SIGNAL, all(&record.vehicle, km_h))]),
+            self.gears([x_range.0, x_range.1], POINTS),
+            Panel {
+                axis: Axis::Within(-100.0, 500.0),
+                ..panel("slip of the converter (rpm)", 70.0, vec![series("engine less turbine", Stroke::SIGNAL, slips)])
+            },
+            self.engine_torques([x_range.0, x_range.1], POINTS, 110.0),
+        ];
+        Figure { x_label: "time (s)", x_range, spans: spans.collect(), panels: with_curves(panels) }
+    }
+
+    fn gears(&self, span_s: [f64; 2], most: usize) -> Panel {
+        let highest = self.ratios.len().max(4);
+        #[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
+        let highest = highest as f64;
+        // Numbers beyond the forward gears stand for others.
+        let gear = |series: &Readings| {
+            let points = points(series, span_s, most, |gear| gear);
+            points.into_iter().map(|(t, gear)| (t, if gear > highest { f64::NAN } else { gear })).collect()
+        };
+        panel(
+            "gear",
+            70.0,
+            vec![
+                series("commanded", Stroke::SECOND, gear(&self.record.target_gear)),
+                series("reported", Stroke::SIGNAL, gear(&self.record.gear)),
+            ],
+        )
+    }
+
+    fn engine_torques(&self, span_s: [f64; 2], most: usize, height: f64) -> Panel {
+        let record = self.record;
+        let torque = points(&record.engine_torque, span_s, most, |n_m| n_m);
+        // Requests come in pieces; between them nothing is asked for.
+        let mut asked: Vec<(f64, f64)> = Vec::new();
+        for (time_s, n_m) in points(&record.torque_request, span_s, most, |n_m| n_m) {
+            if let Some((last_s, _)) = asked.last().filter(|(last_s, _)| time_s - last_s > 0.1).copied() {
+                asked.push((last_s + 1e-6, f64::NAN));
+            }
+            asked.push((time_s, n_m - record.friction_torque.at(time_s)));
+        }
+        // Requests may begin or end far above what an engine gives.
+        let torques = || torque.iter().map(|(_, n_m)| *n_m);
+        let (least, most) = (torques().fold(0.0, f64::min), torques().fold(10.0, f64::max));
+        Panel {
+            axis: Axis::Within(1.2 * least, 1.2 * most),
+            ..panel(
+                "engine torque (N\u{a0}m)",
+                height,
+                vec![
+                    series("at the flywheel", Stroke::SIGNAL, torque),
+                    series("asked for by the gearbox", REQUEST, asked),
+                ],
+            )
+        }
+    }
+
+    /// The capacity over the speed ratio, with what was measured.
+    fn converter_figure(&self, fit: &ConverterFit) -> Figure {
+        let milli = |value: f64| 1e3 * value;
+        let line = |side: f64| {
+            let point =
+                |knot: &fit::drive::Knot| (knot.speed_ratio, milli(knot.capacity_n_m_s2 + side * knot.sd_n_m_s2));
+            fit.knots.iter().map(point).collect::<Vec<_>>()
+        };
+        let mut bins: Vec<Vec<f64>> = vec![Vec::new(); 50];
+        for moment in self.moments.iter().filter(|moment| !moment.no_slip) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin of a ratio")]
+            let bin = (moment.speed_ratio().max(0.0) / BIN) as usize;
+            if let Some(bin) = bins.get_mut(bin) {
+                bin.push(fit.by_engine(self.record, moment) / moment.engine_rad_s.powi(2));
+            }
+        }
+        let quantile = |bin: &mut Vec<f64>, share: f64| {
+            bin.sort_by(f64::total_cmp);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                clippy::cast_precision_loss,
+                reason = "a place"
+            )]
+            let place = (share * bin.len() as f64) as usize;
+            if bin.len() < 10 { f64::NAN } else { milli(bin[place.min(bin.len() - 1)]) }
+        };
+        let mut of = |share: f64| -> Vec<(f64, f64)> {
+            #[expect(clippy::cast_precision_loss, reason = "a bin")]
+            let at = |i: usize| (i as f64 + 0.5) * BIN;
+            bins.iter_mut().enumerate().map(|(i, bin)| (at(i), quantile(bin, share))).collect()
+        };
+        let measured = [("measured: median", 0.5), ("a tenth is below", 0.1), ("a tenth is above", 0.9)];
+        let strokes = [Stroke { weight: Weight::Rival, ..Stroke::SIGNAL }, Stroke::THIRD, Stroke::SECOND];
+        let mut curves: Vec<Series> = measured
+            .into_iter()
+            .zip(strokes)
+            .map(|((label, share), stroke)| series(label, stroke, of(share)))
+            .collect();
+        curves.push(series("fitted", FITTED, line(0.0)));
+        let band = Band { label: "95 %".to_owned(), colour: RANGE, lower: line(-2.0), upper: line(2.0) };
+        Figure {
+            x_label: "turbine speed over engine speed",
+            x_range: (0.0, 1.0),
+            spans: Vec::new(),
+            panels: vec![Panel { band: Some(band), ..panel("capacity (10⁻³ N\u{a0}m\u{a0}s²)", 210.0, curves) }],
+        }
+    }
+
+    /// What the engine gives to the converter, by its signal and by the converter.
+    fn engine_figure(&self, fit: &ConverterFit) -> Figure {
+        let every = self.moments.len().div_ceil(POINTS).max(1);
+        let moments = || self.moments.iter().step_by(every);
+        let by_engine = moments().map(|moment| (moment.time_s, fit.by_engine(self.record, moment))).collect();
+        let converter = |side: f64| {
+            let value = |moment: &Moment| fit.by_converter(moment).map_or(f64::NAN, |[value, sd]| value + side * sd);
+            moments().map(|moment| (moment.time_s, value(moment))).collect::<Vec<_>>()
+        };
+        let spans = self.no_slip().into_iter().map(|[start, end]| Span {
+            label: String::new(),
+            start,
+            end,
+            colour: INERTIA_PHASE,
+        });
+        let x_range = (self.moments.first().map_or(0.0, |m| m.time_s), self.moments.last().map_or(1.0, |m| m.time_s));
+        let band = Band { label: "95 %".to_owned(), colour: RANGE, lower: converter(-2.0), upper: converter(2.0) };
+        let curves = vec![
+            series("by the engine's signal, less its inertia", Stroke::SIGNAL, by_engine),
+            series("by the converter's capacity", FITTED, converter(0.0)),
+        ];
+        Figure {
+            x_label: "time (s)",
+            x_range,
+            spans: spans.collect(),
+            panels: vec![Panel { band: Some(band), ..panel("torque into the converter (N\u{a0}m)", 160.0, curves) }],
+        }
+    }
+
+    fn shift_figure(&self, shift: &Shift, torque: Option<&ShiftTorque>) -> Figure {
+        let record = self.record;
+        let fallback = [shift.start_s() - 0.6, shift.gear_s.unwrap_or(shift.end_s()).max(shift.end_s()) + 0.9];
+        let window_s = torque.map_or(fallback, |torque| torque.window_s);
+        let of = |series: &Readings, unit: fn(f64) -> f64| points(series, window_s, SHIFT_POINTS, unit);
+        let mut speeds = vec![
+            series("engine", Stroke::THIRD, of(&record.engine, rpm)),
+            series("turbine", Stroke::SIGNAL, of(&record.turbine, rpm)),
+        ];
+        for (gear, stroke) in [(shift.from, Stroke::SECOND), (shift.to, SYNCHRONOUS)] {
+            let ratio = usize::try_from(gear).ok().and_then(|gear| self.ratios.get(gear.checked_sub(1)?));
+            if let Some(ratio) = ratio {
+                let output = points(&record.output, window_s, SHIFT_POINTS, rpm);
+                let points = output.into_iter().map(|(t, output)| (t, ratio * output)).collect();
+                speeds.push(series(&format!("turbine in gear {gear}"), stroke, points));
+            }
+        }
+        let mut panels = vec![panel("speed (rpm)", 140.0, speeds)];
+        if let Some(torque) = torque.filter(|torque| !torque.torques.is_empty()) {
+            let end = |end: usize| torque.torques.iter().map(|t| (t.time_s, t.clutches_n_m[end])).collect::<Vec<_>>();
+            let band = Band { label: "range".to_owned(), colour: RANGE, lower: end(0), upper: end(2) };
+            panels.push(Panel {
+                band: Some(band),
+                ..panel("U of both clutches (N\u{a0}m at the turbine)", 120.0, vec![series("U", FITTED, end(1))])
+            });
+        }
+        panels.push(self.engine_torques(window_s, SHIFT_POINTS, 90.0));
+        panels.push(self.gears(window_s, SHIFT_POINTS));
+        let inertia = shift.inertia_s.map(|[start, end]| Span {
+            label: "ratio changes".to_owned(),
+            start,
+            end,
+            colour: INERTIA_PHASE,
+        });
+        Figure {
+            x_label: "time (s)",
+            x_range: (window_s[0], window_s[1]),
+            spans: inertia.into_iter().collect(),
+            panels: with_curves(panels),
+        }
+    }
+}
+
+const FITTED: Stroke = Stroke { colour: RANGE, weight: Weight::Equal, dash: None };
+const REQUEST: Stroke = Stroke { colour: "#D55E00", weight: Weight::Equal, dash: None };
+const SYNCHRONOUS: Stroke = Stroke { colour: "#009E73", weight: Weight::Equal, dash: Some("2 2.5") };
+
+fn series(label: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Series {
+    Series { label: label.to_owned(), stroke, points }
+}
+
+/// The panels that show anything.
+fn with_curves(panels: Vec<Panel>) -> Vec<Panel> {
+    panels.into_iter().filter(|panel| panel.series.iter().any(|series| !series.points.is_empty())).collect()
+}
+
+/// At most so many readings of a span, evenly.
+fn points(readings: &Readings, span_s: [f64; 2], most: usize, unit: fn(f64) -> f64) -> Vec<(f64, f64)> {
+    let count = readings.between(span_s).count();
+    let every = count.div_ceil(most).max(1);
+    readings.between(span_s).step_by(every).map(|(time_s, value)| (time_s, unit(value))).collect()
+}
