@@ -226,7 +226,7 @@ fn unscored(shift: &ScoredShift, cell: impl Fn(&ScoredShift) -> Option<String>) 
 /// A mean with the means of the ends of its range, in another unit.
 fn ranged([mean, low, high]: &[f64; 3], unit: f64, decimals: usize) -> String {
     let [mean, low, high] = [mean, low, high].map(|value| number(unit * value, decimals));
-    format!("{mean} ({low}–{high})")
+    format!("{mean} ({low} to {high})")
 }
 
 fn health((worst, share): (Health, f64)) -> String {

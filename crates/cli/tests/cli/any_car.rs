@@ -117,11 +117,18 @@ fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the
         assert_eq!(column(&estimates, clutch), column(&truth, clutch), "{clutch}");
         let [found, least, greatest] = ["pressure_estimate_pa", "pressure_least_pa", "pressure_greatest_pa"]
             .map(|name| numbers(&estimates, &format!("{clutch}_{name}")));
+        let [torque_least, torque_greatest] =
+            ["torque_least_n_m", "torque_greatest_n_m"].map(|name| numbers(&estimates, &format!("{clutch}_{name}")));
+        let torque = numbers(&truth, &format!("{clutch}_torque_n_m"));
         let truth = numbers(&truth, &format!("{clutch}_pressure_pa"));
         let rows = (0..truth.len()).filter(|&row| truth[row].is_finite());
         assert!(rows.clone().count() > 150);
         for row in rows {
             assert!(least[row] - 1.0 <= truth[row] && truth[row] <= greatest[row] + 1.0, "{clutch} {row}");
+            assert!(0.0 <= least[row] && greatest[row] < 2e6, "{clutch} {row}: {} {}", least[row], greatest[row]);
+            // Beside the drag of an open clutch.
+            let within = torque_least[row] - 1.2 <= torque[row] && torque[row] <= torque_greatest[row] + 1.2;
+            assert!(within, "{clutch} {row}: {}", torque[row]);
             assert!((found[row] - truth[row]).abs() < 0.2e6, "{clutch} {row}: {} {}", found[row], truth[row]);
         }
     }
@@ -187,7 +194,7 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
             first.replacen(",1,1,", ",9,1,", 1),
             "log.csv:2: the gear `9`, which the gearbox does not have\nhint: its gears are",
         ),
-        (first.replacen(",1,1,", ",,1,", 1), "log.csv:2: no gear yet"),
+        (first.replacen(",1,1,", ",,1,", 1), "log.csv:2: the gear is missing"),
         (String::new(), "the file is empty"),
     ];
     for (log, words) in cases {

@@ -209,8 +209,11 @@ impl<'c> CarLog<'c> {
         let found = named(&text).or_else(|| named(&whole?));
         found.or_else(|| before.filter(|_| text.is_empty())).ok_or_else(|| {
             let names = gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
-            let what = if text.is_empty() { "no gear yet".to_owned() } else { format!("the gear `{text}`") };
-            self.rows.wrong(format!("{what}, which the gearbox does not have\nhint: its gears are {names}"))
+            let what = match &*text {
+                "" => "the gear is missing, and no row before has one".to_owned(),
+                other => format!("the gear `{other}`, which the gearbox does not have"),
+            };
+            self.rows.wrong(format!("{what}\nhint: its gears are {names}"))
         })
     }
 }
