@@ -345,6 +345,10 @@ impl<W: Write> CsvWriter<W> {
             self.rows.truncate(begin);
             return Err(io::Error::other(format!("a row of {count} cells for {} columns", self.columns)));
         }
+        if self.rows.len() == begin {
+            // A row of one empty cell is no empty line.
+            self.rows.extend_from_slice(b"\"\"");
+        }
         self.rows.push(b'\n');
         if self.rows.len() >= WRITTEN_AT_ONCE { self.hand_on() } else { Ok(()) }
     }

@@ -1,7 +1,7 @@
 //! `fit`: from logs of shifts to a vehicle file, and to estimates with it.
 
 #[path = "../../../fit/tests/common/mod.rs"]
-mod common;
+pub(crate) mod common;
 
 use common::{Logs, TestCar};
 use trace::signal;

@@ -92,10 +92,10 @@ fn numbers_that_cannot_be_readings_are_lost_samples() {
     let text = String::from_utf8(output.stdout.clone()).unwrap();
     let at = text.lines().next().unwrap().split(',').position(|name| name == "health").unwrap();
     let health: Vec<&str> = text.lines().skip(1).map(|line| line.split(',').nth(at).unwrap()).collect();
-    // A command that did not come stands as it was.
-    assert_eq!(health, ["good", "speeds_rejected", "speeds_rejected", "speeds_rejected", "good"]);
+    // A command that stays away for a second is lost.
+    assert_eq!(health, ["good", "speeds_rejected", "speeds_rejected", "speeds_rejected", "command_rejected"]);
     assert!(!text.contains("inf") && !text.contains("NaN"), "{text}");
-    assert!(stderr(&output).contains("health: good 40.0 %, speeds_rejected 60.0 %"));
+    assert!(stderr(&output).contains("health: good 20.0 %, speeds_rejected 60.0 %, command_rejected 20.0 %"));
 }
 
 #[test]

@@ -4,9 +4,12 @@
 
 mod any_car;
 mod commands;
+mod day_of_logs;
 mod drives;
 mod equations;
 mod fit;
+#[cfg(unix)]
+mod log_to_fit;
 mod logs;
 mod long_logs;
 mod measured;

@@ -1,29 +1,16 @@
 //! The commands of `docs/fit.md`, from a log to an estimate with a fitted file, as they stand there.
 
-#![cfg(unix)]
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-#[path = "../../fit/tests/common/mod.rs"]
-mod common;
-
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use common::{Logs, TestCar};
 use config::Vehicle;
 use trace::{Cell, ColumnKind, TableWriter};
 
+use crate::fit::common::{Logs, TestCar};
+use crate::support::Folder;
+
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/fit.md");
 const SHIFTS: u64 = 5;
-
-/// A folder that goes away with the test.
-struct Folder(PathBuf);
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 /// The log of a car that differs from its file in everything, as MDF with the names of the program.
 fn write_log(path: &Path, car: &mut TestCar) {
@@ -46,8 +33,7 @@ fn write_log(path: &Path, car: &mut TestCar) {
 
 #[test]
 fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
-    let folder = Folder(std::env::temp_dir().join(format!("wetclutch-path-{}", std::process::id())));
-    std::fs::create_dir_all(&folder.0).unwrap();
+    let folder = Folder::new("log-to-fit");
     let page = std::fs::read_to_string(PAGE).unwrap();
     let commands: Vec<&str> = page.split("```").nth(1).unwrap().lines().filter(|line| !line.is_empty()).collect();
     assert!(commands.len() >= 4 && commands.iter().all(|command| command.starts_with("wetclutch ")), "{commands:?}");
@@ -55,18 +41,18 @@ fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
     let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
     for command in commands {
         let shell =
-            Command::new("sh").args(["-c", command]).env("PATH", &path).current_dir(&folder.0).output().unwrap();
+            Command::new("sh").args(["-c", command]).env("PATH", &path).current_dir(folder.path("")).output().unwrap();
         let said = String::from_utf8(shell.stderr).unwrap();
         assert!(shell.status.success(), "{command}: {said}");
         if command.starts_with("wetclutch init") {
-            let mut car = TestCar::of(Vehicle::read(&folder.0.join("car.toml")).unwrap(), 4);
-            write_log(&folder.0.join("drive.mf4"), &mut car);
+            let mut car = TestCar::of(Vehicle::read(Path::new(&folder.path("car.toml"))).unwrap(), 4);
+            write_log(Path::new(&folder.path("drive.mf4")), &mut car);
         }
         if command.starts_with("wetclutch estimate") {
             assert!(said.contains(&format!("shifts: {SHIFTS} (")), "{said}");
         }
     }
-    let fitted = std::fs::read_to_string(folder.0.join("fitted.toml")).unwrap();
+    let fitted = folder.read("fitted.toml");
     assert!(fitted.contains("# fit: x ") && fitted.contains("what the fit leaves open"), "{fitted}");
-    assert!(folder.0.join("estimate_report.html").exists());
+    assert!(Path::new(&folder.path("estimate_report.html")).exists());
 }
