@@ -64,18 +64,21 @@ fn audit(model: &CarModel, (from, to): (usize, usize), throttle: f64, tolerance:
 
 #[test]
 fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
-    let mut worst: f64 = 0.0;
+    let mut worst = (0.0, String::new());
     for car in cars().into_iter().chain(cars().into_iter().map(crate::with_stroke)) {
         let model = CarModel::new(car).unwrap();
         for pair in neighbours(&model.car) {
             for throttle in [0.15, 0.0] {
-                let missing = audit(&model, pair, throttle, 1e-5).missing(&model, "");
-                worst = worst.max(missing);
-                assert!(missing < 1e-4, "{} {pair:?} {throttle}: {missing:e}", model.car.gearbox.name);
+                let missing = audit(&model, pair, throttle, 2e-6).missing(&model, "");
+                let label = format!("{} {pair:?}, throttle {throttle}", model.car.gearbox.name);
+                assert!(missing < 1e-4, "{label}: {missing:e}");
+                if missing > worst.0 {
+                    worst = (missing, label);
+                }
             }
         }
     }
-    println!("most missing: {worst:.1e}");
+    println!("most missing: {:.1e} ({})", worst.0, worst.1);
 }
 
 #[test]
@@ -90,7 +93,7 @@ fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
         slip_rad_s: 0.0,
     });
     let model = CarModel::new(car).unwrap();
-    let (with, pair) = (audit(&model, (3, 4), 0.15, 1e-5), audit(&model, (4, 3), 0.0, 1e-5));
+    let (with, pair) = (audit(&model, (3, 4), 0.15, 2e-6), audit(&model, (4, 3), 0.0, 2e-6));
     assert!(with.missing(&model, "") < 1e-4 && pair.missing(&model, "") < 1e-4);
 }
 
