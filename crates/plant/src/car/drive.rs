@@ -10,7 +10,6 @@ use super::integrate::CarError;
 use super::model::CarModel;
 use super::run::{CarRun, Driver};
 use super::sample::CarSample;
-use super::start::idle_throttle;
 
 /// Engine speed below which the engine has stalled, rad/s.
 const STALLED_RAD_S: f64 = 30.0;
@@ -58,14 +57,13 @@ pub fn simulate_car_drive(
     let mut summary = CarDriveSummary { duration_s, ..CarDriveSummary::default() };
     while run.time_s() < duration_s - SAME_INSTANT_S {
         let now_s = run.time_s();
-        let mut driver = road.at(now_s, &run);
+        let driver = road.at(now_s, &run);
         let [engine_rad_s, ..] = model.speeds(run.state());
         if engine_rad_s < STALLED_RAD_S {
             let message = format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large");
             return Err(CarError::Request(message));
         }
         shifting.step(&mut run, &driver)?;
-        driver.throttle = driver.throttle.max(idle_throttle(engine_rad_s));
         run.advance(driver, |_| {}, &mut record)?;
         let vehicle_m_s = run.state().vehicle_m_s;
         summary.distance_m += vehicle_m_s * (run.time_s() - now_s);

@@ -8,7 +8,7 @@ use crate::rosenbrock::{self, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
 use crate::{Contact, Direction};
 
 /// Relative tolerance of a step, against the size of each state.
-const RELATIVE_TOLERANCE: f64 = 1e-5;
+const RELATIVE_TOLERANCE: f64 = 2e-6;
 /// Margins may fall this far below zero before the contacts change, so that rounding does not start another change.
 const SLACK: f64 = 1e-9;
 /// The same for torques, as a share of the torque that an element can hold.

@@ -6,6 +6,7 @@ use super::controller::{CarCalibration, CarCommands, CarMeasured, CarShiftContro
 use super::integrate::{CarError, CarIntegrator, CarStep};
 use super::model::{CarInputs, CarModel, CarState};
 use super::sample::CarSample;
+use super::start::idle_throttle;
 use super::valves::CarValves;
 
 /// Times closer than this are the same instant, s: sums of periods differ in their last bits.
@@ -121,7 +122,7 @@ impl<'m> CarRun<'m> {
         self.controller.preselect(gear);
     }
 
-    /// Goes on by one control period. `on_step` sees every step of the integration, `record` a sample at every multiple of the
+    /// Goes on by one control period. Below idle speed the idle control opens the throttle. `on_step` sees every step of the integration, `record` a sample at every multiple of the
     /// sample time.
     ///
     /// # Errors
@@ -133,6 +134,8 @@ impl<'m> CarRun<'m> {
         mut record: impl FnMut(&CarSample),
     ) -> Result<(), CarError> {
         let (model, now_s) = (self.model, self.time_s());
+        let [engine_rad_s, ..] = model.speeds(&self.plant.state);
+        let driver = Driver { throttle: driver.throttle.max(idle_throttle(engine_rad_s)), ..driver };
         self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state, driver));
         self.valves.send(model, now_s, &self.commands.elements);
         self.periods += 1;

@@ -96,6 +96,9 @@ pub fn simulate_car_shift(
     Ok(rating.quality())
 }
 
+/// A shift is rated until this time after its end, s.
+const RATED_AFTER_S: f64 = 0.5;
+
 /// Rates a shift sample by sample.
 #[derive(Debug, Clone)]
 pub struct CarShiftRating {
@@ -139,6 +142,10 @@ impl CarShiftRating {
     pub fn push(&mut self, sample: &CarSample) {
         let q = &mut self.quality;
         let after = sample.time_s >= self.shift.request_s - 1e-9;
+        let since_complete_s = q.complete_s.map_or(0.0, |complete_s| sample.time_s - self.shift.request_s - complete_s);
+        if since_complete_s > RATED_AFTER_S {
+            return;
+        }
         let before = self.before.replace((sample.time_s, sample.vehicle_m_s2));
         if !after {
             return;

@@ -64,18 +64,21 @@ fn audit(model: &CarModel, (from, to): (usize, usize), throttle: f64, tolerance:
 
 #[test]
 fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
-    let mut worst: f64 = 0.0;
+    let mut worst = (0.0, String::new());
     for car in cars().into_iter().chain(cars().into_iter().map(crate::with_stroke)) {
         let model = CarModel::new(car).unwrap();
         for pair in neighbours(&model.car) {
             for throttle in [0.15, 0.0] {
-                let missing = audit(&model, pair, throttle, 1e-5).missing(&model, "");
-                worst = worst.max(missing);
-                assert!(missing < 1e-4, "{} {pair:?} {throttle}: {missing:e}", model.car.gearbox.name);
+                let missing = audit(&model, pair, throttle, 2e-6).missing(&model, "");
+                let label = format!("{} {pair:?}, throttle {throttle}", model.car.gearbox.name);
+                assert!(missing < 1e-4, "{label}: {missing:e}");
+                if missing > worst.0 {
+                    worst = (missing, label);
+                }
             }
         }
     }
-    println!("most missing: {worst:.1e}");
+    println!("most missing: {:.1e} ({})", worst.0, worst.1);
 }
 
 #[test]
@@ -90,8 +93,53 @@ fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
         slip_rad_s: 0.0,
     });
     let model = CarModel::new(car).unwrap();
-    let (with, pair) = (audit(&model, (3, 4), 0.15, 1e-5), audit(&model, (4, 3), 0.0, 1e-5));
+    let (with, pair) = (audit(&model, (3, 4), 0.15, 2e-6), audit(&model, (4, 3), 0.0, 2e-6));
     assert!(with.missing(&model, "") < 1e-4 && pair.missing(&model, "") < 1e-4);
+}
+
+/// Launch and creep of the dual clutch, a gear from neutral, a withdrawn shift, a lock-up clutch that keeps a slip.
+#[test]
+fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
+    let mut worst: f64 = 0.0;
+    let mut run = |car: config::Car, vehicle_m_s: f64, driver: Driver, asked: &dyn Fn(&mut CarRun<'_>)| {
+        let model = CarModel::new(car).unwrap();
+        let gear = model.car.gearbox.forward_gears()[0];
+        let state = model.in_gear(gear, None, vehicle_m_s, driver.throttle).unwrap();
+        let calibration = CarCalibration::STANDARD;
+        let mut run = CarRun::new(&model, &model.car, calibration, gear, state, (driver, 0.01)).unwrap();
+        run = run.with_tolerance(2e-6);
+        let mut audit = Audit::default();
+        while run.time_s() < 5.0 {
+            asked(&mut run);
+            run.advance(driver, |step| audit.add(&model, step), |_| {}).unwrap();
+        }
+        worst = worst.max(audit.missing(&model, ""));
+    };
+    let driver = |throttle: f64, brake: f64| Driver { throttle, brake, grade_rad: 0.0 };
+    for throttle in [0.0, 0.2, 0.5] {
+        run(crate::dual_clutch(), 0.0, driver(throttle, 0.0), &|_| {});
+    }
+    for car in cars().into_iter().take(4) {
+        let reverse = car.gearbox.gear("R").unwrap();
+        run(car.clone(), 0.0, driver(0.0, 0.6), &|run| {
+            if run.time_s() > 1.0 {
+                run.request(reverse).unwrap()
+            }
+        });
+        let forward = car.gearbox.forward_gears();
+        let (first, second) = (forward[0], forward[1]);
+        run(crate::with_stroke(car), 6.0, driver(0.2, 0.0), &|run| {
+            let wanted = if run.time_s() > 1.0 && run.time_s() < 1.7 { second } else { first };
+            run.request(wanted).unwrap();
+        });
+    }
+    let mut slipping = cars().swap_remove(0);
+    let (on_rad_s, off_rad_s) = (60.0, 50.0);
+    slipping.lock_up =
+        Some(config::LockUp { capacity_n_m: 300.0, first_gear: 1, on_rad_s, off_rad_s, ramp_s: 0.5, slip_rad_s: 4.0 });
+    run(slipping, 6.0, driver(0.2, 0.0), &|_| {});
+    println!("launches, garage and withdrawn shifts, most missing: {worst:.1e}");
+    assert!(worst < 1e-4, "{worst:e}");
 }
 
 #[test]

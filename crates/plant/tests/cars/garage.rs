@@ -6,12 +6,6 @@ use crate::{cars, with_stroke};
 
 const STANDING: Driver = Driver { throttle: 0.0, brake: 0.6, grade_rad: 0.0 };
 
-/// The idle control of a standing car.
-fn idling(model: &CarModel, run: &CarRun<'_>) -> Driver {
-    let [engine_rad_s, ..] = model.speeds(run.state());
-    Driver { throttle: (0.02 * (85.0 - engine_rad_s)).clamp(0.0, 0.3), ..STANDING }
-}
-
 /// What happened in the seconds after a request.
 struct Engaged {
     complete_s: Option<f64>,
@@ -19,12 +13,11 @@ struct Engaged {
 }
 
 impl Engaged {
-    fn after(model: &CarModel, run: &mut CarRun<'_>, duration_s: f64) -> Self {
+    fn after(run: &mut CarRun<'_>, duration_s: f64) -> Self {
         let begun_s = run.time_s();
         let mut result = Self { complete_s: None, samples: Vec::new() };
         while run.time_s() < begun_s + duration_s {
-            let driver = idling(model, run);
-            run.advance(driver, |_| {}, |sample| result.samples.push(*sample)).unwrap();
+            run.advance(STANDING, |_| {}, |sample| result.samples.push(*sample)).unwrap();
             if run.controller().shift().is_none() && run.time_s() > begun_s + 0.05 {
                 result.complete_s = result.complete_s.or(Some(run.time_s() - begun_s));
             }
@@ -57,7 +50,7 @@ fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
         let start = (STANDING, 0.01);
         let mut run = CarRun::new(&model, &car, CarCalibration::STANDARD, first, state, start).unwrap();
         run.request_neutral().unwrap();
-        let neutral = Engaged::after(&model, &mut run, 3.0);
+        let neutral = Engaged::after(&mut run, 3.0);
         let last = neutral.samples.last().unwrap();
         // The open clutches drag.
         assert!(last.is_neutral && last.output_n_m.abs() < 15.0, "{}: {}", car.gearbox.name, last.output_n_m);
@@ -66,7 +59,7 @@ fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
         // N-D, D-R, R-D.
         for (turns, gear, sign) in [(0, first, 1.0), (1, reverse, -1.0), (1, first, 1.0)] {
             run.request(gear).unwrap();
-            let engaged = Engaged::after(&model, &mut run, 4.0);
+            let engaged = Engaged::after(&mut run, 4.0);
             let label = format!("{} to gear {}", car.gearbox.name, car.gearbox.gears[gear].name);
             assert_eq!(run.controller().gear(), gear, "{label}");
             let last = engaged.samples.last().unwrap();
@@ -77,7 +70,7 @@ fn a_gear_is_engaged_from_neutral_and_from_the_other_direction() {
             jolt[turns] = f64::max(jolt[turns], engaged.jolt());
         }
         run.request_neutral().unwrap();
-        assert!(Engaged::after(&model, &mut run, 2.0).samples.last().unwrap().output_n_m.abs() < 15.0);
+        assert!(Engaged::after(&mut run, 2.0).samples.last().unwrap().output_n_m.abs() < 15.0);
     }
     println!(
         "engaged at rest: longest {longest:.2} s, overshoot {overshoot:.2}, largest change in 10 ms {jolt:.3?} of the end"

@@ -7,6 +7,9 @@ use crate::{cars, neighbours, with_stroke};
 
 /// Time of the request, s.
 const REQUEST_S: f64 = 1.0;
+/// Speed of the gearbox input in the lower gear of [`CarShift::usual`], and the least in the higher one, rad/s.
+const INPUT_RAD_S: f64 = 230.0;
+const LEAST_INPUT_RAD_S: f64 = 120.0;
 /// Time in which the driver moves the pedal, s.
 const PEDAL_S: f64 = 0.15;
 
@@ -31,6 +34,7 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
     run.preselect(Some(shift.to));
     let ratios = [shift.from, shift.to].map(|gear| car.gearbox.gears[gear].ratio);
     let (low, high) = (ratios[0].min(ratios[1]), ratios[0].max(ratios[1]));
+    let mut active_s = REQUEST_S;
     let (mut result, mut before) = (Run { complete_s: None, outside_rad_s: 0.0, jerk_m_s3: 0.0 }, None);
     while run.time_s() < 6.0 {
         let now_s = run.time_s();
@@ -38,10 +42,15 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
         if after_s > -1e-9 {
             run.request(asked(after_s)).unwrap();
         }
+        // Rated while a shift is under way and half a second after it.
+        let is_rated = now_s < active_s + 0.5;
         run.advance(
             driver(now_s),
             |_| {},
             |sample| {
+                if !is_rated {
+                    return;
+                }
                 let (turbine, output) = (sample.torques.turbine_rad_s, sample.torques.output_rad_s);
                 result.outside_rad_s = result.outside_rad_s.max(turbine - high * output).max(low * output - turbine);
                 if let Some(before) = before.replace(sample.vehicle_m_s2)
@@ -52,6 +61,9 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
             },
         )
         .unwrap();
+        if run.controller().shift().is_some() {
+            active_s = run.time_s();
+        }
         let is_there = run.controller().shift().is_none() && run.controller().gear() == asked(f64::INFINITY);
         match (is_there, after_s > 0.05) {
             (true, true) => result.complete_s = result.complete_s.or(Some(run.time_s() - REQUEST_S)),
@@ -110,7 +122,13 @@ fn skip_shifts_run_through_gears_between_and_end_well() {
         let model = CarModel::new(car).unwrap();
         for pair in skips(&model.car) {
             for throttle in [0.0, 0.2, 0.5] {
-                let shift = CarShift::usual(&model.car, pair.0, pair.1, throttle);
+                let mut shift = CarShift::usual(&model.car, pair.0, pair.1, throttle);
+                // Without a converter fast enough for the engine in both gears.
+                let ratio = |gear: usize| model.car.gearbox.gears[gear].ratio;
+                let slowest_rad_s = INPUT_RAD_S * ratio(pair.0).min(ratio(pair.1)) / ratio(pair.0).max(ratio(pair.1));
+                if model.car.converter.is_none() {
+                    shift.vehicle_m_s *= (LEAST_INPUT_RAD_S / slowest_rad_s).max(1.0);
+                }
                 let run = run(&model, &shift, |_| pair.1, |_| throttle);
                 worst.push(&label(&model.car, pair, &format!("throttle {throttle}")), &run);
             }

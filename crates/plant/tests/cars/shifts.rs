@@ -40,7 +40,7 @@ fn each_shift(title: &str, cars: Vec<Car>, friction: f64, limits: Limits) {
                         *worst = (number, label.clone());
                     }
                 }
-                if numbers(&quality).iter().zip(&limits).any(|(number, limit)| !(number < limit)) {
+                if numbers(&quality).iter().zip(&limits).any(|(number, limit)| number.is_nan() || number >= limit) {
                     beyond.push(format!("{label}: {quality:?}"));
                 }
                 shifts += 1;

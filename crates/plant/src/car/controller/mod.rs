@@ -37,6 +37,9 @@ pub use shift::ShiftStage;
 use strokes::Strokes;
 use track::Track;
 
+/// Offgoing and oncoming clutch of a shift, with their places among the elements, and the reduced shift.
+type Single<'c> = ([(usize, ShiftClutch); 2], &'c ReducedShift<f64>);
+
 /// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
 const AT_REST_RAD_S: f64 = 10.0;
 
@@ -241,12 +244,12 @@ impl CarShiftController {
             return Err(CarError::Request(message));
         };
         let neutral_s = if self.is_neutral { 0.0 } else { self.calibration.neutral_s };
-        (self.gear, self.is_neutral, self.active) = (partner, false, Some(shift.from_neutral(neutral_s)));
+        (self.gear, self.is_neutral, self.active) = (partner, false, Some(shift.out_of_neutral(neutral_s)));
         Ok(())
     }
 
     /// The clutches of a shift between two clutches, offgoing and oncoming, with the reduced shift.
-    fn single(&self, from: usize, to: usize) -> Option<([(usize, ShiftClutch); 2], &ReducedShift<f64>)> {
+    fn single(&self, from: usize, to: usize) -> Option<Single<'_>> {
         let shift = self.car.gearbox.shift(from, to)?;
         let (Change::Single { offgoing, oncoming, .. }, Some(reduced)) = (&shift.change, &shift.reduced) else {
             return None;

@@ -115,7 +115,7 @@ impl ActiveShift {
 
     /// The same from neutral, where the offgoing clutch is open already, or from the other direction at rest, where it opens in
     /// the time `neutral_s`.
-    pub(super) fn from_neutral(self, neutral_s: f64) -> Self {
+    pub(super) fn out_of_neutral(self, neutral_s: f64) -> Self {
         Self { is_from_neutral: true, neutral_s, direction: 1.0, ..self }
     }
 
