@@ -29,6 +29,8 @@ pub(super) struct Findings {
     taken: [u64; CHANNELS],
 }
 
+/// From fewer rows nothing is said of most of them \[chosen\]: one second at 100 Hz.
+const ENOUGH_ROWS: u64 = 100;
 /// The channels of an observer, and the role of each.
 const CHANNELS: usize = 7;
 
@@ -77,9 +79,9 @@ impl Findings {
         ];
         for (at, (reading, health)) in readings.iter().zip(estimate.channels.each()).enumerate() {
             // An observer that does without a channel refuses none of its readings.
-            let came = reading.is_some() && health != ChannelHealth::Unused;
-            self.came[at] += u64::from(came);
-            self.taken[at] += u64::from(came && health == ChannelHealth::Good);
+            let taken = matches!(health, ChannelHealth::Good | ChannelHealth::Unused);
+            self.came[at] += u64::from(reading.is_some());
+            self.taken[at] += u64::from(reading.is_some() && taken);
         }
         self.passages.push(row.time_s, estimate.phase);
         match self.health.iter_mut().find(|(health, _)| *health == estimate.health) {
@@ -138,7 +140,7 @@ impl Findings {
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
         let count: u64 = impossible.iter().map(of).sum();
-        if 2 * count <= self.rows {
+        if 2 * count <= self.rows || self.rows < ENOUGH_ROWS {
             return Ok(());
         }
         let worst = impossible.iter().max_by_key(|health| of(health)).map_or("", |health| health.name());
