@@ -110,11 +110,11 @@ pub(crate) trait Stream {
 }
 
 /// A time stamp this far behind the newest one of its stream is not a matter of order on a bus, s.
-pub(crate) const BEHIND_S: f64 = 0.5;
+pub const BEHIND_S: f64 = 0.5;
 /// So many rising time stamps behind the newest one are a reset of the clock.
-const RESET_AFTER: u32 = 20;
+pub const RESET_AFTER: u32 = 20;
 /// Time from the last sample before a reset to the first after it: unknown, so this is set, s.
-const RESET_GAP_S: f64 = 1.0;
+pub const RESET_GAP_S: f64 = 1.0;
 
 /// The clock of a stream.
 ///

@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(inside([4.70, 3.13], &drive, 50.0), expected);
         // Of the shift from 2nd to 3rd gear, 1st gear lies outside too.
         assert_eq!(
-            inside([3.13, 2.10], &[3.13, 3.3, 4.70, 3.6, 3.14, 2.1, 1.67], 50.0),
+            inside([3.13, 2.10], &[3.13, 3.3, 4.70, 3.6, 3.15, 2.1, 1.67], 50.0),
             [true, true, false, false, true, true, false]
         );
         // At walking speed a ratio says nothing.
