@@ -17,7 +17,7 @@ fn samples(car: &Car, drive: &Drive) -> Result<Vec<CarSample>, CarError> {
 #[test]
 fn an_hour_in_town_uses_the_gears_and_shifts_more_than_200_times() {
     let drive = drive(include_str!("../../../../drives/city.toml"));
-    for car in crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3) {
+    for car in crate::runs(crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
         let model = CarModel::new(car.clone()).unwrap();
         let (mut count, mut used) = (0, vec![false; car.gearbox.gears.len()]);
         let begin = std::time::Instant::now();
@@ -229,7 +229,7 @@ fn a_driver_follows_the_published_cycles() {
     for (name, duration_s, distance_m) in [("wltc_3b", 1800.0, 23_266.0), ("ftp_75", 1874.0, 17_769.0)] {
         let drive = Drive::read(format!("{folder}{name}.toml").as_ref()).unwrap();
         assert_eq!(drive.duration_s(), duration_s);
-        for car in crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3) {
+        for car in crate::runs(crate::cars().into_iter().filter(|car| car.gearbox.gears.len() > 3)) {
             let model = CarModel::new(car.clone()).unwrap();
             let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |_| {}).unwrap();
             let error = summary.speed_error.unwrap();

@@ -2,7 +2,7 @@
 
 use plant::car::{CarCalibration, CarModel, CarPowers, CarRun, CarShift, CarState, CarStep, Driver, stored_car_energy};
 
-use crate::{cars, neighbours};
+use crate::{cars, neighbours, runs};
 
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
@@ -67,7 +67,7 @@ fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
     let mut worst = (0.0, String::new());
     for car in cars().into_iter().chain(cars().into_iter().map(crate::with_stroke)) {
         let model = CarModel::new(car).unwrap();
-        for pair in neighbours(&model.car) {
+        for pair in runs(neighbours(&model.car)) {
             for throttle in [0.15, 0.0] {
                 let missing = audit(&model, pair, throttle, 2e-6).missing(&model, "");
                 let label = format!("{} {pair:?}, throttle {throttle}", model.car.gearbox.name);

@@ -48,6 +48,11 @@ fn with_stroke(mut car: Car) -> Car {
     car
 }
 
+/// Of many runs all in an optimised build, every fifth one in a debug build, which is too slow for them.
+fn runs<T>(all: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
+    all.into_iter().step_by(if cfg!(debug_assertions) { 5 } else { 1 })
+}
+
 /// Neighbouring gears in both directions.
 fn neighbours(car: &Car) -> Vec<(usize, usize)> {
     let forward = car.gearbox.forward_gears();

@@ -3,7 +3,7 @@
 use config::Car;
 use plant::car::{CarCalibration, CarModel, CarRun, CarShift, Driver};
 
-use crate::{cars, neighbours, with_stroke};
+use crate::{cars, neighbours, runs, with_stroke};
 
 /// Time of the request, s.
 const REQUEST_S: f64 = 1.0;
@@ -120,7 +120,7 @@ fn skip_shifts_run_through_gears_between_and_end_well() {
     let mut worst = Worst::default();
     for car in cars().into_iter().chain(cars().into_iter().map(with_stroke)) {
         let model = CarModel::new(car).unwrap();
-        for pair in skips(&model.car) {
+        for pair in runs(skips(&model.car)) {
             for throttle in [0.0, 0.2, 0.5] {
                 let mut shift = CarShift::usual(&model.car, pair.0, pair.1, throttle);
                 // Without a converter fast enough for the engine in both gears.
@@ -144,7 +144,7 @@ fn a_request_that_is_withdrawn_ends_in_the_old_gear() {
         let mut worst = Worst::default();
         for car in cars() {
             let model = CarModel::new(with.map_or(car.clone(), |with| with(car))).unwrap();
-            for pair in neighbours(&model.car) {
+            for pair in runs(neighbours(&model.car)) {
                 for throttle in [0.0, 0.25] {
                     for after_s in [0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.7] {
                         let shift = CarShift::usual(&model.car, pair.0, pair.1, throttle);
@@ -169,7 +169,7 @@ fn a_change_of_throttle_in_mid_shift_ends_well() {
         let mut worst = Worst::default();
         for car in cars() {
             let model = CarModel::new(with.map_or(car.clone(), |with| with(car))).unwrap();
-            for pair in neighbours(&model.car) {
+            for pair in runs(neighbours(&model.car)) {
                 for [before, after] in [[0.0, 0.25], [0.25, 0.0]] {
                     for after_s in [0.1, 0.3, 0.45, 0.6] {
                         let shift = CarShift::usual(&model.car, pair.0, pair.1, before);

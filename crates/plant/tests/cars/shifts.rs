@@ -3,7 +3,7 @@
 use config::{Car, Source};
 use plant::car::{CarCalibration, CarModel, CarShift, CarShiftQuality, simulate_car_shift};
 
-use crate::{cars, neighbours};
+use crate::{cars, neighbours, runs};
 
 /// Without power, and from little to much.
 const THROTTLES: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.7];
@@ -28,7 +28,7 @@ fn each_shift(title: &str, cars: Vec<Car>, friction: f64, limits: Limits) {
     let (mut shifts, mut beyond) = (0, Vec::new());
     for nominal in cars {
         let model = CarModel::new(nominal.clone().with_friction(friction)).unwrap();
-        for (from, to) in neighbours(&nominal) {
+        for (from, to) in runs(neighbours(&nominal)) {
             for throttle in THROTTLES {
                 let shift = CarShift::usual(&nominal, from, to, throttle);
                 let name = |gear: usize| nominal.gearbox.gears[gear].name.as_str();
