@@ -100,7 +100,7 @@ impl DrivePage<'_> {
 }
 
 fn name(car: &Car, gear: usize) -> &str {
-    car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str())
+    car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str())
 }
 
 fn gears(shift: &ScoredShift, car: &Car) -> String {

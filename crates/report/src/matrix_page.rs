@@ -180,6 +180,7 @@ pub fn shift_cells<'a>(row: &MatrixRow, car: &'a Car) -> Vec<(String, Cell<'a>)>
         ("phases_above_open_loop", counts.above),
         ("values_compared_with_range", counts.values),
         ("values_outside_range", counts.outside),
+        ("values_without_range", counts.unranged),
         ("rows", counts.rows),
         ("rows_that_say_slip", counts.slips_said),
     ];

@@ -222,3 +222,25 @@ fn commands_for_a_gearbox_say_so_where_a_file_has_none() {
     let both = refused(&wetclutch(&["bench", EXPERIMENT, "--vehicle", VEHICLE]));
     assert!(both.contains("cannot be used with"), "{both}");
 }
+
+#[test]
+fn a_log_may_be_in_neutral() {
+    let folder = simulated("neutral-car");
+    let text = folder.read("sim/short_measured.csv");
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let gears = ["gear", "target_gear"].map(|name| names.iter().position(|other| *other == name).unwrap());
+    let mut log = format!("{}\n", names.join(","));
+    // Selected in the last second, while the car rolls.
+    for (row, line) in text.lines().skip(1).enumerate() {
+        let is_neutral = row >= 2300;
+        let cells = line.split(',').enumerate();
+        let cells = cells.map(|(cell, value)| if is_neutral && gears.contains(&cell) { "N" } else { value });
+        log += &(cells.collect::<Vec<_>>().join(",") + "\n");
+    }
+    folder.write("log.csv", log);
+    said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    let estimates = folder.read("out.csv");
+    let [health, phase] = ["health", "phase"].map(|name| column(&estimates, name));
+    assert!(health[2300..].iter().all(|health| health != "good") && phase[2300..].iter().all(String::is_empty));
+    assert!(health[2200..2300].iter().any(|health| health == "good"));
+}

@@ -24,6 +24,10 @@ const STICKS_RAD_S: f64 = 0.05;
 const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_SHARE: f64 = 0.1;
 
+/// Names for neither a forward gear nor reverse, and their place: that of no gear.
+const NEUTRAL: [&str; 2] = ["N", "P"];
+const NO_GEAR: usize = usize::MAX;
+
 /// The columns with the commands of the valves: element of the gearbox, and name.
 pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
     let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
@@ -206,7 +210,8 @@ impl<'c> CarLog<'c> {
         // A logger may write the gear as a number with decimals.
         let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
         let named = |name: &str| gears.iter().position(|gear| gear.name == name);
-        let found = named(&text).or_else(|| named(&whole?));
+        let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(NO_GEAR);
+        let found = named(&text).or(neutral).or_else(|| named(&whole?));
         found.or_else(|| before.filter(|_| text.is_empty())).ok_or_else(|| {
             let names = gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
             let what = match &*text {

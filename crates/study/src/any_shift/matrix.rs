@@ -147,6 +147,8 @@ pub struct MatrixCounts {
     pub values: u64,
     /// Those outside.
     pub outside: u64,
+    /// Those without a range.
+    pub unranged: u64,
     /// Rows of the shifts.
     pub rows: u64,
     /// Those that say that a held element slips.
@@ -161,6 +163,7 @@ impl MatrixCounts {
         self.above += more.above;
         self.values += more.values;
         self.outside += more.outside;
+        self.unranged += more.unranged;
         self.rows += more.rows;
         self.slips_said += more.slips_said;
     }
@@ -199,6 +202,8 @@ pub struct MatrixPlan<'a> {
     pub seed: u64,
     /// Toothed wheels and their noise.
     pub sensors: &'a Sensors,
+    /// Changes every drawn car further.
+    pub change: fn(&mut Car),
     /// Threads.
     pub threads: usize,
 }
@@ -210,11 +215,12 @@ struct Run {
     failure: Option<String>,
 }
 
-fn run(known: &Car, shift: &MatrixShift, seed: u64, sensors: &Sensors) -> Run {
+fn run(known: &Car, shift: &MatrixShift, seed: u64, plan: &MatrixPlan<'_>) -> Run {
     let MatrixShift { from, to, kind, .. } = *shift;
-    let truth = drawn_car(known, from, to, seed);
+    let mut truth = drawn_car(known, from, to, seed);
+    (plan.change)(&mut truth);
     let usual = CarShift::usual(known, from, to, shift.throttle());
-    match score_shift(known, &truth, &usual, sensors, seed) {
+    match score_shift(known, &truth, &usual, plan.sensors, seed) {
         Ok(rows) => {
             let errors = errors_by_phase(&rows, kind);
             Run { counts: counts(&rows, &errors), errors, failure: None }
@@ -238,6 +244,9 @@ pub(super) fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCo
         compared: main.clone().count() as u64,
         above: above.count() as u64,
         values: 2 * clutches().count() as u64,
+        unranged: clutches()
+            .map(|clutch| u64::from(clutch.pressure_range_pa.is_none()) + u64::from(clutch.torque_range_n_m.is_none()))
+            .sum(),
         outside: clutches().map(|clutch| u64::from(!clutch.in_range)).sum(),
         rows: rows.len() as u64,
         slips_said: rows.iter().filter(|row| row.health == Health::HeldClutchSlips).count() as u64,
@@ -262,7 +271,7 @@ pub fn matrix(known: &Car, plan: &MatrixPlan<'_>, mut done: impl FnMut()) -> Res
         let (at, draw) = (number / plan.draws, number % plan.draws);
         #[expect(clippy::cast_possible_truncation, reason = "below the number of shifts")]
         let at = at as usize;
-        (at, run(known, &shifts[at], plan.seed.wrapping_add(draw), plan.sensors))
+        (at, run(known, &shifts[at], plan.seed.wrapping_add(draw), plan))
     };
     let runs = shifts.len() as u64 * plan.draws;
     in_order::<_, StudyError>(0..runs, plan.threads, work, |(at, run)| {

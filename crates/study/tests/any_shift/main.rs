@@ -22,7 +22,7 @@ const CLUTCHES: [&str; 2] = ["controlling", "other"];
 fn rows(draws: u64, verbose: bool) -> Vec<MatrixRow> {
     let sensors = sensors();
     let threads = std::thread::available_parallelism().unwrap().get();
-    let plan = MatrixPlan { draws, seed: 1, sensors: &sensors, threads };
+    let plan = MatrixPlan { draws, seed: 1, sensors: &sensors, change: |_| (), threads };
     let mut all = Vec::new();
     for car in cars() {
         let matrix = matrix(&car, &plan, || ()).unwrap();
@@ -77,7 +77,9 @@ fn matrix_of_shifts_and_kinds() {
     let draws = std::env::var("MATRIX_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap());
     let rows = rows(draws, std::env::var("MATRIX_VERBOSE").is_ok());
     print(&rows);
-    assert_eq!(Pooled::of(&rows, |_| true).counts.outside, 0, "guaranteed");
+    let counts = Pooled::of(&rows, |_| true).counts;
+    assert_eq!(counts.outside, 0, "guaranteed");
+    assert_eq!(counts.unranged, 0, "every pressure and torque has a range");
     // The bars are for ten draws and by class; over all classes one draw already says this.
     for (kind, bar) in [
         (ShiftKind::PowerOnUp, 0.45),
@@ -96,7 +98,7 @@ fn matrix_of_shifts_and_kinds() {
 #[test]
 fn the_matrix_is_the_same_on_any_number_of_threads() {
     let (car, sensors) = (&cars()[4], sensors());
-    let plan = MatrixPlan { draws: 2, seed: 1, sensors: &sensors, threads: 1 };
+    let plan = MatrixPlan { draws: 2, seed: 1, sensors: &sensors, change: |_| (), threads: 1 };
     let mut done = 0;
     let one = matrix(car, &plan, || done += 1).unwrap();
     assert_eq!((one.rows.len(), done), (4, 8));
