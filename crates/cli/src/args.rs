@@ -12,8 +12,10 @@ use design::Quantity;
 const EXAMPLES: &str = "\
 Examples:
   wetclutch demo                                     simulation, design, estimation and report for the built-in car
+  wetclutch demo --vehicle vehicles/eight_speed.toml  a drive through all gears of any car, every shift with its estimate
   wetclutch reproduce                                the source chapter's experiments, statement by statement
   wetclutch bench                                    all observers on many drives, ranked
+  wetclutch bench --vehicle vehicles/eight_speed.toml   every shift of a gearbox, in every kind
   wetclutch study experiments/settings.toml -o out   two thousand shifts: errors and sensitivities
   wetclutch simulate experiments/e1.toml -o out      a drive as CSV
   wetclutch design vehicles/two_speed_at.toml        gains with their certificate
@@ -49,6 +51,18 @@ pub(crate) enum Command {
     ///   trace.csv      every simulated signal, true values included
     ///   measured.csv   only the signals that a car measures
     ///   estimate.csv   the output of `estimate measured.csv`
+    ///
+    /// With the vehicle file of a car with a gearbox: drives through all of its gears, up under power, down coasting, up
+    /// without power, down under power, or through a drive file. The car differs from the vehicle file. The filter for any
+    /// shift sees it through toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
+    /// quality and the errors of filter and open loop, and writes:
+    ///
+    ///   report.html    the drive, the shifts, each shift drawn
+    ///   shifts.csv     the shifts as numbers
+    ///   drive.csv, drive_measured.csv    the signals, as `simulate` writes them
+    ///
+    ///   wetclutch demo --vehicle vehicles/eight_speed.toml -o out
+    ///   wetclutch demo --vehicle vehicles/ten_speed.toml --drive drives/city.toml -o out
     #[command(verbatim_doc_comment)]
     Demo(Demo),
     /// Simulate an experiment and write its signals as CSV
@@ -114,6 +128,11 @@ pub(crate) enum Command {
     ///
     /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
     ///
+    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a CSV log with the
+    /// columns that `simulate` writes for a drive:
+    ///
+    ///   wetclutch estimate city_measured.csv --vehicle vehicles/eight_speed.toml -o out.csv
+    ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
     /// appears when it contains all rows; it may be the log itself. A log of which a signal is unusable in most samples,
@@ -158,6 +177,12 @@ pub(crate) enum Command {
     /// built-in bench runs them at 100 Hz with real sensors. Prints the RMS error of each observer in each phase, and its
     /// ratio to the RMS error of the open loop; with -o, also writes them as a page. experiments/field.toml is a bench of
     /// errors of the readings: scale, delays, outliers, lost readings, channels with clocks of their own.
+    ///
+    /// With the vehicle file of a car with a gearbox: every shift between neighbouring gears, up and down, with power and
+    /// without, each in --draws cars, estimated by the filter for any shift and by the open loop. Prints the RMS errors of the
+    /// clutch torques (N m) by phase and their ratio, by shift and by kind; with -o, also writes bench.html and bench.csv.
+    ///
+    ///   wetclutch bench --vehicle vehicles/eight_speed.toml --draws 10 -o out
     #[command(verbatim_doc_comment)]
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
@@ -213,6 +238,15 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
+    /// Vehicle file with a gearbox: a drive through all of its gears
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Drive file in place of the drive through all gears
+    #[arg(long, value_name = "FILE", requires = "vehicle")]
+    pub(crate) drive: Option<PathBuf>,
+    /// Seed of the driven car, whose friction, valve gains and converter differ from those of the vehicle file, and of the noise
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
+    pub(crate) seed: u64,
     /// Folder for the report
     #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
     pub(crate) output: PathBuf,
@@ -384,7 +418,7 @@ pub(crate) struct Estimate {
     #[arg(long, value_enum)]
     pub(crate) method: Option<MethodChoice>,
     /// File whose table `sensors` describes the sensors of the log, such as an experiment file. The Kalman filters use
-    /// their noise and lag; without the file they assume small noise and no lag
+    /// their noise and lag; without the file they assume the noise of the error budget and no lag
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
     /// File for the estimate, by its ending CSV, .parquet or .mf4; of several logs the folder for their files. Default:
@@ -547,13 +581,29 @@ pub(crate) struct Reproduce {
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
     /// Experiment file with scenario tables; default: the built-in experiments/bench.toml
+    #[arg(conflicts_with = "vehicle")]
     pub(crate) experiment: Option<PathBuf>,
-    /// Folder for the page
+    /// Vehicle file with a gearbox: every shift between its neighbouring gears, in every kind
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Cars drawn for each shift, whose friction, valve gains and converter differ from those of the vehicle file
+    #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "vehicle")]
+    pub(crate) draws: u32,
+    /// Seed of the first car; each next one has the next seed
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
+    pub(crate) seed: u64,
+    /// File whose table `sensors` describes how the speeds are read; default: those of experiments/bench.toml
+    #[arg(long, value_name = "SENSORS.toml", requires = "vehicle")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// Folder for the page, and for the table of shifts (bench.csv)
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
 }
 
 #[derive(Debug, Args)]

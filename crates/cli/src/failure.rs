@@ -12,6 +12,7 @@ use logs::LogError;
 use plant::PlantError;
 use report::PageError;
 use study::StudyError;
+use study::any_shift::AnyShiftError;
 use trace::TraceError;
 
 /// Why a command failed.
@@ -104,6 +105,16 @@ impl From<StudyError> for Failure {
             StudyError::Plant(error) => error.into(),
             StudyError::Design(error) => error.into(),
             StudyError::Trace(error) => error.into(),
+            StudyError::AnyShift(error) => error.into(),
+        }
+    }
+}
+
+impl From<AnyShiftError> for Failure {
+    fn from(error: AnyShiftError) -> Self {
+        match error {
+            AnyShiftError::Car(error) => error.into(),
+            AnyShiftError::Train(_) | AnyShiftError::TooManyElements(_) => Self::Input(error.to_string()),
         }
     }
 }

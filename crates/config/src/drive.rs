@@ -7,7 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, Word};
-use crate::{Car, ConfigError, Source};
+use crate::{Car, ConfigError, Source, SpeedTrace};
 
 /// Most repetitions of the segments.
 const MOST_REPETITIONS: f64 = 1e6;
@@ -66,9 +66,11 @@ pub struct Drive {
     pub start_gear: Option<String>,
     /// Vehicle speed at the start, m/s.
     pub start_m_s: f64,
-    /// The pieces.
+    /// The pieces; none where the speed is given.
     pub segments: Vec<DriveSegment>,
-    /// How often they are driven.
+    /// The speed that a driver model follows.
+    pub trace: Option<SpeedTrace>,
+    /// How often they, or the speeds, are driven.
     pub repetitions: u32,
     /// When the gearbox shifts.
     pub shifts: ShiftPlan,
@@ -98,7 +100,11 @@ impl Drive {
 
     /// Length of the drive, s.
     pub fn duration_s(&self) -> f64 {
-        f64::from(self.repetitions) * self.segments.iter().map(|segment| segment.duration_s).sum::<f64>()
+        let once_s = match &self.trace {
+            Some(trace) => trace.duration_s(),
+            None => self.segments.iter().map(|segment| segment.duration_s).sum(),
+        };
+        f64::from(self.repetitions) * once_s
     }
 
     /// Checks the text of a drive file.
@@ -108,12 +114,16 @@ impl Drive {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         let raw: RawDrive = source.parse()?;
         let check = Check::of(&source);
-        let segments = raw.segment.get_ref().iter().map(|segment| check_segment(&check, segment));
-        let segments: Vec<DriveSegment> = segments.collect::<Result<_, _>>()?;
-        if segments.is_empty() {
-            let message = "the drive has no segment".to_owned();
-            return Err(check.meaning("segment", raw.segment.span().start, message, None));
-        }
+        let (segments, trace) = match (&raw.segment, &raw.trace) {
+            (Some(segments), None) => (check_segments(&check, segments)?, None),
+            (None, Some(trace)) => (Vec::new(), Some(read_trace(&check, &source, trace)?)),
+            (both, _) => {
+                let at = both.as_ref().map_or(0, |segments| segments.span().start);
+                let message = "expected either [[segment]] or [trace]".to_owned();
+                let hint = "[trace] names a file of speeds; [[segment]] gives throttle and brake".to_owned();
+                return Err(check.meaning("segment", at, message, Some(hint)));
+            }
+        };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number within its range")]
         let repetitions = match &raw.repetitions {
             Some(count) => check.count("repetitions", count, 1.0..=MOST_REPETITIONS)? as u32,
@@ -131,6 +141,7 @@ impl Drive {
             start_m_s: optional("start.vehicle_m_s", &raw.start.vehicle_m_s, 0.0..=100.0, 0.0)?,
             start_gear: raw.start.gear.map(Spanned::into_inner),
             segments,
+            trace,
             repetitions,
             shifts,
             source,
@@ -149,7 +160,15 @@ struct RawDrive {
     start: RawStart,
     schedule: Option<RawSchedule>,
     shift: Option<Spanned<Vec<RawShift>>>,
-    segment: Spanned<Vec<RawSegment>>,
+    segment: Option<Spanned<Vec<RawSegment>>>,
+    trace: Option<RawTrace>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct RawTrace {
+    file: Word,
+    grade_rad: Option<Number>,
 }
 
 #[derive(Deserialize, Default)]
@@ -190,6 +209,24 @@ struct RawSegment {
 enum FromTo {
     Constant(f64),
     Ramp([f64; 2]),
+}
+
+fn check_segments(check: &Check<'_>, raw: &Spanned<Vec<RawSegment>>) -> Result<Vec<DriveSegment>, ConfigError> {
+    if raw.get_ref().is_empty() {
+        return Err(check.meaning("segment", raw.span().start, "the drive has no segment".to_owned(), None));
+    }
+    raw.get_ref().iter().map(|segment| check_segment(check, segment)).collect()
+}
+
+fn read_trace(check: &Check<'_>, source: &Source, raw: &RawTrace) -> Result<SpeedTrace, ConfigError> {
+    let folder = source.path.parent().unwrap_or(Path::new(""));
+    let grade_rad = match &raw.grade_rad {
+        Some(grade) => check.number("trace.grade_rad", grade, -0.4..=0.4)?,
+        None => 0.0,
+    };
+    let file = Source::read(&folder.join(raw.file.get_ref()));
+    let file = file.map_err(|error| error.named_by(source, "trace.file", raw.file.span().start))?;
+    SpeedTrace::from_source(&file, grade_rad)
 }
 
 fn check_segment(check: &Check<'_>, raw: &RawSegment) -> Result<DriveSegment, ConfigError> {

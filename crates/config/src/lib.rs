@@ -10,6 +10,7 @@ pub mod error;
 pub mod experiment;
 pub mod gearbox;
 pub mod source;
+mod speed_trace;
 pub mod study;
 mod tree;
 pub mod vehicle;
@@ -22,6 +23,7 @@ pub use experiment::{
 };
 pub use gearbox::GearboxFile;
 pub use source::{Kind, Source, toml_string};
+pub use speed_trace::SpeedTrace;
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
     Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,

@@ -89,7 +89,7 @@ impl Source {
         let of_a_vehicle = |(key, value): (&String, &toml::Value)| value.is_table() && VEHICLE_TABLES.contains(&&**key);
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
-            (false, _, false) if has("segment") => Ok(Kind::Drive),
+            (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
@@ -101,7 +101,7 @@ impl Source {
                 line: 1,
                 message:
                     "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
-                          file (with [[segment]]), study file (with [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
+                          file (with [[segment]] or [trace]), study file (with [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
                           with tables of a vehicle file)"
                         .to_owned(),
             }),

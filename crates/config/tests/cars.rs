@@ -32,6 +32,24 @@ fn a_key_of_the_file_replaces_that_of_the_eight_speed_car() {
 }
 
 #[test]
+fn a_table_fill_gives_the_pistons_a_stroke() {
+    let strokes = |text: &str| -> Vec<Option<f64>> {
+        let mm = |clutch: &config::ShiftClutch| 1e3 * clutch.cylinder.stroke_m3 / clutch.clutch.piston_area_m2;
+        let car = car(text).unwrap();
+        car.clutches.iter().flatten().map(|clutch| clutch.has_stroke.then(|| mm(clutch))).collect()
+    };
+    assert_eq!(strokes(""), [None; 5]);
+    let close = |a: Option<f64>, b: f64| (a.unwrap() - b).abs() < 1e-9;
+    assert!(strokes("[fill]\n").into_iter().all(|stroke| close(stroke, 1.2)));
+    let own = strokes("[fill]\nstroke_m = 1e-3\n[clutch.C.fill]\nstroke_m = 2e-3\n[clutch.D.fill]\nenabled = false\n");
+    assert!(close(own[0], 1.0) && close(own[2], 2.0) && own[3].is_none(), "{own:?}");
+    let cold = car("[fill]\n[oil]\ntemperature_degc = 5\n").unwrap();
+    assert!(cold.clutches[0].unwrap().cylinder.viscosity_m2_s > 1e-4);
+    let shipped = Car::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed_stroke.toml").as_ref());
+    assert_eq!(shipped.unwrap().clutches, car("[fill]\n").unwrap().clutches);
+}
+
+#[test]
 fn a_valve_of_another_kind_replaces_the_shipped_one() {
     let valve = "[valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 2e4\nline_pressure_pa = 1.6e6\n\
                  delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n";
@@ -42,12 +60,44 @@ fn a_valve_of_another_kind_replaces_the_shipped_one() {
     assert!(weak.contains("car.toml:3") && weak.contains("less than `hydraulics.line_pressure_pa`"), "{weak}");
 }
 
+const VALVE: &str = "lag = { pressure_pa = [0, 1e6], time_constant_s = [0.1, 0.02] }\n\
+                     gain = { current_a = [0, 1], gain_pa_a = [1.2e6, 1.6e6] }\n\
+                     delay = { current_a = [0, 1], delay_s = [0.03, 0.01] }\n";
+
+#[test]
+fn a_valve_with_a_current_of_zero_pressure_is_normally_high() {
+    let car = |more: &str| car(&format!("[clutch.C.valve]\n{VALVE}{more}"));
+    let high = car("zero_pressure_a = 1.1\n").unwrap();
+    let falls: Vec<bool> = high.clutches.iter().flatten().map(|clutch| clutch.valve.falls()).collect();
+    assert_eq!(falls, [false, false, true, false, false]);
+    let valve = high.clutches[2].unwrap().valve;
+    assert!((valve.settled_pressure(0.1) - 1.6e6).abs() < 1.0 && valve.settled_pressure(1.1) == 0.0);
+    let weak = car("zero_pressure_a = 0.9\n").unwrap_err();
+    assert!(weak.contains("car.toml:7") && weak.contains("without current the pressure is 1.404 MPa"), "{weak}");
+    assert!(weak.contains("line pressure needs 1.000 A"), "{weak}");
+    let pulse = "[valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 2e4\nline_pressure_pa = 1.6e6\nzero_pressure_a = 1\n\
+                 delay = { duty_percent = [0.0, 100.0], delay_s = [0.01, 0.01] }\n";
+    assert!(crate::car(pulse).unwrap_err().contains("another kind of valve"));
+    let single = include_str!("../../../vehicles/two_speed_at.toml")
+        .replace("[clutch.b.valve]\n", "[clutch.b.valve]\nzero_pressure_a = 1.1\n");
+    let error = config::Vehicle::from_source(Source::built_in("v.toml", &single)).unwrap_err().to_string();
+    assert!(
+        error.contains("clutch.b.valve.zero_pressure_a") && error.contains("for cars with a gearbox file"),
+        "{error}"
+    );
+}
+
 #[test]
 fn the_shipped_vehicle_files_are_right() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/");
-    for (name, elements) in
-        [("eight_speed", 5), ("ten_speed", 6), ("six_speed", 5), ("four_speed", 5), ("dual_clutch", 2)]
-    {
+    for (name, elements) in [
+        ("eight_speed", 5),
+        ("eight_speed_stroke", 5),
+        ("ten_speed", 6),
+        ("six_speed", 5),
+        ("four_speed", 5),
+        ("dual_clutch", 2),
+    ] {
         let path = format!("{folder}{name}.toml");
         let car = Car::read(path.as_ref()).unwrap();
         assert_eq!(car.clutches.iter().flatten().count(), elements, "{name}");
@@ -72,6 +122,8 @@ fn wrong_vehicle_files_get_their_line_and_a_hint() {
             "[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\non_input_rad_s = 100\noff_input_rad_s = 110\nramp_s = 0.5\n",
             ["car.toml:7", "is 110, not below", ""],
         ),
+        ("[fill]\nstroke_m = 1.2\n", ["car.toml:4", "fill.stroke_m", "expected 0.00001 to 0.02"]),
+        ("[clutch.B.fill]\nleak = 1\n", ["car.toml:4", "unknown field `leak`", ""]),
         ("launch = \"turbo\"\n", ["car.toml:3", "turbo", ""]),
         ("mass = 3\n", ["car.toml:3", "unknown field `mass`", ""]),
         (

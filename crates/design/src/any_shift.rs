@@ -10,6 +10,10 @@ use observer::{Budget, InputLimits, ValveModel};
 
 use crate::kalman::{deviation_of, engine_noise, speed_reading};
 
+/// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the two-speed car's budget.
+const SPEED_QUANTUM_RAD_S: f64 = 0.7;
+/// The same of the wheel speed.
+const WHEEL_QUANTUM_RAD_S: f64 = 0.14;
 /// Errors of the valve's map beside its gain, as a share \[chosen\]: with the bounds of 15 % of friction and 10 % of gain it gives a
 /// deviation of 12 %.
 const MAP_SHARE: f64 = 0.06;
@@ -177,14 +181,18 @@ fn pressure_max_pa(car: &Car, errors: &ShiftErrors) -> f64 {
 /// The largest command of a valve, A or %.
 fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
     let commands = car.clutches.iter().flatten().map(|clutch| match clutch.valve.command_kind() {
-        CommandKind::Current => clutch.valve.command_for(pressure_max_pa(car, errors)),
+        // That of a normally-high valve is the one without pressure.
+        CommandKind::Current => [0.0, pressure_max_pa(car, errors)]
+            .map(|pressure_pa| clutch.valve.command_for(pressure_pa))
+            .into_iter()
+            .fold(0.0, f64::max),
         CommandKind::DutyCycle => 100.0,
     });
     commands.fold(0.0, f64::max)
 }
 
 /// The filter of a car with these tables, for readings of these sensors; without them the readings are taken to be of the
-/// moment and nearly exact.
+/// moment, with the noise of usual sensors.
 ///
 /// A bound of the errors counts as the edge of a uniform distribution.
 pub fn any_shift_filter<'a>(
@@ -206,13 +214,13 @@ pub fn any_shift_filter<'a>(
         },
         uncertainty: uncertainty(errors),
         readings: [
-            speed_reading(sensors.map(|sensors| &sensors.turbine)),
-            speed_reading(sensors.map(|sensors| &sensors.output)),
-            speed_reading(sensors.map(|sensors| &sensors.wheel)),
+            speed_reading(sensors.map(|sensors| &sensors.turbine), SPEED_QUANTUM_RAD_S),
+            speed_reading(sensors.map(|sensors| &sensors.output), SPEED_QUANTUM_RAD_S),
+            speed_reading(sensors.map(|sensors| &sensors.wheel), WHEEL_QUANTUM_RAD_S),
         ],
         engine: (
-            speed_reading(sensors.map(|sensors| &sensors.engine)),
-            engine_noise(inertia, sensors.map(|sensors| &sensors.engine)),
+            speed_reading(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
+            engine_noise(inertia, sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
         ),
         limits: InputLimits {
             speed_max_rad_s: SPEED_MOST_RAD_S,

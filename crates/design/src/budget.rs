@@ -25,8 +25,7 @@ impl ValveErrors {
         let (pressure_pa, time_constant_s) = (shift_pressure(vehicle), shift_time_constant(vehicle));
         let lag = match (&vehicle.observer_valve, real) {
             (Valve::PulseWidth(told), ClutchValve::PulseWidth { law, .. }) => told.flow_sqrt_pa_s / law.flow_sqrt_pa_s,
-            (_, ClutchValve::Proportional(maps)) => maps.time_constant_s.at(pressure_pa) / time_constant_s,
-            (_, ClutchValve::PulseWidth { .. }) => 1.0,
+            (_, real) => real.maps().map_or(1.0, |maps| maps.time_constant_s.at(pressure_pa) / time_constant_s),
         };
         let command = real.command_for(pressure_pa);
         let gain = pressure_pa / vehicle.observer_valve.settled_pressure(command);

@@ -10,8 +10,10 @@ use crate::budget::{ValveErrors, shift_pressure, shift_time_constant};
 use crate::compliant::compliant_model;
 use crate::rigid::tracker;
 
-/// Standard deviation of a speed reading where no sensor is described, rad/s.
+/// Least standard deviation of a speed reading, rad/s \[chosen\].
 const READING_RAD_S: f64 = 0.02;
+/// A quantum of the error budget over the standard deviation of one reading: five deviations of the difference of two.
+const QUANTUM: f64 = 5.0 * std::f64::consts::SQRT_2;
 
 /// Torque by which the engine's may change within [`ENGINE_CHANGE_S`], N m \[chosen\].
 const ENGINE_CHANGE_N_M: f64 = 50.0;
@@ -58,13 +60,14 @@ fn lag_rad(sensor: &SpeedSensor) -> f64 {
     0.5 * (sensor.periods + 1.0) * std::f64::consts::TAU / sensor.teeth
 }
 
-fn deviation_rad_s(sensor: Option<&SpeedSensor>) -> f64 {
-    sensor.map_or(READING_RAD_S, |sensor| sensor.noise_rad_s.max(READING_RAD_S))
+/// Standard deviation of a speed reading, rad/s: that of its sensor, or of the quantum of the error budget.
+fn deviation_rad_s(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> f64 {
+    sensor.map_or(quantum_rad_s / QUANTUM, |sensor| sensor.noise_rad_s).max(READING_RAD_S)
 }
 
-pub(crate) fn speed_reading(sensor: Option<&SpeedSensor>) -> SpeedReading<f64> {
+pub(crate) fn speed_reading(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> SpeedReading<f64> {
     SpeedReading {
-        deviation_rad_s: deviation_rad_s(sensor),
+        deviation_rad_s: deviation_rad_s(sensor, quantum_rad_s),
         lag_rad: sensor.map_or(0.0, lag_rad),
         pitch_rad: sensor.map_or(0.0, |sensor| std::f64::consts::TAU / sensor.teeth),
         delay_s: sensor.map_or(0.0, |sensor| sensor.delay_s),
@@ -72,16 +75,16 @@ pub(crate) fn speed_reading(sensor: Option<&SpeedSensor>) -> SpeedReading<f64> {
 }
 
 /// How the speed of an engine with this inertia changes, and is read.
-pub(crate) fn engine_noise(inertia_kg_m2: f64, sensor: Option<&SpeedSensor>) -> EngineNoise<f64> {
+pub(crate) fn engine_noise(inertia_kg_m2: f64, sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> EngineNoise<f64> {
     EngineNoise {
-        reading_rad_s: deviation_rad_s(sensor),
+        reading_rad_s: deviation_rad_s(sensor, quantum_rad_s),
         acceleration_walk: ENGINE_CHANGE_N_M / inertia_kg_m2 / ENGINE_CHANGE_S.sqrt(),
         acceleration_max_rad_s2: ENGINE_MOST_N_M / inertia_kg_m2,
     }
 }
 
 /// The Kalman filter of this vehicle, for signals from these sensors; without them the readings are taken to be of the
-/// moment and nearly exact.
+/// moment, with the noise of the error budget.
 ///
 /// A bound of the budget counts as the edge of a uniform distribution.
 pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilter<f64> {
@@ -117,7 +120,11 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         delay_least_s: DELAY_LEAST_S,
         output_least_rad_s: told.output_least_rad_s,
     };
-    let engine = engine_noise(vehicle.engine.inertia_kg_m2, sensors.map(|sensors| &sensors.engine));
+    let engine = engine_noise(
+        vehicle.engine.inertia_kg_m2,
+        sensors.map(|sensors| &sensors.engine),
+        budget.turbine_quantum_rad_s,
+    );
     let valve_model = |valve| ValveModel { valve, delay_s: 0.5 * (delay_least_s + delay_most_s) };
     let offgoing = OffgoingClutch {
         valve: valve_model(vehicle.offgoing.valve),
@@ -134,11 +141,11 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         valve_model(vehicle.oncoming.valve),
         uncertainty,
         [
-            speed_reading(sensors.map(|sensors| &sensors.turbine)),
-            speed_reading(sensors.map(|sensors| &sensors.output)),
-            speed_reading(sensors.map(|sensors| &sensors.wheel)),
+            speed_reading(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),
+            speed_reading(sensors.map(|sensors| &sensors.output), budget.output_quantum_rad_s),
+            speed_reading(sensors.map(|sensors| &sensors.wheel), budget.wheel_quantum_rad_s),
         ],
-        (speed_reading(sensors.map(|sensors| &sensors.engine)), engine),
+        (speed_reading(sensors.map(|sensors| &sensors.engine), budget.turbine_quantum_rad_s), engine),
         offgoing,
         reported,
         vehicle.supervisor,
@@ -166,17 +173,17 @@ pub fn unscented_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> Unscent
 }
 
 fn aged_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> ExtendedFilter<f64> {
-    let told = &vehicle.filter;
+    let (budget, told) = (&vehicle.error_bounds, &vehicle.filter);
     let valve = ValveErrors::of(vehicle);
     let noise = FilterNoise {
-        turbine_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.turbine)),
-        output_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.output)),
-        wheel_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.wheel)),
+        turbine_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),
+        output_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.output), budget.output_quantum_rad_s),
+        wheel_rad_s: deviation_rad_s(sensors.map(|sensors| &sensors.wheel), budget.wheel_quantum_rad_s),
         turbine_share: told.turbine_share,
         turbine_share_s: told.turbine_share_s,
         twist_rate_rad_s: told.twist_rate_rad_s,
         output_least_rad_s: told.output_least_rad_s,
-        valve_moving: share(deviation_of(valve.lag_pa_s.hypot(valve.delay_pa_s)), vehicle.error_bounds.shift_ramp_pa_s),
+        valve_moving: share(deviation_of(valve.lag_pa_s.hypot(valve.delay_pa_s)), budget.shift_ramp_pa_s),
         valve_resting_per_s: share(deviation_of(valve.gain_pa_s), shift_pressure(vehicle)),
         valve_rate_s: told.valve_rate_s,
         offgoing_n_m: told.offgoing_n_m,

@@ -125,3 +125,15 @@ fn a_clipped_estimate_is_in_the_guaranteed_ranges_and_says_that_it_was_not() {
     assert_eq!((shaft.shaft_torque_n_m, shaft.health), (Some(500.0), Health::OutsideRange));
     assert_eq!(clipped(estimate(3e5, 15.0, None, Health::Restarted)).health, Health::Restarted);
 }
+
+#[test]
+fn the_range_grows_from_a_new_command_to_the_next() {
+    let vehicle = with_stroke();
+    let (estimator, mut state) = (range(&vehicle), range(&vehicle).start());
+    let input = rolling(&vehicle, vehicle.oncoming.valve.command_for(0.9e6));
+    let at = |age_ms: u32| Input { dt_s: 1e-3, command: input.command.filter(|_| age_ms == 0), ..input };
+    let widths = (0..2009).map(|ms| width(estimator.step(&mut state, &at(ms % 10)).pressure_pa) / 1e3);
+    // kPa, in gear at 0.9 MPa: in the step with the new command, 3 ms and 8 ms after it.
+    let last: Vec<f64> = widths.skip(2000).map(f64::round).collect();
+    assert_eq!([last[0], last[3], last[8]], [225.0, 457.0, 700.0]);
+}

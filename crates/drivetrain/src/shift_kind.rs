@@ -52,6 +52,16 @@ impl ShiftKind {
         }
     }
 
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PowerOnUp => "power-on upshift",
+            Self::PowerOffUp => "power-off upshift",
+            Self::PowerOnDown => "power-on downshift",
+            Self::CoastDown => "coast downshift",
+        }
+    }
+
     /// The order of its phases: torque phase first if `sign(T_t) (|i_off| - |i_on|) > 0`.
     pub fn order(self) -> PhaseOrder {
         match self {

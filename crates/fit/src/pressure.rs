@@ -71,7 +71,7 @@ pub(crate) fn pressures(
 /// it would be a quarter of a percent too long on a ramp.
 fn step(valve: &ClutchValve<f64>, settled_pa: f64, pressure_pa: f64, dt_s: f64) -> f64 {
     match valve {
-        ClutchValve::Proportional(maps) => {
+        ClutchValve::Proportional(maps) | ClutchValve::NormallyHigh { maps, .. } => {
             let middle_pa = pressure_pa + 0.5 * dt_s * maps.pressure_rate(pressure_pa, settled_pa);
             settled_pa + (pressure_pa - settled_pa) * (-dt_s / maps.time_constant_s.at(middle_pa)).exp()
         }

@@ -4,7 +4,8 @@ use drivetrain::{Real, ReducedShift};
 
 use crate::{
     ChannelHealth, Channels, CompliantObserver, Estimate, Estimator, ExtendedFilter, Health, Input, InputLimits,
-    Inversion, Reading, RigidObserver, Sample, SampleEstimator, SlidingObserver, SuperTwisting, UnscentedFilter,
+    Inversion, LOST_S, Reading, RigidObserver, Sample, SampleEstimator, SlidingObserver, SuperTwisting,
+    UnscentedFilter,
 };
 
 /// For how long a speed that does not come is carried on by its last change, s.
@@ -25,11 +26,11 @@ pub struct AlignmentState<T> {
     turbine: Speed<T>,
     output: Speed<T>,
     wheel: Speed<T>,
-    command: Option<T>,
+    command: Option<Reading<T>>,
 }
 
 /// Brings all channels to the time of the step: a speed of which no reading came, or an old one, is carried on by a line
-/// through its last two readings for up to 50 ms \[chosen\]. A command stands until the next one.
+/// through its last two readings for up to 50 ms \[chosen\]. A command stands until the next one, for up to [`LOST_S`].
 ///
 /// Readings of the moment pass unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,23 +99,25 @@ impl<T: Real> Alignment<T> {
         let (turbine_rad_s, turbine) = state.turbine.take(dt_s, input.turbine_rad_s, limits);
         let (output_rad_s, output) = state.output.take(dt_s, input.output_rad_s, limits);
         let (wheel_rad_s, wheel) = state.wheel.take(dt_s, input.wheel_rad_s, limits);
+        let standing = state.command.map(|last| Reading { age_s: last.age_s + dt_s, ..last });
+        state.command = standing.filter(|last| last.age_s <= T::of(LOST_S));
         let command = match input.command {
             Some(reading) if limits.command_valid(reading.value) => {
-                state.command = Some(reading.value);
+                state.command = Some(reading);
                 ChannelHealth::Good
             }
             Some(_) => ChannelHealth::Refused,
             None if state.command.is_some() => ChannelHealth::Absent,
             None => ChannelHealth::Lost,
         };
-        let refused = input.command.map(|reading| reading.value).filter(|_| command == ChannelHealth::Refused);
+        let taken = state.command.filter(|_| command != ChannelHealth::Refused);
         let sample = Sample {
             dt_s: input.dt_s,
             engine_rad_s,
             turbine_rad_s,
             slip_rad_s: self.shift.oncoming_slip(turbine_rad_s, output_rad_s),
             wheel_rad_s,
-            command: refused.or(state.command).unwrap_or_else(T::nan),
+            command: taken.map_or_else(T::nan, |reading| reading.value),
         };
         let unused = ChannelHealth::Unused;
         let channels =
@@ -143,7 +146,10 @@ impl<T: Real> Alignment<T> {
         let (sample, channels) = alignment.step(&mut state.alignment, input);
         let mut estimate = observer.step_sample(&mut state.observer, &sample);
         estimate.channels = channels;
-        if channels.each().contains(&ChannelHealth::Refused) {
+        if !O::READS_WHEEL {
+            estimate.channels.wheel = ChannelHealth::Unused;
+        }
+        if estimate.channels.each().contains(&ChannelHealth::Refused) {
             estimate.health = estimate.health.max(Health::ReadingRefused);
         }
         estimate

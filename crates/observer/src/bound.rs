@@ -10,8 +10,8 @@ use drivetrain::{Clutch, ClutchValve, Real};
 
 use crate::fill_range::FillBudget;
 use crate::{
-    Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Sample,
-    ShaftMemory, ShaftRange, Tracker, TrackerState,
+    Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Reading,
+    Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
 };
 
 /// Largest errors under which the ranges of pressure and clutch torque hold.
@@ -92,8 +92,8 @@ pub struct Bounded<T, O> {
 struct Seen<T> {
     /// Time since the step before, s; none if it is unusable.
     dt_s: Option<T>,
-    /// Lowest and highest command that there may be.
-    command: [T; 2],
+    /// The command, if a usable one was read.
+    command: Option<Reading<T>>,
     /// The phase, if the speeds are usable.
     phase: Option<Phase>,
     /// The signals at the time of the step.
@@ -141,17 +141,14 @@ impl<T: Real> RangeEstimator<T> {
         Bounds { pressure_pa, clutch_torque_n_m, shaft_torque_n_m }
     }
 
-    /// Checks the input and follows the phase. A command that is missing, or older than the step, may have been any.
+    /// Checks the input and follows the phase.
     #[inline]
     fn seen(&self, state: &mut RangeState<T>, input: &Input<T>) -> Seen<T> {
         let (limits, zero) = (&self.tracker.limits, T::zero());
         let alignment = Alignment { shift: self.tracker.shift, limits: *limits };
         let (sample, channels) = alignment.step(&mut state.alignment, input);
         let dt_s = self.tracker.begin(&mut state.tracker, &sample).map(|interval| interval.dt_s);
-        let command = match input.command {
-            Some(reading) if limits.command_valid(reading.value) && reading.age_s <= zero => [reading.value; 2],
-            _ => [zero, limits.command_max],
-        };
+        let command = input.command.filter(|reading| limits.usable_command(reading));
         let phase = limits.speeds_valid(&sample).then(|| match dt_s {
             Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, &sample).0,
             None => state.tracker.supervisor.phase,

@@ -82,6 +82,7 @@ struct SpeedSample<T> {
 
 impl<T: Real> SampleEstimator<T> for CompliantObserver<T> {
     type SampleState = CompliantState<T>;
+    const READS_WHEEL: bool = true;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker

@@ -519,6 +519,7 @@ fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) -> [
 
 impl<T: Real> SampleEstimator<T> for ExtendedFilter<T> {
     type SampleState = ExtendedState<T>;
+    const READS_WHEEL: bool = true;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker

@@ -63,6 +63,7 @@ impl<T: Real> Inversion<T> {
 
 impl<T: Real> SampleEstimator<T> for Inversion<T> {
     type SampleState = InversionState<T>;
+    const READS_WHEEL: bool = true;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker

@@ -47,7 +47,7 @@ pub use rigid_model::{RigidModel, SpeedModel};
 pub use schedule::{Mix, Schedule};
 pub use shaft_range::{ShaftErrors, ShaftMemory, ShaftRange};
 pub use signals::{
-    ChannelHealth, Channels, Estimate, Estimator, Health, Input, InputLimits, Reading, Sample, SampleEstimator,
+    ChannelHealth, Channels, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Reading, Sample, SampleEstimator,
 };
 pub use sliding::{SlidingGains, SlidingObserver, SlidingSample, SlidingState};
 pub use super_twisting::{SuperTwisting, SuperTwistingState, TwistingSample};

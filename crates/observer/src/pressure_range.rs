@@ -5,105 +5,174 @@
 //! gain at the operating point instead of one worst rate. Without a stroke of the piston in the budget the outlet pressure is
 //! the cylinder pressure; with one, [`crate::fill_range`] carries the range on to the cylinder.
 //!
-//! **What it assumes:** the entries of [`Budget`]; that the command stays between the readings of two neighbouring
-//! samples, also over one lost sample, and is the first of them until [`Budget::command_age_s`] before the second; the lag
-//! at a pressure is that of the budget's map times its factors.
+//! A reading of the command is as old as it says. The range is carried to the time of the newest reading with what was read
+//! until then. From there to now the newest command holds until the next reading may come, and then any command.
+//!
+//! **What it assumes:** the entries of [`Budget`]; that the command stays between two neighbouring readings, also over
+//! one lost time step, and is the first of them until [`Budget::command_age_s`] before the second; the lag at a pressure is
+//! that of the budget's map times its factors; that two readings are not much closer in time than usual. Where steps came
+//! between two readings that are farther apart than usual, one is missing, and any command may have been sent.
 
 use drivetrain::Real;
 
-use crate::Budget;
 use crate::commands::Commands;
 use crate::fill_range::{Outlet, PistonRange};
+use crate::{Budget, Reading};
 
 /// Longest time over which the lag is taken at its extreme, s; a longer sample is cut into pieces.
 const PIECE_S: f64 = 0.0101;
 /// Most pieces; beyond them each is longer, which makes the range wider and not wrong.
 const MOST_PIECES: usize = 8;
-/// A time step of more than this many times the one before has lost a sample: a command of between may be that of the
-/// sample that was lost.
+/// Two readings more than this many usual periods apart have lost one between them: a command of between may be that of
+/// the lost one.
 const LOST: f64 = 1.5;
-/// A time step of more than this many times the one before is a gap: more than one sample is missing.
+/// Two readings more than this many usual periods apart have lost more than one.
 const GAP: f64 = 2.5;
+/// The next reading comes after at least this share of the usual period [chosen: clocks that waver by a tenth].
+const SOONEST: f64 = 0.8;
+/// By how much a longer period raises the usual one: a slower channel counts as such after some readings, not at once, since
+/// it may be one that has lost readings [chosen].
+const SLOWER: f64 = 1.25;
 
 /// Memory of the range of the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PressureRange<T> {
+    /// Ages are those at the newest reading.
     commands: Commands<T>,
+    /// At the newest reading.
+    at_reading: Limits<T>,
+    now: Limits<T>,
+    /// Time since the newest reading was true, s; none before the first.
+    since_reading_s: Option<T>,
+    /// Whether a step has come since then without a reading.
+    stepped: bool,
+    /// Usual time between two readings, s.
+    period_s: T,
+}
+
+/// What is known of the valve and the cylinder at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Limits<T> {
     /// Lowest and highest settled pressure behind the hysteresis, Pa.
     asked_pa: [T; 2],
     /// Lowest and highest pressure at the valve's outlet, Pa.
     outlet_pa: [T; 2],
     piston: PistonRange<T>,
-    /// The time step before, s.
-    last_dt_s: T,
 }
 
 impl<T: Real> PressureRange<T> {
     /// Nothing is known of the cylinder, nor of the command before the first one, up to `command_max`.
     pub fn unknown(budget: &Budget<T>, command_max: T) -> Self {
-        let zero = T::zero();
+        let limits = Limits::unknown(budget.pressure_max_pa);
         Self {
             commands: Commands::unknown(command_max),
-            asked_pa: [zero, T::infinity()],
-            outlet_pa: [zero, budget.pressure_max_pa],
-            piston: PistonRange::unknown(budget.pressure_max_pa),
-            last_dt_s: T::infinity(),
+            at_reading: limits,
+            now: limits,
+            since_reading_s: None,
+            stepped: false,
+            period_s: T::infinity(),
         }
     }
 
     /// Lowest and highest cylinder pressure, Pa.
     #[inline]
     pub fn pressure_pa(&self, budget: &Budget<T>) -> [T; 2] {
-        budget.fill.as_ref().map_or(self.outlet_pa, |fill| self.piston.pressure_pa(fill))
+        budget.fill.as_ref().map_or(self.now.outlet_pa, |fill| self.now.piston.pressure_pa(fill))
     }
 
     /// What is known of the piston, where the budget has a stroke.
     pub fn piston(&self, budget: &Budget<T>) -> Option<&PistonRange<T>> {
-        budget.fill.is_some().then_some(&self.piston)
+        budget.fill.is_some().then_some(&self.now.piston)
     }
 
-    /// Takes a sample, `dt_s` after the one before, whose command is between two limits; `command_max` is the largest
-    /// that there is. After a gap any command may have come and gone unseen.
+    /// Lets `dt_s` pass and takes a reading of the command, if there is a new one; `command_max` is the largest command
+    /// that there is. A reading that is older than the one before is left out.
     #[inline]
-    pub fn step(&mut self, budget: &Budget<T>, dt_s: T, command: [T; 2], command_max: T) {
-        let (zero, delay_max_s) = (T::zero(), budget.delay_s[1]);
-        if dt_s > T::of(GAP) * self.last_dt_s {
-            self.commands.send(zero, zero, [zero, command_max], delay_max_s);
-        }
-        let lost = dt_s > T::of(LOST) * self.last_dt_s;
-        if dt_s > zero {
-            self.last_dt_s = dt_s;
-        }
-        let early_s = if lost { dt_s } else { budget.command_age_s.min(dt_s) };
-        if early_s > zero {
-            self.commands.send(-dt_s, early_s, command, delay_max_s);
-        }
-        self.advance(budget, dt_s);
-        if early_s <= zero {
-            self.commands.send(zero, zero, command, delay_max_s);
+    pub fn step(&mut self, budget: &Budget<T>, dt_s: T, command: Option<Reading<T>>, command_max: T) {
+        let zero = T::zero();
+        let before_s = self.since_reading_s;
+        let now_s = before_s.map(|before_s| before_s + dt_s);
+        // The first one tells nothing of the time before it.
+        let new = command.map(|reading| (reading, now_s.map_or(zero, |now_s| now_s - reading.age_s)));
+        if let Some((reading, interval_s)) = new.filter(|(_, interval_s)| *interval_s >= zero) {
+            self.take(budget, interval_s, reading.value, command_max);
+            self.now = self.at_reading;
+            self.carry_on(budget, zero, reading.age_s, command_max);
+            (self.since_reading_s, self.stepped) = (Some(reading.age_s), false);
+        } else {
+            let start_s = before_s.unwrap_or(zero);
+            self.carry_on(budget, start_s, start_s + dt_s, command_max);
+            (self.since_reading_s, self.stepped) = (now_s, true);
         }
     }
 
     /// Everything is possible: time was lost, and with it commands.
     pub fn forget(&mut self, budget: &Budget<T>, command_max: T) {
-        *self = Self { last_dt_s: self.last_dt_s, ..Self::unknown(budget, command_max) };
+        *self = Self { period_s: self.period_s, ..Self::unknown(budget, command_max) };
     }
 
-    /// Carries the range over `dt_s` under the commands that were sent.
+    /// Carries the limits at the newest reading on to the next one, `interval_s` later.
     #[inline]
-    fn advance(&mut self, budget: &Budget<T>, dt_s: T) {
+    fn take(&mut self, budget: &Budget<T>, interval_s: T, command: T, command_max: T) {
+        let (zero, delay_max_s) = (T::zero(), budget.delay_s[1]);
+        let lost = interval_s > T::of(LOST) * self.period_s;
+        if lost && self.stepped || interval_s > T::of(GAP) * self.period_s {
+            self.commands.send(zero, zero, [zero, command_max], delay_max_s);
+        }
+        if interval_s > zero {
+            self.period_s = interval_s.min(self.period_s * T::of(SLOWER));
+        }
+        let early_s = if lost { interval_s } else { budget.command_age_s.min(interval_s) };
+        if early_s > zero {
+            self.commands.send(-interval_s, early_s, [command; 2], delay_max_s);
+        }
+        let commands = &self.commands;
+        self.at_reading
+            .carry(budget, zero, interval_s, |start_s, end_s| commands.in_effect(budget.delay_s, start_s, end_s));
+        self.commands.age(interval_s);
+        if early_s <= zero {
+            self.commands.send(zero, zero, [command; 2], delay_max_s);
+        }
+    }
+
+    /// Carries the limits for now from `start_s` to `end_s` after the newest reading. Its command holds until the next one
+    /// may come; from then on any command may have been sent.
+    #[inline]
+    fn carry_on(&mut self, budget: &Budget<T>, start_s: T, end_s: T, command_max: T) {
+        let usual_s = if self.period_s.is_finite() { T::of(SOONEST) * self.period_s } else { T::zero() };
+        let any_s = (usual_s - budget.command_age_s).max(T::zero()) + budget.delay_s[0];
+        let commands = &self.commands;
+        self.now.carry(budget, start_s, end_s, |start_s, end_s| {
+            if end_s <= any_s { commands.in_effect(budget.delay_s, start_s, end_s) } else { [T::zero(), command_max] }
+        });
+    }
+}
+
+impl<T: Real> Limits<T> {
+    /// Nothing is known, up to the highest pressure of the supply.
+    fn unknown(pressure_max_pa: T) -> Self {
         let zero = T::zero();
-        if dt_s > zero {
+        Self {
+            asked_pa: [zero, T::infinity()],
+            outlet_pa: [zero, pressure_max_pa],
+            piston: PistonRange::unknown(pressure_max_pa),
+        }
+    }
+
+    /// Carries the limits from one time to another under the commands that may be in effect between two times.
+    #[inline]
+    fn carry(&mut self, budget: &Budget<T>, start_s: T, end_s: T, in_effect: impl Fn(T, T) -> [T; 2]) {
+        let dt_s = end_s - start_s;
+        if dt_s > T::zero() {
             let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
             let length_s = dt_s / T::of(pieces as f64);
-            let mut done_s = zero;
+            let mut at_s = start_s;
             for _ in 0..pieces {
-                let commands = self.commands.in_effect(budget.delay_s, done_s, done_s + length_s);
+                let commands = in_effect(at_s, at_s + length_s);
                 self.asked_pa = budget.asked(self.asked_pa, commands);
                 self.advance_piece(budget, length_s);
-                done_s = done_s + length_s;
+                at_s = at_s + length_s;
             }
-            self.commands.age(dt_s);
         }
     }
 
@@ -138,8 +207,10 @@ impl<T: Real> Budget<T> {
     #[inline]
     fn asked(&self, [low, high]: [T; 2], [lowest, highest]: [T; 2]) -> [T; 2] {
         let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
-        let bottom = settled((lowest - self.command).max(T::zero()), self.gain_factor[0]);
-        let top = settled(highest + self.command, self.gain_factor[1]);
+        let (weakest, strongest) = ((lowest - self.command).max(T::zero()), highest + self.command);
+        let (weakest, strongest) = if self.valve.falls() { (strongest, weakest) } else { (weakest, strongest) };
+        let bottom = settled(weakest, self.gain_factor[0]);
+        let top = settled(strongest, self.gain_factor[1]);
         [bottom.min(low.max(bottom - self.hysteresis_pa)), top.max(high.min(top + self.hysteresis_pa))]
     }
 
@@ -188,10 +259,14 @@ mod tests {
         Budget { valve, command: 0.5, ..budget() }
     }
 
+    fn read(value: f64) -> Option<Reading<f64>> {
+        Some(Reading::now(value))
+    }
+
     /// An empty cylinder whose valve has had no command for long.
     fn empty(b: &Budget<f64>) -> PressureRange<f64> {
         let mut range = PressureRange::unknown(b, 0.0);
-        range.outlet_pa[1] = 0.0;
+        range.at_reading.outlet_pa[1] = 0.0;
         range
     }
 
@@ -226,7 +301,7 @@ mod tests {
         let ranges: Vec<[f64; 2]> = (0..=60)
             .map(|k| {
                 let command = commands.get(k).copied().unwrap_or_default();
-                range.step(b, if k == 0 { 0.0 } else { 0.01 }, [command; 2], 1.2);
+                range.step(b, if k == 0 { 0.0 } else { 0.01 }, read(command), 1.2);
                 range.pressure_pa(b)
             })
             .collect();
@@ -250,11 +325,26 @@ mod tests {
         let b = budget();
         let mut range = PressureRange::unknown(&b, 1.2);
         for _ in 0..200 {
-            range.step(&b, 0.01, [0.3; 2], 1.2);
+            range.step(&b, 0.01, read(0.3), 1.2);
         }
         let settled = |command: f64, gain: f64| gain * b.valve.settled_pressure(command);
         let [low, high] = range.pressure_pa(&b);
         assert!((low - settled(0.295, 0.9)).abs() < 1.0 && (high - settled(0.305, 1.1)).abs() < 1.0, "{low} {high}");
+    }
+
+    #[test]
+    fn a_normally_high_valve_has_the_range_of_the_mirrored_commands() {
+        let low = budget();
+        let Some(&maps) = low.valve.maps() else { panic!("it has maps") };
+        let high = Budget { valve: ClutchValve::NormallyHigh { maps, zero_pressure_a: 1.2 }, ..budget() };
+        let mut ranges = [PressureRange::unknown(&low, 1.2), PressureRange::unknown(&high, 1.2)];
+        for k in 0..80 {
+            let current = [0.0, 0.3, 0.12, 0.5, 0.9, 0.4, 0.05, 0.2][k / 10];
+            ranges[0].step(&low, 0.01, read(current), 1.2);
+            ranges[1].step(&high, 0.01, read(1.2 - current), 1.2);
+            let [a, b] = [ranges[0].pressure_pa(&low), ranges[1].pressure_pa(&high)];
+            assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3, "{k}: {a:?} {b:?}");
+        }
     }
 
     #[test]
@@ -264,7 +354,7 @@ mod tests {
         let mut range = empty(&b);
         let mut left = false;
         for (k, p) in simulated(&b, 1.0, 1.3, 10, &commands).into_iter().enumerate() {
-            range.step(&b, if k == 0 { 0.0 } else { 0.01 }, [0.4; 2], 1.2);
+            range.step(&b, if k == 0 { 0.0 } else { 0.01 }, read(0.4), 1.2);
             let [_, high] = range.pressure_pa(&b);
             left |= p > high;
         }
@@ -277,7 +367,7 @@ mod tests {
         let mut range = empty(&b);
         for k in 0..500 {
             let command = if k == 300 { 1.0 } else { 0.1 };
-            range.step(&b, 0.001, [command; 2], 1.2);
+            range.step(&b, 0.001, read(command), 1.2);
             // Up to 0.2 s later the large command may still act.
             if (302..=500).contains(&k) {
                 assert!(range.pressure_pa(&b)[1] > 0.1e6);
@@ -292,7 +382,7 @@ mod tests {
         assert_eq!(range.pressure_pa(&b), [0.0, b.pressure_max_pa]);
         let mut hold = |dt_s: f64, samples: u32| {
             for _ in 0..samples {
-                range.step(&b, dt_s, [0.3; 2], 1.2);
+                range.step(&b, dt_s, read(0.3), 1.2);
             }
             range.pressure_pa(&b)
         };
@@ -303,5 +393,63 @@ mod tests {
         assert!(low > 0.2e6 && high < 0.4e6, "{low} {high}");
         let [low, high] = hold(0.5, 1);
         assert!(low < 0.05e6 && high > 1.1e6, "{low} {high}");
+    }
+
+    /// Ranges under a rising command that is read every 10 ms and `late_ms` after it was true, in steps of 1 ms.
+    fn late_ranges(b: &Budget<f64>, late_ms: usize) -> Vec<[f64; 2]> {
+        let mut range = PressureRange::unknown(b, 1.2);
+        let ranges = (0..3000_usize).map(|now_ms| {
+            let true_ms = now_ms.checked_sub(late_ms).filter(|true_ms| true_ms % 10 == 0);
+            let reading =
+                true_ms.map(|true_ms| Reading { value: 0.2 + 1e-4 * true_ms as f64, age_s: 1e-3 * late_ms as f64 });
+            range.step(b, 1e-3, reading, 1.2);
+            range.pressure_pa(b)
+        });
+        ranges.collect()
+    }
+
+    #[test]
+    fn a_late_command_is_taken_at_its_time() {
+        let b = budget();
+        let (now, late) = (late_ranges(&b, 0), late_ranges(&b, 5));
+        // Up to 8 ms after a reading no other command can have been sent.
+        for at_ms in (2000..3000).filter(|ms| ms % 10 <= 7 && ms % 10 >= 5) {
+            let ends = now[at_ms].into_iter().zip(late[at_ms]);
+            assert!(ends.clone().all(|(now, late)| (now - late).abs() < 1.0), "{at_ms} ms: {ends:?}");
+        }
+        let widest = late[2000..].iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+        assert!(widest < 0.8e6, "{widest}");
+        // Older than its period, it leaves more open; the range is taken back at the next reading all the same.
+        let older = late_ranges(&b, 20);
+        let width = |ranges: &[[f64; 2]]| ranges[2000..].iter().map(|[low, high]| high - low).sum::<f64>() / 1000.0;
+        let widths = [&now, &late, &older].map(|ranges| width(ranges));
+        assert!(widths.is_sorted() && widths[2] < 1.0e6, "{widths:?}");
+    }
+
+    #[test]
+    fn a_missing_reading_leaves_any_command_possible_until_the_next() {
+        let b = budget();
+        let mut range = PressureRange::unknown(&b, 1.2);
+        let mut hold = |samples: usize, command: Option<Reading<f64>>| {
+            (0..samples).for_each(|_| range.step(&b, 0.01, command, 1.2));
+            range.pressure_pa(&b)
+        };
+        let [_, settled] = hold(300, read(0.3));
+        let [_, unread] = hold(1, None);
+        assert!(unread > settled + 0.05e6, "{unread} {settled}");
+        // What came and went in the meantime fades.
+        assert!(hold(1, read(0.3))[1] > settled + 0.05e6);
+        assert!((hold(300, read(0.3))[1] - settled).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_reading_out_of_order_is_left_out() {
+        let b = budget();
+        let mut range = PressureRange::unknown(&b, 1.2);
+        (0..300).for_each(|_| range.step(&b, 0.01, read(0.3), 1.2));
+        let mut other = range;
+        range.step(&b, 0.001, Some(Reading { value: 1.0, age_s: 0.005 }), 1.2);
+        other.step(&b, 0.001, None, 1.2);
+        assert_eq!(range, other);
     }
 }

@@ -95,6 +95,7 @@ pub struct RigidSample<T> {
 
 impl<T: Real> SampleEstimator<T> for RigidObserver<T> {
     type SampleState = RigidState<T>;
+    const READS_WHEEL: bool = false;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker

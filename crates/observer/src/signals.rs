@@ -120,6 +120,12 @@ impl<T: Real> InputLimits<T> {
         command >= T::zero() && command <= self.command_max
     }
 
+    /// Whether a reading of a valve command can be used.
+    #[inline]
+    pub(crate) fn usable_command(&self, reading: &Reading<T>) -> bool {
+        self.command_valid(reading.value) && reading.age_s >= T::zero() && reading.age_s.is_finite()
+    }
+
     /// Whether a drive-shaft torque is a number within its limit.
     #[inline]
     pub fn shaft_torque_possible(&self, torque_n_m: T) -> bool {
@@ -209,6 +215,9 @@ impl Health {
         }
     }
 }
+
+/// Time without a reading after which a channel is lost, and without any speed after which a filter begins anew, s.
+pub const LOST_S: f64 = 0.25;
 
 /// What became of a channel in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -326,6 +335,9 @@ impl<T, O: Estimator<T>> Estimator<T> for &O {
 pub trait SampleEstimator<T> {
     /// What it remembers from one sample to the next.
     type SampleState;
+
+    /// Whether it reads the speed of the driven wheels.
+    const READS_WHEEL: bool;
 
     /// Its checks, valve and phase.
     fn tracker(&self) -> &Tracker<T>;

@@ -62,6 +62,7 @@ pub struct SlidingSample<T> {
 
 impl<T: Real> SampleEstimator<T> for SlidingObserver<T> {
     type SampleState = SlidingState<T>;
+    const READS_WHEEL: bool = false;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker

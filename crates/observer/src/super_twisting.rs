@@ -77,6 +77,7 @@ fn implicit<T: Real>(y: T, a: T, b: T) -> (T, T) {
 
 impl<T: Real> SampleEstimator<T> for SuperTwisting<T> {
     type SampleState = SuperTwistingState<T>;
+    const READS_WHEEL: bool = false;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.tracker

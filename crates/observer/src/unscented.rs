@@ -25,6 +25,7 @@ impl<T: Real> UnscentedFilter<T> {
 
 impl<T: Real> SampleEstimator<T> for UnscentedFilter<T> {
     type SampleState = ExtendedState<T>;
+    const READS_WHEEL: bool = true;
 
     fn tracker(&self) -> &Tracker<T> {
         &self.filter.tracker

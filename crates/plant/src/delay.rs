@@ -32,6 +32,11 @@ impl DelayLine {
         self.under_way.front().map(|&(arrival, _)| arrival)
     }
 
+    /// Command that arrived last.
+    pub fn arrived(&self) -> f64 {
+        self.arrived
+    }
+
     /// Command that has arrived by `now_s`.
     pub fn arrive(&mut self, now_s: f64) -> f64 {
         while let Some(&(arrival, command)) = self.under_way.front() {

@@ -1,6 +1,6 @@
 //! The hybrid integrator: smooth steps within a mode, events between modes.
 
-use crate::rosenbrock::{self, Tolerance, Trial};
+use crate::rosenbrock::{self, LONGEST_STEP_S, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
 use crate::state::{STATES, STATES_WITH_STROKE, State};
 use crate::{Contact, Direction, Inputs, Mode, Powertrain, Torques};
 
@@ -9,10 +9,6 @@ pub const RELATIVE_TOLERANCE: f64 = 1e-5;
 /// Event functions (rad/s of slip, N m of holding torque) may fall this far below zero before the mode
 /// changes, so that rounding at a fresh change does not start another.
 const MARGIN_SLACK: f64 = 1e-9;
-/// Longest step, s: short enough that no event function crosses zero twice within one.
-const LONGEST_STEP_S: f64 = 0.02;
-/// Shortest step, s; an integration that needs less has diverged.
-const SHORTEST_STEP_S: f64 = 1e-10;
 /// Accuracy to which the time of an event is located, s.
 const EVENT_TIME_S: f64 = 1e-12;
 /// Evaluations of an event function after which its zero is taken as found.
@@ -77,7 +73,7 @@ pub struct HybridIntegrator {
     time_s: f64,
     state: State,
     mode: Mode,
-    step_s: f64,
+    step_size: StepSize,
     relative_tolerance: f64,
     /// What the last step found at its end, where that still holds.
     known: Option<(Inputs, Rates<STATES_WITH_STROKE>)>,
@@ -144,7 +140,7 @@ impl HybridIntegrator {
             time_s,
             state,
             mode: Mode { offgoing, oncoming },
-            step_s: 1e-4,
+            step_size: StepSize::FIRST,
             relative_tolerance: relative,
             known: None,
         };
@@ -191,7 +187,11 @@ impl HybridIntegrator {
         };
         let mut changes = 0;
         while until_s - self.time_s > EVENT_TIME_S {
-            let (step_s, trial) = self.accepted_step::<N, ROWS>(powertrain, inputs, &rates, until_s)?;
+            let mut size = self.step_size;
+            let accepted =
+                size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(powertrain, inputs, &rates, h));
+            self.step_size = size;
+            let (step_s, trial) = accepted.ok_or(PlantError::Diverged { time_s: self.time_s })?;
             let Some(theta) = self.first_event(powertrain, inputs, &trial) else {
                 self.take(&trial, self.time_s + step_s, inputs, record);
                 rates = Rates { slope: trial.end_slope, applied: trial.end_applied };
@@ -240,34 +240,6 @@ impl HybridIntegrator {
         let rows: [_; ROWS] = powertrain.stiff_rows(&self.state, rates.applied.tyre_n);
         let tolerance = Tolerance { relative: self.relative_tolerance, scale: State::SCALE.to_vector() };
         rosenbrock::step(&f, &at_end, &self.state.to_vector(), &rates.slope, &rows, step_s, &tolerance)
-    }
-
-    /// Finds a step length whose error is small enough; returns it with its trial.
-    #[inline]
-    fn accepted_step<const N: usize, const ROWS: usize>(
-        &mut self,
-        powertrain: &Powertrain,
-        inputs: &Inputs,
-        rates: &Rates<N>,
-        until_s: f64,
-    ) -> Result<(f64, Trial<N, Torques>), PlantError> {
-        loop {
-            let rest = until_s - self.time_s;
-            // Stretch a little rather than leave a sliver for the next step.
-            let step_s = if self.step_s > 0.9 * rest { rest } else { self.step_s };
-            let trial = self.trial::<N, ROWS>(powertrain, inputs, rates, step_s);
-            let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
-            if trial.error <= 1.0 {
-                // A step cut short by the end of the segment says nothing against the usual length.
-                let usual = if step_s < self.step_s { self.step_s } else { 0.0 };
-                self.step_s = usual.max(step_s * factor).min(LONGEST_STEP_S);
-                return Ok((step_s, trial));
-            }
-            self.step_s = if factor.is_nan() { 0.2 * step_s } else { factor * step_s };
-            if self.step_s < SHORTEST_STEP_S {
-                return Err(PlantError::Diverged { time_s: self.time_s });
-            }
-        }
     }
 
     /// Margins of offgoing and oncoming clutch, with the slack.

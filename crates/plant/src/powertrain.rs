@@ -90,12 +90,9 @@ impl Powertrain {
     /// Pressures in the cylinders of the offgoing and the oncoming clutch, Pa.
     #[inline]
     pub fn pressures(&self, x: &State) -> [f64; 2] {
-        let of = |clutch: &ShiftClutch, valve_pa: f64, volume_m3: f64| {
-            if clutch.has_stroke { clutch.cylinder.pressure(volume_m3) } else { valve_pa }
-        };
         [
-            of(&self.vehicle.offgoing, x.offgoing_valve_pa, x.offgoing_m3),
-            of(&self.vehicle.oncoming, x.oncoming_valve_pa, x.oncoming_m3),
+            self.vehicle.offgoing.pressure(x.offgoing_valve_pa, x.offgoing_m3),
+            self.vehicle.oncoming.pressure(x.oncoming_valve_pa, x.oncoming_m3),
         ]
     }
 
@@ -178,8 +175,8 @@ impl Powertrain {
             vehicle_m_s: self.vehicle_acceleration(&x, &torques),
             offgoing_valve_pa: v.offgoing.valve.pressure_rate(x.offgoing_valve_pa, inputs.offgoing_settled_pa),
             oncoming_valve_pa: v.oncoming.valve.pressure_rate(x.oncoming_valve_pa, inputs.oncoming_settled_pa),
-            offgoing_m3: volume_rate(&v.offgoing, x.offgoing_m3, x.offgoing_valve_pa),
-            oncoming_m3: volume_rate(&v.oncoming, x.oncoming_m3, x.oncoming_valve_pa),
+            offgoing_m3: v.offgoing.volume_rate(x.offgoing_m3, x.offgoing_valve_pa),
+            oncoming_m3: v.oncoming.volume_rate(x.oncoming_m3, x.oncoming_valve_pa),
         };
         (rates.to_vector(), torques)
     }
@@ -192,12 +189,12 @@ impl Powertrain {
         std::array::from_fn(|row| match row {
             0 => StiffRow { state: WHEEL, gradient: self.wheel_gradient(x, tyre_n).to_vector() },
             1 => {
-                let (own, valve) = volume_rate_slopes(&v.offgoing, x.offgoing_m3, x.offgoing_valve_pa);
+                let (own, valve) = v.offgoing.volume_rate_slopes(x.offgoing_m3, x.offgoing_valve_pa);
                 let gradient = State { offgoing_m3: own, offgoing_valve_pa: valve, ..State::ZERO };
                 StiffRow { state: CYLINDERS[0], gradient: gradient.to_vector() }
             }
             _ => {
-                let (own, valve) = volume_rate_slopes(&v.oncoming, x.oncoming_m3, x.oncoming_valve_pa);
+                let (own, valve) = v.oncoming.volume_rate_slopes(x.oncoming_m3, x.oncoming_valve_pa);
                 let gradient = State { oncoming_m3: own, oncoming_valve_pa: valve, ..State::ZERO };
                 StiffRow { state: CYLINDERS[1], gradient: gradient.to_vector() }
             }
@@ -270,16 +267,4 @@ impl Powertrain {
             margin(mode.oncoming, slips[1], &v.oncoming.clutch, oncoming_pa, torques.oncoming_n_m),
         ]
     }
-}
-
-/// Rate of the oil in a clutch's cylinder, m^3/s; zero without a stroke.
-#[inline]
-fn volume_rate(clutch: &ShiftClutch, volume_m3: f64, valve_pa: f64) -> f64 {
-    if clutch.has_stroke { clutch.cylinder.volume_rate(volume_m3, valve_pa) } else { 0.0 }
-}
-
-/// Derivatives of that rate by the volume, 1/s, and by the valve's pressure, m^3/(s Pa).
-#[inline]
-fn volume_rate_slopes(clutch: &ShiftClutch, volume_m3: f64, valve_pa: f64) -> (f64, f64) {
-    if clutch.has_stroke { clutch.cylinder.volume_rate_slopes(volume_m3, valve_pa) } else { (0.0, 0.0) }
 }

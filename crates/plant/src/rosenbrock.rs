@@ -90,6 +90,46 @@ pub struct Tolerance<const N: usize> {
     pub scale: [f64; N],
 }
 
+/// Longest step, s: short enough that no event function crosses zero twice within one.
+pub const LONGEST_STEP_S: f64 = 0.02;
+/// Shortest step, s; an integration that needs less has diverged.
+pub const SHORTEST_STEP_S: f64 = 1e-10;
+
+/// Length of the next step, s, as the errors of those before it allow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepSize(f64);
+
+impl StepSize {
+    /// Where nothing is known yet.
+    pub const FIRST: Self = Self(1e-4);
+
+    /// Finds a step of at most `rest_s` whose error is small enough; returns its length with its trial. `None` if it would
+    /// be shorter than [`SHORTEST_STEP_S`].
+    #[inline]
+    pub fn accepted<const N: usize, E>(
+        &mut self,
+        rest_s: f64,
+        trial: impl Fn(f64) -> Trial<N, E>,
+    ) -> Option<(f64, Trial<N, E>)> {
+        loop {
+            // Stretch a little rather than leave a sliver for the next step.
+            let step_s = if self.0 > 0.9 * rest_s { rest_s } else { self.0 };
+            let trial = trial(step_s);
+            let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
+            if trial.error <= 1.0 {
+                // A step cut short by the end of the segment says nothing against the usual length.
+                let usual = if step_s < self.0 { self.0 } else { 0.0 };
+                self.0 = usual.max(step_s * factor).min(LONGEST_STEP_S);
+                return Some((step_s, trial));
+            }
+            self.0 = if factor.is_nan() { 0.2 * step_s } else { factor * step_s };
+            if self.0 < SHORTEST_STEP_S {
+                return None;
+            }
+        }
+    }
+}
+
 /// Tries a step of length `h` from `x`, where `slope = f(x)`; `at_end` is `f` with what else is wanted at the end.
 ///
 /// The stages satisfy `(1 - h gamma J) k_i = h f(x + sum alpha_ij k_j) + h J sum gamma_ij k_j`. No stiff row may depend on

@@ -2,12 +2,14 @@
 
 mod axis;
 pub mod bench_page;
+pub mod drive_page;
 pub mod error_bound_page;
 pub mod figure;
 pub mod gearbox_figure;
 mod legend;
 pub mod log_page;
 pub mod map_figures;
+pub mod matrix_page;
 pub mod page;
 pub mod palette;
 pub mod reproduction;

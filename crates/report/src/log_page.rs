@@ -88,7 +88,7 @@ impl LogPage<'_> {
 }
 
 /// The same figure with its curves to a tenth of a pixel, which is half of their text.
-fn compact(svg: &str) -> String {
+pub(crate) fn compact(svg: &str) -> String {
     let mut parts = svg.split(" d=\"");
     let mut compact = parts.next().unwrap_or_default().to_owned();
     for part in parts {
@@ -184,9 +184,9 @@ fn remark(shift: &ShiftEstimate) -> &'static str {
 
 const SPEEDS: [(&str, Stroke); 3] =
     [("engine", Stroke::THIRD), ("turbine", Stroke::SIGNAL), ("gearbox output", Stroke::SECOND)];
-const ESTIMATE: Stroke = Stroke { colour: RANGE, weight: Weight::Equal, dash: None };
+pub(crate) const ESTIMATE: Stroke = Stroke { colour: RANGE, weight: Weight::Equal, dash: None };
 
-fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
+pub(crate) fn panel(y_label: &str, height: f64, series: Vec<Series>) -> Panel {
     Panel { y_label: y_label.to_owned(), height, series, band: None, axis: Axis::All }
 }
 
@@ -341,10 +341,10 @@ fn phases(shift: &ShiftEstimate) -> Vec<Span> {
 }
 
 /// Kinds of health.
-const HEALTHS: usize = Health::ALL.len();
+pub(crate) const HEALTHS: usize = Health::ALL.len();
 
 /// A line for each health that was met: where it holds. None if all is good.
-fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> {
+pub(crate) fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> {
     const COLOURS: [&str; HEALTHS] = [
         "#009E73", "#E69F00", "#B8A50A", "#56B4E9", "#0072B2", "#CC79A7", "#CC79A7", "#D55E00", "#882255", "#AA4499",
         "#D55E00", "#000000",

@@ -4,14 +4,19 @@
 //! toothed wheels. Errors are counted by what the true clutches do: in the *torque phase* one of them holds and the other
 //! carries torque while it slips; in the *inertia phase* both slip.
 
+pub mod drive;
+pub mod logged;
+pub mod matrix;
+pub mod recording;
+pub mod tour;
+
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
-use drivetrain::Real;
-use observer::any_shift::{AnyShiftFilter, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
-use observer::{Health, Reading};
+use observer::Health;
+use observer::any_shift::{AnyShiftFilter, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use plant::TrainError;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
-use plant::sensors::{Channel, Rows, read_speed};
+use recording::{Recording, records_in_a_sample};
 use thiserror::Error;
 
 /// Sample time of the records that toothed wheels are read from, s.
@@ -85,14 +90,18 @@ impl ShiftDraw {
 /// Truth and estimates of one clutch at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClutchRow {
-    /// Torque, N m: true, estimated, by the valve model alone.
+    /// Torque, N m: true (not a number where it is not known), estimated, by the valve model alone.
     pub torque_n_m: [f64; 3],
-    /// Pressure, Pa: true, estimated, by the valve model alone.
+    /// Pressure, Pa: true (not a number where it is not known), estimated, by the valve model alone.
     pub pressure_pa: [f64; 3],
-    /// Whether it truly sticks.
+    /// Whether it truly sticks; by the estimate where that is not known.
     pub sticks: bool,
     /// The guaranteed range of the torque, N m.
     pub torque_range_n_m: Option<[f64; 2]>,
+    /// The guaranteed range of the pressure, Pa.
+    pub pressure_range_pa: Option<[f64; 2]>,
+    /// Whether the speeds show nothing of its torque, so that the estimate is that of the valve model.
+    pub hidden: bool,
     /// Whether the truth is within the guaranteed ranges.
     pub in_range: bool,
 }
@@ -124,28 +133,29 @@ pub enum TruePhase {
 }
 
 impl ShiftScoreRow {
-    /// What the clutches truly do; `None` where neither phase is on.
+    /// What the clutches truly do, by the estimate where that is not known; `None` where neither phase is on.
     pub fn phase(&self) -> Option<TruePhase> {
         match self.clutches.map(|clutch| clutch.sticks) {
             [false, false] => Some(TruePhase::Inertia),
             [true, true] => None,
             [off, _] => {
-                let slipping = &self.clutches[usize::from(off)];
-                (slipping.torque_n_m[0].abs() > CARRIES_N_M).then_some(TruePhase::Torque)
+                let [truth, estimate, _] = self.clutches[usize::from(off)].torque_n_m;
+                let torque_n_m = if truth.is_nan() { estimate } else { truth };
+                (torque_n_m.abs() > CARRIES_N_M).then_some(TruePhase::Torque)
             }
         }
     }
 }
 
-/// Squared errors of a clutch's torque over the rows of a phase.
+/// Squared errors of a clutch's torque or pressure over the rows of a phase, in N m or Pa.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SquaredErrors {
-    /// Sum of the squares of the estimate's errors, (N m)^2.
+    /// Sum of the squares of the estimate's errors.
     pub estimate: f64,
     /// The same by the valve model alone.
     pub open_loop: f64,
-    /// Sum of the true torque's size, N m.
-    pub torque: f64,
+    /// Sum of the true value's size.
+    pub size: f64,
     /// Number of rows.
     pub rows: f64,
 }
@@ -155,23 +165,47 @@ impl SquaredErrors {
     pub fn add(&mut self, more: &Self) {
         self.estimate += more.estimate;
         self.open_loop += more.open_loop;
-        self.torque += more.torque;
+        self.size += more.size;
         self.rows += more.rows;
     }
 
-    /// Root mean square errors, N m: of the estimate, and of the valve model alone.
+    /// Root mean square errors of a torque, N m: of the estimate, and of the valve model alone.
     pub fn rms_n_m(&self) -> [f64; 2] {
+        self.rms()
+    }
+
+    /// Root mean square errors of a pressure, Pa: of the estimate, and of the valve model alone.
+    pub fn rms_pa(&self) -> [f64; 2] {
+        self.rms()
+    }
+
+    fn rms(&self) -> [f64; 2] {
         [self.estimate, self.open_loop].map(|sum| (sum / self.rows.max(1.0)).sqrt())
     }
 
-    /// The errors of one clutch in one phase.
+    /// The error of the estimate over that of the valve model alone; `None` without rows.
+    pub fn ratio(&self) -> Option<f64> {
+        let [estimate, open_loop] = self.rms();
+        (self.rows > 0.0 && open_loop > 0.0).then(|| estimate / open_loop)
+    }
+
+    /// The errors of one clutch's torque in one phase.
     pub fn of(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
+        Self::over(rows, phase, clutch, |clutch| clutch.torque_n_m)
+    }
+
+    /// The errors of one clutch's pressure in one phase.
+    pub fn of_pressure(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
+        Self::over(rows, phase, clutch, |clutch| clutch.pressure_pa)
+    }
+
+    fn over(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize, values: fn(&ClutchRow) -> [f64; 3]) -> Self {
         let mut sum = Self::default();
         for row in rows.iter().filter(|row| row.phase() == Some(phase) && !row.clutches[clutch].sticks) {
-            let [truth, estimate, open_loop] = row.clutches[clutch].torque_n_m;
+            let [truth, estimate, open_loop] = values(&row.clutches[clutch]);
             sum.estimate += (truth - estimate).powi(2);
             sum.open_loop += (truth - open_loop).powi(2);
-            sum.torque += truth.abs();
+            sum.size += truth.abs();
             sum.rows += 1.0;
         }
         sum
@@ -217,56 +251,10 @@ pub fn inputs(
     sensors: &Sensors,
     seed: u64,
 ) -> Vec<(usize, ShiftInput<f64>)> {
-    let every = (SAMPLE_S / RECORD_S).round().max(1.0).whole();
-    let places: Vec<usize> = (0..samples.len()).step_by(every).collect();
-    let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s).collect();
-    let at_s: Vec<f64> = places.iter().map(|&at| time_s[at]).collect();
-    let rows = Rows { at_s: &at_s, offset_s: at_s.first().copied().unwrap_or(0.0), shift_s: [0.0; 2], seed };
-    let read = |name: &str, sensor, of: &dyn Fn(&CarSample) -> f64| {
-        let values: Vec<f64> = samples.iter().map(of).collect();
-        read_speed(sensor, Channel { name, time_s: &time_s, values: &values }, rows)
-    };
-    let speeds = [
-        read("engine", &sensors.engine, &|sample| sample.torques.engine_rad_s),
-        read("turbine", &sensors.turbine, &|sample| sample.torques.turbine_rad_s),
-        read("output", &sensors.output, &|sample| sample.torques.output_rad_s),
-        read("wheel", &sensors.wheel, &|sample| sample.wheel_rad_s),
-    ];
-    let mut inputs = Vec::new();
-    for (row, &at) in places.iter().enumerate() {
-        let sample = &samples[at];
-        let reading = |channel: usize| {
-            let (value, age_s) = (speeds[channel].values[row], speeds[channel].age_s[row]);
-            (!value.is_nan()).then_some(Reading { value, age_s })
-        };
-        let mut commands = [None; MAX_ELEMENTS];
-        for (element, &command) in sample.commands.iter().enumerate() {
-            if let Some(place) = tables.place(element) {
-                commands[place] = Some(Reading::now(command));
-            }
-        }
-        let gear = match &sample.shift {
-            Some(shift) => GearCommand { from: shift.from, to: shift.to },
-            None => GearCommand { from: sample.gear, to: sample.gear },
-        };
-        // Without a converter nothing else tells the torque at the gearbox input.
-        let engine_n_m = sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s;
-        inputs.push((
-            at,
-            ShiftInput {
-                dt_s: SAMPLE_S,
-                engine_rad_s: reading(0),
-                turbine_rad_s: reading(1),
-                output_rad_s: reading(2),
-                wheel_rad_s: reading(3),
-                engine_n_m: car.converter.is_none().then_some(Reading::now(engine_n_m)),
-                lock_up_applied: false,
-                commands,
-                gear,
-            },
-        ));
-    }
-    inputs
+    let mut recording = Recording::default();
+    samples.iter().for_each(|sample| recording.push(sample));
+    let inputs = recording.inputs(car, tables, sensors, seed);
+    inputs.enumerate().map(|(row, input)| (row * records_in_a_sample(), input)).collect()
 }
 
 /// Truth and estimates of a recorded drive while its shifts are under way.
@@ -285,23 +273,25 @@ pub fn score_samples(
     rows
 }
 
+/// Whether a value lies in a range up to a tolerance; what is not known lies in it.
+fn within(range: Option<[f64; 2]>, value: f64, tolerance: f64) -> bool {
+    value.is_nan() || range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
+}
+
 fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f64>) -> Option<ShiftScoreRow> {
     let under_way = sample.shift.as_ref()?;
     let clutches = estimate.clutches.as_ref()?;
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
-        (Some(found.element) == tables.place(truth.element)).then(|| {
-            let within = |range: Option<[f64; 2]>, value: f64, tolerance: f64| {
-                range.is_none_or(|[low, high]| low - tolerance <= value && value <= high + tolerance)
-            };
-            ClutchRow {
-                torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
-                pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
-                sticks: truth.sticks,
-                torque_range_n_m: found.torque_range_n_m,
-                in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
-                    && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
-            }
+        (Some(found.element) == tables.place(truth.element)).then(|| ClutchRow {
+            torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
+            pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
+            sticks: truth.sticks,
+            torque_range_n_m: found.torque_range_n_m,
+            pressure_range_pa: found.pressure_range_pa,
+            hidden: found.hidden,
+            in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
+                && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
         })
     };
     Some(ShiftScoreRow {

@@ -7,6 +7,7 @@ use observer::{Bounds, Estimate, Phase};
 use plant::PlantError;
 use trace::{Trace, TraceError, signal};
 
+use crate::any_shift::AnyShiftError;
 use crate::observers::{AnyObserver, ranges};
 use crate::sampling::{sampled, through_sensors};
 use crate::score::{score_ranges, size};
@@ -48,6 +49,9 @@ pub enum StudyError {
     /// A signal is missing.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// A shift of a car with any gearbox could not be scored.
+    #[error(transparent)]
+    AnyShift(#[from] AnyShiftError),
 }
 
 /// One observer's part in a comparison.

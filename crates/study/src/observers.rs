@@ -152,7 +152,7 @@ impl AnyObserver {
 
     /// Longest time between two samples over which the speeds correct its estimate, s.
     pub fn sample_max_s(&self) -> f64 {
-        self.clone().tracker_mut().map_or(observer::kalman::LOST_S, |tracker| tracker.sample_max_s)
+        self.clone().tracker_mut().map_or(observer::LOST_S, |tracker| tracker.sample_max_s)
     }
 
     /// The columns of its estimates of a log. They follow from what it can estimate, before it has estimated anything.

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use config::{Experiment, Study, Vehicle};
-use design::{kalman_filter, open_loop_maps, rigid_observer};
+use design::{bounded, kalman_filter, open_loop_maps, rigid_observer};
 use observer::{ChannelHealth, Estimate, Estimator, Health, Input, Phase, Reading, RigidGains};
 use study::sampling::through_sensors;
 use study::{Campaign, Consistency, RunColumns, simulate_drive, true_phases};
@@ -112,6 +112,72 @@ fn what_is_missing_or_refused_is_said_of_its_channel() {
     assert_eq!((channels(3).command, estimates[at + 3].health), (ChannelHealth::Refused, Health::CommandRejected));
     assert_eq!(channels(11).wheel, ChannelHealth::Absent);
     assert_eq!((channels(45).wheel, estimates[at + 45].health), (ChannelHealth::Lost, Health::ChannelLost));
+}
+
+#[test]
+fn a_command_that_stays_away_is_lost() {
+    let field = Field::new();
+    let mut rows = field.rows("nominal");
+    let at = rows.len() - 60;
+    rows[at..].iter_mut().for_each(|row| row.0.command = None);
+    let rigid = field.estimates(&rigid_observer(&field.vehicle, RigidGains::open_loop()), &rows);
+    for estimates in [field.kalman(&rows), rigid] {
+        let said = |step: usize| (estimates[at + step].channels.command, estimates[at + step].health);
+        assert_eq!(said(20), (ChannelHealth::Absent, Health::Good));
+        assert_eq!(said(30), (ChannelHealth::Lost, Health::CommandRejected));
+    }
+}
+
+#[test]
+fn an_observer_says_unused_of_a_wheel_speed_that_it_does_not_read() {
+    let field = Field::new();
+    let mut rows = field.rows("nominal");
+    rows.iter_mut().for_each(|row| row.0.wheel_rad_s = None);
+    let rigid = field.estimates(&rigid_observer(&field.vehicle, RigidGains::open_loop()), &rows);
+    for estimates in [field.estimates(&open_loop_maps(&field.vehicle), &rows), rigid] {
+        assert!(estimates.iter().all(|estimate| estimate.channels.wheel == ChannelHealth::Unused));
+        assert_eq!(estimates.last().unwrap().health, Health::Good);
+    }
+    assert_eq!(field.kalman(&rows).last().unwrap().channels.wheel, ChannelHealth::Lost);
+}
+
+#[test]
+fn one_wrong_turbine_speed_is_no_flare() {
+    let field = Field::new();
+    let rows = field.rows("nominal");
+    for (at, _) in rows.iter().enumerate().filter(|(_, row)| SHIFT.contains(&row.1)).step_by(2) {
+        for error_rad_s in [3.0, 5.0] {
+            let mut wrong = rows.clone();
+            wrong[at].0.turbine_rad_s.as_mut().unwrap().value += error_rad_s;
+            let flares = field.kalman(&wrong).iter().position(|estimate| estimate.health == Health::Flare);
+            assert_eq!(flares, None, "{error_rad_s} rad/s at step {at}");
+        }
+    }
+}
+
+#[test]
+fn a_command_that_is_late_or_slow_leaves_a_range_of_use() {
+    let field = Field::new();
+    let filter = bounded(&field.vehicle, kalman_filter(&field.vehicle, field.experiment.sensors_told.as_ref()));
+    let rows = field.rows("nominal");
+    let with = |command: &dyn Fn(usize) -> Option<Reading<f64>>| {
+        let of =
+            |(step, &(input, phase, truth)): (usize, &Row)| (Input { command: command(step), ..input }, phase, truth);
+        rows.iter().enumerate().map(of).collect::<Vec<Row>>()
+    };
+    let logged = |step: usize| rows[step].0.command;
+    let late = |step: usize| Some(Reading { age_s: SAMPLE_S, ..logged(step.checked_sub(1)?)? });
+    let slow = |step: usize| logged(step).filter(|_| step.is_multiple_of(2));
+    // Mean widths over the last two seconds, MPa; by the budget any command may have been sent right after a reading.
+    for (name, rows, most_mpa) in
+        [("as sent", with(&logged), 0.25), ("late", with(&late), 0.9), ("slow", with(&slow), 0.6)]
+    {
+        let estimates = field.estimates(&filter, &rows);
+        let ranges = || estimates.iter().map(|estimate| estimate.bounds.unwrap().pressure_pa);
+        let outside = ranges().zip(&rows).filter(|([low, high], (.., truth))| !(low..=high).contains(&truth)).count();
+        let mean_mpa = ranges().rev().take(200).map(|[low, high]| (high - low) / 1e6).sum::<f64>() / 200.0;
+        assert!(outside == 0 && mean_mpa < most_mpa, "{name}: {outside} outside, {mean_mpa} MPa wide");
+    }
 }
 
 #[test]

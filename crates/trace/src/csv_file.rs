@@ -183,7 +183,7 @@ impl CsvRows {
     }
 
     /// An error in this row.
-    fn wrong(&self, message: String) -> TraceError {
+    pub fn wrong(&self, message: String) -> TraceError {
         let line = self.row.position().map_or(0, csv::Position::line);
         TraceError::Row { path: self.path.clone(), line, message }
     }
@@ -270,8 +270,16 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// What the writer meets.
     pub fn new<'a>(writer: W, names: impl IntoIterator<Item = &'a str>) -> io::Result<Self> {
+        Self::without_time(writer, std::iter::once(signal::TIME).chain(names))
+    }
+
+    /// Writes the names of a table that is not over time, whose rows are [`Self::cells`].
+    ///
+    /// # Errors
+    /// What the writer meets.
+    pub fn without_time<'a>(writer: W, names: impl IntoIterator<Item = &'a str>) -> io::Result<Self> {
         let mut writer = csv::Writer::from_writer(writer);
-        writer.write_record(std::iter::once(signal::TIME).chain(names)).map_err(into_io)?;
+        writer.write_record(names).map_err(into_io)?;
         Ok(Self { writer, text: String::new() })
     }
 
@@ -280,7 +288,15 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// What the writer meets, or a row that has not one cell for each name.
     pub fn row<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        for cell in std::iter::once(Cell::Number(time_s)).chain(cells) {
+        self.cells(std::iter::once(Cell::Number(time_s)).chain(cells))
+    }
+
+    /// Writes a row of a table without time.
+    ///
+    /// # Errors
+    /// As [`Self::row`].
+    pub fn cells<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
+        for cell in cells {
             match cell {
                 Cell::Word(word) => self.writer.write_field(word),
                 Cell::Whole(number) => self.writer.write_field(number.to_string()),

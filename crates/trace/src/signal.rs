@@ -22,6 +22,14 @@ pub const ONCOMING_DUTY: &str = "oncoming_duty_percent";
 pub const OFFGOING_DUTY: &str = "offgoing_duty_percent";
 /// Engine torque as the engine controller reports it, N m.
 pub const REPORTED_ENGINE_TORQUE: &str = "reported_engine_torque_n_m";
+/// Whether the lock-up clutch of the converter carries torque, 0 or 1.
+pub const LOCK_UP_APPLIED: &str = "lock_up_applied";
+/// Gear, by its name; during a shift the one that is left.
+pub const GEAR: &str = "gear";
+/// Gear that is commanded, by its name.
+pub const TARGET_GEAR: &str = "target_gear";
+/// Brake, 0 to 1.
+pub const BRAKE: &str = "brake";
 /// Throttle, 0 to 1.
 pub const THROTTLE: &str = "throttle";
 

@@ -12,6 +12,9 @@ use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
+    if let Some(vehicle) = &options.vehicle {
+        return super::matrix::bench(options, vehicle);
+    }
     let (vehicle, experiment) = match &options.experiment {
         Some(path) => {
             let experiment = Experiment::read(path)?;

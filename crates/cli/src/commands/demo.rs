@@ -16,6 +16,9 @@ use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
+    if let Some(vehicle) = &options.vehicle {
+        return super::demo_drive::demo(options, vehicle);
+    }
     let (vehicle, mut experiment) = (Vehicle::two_speed_at()?, Experiment::e1()?);
     // The gains that E1 gives are the chapter's; the demo designs its own.
     experiment.observers.retain(|entry| entry.gains.is_none());

@@ -168,17 +168,11 @@ fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
     }
     output::line("\norder of the phases")?;
     let order = |kind: ShiftKind| {
-        let name = match kind {
-            ShiftKind::PowerOnUp => "power-on upshift",
-            ShiftKind::PowerOffUp => "power-off upshift",
-            ShiftKind::PowerOnDown => "power-on downshift",
-            ShiftKind::CoastDown => "coast downshift",
-        };
         let phases = match kind.order() {
             PhaseOrder::TorqueFirst => "torque phase, then inertia phase by the oncoming element",
             PhaseOrder::InertiaFirst => "inertia phase by the offgoing element, then torque phase",
         };
-        vec![name.to_owned(), phases.to_owned()]
+        vec![kind.name().to_owned(), phases.to_owned()]
     };
     output::table(2, &ShiftKind::ALL.map(order))?;
     Ok(())

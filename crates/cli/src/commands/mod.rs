@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod demo;
+mod demo_drive;
 mod design;
 mod error_bound;
 mod estimate;
@@ -10,6 +11,7 @@ mod fit;
 mod gearbox;
 mod init;
 mod inspect;
+mod matrix;
 mod reproduce;
 mod sensitivity;
 mod simulate;
@@ -34,9 +36,10 @@ pub(crate) use worst_case::worst_case;
 
 use std::path::{Path, PathBuf};
 
+use config::{Car, Kind, Source};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
-use trace::Trace;
+use trace::{Cell, CsvWriter, Trace, WholeFile};
 
 use crate::args::Mapping;
 use crate::failure::Failure;
@@ -49,6 +52,40 @@ fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
 /// Writes a text file, whole or not at all.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
+}
+
+/// Reads the vehicle file of a car with a gearbox.
+fn read_car(path: &Path) -> Result<Car, Failure> {
+    if Source::read(path)?.kind()? == Kind::Vehicle {
+        return Err(Failure::Input(format!(
+            "{}: this vehicle file describes one shift, and not a gearbox\nhint: use one with `gearbox`, such as vehicles/eight_speed.toml",
+            path.display()
+        )));
+    }
+    Ok(Car::read(path)?)
+}
+
+/// Writes rows of named cells as a comma-separated file, whole or not at all.
+fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Failure> {
+    let write = || -> std::io::Result<()> {
+        let names = rows.first().into_iter().flatten().map(|(name, _)| name.as_str());
+        let mut table = CsvWriter::without_time(WholeFile::create(path)?, names)?;
+        for row in rows {
+            table.cells(row.iter().map(|(_, cell)| *cell))?;
+        }
+        table.finish()?.finish()
+    };
+    write().map_err(|error| Failure::writing(path, &error))
+}
+
+/// Named cells as a JSON object; not a number becomes null.
+fn json_object<'a>(cells: impl IntoIterator<Item = (String, Cell<'a>)>) -> serde_json::Map<String, serde_json::Value> {
+    let value = |cell: Cell<'_>| match cell {
+        Cell::Number(number) => serde_json::Value::from(number),
+        Cell::Whole(number) => serde_json::Value::from(number),
+        Cell::Word(word) => serde_json::Value::from(word),
+    };
+    cells.into_iter().map(|(name, cell)| (name, value(cell))).collect()
 }
 
 /// Checks that these files can be written into a folder, before the work starts. Creates a missing folder.

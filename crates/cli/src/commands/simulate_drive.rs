@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use config::{Car, Drive};
 use drivetrain::CommandKind;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, simulate_car_drive};
+use study::any_shift::logged::element_commands;
+use study::any_shift::recording::{lock_up_is_applied, reported_engine_n_m};
+use trace::units::km_h;
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
 use crate::args::Simulate;
@@ -14,7 +17,7 @@ use crate::output;
 pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let drive = Drive::read(&options.experiment)?;
     let car = match &options.vehicle {
-        Some(vehicle) => Car::read(vehicle)?,
+        Some(vehicle) => super::read_car(vehicle)?,
         None => drive.read_vehicle()?,
     };
     if options.scenario.is_some() {
@@ -23,39 +26,91 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     }
     let name = drive.name.to_lowercase();
     let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
-    let columns = columns(&car);
-    let mut whole = Table::create(options.output.join(format!("{name}.csv")), &columns, |_| true)?;
-    let mut measured =
-        Table::create(options.output.join(format!("{name}_measured.csv")), &columns, |column| column.is_measured)?;
+    let mut tables = DriveTables::create(&options.output, &name, &car)?;
     let mut written = Ok(());
     let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
         // After a write error the simulation continues to its end without writing: this takes seconds.
         if written.is_ok() {
-            written = whole.write(&car, sample).and_then(|()| measured.write(&car, sample));
+            written = tables.write(&car, sample);
         }
     })?;
     written?;
-    let ((whole_file, whole), (measured_file, measured)) = (whole.complete()?, measured.complete()?);
-    WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(&options.output, &error))?;
+    let paths = tables.finish(&options.output)?;
     output::note(&format!(
         "drive: {:.0} s, {:.2} km, {} shifts, at most {:.0} km/h",
         summary.duration_s,
         1e-3 * summary.distance_m,
         summary.shifts,
-        3.6 * summary.fastest_m_s,
+        km_h(summary.fastest_m_s),
     ));
-    output::line(&whole.display().to_string())?;
-    output::line(&measured.display().to_string())?;
+    if let Some(error) = summary.speed_error {
+        output::note(&format!(
+            "speed: error {:.2} km/h (root mean square), at most {:.1} km/h; outside the tolerance of 2 km/h and 1 s for {:.2} % of the time",
+            km_h(error.rms_m_s),
+            km_h(error.largest_m_s),
+            100.0 * error.beyond,
+        ));
+    }
+    for path in paths {
+        output::line(&path.display().to_string())?;
+    }
     Ok(())
 }
 
+/// The two files of a drive: every signal, and those that a car measures or commands.
+pub(super) struct DriveTables {
+    whole: Table,
+    measured: Table,
+}
+
+impl DriveTables {
+    /// Begins `NAME.csv` and `NAME_measured.csv`.
+    pub(super) fn create(folder: &Path, name: &str, car: &Car) -> Result<Self, Failure> {
+        let columns = columns(car);
+        Ok(Self {
+            whole: Table::create(folder.join(format!("{name}.csv")), &columns, |_| true)?,
+            measured: Table::create(folder.join(format!("{name}_measured.csv")), &columns, |column| {
+                column.is_measured
+            })?,
+        })
+    }
+
+    pub(super) fn write(&mut self, car: &Car, sample: &CarSample) -> Result<(), Failure> {
+        self.whole.write(car, sample).and_then(|()| self.measured.write(car, sample))
+    }
+
+    /// Gives both files their names.
+    pub(super) fn finish(self, folder: &Path) -> Result<[PathBuf; 2], Failure> {
+        let ((whole_file, whole), (measured_file, measured)) = (self.whole.complete()?, self.measured.complete()?);
+        WholeFile::finish_all([whole_file, measured_file]).map_err(|error| Failure::writing(folder, &error))?;
+        Ok([whole, measured])
+    }
+}
+
 /// A column of the results.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct DriveColumn {
-    name: &'static str,
+    name: String,
     /// Whether a car measures or commands it.
     is_measured: bool,
-    value: for<'c> fn(&'c Car, &CarSample) -> Cell<'c>,
+    value: DriveValue,
+}
+
+/// Where the cells of a column come from.
+#[derive(Clone, Copy)]
+enum DriveValue {
+    Of(for<'c> fn(&'c Car, &CarSample) -> Cell<'c>),
+    /// The command of an element's valve.
+    Command(usize),
+}
+
+impl DriveValue {
+    fn cell<'c>(self, car: &'c Car, sample: &CarSample) -> Cell<'c> {
+        match self {
+            Self::Of(value) => value(car, sample),
+            Self::Command(element) => Cell::Number(sample.commands.get(element).copied().unwrap_or(f64::NAN)),
+        }
+    }
 }
 
 /// A number of a shift clutch; an empty cell where no shift is under way.
@@ -75,18 +130,27 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
     } else {
         ["offgoing_command", "oncoming_command"]
     };
-    let measured = |name, value| DriveColumn { name, is_measured: true, value };
-    let truth = |name, value| DriveColumn { name, is_measured: false, value };
-    vec![
+    type Value = for<'c> fn(&'c Car, &CarSample) -> Cell<'c>;
+    let column = |is_measured: bool| {
+        move |name: &str, value: Value| DriveColumn { name: name.to_owned(), is_measured, value: DriveValue::Of(value) }
+    };
+    let (measured, truth) = (column(true), column(false));
+    let mut columns = vec![
         measured(signal::ENGINE_SPEED, |_, s| Cell::Number(s.torques.engine_rad_s)),
         measured(signal::TURBINE_SPEED, |_, s| Cell::Number(s.torques.turbine_rad_s)),
         measured(signal::OUTPUT_SPEED, |_, s| Cell::Number(s.torques.output_rad_s)),
         measured(signal::WHEEL_SPEED, |_, s| Cell::Number(s.wheel_rad_s)),
         measured(signal::THROTTLE, |_, s| Cell::Number(s.driver.throttle)),
-        measured("brake", |_, s| Cell::Number(s.driver.brake)),
+        measured(signal::BRAKE, |_, s| Cell::Number(s.driver.brake)),
         measured("engine_share", |_, s| Cell::Number(s.engine_share)),
-        measured("gear", |car, s| gear_name(car, s.gear)),
-        measured("target_gear", |car, s| gear_name(car, s.shift.map_or(s.gear, |shift| shift.to))),
+        measured(signal::REPORTED_ENGINE_TORQUE, |car, s| Cell::Number(reported_engine_n_m(car, s))),
+        measured(signal::LOCK_UP_APPLIED, |car, s| Cell::Whole(u64::from(lock_up_is_applied(car, s)))),
+        measured(signal::GEAR, |car, s| if s.is_neutral { Cell::Word("N") } else { gear_name(car, s.gear) }),
+        measured(signal::TARGET_GEAR, |car, s| match &s.shift {
+            None if s.is_neutral => Cell::Word("N"),
+            None => gear_name(car, s.gear),
+            Some(shift) => gear_name(car, shift.to),
+        }),
         measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
         measured("offgoing", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.offgoing.element))),
         measured("oncoming", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.oncoming.element))),
@@ -104,7 +168,13 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         truth("grade_rad", |_, s| Cell::Number(s.driver.grade_rad)),
         truth(signal::VEHICLE_SPEED, |_, s| Cell::Number(s.vehicle_m_s)),
         truth(signal::VEHICLE_ACCELERATION, |_, s| Cell::Number(s.vehicle_m_s2)),
-    ]
+    ];
+    columns.extend(element_commands(car).into_iter().map(|(element, name)| DriveColumn {
+        name,
+        is_measured: true,
+        value: DriveValue::Command(element),
+    }));
+    columns
 }
 
 fn gear_name(car: &Car, gear: usize) -> Cell<'_> {
@@ -135,15 +205,15 @@ struct Table {
 
 impl Table {
     fn create(path: PathBuf, columns: &[DriveColumn], keep: impl Fn(&DriveColumn) -> bool) -> Result<Self, Failure> {
-        let columns: Vec<DriveColumn> = columns.iter().filter(|column| keep(column)).copied().collect();
-        let names = columns.iter().map(|column| column.name);
+        let columns: Vec<DriveColumn> = columns.iter().filter(|column| keep(column)).cloned().collect();
+        let names = columns.iter().map(|column| column.name.as_str());
         let writer = WholeFile::create(&path).and_then(|file| CsvWriter::new(file, names));
         let writer = writer.map_err(|error| Failure::writing(&path, &error))?;
         Ok(Self { path, columns, writer })
     }
 
     fn write(&mut self, car: &Car, sample: &CarSample) -> Result<(), Failure> {
-        let cells = self.columns.iter().map(|column| (column.value)(car, sample));
+        let cells = self.columns.iter().map(|column| column.value.cell(car, sample));
         self.writer.row(sample.time_s, cells).map_err(|error| Failure::writing(&self.path, &error))
     }
 
@@ -174,10 +244,12 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
     for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
         if let Some(clutch) = clutch {
             output::line(&format!(
-                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure",
+                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure{}{}",
                 element.name,
                 trace::units::mpa(clutch.clutch.kiss_pressure()),
                 clutch.clutch.static_capacity(car.line_pressure_pa),
+                if clutch.valve.falls() { ", valve normally high" } else { "" },
+                if clutch.has_stroke { ", with stroke" } else { "" },
             ))?;
         }
     }
@@ -189,11 +261,14 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
 
 /// Prints what a drive file describes.
 pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> {
+    let given = match &drive.trace {
+        Some(trace) => format!("by {} speeds", trace.points()),
+        None => format!("in {} segments", drive.segments.len()),
+    };
     output::line(&format!(
-        "drive {}: {:.0} s in {} segments, driven {} times",
+        "drive {}: {:.0} s {given}, driven {} times",
         drive.name,
         drive.duration_s(),
-        drive.segments.len(),
         drive.repetitions
     ))?;
     match drive.vehicle {

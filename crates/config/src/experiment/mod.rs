@@ -74,6 +74,12 @@ pub struct FastFill {
     pub hold_s: f64,
 }
 
+impl FastFill {
+    /// Where a file says nothing.
+    pub const STANDARD: Self =
+        Self { over_kiss_pa: 0.15e6, offset_s: 0.0, ramp_s: 0.06, stroke_over_kiss_pa: 0.015e6, hold_s: 0.2 };
+}
+
 /// Calibration of the shift controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftCalibration {
@@ -485,11 +491,17 @@ fn fast_fill(check: &Check<'_>, raw: &RawFill) -> Result<FastFill, ConfigError> 
         Some(value) => check.number(format_args!("shift.fill.{key}"), value, range),
         None => Ok(default),
     };
+    let usual = FastFill::STANDARD;
     Ok(FastFill {
-        over_kiss_pa: number("fast_fill_over_kiss_pa", &raw.fast_fill_over_kiss_pa, 0.15e6, 1e3..=2e6)?,
-        offset_s: number("fast_fill_offset_s", &raw.fast_fill_offset_s, 0.0, -0.2..=0.2)?,
-        ramp_s: number("ramp_s", &raw.ramp_s, 0.06, 0.0..=1.0)?,
-        stroke_over_kiss_pa: number("stroke_over_kiss_pa", &raw.stroke_over_kiss_pa, 0.015e6, 0.0..=0.5e6)?,
-        hold_s: number("hold_s", &raw.hold_s, 0.2, 0.0..=2.0)?,
+        over_kiss_pa: number("fast_fill_over_kiss_pa", &raw.fast_fill_over_kiss_pa, usual.over_kiss_pa, 1e3..=2e6)?,
+        offset_s: number("fast_fill_offset_s", &raw.fast_fill_offset_s, usual.offset_s, -0.2..=0.2)?,
+        ramp_s: number("ramp_s", &raw.ramp_s, usual.ramp_s, 0.0..=1.0)?,
+        stroke_over_kiss_pa: number(
+            "stroke_over_kiss_pa",
+            &raw.stroke_over_kiss_pa,
+            usual.stroke_over_kiss_pa,
+            0.0..=0.5e6,
+        )?,
+        hold_s: number("hold_s", &raw.hold_s, usual.hold_s, 0.0..=2.0)?,
     })
 }

@@ -5,11 +5,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use drivetrain::{Clutch, ClutchValve, Converter, Cylinder, Driveline, Engine, RoadLoad, Table1, Tyre};
+use drivetrain::{Clutch, ClutchValve, Converter, Driveline, Engine, RoadLoad, Table1, Tyre};
 use geartrain::{ElementKind, Gearbox};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
 use super::{HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre, valves};
 use crate::check::{Check, Number, Word};
@@ -37,6 +38,8 @@ pub struct LockUp {
     pub off_rad_s: f64,
     /// Time in which it closes, s.
     pub ramp_s: f64,
+    /// Slip that is kept, rad/s; zero where the clutch is to lock.
+    pub slip_rad_s: f64,
 }
 
 /// A car with all the gears and elements of its gearbox.
@@ -179,6 +182,7 @@ struct RawCar {
     hydraulics: RawHydraulics,
     friction: RawShape,
     valve: Spanned<RawClutchValve>,
+    fill: Option<RawFill>,
     lock_up: Option<RawLockUp>,
     #[serde(default)]
     clutch: BTreeMap<Spanned<String>, RawElementClutch>,
@@ -217,6 +221,7 @@ struct RawLockUp {
     on_input_rad_s: Number,
     off_input_rad_s: Number,
     ramp_s: Number,
+    slip_rad_s: Option<Number>,
 }
 
 /// Course of the friction over slip, and drag, of all clutches.
@@ -237,6 +242,7 @@ struct RawElementClutch {
     static_friction: Option<Number>,
     drag_n_m: Option<Number>,
     valve: Option<Spanned<RawClutchValve>>,
+    fill: Option<RawFill>,
 }
 
 fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) -> Result<LockUp, ConfigError> {
@@ -264,6 +270,7 @@ fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) 
         on_rad_s,
         off_rad_s,
         ramp_s: number("ramp_s", &raw.ramp_s, 0.05..=10.0)?,
+        slip_rad_s: raw.slip_rad_s.as_ref().map_or(Ok(0.0), |slip| number("slip_rad_s", slip, 0.0..=30.0))?,
     })
 }
 
@@ -348,8 +355,13 @@ fn clutches(
             let at = raw.hydraulics.line_pressure_pa.span().start;
             return Err(check.meaning("hydraulics.line_pressure_pa", at, message, None));
         }
-        let cylinder = Cylinder::of_clutch(&clutch).with_oil(oil_degc);
-        Ok(Some(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke: false, drag_n_m }))
+        let (table, fills) = match own.and_then(|own| own.fill.as_ref()) {
+            Some(own) => (key("fill"), Some(own)),
+            None => ("fill".to_owned(), raw.fill.as_ref()),
+        };
+        let (cylinder, has_stroke) = fill::cylinder(check, &table, fills, &clutch, oil_degc)?;
+        let has_stroke = has_stroke && fills.is_some();
+        Ok(Some(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke, drag_n_m }))
     };
     gearbox.elements.iter().map(element).collect()
 }
@@ -372,6 +384,24 @@ fn reaches(
     match valve {
         ClutchValve::Proportional(maps) => {
             valves::settled_pressure_rises(check, table, valve, raw, maps.current_for(line_pressure_pa))
+        }
+        ClutchValve::NormallyHigh { maps, zero_pressure_a } => {
+            valves::settled_pressure_rises(check, table, valve, raw, *zero_pressure_a)?;
+            let most_pa = maps.settled_pressure(*zero_pressure_a);
+            if most_pa >= line_pressure_pa {
+                return Ok(());
+            }
+            let message = format!(
+                "is {zero_pressure_a} A: without current the pressure is {:.3} MPa, less than `hydraulics.line_pressure_pa`, {:.3} MPa",
+                1e-6 * most_pa,
+                1e-6 * line_pressure_pa
+            );
+            let hint = format!(
+                "line pressure needs {:.3} A; the maps of a normally-high valve are over `zero_pressure_a` less the current",
+                maps.current_for(line_pressure_pa)
+            );
+            let at = raw.get_ref().zero_pressure_a.as_ref().map_or(raw.span().start, |zero| zero.span().start);
+            Err(check.meaning(format!("{table}.zero_pressure_a"), at, message, Some(hint)))
         }
         ClutchValve::PulseWidth { law, .. } if law.line_pressure_pa < line_pressure_pa => {
             let message = format!(

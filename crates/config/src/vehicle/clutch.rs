@@ -26,6 +26,26 @@ pub struct ShiftClutch {
     pub drag_n_m: f64,
 }
 
+impl ShiftClutch {
+    /// Pressure on the plates, Pa, with this pressure at the valve's outlet and this oil in the cylinder.
+    #[inline]
+    pub fn pressure(&self, valve_pa: f64, volume_m3: f64) -> f64 {
+        if self.has_stroke { self.cylinder.pressure(volume_m3) } else { valve_pa }
+    }
+
+    /// Rate of the oil in the cylinder, m^3/s; zero without a stroke.
+    #[inline]
+    pub fn volume_rate(&self, volume_m3: f64, valve_pa: f64) -> f64 {
+        if self.has_stroke { self.cylinder.volume_rate(volume_m3, valve_pa) } else { 0.0 }
+    }
+
+    /// Derivatives of that rate by the oil, 1/s, and by the valve's pressure, m^3/(s Pa).
+    #[inline]
+    pub fn volume_rate_slopes(&self, volume_m3: f64, valve_pa: f64) -> (f64, f64) {
+        if self.has_stroke { self.cylinder.volume_rate_slopes(volume_m3, valve_pa) } else { (0.0, 0.0) }
+    }
+}
+
 /// The clutch of this name, with oil of this temperature.
 pub(super) fn check(
     check: &Check<'_>,
@@ -54,11 +74,17 @@ pub(super) fn check(
         let hint = "with a smaller static friction the clutch could neither stick nor slip".to_owned();
         return Err(check.meaning(key("static_friction"), raw.static_friction.span().start, message, Some(hint)));
     }
-    let (cylinder, has_stroke) = fill::cylinder(check, name, raw, &clutch, oil_degc)?;
+    let valve = &raw.valve;
+    if let Some(zero) = &valve.get_ref().zero_pressure_a {
+        let message = "is for cars with a gearbox file".to_owned();
+        let hint = "the observers of a single shift know valves only whose pressure rises with the current".to_owned();
+        return Err(check.meaning(key("valve.zero_pressure_a"), zero.span().start, message, Some(hint)));
+    }
+    let (cylinder, has_stroke) = fill::cylinder(check, &format!("{table}.fill"), raw.fill.as_ref(), &clutch, oil_degc)?;
     Ok(ShiftClutch {
         clutch,
-        valve: valves::clutch_valve(check, &format!("{table}.valve"), &raw.valve)?,
-        hysteresis_pa: match &raw.valve.get_ref().hysteresis_pa {
+        valve: valves::clutch_valve(check, &format!("{table}.valve"), valve)?,
+        hysteresis_pa: match &valve.get_ref().hysteresis_pa {
             Some(half_width) => check.number(key("valve.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         },

@@ -3,7 +3,6 @@
 use drivetrain::{Clutch, Cylinder};
 use serde::Deserialize;
 
-use super::raw::RawClutch;
 use crate::ConfigError;
 use crate::check::{Check, Number};
 
@@ -26,18 +25,19 @@ pub(super) struct RawFill {
     leak_m3_s_pa: Option<Number>,
 }
 
-/// The cylinder of a clutch with oil of this temperature, and whether its piston has a stroke.
+/// The cylinder of a clutch with oil of this temperature, and whether its piston has a stroke. `table` is the name of the
+/// table that says how it fills.
 pub(super) fn cylinder(
     check: &Check<'_>,
-    name: &str,
-    raw: &RawClutch,
+    table: &str,
+    raw: Option<&RawFill>,
     clutch: &Clutch<f64>,
     oil_degc: f64,
 ) -> Result<(Cylinder<f64>, bool), ConfigError> {
     let mut cylinder = Cylinder::of_clutch(clutch).with_oil(oil_degc);
-    let Some(raw) = &raw.fill else { return Ok((cylinder, true)) };
+    let Some(raw) = raw else { return Ok((cylinder, true)) };
     let number = |field: &str, value: &Option<Number>, default: f64, range| match value {
-        Some(value) => check.number(format_args!("clutch.{name}.fill.{field}"), value, range),
+        Some(value) => check.number(format_args!("{table}.{field}"), value, range),
         None => Ok(default),
     };
     let stroke_m = cylinder.stroke_m3 / clutch.piston_area_m2;

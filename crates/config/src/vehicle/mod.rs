@@ -293,8 +293,7 @@ impl Vehicle {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         if source.kind().is_ok_and(|kind| kind == Kind::Car) {
             let message = "is a vehicle with a whole gearbox, not one with a single shift".to_owned();
-            let hint =
-                "`simulate` of a drive file and `check` take it; observers and designs need a file with [gear_train]";
+            let hint = "`simulate`, `demo`, `bench`, `estimate` and `check` take it; designs, studies and fits need a file with [gear_train]";
             return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
         }
         let vehicle = Self::checked(&Check::of(&source), &source.parse()?)?;

@@ -121,6 +121,7 @@ pub(super) struct RawClutchValve {
     pub(super) flow_sqrt_pa_s: Option<Number>,
     pub(super) line_pressure_pa: Option<Number>,
     pub(super) hysteresis_pa: Option<Number>,
+    pub(super) zero_pressure_a: Option<Number>,
     pub(super) delay: Spanned<RawDelay>,
 }
 

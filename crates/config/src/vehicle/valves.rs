@@ -61,7 +61,7 @@ pub(super) fn clutch_valve(
             refuse_foreign(check, table, &foreign, hint)?;
             let lag = check.required(table, at, "lag", raw.lag.as_ref())?.get_ref();
             let gain = check.required(table, at, "gain", raw.gain.as_ref())?.get_ref();
-            Ok(ClutchValve::Proportional(ValveMaps {
+            let maps = ValveMaps {
                 time_constant_s: check.table(
                     (key("lag.pressure_pa"), &lag.pressure_pa, 0.0..=10e6),
                     (key("lag.time_constant_s"), &lag.time_constant_s, TIME_CONSTANTS_S),
@@ -71,10 +71,14 @@ pub(super) fn clutch_valve(
                     (key("gain.gain_pa_a"), &gain.gain_pa_a, GAINS_PA_A),
                 )?,
                 delay_s: delays("current_a", &delay.current_a, 0.0..=10.0)?,
-            }))
+            };
+            let Some(zero) = &raw.zero_pressure_a else { return Ok(ClutchValve::Proportional(maps)) };
+            let zero_pressure_a = check.number(key("zero_pressure_a"), zero, 0.01..=10.0)?;
+            Ok(ClutchValve::NormallyHigh { maps, zero_pressure_a })
         }
         RawValveKind::PulseWidth => {
-            refuse_foreign(check, table, &[place(&raw.lag), place(&raw.gain), place(&delay.current_a)], hint)?;
+            let foreign = [place(&raw.lag), place(&raw.gain), place(&delay.current_a), place(&raw.zero_pressure_a)];
+            refuse_foreign(check, table, &foreign, hint)?;
             let law = pulse_width(check, table, at, &raw.flow_sqrt_pa_s, &raw.line_pressure_pa)?;
             Ok(ClutchValve::PulseWidth { law, delay_s: delays("duty_percent", &delay.duty_percent, DUTY_CYCLES)? })
         }
@@ -107,7 +111,7 @@ pub(super) fn settled_pressure_rises(
     raw: &Spanned<RawClutchValve>,
     most_a: f64,
 ) -> Result<(), ConfigError> {
-    let (ClutchValve::Proportional(maps), Some(raw)) = (valve, &raw.get_ref().gain) else { return Ok(()) };
+    let (Some(maps), Some(raw)) = (valve.maps(), &raw.get_ref().gain) else { return Ok(()) };
     let (currents, gains) = (maps.gain_pa_a.axis(), maps.gain_pa_a.values());
     for (i, k) in currents.windows(2).zip(gains.windows(2)).filter(|(i, _)| i[0] < most_a) {
         let slope = (k[1] - k[0]) / (i[1] - i[0]);

@@ -9,6 +9,13 @@ use crate::{Real, Table1};
 pub enum ClutchValve<T> {
     /// Commanded by a current, A; its maps as measured.
     Proportional(ValveMaps<T>),
+    /// Commanded by a current, A, with full pressure at none: its maps are over `zero_pressure_a` less the current.
+    NormallyHigh {
+        /// The maps of the mirrored current.
+        maps: ValveMaps<T>,
+        /// Current at which it gives no pressure, A.
+        zero_pressure_a: T,
+    },
     /// Commanded by a duty cycle, %.
     PulseWidth {
         /// How the pressure follows the duty cycle.
@@ -22,9 +29,23 @@ impl<T: Real> ClutchValve<T> {
     /// What its command is.
     pub fn command_kind(&self) -> CommandKind {
         match self {
-            Self::Proportional(_) => CommandKind::Current,
+            Self::Proportional(_) | Self::NormallyHigh { .. } => CommandKind::Current,
             Self::PulseWidth { .. } => CommandKind::DutyCycle,
         }
+    }
+
+    /// Maps of a valve that is commanded by a current.
+    pub fn maps(&self) -> Option<&ValveMaps<T>> {
+        match self {
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => Some(maps),
+            Self::PulseWidth { .. } => None,
+        }
+    }
+
+    /// Whether its pressure falls while the command rises.
+    #[inline]
+    pub fn falls(&self) -> bool {
+        matches!(self, Self::NormallyHigh { .. })
     }
 
     /// Rate of the cylinder pressure, Pa/s, where `settled_pa` is the [`Self::settled_pressure`] of the command that has
@@ -32,7 +53,7 @@ impl<T: Real> ClutchValve<T> {
     #[inline]
     pub fn pressure_rate(&self, pressure_pa: T, settled_pa: T) -> T {
         match self {
-            Self::Proportional(maps) => maps.pressure_rate(pressure_pa, settled_pa),
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => maps.pressure_rate(pressure_pa, settled_pa),
             Self::PulseWidth { law, .. } => law.pressure_rate(pressure_pa, settled_pa),
         }
     }
@@ -42,6 +63,9 @@ impl<T: Real> ClutchValve<T> {
     pub fn settled_pressure(&self, command: T) -> T {
         match self {
             Self::Proportional(maps) => maps.settled_pressure(command),
+            Self::NormallyHigh { maps, zero_pressure_a } => {
+                maps.settled_pressure((*zero_pressure_a - command).max(T::zero()))
+            }
             Self::PulseWidth { law, .. } => law.settled_pressure(command),
         }
     }
@@ -50,6 +74,9 @@ impl<T: Real> ClutchValve<T> {
     pub fn command_for(&self, pressure_pa: T) -> T {
         match self {
             Self::Proportional(maps) => maps.current_for(pressure_pa),
+            Self::NormallyHigh { maps, zero_pressure_a } => {
+                (*zero_pressure_a - maps.current_for(pressure_pa)).max(T::zero())
+            }
             Self::PulseWidth { law, .. } => law.duty_for(pressure_pa),
         }
     }
@@ -57,7 +84,7 @@ impl<T: Real> ClutchValve<T> {
     /// Time by which a pressure that moves at `rate_pa_s` lags behind its settled value, s.
     pub fn lag(&self, pressure_pa: T, rate_pa_s: T) -> T {
         match self {
-            Self::Proportional(maps) => maps.time_constant_s.at(pressure_pa),
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => maps.time_constant_s.at(pressure_pa),
             Self::PulseWidth { law, .. } => law.lag(rate_pa_s),
         }
     }
@@ -67,6 +94,7 @@ impl<T: Real> ClutchValve<T> {
     pub fn delay(&self, command: T) -> T {
         match self {
             Self::Proportional(maps) => maps.delay_s.at(command),
+            Self::NormallyHigh { maps, zero_pressure_a } => maps.delay_s.at(*zero_pressure_a - command),
             Self::PulseWidth { delay_s, .. } => delay_s.at(command),
         }
     }
@@ -76,7 +104,7 @@ impl<T: Real> ClutchValve<T> {
     #[inline]
     pub fn step(&self, settled_pa: T, pressure_pa: T, dt_s: T) -> ValveStep<T> {
         match self {
-            Self::Proportional(maps) => {
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => {
                 let a22_per_s = -maps.time_constant_s.at(pressure_pa).recip();
                 LinearValve { a22_per_s, b2_pa_s: -a22_per_s * settled_pa }.step(dt_s)
             }
@@ -89,7 +117,9 @@ impl<T: Real> ClutchValve<T> {
     #[inline]
     pub fn moved(&self, pressure_pa: T, settled_pa: T, dt_s: T, lag_factor: [T; 2], furthest: bool) -> T {
         match self {
-            Self::Proportional(maps) => maps.moved(pressure_pa, settled_pa, dt_s, lag_factor, furthest),
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => {
+                maps.moved(pressure_pa, settled_pa, dt_s, lag_factor, furthest)
+            }
             Self::PulseWidth { law, .. } => {
                 let factor = if furthest { lag_factor[0] } else { lag_factor[1] };
                 law.slowed(factor).moved(pressure_pa, settled_pa, dt_s)
@@ -102,12 +132,14 @@ impl<T: Real> ClutchValve<T> {
     #[must_use]
     pub fn changed(self, lag_factor: T, gain_factor: T, delay_s: Option<T>) -> Self {
         let delay = |own: Table1<T>| delay_s.map_or(own, Table1::constant);
+        let changed = |maps: ValveMaps<T>| ValveMaps {
+            time_constant_s: maps.time_constant_s.scaled(lag_factor),
+            gain_pa_a: maps.gain_pa_a.scaled(gain_factor),
+            delay_s: delay(maps.delay_s),
+        };
         match self {
-            Self::Proportional(maps) => Self::Proportional(ValveMaps {
-                time_constant_s: maps.time_constant_s.scaled(lag_factor),
-                gain_pa_a: maps.gain_pa_a.scaled(gain_factor),
-                delay_s: delay(maps.delay_s),
-            }),
+            Self::Proportional(maps) => Self::Proportional(changed(maps)),
+            Self::NormallyHigh { maps, zero_pressure_a } => Self::NormallyHigh { maps: changed(maps), zero_pressure_a },
             Self::PulseWidth { law, delay_s } => {
                 let mut law = law.slowed(lag_factor);
                 law.line_pressure_pa = law.line_pressure_pa * gain_factor;
@@ -115,11 +147,48 @@ impl<T: Real> ClutchValve<T> {
             }
         }
     }
+
     /// The same valve in another precision.
     pub fn cast<U: Real>(&self) -> ClutchValve<U> {
         match self {
             Self::Proportional(maps) => ClutchValve::Proportional(maps.cast()),
+            Self::NormallyHigh { maps, zero_pressure_a } => {
+                ClutchValve::NormallyHigh { maps: maps.cast(), zero_pressure_a: U::of(zero_pressure_a.to_f64_exact()) }
+            }
             Self::PulseWidth { law, delay_s } => ClutchValve::PulseWidth { law: law.cast(), delay_s: delay_s.cast() },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn maps() -> ValveMaps<f64> {
+        ValveMaps {
+            time_constant_s: Table1::constant(0.04),
+            gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[1.0e6, 1.4e6, 1.6e6]).unwrap(),
+            delay_s: Table1::new(&[0.0, 1.0], &[0.03, 0.01]).unwrap(),
+        }
+    }
+
+    #[test]
+    fn a_normally_high_valve_mirrors_the_current() {
+        let (low, high) =
+            (ClutchValve::Proportional(maps()), ClutchValve::NormallyHigh { maps: maps(), zero_pressure_a: 1.1 });
+        assert!(high.falls() && !low.falls());
+        assert_eq!(high.settled_pressure(1.1), 0.0);
+        assert_eq!(high.settled_pressure(1.3), 0.0);
+        for pressure in [0.0, 0.05e6, 0.4e6, 1.6e6] {
+            let command = high.command_for(pressure);
+            assert!((high.settled_pressure(command) - pressure).abs() < 1e-6);
+            assert!((command + low.command_for(pressure) - 1.1).abs() < 1e-12);
+            assert!((high.delay(command) - low.delay(low.command_for(pressure))).abs() < 1e-12);
+        }
+        // No current is negative.
+        assert_eq!(high.command_for(9e6), 0.0);
+        let stronger = high.changed(1.0, 1.1, None);
+        assert!((stronger.settled_pressure(0.4) / high.settled_pressure(0.4) - 1.1).abs() < 1e-12);
+        assert_eq!(high.cast::<f32>().cast::<f64>().command_for(0.0), f64::from(1.1_f32));
     }
 }

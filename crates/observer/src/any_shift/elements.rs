@@ -53,13 +53,9 @@ impl<T: Real> ElementState<T> {
             }
             self.rate_pa_s = (self.valve_pa - before_pa) / dt_s;
         }
-        let usable = command.filter(|reading| limits.command_valid(reading.value) && reading.age_s >= T::zero());
+        let usable = command.filter(|reading| limits.usable_command(reading));
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
-            let possible = match usable {
-                Some(reading) if reading.age_s <= T::zero() => [reading.value; 2],
-                _ => [T::zero(), limits.command_max],
-            };
-            range.step(budget, dt_s, possible, limits.command_max);
+            range.step(budget, dt_s, usable, limits.command_max);
         }
         match (command, usable) {
             (None, _) if self.commands.newest_pa().is_none() => ChannelHealth::Lost,

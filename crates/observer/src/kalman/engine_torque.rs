@@ -7,8 +7,8 @@ use drivetrain::Real;
 
 use super::covariance::{ALL, CONSIDERED, Measured};
 use super::engine::Engine;
-use super::{KalmanFilter, KalmanState, LOST_S, SHARE, TURBINE};
-use crate::{ChannelHealth, Input, Reading};
+use super::{KalmanFilter, KalmanState, SHARE, TURBINE};
+use crate::{ChannelHealth, Input, LOST_S, Reading};
 
 /// Time within which the filter of the engine speed finds a new acceleration, s \[chosen\].
 const SETTLED_S: f64 = 0.05;

@@ -41,8 +41,8 @@ pub(crate) mod valve_model;
 use drivetrain::{Engagement, Real, ShiftCoefficients};
 
 use crate::{
-    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, Phase, Supervisor,
-    SupervisorState,
+    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Phase,
+    Supervisor, SupervisorState,
 };
 use covariance::Covariance;
 use engine::Engine;
@@ -75,8 +75,6 @@ const SKEW: usize = 12;
 /// What the filter learns and keeps from shift to shift.
 const LEARNT: [usize; 5] = [FRICTION, GAIN, SCALE, DELAY, SKEW];
 
-/// Time without any speed after which the filter begins anew, s.
-pub const LOST_S: f64 = 0.25;
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
 /// How old the first readings may be, s.
@@ -201,6 +199,8 @@ struct Running<T> {
     /// Direction of the oncoming clutch's slip, 1 or -1, and for how long it has been the other one, s.
     direction: T,
     turned_s: T,
+    /// For how long the turbine has run away from the old gear, s.
+    flares_s: T,
     gates: [Gate; 3],
     /// Time since a reading of turbine, output or wheel was taken, s.
     silent_s: [T; 3],
@@ -319,9 +319,9 @@ impl<T: Real> KalmanFilter<T> {
     #[inline]
     fn take_command(&self, state: &mut KalmanState<T>, input: &Input<T>) -> ChannelHealth {
         let Some(reading) = input.command else {
-            return if state.commands.newest_pa().is_some() { ChannelHealth::Absent } else { ChannelHealth::Lost };
+            return if state.commands.is_fresh(T::of(LOST_S)) { ChannelHealth::Absent } else { ChannelHealth::Lost };
         };
-        if !(self.limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
+        if !self.limits.usable_command(&reading) {
             return ChannelHealth::Refused;
         }
         let settled_pa = self.valve.valve.settled_pressure(reading.value);
@@ -407,6 +407,9 @@ impl<T: Real> KalmanFilter<T> {
                     *health = ChannelHealth::Lost;
                 }
             }
+            if self.uncertainty.output_least_rad_s == T::infinity() {
+                health[WHEEL] = ChannelHealth::Unused;
+            }
         }
         health
     }
@@ -475,7 +478,7 @@ impl<T: Real> KalmanFilter<T> {
                 let shaft = x[SPRING] + line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
                 let slip = self.model.shift.oncoming_slip(x[TURBINE], x[OUTPUT]);
                 let engine = state.engine.map_or(x[TURBINE], |engine| engine.speed_before(T::zero()));
-                if self.flares(running, engine) {
+                if self.is_flare(running) {
                     health = health.max(Health::Flare);
                 }
                 estimate.pressure_pa = x[PRESSURE];

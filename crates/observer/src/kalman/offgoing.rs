@@ -5,7 +5,7 @@ use drivetrain::{Clutch, Real};
 use super::covariance::{ALL, CONSIDERED, Measured};
 use super::valve_model::Commands;
 use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
-use crate::{ChannelHealth, InputLimits, Reading};
+use crate::{ChannelHealth, InputLimits, LOST_S, Reading};
 
 /// A pressure this near to what the commands end at is there, Pa.
 const SETTLED_PA: f64 = 1.0;
@@ -63,10 +63,13 @@ impl<T: Real> OffgoingPressure<T> {
     ) -> ChannelHealth {
         // A log without this channel misses nothing, and one command stands until the next.
         let Some(reading) = reading else {
-            let known = self.commands.newest_pa().is_some();
-            return if known { ChannelHealth::Absent } else { ChannelHealth::Unused };
+            return match self.commands.newest_pa() {
+                None => ChannelHealth::Unused,
+                Some(_) if self.commands.is_fresh(T::of(LOST_S)) => ChannelHealth::Absent,
+                Some(_) => ChannelHealth::Lost,
+            };
         };
-        if !(limits.command_valid(reading.value) && reading.age_s >= T::zero()) {
+        if !limits.usable_command(&reading) {
             return ChannelHealth::Refused;
         }
         let settled_pa = offgoing.valve.valve.settled_pressure(reading.value);
@@ -86,7 +89,7 @@ impl<T: Real> KalmanFilter<T> {
     #[inline]
     pub(super) fn limit_offgoing(&self, running: &mut Running<T>, offgoing: &OffgoingPressure<T>) {
         let u = &self.uncertainty;
-        if offgoing.commands.newest_pa().is_none() {
+        if !offgoing.commands.is_fresh(T::of(LOST_S)) {
             return;
         }
         let clutch = &self.offgoing.clutch;

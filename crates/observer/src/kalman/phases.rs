@@ -39,14 +39,10 @@ impl<T: Real> KalmanFilter<T> {
         let slip = shift.oncoming_slip(turbine, output);
         // A clutch lets go, or grips again, when readings and filter both say so: one wrong reading moves the former, a
         // wrong torque the latter.
-        let offgoing_slip = match (filtered, readings) {
-            (Some(filtered), Some(readings)) => {
-                let [a, b] = [filtered, readings].map(|(turbine, output)| shift.offgoing_slip(turbine, output));
-                let smaller = a.abs() < b.abs();
-                if smaller == (phase != Phase::InertiaPhase) { a } else { b }
-            }
-            _ => shift.offgoing_slip(turbine, output),
-        };
+        let sources = [filtered.unwrap_or((turbine, output)), readings.unwrap_or((turbine, output))];
+        let [a, b] = sources.map(|(turbine, output)| shift.offgoing_slip(turbine, output));
+        let smaller = a.abs() < b.abs();
+        let offgoing_slip = if smaller == (phase != Phase::InertiaPhase) { a } else { b };
         let phase = self.supervisor.step(&mut state.supervisor, dt_s, state.valve_pa, offgoing_slip, slip);
         let Some(running) = &mut state.running else { return };
         let acting = self.acting_phase(running, phase, slip, dt_s);
@@ -59,19 +55,23 @@ impl<T: Real> KalmanFilter<T> {
             running.covariance.renew(OFFGOING, at_start(OFFGOING_START, holding));
         }
         running.acting = acting;
+        let engine = state.engine.map_or(turbine, |engine| engine.speed_before(T::zero()));
+        let flares = [a, b].into_iter().all(|slip| self.flares(running, engine, slip));
+        running.flares_s = if flares { running.flares_s + dt_s } else { T::zero() };
+    }
+
+    /// Whether a flare lasts for longer than one wrong reading can show it.
+    #[inline]
+    pub(super) fn is_flare(&self, running: &Running<T>) -> bool {
+        running.flares_s > self.supervisor.lock_hold_s + T::of(FRESH_S)
     }
 
     /// Whether the turbine runs away from the old gear in the direction of its torque.
     #[inline]
-    pub(super) fn flares(&self, running: &Running<T>, engine_rad_s: T) -> bool {
-        if running.acting != Phase::InertiaPhase {
-            return false;
-        }
-        let (turbine, output) = (running.mean[TURBINE], running.mean[OUTPUT]);
-        let slip = self.model.shift.offgoing_slip(turbine, output);
+    fn flares(&self, running: &Running<T>, engine_rad_s: T, offgoing_slip: T) -> bool {
         // In overrun the torque is negative.
-        let ahead = if turbine > engine_rad_s { -slip } else { slip };
-        ahead > self.supervisor.release_slip_rad_s
+        let ahead = if running.mean[TURBINE] > engine_rad_s { -offgoing_slip } else { offgoing_slip };
+        running.acting == Phase::InertiaPhase && ahead > self.supervisor.release_slip_rad_s
     }
 
     /// The phase whose equations hold. A clutch whose slip ends is locked. Only a slip the other way that lasts has turned

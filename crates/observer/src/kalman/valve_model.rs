@@ -39,6 +39,11 @@ impl<T: Real> Commands<T> {
         self.sent.iter().take(self.count).map(|sent| sent.settled_pa).next()
     }
 
+    /// Whether a command came in the last `lost_s`.
+    pub(crate) fn is_fresh(&self, lost_s: T) -> bool {
+        self.sent.iter().take(self.count.min(1)).any(|newest| newest.age_s <= lost_s)
+    }
+
     /// Lets time pass.
     #[inline]
     pub(crate) fn pass(&mut self, dt_s: T) {
@@ -140,6 +145,7 @@ mod tests {
             commands.send(0.0, f32::from(i), 1.0);
             commands.pass(0.001);
         }
+        assert!(commands.is_fresh(0.0015) && !commands.is_fresh(0.0005));
         // Number 84 was sent 16 ms ago, and 83 before it.
         let mean = commands.mean_pa(0.0155, 0.001).unwrap();
         assert!((mean - 83.5).abs() < 0.01, "{mean}");

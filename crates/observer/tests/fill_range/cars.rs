@@ -111,7 +111,7 @@ impl Car {
             delay_s: [0.0, self.delay_max_steps as f64 * STEP_S],
             hysteresis_pa: self.hysteresis_max_pa,
             command: self.command_error_a,
-            command_age_s: if sampling == Sampling::Synchronous { 0.0 } else { 0.05 },
+            command_age_s: if sampling == Sampling::Asynchronous { 0.05 } else { 0.0 },
             line_pressure_pa: [LINE_PA; 2],
             pressure_max_pa: LINE_PA,
             fill: Some(self.limits),

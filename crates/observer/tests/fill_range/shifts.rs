@@ -25,6 +25,8 @@ pub(crate) struct Row {
     pub(crate) dt_s: f64,
     /// The reading, if it is not missing.
     pub(crate) command_a: Option<f64>,
+    /// Age of the reading.
+    pub(crate) age_s: f64,
     /// The small step at whose end it is; none before the run.
     pub(crate) step: Option<usize>,
 }
@@ -49,13 +51,13 @@ impl Log {
         let tick = if random.chance(0.8) { 40 } else { 200 };
         let sent_a = sent(random, car, start, tick);
         let (first, every) = match sampling {
-            Sampling::Synchronous => (0, tick),
+            Sampling::Synchronous | Sampling::Late => (0, tick),
             Sampling::Asynchronous => {
                 let every = tick - random.count(1, tick / 3);
                 (random.count(1, every), every)
             }
         };
-        let mut rows = rest(start, every as f64 * STEP_S);
+        let mut rows = Vec::new();
         let mut last: Option<usize> = None;
         let (mut at, mut kept) = (first, 0);
         while at < STEPS {
@@ -67,23 +69,49 @@ impl Log {
                 last.map_or(sent_a[0], |l| sent_a[l]),
                 sent_a[(at + every).min(STEPS - 1)],
             );
-            if hidden(lose) && (lose > 1 || between) && sampling == Sampling::Synchronous {
+            if hidden(lose) && (lose > 1 || between) && sampling != Sampling::Asynchronous {
                 (at, kept) = (at + lose * every, 0);
             }
             let missing = random.chance(0.01);
             let reading = (sent_a[at] + car.reading_error_a(random)).max(0.0);
             let dt_s = match last {
                 Some(last) => (at - last) as f64 * STEP_S,
-                None if rows.is_empty() => 0.0,
                 None => every as f64 * STEP_S,
             };
             // The pressure at the sample is that before its command acts: at the end of the step before.
             let step = at.checked_sub(1);
-            rows.push(Row { dt_s, command_a: (!missing).then_some(reading), step });
+            rows.push(Row { dt_s, command_a: (!missing).then_some(reading), age_s: 0.0, step });
             (last, at, kept) = (Some(at), at + every, kept + 1);
         }
-        Self { start, sent_a, rows }
+        if sampling == Sampling::Late {
+            rows = late(random, &rows, every);
+        }
+        let mut all = rest(start, every as f64 * STEP_S);
+        if let (true, Some(first)) = (all.is_empty(), rows.first_mut()) {
+            first.dt_s = 0.0;
+        }
+        all.append(&mut rows);
+        Self { start, sent_a, rows: all }
     }
+}
+
+/// The same readings, each later by one time, in rows of a rate of their own.
+fn late(random: &mut Random, rows: &[Row], every: usize) -> Vec<Row> {
+    let (lag, grid) = (random.count(0, 2 * every), random.count(every / 8, every));
+    let at = |row: &Row| row.step.map_or(0, |step| step + 1);
+    let mut readings = rows.iter().filter(|row| row.command_a.is_some()).peekable();
+    (0..STEPS)
+        .step_by(grid)
+        .map(|now| {
+            let reading = readings.next_if(|row| at(row) + lag <= now);
+            Row {
+                dt_s: if now == 0 { every } else { grid } as f64 * STEP_S,
+                command_a: reading.and_then(|row| row.command_a),
+                age_s: reading.map_or(0.0, |row| (now - at(row)) as f64 * STEP_S),
+                step: now.checked_sub(1),
+            }
+        })
+        .collect()
 }
 
 fn within(x: f64, a: f64, b: f64) -> bool {
@@ -95,7 +123,7 @@ fn rest(start: Start, dt_s: f64) -> Vec<Row> {
     match start {
         Start::Unknown => Vec::new(),
         Start::AtRest { command_a } => {
-            vec![Row { dt_s, command_a: Some(command_a), step: None }; (3.0 / dt_s) as usize]
+            vec![Row { dt_s, command_a: Some(command_a), age_s: 0.0, step: None }; (3.0 / dt_s) as usize]
         }
     }
 }

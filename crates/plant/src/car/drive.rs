@@ -1,17 +1,17 @@
 //! A drive with all its shifts.
 
-use config::{Car, Drive, ShiftPlan};
+use std::collections::VecDeque;
+
+use config::{Car, Drive, ShiftPlan, ShiftSchedule};
 
 use super::controller::CarCalibration;
+use super::follow::{Follower, SpeedError};
 use super::integrate::CarError;
 use super::model::CarModel;
 use super::run::{CarRun, Driver};
 use super::sample::CarSample;
-use super::start::IDLE_RAD_S;
+use super::start::idle_throttle;
 
-/// Throttle of the idle control per speed below idle, s/rad, and the most that the idle control gives.
-const IDLE_GAIN: f64 = 0.02;
-const IDLE_MOST: f64 = 0.3;
 /// Engine speed below which the engine has stalled, rad/s.
 const STALLED_RAD_S: f64 = 30.0;
 /// The gear below is taken at no more than this share of the speed at which the gear was reached: the hysteresis.
@@ -30,6 +30,8 @@ pub struct CarDriveSummary {
     pub shifts: usize,
     /// Highest speed, m/s.
     pub fastest_m_s: f64,
+    /// How well the speed was followed, where the drive gives one.
+    pub speed_error: Option<SpeedError>,
 }
 
 /// Simulates a drive and shows every sample to `record`. `nominal` is the car of the shift controller's model.
@@ -43,57 +45,70 @@ pub fn simulate_car_drive(
     drive: &Drive,
     mut record: impl FnMut(&CarSample),
 ) -> Result<CarDriveSummary, CarError> {
-    if drive.segments.is_empty() || drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3) {
-        return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
-    }
-    let mut road = Road::new(drive);
+    let mut road = Road::new(drive)?;
     let mut shifting = Shifting::new(&model.car, drive)?;
-    let driver = road.at(0.0);
+    let driver = road.at_start();
     let state = model.in_gear(shifting.gear, None, drive.start_m_s, driver.throttle)?;
     let start = (driver, drive.sample_time_s);
     let mut run = CarRun::new(model, nominal, calibration, shifting.gear, state, start)?;
+    if shifting.starts_in_neutral {
+        run.request_neutral()?;
+    }
     let duration_s = drive.duration_s();
     let mut summary = CarDriveSummary { duration_s, ..CarDriveSummary::default() };
     while run.time_s() < duration_s - SAME_INSTANT_S {
         let now_s = run.time_s();
-        let mut driver = road.at(now_s);
+        let mut driver = road.at(now_s, &run);
         let [engine_rad_s, ..] = model.speeds(run.state());
         if engine_rad_s < STALLED_RAD_S {
-            return Err(stalled(model, now_s, engine_rad_s));
+            let message = format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large");
+            return Err(CarError::Request(message));
         }
         shifting.step(&mut run, &driver)?;
-        driver.throttle = driver.throttle.max((IDLE_GAIN * (IDLE_RAD_S - engine_rad_s)).clamp(0.0, IDLE_MOST));
+        driver.throttle = driver.throttle.max(idle_throttle(engine_rad_s));
         run.advance(driver, |_| {}, &mut record)?;
         let vehicle_m_s = run.state().vehicle_m_s;
         summary.distance_m += vehicle_m_s * (run.time_s() - now_s);
         summary.fastest_m_s = summary.fastest_m_s.max(vehicle_m_s);
     }
-    summary.shifts = shifting.completed;
+    summary.shifts = run.controller().completed();
+    summary.speed_error = road.follower.map(|follower| follower.error());
     Ok(summary)
 }
 
-fn stalled(model: &CarModel, now_s: f64, engine_rad_s: f64) -> CarError {
-    let why = match model.car.converter {
-        Some(_) => "the load is too large for the engine",
-        None => "without a converter a launch is not simulated: begin at a speed in a gear, and do not stop",
-    };
-    CarError::Request(format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): {why}"))
-}
-
-/// What driver and road do over time, piece by piece.
+/// What driver and road do over time: piece by piece, or as the speed wants it.
 struct Road<'d> {
     drive: &'d Drive,
     segment: usize,
     begun_s: f64,
+    follower: Option<Follower<'d>>,
 }
 
 impl<'d> Road<'d> {
-    fn new(drive: &'d Drive) -> Self {
-        Self { drive, segment: 0, begun_s: 0.0 }
+    fn new(drive: &'d Drive) -> Result<Self, CarError> {
+        let is_short = drive.segments.iter().any(|segment| segment.duration_s.max(0.0) < 1e-3);
+        if drive.trace.is_none() && (drive.segments.is_empty() || is_short) {
+            return Err(CarError::Request("a drive needs segments of 1 ms or more".to_owned()));
+        }
+        Ok(Self { drive, segment: 0, begun_s: 0.0, follower: drive.trace.as_ref().map(Follower::new) })
+    }
+
+    fn at_start(&mut self) -> Driver {
+        match &self.drive.trace {
+            Some(trace) => Driver { throttle: 0.0, brake: 0.0, grade_rad: trace.grade_rad },
+            None => self.piece(0.0),
+        }
     }
 
     /// At a time that does not fall from call to call.
-    fn at(&mut self, time_s: f64) -> Driver {
+    fn at(&mut self, time_s: f64, run: &CarRun<'_>) -> Driver {
+        match &mut self.follower {
+            Some(follower) => follower.step(run.model(), run.state(), run.controller().gear(), time_s, run.period_s()),
+            None => self.piece(time_s),
+        }
+    }
+
+    fn piece(&mut self, time_s: f64) -> Driver {
         let segments = &self.drive.segments;
         while time_s >= self.begun_s + segments[self.segment].duration_s - SAME_INSTANT_S {
             self.begun_s += segments[self.segment].duration_s;
@@ -106,6 +121,16 @@ impl<'d> Road<'d> {
     }
 }
 
+/// What is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    Neutral,
+    Gear(usize),
+}
+
+/// Name of neutral in a drive file.
+const NEUTRAL: &str = "N";
+
 /// Which gear is wanted when.
 struct Shifting<'d> {
     plan: &'d ShiftPlan,
@@ -113,10 +138,9 @@ struct Shifting<'d> {
     gears: Vec<(usize, f64)>,
     final_ratio: f64,
     gear: usize,
+    starts_in_neutral: bool,
     since_s: f64,
-    listed: usize,
-    listed_gears: Vec<(f64, usize)>,
-    completed: usize,
+    listed: VecDeque<(f64, Wanted)>,
 }
 
 impl<'d> Shifting<'d> {
@@ -124,25 +148,31 @@ impl<'d> Shifting<'d> {
         let named = |name: &str| {
             let names = || car.gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
             let message = || format!("the gearbox has no gear \"{name}\"\nhint: its gears are {}", names());
-            car.gearbox.gear(name).ok_or_else(|| CarError::Request(message()))
+            match car.gearbox.gear(name) {
+                Some(gear) => Ok(Wanted::Gear(gear)),
+                None if name == NEUTRAL => Ok(Wanted::Neutral),
+                None => Err(CarError::Request(message())),
+            }
         };
         let gears: Vec<(usize, f64)> =
             car.gearbox.forward_gears().into_iter().map(|gear| (gear, car.gearbox.gears[gear].ratio)).collect();
-        let lowest = gears.first().map(|&(gear, _)| gear);
         let no_gear = || CarError::Request("the gearbox has no forward gear".to_owned());
-        let gear = match &drive.start_gear {
-            Some(name) => named(name)?,
-            None => lowest.ok_or_else(no_gear)?,
+        let lowest = gears.first().map(|&(gear, _)| gear).ok_or_else(no_gear)?;
+        let start = drive.start_gear.as_deref().map_or(Ok(Wanted::Gear(lowest)), named)?;
+        let (gear, starts_in_neutral) = match start {
+            Wanted::Gear(gear) => (gear, false),
+            Wanted::Neutral => (lowest, true),
         };
-        let listed_gears = match &drive.shifts {
-            ShiftPlan::Listed(list) => {
-                list.iter().map(|(time_s, name)| named(name).map(|gear| (*time_s, gear))).collect::<Result<_, _>>()?
-            }
-            ShiftPlan::Schedule(_) => Vec::new(),
+        let listed = match &drive.shifts {
+            ShiftPlan::Listed(list) => list
+                .iter()
+                .map(|(time_s, name)| named(name).map(|wanted| (*time_s, wanted)))
+                .collect::<Result<_, _>>()?,
+            ShiftPlan::Schedule(_) => VecDeque::new(),
         };
         let final_ratio = car.driveline.final_ratio;
         let (plan, since_s) = (&drive.shifts, 0.0);
-        Ok(Self { plan, gears, final_ratio, gear, since_s, listed: 0, listed_gears, completed: 0 })
+        Ok(Self { plan, gears, final_ratio, gear, starts_in_neutral, since_s, listed })
     }
 
     /// Asks for another gear where the plan wants it.
@@ -151,42 +181,81 @@ impl<'d> Shifting<'d> {
         if run.controller().gear() != self.gear {
             self.gear = run.controller().gear();
             self.since_s = now_s;
-            self.completed += 1;
-        }
-        if run.controller().shift().is_some() {
-            return Ok(());
         }
         match self.plan {
-            ShiftPlan::Listed(_) => match self.listed_gears.get(self.listed) {
-                Some(&(time_s, gear)) if now_s >= time_s - SAME_INSTANT_S => {
-                    self.listed += 1;
-                    run.request(gear)
-                }
-                next => {
-                    run.preselect(next.map(|&(_, gear)| gear));
-                    Ok(())
-                }
-            },
-            ShiftPlan::Schedule(schedule) => {
-                let Some(at) = self.gears.iter().position(|&(gear, _)| gear == self.gear) else { return Ok(()) };
-                let ratio = self.gears[at].1;
-                let input_rad_s = run.state().wheel_rad_s * self.final_ratio * ratio;
-                let (up, down) = (schedule.up_rad_s.at(driver.throttle), schedule.down_rad_s.at(driver.throttle));
-                let above = self.gears.get(at + 1);
-                let below = at.checked_sub(1).map(|below| self.gears[below]);
-                let down = below.map_or(0.0, |(_, lower)| down.min(HYSTERESIS * up * ratio / lower));
-                let nearer_above = input_rad_s - down > up - input_rad_s;
-                let expected = if nearer_above { above.copied().or(below) } else { below.or(above.copied()) };
-                run.preselect(expected.map(|(gear, _)| gear));
-                if now_s < self.since_s + schedule.time_in_gear_s {
-                    return Ok(());
-                }
-                match (above, below) {
-                    (Some(&(gear, _)), _) if input_rad_s > up => run.request(gear),
-                    (_, Some((gear, _))) if input_rad_s < down => run.request(gear),
-                    _ => Ok(()),
-                }
-            }
+            ShiftPlan::Listed(_) => self.listed(run, now_s),
+            ShiftPlan::Schedule(schedule) => self.scheduled(run, driver, schedule),
         }
+    }
+
+    fn listed(&mut self, run: &mut CarRun<'_>, now_s: f64) -> Result<(), CarError> {
+        let Some(&(time_s, wanted)) = self.listed.front() else { return Ok(()) };
+        if now_s < time_s - SAME_INSTANT_S {
+            if let Wanted::Gear(gear) = wanted
+                && run.controller().shift().is_none()
+            {
+                run.preselect(Some(gear));
+            }
+            return Ok(());
+        }
+        self.listed.pop_front();
+        match wanted {
+            Wanted::Gear(gear) => run.request(gear),
+            Wanted::Neutral => run.request_neutral(),
+        }
+    }
+
+    fn scheduled(&self, run: &mut CarRun<'_>, driver: &Driver, schedule: &ShiftSchedule) -> Result<(), CarError> {
+        let place = |gear: usize| self.gears.iter().position(|&(other, _)| other == gear);
+        if run.controller().is_neutral() {
+            return Ok(());
+        }
+        let Some(at) = place(self.gear) else { return Ok(()) };
+        let output_rad_s = run.state().wheel_rad_s * self.final_ratio;
+        if let Some(shift) = run.controller().shift() {
+            // The driver has changed his mind: back, or further on.
+            let (Some(from), Some(to)) = (place(shift.from), place(shift.to)) else { return Ok(()) };
+            let wanted = self.wanted(schedule, driver, output_rad_s, to);
+            let is_back = if to > from { wanted <= from } else { wanted >= from };
+            let is_further = if to > from { wanted > to } else { wanted < to };
+            return match (is_back, is_further) {
+                (true, _) => run.request(shift.from),
+                (_, true) => run.request(self.gears[wanted].0),
+                _ => Ok(()),
+            };
+        }
+        let (_, ratio) = self.gears[at];
+        let (up, down) = self.lines(schedule, driver, at);
+        let (above, below) = (self.gears.get(at + 1), at.checked_sub(1).map(|below| &self.gears[below]));
+        let nearer_above = ratio * output_rad_s - down > up - ratio * output_rad_s;
+        let expected = if nearer_above { above.or(below) } else { below.or(above) };
+        run.preselect(expected.map(|&(gear, _)| gear));
+        if run.time_s() < self.since_s + schedule.time_in_gear_s {
+            return Ok(());
+        }
+        let wanted = self.wanted(schedule, driver, output_rad_s, at);
+        if wanted == at { Ok(()) } else { run.request(self.gears[wanted].0) }
+    }
+
+    /// Speeds of the gearbox input in the gear at this place above and below which another gear is wanted, rad/s.
+    fn lines(&self, schedule: &ShiftSchedule, driver: &Driver, at: usize) -> (f64, f64) {
+        let (up, down) = (schedule.up_rad_s.at(driver.throttle), schedule.down_rad_s.at(driver.throttle));
+        let below = at.checked_sub(1).map(|below| self.gears[below].1);
+        (up, below.map_or(0.0, |lower| down.min(HYSTERESIS * up * self.gears[at].1 / lower)))
+    }
+
+    /// Place of the gear that the schedule wants at this speed of the output, from the gear at a place.
+    fn wanted(&self, schedule: &ShiftSchedule, driver: &Driver, output_rad_s: f64, from: usize) -> usize {
+        let mut at = from;
+        while at + 1 < self.gears.len() && self.gears[at].1 * output_rad_s > self.lines(schedule, driver, at).0 {
+            at += 1;
+        }
+        if at != from {
+            return at;
+        }
+        while at > 0 && self.gears[at].1 * output_rad_s < self.lines(schedule, driver, at).1 {
+            at -= 1;
+        }
+        at
     }
 }

@@ -1,10 +1,10 @@
 //! Steps within one set of contacts, and the events between them.
 
 use super::contacts::Contacts;
-use super::model::{CarInputs, CarModel, CarState, CarTorques, Part, STATES};
+use super::model::{CarInputs, CarModel, CarState, CarTorques, MAX_PACKS, Part, STATES, STATES_WITH_STROKE};
 use crate::gear_train::{MAX_ELEMENTS, TrainError};
 use crate::hybrid::root;
-use crate::rosenbrock::{self, Tolerance, Trial};
+use crate::rosenbrock::{self, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
 use crate::{Contact, Direction};
 
 /// Relative tolerance of a step, against the size of each state.
@@ -15,10 +15,6 @@ const SLACK: f64 = 1e-9;
 const TORQUE_SLACK: f64 = 1e-8;
 /// A pressure counts as this much per Pa among the margins.
 const PER_PA: f64 = 1e-5;
-/// Longest step, s: short enough that no margin crosses zero twice within one.
-const LONGEST_STEP_S: f64 = 0.02;
-/// Shortest step, s; an integration that needs less has diverged.
-const SHORTEST_STEP_S: f64 = 1e-10;
 /// Times closer than this are the same, s.
 const SAME_INSTANT_S: f64 = 1e-12;
 /// Changes of contact at one instant before the car is declared inconsistent.
@@ -61,13 +57,25 @@ pub struct CarStep<'a> {
     pub contacts: &'a Contacts,
     /// The inputs throughout.
     pub inputs: &'a CarInputs,
-    trial: &'a Trial<STATES, CarTorques>,
+    trial: &'a dyn DenseOutput,
+}
+
+/// The state anywhere within a step.
+trait DenseOutput: std::fmt::Debug {
+    /// State at this fraction of the step.
+    fn state_at(&self, theta: f64) -> CarState;
+}
+
+impl<const N: usize> DenseOutput for Trial<N, CarTorques> {
+    fn state_at(&self, theta: f64) -> CarState {
+        CarState::from_array(&self.at(theta))
+    }
 }
 
 impl CarStep<'_> {
     /// State at a time within the step.
     pub fn at(&self, time_s: f64) -> CarState {
-        CarState::from_array(&self.trial.at((time_s - self.start_s) / (self.end_s - self.start_s)))
+        self.trial.state_at((time_s - self.start_s) / (self.end_s - self.start_s))
     }
 }
 
@@ -80,7 +88,7 @@ pub struct CarIntegrator {
     pub state: CarState,
     /// Which elements stick.
     pub contacts: Contacts,
-    step_s: f64,
+    step_size: StepSize,
     relative_tolerance: f64,
 }
 
@@ -90,12 +98,11 @@ impl CarIntegrator {
     /// # Errors
     /// A number is not finite, or too many elements have no slip.
     pub fn new(model: &CarModel, time_s: f64, state: CarState, inputs: &CarInputs) -> Result<Self, CarError> {
-        let finite = state.to_array().iter().all(|x| x.is_finite());
-        if !finite {
+        if !state.is_finite() {
             return Err(TrainError::NotFinite.into());
         }
         let (contacts, state) = Contacts::settle(model, &[None; MAX_ELEMENTS], None, &state, inputs)?;
-        Ok(Self { time_s, state, contacts, step_s: 1e-4, relative_tolerance: RELATIVE_TOLERANCE })
+        Ok(Self { time_s, state, contacts, step_size: StepSize::FIRST, relative_tolerance: RELATIVE_TOLERANCE })
     }
 
     /// The same with another relative tolerance of a step.
@@ -117,10 +124,29 @@ impl CarIntegrator {
         record: &mut impl FnMut(&CarStep<'_>),
     ) -> Result<(), CarError> {
         self.resettle(model, inputs)?;
-        let mut slope = model.rates(&self.contacts, &self.state.to_array(), inputs);
+        // The oil in the cylinders is integrated only where it matters.
+        if model.has_stroke() {
+            self.advance_states::<STATES_WITH_STROKE, { 1 + MAX_PACKS }>(model, inputs, until_s, record)
+        } else {
+            self.advance_states::<STATES, 1>(model, inputs, until_s, record)
+        }
+    }
+
+    /// As [`Self::advance`], for the first `N` states with this number of stiff rows.
+    fn advance_states<const N: usize, const ROWS: usize>(
+        &mut self,
+        model: &CarModel,
+        inputs: &CarInputs,
+        until_s: f64,
+        record: &mut impl FnMut(&CarStep<'_>),
+    ) -> Result<(), CarError> {
+        let mut slope = model.rates::<N>(&self.contacts, &self.state.to_array(), inputs);
         let mut changes = 0;
         while until_s - self.time_s > SAME_INSTANT_S {
-            let (step_s, trial) = self.accepted_step(model, inputs, &slope, until_s)?;
+            let mut size = self.step_size;
+            let accepted = size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(model, inputs, &slope, h));
+            self.step_size = size;
+            let (step_s, trial) = accepted.ok_or(CarError::Diverged { time_s: self.time_s })?;
             let Some((theta, element)) = self.first_event(model, inputs, &trial) else {
                 self.take(&trial, step_s, inputs, record);
                 slope = (trial.end_slope, trial.end_applied);
@@ -128,7 +154,7 @@ impl CarIntegrator {
                 continue;
             };
             // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
-            let to_event = self.trial(model, inputs, &slope, theta * step_s);
+            let to_event = self.trial::<N, ROWS>(model, inputs, &slope, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(CarError::Chatter { time_s: self.time_s });
@@ -157,9 +183,9 @@ impl CarIntegrator {
         Ok(())
     }
 
-    fn take(
+    fn take<const N: usize>(
         &mut self,
-        trial: &Trial<STATES, CarTorques>,
+        trial: &Trial<N, CarTorques>,
         step_s: f64,
         inputs: &CarInputs,
         record: &mut impl FnMut(&CarStep<'_>),
@@ -171,54 +197,27 @@ impl CarIntegrator {
     }
 
     #[inline]
-    fn trial(
+    fn trial<const N: usize, const ROWS: usize>(
         &self,
         model: &CarModel,
         inputs: &CarInputs,
-        (slope, applied): &([f64; STATES], CarTorques),
+        (slope, applied): &([f64; N], CarTorques),
         step_s: f64,
-    ) -> Trial<STATES, CarTorques> {
-        let f = |x: &[f64; STATES]| model.rates(&self.contacts, x, inputs).0;
-        let at_end = |x: &[f64; STATES]| model.rates(&self.contacts, x, inputs);
-        let rows = [model.stiff_row(&self.state, applied.tyre_n, inputs)];
+    ) -> Trial<N, CarTorques> {
+        let f = |x: &[f64; N]| model.rates(&self.contacts, x, inputs).0;
+        let at_end = |x: &[f64; N]| model.rates(&self.contacts, x, inputs);
+        let rows: [_; ROWS] = model.stiff_rows(&self.state, applied.tyre_n, inputs);
         let tolerance = Tolerance { relative: self.relative_tolerance, scale: CarState::scale() };
         rosenbrock::step(&f, &at_end, &self.state.to_array(), slope, &rows, step_s, &tolerance)
     }
 
-    /// Finds a step length whose error is small enough; returns it with its trial.
-    fn accepted_step(
-        &mut self,
-        model: &CarModel,
-        inputs: &CarInputs,
-        slope: &([f64; STATES], CarTorques),
-        until_s: f64,
-    ) -> Result<(f64, Trial<STATES, CarTorques>), CarError> {
-        loop {
-            let rest = until_s - self.time_s;
-            // Stretch a little rather than leave a sliver for the next step.
-            let step_s = if self.step_s > 0.9 * rest { rest } else { self.step_s };
-            let trial = self.trial(model, inputs, slope, step_s);
-            let factor = (0.9 / trial.error.cbrt()).clamp(0.2, 4.0);
-            if trial.error <= 1.0 {
-                // A step cut short by the end of the segment says nothing against the usual length.
-                let usual = if step_s < self.step_s { self.step_s } else { 0.0 };
-                self.step_s = usual.max(step_s * factor).min(LONGEST_STEP_S);
-                return Ok((step_s, trial));
-            }
-            self.step_s = if factor.is_nan() { 0.2 * step_s } else { factor * step_s };
-            if self.step_s < SHORTEST_STEP_S {
-                return Err(CarError::Diverged { time_s: self.time_s });
-            }
-        }
-    }
-
     /// Fraction of the step at which the first margin reaches zero, located on the dense output, and the element that has
     /// no slip there.
-    fn first_event(
+    fn first_event<const N: usize>(
         &self,
         model: &CarModel,
         inputs: &CarInputs,
-        trial: &Trial<STATES, CarTorques>,
+        trial: &Trial<N, CarTorques>,
     ) -> Option<(f64, Option<usize>)> {
         let end = CarState::from_array(&trial.end);
         let at_end = self.margins(model, inputs, &end, &trial.end_applied);
@@ -246,7 +245,7 @@ impl CarIntegrator {
                 margins[element] = Direction::sign(direction) * model.slip(x, element) + SLACK;
             }
             if let Part::Friction(slot, clutch) = &model.parts[element] {
-                let beyond_kiss_pa = x.pressures_pa[*slot] - clutch.clutch.kiss_pressure();
+                let beyond_kiss_pa = CarModel::plates_pa(*slot, clutch, x) - clutch.clutch.kiss_pressure();
                 let sign = if self.contacts.of(element).is_some() { 1.0 } else { -1.0 };
                 margins[MAX_ELEMENTS + element] = sign * PER_PA * beyond_kiss_pa + SLACK;
             }

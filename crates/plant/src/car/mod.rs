@@ -17,11 +17,13 @@
 //! | `run.rs` | car, valves and controller together, period by period |
 //! | `shift.rs` | one shift |
 //! | `drive.rs` | a drive with all its shifts |
+//! | `follow.rs` | a driver who follows a speed |
 
 mod contacts;
 mod controller;
 mod drive;
 mod energy;
+mod follow;
 mod integrate;
 mod model;
 mod run;
@@ -34,9 +36,11 @@ pub use contacts::{ContactState, Contacts};
 pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftProgress, ShiftStage};
 pub use drive::{CarDriveSummary, simulate_car_drive};
 pub use energy::{CarPowers, stored_car_energy};
+pub use follow::SpeedError;
 pub use integrate::{CarError, CarIntegrator, CarStep};
 pub use model::{CarInputs, CarModel, CarState, CarTorques, MAX_PACKS};
 pub use run::{CarRun, Driver};
 pub use sample::{CarSample, ElementSample, ShiftUnderWay};
-pub use shift::{CarShift, CarShiftQuality, simulate_car_shift};
+pub use shift::{CarShift, CarShiftQuality, CarShiftRating, simulate_car_shift};
+pub use start::idle_throttle;
 pub use valves::CarValves;

@@ -18,8 +18,11 @@ const WHEEL: usize = 1;
 const VEHICLE: usize = 2;
 const MOTION: usize = 3;
 const PRESSURE: usize = MOTION + MAX_FREEDOMS;
-/// Number of states.
-pub(super) const STATES: usize = PRESSURE + MAX_PACKS;
+const VOLUME: usize = PRESSURE + MAX_PACKS;
+/// Number of states of a car whose pistons have no stroke.
+pub(super) const STATES: usize = VOLUME;
+/// Number of states of a car whose pistons have one: the oil in the cylinders is added.
+pub(super) const STATES_WITH_STROKE: usize = VOLUME + MAX_PACKS;
 
 /// Speed of the wheel, rad/s, over which the torque of the brake turns around: the brakes of a standing car creep instead of
 /// sticking, as its tyres do.
@@ -52,42 +55,57 @@ pub struct CarState {
     pub vehicle_m_s: f64,
     /// Speeds of train and engine in the coordinates of [`crate::TrainModel::with_engine`], rad/s.
     pub motion: [f64; MAX_FREEDOMS],
-    /// Pressure of each friction element, Pa.
-    pub pressures_pa: [f64; MAX_PACKS],
+    /// Pressure at the outlet of the valve of each friction element, Pa; that of the element, if its piston has no stroke.
+    pub valves_pa: [f64; MAX_PACKS],
+    /// Oil in the cylinder of each friction element beyond that of a piston on its stop, m^3; unused without a stroke.
+    pub volumes_m3: [f64; MAX_PACKS],
 }
 
 impl CarState {
     /// Size of each state that an absolute error is measured against.
-    pub(super) fn scale() -> [f64; STATES] {
-        Self {
-            twist_rad: 0.1,
-            wheel_rad_s: 10.0,
-            vehicle_m_s: 10.0,
-            motion: [100.0; MAX_FREEDOMS],
-            pressures_pa: [1e5; MAX_PACKS],
-        }
-        .to_array()
+    const SCALE: Self = Self {
+        twist_rad: 0.1,
+        wheel_rad_s: 10.0,
+        vehicle_m_s: 10.0,
+        motion: [100.0; MAX_FREEDOMS],
+        valves_pa: [1e5; MAX_PACKS],
+        volumes_m3: [1e-6; MAX_PACKS],
+    };
+
+    /// The size of each of the first `N` states.
+    pub(super) fn scale<const N: usize>() -> [f64; N] {
+        Self::SCALE.to_array()
     }
 
+    pub(super) fn is_finite(&self) -> bool {
+        self.to_array::<STATES_WITH_STROKE>().iter().all(|x| x.is_finite())
+    }
+
+    /// The first `N` states.
     #[inline]
-    pub(super) fn to_array(self) -> [f64; STATES] {
-        let mut x = [0.0; STATES];
+    pub(super) fn to_array<const N: usize>(self) -> [f64; N] {
+        let mut x = [0.0; N];
         x[TWIST] = self.twist_rad;
         x[WHEEL] = self.wheel_rad_s;
         x[VEHICLE] = self.vehicle_m_s;
         x[MOTION..PRESSURE].copy_from_slice(&self.motion);
-        x[PRESSURE..].copy_from_slice(&self.pressures_pa);
+        x[PRESSURE..VOLUME].copy_from_slice(&self.valves_pa);
+        if N > VOLUME {
+            x[VOLUME..].copy_from_slice(&self.volumes_m3);
+        }
         x
     }
 
+    /// The state from its first `N` numbers; the others are zero.
     #[inline]
-    pub(super) fn from_array(x: &[f64; STATES]) -> Self {
+    pub(super) fn from_array<const N: usize>(x: &[f64; N]) -> Self {
         Self {
             twist_rad: x[TWIST],
             wheel_rad_s: x[WHEEL],
             vehicle_m_s: x[VEHICLE],
             motion: std::array::from_fn(|i| x[MOTION + i]),
-            pressures_pa: std::array::from_fn(|i| x[PRESSURE + i]),
+            valves_pa: std::array::from_fn(|i| x[PRESSURE + i]),
+            volumes_m3: std::array::from_fn(|i| if N > VOLUME { x[VOLUME + i] } else { 0.0 }),
         }
     }
 }
@@ -150,6 +168,7 @@ pub struct CarModel {
     pub car: Car,
     pub(super) train: TrainModel,
     pub(super) parts: Vec<Part>,
+    has_stroke: bool,
 }
 
 impl CarModel {
@@ -177,7 +196,8 @@ impl CarModel {
         if packs > MAX_PACKS || parts.len() != train.elements {
             return Err(TrainError::TooLarge);
         }
-        Ok(Self { car, train, parts })
+        let has_stroke = car.clutches.iter().flatten().any(|clutch| clutch.has_stroke);
+        Ok(Self { car, train, parts, has_stroke })
     }
 
     /// Place of the clutch between engine and gearbox input among the elements.
@@ -191,6 +211,23 @@ impl CarModel {
             Part::Friction(slot, clutch) => Some((*slot, clutch)),
             _ => None,
         }
+    }
+
+    /// Whether a piston has a stroke, so that the oil in the cylinders is part of the state.
+    #[inline]
+    pub(super) fn has_stroke(&self) -> bool {
+        self.has_stroke
+    }
+
+    /// Pressure on the plates of the friction element that has this place among the pressures, Pa.
+    #[inline]
+    pub(super) fn plates_pa(slot: usize, clutch: &ShiftClutch, state: &CarState) -> f64 {
+        clutch.pressure(state.valves_pa[slot], state.volumes_m3[slot])
+    }
+
+    /// Pressure on the plates of an element, Pa; zero for one without.
+    pub fn pressure_pa(&self, state: &CarState, element: usize) -> f64 {
+        self.friction(element).map_or(0.0, |(slot, clutch)| Self::plates_pa(slot, clutch, state))
     }
 
     /// Speeds of engine, gearbox input and gearbox output, rad/s.
@@ -211,7 +248,7 @@ impl CarModel {
     pub(super) fn holding_limits(&self, element: usize, state: &CarState, inputs: &CarInputs) -> Option<(f64, f64)> {
         const UNLIMITED_N_M: f64 = 1e9;
         let capacity = match &self.parts[element] {
-            Part::Friction(slot, clutch) => clutch.clutch.static_capacity(state.pressures_pa[*slot]),
+            Part::Friction(slot, clutch) => clutch.clutch.static_capacity(Self::plates_pa(*slot, clutch, state)),
             Part::OneWay => return Some((0.0, UNLIMITED_N_M)),
             Part::Dog if inputs.dogs[element] => UNLIMITED_N_M,
             Part::Dog => 0.0,
@@ -232,7 +269,7 @@ impl CarModel {
             Part::Friction(slot, clutch) => {
                 let torque = match contact {
                     None => 0.0,
-                    Some(_) => direction * clutch.clutch.torque_capacity(x.pressures_pa[*slot], slip),
+                    Some(_) => direction * clutch.clutch.torque_capacity(Self::plates_pa(*slot, clutch, x), slip),
                 };
                 if clutch.drag_n_m > 0.0 { torque + drag_torque(clutch.drag_n_m, slip) } else { torque }
             }
@@ -299,19 +336,25 @@ impl CarModel {
 
     /// Time derivative of the state, and the torques that make it but for those of the sticking elements.
     #[inline]
-    pub(super) fn rates(&self, contacts: &Contacts, x: &[f64; STATES], u: &CarInputs) -> ([f64; STATES], CarTorques) {
+    pub(super) fn rates<const N: usize>(
+        &self,
+        contacts: &Contacts,
+        x: &[f64; N],
+        u: &CarInputs,
+    ) -> ([f64; N], CarTorques) {
         let x = CarState::from_array(x);
         let torques = self.applied(contacts, &x, u);
         let (car, ends) = (&self.car, self.ends_n_m(&torques));
         let road = &car.road;
-        let mut pressures_pa = [0.0; MAX_PACKS];
+        let (mut valves_pa, mut volumes_m3) = ([0.0; MAX_PACKS], [0.0; MAX_PACKS]);
         for part in &self.parts {
             if let Part::Friction(slot, clutch) = part {
-                let (now, settled) = (x.pressures_pa[*slot], u.settled_pa[*slot]);
+                let (now, settled) = (x.valves_pa[*slot], u.settled_pa[*slot]);
                 // Most of a drive most pressures rest.
                 if now != settled {
-                    pressures_pa[*slot] = clutch.valve.pressure_rate(now, settled);
+                    valves_pa[*slot] = clutch.valve.pressure_rate(now, settled);
                 }
+                volumes_m3[*slot] = clutch.volume_rate(x.volumes_m3[*slot], now);
             }
         }
         let wheel_n_m = torques.shaft_n_m
@@ -323,7 +366,8 @@ impl CarModel {
             wheel_rad_s: wheel_n_m / car.driveline.wheel_inertia_kg_m2,
             vehicle_m_s: self.vehicle_acceleration(&x, torques.tyre_n, u),
             motion: contacts.accelerations_rad_s2(&ends, &torques.elements_n_m),
-            pressures_pa,
+            valves_pa,
+            volumes_m3,
         };
         (rates.to_array(), torques)
     }
@@ -335,9 +379,33 @@ impl CarModel {
         (tyre_n - road.drag_force(x.vehicle_m_s)) / road.mass_kg - drivetrain::road::GRAVITY_M_S2 * u.grade_rad.sin()
     }
 
+    /// The equations that are stiff: that of the wheel, and with a stroke those of the oil in the cylinders, as many as are
+    /// asked for. `tyre_n` is the tyre's force at this state.
+    #[inline]
+    pub(super) fn stiff_rows<const N: usize, const ROWS: usize>(
+        &self,
+        x: &CarState,
+        tyre_n: f64,
+        u: &CarInputs,
+    ) -> [StiffRow<N>; ROWS] {
+        let mut rows = [StiffRow::none(); ROWS];
+        rows[0] = self.wheel_row(x, tyre_n, u);
+        for part in &self.parts {
+            if let Part::Friction(slot, clutch) = part
+                && let Some(row) = rows.get_mut(1 + slot)
+            {
+                let (own, valve) = clutch.volume_rate_slopes(x.volumes_m3[*slot], x.valves_pa[*slot]);
+                row.state = VOLUME + slot;
+                row.gradient[VOLUME + slot] = own;
+                row.gradient[PRESSURE + slot] = valve;
+            }
+        }
+        rows
+    }
+
     /// The wheel's equation, which tyre and brake make stiff.
     #[inline]
-    pub(super) fn stiff_row(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> StiffRow<STATES> {
+    fn wheel_row<const N: usize>(&self, x: &CarState, tyre_n: f64, u: &CarInputs) -> StiffRow<N> {
         let (road, line) = (&self.car.road, &self.car.driveline);
         let radius = road.wheel_radius_m;
         let grip = self.car.tyre.damping(radius * x.wheel_rad_s, x.vehicle_m_s, tyre_n);
@@ -345,7 +413,7 @@ impl CarModel {
         let (damping, stiffness) =
             if in_gap { (0.0, 0.0) } else { (line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad) };
         let by_inertia = |torque: f64| torque / line.wheel_inertia_kg_m2;
-        let mut gradient = [0.0; STATES];
+        let mut gradient = [0.0; N];
         gradient[WHEEL] = by_inertia(-(radius * radius * grip + damping + brake_slope(u.brake_n_m, x.wheel_rad_s)));
         gradient[VEHICLE] = by_inertia(radius * grip);
         gradient[TWIST] = by_inertia(stiffness);

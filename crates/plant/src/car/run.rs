@@ -11,7 +11,7 @@ use super::valves::CarValves;
 /// Times closer than this are the same instant, s: sums of periods differ in their last bits.
 const SAME_INSTANT_S: f64 = 1e-9;
 /// Largest torque of the brakes over what the tyres can pass to the road.
-const BRAKE_OVER_TYRES: f64 = 1.0;
+pub(super) const BRAKE_OVER_TYRES: f64 = 1.0;
 
 /// What the driver and the road do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,7 +59,7 @@ impl<'m> CarRun<'m> {
             return Err(CarError::Request(message));
         }
         let mut controller = CarShiftController::new(nominal, calibration, gear)?;
-        let commands = controller.step(0.0, driver.throttle, &measure(model, &state));
+        let commands = controller.step(0.0, driver.throttle, &measure(model, &state, driver));
         let mut valves = CarValves::new(model, &commands.elements);
         let inputs = inputs(model, &mut valves, &commands, driver, 0.0);
         let plant = CarIntegrator::new(model, 0.0, state, &inputs)?;
@@ -80,6 +80,16 @@ impl<'m> CarRun<'m> {
         self.periods as f64 * self.period_s
     }
 
+    /// Control period, s.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// The simulated car.
+    pub fn model(&self) -> &'m CarModel {
+        self.model
+    }
+
     /// The shift controller.
     pub fn controller(&self) -> &CarShiftController {
         &self.controller
@@ -90,12 +100,20 @@ impl<'m> CarRun<'m> {
         &self.plant.state
     }
 
-    /// Asks for a gear.
+    /// Asks for a gear; see [`CarShiftController::request`].
     ///
     /// # Errors
-    /// The shift is not one between two clutches.
+    /// The gear cannot be reached.
     pub fn request(&mut self, to: usize) -> Result<(), CarError> {
         self.controller.request(to, self.time_s())
+    }
+
+    /// Asks for neutral.
+    ///
+    /// # Errors
+    /// A shift is under way, or the gear is neither the lowest nor reverse.
+    pub fn request_neutral(&mut self) -> Result<(), CarError> {
+        self.controller.request_neutral()
     }
 
     /// Puts in the dogs of a gear that is expected next.
@@ -115,11 +133,11 @@ impl<'m> CarRun<'m> {
         mut record: impl FnMut(&CarSample),
     ) -> Result<(), CarError> {
         let (model, now_s) = (self.model, self.time_s());
-        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state));
+        self.commands = self.controller.step(now_s, driver.throttle, &measure(model, &self.plant.state, driver));
         self.valves.send(model, now_s, &self.commands.elements);
         self.periods += 1;
         let end_s = self.time_s();
-        let shown = (self.controller.gear(), self.controller.shift());
+        let shown = (self.controller.gear(), self.controller.is_neutral(), self.controller.shift());
         while self.plant.time_s < end_s - SAME_INSTANT_S {
             let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s + SAME_INSTANT_S);
             let until_s = self.valves.next_arrival_s().map_or(end_s, |arrival| arrival.min(end_s));
@@ -152,9 +170,9 @@ fn is_same_box(car: &Car, other: &Car) -> bool {
     is_whole && gears(car) == gears(other) && elements(car) == elements(other)
 }
 
-fn measure(model: &CarModel, state: &CarState) -> CarMeasured {
+fn measure(model: &CarModel, state: &CarState, driver: Driver) -> CarMeasured {
     let [engine_rad_s, turbine_rad_s, output_rad_s] = model.speeds(state);
-    CarMeasured { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s: state.wheel_rad_s }
+    CarMeasured { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s: state.wheel_rad_s, brake: driver.brake }
 }
 
 /// Commands that have arrived, and what the driver does.

@@ -46,6 +46,8 @@ pub struct CarSample {
     pub time_s: f64,
     /// Gear; during a shift the one that is left.
     pub gear: usize,
+    /// Whether no gear is engaged; `gear` is then one of those that follow by one clutch.
+    pub is_neutral: bool,
     /// The shift, from its request to the end of its last ramp.
     pub shift: Option<ShiftUnderWay>,
     /// What the driver does.
@@ -81,15 +83,13 @@ impl CarSample {
         time_s: f64,
         commands: &CarCommands,
         driver: Driver,
-        (gear, shift): (usize, Option<ShiftProgress>),
+        (gear, is_neutral, shift): (usize, bool, Option<ShiftProgress>),
     ) -> Self {
         let x = step.at(time_s.clamp(step.start_s, step.end_s));
         let torques = model.torques(step.contacts, &x, step.inputs);
         let mut pressures_pa = [0.0; MAX_ELEMENTS];
         for (element, pressure) in pressures_pa.iter_mut().enumerate().take(model.lock_up()) {
-            if let Some((slot, _)) = model.friction(element) {
-                *pressure = x.pressures_pa[slot];
-            }
+            *pressure = model.pressure_pa(&x, element);
         }
         let element = |element: usize| ElementSample {
             element,
@@ -102,6 +102,7 @@ impl CarSample {
         Self {
             time_s,
             gear,
+            is_neutral,
             shift: shift.map(|shift| ShiftUnderWay {
                 from: shift.from,
                 to: shift.to,

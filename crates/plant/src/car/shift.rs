@@ -77,7 +77,7 @@ pub fn simulate_car_shift(
     let state = model.in_gear(shift.from, Some(shift.to), shift.vehicle_m_s, shift.throttle)?;
     let mut run = CarRun::new(model, nominal, calibration, shift.from, state, (driver, shift.sample_time_s))?;
     run.preselect(Some(shift.to));
-    let mut rating = Rating::new(model, shift);
+    let mut rating = CarShiftRating::new(model, shift);
     let mut requested = false;
     while run.time_s() < shift.duration_s - 1e-9 {
         if !requested && run.time_s() >= shift.request_s - 1e-9 {
@@ -93,12 +93,13 @@ pub fn simulate_car_shift(
             },
         )?;
     }
-    Ok(rating.quality)
+    Ok(rating.quality())
 }
 
 /// Rates a shift sample by sample.
-struct Rating<'s> {
-    shift: &'s CarShift,
+#[derive(Debug, Clone)]
+pub struct CarShiftRating {
+    shift: CarShift,
     ratios: [f64; 2],
     alphas: [f64; 2],
     held: Vec<usize>,
@@ -107,8 +108,9 @@ struct Rating<'s> {
     was_requested: bool,
 }
 
-impl<'s> Rating<'s> {
-    fn new(model: &CarModel, shift: &'s CarShift) -> Self {
+impl CarShiftRating {
+    /// Of a shift between these gears that is requested at `request_s`.
+    pub fn new(model: &CarModel, shift: &CarShift) -> Self {
         let reduced = model.car.gearbox.shift(shift.from, shift.to).and_then(|shift| shift.reduced);
         let (ratios, alphas) = reduced.map_or(([1.0; 2], [1.0; 2]), |r| {
             ([r.ratio_offgoing(), r.ratio_oncoming()], [r.slip_offgoing[0], r.slip_oncoming[0]])
@@ -117,10 +119,24 @@ impl<'s> Rating<'s> {
             Some(Change::Single { held, .. }) => held.clone(),
             _ => Vec::new(),
         };
-        Self { shift, ratios, alphas, held, quality: CarShiftQuality::default(), before: None, was_requested: false }
+        Self {
+            shift: *shift,
+            ratios,
+            alphas,
+            held,
+            quality: CarShiftQuality::default(),
+            before: None,
+            was_requested: false,
+        }
     }
 
-    fn push(&mut self, sample: &CarSample) {
+    /// So far.
+    pub fn quality(&self) -> CarShiftQuality {
+        self.quality
+    }
+
+    /// Takes the next sample.
+    pub fn push(&mut self, sample: &CarSample) {
         let q = &mut self.quality;
         let after = sample.time_s >= self.shift.request_s - 1e-9;
         let before = self.before.replace((sample.time_s, sample.vehicle_m_s2));

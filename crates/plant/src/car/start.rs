@@ -7,12 +7,22 @@ use super::model::{CarModel, CarState, MAX_PACKS};
 const SPEEDS_RAD_S: (f64, f64) = (20.0, 700.0);
 /// Idle speed of the engine, rad/s \[chosen\].
 pub(super) const IDLE_RAD_S: f64 = 85.0;
+/// Throttle of the idle control per speed below idle, s/rad, and the most that the idle control gives.
+const IDLE_GAIN: f64 = 0.02;
+const IDLE_MOST: f64 = 0.3;
+
+/// Throttle that the idle control gives at least, 0 to 1.
+pub fn idle_throttle(engine_rad_s: f64) -> f64 {
+    (IDLE_GAIN * (IDLE_RAD_S - engine_rad_s)).clamp(0.0, IDLE_MOST)
+}
+
 /// Steps of the search from above.
 const SEARCH: u32 = 340;
 
 impl CarModel {
     /// At this vehicle speed in a gear, with the engine at its steady speed under this throttle. In a box with dogs the shafts
-    /// turn as they do where both gears of the shift are in.
+    /// turn as they do where both gears of the shift are in. Without a converter the clutch of the gear is open where the
+    /// engine would turn slower than idle.
     ///
     /// # Errors
     /// There is no such gear, or the engine would turn too fast.
@@ -40,32 +50,44 @@ impl CarModel {
                 of_gear.name, SPEEDS_RAD_S.1
             ));
         }
+        let idles = car.converter.is_none() && turbine.abs() < IDLE_RAD_S;
+        let singles = |to: &usize| matches!(car.gearbox.shift(gear, *to), Some(shift) if shift.reduced.is_some());
+        let next = next.or_else(|| (0..car.gearbox.gears.len()).find(singles).filter(|_| idles));
         let held = next.and_then(|next| car.gearbox.shift(gear, next)).and_then(|shift| match &shift.change {
             geartrain::Change::Single { held, .. } => train.speeds_in_shift(held),
             _ => None,
         });
+        let input = if idles { IDLE_RAD_S } else { turbine };
         let shafts: Vec<f64> = match held {
-            Some(speeds) => speeds.row_iter().map(|row| row[0] * turbine + row[1] * output).collect(),
+            Some(speeds) => speeds.row_iter().map(|row| row[0] * input + row[1] * output).collect(),
+            None if idles => return wrong(format!("gear {} has no clutch that could slip", of_gear.name)),
             None => of_gear.shaft_speeds.iter().map(|speed| speed.unwrap_or(0.0) * turbine).collect(),
         };
-        let engine_rad_s = self.steady_engine(turbine, throttle);
+        let engine_rad_s = self.steady_engine(input, throttle);
         let Some(motion) = self.motion_of(&shafts, engine_rad_s) else {
             return Err(crate::TrainError::NoDiagram.into());
         };
         let turbine_n_m = match &car.converter {
             Some(converter) => converter.torques(engine_rad_s, turbine).turbine_n_m,
+            None if idles => 0.0,
             None => car.engine.torque(turbine, throttle) - car.engine.drag_n_m_s * turbine,
         };
         // A standing car has been held by its brake.
         let shaft_n_m = turbine_n_m * of_gear.ratio * car.driveline.final_ratio;
-        let mut pressures_pa = [0.0; MAX_PACKS];
+        let mut valves_pa = [0.0; MAX_PACKS];
         for holding in &of_gear.holding {
-            if let Some((slot, _)) = self.friction(holding.element) {
-                pressures_pa[slot] = car.line_pressure_pa;
+            if let Some((slot, _)) = self.friction(holding.element)
+                && !idles
+            {
+                valves_pa[slot] = car.line_pressure_pa;
             }
         }
+        let mut volumes_m3 = [0.0; MAX_PACKS];
+        for (slot, clutch) in (0..self.lock_up()).filter_map(|element| self.friction(element)) {
+            volumes_m3[slot] = clutch.cylinder.volume(valves_pa[slot]);
+        }
         let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad + 0.5 * car.backlash_rad * shaft_n_m.signum();
-        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, pressures_pa })
+        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, valves_pa, volumes_m3 })
     }
 
     /// The highest speed at which engine and pump are in balance, rad/s, at least idle speed; without a converter that of the gearbox input.

@@ -65,7 +65,7 @@ fn audit(model: &CarModel, (from, to): (usize, usize), throttle: f64, tolerance:
 #[test]
 fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
     let mut worst: f64 = 0.0;
-    for car in cars() {
+    for car in cars().into_iter().chain(cars().into_iter().map(crate::with_stroke)) {
         let model = CarModel::new(car).unwrap();
         for pair in neighbours(&model.car) {
             for throttle in [0.15, 0.0] {
@@ -81,8 +81,14 @@ fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
 #[test]
 fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
     let mut car = crate::cars().swap_remove(0);
-    car.lock_up =
-        Some(config::LockUp { capacity_n_m: 300.0, first_gear: 3, on_rad_s: 120.0, off_rad_s: 100.0, ramp_s: 0.5 });
+    car.lock_up = Some(config::LockUp {
+        capacity_n_m: 300.0,
+        first_gear: 3,
+        on_rad_s: 120.0,
+        off_rad_s: 100.0,
+        ramp_s: 0.5,
+        slip_rad_s: 0.0,
+    });
     let model = CarModel::new(car).unwrap();
     let (with, pair) = (audit(&model, (3, 4), 0.15, 1e-5), audit(&model, (4, 3), 0.0, 1e-5));
     assert!(with.missing(&model, "") < 1e-4 && pair.missing(&model, "") < 1e-4);

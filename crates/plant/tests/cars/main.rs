@@ -17,6 +17,8 @@ macro_rules! car {
 
 mod drives;
 mod energy;
+mod garage;
+mod sequences;
 mod shifts;
 mod two_speed;
 
@@ -38,6 +40,12 @@ fn cars() -> Vec<Car> {
         two_speed(),
         dual_clutch(),
     ]
+}
+
+/// The car with pistons that have a stroke.
+fn with_stroke(mut car: Car) -> Car {
+    car.clutches.iter_mut().flatten().for_each(|clutch| clutch.has_stroke = true);
+    car
 }
 
 /// Neighbouring gears in both directions.

@@ -42,7 +42,8 @@ fn the_two_speed_plant_and_the_general_one_agree_under_the_same_commands() {
         wheel_rad_s: start.wheel_rad_s,
         vehicle_m_s: start.vehicle_m_s,
         motion,
-        pressures_pa: [start.offgoing_valve_pa, start.oncoming_valve_pa, 0.0, 0.0, 0.0, 0.0],
+        valves_pa: [start.offgoing_valve_pa, start.oncoming_valve_pa, 0.0, 0.0, 0.0, 0.0],
+        volumes_m3: [start.offgoing_m3, start.oncoming_m3, 0.0, 0.0, 0.0, 0.0],
     };
     let mut valves = CarValves::new(&model, &commands(&samples[begin]));
     let mut inputs = CarInputs {
@@ -75,8 +76,8 @@ fn the_two_speed_plant_and_the_general_one_agree_under_the_same_commands() {
             far(output, x.output_rad_s, 100.0),
             far(plant.state.twist_rad, x.twist_rad, 0.1),
             far(plant.state.vehicle_m_s, x.vehicle_m_s, 10.0),
-            far(plant.state.pressures_pa[0], next.offgoing_pa, 1e6),
-            far(plant.state.pressures_pa[1], next.oncoming_pa, 1e6),
+            far(model.pressure_pa(&plant.state, 0), next.offgoing_pa, 1e6),
+            far(model.pressure_pa(&plant.state, 1), next.oncoming_pa, 1e6),
         ];
         let worst = distance.into_iter().fold(0.0, f64::max);
         assert!(worst < 2e-3, "{:.3} s: {distance:?}", next.time_s);

@@ -1,8 +1,12 @@
 //! The shipped gearboxes as cars, their shifts, and the sensors.
 
 use config::{Car, Sensors, Source};
+use design::{ShiftErrors, ShiftTables};
 use plant::car::CarShift;
 use std::path::Path;
+use study::any_shift::matrix::neighbouring_shifts;
+
+pub(crate) use study::any_shift::matrix::Random;
 
 /// A vehicle file of two or three lines with a gearbox that ships with the program.
 macro_rules! car {
@@ -28,10 +32,10 @@ pub(crate) fn cars() -> Vec<Car> {
 
 /// Neighbouring gears in both directions, with and without power.
 pub(crate) fn shifts(car: &Car) -> Vec<(usize, usize, f64)> {
-    let forward = car.gearbox.forward_gears();
-    let up = forward.windows(2).map(|pair| (pair[0], pair[1]));
-    let both = up.flat_map(|(low, high)| [(low, high), (high, low)]);
-    both.flat_map(|(from, to)| [(from, to, 0.15), (from, to, 0.0)]).collect()
+    let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
+    let (shifts, without_tables) = neighbouring_shifts(car, &tables);
+    assert_eq!(without_tables, Vec::<[usize; 2]>::new());
+    shifts.iter().map(|shift| (shift.from, shift.to, shift.throttle())).collect()
 }
 
 pub(crate) fn usual(car: &Car, from: usize, to: usize, throttle: f64) -> CarShift {
@@ -42,18 +46,4 @@ pub(crate) fn usual(car: &Car, from: usize, to: usize, throttle: f64) -> CarShif
 pub(crate) fn sensors() -> Sensors {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments/bench.toml");
     Sensors::read(&path).unwrap().unwrap()
-}
-
-/// Random numbers (SplitMix64).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    /// From 0 to 1.
-    pub(crate) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
 }

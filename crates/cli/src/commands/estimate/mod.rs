@@ -1,5 +1,6 @@
 //! `wetclutch estimate`: one log, or several at a time.
 
+mod any_car;
 mod findings;
 mod job;
 mod measured;
@@ -13,7 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use config::Vehicle;
+use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
 
 use crate::args::Estimate;
@@ -21,7 +22,7 @@ use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
 
-pub(super) use observer::{best, kind};
+pub(super) use observer::{best, kind, sensors};
 
 /// What is common to all logs of a command.
 struct Setup<'a> {
@@ -47,6 +48,9 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    if Source::read(&options.vehicle)?.kind()? == Kind::Car {
+        return any_car::estimate(options);
+    }
     observer::check_options(options)?;
     match options.logs.as_slice() {
         [log] => {

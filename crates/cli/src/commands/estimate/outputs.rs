@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use observer::Estimate;
 use study::{EstimateColumns, OutputColumn};
-use trace::{CsvWriter, TableWriter};
+use trace::{Cell, ColumnKind, CsvWriter, TableWriter};
 
 use crate::failure::Failure;
 
@@ -42,14 +42,21 @@ pub(super) enum Output {
 impl Output {
     /// Begins a file, or the table on standard output.
     pub(super) fn create(path: Option<&Path>, columns: &[OutputColumn]) -> Result<Self, Failure> {
+        Self::named(path, columns.iter().map(|column| (column.name, column.kind())))
+    }
+
+    /// The same with these columns.
+    pub(super) fn named<'a>(
+        path: Option<&Path>,
+        named: impl Iterator<Item = (&'a str, ColumnKind)>,
+    ) -> Result<Self, Failure> {
         match path {
             Some(path) => {
-                let named = columns.iter().map(|column| (column.name, column.kind()));
                 let writer = TableWriter::create(path, named).map_err(|error| Failure::writing(path, &error))?;
                 Ok(Self::File(writer, path.to_owned()))
             }
             None => {
-                let names = columns.iter().map(|column| column.name);
+                let names = named.map(|(name, _)| name);
                 Ok(Self::Standard(Box::new(CsvWriter::new(BufWriter::new(io::stdout()), names)?)))
             }
         }
@@ -61,7 +68,10 @@ impl Output {
         estimate: &Estimate<f64>,
         columns: &[OutputColumn],
     ) -> Result<(), Failure> {
-        let cells = columns.iter().map(|column| column.cell(estimate));
+        self.cells(time_s, columns.iter().map(|column| column.cell(estimate)))
+    }
+
+    pub(super) fn cells<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Failure> {
         match self {
             Self::File(writer, path) => writer.row(time_s, cells).map_err(|error| Failure::writing(path, &error)),
             Self::Standard(writer) => Ok(writer.row(time_s, cells)?),

@@ -11,6 +11,7 @@ use study::{LogSample, Overview, RecentSamples, ShiftEstimate};
 use trace::{Cell, CsvWriter, WholeFile};
 
 use crate::args::{Estimate, GearPair};
+use crate::commands::json_object;
 use crate::failure::Failure;
 
 /// Which shifts are wanted.
@@ -131,13 +132,7 @@ pub(super) fn write(shifts: &[ShiftEstimate], csv: &Path, json: &Path) -> Result
     let object = |shift: &ShiftEstimate| {
         let time = std::iter::once((trace::signal::TIME, Cell::Number(shift.begin_s())));
         let cells = time.chain(columns.iter().map(|(name, cell)| (*name, cell(shift))));
-        let value = |cell: Cell<'_>| match cell {
-            // Not a number becomes null.
-            Cell::Number(number) => serde_json::Value::from(number),
-            Cell::Whole(number) => serde_json::Value::from(number),
-            Cell::Word(word) => serde_json::Value::from(word),
-        };
-        cells.map(|(name, cell)| (name.to_owned(), value(cell))).collect::<serde_json::Map<_, _>>()
+        json_object(cells.map(|(name, cell)| (name.to_owned(), cell)))
     };
     let objects: Vec<_> = shifts.iter().map(object).collect();
     let text = serde_json::to_string_pretty(&objects)? + "\n";

@@ -1,5 +1,7 @@
 //! Numbers of the shift controller.
 
+use config::FastFill;
+
 /// Calibration of the shift controller: one set for all gearboxes and all kinds of shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CarCalibration {
@@ -7,12 +9,20 @@ pub struct CarCalibration {
     pub control_period_s: f64,
     /// Time to bring the oncoming clutch to its kiss point and the offgoing one to what it must hold, s.
     pub fill_s: f64,
+    /// The fill of a clutch whose piston has a stroke.
+    pub fast_fill: FastFill,
+    /// Most torque that such a clutch is to carry at the end of its fill, N m at the turbine.
+    pub filled_n_m: f64,
     /// The oncoming clutch waits this far below its kiss point, Pa.
     pub below_kiss_pa: f64,
     /// Torque that the offgoing clutch can hold over what it must, before and during the torque phase.
     pub holding_margin: f64,
     /// Duration of the torque phase, s.
     pub torque_phase_s: f64,
+    /// Slip of the old gear in the wrong direction that counts as a flare, rad/s at the turbine.
+    pub flare_slip_rad_s: f64,
+    /// Gain of such a slip on the torque of the oncoming clutch, 1/s.
+    pub flare_per_s: f64,
     /// Speed of the oncoming ramp when the old gear flares, over that without.
     pub flare_ramp: f64,
     /// Share of the turbine torque that the offgoing clutch holds while the old gear flares.
@@ -21,7 +31,7 @@ pub struct CarCalibration {
     pub sign_n_m: f64,
     /// Time in which the offgoing clutch gives up the turbine torque, until the old gear slips (inertia phase first), s.
     pub release_s: f64,
-    /// Slip of the old gear at which it is left, or counts as a flare, rad/s at the turbine.
+    /// Slip of the old gear at which it is left, rad/s at the turbine.
     pub release_slip_rad_s: f64,
     /// Duration of the inertia phase at 120 rad/s of slip where the turbine torque drives the change and the oncoming clutch
     /// controls it, s.
@@ -30,6 +40,10 @@ pub struct CarCalibration {
     pub power_on_down_s: f64,
     /// The same of power-off upshifts, s.
     pub power_off_up_s: f64,
+    /// The same from neutral to a gear at rest.
+    pub from_neutral_s: f64,
+    /// Time in neutral between the directions, s: the turbine comes up.
+    pub neutral_s: f64,
     /// The reference of the slip ends this far past zero, rad/s.
     pub past_synchronous_rad_s: f64,
     /// Gain of the slip error, 1/s.
@@ -66,6 +80,30 @@ pub struct CarCalibration {
     pub engine_ramp_s: f64,
     /// Time in which the lock-up clutch opens, s: less than that of the fill.
     pub unlock_s: f64,
+    /// Gain of the slip of the lock-up clutch, 1/s.
+    pub slip_per_s: f64,
+    /// Gain of its integral, 1/s^2.
+    pub slip_per_s2: f64,
+    /// Speed of the gearbox input below which the clutch of a car without a converter opens, rad/s.
+    pub launch_open_rad_s: f64,
+    /// Engine speed at a launch above idle speed, per throttle, rad/s.
+    pub launch_rad_s: f64,
+    /// The most of it, rad/s.
+    pub launch_most_rad_s: f64,
+    /// Gain of the engine speed at a launch, 1/s.
+    pub launch_per_s: f64,
+    /// Rate at which the launch clutch takes torque, N m/s; it gives it up four times as fast.
+    pub launch_n_m_s: f64,
+    /// Time without slip after which the launch clutch closes, s.
+    pub launch_lock_s: f64,
+    /// Torque of the launch clutch without throttle, N m.
+    pub creep_n_m: f64,
+    /// Brake at which it is none, 0 to 1.
+    pub creep_brake: f64,
+    /// Most torque of the launch clutch, per engine speed over one this far below idle speed, N m s/rad.
+    pub stall_n_m_s_rad: f64,
+    /// How far, rad/s.
+    pub stall_rad_s: f64,
     /// Time constant of the output speed, s.
     pub output_filter_s: f64,
     /// Time constant with which a pressure is made to follow, s.
@@ -79,17 +117,23 @@ impl CarCalibration {
     pub const STANDARD: Self = Self {
         control_period_s: 0.01,
         fill_s: 0.20,
+        fast_fill: FastFill { hold_s: 0.14, ..FastFill::STANDARD },
+        filled_n_m: 6.0,
         below_kiss_pa: 4e3,
         holding_margin: 1.15,
         torque_phase_s: 0.20,
+        flare_slip_rad_s: 1.0,
+        flare_per_s: 30.0,
         flare_ramp: 1.8,
-        flare_holding: 0.25,
+        flare_holding: 0.5,
         sign_n_m: 5.0,
         release_s: 0.5,
         release_slip_rad_s: 3.0,
         inertia_phase_s: 0.40,
         power_on_down_s: 0.72,
         power_off_up_s: 0.70,
+        from_neutral_s: 0.8,
+        neutral_s: 0.7,
         past_synchronous_rad_s: 2.5,
         proportional_per_s: 9.0,
         integral_per_s2: 25.0,
@@ -108,6 +152,18 @@ impl CarCalibration {
         engine_way: 0.8,
         engine_ramp_s: 0.2,
         unlock_s: 0.12,
+        slip_per_s: 12.0,
+        slip_per_s2: 30.0,
+        launch_open_rad_s: 95.0,
+        launch_rad_s: 260.0,
+        launch_most_rad_s: 160.0,
+        launch_per_s: 2.0,
+        launch_n_m_s: 300.0,
+        launch_lock_s: 0.1,
+        creep_n_m: 15.0,
+        creep_brake: 0.02,
+        stall_n_m_s_rad: 8.0,
+        stall_rad_s: 12.0,
         output_filter_s: 0.04,
         pressure_follow_s: 0.02,
         pressure_lead_pa: 0.3e6,

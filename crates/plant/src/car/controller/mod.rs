@@ -13,19 +13,32 @@
 //! the nominal car; it does not know pressures, torques, or the errors of the valves.
 
 mod calibration;
+mod launch;
+mod lock_up;
 mod pressure;
 mod shift;
+mod strokes;
 mod track;
 
-use config::Car;
+use std::collections::VecDeque;
+
+use config::{Car, ShiftClutch};
+use drivetrain::ReducedShift;
 use geartrain::{Change, ElementKind};
 
 use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
 pub use calibration::CarCalibration;
+use launch::Launch;
+use lock_up::LockUpControl;
+use pressure::Controlled;
 use shift::ActiveShift;
 pub use shift::ShiftStage;
+use strokes::Strokes;
 use track::Track;
+
+/// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
+const AT_REST_RAD_S: f64 = 10.0;
 
 /// What the controller measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +51,8 @@ pub struct CarMeasured {
     pub output_rad_s: f64,
     /// Driven wheel speed, rad/s.
     pub wheel_rad_s: f64,
+    /// Brake, 0 to 1.
+    pub brake: f64,
 }
 
 /// What the controller commands.
@@ -75,12 +90,17 @@ pub struct CarShiftController {
     calibration: CarCalibration,
     gear: usize,
     active: Option<ActiveShift>,
+    /// Gears that follow the shift that is under way.
+    route: VecDeque<usize>,
+    is_neutral: bool,
+    completed: usize,
     preselected: Option<usize>,
     output: Track,
     engine_share: f64,
-    /// Share of its capacity with which the lock-up clutch is closed.
-    lock_up_share: f64,
-    is_locked_up: bool,
+    lock_up: LockUpControl,
+    strokes: Strokes,
+    /// The clutch of a car without a converter, while it is not closed.
+    launch: Option<Launch>,
 }
 
 impl CarShiftController {
@@ -98,11 +118,15 @@ impl CarShiftController {
             calibration,
             gear,
             active: None,
+            route: VecDeque::new(),
+            is_neutral: false,
+            completed: 0,
             preselected: None,
             output,
             engine_share: 1.0,
-            lock_up_share: 0.0,
-            is_locked_up: false,
+            lock_up: LockUpControl::default(),
+            strokes: Strokes::new(car, gear),
+            launch: None,
         })
     }
 
@@ -127,54 +151,194 @@ impl CarShiftController {
         self.preselected = gear.filter(|&gear| gear < self.car.gearbox.gears.len());
     }
 
-    /// Begins a shift to this gear. While another shift is under way nothing happens.
+    /// Shifts that were completed.
+    pub fn completed(&self) -> usize {
+        self.completed
+    }
+
+    /// Whether no gear is engaged.
+    pub fn is_neutral(&self) -> bool {
+        self.is_neutral
+    }
+
+    /// Asks for a gear: through gears between where the shift is not one between two clutches, back where the gear is the one
+    /// that is being left, from neutral, and from one direction to the other at rest.
     ///
     /// # Errors
-    /// The shift is not one between two clutches.
+    /// The gear cannot be reached.
     pub fn request(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
-        if self.active.is_some() || to == self.gear {
+        let Some(ratio) = self.car.gearbox.gears.get(to).map(|gear| gear.ratio) else {
+            return Err(CarError::Request(format!("the gearbox has no gear number {to}")));
+        };
+        let Some(active) = &self.active else {
+            let turns = ratio * self.car.gearbox.gears[self.gear].ratio < 0.0;
+            if turns && self.output.speed_rad_s().abs() > AT_REST_RAD_S {
+                let message = format!("gear {} can be engaged only at rest", self.name(to));
+                return Err(CarError::Request(message));
+            }
+            if self.is_neutral || turns {
+                return self.engage(to, time_s);
+            }
+            self.route = self.way(self.gear, to)?;
+            if self.launch.is_some() && to != self.gear {
+                // The clutches are open: the dogs alone change.
+                self.route.clear();
+                self.completed += 1;
+                (self.gear, self.launch) = (to, Launch::of(&self.car, to));
+            }
+            return Ok(());
+        };
+        if to == self.gear
+            && let Some(mut back) = active.withdrawn(&self.calibration, to, time_s)
+        {
+            let piston = self.strokes.of(back.oncoming.element);
+            back.oncoming = back.oncoming.filled_from(piston, &self.calibration);
+            self.gear = active.to;
+            self.active = Some(back);
+            self.route.clear();
             return Ok(());
         }
-        let names = |gear: usize| self.car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str());
-        let shift = self.car.gearbox.shift(self.gear, to);
-        let single = shift.and_then(|shift| match (&shift.change, &shift.reduced) {
-            (Change::Single { offgoing, oncoming, .. }, Some(reduced)) => Some((*offgoing, *oncoming, *reduced)),
-            _ => None,
-        });
-        let both = single.and_then(|(offgoing, oncoming, reduced)| {
-            let clutch = |element: usize| self.car.clutches.get(element).copied().flatten();
-            Some((offgoing, oncoming, clutch(offgoing)?, clutch(oncoming)?, reduced))
-        });
-        let Some((offgoing, oncoming, off, on, reduced)) = both else {
+        self.route = self.way(active.to, to)?;
+        Ok(())
+    }
+
+    /// Opens the clutch that distinguishes forward from reverse.
+    ///
+    /// # Errors
+    /// A shift is under way, or the gear is neither the lowest nor reverse.
+    pub fn request_neutral(&mut self) -> Result<(), CarError> {
+        if self.is_neutral {
+            return Ok(());
+        }
+        let Some(partner) = self.partner(self.gear).filter(|_| self.active.is_none()) else {
+            let gear = self.name(self.gear);
             let message = format!(
-                "shift {}-{} is not between two clutches; shift through the gears between",
-                names(self.gear),
-                names(to)
+                "no neutral from gear {gear}\nhint: it is reached from the lowest gear or reverse, which differ by one clutch, between shifts"
             );
             return Err(CarError::Request(message));
         };
-        self.active = Some(ActiveShift::new(to, (offgoing, off), (oncoming, on), &reduced, &self.car, time_s));
+        (self.gear, self.is_neutral) = (partner, true);
         Ok(())
+    }
+
+    fn name(&self, gear: usize) -> &str {
+        self.car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str())
+    }
+
+    /// The gear of the other direction that differs from this one by one clutch: neutral is what they have in common.
+    fn partner(&self, gear: usize) -> Option<usize> {
+        let gears = &self.car.gearbox.gears;
+        let turns = |other: &usize| gears[*other].ratio * gears[gear].ratio < 0.0;
+        let candidates = (0..gears.len()).filter(turns).filter(|&other| self.single(other, gear).is_some());
+        candidates.max_by(|&a, &b| gears[a].ratio.abs().total_cmp(&gears[b].ratio.abs()))
+    }
+
+    /// Engages a gear from neutral.
+    fn engage(&mut self, to: usize, time_s: f64) -> Result<(), CarError> {
+        let shift = self.partner(to).and_then(|partner| Some((partner, self.leg(partner, to, time_s)?)));
+        let Some((partner, shift)) = shift else {
+            let message = format!("gear {} does not follow from neutral by one clutch", self.name(to));
+            return Err(CarError::Request(message));
+        };
+        let neutral_s = if self.is_neutral { 0.0 } else { self.calibration.neutral_s };
+        (self.gear, self.is_neutral, self.active) = (partner, false, Some(shift.from_neutral(neutral_s)));
+        Ok(())
+    }
+
+    /// The clutches of a shift between two clutches, offgoing and oncoming, with the reduced shift.
+    fn single(&self, from: usize, to: usize) -> Option<([(usize, ShiftClutch); 2], &ReducedShift<f64>)> {
+        let shift = self.car.gearbox.shift(from, to)?;
+        let (Change::Single { offgoing, oncoming, .. }, Some(reduced)) = (&shift.change, &shift.reduced) else {
+            return None;
+        };
+        let clutch = |element: usize| Some((element, self.car.clutches.get(element).copied().flatten()?));
+        Some(([clutch(*offgoing)?, clutch(*oncoming)?], reduced))
+    }
+
+    /// The gears to go through, each one further on than the one before, by the fewest shifts between two clutches.
+    fn way(&self, from: usize, to: usize) -> Result<VecDeque<usize>, CarError> {
+        let gears = &self.car.gearbox.gears;
+        let ahead =
+            |a: usize, b: usize| (gears[a].ratio - gears[b].ratio) * (gears[from].ratio - gears[to].ratio) > 0.0;
+        let mut ways = VecDeque::from([vec![from]]);
+        let mut seen = vec![false; gears.len()];
+        while let Some(way) = ways.pop_front() {
+            let last = way[way.len() - 1];
+            if last == to {
+                return Ok(way.into_iter().skip(1).collect());
+            }
+            for next in 0..gears.len() {
+                let leads_on = ahead(last, next) && (next == to || ahead(next, to));
+                if leads_on
+                    && !seen[next]
+                    && gears[next].ratio * gears[to].ratio > 0.0
+                    && self.single(last, next).is_some()
+                {
+                    seen[next] = true;
+                    ways.push_back(way.iter().copied().chain([next]).collect());
+                }
+            }
+        }
+        let message = format!(
+            "there is no way from gear {} to gear {} by shifts between two clutches",
+            self.name(from),
+            self.name(to)
+        );
+        Err(CarError::Request(message))
+    }
+
+    /// A shift between two clutches.
+    fn leg(&self, from: usize, to: usize, time_s: f64) -> Option<ActiveShift> {
+        let ([(offgoing, off), (oncoming, on)], reduced) = self.single(from, to)?;
+        let line_pa = self.car.line_pressure_pa;
+        let offgoing = Controlled::new(offgoing, off, reduced.slip_offgoing, line_pa);
+        let on = Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0);
+        let oncoming = on.filled_from(self.strokes.of(oncoming), &self.calibration);
+        Some(ActiveShift::new(to, [offgoing, oncoming], reduced.mass_kg_m2, line_pa, time_s))
     }
 
     /// Commands for the period that begins at `time_s`.
     pub fn step(&mut self, time_s: f64, throttle: f64, measured: &CarMeasured) -> CarCommands {
+        if self.active.is_none()
+            && let Some(next) = self.route.pop_front()
+        {
+            self.active = self.leg(self.gear, next, time_s);
+        }
         let period_s = self.calibration.control_period_s;
         self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
         let turbine_n_m = self.turbine_torque(throttle, measured);
-        let mut elements = [0.0; MAX_ELEMENTS];
+        let open = |element: usize| self.car.clutches.get(element).and_then(Option::as_ref);
+        let mut elements: [f64; MAX_ELEMENTS] =
+            std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
+        let opened = if self.is_neutral {
+            self.partner(self.gear).and_then(|partner| self.single(self.gear, partner))
+        } else {
+            None
+        };
+        let opened = opened.map(|(clutches, _)| clutches[0].0);
         // The clutches of a shift get their commands below.
         let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
         for gear in [Some(self.gear), next].into_iter().flatten() {
             for holding in &self.car.gearbox.gears[gear].holding {
                 let element = holding.element;
                 match &self.car.clutches[element] {
-                    Some(clutch) if gear == self.gear => elements[element] = clutch.valve.command_for(line_pa),
+                    Some(clutch) if gear == self.gear && opened != Some(element) => {
+                        elements[element] = clutch.valve.command_for(line_pa)
+                    }
                     Some(_) => (),
                     None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
                 }
+            }
+        }
+        self.open_at_low_speed(measured);
+        let c = &self.calibration;
+        if let Some(launch) = &mut self.launch {
+            let (element, command) = launch.step((&self.car, c), time_s, throttle, measured);
+            elements[element] = command;
+            if launch.is_over(c, time_s, measured) {
+                self.launch = None;
             }
         }
         let mut wanted = 1.0;
@@ -187,37 +351,46 @@ impl CarShiftController {
             if shift.stage == ShiftStage::Done {
                 self.gear = shift.to;
                 self.active = None;
+                self.completed += 1;
             }
         }
         let step = period_s / self.calibration.engine_ramp_s;
         self.engine_share += (wanted - self.engine_share).clamp(-step, step);
-        let lock_up_n_m = self.lock_up(measured);
+        let engine_n_m = self.engine_torque(throttle, measured.engine_rad_s);
+        let in_gear = self.active.is_none().then_some(self.gear).filter(|_| !self.is_neutral);
+        let lock_up_n_m = self.lock_up.torque_n_m((&self.car, &self.calibration), in_gear, engine_n_m, measured);
+        self.strokes.follow(&self.car, &elements, period_s);
         CarCommands { elements, dogs, engine_share: self.engine_share, lock_up_n_m }
     }
 
-    /// Torque that the lock-up clutch is to hold, N m. It is open during shifts: their turbine torque is that of the converter.
-    fn lock_up(&mut self, measured: &CarMeasured) -> f64 {
-        let Some(lock_up) = self.car.lock_up else { return 0.0 };
-        let ratio = |gear: usize| self.car.gearbox.gears[gear].ratio;
-        let is_high = ratio(self.gear) > 0.0 && ratio(self.gear) <= ratio(lock_up.first_gear);
-        let fastest = if self.is_locked_up { lock_up.off_rad_s } else { lock_up.on_rad_s };
-        self.is_locked_up = self.active.is_none() && is_high && measured.turbine_rad_s > fastest;
-        let period_s = self.calibration.control_period_s;
-        let step = if self.is_locked_up { period_s / lock_up.ramp_s } else { -period_s / self.calibration.unlock_s };
-        self.lock_up_share = (self.lock_up_share + step).clamp(0.0, 1.0);
-        self.lock_up_share * lock_up.capacity_n_m
+    /// Without a converter the clutch opens before the engine turns too slowly, in a shift too.
+    fn open_at_low_speed(&mut self, measured: &CarMeasured) {
+        if self.car.converter.is_some() || self.launch.is_some() {
+            return;
+        }
+        let gears = &self.car.gearbox.gears;
+        let slow = |gear: usize| gears[gear].ratio * measured.output_rad_s < self.calibration.launch_open_rad_s;
+        let to = self.active.as_ref().map_or(self.gear, |shift| shift.to);
+        if slow(self.gear) && slow(to) {
+            self.launch = Launch::of(&self.car, to);
+            (self.gear, self.active) = (to, None);
+            self.route.clear();
+        }
     }
 
     /// Torque on the gearbox input as the nominal maps give it, N m. The engine controller's reductions are known.
     fn turbine_torque(&self, throttle: f64, measured: &CarMeasured) -> f64 {
         match &self.car.converter {
             Some(converter) => converter.torques(measured.engine_rad_s, measured.turbine_rad_s).turbine_n_m,
-            None => {
-                let engine = &self.car.engine;
-                let torque = engine.torque(measured.turbine_rad_s, throttle);
-                let reduced = if torque > 0.0 { torque * self.engine_share } else { torque };
-                reduced - engine.drag_n_m_s * measured.turbine_rad_s
-            }
+            None => self.engine_torque(throttle, measured.turbine_rad_s),
         }
+    }
+
+    /// Torque of the engine less its drag, N m, with the reduction of the transmission controller.
+    fn engine_torque(&self, throttle: f64, engine_rad_s: f64) -> f64 {
+        let engine = &self.car.engine;
+        let torque = engine.torque(engine_rad_s, throttle);
+        let reduced = if torque > 0.0 { torque * self.engine_share } else { torque };
+        reduced - engine.drag_n_m_s * engine_rad_s
     }
 }

@@ -1,8 +1,9 @@
 //! A shift clutch as its controller sees it: from torque at the turbine to the command of its valve.
 
-use config::ShiftClutch;
+use config::{FastFill, ShiftClutch};
 
 use super::CarCalibration;
+use crate::fast_fill::{FillPlan, StrokeModel};
 
 /// One of the two clutches of a shift.
 #[derive(Debug, Clone)]
@@ -16,12 +17,25 @@ pub(super) struct Controlled {
     pub(super) ratio: f64,
     /// Pressure that the nominal valve has, Pa.
     modelled_pa: f64,
+    /// How it is filled, if its piston has a stroke.
+    pub(super) fill: Option<FillPlan>,
 }
 
 impl Controlled {
     pub(super) fn new(element: usize, clutch: ShiftClutch, slip_row: [f64; 2], modelled_pa: f64) -> Self {
         let [alpha, per_output] = slip_row;
-        Self { element, clutch, alpha, ratio: -per_output / alpha, modelled_pa }
+        Self { element, clutch, alpha, ratio: -per_output / alpha, modelled_pa, fill: None }
+    }
+
+    /// The same, filled from this state of its piston. The plates touch gently: a clutch that counts much at the turbine has
+    /// less pressure at the end of its fill.
+    pub(super) fn filled_from(mut self, state: Option<&StrokeModel>, calibration: &CarCalibration) -> Self {
+        let c = calibration;
+        let gentle_pa = self.pressure_for(c.filled_n_m, 0.0) - self.kiss_pa();
+        let stroke_over_kiss_pa = c.fast_fill.stroke_over_kiss_pa.min(gentle_pa);
+        let fast_fill = FastFill { stroke_over_kiss_pa, ..c.fast_fill };
+        self.fill = state.map(|state| FillPlan::from_state(&self.clutch, fast_fill, c.control_period_s, state));
+        self
     }
 
     /// Its slip at the turbine, rad/s.
@@ -46,8 +60,13 @@ impl Controlled {
         let lag_s = self.clutch.valve.lag(self.modelled_pa, to_go / c.pressure_follow_s);
         let ahead = (lag_s / c.pressure_follow_s - 1.0).max(0.0) * to_go;
         let settled = wanted_pa + ahead.clamp(-c.pressure_lead_pa, c.pressure_lead_pa);
-        let settled = settled.clamp(0.0, line_pa);
-        let step = self.clutch.valve.step(settled, self.modelled_pa, c.control_period_s);
+        self.without_lead(calibration, settled, line_pa)
+    }
+
+    /// The pressure at which its command is to settle, Pa, within what the valve can give; the model follows.
+    pub(super) fn without_lead(&mut self, calibration: &CarCalibration, settled_pa: f64, line_pa: f64) -> f64 {
+        let settled = settled_pa.clamp(0.0, line_pa);
+        let step = self.clutch.valve.step(settled, self.modelled_pa, calibration.control_period_s);
         self.modelled_pa = step.phi * self.modelled_pa + step.drift_pa;
         settled
     }

@@ -1,7 +1,6 @@
 //! One shift: its stages and the pressures of both clutches.
 
-use config::{Car, ShiftClutch};
-use drivetrain::{PhaseOrder, ReducedShift};
+use drivetrain::PhaseOrder;
 
 use super::pressure::Controlled;
 use super::track::Track;
@@ -36,8 +35,15 @@ pub(super) struct ActiveShift {
     pub(super) stage: ShiftStage,
     mass_kg_m2: [[f64; 2]; 2],
     line_pa: f64,
+    /// Positive for an upshift of forward gears, and for a turbine that is slowed down from neutral.
+    direction: f64,
+    /// From neutral, or from the other direction at rest: the offgoing clutch opens first, and the turbine comes up.
+    is_from_neutral: bool,
+    /// Time for that, s.
+    neutral_s: f64,
     begun_s: f64,
     since_s: f64,
+    is_filled_by_plan: bool,
     /// Share of the load that the oncoming clutch has taken in the torque phase.
     transferred: f64,
     has_flared: bool,
@@ -49,6 +55,8 @@ pub(super) struct ActiveShift {
     integral_rad: f64,
     /// Torque of the slip controller, N m at the turbine.
     controlled_n_m: f64,
+    /// Torque with which the slip controller begins, N m at the turbine.
+    taken_over_n_m: Option<f64>,
     locked_since_s: Option<f64>,
     /// Offgoing torque at the start of the hand-over, N m at the turbine.
     handed_n_m: f64,
@@ -71,21 +79,25 @@ struct Now {
 impl ActiveShift {
     pub(super) fn new(
         to: usize,
-        (offgoing, off): (usize, ShiftClutch),
-        (oncoming, on): (usize, ShiftClutch),
-        reduced: &ReducedShift<f64>,
-        car: &Car,
+        [offgoing, oncoming]: [Controlled; 2],
+        mass_kg_m2: [[f64; 2]; 2],
+        line_pa: f64,
         time_s: f64,
     ) -> Self {
+        let direction = (offgoing.ratio - oncoming.ratio).signum();
         Self {
             to,
-            offgoing: Controlled::new(offgoing, off, reduced.slip_offgoing, car.line_pressure_pa),
-            oncoming: Controlled::new(oncoming, on, reduced.slip_oncoming, 0.0),
+            offgoing,
+            oncoming,
+            direction,
+            is_from_neutral: false,
+            neutral_s: 0.0,
             stage: ShiftStage::Fill,
-            mass_kg_m2: reduced.mass_kg_m2,
-            line_pa: car.line_pressure_pa,
+            mass_kg_m2,
+            line_pa,
             begun_s: time_s,
             since_s: time_s,
+            is_filled_by_plan: false,
             transferred: 0.0,
             has_flared: false,
             is_slipping: false,
@@ -94,20 +106,48 @@ impl ActiveShift {
             slipping_since_s: time_s,
             integral_rad: 0.0,
             controlled_n_m: 0.0,
+            taken_over_n_m: None,
             locked_since_s: None,
             handed_n_m: 0.0,
             slip_before_rad_s: None,
         }
     }
 
-    /// Positive for an upshift of forward gears.
-    fn direction(&self) -> f64 {
-        (self.offgoing.ratio - self.oncoming.ratio).signum()
+    /// The same from neutral, where the offgoing clutch is open already, or from the other direction at rest, where it opens in
+    /// the time `neutral_s`.
+    pub(super) fn from_neutral(self, neutral_s: f64) -> Self {
+        Self { is_from_neutral: true, neutral_s, direction: 1.0, ..self }
+    }
+
+    /// The way back to the gear `from` that is being left: offgoing and oncoming clutch change their roles. `None` where the new
+    /// gear is nearly engaged.
+    pub(super) fn withdrawn(&self, c: &CarCalibration, from: usize, time_s: f64) -> Option<Self> {
+        if self.is_from_neutral {
+            return None;
+        }
+        let clutches = [self.oncoming.clone(), self.offgoing.clone()];
+        let mut back = Self::new(from, clutches, self.mass_kg_m2, self.line_pa, time_s);
+        match self.stage {
+            ShiftStage::TorquePhase => {
+                // What the old gear has given up comes back as at the end of a shift.
+                back.stage = ShiftStage::HandOver;
+                back.since_s = time_s - (1.0 - self.transferred) * c.hand_over_s;
+            }
+            ShiftStage::InertiaPhase if self.is_slipping => {
+                back.stage = ShiftStage::InertiaPhase;
+                back.is_slipping = true;
+                back.controlled_n_m = self.controlled_n_m;
+                back.taken_over_n_m = Some(self.controlled_n_m);
+            }
+            ShiftStage::Fill | ShiftStage::InertiaPhase => back.stage = ShiftStage::Lock,
+            ShiftStage::HandOver | ShiftStage::Lock | ShiftStage::Done => return None,
+        }
+        Some(back)
     }
 
     /// Torque phase first where the turbine torque drives the speed change.
     fn order(&self, turbine_n_m: f64) -> PhaseOrder {
-        if turbine_n_m * self.direction() > 0.0 { PhaseOrder::TorqueFirst } else { PhaseOrder::InertiaFirst }
+        if turbine_n_m * self.direction > 0.0 { PhaseOrder::TorqueFirst } else { PhaseOrder::InertiaFirst }
     }
 
     /// Pressures at which offgoing and oncoming valve are to settle, Pa.
@@ -129,6 +169,7 @@ impl ActiveShift {
             output_rad_s2: output.rate_rad_s2,
         };
         self.change_stage(c, &now);
+        self.is_filled_by_plan = false;
         let torques = match self.stage {
             ShiftStage::Fill => self.fill(c, &now),
             ShiftStage::TorquePhase => self.transfer(c, &now),
@@ -137,20 +178,28 @@ impl ActiveShift {
             ShiftStage::Lock | ShiftStage::Done => [0.0, self.locked_pa(c, &now)],
         };
         self.slip_before_rad_s = Some(now.z_wheels);
-        let [off_pa, on_pa] = torques;
-        [self.offgoing.lead(c, off_pa, self.line_pa), self.oncoming.lead(c, on_pa, self.line_pa)]
+        let [off_pa, on_pa] = if self.is_from_neutral { [self.opening_pa(&now), torques[1]] } else { torques };
+        let on_pa = if self.is_filled_by_plan {
+            self.oncoming.without_lead(c, on_pa, self.line_pa)
+        } else {
+            self.oncoming.lead(c, on_pa, self.line_pa)
+        };
+        [self.offgoing.lead(c, off_pa, self.line_pa), on_pa]
     }
 
     fn change_stage(&mut self, c: &CarCalibration, now: &Now) {
         // Times are sums of periods; a rounding error must not cost a whole one.
         let passed = |since_s: f64, duration_s: f64| now.time_s - since_s >= duration_s - 1e-9;
-        let direction = self.direction();
+        let direction = self.direction;
         let locks = now.z.abs() < c.lock_slip_rad_s || now.z * direction < 0.0;
         self.locked_since_s =
             if now.z.abs() < c.lock_slip_rad_s { self.locked_since_s.or(Some(now.time_s)) } else { None };
         let holds = self.locked_since_s.is_some_and(|since_s| passed(since_s, c.lock_hold_s));
         let next = match self.stage {
-            ShiftStage::Fill if passed(self.since_s, c.fill_s) => match self.order(now.turbine_n_m) {
+            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) && self.is_from_neutral => {
+                ShiftStage::InertiaPhase
+            }
+            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) => match self.order(now.turbine_n_m) {
                 PhaseOrder::TorqueFirst => ShiftStage::TorquePhase,
                 PhaseOrder::InertiaFirst => ShiftStage::InertiaPhase,
             },
@@ -179,7 +228,10 @@ impl ActiveShift {
         self.since_s = now.time_s;
         if next == ShiftStage::InertiaPhase {
             self.controlled_n_m = now.turbine_n_m;
-            if self.order(now.turbine_n_m) == PhaseOrder::TorqueFirst {
+            if self.is_from_neutral {
+                self.direction = now.z.signum();
+            }
+            if self.is_from_neutral || self.order(now.turbine_n_m) == PhaseOrder::TorqueFirst {
                 self.begin_slip(c, now);
             }
         }
@@ -194,7 +246,8 @@ impl ActiveShift {
         self.from_rad_s = now.z_wheels;
         self.slipping_since_s = now.time_s;
         let scale = (self.from_rad_s.abs() / 120.0).clamp(0.55, 1.3);
-        let at_full = match (self.order(now.turbine_n_m), self.direction() > 0.0) {
+        let at_full = match (self.order(now.turbine_n_m), self.direction > 0.0) {
+            _ if self.is_from_neutral => c.from_neutral_s,
             (PhaseOrder::TorqueFirst, _) => c.inertia_phase_s,
             (PhaseOrder::InertiaFirst, true) => c.power_off_up_s,
             (PhaseOrder::InertiaFirst, false) => c.power_on_down_s,
@@ -202,42 +255,71 @@ impl ActiveShift {
         self.duration_s = at_full * scale;
     }
 
+    /// The same, with this torque of the slip controller, N m at the turbine.
+    fn begin_slip_with(&mut self, c: &CarCalibration, now: &Now, torque_n_m: f64) {
+        self.begin_slip(c, now);
+        let without = self.slip_controlled_n_m(c, now);
+        self.integral_rad = (torque_n_m - without) / (c.integral_per_s2 * self.mass_kg_m2[0][0]);
+    }
+
     /// Whether the slip reaches zero soon.
     fn nears(&self, c: &CarCalibration, now: &Now) -> bool {
         let rate = self.slip_before_rad_s.map_or(0.0, |before| (now.z_wheels - before) / c.control_period_s);
-        (now.z + c.hand_over_lead_s * rate) * self.direction() <= 0.0
+        (now.z + c.hand_over_lead_s * rate) * self.direction <= 0.0
     }
 
-    fn waiting_pa(&self, c: &CarCalibration) -> f64 {
-        (self.oncoming.kiss_pa() - c.below_kiss_pa).max(0.0)
+    /// Pressure with which the oncoming clutch waits, Pa: just below its kiss point, or on the plan of its fill and then with
+    /// the piston at the end of its stroke.
+    fn waiting_pa(&mut self, c: &CarCalibration, now: &Now) -> f64 {
+        let Some(plan) = self.oncoming.fill else { return (self.oncoming.kiss_pa() - c.below_kiss_pa).max(0.0) };
+        let elapsed_s = now.time_s - self.begun_s;
+        // The plan counts with the lag of the valve.
+        self.is_filled_by_plan = elapsed_s < plan.duration_s();
+        plan.pressure(elapsed_s)
     }
 
-    fn fill(&self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let share = ((now.time_s - self.since_s + c.control_period_s) / c.fill_s).min(1.0);
+    /// Duration of the fill, s.
+    fn fill_s(&self, c: &CarCalibration) -> f64 {
+        let fill_s = self.oncoming.fill.map_or(c.fill_s, |plan| plan.duration_s().max(plan.arrival_s).max(c.fill_s));
+        fill_s.max(self.neutral_s)
+    }
+
+    /// Pressure of a clutch that opens into neutral, Pa: its torque goes in the first third of the time.
+    fn opening_pa(&self, now: &Now) -> f64 {
+        let left = 1.0 - 3.0 * (now.time_s - self.begun_s) / self.neutral_s;
+        if left > 0.0 { self.offgoing.pressure_for(left * now.turbine_n_m, 0.0) } else { 0.0 }
+    }
+
+    fn fill(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
+        let share = ((now.time_s - self.since_s + c.control_period_s) / self.fill_s(c)).min(1.0);
         let held = self.offgoing.pressure_for(c.holding_margin * now.turbine_n_m, 0.0);
         let offgoing_pa = self.line_pa.min(held + (1.0 - share) * (self.line_pa - held).max(0.0));
+        if self.oncoming.fill.is_some() {
+            return [offgoing_pa, self.waiting_pa(c, now)];
+        }
         // Gently: a command that falls arrives later than the one that rises before it.
         let filled = (std::f64::consts::FRAC_PI_2 * (share / FILLED_AT).min(1.0)).sin();
-        [offgoing_pa, filled * self.waiting_pa(c)]
+        [offgoing_pa, filled * self.waiting_pa(c, now)]
     }
 
     fn transfer(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let flare = now.y * self.direction() > c.release_slip_rad_s;
+        let flare = now.y * self.direction > c.flare_slip_rad_s;
         self.has_flared |= flare;
         let speed = if self.has_flared { c.flare_ramp } else { 1.0 };
         self.transferred = (self.transferred + speed * c.control_period_s / c.torque_phase_s).min(1.0);
         let (taken, left) = (self.transferred, 1.0 - self.transferred);
         let held = c.holding_margin * left;
         let held = if flare { held.max(c.flare_holding) } else { held };
+        let caught = if flare { c.flare_per_s * self.mass_kg_m2[0][0] * now.y } else { 0.0 };
         [
             self.offgoing.pressure_for(held * now.turbine_n_m, now.y),
-            self.oncoming.pressure_for(taken * now.turbine_n_m, now.z),
+            self.oncoming.pressure_for(taken * now.turbine_n_m + caught, now.z),
         ]
     }
 
     /// The sum of the torques of both clutches that makes the slip follow its reference, N m at the turbine.
     fn slip_controlled_n_m(&mut self, c: &CarCalibration, now: &Now) -> f64 {
-        let end = -c.past_synchronous_rad_s * self.direction();
+        let end = -c.past_synchronous_rad_s * self.direction;
         let elapsed_s = now.time_s - self.slipping_since_s;
         let (reference, _) = half_cosine(self.from_rad_s, end, elapsed_s, self.duration_s);
         let (_, rate) = half_cosine(self.from_rad_s, end, elapsed_s + c.lead_s, self.duration_s);
@@ -255,21 +337,21 @@ impl ActiveShift {
             // Inertia phase first: the offgoing clutch gives way by and by until the old gear slips.
             let margin = (c.holding_margin - (now.time_s - self.since_s) / c.release_s).max(0.0);
             self.controlled_n_m = margin * now.turbine_n_m;
-            if now.y * self.direction() < -c.release_slip_rad_s || margin <= 0.0 {
-                let held = self.controlled_n_m;
-                self.begin_slip(c, now);
+            if now.y * self.direction < -c.release_slip_rad_s || margin <= 0.0 {
                 // What slipped tells the friction: the controller begins with the torque at which it did.
-                let without = self.slip_controlled_n_m(c, now);
-                self.integral_rad = (held - without) / (c.integral_per_s2 * self.mass_kg_m2[0][0]);
+                self.begin_slip_with(c, now, self.controlled_n_m);
             } else {
-                return [self.offgoing.pressure_for(self.controlled_n_m, 0.0), self.waiting_pa(c)];
+                return [self.offgoing.pressure_for(self.controlled_n_m, 0.0), self.waiting_pa(c, now)];
             }
         }
+        if let Some(torque_n_m) = self.taken_over_n_m.take() {
+            self.begin_slip_with(c, now, torque_n_m);
+        }
         let u = self.slip_controlled_n_m(c, now);
-        if u * self.direction() > 0.0 {
+        if u * self.direction > 0.0 {
             [0.0, self.oncoming.pressure_for(u, now.z)]
         } else {
-            [self.offgoing.pressure_for(u, now.y), self.waiting_pa(c)]
+            [self.offgoing.pressure_for(u, now.y), self.waiting_pa(c, now)]
         }
     }
 
@@ -280,14 +362,14 @@ impl ActiveShift {
 
     /// Torque of the oncoming clutch against a slip beyond synchronous speed, where both clutches hold the turbine, N m.
     fn beyond_n_m(&self, c: &CarCalibration, now: &Now) -> f64 {
-        (-now.z * self.direction()).max(0.0) * c.beyond_per_s * self.mass_kg_m2[0][0]
+        (-now.z * self.direction).max(0.0) * c.beyond_per_s * self.mass_kg_m2[0][0]
     }
 
     /// The oncoming clutch closes; what it cannot yet carry of the controlled torque stays with the offgoing one.
     fn hand_over(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
         let share = ((now.time_s - self.since_s + c.control_period_s) / c.hand_over_s).min(1.0);
         let taken = share * self.closing_n_m(c, now);
-        let left = (-self.slip_controlled_n_m(c, now) * self.direction() - taken).max(0.0);
+        let left = (-self.slip_controlled_n_m(c, now) * self.direction - taken).max(0.0);
         // The offgoing clutch is open at the end, whatever the slip.
         let left = left.min((1.0 - share) * c.holding_margin * self.handed_n_m.abs());
         let oncoming = taken + self.beyond_n_m(c, now);
@@ -302,17 +384,17 @@ impl ActiveShift {
 
     /// Share of the engine torque that suits the stage.
     pub(super) fn engine_share(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
-        if !self.is_slipping {
+        if !self.is_slipping || self.is_from_neutral {
             return 1.0;
         }
         let z = self.oncoming.slip_at_turbine(measured.turbine_rad_s, measured.output_rad_s);
         let way = 1.0 - z / self.from_rad_s;
         match self.stage {
-            ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction() > 0.0 && way < c.engine_way => {
+            ShiftStage::InertiaPhase if turbine_n_m > 0.0 && self.direction > 0.0 && way < c.engine_way => {
                 c.up_engine_share
             }
             ShiftStage::InertiaPhase | ShiftStage::HandOver
-                if turbine_n_m > 0.0 && self.direction() < 0.0 && way > c.engine_way =>
+                if turbine_n_m > 0.0 && self.direction < 0.0 && way > c.engine_way =>
             {
                 c.down_engine_share
             }

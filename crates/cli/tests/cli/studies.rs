@@ -1,52 +1,35 @@
 //! Studies from the command line: the same bytes however they are made, and no run lost.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
+use std::path::Path;
+use std::process::{Command, Stdio};
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-
-const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/bench.toml");
-
-fn wetclutch(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
-}
+use crate::support::{self, BENCH, Folder, printed, wetclutch};
 
 fn done(arguments: &[&str]) -> String {
-    let output = wetclutch(arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    printed(&wetclutch(arguments))
 }
 
 fn refused(arguments: &[&str]) -> String {
-    let output = wetclutch(arguments);
-    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stdout));
-    String::from_utf8(output.stderr).unwrap()
+    support::refused(&wetclutch(arguments))
 }
 
-/// A folder with a study file, which goes away with the test.
-struct Study(PathBuf);
+/// A folder with a study file.
+struct Study(Folder);
 
 impl Study {
     fn new(name: &str, text: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("wetclutch-study-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        let head = format!("name = \"small\"\ntitle = \"Small\"\nexperiment = '{EXPERIMENT}'\n");
-        std::fs::write(path.join("study.toml"), head + text).unwrap();
-        Self(path)
+        let folder = Folder::new(name);
+        let head = format!("name = \"small\"\ntitle = \"Small\"\nexperiment = '{BENCH}'\n");
+        folder.write("study.toml", head + text);
+        Self(folder)
     }
 
     fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
+        self.0.path(name)
     }
 
     fn file(&self) -> String {
         self.path("study.toml")
-    }
-}
-
-impl Drop for Study {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
@@ -192,7 +175,7 @@ fn refused_before_the_first_run(study: &Study, words: &str) {
         let error = refused(&command);
         assert!(error.contains(words) && error.contains("study.toml:"), "{words}: {error}");
     }
-    assert!(!study.0.join("out").exists());
+    assert!(!Path::new(&study.path("out")).exists());
 }
 
 #[test]
@@ -215,7 +198,7 @@ fn a_name_that_would_spoil_a_table_is_refused_before_the_first_run() {
         refused_before_the_first_run(&study, words);
     }
     let study = Study::new("title", "");
-    let head = format!("name = \"small\"\ntitle = \"two\\nlines\"\nexperiment = '{EXPERIMENT}'\n");
+    let head = format!("name = \"small\"\ntitle = \"two\\nlines\"\nexperiment = '{BENCH}'\n");
     std::fs::write(study.file(), head + FACTORS).unwrap();
     refused_before_the_first_run(&study, "a title must not contain a line break");
 }
@@ -227,11 +210,11 @@ fn a_study_needs_an_observer_and_each_of_its_own_columns() {
     refused_before_the_first_run(&Study::new("twice", &twice), "is in the list twice");
 
     let study = Study::new("bare", &FACTORS.replace("observers = [\"peak-to-peak\", \"open loop\"]", ""));
-    let whole = std::fs::read_to_string(EXPERIMENT).unwrap();
+    let whole = std::fs::read_to_string(BENCH).unwrap();
     let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
     let whole = whole.replace("../vehicles/two_speed_at.toml", vehicle);
     let own = study.path("own.toml");
-    let text = std::fs::read_to_string(study.file()).unwrap().replace(EXPERIMENT, "own.toml");
+    let text = std::fs::read_to_string(study.file()).unwrap().replace(BENCH, "own.toml");
     std::fs::write(study.file(), text).unwrap();
     // A simulation needs none.
     std::fs::write(&own, &whole[..whole.find("[[observer]]").unwrap()]).unwrap();
@@ -359,7 +342,7 @@ fn a_shard_without_runs_is_an_empty_table_that_merges() {
 #[cfg(unix)]
 fn printed_commands_work_as_they_are_whatever_the_paths_and_titles_hold() {
     let study = Study::new("it's here", "");
-    let whole = std::fs::read_to_string(EXPERIMENT).unwrap();
+    let whole = std::fs::read_to_string(BENCH).unwrap();
     let vehicle = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
     std::fs::write(study.path("own.toml"), whole.replace("../vehicles/two_speed_at.toml", vehicle)).unwrap();
     let text = with_observers("[\"open loop\"]").replace("runs = 48", "runs = 2");

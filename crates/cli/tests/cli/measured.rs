@@ -1,53 +1,9 @@
 //! Logs of every format, from `inspect` to `estimate`.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
+use crate::support::{EXPERIMENT, Folder, VEHICLE, printed, stderr, wetclutch};
 
-use std::path::PathBuf;
-use std::process::{Command, Output};
-
-const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
-const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
 /// Files that other programs wrote.
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../logs/tests/data");
-
-fn wetclutch(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
-}
-
-fn stdout(output: &Output) -> String {
-    assert!(output.status.success(), "{}", stderr(output));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// A folder that goes away with the test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("wetclutch-measured-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.0.join(name), text).unwrap();
-        self.path(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 #[test]
 fn inspect_lists_the_channels_of_every_format() {
@@ -60,7 +16,7 @@ fn inspect_lists_the_channels_of_every_format() {
         if let Some(dbc) = &dbc {
             arguments.extend(["--dbc", dbc]);
         }
-        let text = stdout(&wetclutch(&arguments));
+        let text = printed(&wetclutch(&arguments));
         let row = text.lines().find(|line| line.starts_with("N_Eng ")).unwrap_or_else(|| panic!("{name}: {text}"));
         let cells: Vec<&str> = row.split_whitespace().collect();
         // A bus has one more frame, and in the Parquet file six values are absent.
@@ -79,12 +35,12 @@ fn inspect_lists_the_channels_of_every_format() {
 #[test]
 fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
     let folder = Folder::new("suggested");
-    stdout(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("")]));
+    printed(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("")]));
     let log = folder.path("e1_measured.csv");
-    let expected = stdout(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE]));
-    let map = folder.write("map.toml", &stdout(&wetclutch(&["inspect", &log, "--suggest"])));
+    let expected = printed(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE]));
+    let map = folder.write("map.toml", printed(&wetclutch(&["inspect", &log, "--suggest"])));
     let mapped = wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--map", &map]);
-    assert!(stdout(&mapped) == expected, "{}", stderr(&mapped));
+    assert!(printed(&mapped) == expected, "{}", stderr(&mapped));
     assert!(stderr(&mapped).contains("shifts: 1 (7.701 to 8.332 s)"), "{}", stderr(&mapped));
     // The same drive with other names, units and signs of decimals.
     let text = std::fs::read_to_string(&log).unwrap();
@@ -92,8 +48,8 @@ fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
     let other = folder.write("other.csv", &renamed);
     let arguments = ["estimate", &other, "--vehicle", VEHICLE, "--map", &map, "--channel", "oncoming_current=Strom"];
     let mapped = wetclutch(&arguments);
-    assert!(stdout(&mapped) == expected, "{}", stderr(&mapped));
-    let shifts = stdout(&wetclutch(&["inspect", &log, "--map", &map, "--shifts", "--ratios", "2.5,1.0"]));
+    assert!(printed(&mapped) == expected, "{}", stderr(&mapped));
+    let shifts = printed(&wetclutch(&["inspect", &log, "--map", &map, "--shifts", "--ratios", "2.5,1.0"]));
     assert!(
         shifts.starts_with("1 shifts from 0.00 to 9.50 s\n") && shifts.contains("\n1-2    power-on up"),
         "{shifts}"
@@ -134,7 +90,7 @@ fn what_an_estimate_lacks_is_said_before_anything_is_written() {
     let mut arguments = vec!["estimate", &table, "--vehicle", VEHICLE, "--observer", "open-loop"];
     let entries = with(&[]);
     arguments.extend(entries.iter().map(String::as_str));
-    assert_eq!(stdout(&wetclutch(&arguments)).lines().count(), 4);
+    assert_eq!(printed(&wetclutch(&arguments)).lines().count(), 4);
 }
 
 #[test]
@@ -145,9 +101,9 @@ fn the_map_of_the_public_drive_is_in_order() {
     let frames = "(1.0) can0 316#353EAC173E0E1B72\n(1.0) can0 43F#834480FF77901700\n(1.0) can0 440#FFB31B00FF9C1753\n(1.01) can0 316#353EAC173E0E1B72\n(1.01) can0 43F#834480FF77901700\n(1.01) can0 440#FFB31B00FF9C1753\n";
     let log = folder.write("drive.log", frames);
     let output = wetclutch(&["inspect", &log, "--map", &format!("{maps}/genesis_at8.toml"), "--shifts"]);
-    assert!(stdout(&output).starts_with("0 shifts from 1.00 to 1.01 s"), "{}", stderr(&output));
+    assert!(printed(&output).starts_with("0 shifts from 1.00 to 1.01 s"), "{}", stderr(&output));
     assert!(stderr(&output).contains("no valve command is mapped"), "{}", stderr(&output));
-    let text = stdout(&wetclutch(&["inspect", &log, "--dbc", &format!("{maps}/genesis_at8.dbc")]));
+    let text = printed(&wetclutch(&["inspect", &log, "--dbc", &format!("{maps}/genesis_at8.dbc")]));
     // Bytes 5 and 6 of 0x43F: 0x1790 times 0.25 rpm.
     assert!(text.lines().any(|line| line.starts_with("TurbineSpeed ") && line.contains(" 1508 ")), "{text}");
 }

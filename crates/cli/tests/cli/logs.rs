@@ -1,26 +1,16 @@
 //! Logs and drives as files: whatever is read, and wherever it is written to.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
-const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
-const NAMES: &str = "time_s,engine_speed_rad_s,turbine_speed_rad_s,output_speed_rad_s,oncoming_current_a";
+use crate::support::{EXPERIMENT, Folder, VEHICLE, stderr, wetclutch};
 
-fn wetclutch(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
-}
+const NAMES: &str = "time_s,engine_speed_rad_s,turbine_speed_rad_s,output_speed_rad_s,oncoming_current_a";
 
 /// Runs an observer that needs no gains.
 fn estimate(log: &str, more: &[&str]) -> Output {
     wetclutch(&[&["estimate", log, "--vehicle", VEHICLE, "--observer", "open-loop"], more].concat())
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
 }
 
 /// A log of this many rows, 10 ms apart.
@@ -32,42 +22,11 @@ fn log(rows: usize) -> String {
     log
 }
 
-/// A folder that goes away with the test.
-struct Folder(PathBuf);
-
 impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("wetclutch-logs-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn write(&self, name: &str, text: impl AsRef<[u8]>) -> String {
-        std::fs::write(self.0.join(name), text).unwrap();
-        self.path(name)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let names = std::fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-        let mut names: Vec<String> = names.collect();
-        names.sort();
-        names
-    }
-
     #[cfg(unix)]
     fn pipe(&self, name: &str) -> String {
-        assert!(Command::new("mkfifo").arg(self.0.join(name)).status().unwrap().success());
+        assert!(Command::new("mkfifo").arg(self.path(name)).status().unwrap().success());
         self.path(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 

@@ -1,59 +1,12 @@
 //! `fit`: from logs of shifts to a vehicle file, and to estimates with it.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
-#[path = "../../fit/tests/common/mod.rs"]
+#[path = "../../../fit/tests/common/mod.rs"]
 mod common;
-
-use std::path::PathBuf;
-use std::process::{Command, Output};
 
 use common::{Logs, TestCar};
 use trace::signal;
 
-const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
-const SENSORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/bench.toml");
-
-fn wetclutch(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
-}
-
-fn stdout(output: &Output) -> String {
-    assert!(output.status.success(), "{}", stderr(output));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// A folder that goes away with the test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("wetclutch-fit-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.0.join(name), text).unwrap();
-        self.path(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        if std::env::var_os("FIT_KEEP").is_none() {
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
-    }
-}
+use crate::support::{BENCH, Folder, VEHICLE, printed, stderr, wetclutch};
 
 /// RMS error of the torque that the valve maps of a vehicle file give, N m, over logs with their truth.
 fn torque_error(folder: &Folder, vehicle: &str, logs: &[(String, trace::Trace)]) -> f64 {
@@ -61,7 +14,7 @@ fn torque_error(folder: &Folder, vehicle: &str, logs: &[(String, trace::Trace)])
     for (log, truth) in logs {
         let estimate = folder.path("estimate.csv");
         let arguments = ["estimate", log, "--vehicle", vehicle, "--observer", "open-loop-maps", "-o", &estimate];
-        stdout(&wetclutch(&arguments));
+        printed(&wetclutch(&arguments));
         let estimate = trace::read_csv(std::path::Path::new(&estimate)).unwrap();
         let phases = study::true_phases(truth).unwrap();
         let [estimated, torque] = [(&estimate, signal::TORQUE_ESTIMATE), (truth, signal::ONCOMING_TORQUE)]
@@ -94,9 +47,9 @@ fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
     let fitted = folder.path("fitted.toml");
     let mut arguments = vec!["fit"];
     arguments.extend(logs.iter().map(String::as_str));
-    arguments.extend(["--vehicle", VEHICLE, "--sensors", SENSORS, "-o", &fitted]);
+    arguments.extend(["--vehicle", VEHICLE, "--sensors", BENCH, "-o", &fitted]);
     let output = wetclutch(&arguments);
-    let said = stdout(&output);
+    let said = printed(&output);
     let valve_gain = said.lines().find(|line| line.starts_with("valve gain ")).unwrap();
     assert!(valve_gain.ends_with("not told by these logs"), "{valve_gain}");
     assert!(said.contains("torque scale: not told by these logs"), "{said}");
@@ -107,7 +60,7 @@ fn a_fitted_file_estimates_the_torque_of_other_shifts_better() {
     let lost = given.lines().filter(|line| !text.lines().any(|other| other == *line)).count();
     assert!(lost < 40, "{lost} lines changed");
     assert!(text.contains("# fit: x "), "{text}");
-    stdout(&wetclutch(&["check", &fitted]));
+    printed(&wetclutch(&["check", &fitted]));
     let others: Vec<(String, trace::Trace)> = (100..103)
         .map(|number| {
             let [measured, truth] = car.logs(number, Logs::SpeedsAndCurrent);
@@ -173,13 +126,13 @@ fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is
         cells.pop();
         cells.join(",") + "\n"
     });
-    let log = folder.write("log.csv", &lossy.collect::<String>());
+    let log = folder.write("log.csv", lossy.collect::<String>());
     let fitted = folder.path("fitted.toml");
     let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
-    let said = stdout(&output);
+    let said = printed(&output);
     assert!(said.contains("one shift only"), "{said}");
     assert!(said.contains("no shift is held out"), "{said}");
-    stdout(&wetclutch(&["check", &fitted]));
+    printed(&wetclutch(&["check", &fitted]));
     let output = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &fitted]);
     assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));
 }
@@ -195,7 +148,7 @@ fn a_new_vehicle_file_can_be_used_and_is_not_written_over() {
     assert!(stderr(&output).contains("which is no upshift"), "{}", stderr(&output));
     assert!(stderr(&init("4.17")).contains("two ratios"));
     assert!(!init("nan,2").status.success());
-    stdout(&init("4.17,2.34"));
-    stdout(&wetclutch(&["check", &car]));
+    printed(&init("4.17,2.34"));
+    printed(&wetclutch(&["check", &car]));
     assert!(stderr(&init("4.17,2.34")).contains("is there already"));
 }

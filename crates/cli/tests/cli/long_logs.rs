@@ -1,62 +1,17 @@
 //! Estimates of logs with many shifts: shift by shift, in other formats, several at a time, and while they are written.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-const VEHICLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml");
-const EXPERIMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../experiments/e1.toml");
-
-fn wetclutch(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wetclutch")).args(arguments).output().unwrap()
-}
+use crate::support::{EXPERIMENT, Folder, VEHICLE, refused, said, stderr, wetclutch};
 
 fn estimate(log: &str, more: &[&str]) -> Output {
     wetclutch(&[&["estimate", log, "--vehicle", VEHICLE], more].concat())
 }
 
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// The standard error of a command that must succeed.
-fn said(output: &Output) -> String {
-    assert!(output.status.success(), "{}", stderr(output));
-    stderr(output)
-}
-
-/// The standard error of a command whose input must be refused.
-fn refused(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(2), "{}", stderr(output));
-    stderr(output)
-}
-
-/// A folder that goes away with the test.
-struct Folder(PathBuf);
-
 impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("wetclutch-long-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.0.join(name), text).unwrap();
-        self.path(name)
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.0.join(name)).unwrap()
-    }
-
     /// The simulated launch and upshift at 100 Hz, so many times, each 12 s after the one before, with true values; cells of
     /// a column are multiplied.
     fn drives(&self, name: &str, count: u32, wrong: Option<(&str, f64)>) -> String {
@@ -79,12 +34,6 @@ impl Folder {
             }
         }
         self.write(name, &log)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
@@ -240,7 +189,7 @@ fn a_signal_in_another_unit_than_its_name_says_is_an_error_with_the_likely_one()
         let engine = if i % 3 > 0 { "inf" } else { cells[1] };
         [&[cells[0], engine], &cells[2..]].concat().join(",") + "\n"
     };
-    let log = folder.write("log.csv", &text.lines().enumerate().map(broken).collect::<String>());
+    let log = folder.write("log.csv", text.lines().enumerate().map(broken).collect::<String>());
     let text = refused(&estimate(&log, &["-o", &folder.path("out.csv")]));
     assert!(text.contains("readings of engine_speed were refused"), "{text}");
     assert!(!Path::new(&folder.path("out.csv")).exists());

@@ -1,7 +1,5 @@
 //! `docs/equations.md` against the code, both ways.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

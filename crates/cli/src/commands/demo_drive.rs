@@ -1,0 +1,86 @@
+//! `wetclutch demo --vehicle`: a drive through all gears of any car, with the estimate of every shift.
+
+use std::path::Path;
+
+use config::{Car, Drive, Source};
+use design::ShiftErrors;
+use plant::car::{CarCalibration, CarModel, simulate_car_drive};
+use report::drive_page::{DrivePage, findings, shift_cells, shift_rows};
+use report::matrix_page::kind_rows;
+use study::any_shift::drive::{ScoredDrive, score_drive};
+use study::any_shift::matrix::Random;
+use study::any_shift::recording::Recording;
+use study::any_shift::tour::drive_tour;
+use study::any_shift::{RECORD_S, ShiftDraw};
+use trace::Cell;
+
+use super::matrix::bench_sensors;
+use super::simulate_drive::DriveTables;
+use crate::args::Demo;
+use crate::commands::{read_car, writable, write_cells, write_text};
+use crate::failure::Failure;
+use crate::output;
+
+/// The names of the files beside those of the signals.
+const PAGE: &str = "report.html";
+const SHIFTS: &str = "shifts.csv";
+/// The name of the signals' files.
+const NAME: &str = "drive";
+
+pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
+    let car = read_car(vehicle)?;
+    let drive = options.drive.as_deref().map(Drive::read).transpose()?;
+    let folder = &options.output;
+    writable(folder, &[PAGE, SHIFTS])?;
+    let mut random = Random(options.seed);
+    let draw = ShiftDraw::within(&car, &ShiftErrors::STANDARD, || random.uniform());
+    let model = CarModel::new(draw.car(&car)).map_err(|error| Failure::Input(error.to_string()))?;
+    let mut recording = Recording::default();
+    let name = match &drive {
+        Some(drive) => {
+            output::note(&format!("driving \"{}\", {:.0} s", drive.name, drive.duration_s()));
+            let drive = Drive { sample_time_s: RECORD_S, ..drive.clone() };
+            simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| recording.push(sample))?;
+            drive.name
+        }
+        None => {
+            output::note("driving through all gears, up and down, with power and without");
+            drive_tour(&model, &car, |sample| recording.push(sample), || ())?;
+            "Through all gears".to_owned()
+        }
+    };
+    output::note("running the filter and the open loop");
+    let scored = score_drive(&car, &model, &recording, &bench_sensors()?, options.seed)?;
+    write_signals(folder, &car, &recording)?;
+    let cells: Vec<Vec<(String, Cell<'_>)>> = scored.shifts.iter().map(|shift| shift_cells(shift, &car)).collect();
+    write_cells(&folder.join(SHIFTS), &cells)?;
+    let sources: Vec<&Source> = std::iter::once(&car.source).chain(drive.iter().map(|drive| &drive.source)).collect();
+    let page =
+        DrivePage { name: &name, car: &car, draw: Some((&draw, options.seed)), drive: &scored, sources: &sources };
+    write_text(&folder.join(PAGE), &page.html()?)?;
+    print(&scored, &car, &folder.join(PAGE))
+}
+
+/// The signals of the drive, as `simulate` writes them.
+fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<(), Failure> {
+    let mut tables = DriveTables::create(folder, NAME, car)?;
+    recording.samples.iter().try_for_each(|sample| tables.write(car, sample))?;
+    tables.finish(folder).map(drop)
+}
+
+fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {
+    output::line(
+        "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
+         controls the inertia phase; in brackets where the open loop errs by less than 2 N m\n",
+    )?;
+    for (left, (titles, rows)) in [(3, shift_rows(drive, car)), (2, kind_rows(&drive.matrix(car)))] {
+        let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
+        output::table(left, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
+        output::line("")?;
+    }
+    for sentence in findings(drive) {
+        output::line(&sentence)?;
+    }
+    output::line(&format!("\nreport: {}", page.display()))?;
+    Ok(())
+}

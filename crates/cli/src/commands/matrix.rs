@@ -1,0 +1,90 @@
+//! `wetclutch bench --vehicle`: every shift of a gearbox in every kind.
+
+use std::path::Path;
+
+use config::{Car, Experiment, Sensors};
+use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
+use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
+use trace::Cell;
+
+use crate::args::Bench;
+use crate::commands::{json_object, progress, read_car, writable, write_cells, write_text};
+use crate::failure::Failure;
+use crate::output;
+
+/// The names of the files.
+const PAGE: &str = "bench.html";
+const TABLE: &str = "bench.csv";
+
+pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
+    let car = read_car(vehicle)?;
+    let sensors = match &options.sensors {
+        Some(path) => super::estimate::sensors(path)?,
+        None => bench_sensors()?,
+    };
+    options.output.as_deref().map(|folder| writable(folder, &[PAGE, TABLE])).transpose()?;
+    let (draws, seed) = (u64::from(options.draws), options.seed);
+    let all = runs(&car, draws)?;
+    if all == 0 {
+        let message = format!(
+            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; the elements need plates (`pack`) and valves",
+            vehicle.display()
+        );
+        return Err(Failure::Input(message));
+    }
+    output::note(&format!("running the filter and the open loop on {all} shifts"));
+    let bar = progress(all, 0);
+    let plan = MatrixPlan { draws, seed, sensors: &sensors, threads: options.threads.count() };
+    let result = matrix(&car, &plan, || bar.inc(1))?;
+    bar.finish_and_clear();
+    let cells: Vec<Vec<(String, Cell<'_>)>> = result.rows.iter().map(|row| shift_cells(row, &car)).collect();
+    if let Some(folder) = &options.output {
+        write_text(&folder.join(PAGE), &matrix_page(&result, &car, seed)?)?;
+        write_cells(&folder.join(TABLE), &cells)?;
+    }
+    if options.json {
+        let objects: Vec<_> = cells.into_iter().map(json_object).collect();
+        output::line(&serde_json::to_string_pretty(&objects)?)?;
+        return Ok(());
+    }
+    print(&result, &car)?;
+    if let Some(folder) = &options.output {
+        output::line(&format!("\ntable: {}", folder.join(TABLE).display()))?;
+        output::line(&format!("page: {}", folder.join(PAGE).display()))?;
+    }
+    Ok(())
+}
+
+/// The toothed wheels of the built-in bench.
+pub(super) fn bench_sensors() -> Result<Sensors, Failure> {
+    let sensors = Experiment::bench()?.sensors;
+    sensors.ok_or_else(|| Failure::Work("the built-in bench has no sensors".to_owned()))
+}
+
+fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
+    output::line(
+        "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
+         controls the inertia phase; in brackets where the open loop errs by less than 2 N m\n",
+    )?;
+    for (left, (titles, rows)) in [(2, shift_rows(result, car)), (2, kind_rows(result))] {
+        let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
+        output::table(left, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
+        output::line("")?;
+    }
+    let counts = Pooled::of(&result.rows, |_| true).counts;
+    output::line(&format!(
+        "above the open loop by more than 1 N m: {} of {} phases\n\
+         outside their guaranteed ranges: {} of {} pressures and torques of both clutches\n\
+         a held element is said to slip: {} of {} rows",
+        counts.above,
+        counts.compared,
+        output::grouped(counts.outside),
+        output::grouped(counts.values),
+        output::grouped(counts.slips_said),
+        output::grouped(counts.rows),
+    ))?;
+    for sentence in without_tables(result, car).into_iter().chain(failures(result, car)) {
+        output::note(&format!("warning: {sentence}"));
+    }
+    Ok(())
+}

@@ -1,0 +1,217 @@
+//! Cars with any gearbox: demo, bench and estimate.
+
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, wetclutch};
+
+/// Two upshifts under power and one coasting downshift.
+const DRIVE: &str = "name = \"short\"\n[[segment]]\nduration_s = 14\nthrottle = 0.3\n[[segment]]\nduration_s = 10\nthrottle = 0\nbrake = 0.1\n";
+
+fn vehicle(name: &str) -> String {
+    format!("{ROOT}vehicles/{name}.toml")
+}
+
+/// A folder with the signals of a simulated drive of the four-speed car.
+fn simulated(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    let drive = folder.write("drive.toml", DRIVE);
+    let (car, out) = (vehicle("four_speed"), folder.path("sim"));
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &out]));
+    folder
+}
+
+fn estimate(folder: &Folder, log: &str, more: &[&str]) -> std::process::Output {
+    let (log, car) = (folder.path(log), vehicle("four_speed"));
+    wetclutch(&[&["estimate", &log, "--vehicle", &car], more].concat())
+}
+
+/// The cells of a column.
+fn column(text: &str, name: &str) -> Vec<String> {
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let at = names.iter().position(|other| *other == name).unwrap_or_else(|| panic!("{name}: {names:?}"));
+    text.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().to_owned()).collect()
+}
+
+fn numbers(text: &str, name: &str) -> Vec<f64> {
+    column(text, name).iter().map(|cell| cell.parse().unwrap_or(f64::NAN)).collect()
+}
+
+#[test]
+fn the_demo_of_a_car_drives_through_all_gears_and_shows_every_shift() {
+    let folder = Folder::new("demo-car");
+    let run = |name: &str, seed: &str| {
+        let (car, out) = (vehicle("four_speed"), folder.path(name));
+        printed(&wetclutch(&["demo", "--vehicle", &car, "--seed", seed, "-o", &out]))
+    };
+    let text = run("one", "1");
+    assert!(text.contains("12 of 12 shifts were completed") && text.contains("report.html"), "{text}");
+    let shifts = folder.read("one/shifts.csv");
+    let gears: Vec<String> =
+        column(&shifts, "from_gear").iter().zip(column(&shifts, "to_gear")).map(|(a, b)| format!("{a}-{b}")).collect();
+    let up_and_down = ["1-2", "2-3", "3-4", "4-3", "3-2", "2-1"];
+    assert_eq!(gears, [up_and_down, up_and_down].concat());
+    for kind in ["power-on upshift", "coast downshift", "power-off upshift", "power-on downshift"] {
+        assert_eq!(column(&shifts, "kind").iter().filter(|cell| *cell == kind).count(), 3, "{kind}");
+    }
+    assert!(numbers(&shifts, "inside_range").iter().all(|&share| share == 1.0), "{shifts}");
+    // In most shifts the filter is better than the valve model alone.
+    let [filter, valve] =
+        ["rms_n_m", "open_loop_rms_n_m"].map(|what| numbers(&shifts, &format!("inertia_phase_controlling_{what}")));
+    assert!(filter.iter().zip(&valve).filter(|(filter, valve)| filter < valve).count() >= 8, "{filter:?} {valve:?}");
+    let page = folder.read("one/report.html");
+    assert_eq!(page.matches("<figure>").count(), 13);
+    assert!(!page.contains("src=") && !page.contains("@import") && page.trim_end().ends_with("</html>"));
+    run("again", "1");
+    run("other", "2");
+    for name in ["report.html", "shifts.csv", "drive.csv"] {
+        assert!(folder.read(&format!("one/{name}")) == folder.read(&format!("again/{name}")), "{name}");
+        assert!(folder.read(&format!("one/{name}")) != folder.read(&format!("other/{name}")), "{name}");
+    }
+}
+
+#[test]
+fn a_drive_file_can_be_driven_by_the_demo() {
+    let folder = Folder::new("demo-drive");
+    let (drive, car, out) = (folder.write("drive.toml", DRIVE), vehicle("four_speed"), folder.path("out"));
+    let text = printed(&wetclutch(&["demo", "--vehicle", &car, "--drive", &drive, "-o", &out]));
+    assert!(text.contains("1-2    power-on upshift"), "{text}");
+    let none = folder.write("none.toml", "name = \"n\"\n[[segment]]\nduration_s = 2\nthrottle = 0.1\n");
+    let text = printed(&wetclutch(&["demo", "--vehicle", &car, "--drive", &none, "-o", &out]));
+    assert!(text.contains("0 of 0 shifts"), "{text}");
+}
+
+#[test]
+fn the_bench_of_a_gearbox_has_every_shift_in_every_kind_on_any_number_of_threads() {
+    let folder = Folder::new("bench-car");
+    let run = |name: &str, more: &[&str]| {
+        let (car, out) = (vehicle("four_speed"), folder.path(name));
+        wetclutch(&[&["bench", "--vehicle", &car, "--draws", "2", "-o", &out], more].concat())
+    };
+    let text = printed(&run("one", &["--threads", "1"]));
+    assert!(text.contains("outside their guaranteed ranges: 0 of "), "{text}");
+    let rows = |text: &str| text.lines().filter(|line| line.contains("upshift") || line.contains("downshift")).count();
+    // Twelve shifts, and the kinds by class.
+    assert!(rows(&text) > 12, "{text}");
+    let table = folder.read("one/bench.csv");
+    assert_eq!(table.lines().count(), 13);
+    assert!(numbers(&table, "failed_runs").iter().all(|&failed| failed == 0.0));
+    let json = printed(&run("three", &["--threads", "3", "--json"]));
+    let objects: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
+    let name = "inertia_phase_controlling_torque_rms_n_m";
+    let in_json: Vec<f64> = objects.iter().map(|object| object[name].as_f64().unwrap()).collect();
+    assert_eq!(in_json, numbers(&table, name));
+    for name in ["bench.csv", "bench.html"] {
+        assert!(folder.read(&format!("one/{name}")) == folder.read(&format!("three/{name}")), "{name}");
+    }
+    printed(&run("other", &["--seed", "9"]));
+    assert!(folder.read("other/bench.csv") != table);
+}
+
+#[test]
+fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the_truth() {
+    let folder = simulated("estimate-car");
+    let text = said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path("whole.csv")]));
+    assert!(text.contains("pressures and torques of the shift clutches are within"), "{text}");
+    said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("measured.csv")]));
+    assert!(folder.read("whole.csv") == folder.read("measured.csv"));
+    let (estimates, truth) = (folder.read("whole.csv"), folder.read("sim/short.csv"));
+    for clutch in ["offgoing", "oncoming"] {
+        assert_eq!(column(&estimates, clutch), column(&truth, clutch), "{clutch}");
+        let [found, least, greatest] = ["pressure_estimate_pa", "pressure_least_pa", "pressure_greatest_pa"]
+            .map(|name| numbers(&estimates, &format!("{clutch}_{name}")));
+        let truth = numbers(&truth, &format!("{clutch}_pressure_pa"));
+        let rows = (0..truth.len()).filter(|&row| truth[row].is_finite());
+        assert!(rows.clone().count() > 150);
+        for row in rows {
+            assert!(least[row] - 1.0 <= truth[row] && truth[row] <= greatest[row] + 1.0, "{clutch} {row}");
+            assert!((found[row] - truth[row]).abs() < 0.2e6, "{clutch} {row}: {} {}", found[row], truth[row]);
+        }
+    }
+    let shifts = folder.read("whole_shifts.csv");
+    assert!(shifts.lines().count() >= 4, "{shifts}");
+    assert!(numbers(&shifts, "complete_s").iter().all(|time_s| (0.4..2.0).contains(time_s)), "{shifts}");
+    let json: Vec<serde_json::Value> = serde_json::from_str(&folder.read("whole_shifts.json")).unwrap();
+    assert_eq!(json.len(), shifts.lines().count() - 1);
+    assert!(folder.read("whole_report.html").contains("Kinds of shift"));
+    let page = folder.read("measured_report.html");
+    assert!(!page.contains("Kinds of shift") && !page.contains(">true<") && page.contains("<figure>"));
+    said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path("few.csv"), "--columns", "health,gear"]));
+    assert_eq!(folder.read("few.csv").lines().next(), Some("time_s,health,gear"));
+    for name in ["e.parquet", "e.mf4"] {
+        said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path(name)]));
+        assert!(std::fs::metadata(folder.path(name)).unwrap().len() > 10_000, "{name}");
+    }
+}
+
+#[test]
+fn lost_repeated_and_late_readings_of_a_drive_are_no_error() {
+    let folder = simulated("lost-car");
+    let text = folder.read("sim/short_measured.csv");
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| names.iter().position(|other| *other == name).unwrap();
+    let lost = |row: usize, cell: usize| match row % 7 {
+        0 => cell == at("turbine_speed_rad_s"),
+        1 => cell == at("engine_speed_rad_s"),
+        2 => cell == at("element_int_current_a") || cell == at("gear"),
+        // A tenth of a second without any speed.
+        _ => (600..610).contains(&row) && (1..=4).contains(&cell),
+    };
+    let mut log = format!("{}\n", names.join(","));
+    for (row, line) in text.lines().skip(1).enumerate() {
+        let cells = line.split(',').enumerate().map(|(cell, value)| match value {
+            _ if row > 0 && lost(row, cell) => String::new(),
+            // As some loggers write a gear.
+            gear if cell == at("gear") => format!("{gear}.0"),
+            value => value.to_owned(),
+        });
+        log += &(cells.collect::<Vec<_>>().join(",") + "\n");
+    }
+    folder.write("lost.csv", log);
+    said(&estimate(&folder, "lost.csv", &["-o", &folder.path("lost_out.csv")]));
+    let shifts = folder.read("lost_out_shifts.csv");
+    assert!(shifts.lines().count() >= 4, "{shifts}");
+    let estimates = folder.read("lost_out.csv");
+    assert_eq!(estimates.lines().count(), text.lines().count());
+    assert!(!estimates.contains("NaN") && !estimates.contains("inf"));
+}
+
+#[test]
+fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
+    let folder = simulated("wrong-car");
+    let text = folder.read("sim/short_measured.csv");
+    let first = text.lines().take(2).collect::<Vec<_>>().join("\n") + "\n";
+    let cases = [
+        (text.replacen("turbine_speed_rad_s", "turbine_speed_rpm", 1), "check the units of both speeds"),
+        (text.replacen("output_speed_rad_s", "other_rad_s", 1), "there is no column `output_speed_rad_s`"),
+        (text.replacen("element_int_current_a", "int", 1), "there is no column `element_int_current_a`"),
+        (text.replacen("target_gear", "goal", 1), "there is no column `target_gear`"),
+        (
+            first.replacen(",1,1,", ",9,1,", 1),
+            "log.csv:2: the gear `9`, which the gearbox does not have\nhint: its gears are",
+        ),
+        (first.replacen(",1,1,", ",,1,", 1), "log.csv:2: no gear yet"),
+        (String::new(), "the file is empty"),
+    ];
+    for (log, words) in cases {
+        folder.write("log.csv", log);
+        let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        assert!(error.contains(words), "{words}: {error}");
+        assert!(!folder.names().iter().any(|name| name.starts_with("out")), "{words}");
+    }
+    // One row is a log, without shifts.
+    folder.write("log.csv", first);
+    said(&estimate(&folder, "log.csv", &["-o", &folder.path("row.csv")]));
+    assert_eq!(folder.read("row.csv").lines().count(), 2);
+    for option in [["--observer", "rigid"], ["--map", "map.toml"], ["--shift", "2"]] {
+        let error = refused(&estimate(&folder, "log.csv", &option));
+        assert!(error.contains("has no effect with the vehicle file of a car with a gearbox"), "{error}");
+    }
+}
+
+#[test]
+fn commands_for_a_gearbox_say_so_where_a_file_has_none() {
+    for command in [vec!["demo", "--vehicle", VEHICLE], vec!["bench", "--vehicle", VEHICLE]] {
+        let error = refused(&wetclutch(&command));
+        assert!(error.contains("this vehicle file describes one shift") && error.contains("hint: "), "{error}");
+    }
+    let both = refused(&wetclutch(&["bench", EXPERIMENT, "--vehicle", VEHICLE]));
+    assert!(both.contains("cannot be used with"), "{both}");
+}

@@ -1,0 +1,440 @@
+//! The page of a simulated drive of a car with any gearbox: the drive, the table of its shifts, shifts drawn.
+
+use config::{Car, Source};
+use minijinja::{Value, context};
+use observer::Health;
+use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
+use study::any_shift::matrix::{ErrorsByPhase, controlling};
+use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, TruePhase};
+use trace::Cell;
+use trace::units::{km_h, mpa, rpm};
+
+use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
+use crate::log_page::{ESTIMATE, compact, health_panel, panel};
+use crate::matrix_page::{kind_rows, ratio, torques};
+use crate::page::{PageError, inline, origin, templates};
+use crate::palette::{RANGE, Weight};
+use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
+use crate::tables::{coverage, number};
+
+/// Shifts that are drawn; of a drive with more, the worst.
+pub const MOST_DRAWN: usize = 60;
+/// Worst shifts that are named.
+const WORST: usize = 5;
+/// Time before and after a shift that its figure shows, s.
+const MARGIN_S: [f64; 2] = [0.15, 0.25];
+/// Points of a curve over the whole drive.
+const POINTS: usize = 3000;
+/// Part of the drive that a step of the gear takes in its figure: a pixel.
+const STEP: f64 = 900.0;
+/// Shortest time axis, s.
+const SHORTEST_S: f64 = 0.1;
+/// Room above the pressures of a clutch that slips, and least height of their axis, MPa.
+const PRESSURE_ROOM: f64 = 1.5;
+const LEAST_MPA: f64 = 0.2;
+const OPEN_LOOP: Stroke = Stroke { colour: "#767676", weight: Weight::Rival, dash: Some("6 3") };
+
+/// What a page is made from.
+pub struct DrivePage<'a> {
+    /// The name of the drive.
+    pub name: &'a str,
+    /// The car that the filter and the shift controller know.
+    pub car: &'a Car,
+    /// How the driven car differs from it, and the seed of that, where the drive was simulated.
+    pub draw: Option<(&'a ShiftDraw, u64)>,
+    /// The drive.
+    pub drive: &'a ScoredDrive,
+    /// The files that the drive follows from.
+    pub sources: &'a [&'a Source],
+}
+
+impl DrivePage<'_> {
+    /// The page; it needs nothing but itself.
+    ///
+    /// # Errors
+    /// None in a released program; the tests render the template.
+    pub fn html(&self) -> Result<String, PageError> {
+        let (car, drive) = (self.car, self.drive);
+        let worst = worst_first(&drive.shifts);
+        let mut drawn: Vec<&ScoredShift> = worst.iter().take(MOST_DRAWN).copied().collect();
+        drawn.sort_by_key(|shift| shift.number);
+        let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
+        let (titles, rows) = shift_rows(drive, car);
+        let rows = rows.into_iter().zip(&drive.shifts);
+        let rows: Vec<Value> = rows.map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
+        let (kind_titles, kinds) = kind_rows(&drive.matrix(car));
+        let figures = drawn.iter().map(|shift| {
+            context! {
+                number => shift.number,
+                title => title(shift, car),
+                at => number(shift.time_s[0], 2),
+                clutches => clutch_names(shift, car).join(" opens, ") + " closes",
+                svg => inline(&compact(&shift_figure(shift, drive, car).svg())),
+            }
+        });
+        let named = worst.iter().take(WORST).map(|shift| {
+            context! { number => shift.number, gears => gears(shift, car), error => number(worst_error(shift), 1) }
+        });
+        Ok(templates()?.get_template("drive.html")?.render(context! {
+            name => self.name,
+            title => "drive",
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &car.name,
+            gearbox_name => &car.gearbox.name,
+            overview => inline(&compact(&overview_figure(drive, car).svg())),
+            findings => findings(drive),
+            kind_titles,
+            kinds,
+            titles,
+            rows,
+            figures => figures.collect::<Vec<_>>(),
+            worst => named.collect::<Vec<_>>(),
+            undrawn => drive.shifts.len() - drawn.len(),
+            draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
+            converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
+            seed => self.draw.map(|(_, seed)| seed),
+            has_truth => drive.has_truth(),
+            inputs => origin(self.sources),
+        })?)
+    }
+}
+
+fn name(car: &Car, gear: usize) -> &str {
+    car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str())
+}
+
+fn gears(shift: &ScoredShift, car: &Car) -> String {
+    format!("{}-{}", name(car, shift.from), name(car, shift.to))
+}
+
+fn title(shift: &ScoredShift, car: &Car) -> String {
+    let kind = shift.kind.map_or("shift without torque", |kind| kind.name());
+    format!("{}, {kind}", gears(shift, car))
+}
+
+/// Offgoing and oncoming element.
+fn clutch_names<'a>(shift: &ScoredShift, car: &'a Car) -> [&'a str; 2] {
+    shift.elements.map(|at| car.gearbox.elements.get(at).map_or("?", |element| element.name.as_str()))
+}
+
+/// The largest RMS error of the controlling clutch's torque in a phase, N m.
+fn worst_error(shift: &ScoredShift) -> f64 {
+    let errors = shift.errors().unwrap_or_default();
+    errors.iter().map(|phase| phase[0].torque.rms_n_m()[0]).fold(0.0, f64::max)
+}
+
+/// The shifts with the largest error first.
+fn worst_first(shifts: &[ScoredShift]) -> Vec<&ScoredShift> {
+    let mut worst: Vec<&ScoredShift> = shifts.iter().collect();
+    worst.sort_by(|a, b| worst_error(b).total_cmp(&worst_error(a)));
+    worst
+}
+
+/// Friction and valve gain of each element of the driven car over those of the known one.
+fn draw_rows(draw: &ShiftDraw, car: &Car) -> Vec<Value> {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).zip(draw.friction.iter().zip(&draw.valve_gain));
+    let with_plates = elements.filter(|((_, clutch), _)| clutch.is_some());
+    let row = with_plates.map(|((element, _), (friction, gain))| {
+        context! { element => &element.name, friction => number(*friction, 3), gain => number(*gain, 3) }
+    });
+    row.collect()
+}
+
+/// What happened, in sentences.
+pub fn findings(drive: &ScoredDrive) -> Vec<String> {
+    let shifts = &drive.shifts;
+    let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
+    let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
+    let clutches = || shifts.iter().flat_map(|shift| &shift.rows).flat_map(|row| &row.clutches);
+    let (all, inside) = (2 * clutches().count(), 2 * clutches().filter(|clutch| clutch.in_range).count());
+    let rows = || shifts.iter().flat_map(|shift| &shift.rows);
+    let good = rows().filter(|row| row.health == Health::Good).count();
+    let mut sentences = vec![
+        format!(
+            "{completed} of {} shifts were completed; the longest took {} s.",
+            shifts.len(),
+            number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
+        ),
+        format!(
+            "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",
+            number(most(|shift| shift.quality.flare_rad_s), 1),
+            number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
+        ),
+        format!("Health is good in {good} of {} samples of the shifts.", rows().count()),
+    ];
+    if drive.has_truth() {
+        sentences.push(format!(
+            "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
+        ));
+    }
+    let hidden = shifts.iter().filter(|shift| shift.rows.is_empty()).count();
+    if hidden > 0 {
+        sentences.push(format!("Of {hidden} shifts the filter has no tables: nothing is estimated."));
+    }
+    sentences
+}
+
+/// Titles and rows of the table of shifts. Errors of the clutch torque where the truth is known, else means of the estimates; columns
+/// that no shift fills are left out.
+pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    /// A title and its cell.
+    type Column = (&'static str, fn(&ScoredShift, &Car) -> String);
+    const COLUMNS: &[Column] = &[
+        ("#", |s, _| s.number.to_string()),
+        ("shift", gears),
+        ("kind", |s, _| s.kind.map_or("–", |kind| kind.name()).to_owned()),
+        ("begin s", |s, _| number(s.time_s[0], 2)),
+        ("time s", |s, _| number(s.quality.complete_s.unwrap_or(f64::NAN), 2)),
+        ("torque phase s", |s, _| number(s.length_s(TruePhase::Torque), 2)),
+        ("inertia phase s", |s, _| number(s.length_s(TruePhase::Inertia), 2)),
+        ("flare rad/s", |s, _| number(s.quality.flare_rad_s, 1)),
+        ("beyond rad/s", |s, _| number(s.quality.past_synchronous_rad_s, 1)),
+        (
+            "jerk m/s^3",
+            |s, _| if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 0) },
+        ),
+        ("inertia phase", |s, _| scored(s, |[_, [inertia, _]]| ratio(&inertia.torque))),
+        ("N m", |s, _| scored(s, |[_, [inertia, _]]| torques(&inertia.torque))),
+        ("torque phase", |s, _| scored(s, |[[torque, _], _]| ratio(&torque.torque))),
+        ("N m", |s, _| scored(s, |[[torque, _], _]| torques(&torque.torque))),
+        ("other, inertia", |s, _| scored(s, |[_, [_, other]]| ratio(&other.torque))),
+        ("in range", |s, _| if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }),
+        ("controlling", |s, car| unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))),
+        ("pressure MPa", |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3)))),
+        ("torque N m", |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0)))),
+        ("hidden", |s, _| s.hidden().map_or("–".to_owned(), |share| format!("{:.0} %", 100.0 * share))),
+        ("health", |s, _| s.worst_health().map_or("no tables".to_owned(), health)),
+    ];
+    let cells: Vec<Vec<String>> =
+        drive.shifts.iter().map(|shift| COLUMNS.iter().map(|(_, cell)| cell(shift, car)).collect()).collect();
+    let filled = |column: &usize| cells.iter().any(|row| !row[*column].is_empty());
+    let columns: Vec<usize> = (0..COLUMNS.len()).filter(filled).collect();
+    let titles = columns.iter().map(|column| COLUMNS[*column].0).collect();
+    (titles, cells.iter().map(|row| columns.iter().map(|column| row[*column].clone()).collect()).collect())
+}
+
+/// A cell of a shift whose truth is known.
+fn scored(shift: &ScoredShift, cell: fn(ErrorsByPhase) -> String) -> String {
+    shift.errors().filter(|_| shift.has_truth()).map_or(String::new(), cell)
+}
+
+/// A cell of a shift whose truth is not known.
+fn unscored(shift: &ScoredShift, cell: impl Fn(&ScoredShift) -> Option<String>) -> String {
+    Some(shift).filter(|shift| !shift.has_truth()).and_then(cell).unwrap_or_default()
+}
+
+/// A mean with the means of the ends of its range, in another unit.
+fn ranged([mean, low, high]: &[f64; 3], unit: f64, decimals: usize) -> String {
+    let [mean, low, high] = [mean, low, high].map(|value| number(unit * value, decimals));
+    format!("{mean} ({low}–{high})")
+}
+
+fn health((worst, share): (Health, f64)) -> String {
+    match worst {
+        Health::Good => "good".to_owned(),
+        worst => format!("{} {:.0} %", worst.name().replace('_', " "), (100.0 * share).max(1.0)),
+    }
+}
+
+/// The shifts as named cells in SI units, for files. RMS errors of the torque of the controlling clutch and of the
+/// other, N m; means of the inertia phase.
+pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'a>)> {
+    let [offgoing, oncoming] = clutch_names(shift, car);
+    let quality = &shift.quality;
+    let number = |name: &str, value: f64| (name.to_owned(), Cell::Number(value));
+    let word = |name: &str, word: &'a str| (name.to_owned(), Cell::Word(word));
+    let mut cells = vec![
+        ("number".to_owned(), Cell::Whole(shift.number as u64)),
+        number("time_s", shift.time_s[0]),
+        word("from_gear", name(car, shift.from)),
+        word("to_gear", name(car, shift.to)),
+        word("kind", shift.kind.map_or("", |kind| kind.name())),
+        word("offgoing", offgoing),
+        word("oncoming", oncoming),
+        number("complete_s", quality.complete_s.unwrap_or(f64::NAN)),
+        number("torque_phase_s", shift.length_s(TruePhase::Torque)),
+        number("inertia_phase_s", shift.length_s(TruePhase::Inertia)),
+        number("flare_rad_s", quality.flare_rad_s),
+        number("past_synchronous_rad_s", quality.past_synchronous_rad_s),
+        number("held_slip_rad_s", quality.held_slip_rad_s),
+        number("tie_up_n_m", quality.tie_up_n_m),
+        number("jerk_m_s3", quality.jerk_m_s3),
+    ];
+    let errors: ErrorsByPhase = shift.errors().unwrap_or_default();
+    for (phase, clutches) in ["torque_phase", "inertia_phase"].iter().zip(errors) {
+        for (clutch, errors) in ["controlling", "other"].iter().zip(clutches) {
+            let ends = errors.torque.rms_n_m().map(|n_m| if errors.torque.rows > 0.0 { n_m } else { f64::NAN });
+            for (what, value) in ["rms_n_m", "open_loop_rms_n_m"].iter().zip(ends) {
+                cells.push(number(&format!("{phase}_{clutch}_{what}"), value));
+            }
+        }
+    }
+    for (c, role) in ["offgoing", "oncoming"].iter().enumerate() {
+        let none = [f64::NAN; 3];
+        let (pressure, torque) = (shift.mean_pressure_pa(c).unwrap_or(none), shift.mean_torque_n_m(c).unwrap_or(none));
+        for (what, at) in [("", 0), ("least_", 1), ("greatest_", 2)] {
+            cells.push(number(&format!("{role}_pressure_mean_{what}pa"), pressure[at]));
+            cells.push(number(&format!("{role}_torque_mean_{what}n_m"), torque[at]));
+        }
+    }
+    cells.push(number("hidden_share", shift.hidden().unwrap_or(f64::NAN)));
+    let inside = shift.inside().filter(|_| shift.has_truth());
+    cells.push(number("inside_range", inside.unwrap_or(f64::NAN)));
+    cells.push(word("worst_health", shift.worst_health().map_or("", |(health, _)| health.name())));
+    cells
+}
+
+/// The gear as a number for an axis: its name where that is a number, else its place among the forward gears.
+fn gear_number(car: &Car, gear: usize) -> f64 {
+    let place = car.gearbox.forward_gears().iter().position(|&forward| forward == gear);
+    #[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
+    let place = place.map_or(0.0, |place| place as f64 + 1.0);
+    name(car, gear).parse().unwrap_or(place)
+}
+
+/// The gear over time. A step takes `wide_s`, because a figure draws only one of points that lie closer.
+fn gear_steps(drive: &ScoredDrive, car: &Car, wide_s: f64) -> Vec<(f64, f64)> {
+    let mut steps: Vec<(f64, f64)> = Vec::new();
+    for state in &drive.states {
+        let gear = gear_number(car, state.gear);
+        match steps.last() {
+            Some(&(_, before)) if before == gear => {}
+            Some(&(_, before)) => steps.extend([(state.time_s, before), (state.time_s + wide_s, gear)]),
+            None => steps.push((state.time_s, gear)),
+        }
+    }
+    let last_s = drive.states.last().map_or(0.0, |state| state.time_s);
+    steps.extend(steps.last().copied().map(|(_, gear)| (last_s, gear)));
+    steps
+}
+
+/// Gear, speeds and pedals over the whole drive.
+fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
+    let states = &drive.states;
+    let every = states.len().div_ceil(POINTS).max(1);
+    let thinned = || states.iter().step_by(every);
+    let curve = |label: &str, stroke: Stroke, value: &dyn Fn(&DriveState) -> f64| Series {
+        label: label.to_owned(),
+        stroke: Stroke { weight: Weight::Rival, ..stroke },
+        points: thinned().map(|state| (state.time_s, value(state))).collect(),
+    };
+    let [first_s, last_s] = [states.first(), states.last()].map(|state| state.map_or(0.0, |state| state.time_s));
+    let gear = Series {
+        label: "gear".to_owned(),
+        stroke: Stroke::SIGNAL,
+        points: gear_steps(drive, car, (last_s - first_s) / STEP),
+    };
+    let is = |state: &DriveState| Health::ALL.map(|health| health == state.health);
+    let healths: Vec<_> = states.iter().map(|state| (state.time_s, is(state))).collect();
+    let spans = drive.shifts.iter().map(|shift| Span {
+        label: String::new(),
+        start: shift.time_s[0],
+        end: shift.time_s[1],
+        colour: TORQUE_PHASE,
+    });
+    let speeds = ["engine", "turbine"].into_iter().zip([Stroke::THIRD, Stroke::SIGNAL]).enumerate();
+    let speeds = speeds.map(|(i, (label, stroke))| curve(label, stroke, &|state| rpm(state.speeds_rad_s[i])));
+    let pedals = ["throttle", "brake"].into_iter().zip([Stroke::SIGNAL, Stroke::THIRD]).enumerate();
+    let pedals = pedals.map(|(i, (label, stroke))| curve(label, stroke, &|state| state.pedals[i]));
+    let panels = [
+        panel("gear", 120.0, vec![gear]),
+        panel("speed (km/h)", 80.0, vec![curve("vehicle", Stroke::SIGNAL, &|state| km_h(state.vehicle_m_s))]),
+        panel("speed (rpm)", 110.0, speeds.collect()),
+        Panel { axis: Axis::Fixed(0.0, 1.0), ..panel("pedals (0 to 1)", 70.0, pedals.collect()) },
+    ];
+    Figure {
+        x_label: "time (s)",
+        x_range: (first_s, last_s.max(first_s + SHORTEST_S)),
+        spans: spans.take(4 * MOST_DRAWN).collect(),
+        panels: panels.into_iter().chain(health_panel(&healths)).collect(),
+    }
+}
+
+/// A shift with some time around it.
+fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
+    let [from_s, to_s] = [shift.time_s[0] - MARGIN_S[0], shift.time_s[1] + MARGIN_S[1]];
+    let first = drive.states.partition_point(|state| state.time_s < from_s);
+    let last = drive.states.partition_point(|state| state.time_s <= to_s);
+    let states = &drive.states[first..last];
+    let speed = |label: String, stroke: Stroke, value: &dyn Fn(&DriveState) -> f64| Series {
+        label,
+        stroke,
+        points: states.iter().map(|state| (state.time_s, rpm(value(state)))).collect(),
+    };
+    let in_gear = |gear: usize, stroke: Stroke| {
+        let ratio = car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        speed(format!("turbine in gear {}", name(car, gear)), stroke, &|state| ratio * state.speeds_rad_s[2])
+    };
+    let dotted = |dash| Stroke { weight: Weight::Rival, dash: Some(dash), ..Stroke::SIGNAL };
+    let speeds = vec![
+        speed("engine".to_owned(), Stroke::THIRD, &|state| state.speeds_rad_s[0]),
+        speed("turbine".to_owned(), Stroke::SIGNAL, &|state| state.speeds_rad_s[1]),
+        in_gear(shift.from, dotted("2.5 2")),
+        in_gear(shift.to, dotted("9 2.5 2 2.5")),
+    ];
+    let mut panels = vec![panel("speed (rpm)", 120.0, speeds)];
+    let names = clutch_names(shift, car);
+    if !shift.rows.is_empty() {
+        let roles = || ["offgoing", "oncoming"].into_iter().zip(names).enumerate();
+        panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
+        panels.extend(roles().map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
+    }
+    let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
+    let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
+    panels.extend(health_panel(&healths));
+    let mut spans = phase_spans(shift, "torque phase", TruePhase::Torque, TORQUE_PHASE);
+    spans.extend(phase_spans(shift, "inertia phase", TruePhase::Inertia, INERTIA_PHASE));
+    spans.sort_by(|a, b| a.start.total_cmp(&b.start));
+    Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
+}
+
+/// The pieces of a phase; the longest has its name.
+fn phase_spans(shift: &ScoredShift, label: &str, phase: TruePhase, colour: &'static str) -> Vec<Span> {
+    let pieces = shift.spans_s(phase);
+    let longest = pieces.iter().map(|[start, end]| end - start).fold(0.0, f64::max);
+    let label = |[start, end]: [f64; 2]| if end - start >= longest { label.to_owned() } else { String::new() };
+    pieces.into_iter().map(|piece| Span { label: label(piece), start: piece[0], end: piece[1], colour }).collect()
+}
+
+/// Truth, estimate and valve model of a clutch's torque. One that holds has no torque by its valve model, and its range is all
+/// that it can hold: neither is drawn.
+fn torque_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
+    let held = |clutch: &ClutchRow, value: f64| if clutch.sticks { f64::NAN } else { value };
+    let of = |clutch: &ClutchRow| {
+        let [truth, estimate, valve] = clutch.torque_n_m;
+        let range = clutch.torque_range_n_m.map(|range| range.map(|end| held(clutch, end)));
+        ([truth, estimate, held(clutch, valve)], range)
+    };
+    clutch_panel(rows, c, (format!("torque of {clutch} (N\u{a0}m)"), 125.0, Axis::All), of)
+}
+
+/// Truth, estimate and valve model of a clutch's pressure. The axis follows the pressures at which it slips: of one that holds the
+/// speeds show nothing.
+fn pressure_panel(rows: &[ShiftScoreRow], c: usize, clutch: String) -> Panel {
+    let slipping = rows.iter().map(|row| &row.clutches[c]).filter(|clutch| !clutch.sticks);
+    let most = slipping.flat_map(|clutch| clutch.pressure_pa).map(mpa).fold(LEAST_MPA, f64::max);
+    let of = |clutch: &ClutchRow| (clutch.pressure_pa.map(mpa), clutch.pressure_range_pa.map(|range| range.map(mpa)));
+    let axis = Axis::Within(0.0, PRESSURE_ROOM * most);
+    clutch_panel(rows, c, (format!("pressure of {clutch} (MPa)"), 110.0, axis), of)
+}
+
+fn clutch_panel(
+    rows: &[ShiftScoreRow],
+    c: usize,
+    (y_label, height, axis): (String, f64, Axis),
+    of: impl Fn(&ClutchRow) -> ([f64; 3], Option<[f64; 2]>),
+) -> Panel {
+    let curve = |which: usize, label: &str, stroke: Stroke| Series {
+        label: label.to_owned(),
+        stroke,
+        points: rows.iter().map(|row| (row.time_s, of(&row.clutches[c]).0[which])).collect(),
+    };
+    let end = |end: usize| {
+        let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1.map_or(f64::NAN, |range| range[end]);
+        rows.iter().map(|row| (row.time_s, value(row))).collect()
+    };
+    let series =
+        vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE), curve(2, "valve model", OPEN_LOOP)];
+    let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
+    Panel { y_label, height, series, band: Some(band), axis }
+}

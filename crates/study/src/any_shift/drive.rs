@@ -1,0 +1,258 @@
+//! A whole drive: what the filter says of every shift of it, beside the truth and the valve model alone.
+
+use config::{Car, Sensors};
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::ShiftKind;
+use observer::Health;
+use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating};
+
+use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
+use super::recording::Recording;
+use super::{AnyShiftError, ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase, row};
+
+/// The drive at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveState {
+    /// Time, s.
+    pub time_s: f64,
+    /// Gear; during a shift the one that is left.
+    pub gear: usize,
+    /// Throttle and brake, 0 to 1.
+    pub pedals: [f64; 2],
+    /// Vehicle speed, m/s.
+    pub vehicle_m_s: f64,
+    /// True speeds of engine, turbine and output, rad/s.
+    pub speeds_rad_s: [f64; 3],
+    /// What the filter says of itself.
+    pub health: Health,
+}
+
+/// A shift of a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoredShift {
+    /// Its number, from 1.
+    pub number: usize,
+    /// The gear before.
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// Direction and power at the request; `None` without torque.
+    pub kind: Option<ShiftKind>,
+    /// Places of the offgoing and the oncoming element in the gearbox.
+    pub elements: [usize; 2],
+    /// Time of the request, and of the last row, s.
+    pub time_s: [f64; 2],
+    /// How it went.
+    pub quality: CarShiftQuality,
+    /// Truth and estimates; empty where the filter has no tables.
+    pub rows: Vec<ShiftScoreRow>,
+}
+
+impl ScoredShift {
+    /// Errors by phase of the controlling and the other clutch; none where the shift has no kind.
+    pub fn errors(&self) -> Option<ErrorsByPhase> {
+        self.kind.map(|kind| errors_by_phase(&self.rows, kind))
+    }
+
+    /// How long a true phase lasts, s.
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    pub fn length_s(&self, phase: TruePhase) -> f64 {
+        self.rows.iter().filter(|row| row.phase() == Some(phase)).count() as f64 * SAMPLE_S
+    }
+
+    /// Begin and end of every piece of a phase, s.
+    pub fn spans_s(&self, phase: TruePhase) -> Vec<[f64; 2]> {
+        let pieces = self.rows.split(|row| row.phase() != Some(phase));
+        pieces.filter_map(|piece| Some([piece.first()?.time_s, piece.last()?.time_s + SAMPLE_S])).collect()
+    }
+
+    /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without rows.
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    pub fn inside(&self) -> Option<f64> {
+        let clutches = || self.rows.iter().flat_map(|row| &row.clutches);
+        let inside = clutches().filter(|clutch| clutch.in_range).count();
+        (!self.rows.is_empty()).then(|| inside as f64 / clutches().count() as f64)
+    }
+
+    /// Share of the rows of both phases in which the speeds show nothing of the controlling clutch's torque while it slips; `None`
+    /// where there are none.
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    pub fn hidden(&self) -> Option<f64> {
+        let clutch = controlling(self.kind?);
+        let rows = self.rows.iter().filter(|row| row.phase().is_some()).map(|row| &row.clutches[clutch]);
+        let slipping: Vec<bool> = rows.filter(|clutch| !clutch.sticks).map(|clutch| clutch.hidden).collect();
+        let hidden = slipping.iter().filter(|hidden| **hidden).count();
+        (!slipping.is_empty()).then(|| hidden as f64 / slipping.len() as f64)
+    }
+
+    /// Whether the true pressures and torques are known, as in a simulation.
+    pub fn has_truth(&self) -> bool {
+        self.rows.iter().any(|row| row.clutches[0].torque_n_m[0].is_finite())
+    }
+
+    /// Mean estimate of the inertia phase, and of the ends of its range: pressure of the offgoing (0) or oncoming (1) clutch, Pa.
+    pub fn mean_pressure_pa(&self, clutch: usize) -> Option<[f64; 3]> {
+        self.mean(clutch, |clutch| (clutch.pressure_pa[1], clutch.pressure_range_pa))
+    }
+
+    /// The same of its torque, N m.
+    pub fn mean_torque_n_m(&self, clutch: usize) -> Option<[f64; 3]> {
+        self.mean(clutch, |clutch| (clutch.torque_n_m[1], clutch.torque_range_n_m))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    fn mean(&self, clutch: usize, of: impl Fn(&ClutchRow) -> (f64, Option<[f64; 2]>)) -> Option<[f64; 3]> {
+        let (mut sum, mut count) = ([0.0; 3], 0_usize);
+        for row in self.rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia)) {
+            let (value, range) = of(&row.clutches[clutch.min(1)]);
+            let [low, high] = range.unwrap_or([f64::NAN; 2]);
+            [value, low, high].iter().zip(&mut sum).for_each(|(value, sum)| *sum += value);
+            count += 1;
+        }
+        (count > 0).then(|| sum.map(|sum| sum / count as f64))
+    }
+
+    /// The worst health and its share of the rows; `None` without rows.
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    pub fn worst_health(&self) -> Option<(Health, f64)> {
+        let worst = self.rows.iter().map(|row| row.health).max()?;
+        let share = self.rows.iter().filter(|row| row.health == worst).count() as f64 / self.rows.len() as f64;
+        Some((worst, share))
+    }
+}
+
+/// A drive with its shifts.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ScoredDrive {
+    /// Every [`SAMPLE_S`].
+    pub states: Vec<DriveState>,
+    /// Its shifts.
+    pub shifts: Vec<ScoredShift>,
+}
+
+impl ScoredDrive {
+    /// Whether the true pressures and torques are known, as in a simulation.
+    pub fn has_truth(&self) -> bool {
+        self.shifts.iter().any(ScoredShift::has_truth)
+    }
+
+    /// The shifts as rows of a matrix; those without a kind are left out.
+    pub fn matrix(&self, car: &Car) -> Matrix {
+        let row = |shift: &ScoredShift| {
+            let (from, to, kind) = (shift.from, shift.to, shift.kind?);
+            let [i_off, i_on] = [from, to].map(|gear| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
+            let errors = errors_by_phase(&shift.rows, kind);
+            Some(MatrixRow {
+                shift: MatrixShift { from, to, kind, gain: (i_off - i_on).abs().recip() },
+                counts: counts(&shift.rows, &errors),
+                errors,
+                failure: None,
+            })
+        };
+        Matrix { rows: self.shifts.iter().filter_map(row).collect(), without_tables: Vec::new(), draws: 1 }
+    }
+}
+
+/// Shifts that begin and end while a drive goes by.
+#[derive(Debug, Default)]
+pub(super) struct PassingShifts {
+    pub(super) drive: ScoredDrive,
+    pub(super) open: Option<ScoredShift>,
+}
+
+impl PassingShifts {
+    /// Whether a shift ends with the first row that is in a gear or in this other shift. A change of mind begins another shift.
+    pub(super) fn ends(&self, gears: Option<[usize; 2]>) -> bool {
+        self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
+    }
+
+    pub(super) fn end(&mut self, quality: CarShiftQuality) {
+        self.drive.shifts.extend(self.open.take().map(|shift| ScoredShift { quality, ..shift }));
+    }
+
+    /// Begins a shift. The turbine torque tells its kind.
+    pub(super) fn begin(
+        &mut self,
+        car: &Car,
+        [from, to]: [usize; 2],
+        elements: [usize; 2],
+        (time_s, turbine_n_m): (f64, f64),
+    ) {
+        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        self.open = Some(ScoredShift {
+            number: self.drive.shifts.len() + 1,
+            from,
+            to,
+            kind: ShiftKind::of(turbine_n_m, ratio(from), ratio(to)),
+            elements,
+            time_s: [time_s; 2],
+            quality: CarShiftQuality::default(),
+            rows: Vec::new(),
+        });
+    }
+}
+
+/// Lets the filter, which knows the car `known`, estimate a recorded drive of the car `model` through these sensors. One filter serves
+/// the whole drive.
+///
+/// # Errors
+/// The gearbox has more clutches than the filter has room for.
+pub fn score_drive(
+    known: &Car,
+    model: &CarModel,
+    recording: &Recording,
+    sensors: &Sensors,
+    seed: u64,
+) -> Result<ScoredDrive, AnyShiftError> {
+    let errors = ShiftErrors::STANDARD;
+    let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
+    let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
+    let mut state = filter.start();
+    let mut passing = PassingShifts::default();
+    let mut rating: Option<CarShiftRating> = None;
+    for (sample, input) in recording.samples.iter().zip(recording.inputs(known, &tables, sensors, seed)) {
+        let estimate = filter.step(&mut state, &input);
+        passing.drive.states.push(state_of(sample, estimate.health));
+        let gears = sample.shift.as_ref().map(|shift| [shift.from, shift.to]);
+        if passing.ends(gears) {
+            end(&mut passing, &mut rating, sample);
+        }
+        let Some(under_way) = &sample.shift else { continue };
+        let (from, to) = (under_way.from, under_way.to);
+        if passing.open.is_none() {
+            let elements = [under_way.offgoing.element, under_way.oncoming.element];
+            passing.begin(known, [from, to], elements, (sample.time_s, sample.turbine_n_m));
+            let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(known, from, to, 0.0) };
+            rating = Some(CarShiftRating::new(model, &begun));
+        }
+        if let (Some(shift), Some(rating)) = (&mut passing.open, &mut rating) {
+            rating.push(sample);
+            shift.time_s[1] = sample.time_s;
+            shift.rows.extend(row(&tables, sample, &estimate));
+        }
+    }
+    if let Some(last) = recording.samples.last() {
+        end(&mut passing, &mut rating, last);
+    }
+    Ok(passing.drive)
+}
+
+/// Ends the open shift with the first sample after it.
+fn end(passing: &mut PassingShifts, rating: &mut Option<CarShiftRating>, after: &CarSample) {
+    if let Some(mut rating) = rating.take() {
+        rating.push(after);
+        passing.end(rating.quality());
+    }
+}
+
+fn state_of(sample: &CarSample, health: Health) -> DriveState {
+    let torques = &sample.torques;
+    DriveState {
+        time_s: sample.time_s,
+        gear: sample.gear,
+        pedals: [sample.driver.throttle, sample.driver.brake],
+        vehicle_m_s: sample.vehicle_m_s,
+        speeds_rad_s: [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s],
+        health,
+    }
+}

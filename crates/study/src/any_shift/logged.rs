@@ -1,0 +1,352 @@
+//! A log of a drive of a car with any gearbox: its columns, what the filter is shown of it, and what it says.
+//!
+//! The columns have the names of `wetclutch simulate`. Time, turbine and output speed, gear, target gear and the command of every
+//! element's valve are needed, with a converter the engine speed too, without one the reported engine torque. True values are
+//! compared where the log has them.
+
+use config::{Car, Sensors};
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::CommandKind;
+use observer::Reading;
+use observer::any_shift::{
+    AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
+};
+use plant::car::CarShiftQuality;
+use trace::{CsvRows, TraceError, signal};
+
+use super::drive::{DriveState, PassingShifts, ScoredDrive};
+use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
+
+/// Slip below which a true clutch sticks, rad/s.
+const STICKS_RAD_S: f64 = 0.05;
+
+/// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
+const RATIO_FROM_RAD_S: f64 = 20.0;
+const RATIO_SHARE: f64 = 0.1;
+
+/// The columns with the commands of the valves: element of the gearbox, and name.
+pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
+    let columns = elements.filter_map(|(at, (element, clutch))| {
+        let unit = match clutch.as_ref()?.valve.command_kind() {
+            CommandKind::Current => "current_a",
+            CommandKind::DutyCycle => "duty_percent",
+        };
+        Some((at, format!("{}_{unit}", element_column(&element.name))))
+    });
+    columns.collect()
+}
+
+/// How the names of an element's columns begin.
+pub fn element_column(element: &str) -> String {
+    let plain = |c: char| if c.is_alphanumeric() { c } else { '_' };
+    format!("element_{}", element.to_lowercase().chars().map(plain).collect::<String>())
+}
+
+/// Places of a speed or a command in the log, and of the age of its readings.
+#[derive(Debug, Clone, Copy)]
+struct ReadingColumn {
+    value: usize,
+    age: Option<usize>,
+}
+
+impl ReadingColumn {
+    fn find(rows: &CsvRows, name: &str) -> Option<Self> {
+        let age = signal::age_of(name).and_then(|age| rows.find(age));
+        rows.find(name).map(|value| Self { value, age })
+    }
+
+    fn require(rows: &CsvRows, name: &str) -> Result<Self, TraceError> {
+        let value = rows.require(name)?;
+        Ok(Self { value, age: signal::age_of(name).and_then(|age| rows.find(age)) })
+    }
+
+    fn read(self, rows: &CsvRows) -> Result<Option<Reading<f64>>, TraceError> {
+        let value = rows.number(self.value)?;
+        let age_s = self.age.map_or(Ok(0.0), |age| rows.number(age))?;
+        Ok((!value.is_nan()).then_some(Reading { value, age_s: if age_s.is_nan() { 0.0 } else { age_s } }))
+    }
+}
+
+/// Where the columns are.
+struct Columns {
+    engine: Option<ReadingColumn>,
+    turbine: ReadingColumn,
+    output: ReadingColumn,
+    wheel: Option<ReadingColumn>,
+    engine_torque: Option<ReadingColumn>,
+    lock_up: Option<usize>,
+    gear: usize,
+    target: usize,
+    /// Place in the filter's tables, and column.
+    commands: Vec<(usize, usize)>,
+    pedals: [Option<usize>; 2],
+    vehicle: Option<usize>,
+    /// Pressure, torque and slip of offgoing and oncoming clutch.
+    truth: Option<[[usize; 3]; 2]>,
+}
+
+impl Columns {
+    fn of(rows: &CsvRows, car: &Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
+        let find = |name: &str| ReadingColumn::find(rows, name);
+        let require = |name: &str| ReadingColumn::require(rows, name);
+        let commands = element_commands(car).into_iter().filter_map(|(element, name)| {
+            let place = tables.place(element)?;
+            Some(rows.require(&name).map(|column| (place, column)))
+        });
+        let truth = |names: [&str; 3]| -> Option<[usize; 3]> {
+            let places: Option<Vec<usize>> = names.iter().map(|name| rows.find(name)).collect();
+            places?.try_into().ok()
+        };
+        let offgoing = truth([signal::OFFGOING_PRESSURE, signal::OFFGOING_TORQUE, signal::OFFGOING_SLIP]);
+        let oncoming = truth([signal::ONCOMING_PRESSURE, signal::ONCOMING_TORQUE, signal::ONCOMING_SLIP]);
+        let has_converter = car.converter.is_some();
+        Ok(Self {
+            engine: if has_converter { Some(require(signal::ENGINE_SPEED)?) } else { find(signal::ENGINE_SPEED) },
+            turbine: require(signal::TURBINE_SPEED)?,
+            output: require(signal::OUTPUT_SPEED)?,
+            wheel: find(signal::WHEEL_SPEED),
+            engine_torque: match has_converter {
+                true => find(signal::REPORTED_ENGINE_TORQUE),
+                false => Some(require(signal::REPORTED_ENGINE_TORQUE)?),
+            },
+            lock_up: rows.find(signal::LOCK_UP_APPLIED),
+            gear: rows.require(signal::GEAR)?,
+            target: rows.require(signal::TARGET_GEAR)?,
+            commands: commands.collect::<Result<_, _>>()?,
+            pedals: [signal::THROTTLE, signal::BRAKE].map(|name| rows.find(name)),
+            vehicle: rows.find(signal::VEHICLE_SPEED),
+            truth: offgoing.zip(oncoming).map(|(offgoing, oncoming)| [offgoing, oncoming]),
+        })
+    }
+}
+
+/// A row of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogStep {
+    /// Time, s.
+    pub time_s: f64,
+    /// What the filter is shown.
+    pub input: ShiftInput<f64>,
+    /// Throttle and brake, 0 to 1; not a number where the log has none.
+    pub pedals: [f64; 2],
+    /// Vehicle speed, m/s; by the wheels where the log has none.
+    pub vehicle_m_s: f64,
+    /// Pressure, Pa, torque, N m, and slip, rad/s, of offgoing and oncoming clutch; not a number where the log has none.
+    pub truth: [[f64; 3]; 2],
+}
+
+/// A log, read row by row.
+pub struct CarLog<'c> {
+    car: &'c Car,
+    rows: CsvRows,
+    columns: Columns,
+    last_s: Option<f64>,
+    gear: Option<usize>,
+}
+
+impl<'c> CarLog<'c> {
+    /// Finds the columns.
+    ///
+    /// # Errors
+    /// One that is needed is missing.
+    pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
+        Ok(Self { car, columns: Columns::of(&rows, car, tables)?, rows, last_s: None, gear: None })
+    }
+
+    /// The next row; `None` at the end.
+    ///
+    /// # Errors
+    /// The file cannot be read, a cell is no number, or a gear is none of the gearbox.
+    pub fn next_step(&mut self) -> Result<Option<LogStep>, TraceError> {
+        if !self.rows.advance()? {
+            return Ok(None);
+        }
+        let time_s = self.rows.time_s();
+        let dt_s = self.last_s.replace(time_s).map_or(0.0, |last_s| time_s - last_s);
+        let gear = self.gear_at(self.columns.gear, self.gear)?;
+        let to = self.gear_at(self.columns.target, Some(gear))?;
+        self.gear = Some(gear);
+        let (rows, columns) = (&self.rows, &self.columns);
+        let reading = |column: Option<ReadingColumn>| column.map_or(Ok(None), |column| column.read(rows));
+        let number = |column: Option<usize>| column.map_or(Ok(f64::NAN), |column| rows.number(column));
+        let mut commands = [None; MAX_ELEMENTS];
+        for &(place, column) in &columns.commands {
+            let command = rows.number(column)?;
+            commands[place] = (!command.is_nan()).then_some(Reading::now(command));
+        }
+        let wheel_rad_s = reading(columns.wheel)?;
+        let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
+        let vehicle_m_s = if columns.vehicle.is_some() { number(columns.vehicle)? } else { by_wheels };
+        let mut truth = [[f64::NAN; 3]; 2];
+        for (values, places) in truth.iter_mut().flatten().zip(columns.truth.iter().flatten().flatten()) {
+            *values = rows.number(*places)?;
+        }
+        let lock_up_applied = number(columns.lock_up)? > 0.5;
+        // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
+        let input = ShiftInput {
+            dt_s,
+            engine_rad_s: reading(columns.engine)?,
+            turbine_rad_s: reading(Some(columns.turbine))?,
+            output_rad_s: reading(Some(columns.output))?,
+            wheel_rad_s,
+            engine_n_m: reading(columns.engine_torque)?.filter(|_| self.car.converter.is_none() || lock_up_applied),
+            lock_up_applied,
+            commands,
+            gear: GearCommand { from: gear, to },
+        };
+        let pedals = [number(columns.pedals[0])?, number(columns.pedals[1])?];
+        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, truth }))
+    }
+
+    /// The gear of a cell; an empty one is the gear before.
+    fn gear_at(&self, column: usize, before: Option<usize>) -> Result<usize, TraceError> {
+        let text = self.rows.text(column);
+        let gears = &self.car.gearbox.gears;
+        // A logger may write the gear as a number with decimals.
+        let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
+        let named = |name: &str| gears.iter().position(|gear| gear.name == name);
+        let found = named(&text).or_else(|| named(&whole?));
+        found.or_else(|| before.filter(|_| text.is_empty())).ok_or_else(|| {
+            let names = gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
+            let what = if text.is_empty() { "no gear yet".to_owned() } else { format!("the gear `{text}`") };
+            self.rows.wrong(format!("{what}, which the gearbox does not have\nhint: its gears are {names}"))
+        })
+    }
+}
+
+/// The filter of a car on its way through a log.
+pub struct LoggedDrive<'c> {
+    car: &'c Car,
+    tables: &'c ShiftTables<f64>,
+    filter: AnyShiftFilter<'c, f64>,
+    state: AnyShiftState<f64>,
+    passing: PassingShifts,
+    speeds_rad_s: [f64; 3],
+    begun_s: f64,
+    /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
+    in_gear: [u64; 2],
+}
+
+impl<'c> LoggedDrive<'c> {
+    /// The filter of a car with these tables, for readings of these sensors.
+    pub fn new(car: &'c Car, tables: &'c ShiftTables<f64>, sensors: Option<&Sensors>) -> Self {
+        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, sensors);
+        let state = filter.start();
+        let (passing, speeds_rad_s) = (PassingShifts::default(), [f64::NAN; 3]);
+        Self { car, tables, filter, state, passing, speeds_rad_s, begun_s: f64::NAN, in_gear: [0; 2] }
+    }
+
+    /// The tables of a car.
+    ///
+    /// # Errors
+    /// The gearbox has more clutches than the filter has room for.
+    pub fn tables(car: &Car) -> Result<ShiftTables<f64>, AnyShiftError> {
+        ShiftTables::of_car(car, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)
+    }
+
+    /// Takes a row and returns the estimate for it.
+    pub fn push(&mut self, step: &LogStep) -> ShiftEstimate<f64> {
+        let input = &step.input;
+        let estimate = self.filter.step(&mut self.state, input);
+        for (speed, reading) in
+            self.speeds_rad_s.iter_mut().zip([input.engine_rad_s, input.turbine_rad_s, input.output_rad_s])
+        {
+            *speed = reading.map_or(*speed, |reading| reading.value);
+        }
+        let GearCommand { from, to } = input.gear;
+        self.passing.drive.states.push(DriveState {
+            time_s: step.time_s,
+            gear: from,
+            pedals: step.pedals,
+            vehicle_m_s: step.vehicle_m_s,
+            speeds_rad_s: self.speeds_rad_s,
+            health: estimate.health,
+        });
+        let gears = (from != to).then_some([from, to]);
+        if self.passing.ends(gears) {
+            self.end(step.time_s, from);
+        }
+        match gears {
+            Some(_) => self.during(step, &estimate),
+            None => self.compare_ratio(from),
+        }
+        estimate
+    }
+
+    fn compare_ratio(&mut self, gear: usize) {
+        let [_, turbine, output] = self.speeds_rad_s;
+        let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output;
+        if output > RATIO_FROM_RAD_S {
+            self.in_gear[0] += 1;
+            self.in_gear[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
+        }
+    }
+
+    /// Rows in a gear at speed, and those whose turbine and output speed do not fit the ratio of that gear.
+    pub fn rows_in_gear(&self) -> [u64; 2] {
+        self.in_gear
+    }
+
+    fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {
+        let GearCommand { from, to } = step.input.gear;
+        let elements = self.tables.tables().shift(from, to).map(|row| row.clutches.map(|clutch| clutch.element));
+        if self.passing.open.is_none() {
+            let known = (0..self.car.gearbox.elements.len()).collect::<Vec<_>>();
+            let of = |place: usize| known.iter().copied().find(|&element| self.tables.place(element) == Some(place));
+            let elements = elements.map_or([usize::MAX; 2], |places| places.map(|at| of(at).unwrap_or(usize::MAX)));
+            let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
+            self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
+            self.begun_s = step.time_s;
+        }
+        let Some(shift) = &mut self.passing.open else { return };
+        shift.time_s[1] = step.time_s;
+        let ratio = |gear: usize| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        let direction = (ratio(from) - ratio(to)).signum();
+        let [_, turbine, output] = self.speeds_rad_s;
+        let slip = |gear: usize| direction * (turbine - ratio(gear) * output);
+        let quality = &mut shift.quality;
+        quality.flare_rad_s = quality.flare_rad_s.max(slip(from));
+        quality.past_synchronous_rad_s = quality.past_synchronous_rad_s.max(-slip(to));
+        let clutches = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
+        let Some(found) = clutches else { return };
+        shift.rows.push(ShiftScoreRow {
+            time_s: step.time_s,
+            clutches: [0, 1].map(|c| clutch_row(&found[c], step.truth[c])),
+            turbine_n_m: [f64::NAN, estimate.turbine_n_m.unwrap_or(f64::NAN)],
+            speeds_rad_s: [self.speeds_rad_s[0], turbine, output, f64::NAN],
+            phase: estimate.phase.map_or("-", |phase| phase.name()),
+            health: estimate.health,
+        });
+    }
+
+    /// Ends the open shift with the first row after it, which is in this gear.
+    fn end(&mut self, time_s: f64, gear: usize) {
+        let Some(shift) = &self.passing.open else { return };
+        let complete_s = (gear == shift.to).then_some(time_s - self.begun_s);
+        // A log has no acceleration of its own, and of the held elements no slip.
+        let unknown =
+            CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
+        self.passing.end(CarShiftQuality { complete_s, ..unknown });
+    }
+
+    /// The drive.
+    pub fn finish(mut self) -> ScoredDrive {
+        // A shift that the log cuts off is not complete.
+        self.end(f64::NAN, usize::MAX);
+        self.passing.drive
+    }
+}
+
+fn clutch_row(found: &ClutchEstimate<f64>, [pressure_pa, torque_n_m, slip_rad_s]: [f64; 3]) -> ClutchRow {
+    ClutchRow {
+        torque_n_m: [torque_n_m, found.torque_n_m, found.open_loop_n_m],
+        pressure_pa: [pressure_pa, found.pressure_pa, found.valve_pa],
+        sticks: if slip_rad_s.is_nan() { found.holds } else { slip_rad_s.abs() < STICKS_RAD_S },
+        torque_range_n_m: found.torque_range_n_m,
+        pressure_range_pa: found.pressure_range_pa,
+        hidden: found.hidden,
+        in_range: within(found.pressure_range_pa, pressure_pa, ROUNDING_PA)
+            && within(found.torque_range_n_m, torque_n_m, DRAG_N_M),
+    }
+}

@@ -1,0 +1,116 @@
+//! A simulated drive as the filter sees it: speeds through toothed wheels, the commands of the valves, the gear.
+
+use config::{Car, Sensors};
+use design::ShiftTables;
+use drivetrain::Real;
+use observer::Reading;
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use plant::car::CarSample;
+use plant::sensors::{Channel, Readings, Rows, read_speed};
+
+use super::{RECORD_S, SAMPLE_S};
+
+/// Torque of the lock-up clutch from which on it counts as applied, N m.
+const LOCK_UP_N_M: f64 = 0.1;
+
+/// A drive that was sampled every [`RECORD_S`]: its speeds, and every [`SAMPLE_S`] the whole sample.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    time_s: Vec<f64>,
+    /// Engine, turbine, output and wheel speed, rad/s.
+    speeds_rad_s: [Vec<f64>; 4],
+    /// Every [`SAMPLE_S`].
+    pub samples: Vec<CarSample>,
+}
+
+/// Records between two samples of the filter.
+pub(super) fn records_in_a_sample() -> usize {
+    (SAMPLE_S / RECORD_S).round().max(1.0).whole()
+}
+
+impl Recording {
+    /// Takes the next sample, [`RECORD_S`] after the one before.
+    pub fn push(&mut self, sample: &CarSample) {
+        if self.time_s.len().is_multiple_of(records_in_a_sample()) {
+            self.samples.push(*sample);
+        }
+        self.time_s.push(sample.time_s);
+        let torques = &sample.torques;
+        let speeds = [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s, sample.wheel_rad_s];
+        for (column, speed) in self.speeds_rad_s.iter_mut().zip(speeds) {
+            column.push(speed);
+        }
+    }
+
+    /// What the filter is shown, an input for each of the samples.
+    pub fn inputs(
+        &self,
+        car: &Car,
+        tables: &ShiftTables<f64>,
+        sensors: &Sensors,
+        seed: u64,
+    ) -> impl Iterator<Item = ShiftInput<f64>> {
+        let at_s: Vec<f64> = self.samples.iter().map(|sample| sample.time_s).collect();
+        let rows = Rows { at_s: &at_s, offset_s: at_s.first().copied().unwrap_or(0.0), shift_s: [0.0; 2], seed };
+        let channels = [
+            ("engine", &sensors.engine),
+            ("turbine", &sensors.turbine),
+            ("output", &sensors.output),
+            ("wheel", &sensors.wheel),
+        ];
+        let mut columns = channels.into_iter().zip(&self.speeds_rad_s);
+        let speeds: [Readings; 4] = std::array::from_fn(|_| {
+            let ((name, sensor), values) = columns.next().unwrap_or((channels[0], &self.speeds_rad_s[0]));
+            read_speed(sensor, Channel { name, time_s: &self.time_s, values }, rows)
+        });
+        (0..self.samples.len()).map(move |row| input(car, tables, &self.samples[row], &speeds, row))
+    }
+}
+
+fn input(
+    car: &Car,
+    tables: &ShiftTables<f64>,
+    sample: &CarSample,
+    speeds: &[Readings; 4],
+    row: usize,
+) -> ShiftInput<f64> {
+    let reading = |channel: usize| {
+        let (value, age_s) = (speeds[channel].values[row], speeds[channel].age_s[row]);
+        (!value.is_nan()).then_some(Reading { value, age_s })
+    };
+    let mut commands = [None; MAX_ELEMENTS];
+    for (element, &command) in sample.commands.iter().enumerate() {
+        if let Some(place) = tables.place(element) {
+            commands[place] = Some(Reading::now(command));
+        }
+    }
+    let gear = match &sample.shift {
+        Some(shift) => GearCommand { from: shift.from, to: shift.to },
+        None => GearCommand { from: sample.gear, to: sample.gear },
+    };
+    let lock_up_applied = lock_up_is_applied(car, sample);
+    // Without a converter, or where it is locked, nothing else gives the torque at the gearbox input.
+    let engine_n_m = reported_engine_n_m(car, sample);
+    ShiftInput {
+        dt_s: SAMPLE_S,
+        engine_rad_s: reading(0),
+        turbine_rad_s: reading(1),
+        output_rad_s: reading(2),
+        wheel_rad_s: reading(3),
+        engine_n_m: (car.converter.is_none() || lock_up_applied).then_some(Reading::now(engine_n_m)),
+        lock_up_applied,
+        commands,
+        gear,
+    }
+}
+
+/// Whether the lock-up clutch carries torque. It comes after the elements of the gearbox.
+pub fn lock_up_is_applied(car: &Car, sample: &CarSample) -> bool {
+    let lock_up = car.converter.and_then(|_| sample.torques.elements_n_m.get(car.gearbox.elements.len()));
+    lock_up.is_some_and(|torque_n_m| torque_n_m.abs() > LOCK_UP_N_M)
+}
+
+/// The engine torque as the engine's controller reports it, N m: at the clutch, less the drag of the engine.
+pub fn reported_engine_n_m(car: &Car, sample: &CarSample) -> f64 {
+    sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s
+}

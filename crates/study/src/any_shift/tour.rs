@@ -1,0 +1,159 @@
+//! A drive through all gears of any car: up under power, down coasting, up without power, down under power.
+
+use config::Car;
+use design::{ShiftErrors, ShiftTables};
+use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver, idle_throttle};
+
+use super::{AnyShiftError, RECORD_S};
+
+/// Throttle at which the car accelerates to the speed of a shift, and brake at which it slows down to it \[chosen\].
+const ACCELERATE: f64 = 0.5;
+const SLOW_DOWN: f64 = 0.08;
+/// Throttle of the shifts under power \[chosen\].
+const POWER_ON: f64 = 0.15;
+/// Time with the throttle of a shift before its request, and after its end, s \[chosen\].
+const SETTLE_S: f64 = 1.0;
+const AFTER_S: f64 = 0.6;
+/// Time in which the driver moves the pedal, s.
+const PEDAL_S: f64 = 0.3;
+/// How near the speed of a shift must be, m/s.
+const NEAR_M_S: f64 = 0.3;
+/// Longest time to reach the speed of a shift, and longest shift, s.
+const LONGEST_APPROACH_S: f64 = 90.0;
+const LONGEST_SHIFT_S: f64 = 6.0;
+/// Speed at the start of a car without a converter, over that of its first shift: a launch is not simulated.
+const START: f64 = 0.6;
+
+/// A shift of the drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Leg {
+    /// The gear before.
+    pub from: usize,
+    /// The gear after.
+    pub to: usize,
+    /// Throttle during the shift, 0 to 1.
+    pub throttle: f64,
+}
+
+/// The shifts of a drive through all forward gears. A gear to which no shift between two clutches leads from the one below is passed
+/// over.
+pub fn legs(car: &Car, tables: &ShiftTables<f64>) -> Vec<Leg> {
+    let is_single = |from: usize, to: usize| tables.tables().shift(from, to).is_some();
+    let mut up: Vec<[usize; 2]> = Vec::new();
+    let mut gear = None;
+    for next in car.gearbox.forward_gears() {
+        let from = *gear.get_or_insert(next);
+        if is_single(from, next) && is_single(next, from) {
+            up.push([from, next]);
+            gear = Some(next);
+        }
+    }
+    let leg = |throttle: f64| move |&[from, to]: &[usize; 2]| Leg { from, to, throttle };
+    let down: Vec<[usize; 2]> = up.iter().rev().map(|&[from, to]| [to, from]).collect();
+    let first = up.iter().map(leg(POWER_ON)).chain(down.iter().map(leg(0.0)));
+    first.chain(up.iter().map(leg(0.0))).chain(down.iter().map(leg(POWER_ON))).collect()
+}
+
+/// A driver on the way through the legs.
+struct TourDriver<'m> {
+    model: &'m CarModel,
+    run: CarRun<'m>,
+    throttle: f64,
+}
+
+impl TourDriver<'_> {
+    /// Goes on by one control period towards this throttle.
+    fn advance(&mut self, throttle: f64, brake: f64, record: &mut impl FnMut(&CarSample)) -> Result<(), AnyShiftError> {
+        let before_s = self.run.time_s();
+        let [engine_rad_s, ..] = self.model.speeds(self.run.state());
+        if engine_rad_s <= 0.0 {
+            return Err(
+                CarError::Request(format!("the engine stalls at {before_s:.2} s: the load is too large")).into()
+            );
+        }
+        let throttle_now = self.throttle.max(idle_throttle(engine_rad_s));
+        let driver = Driver { throttle: throttle_now, brake, grade_rad: 0.0 };
+        self.run.advance(driver, |_| {}, record)?;
+        let most = (self.run.time_s() - before_s) / PEDAL_S;
+        self.throttle += (throttle - self.throttle).clamp(-most, most);
+        Ok(())
+    }
+
+    /// Holds a throttle for a time.
+    fn hold(&mut self, throttle: f64, time_s: f64, record: &mut impl FnMut(&CarSample)) -> Result<(), AnyShiftError> {
+        let until_s = self.run.time_s() + time_s;
+        while self.run.time_s() < until_s {
+            self.advance(throttle, 0.0, record)?;
+        }
+        Ok(())
+    }
+
+    /// Brings the car to a speed; false if that takes too long.
+    fn reach(&mut self, vehicle_m_s: f64, record: &mut impl FnMut(&CarSample)) -> Result<bool, AnyShiftError> {
+        let until_s = self.run.time_s() + LONGEST_APPROACH_S;
+        loop {
+            let missing = vehicle_m_s - self.run.state().vehicle_m_s;
+            if missing.abs() <= NEAR_M_S {
+                return Ok(true);
+            }
+            if self.run.time_s() > until_s {
+                return Ok(false);
+            }
+            let (throttle, brake) = if missing > 0.0 { (ACCELERATE, 0.0) } else { (0.0, SLOW_DOWN) };
+            self.advance(throttle, brake, record)?;
+        }
+    }
+}
+
+/// Drives the car `model`, whose controller knows the car `known`, through the legs and shows every sample to `record`, one every
+/// [`RECORD_S`]. `done` is called after each leg.
+///
+/// # Errors
+/// The gearbox has no shift between two clutches, the car does not reach the speed of a shift, a shift does not end, or the simulation
+/// fails.
+pub fn drive_tour(
+    model: &CarModel,
+    known: &Car,
+    mut record: impl FnMut(&CarSample),
+    mut done: impl FnMut(),
+) -> Result<(), AnyShiftError> {
+    let tables = ShiftTables::of_car(known, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+    let legs = legs(known, &tables);
+    let Some(first) = legs.first() else {
+        let message = "the gearbox has no shift from one clutch to another\nhint: `wetclutch check` lists its shifts";
+        return Err(CarError::Request(message.to_owned()).into());
+    };
+    let speed_m_s = |leg: &Leg| CarShift::usual(known, leg.from, leg.to, leg.throttle).vehicle_m_s;
+    let start_m_s = if known.converter.is_some() { 0.0 } else { START * speed_m_s(first) };
+    let start = Driver { throttle: POWER_ON, brake: 0.0, grade_rad: 0.0 };
+    let state = model.in_gear(first.from, Some(first.to), start_m_s, start.throttle)?;
+    let run = CarRun::new(model, known, CarCalibration::STANDARD, first.from, state, (start, RECORD_S))?;
+    let mut driver = TourDriver { model, run, throttle: start.throttle };
+    for leg in &legs {
+        driver.run.preselect(Some(leg.to));
+        let name = |gear: usize| known.gearbox.gears[gear].name.clone();
+        let failed = |what: String| AnyShiftError::from(CarError::Request(what));
+        if !driver.reach(speed_m_s(leg), &mut record)? {
+            let speed = 3.6 * speed_m_s(leg);
+            return Err(failed(format!(
+                "the car does not reach {speed:.0} km/h in gear {}\nhint: check mass, resistance and engine torque",
+                name(leg.from)
+            )));
+        }
+        driver.hold(leg.throttle, SETTLE_S, &mut record)?;
+        driver.run.request(leg.to)?;
+        let until_s = driver.run.time_s() + LONGEST_SHIFT_S;
+        // The request becomes a shift in the next control period.
+        driver.advance(leg.throttle, 0.0, &mut record)?;
+        while driver.run.controller().shift().is_some() {
+            if driver.run.time_s() > until_s {
+                let (from, to) = (name(leg.from), name(leg.to));
+                return Err(failed(format!("the shift {from}-{to} does not end within {LONGEST_SHIFT_S} s")));
+            }
+            driver.advance(leg.throttle, 0.0, &mut record)?;
+        }
+        driver.hold(leg.throttle, AFTER_S, &mut record)?;
+        done();
+    }
+    Ok(())
+}

@@ -1,0 +1,69 @@
+//! Whole drives: through all gears of every shipped gearbox.
+
+use config::Car;
+use observer::Health;
+use plant::car::CarModel;
+use study::any_shift::drive::{ScoredDrive, score_drive};
+use study::any_shift::matrix::{Pooled, drawn_car};
+use study::any_shift::recording::Recording;
+use study::any_shift::tour::{drive_tour, legs};
+use study::any_shift::{SAMPLE_S, TruePhase};
+
+use crate::cars::{cars, sensors};
+
+fn driven(car: &Car, seed: u64) -> ScoredDrive {
+    let model = CarModel::new(drawn_car(car, 0, 0, seed)).unwrap();
+    let mut recording = Recording::default();
+    let mut done = 0;
+    drive_tour(&model, car, |sample| recording.push(sample), || done += 1).unwrap();
+    let drive = score_drive(car, &model, &recording, &sensors(), seed).unwrap();
+    assert_eq!(drive.shifts.len(), done);
+    drive
+}
+
+/// Each shift between neighbouring gears once in every kind, by one filter for the whole drive.
+#[test]
+fn every_car_drives_through_all_its_gears_and_every_shift_is_estimated() {
+    let mut rows = Vec::new();
+    for car in cars() {
+        let drive = driven(&car, 1);
+        let name = &car.gearbox.name;
+        let steps = car.gearbox.forward_gears().len() - 1;
+        assert_eq!(drive.shifts.len(), 4 * steps, "{name}");
+        for shift in &drive.shifts {
+            let label = format!("{name} {} {}-{}", shift.number, shift.from, shift.to);
+            assert!(shift.quality.complete_s.is_some_and(|time_s| time_s < 2.0), "{label}: {:?}", shift.quality);
+            assert!(shift.kind.is_some() && !shift.rows.is_empty(), "{label}");
+            assert_eq!(shift.inside(), Some(1.0), "{label}: guaranteed");
+            let under_way_s = shift.time_s[1] - shift.time_s[0];
+            let phases_s = shift.length_s(TruePhase::Torque) + shift.length_s(TruePhase::Inertia);
+            assert!(shift.length_s(TruePhase::Inertia) > 0.05 && phases_s <= under_way_s + SAMPLE_S, "{label}");
+        }
+        let kinds: std::collections::BTreeSet<_> =
+            drive.shifts.iter().map(|shift| format!("{:?}", shift.kind)).collect();
+        assert_eq!(kinds.len(), 4, "{name}: {kinds:?}");
+        // After the first readings the filter has a gear.
+        let restarts = drive.states.iter().skip(100).filter(|state| state.health == Health::Restarted).count();
+        assert_eq!(restarts, 0, "{name}");
+        rows.extend(drive.matrix(&car).rows);
+    }
+    let [_, [inertia, _]] = Pooled::of(&rows, |_| true).torque;
+    println!("controlling clutch, inertia phase, all shifts: {:.2}", inertia.ratio().unwrap());
+    // Better than the valve model alone; the bars by kind are those of the matrix.
+    assert!(inertia.ratio().unwrap() < 1.0, "{inertia:?}");
+}
+
+/// A gearbox whose third gear can only be reached by two changes at once is driven without it.
+#[test]
+fn a_gear_without_a_shift_between_two_clutches_is_passed_over() {
+    let mut car = cars().swap_remove(0);
+    let gear = |name: &str| car.gearbox.gear(name).unwrap();
+    let (two, three, four) = (gear("2"), gear("3"), gear("4"));
+    car.gearbox.shifts.retain(|shift| ![[two, three], [three, two]].contains(&[shift.from, shift.to]));
+    let tables = design::ShiftTables::of_car(&car, &design::ShiftErrors::STANDARD).unwrap();
+    let legs = legs(&car, &tables);
+    let has = |from: usize, to: usize| legs.iter().any(|leg| (leg.from, leg.to) == (from, to));
+    assert!(!has(two, three) && has(two, four), "{legs:?}");
+    // Every leg begins where the one before has ended.
+    assert!(legs.windows(2).all(|pair| pair[0].to == pair[1].from), "{legs:?}");
+}
