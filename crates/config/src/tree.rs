@@ -257,3 +257,51 @@ impl<'de> Deserializer<'de> for &'de Node {
         tuple_struct map identifier ignored_any
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Experiment, Vehicle};
+
+    fn path(key: &str) -> Vec<String> {
+        key.split('.').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_file_is_the_same_through_its_tree() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let tree = Tree::of(&vehicle.source).unwrap();
+        assert_eq!(Vehicle::from_tree(&vehicle.source, &tree).unwrap(), vehicle);
+        for experiment in Experiment::built_in().unwrap().into_iter().chain([Experiment::bench().unwrap()]) {
+            let tree = Tree::of(&experiment.source).unwrap();
+            assert_eq!(Experiment::from_tree(&experiment.source, &tree).unwrap(), experiment);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_changed_value_is_said_with_its_line_in_the_file() {
+        let source = Vehicle::two_speed_at().unwrap().source;
+        let error = |key: &str, change, value| {
+            let mut tree = Tree::of(&source).unwrap();
+            tree.change(&path(key), change, value).unwrap();
+            Vehicle::from_tree(&source, &tree).unwrap_err().to_string()
+        };
+        let line = 1 + source.text.lines().position(|line| line.starts_with("mass_kg")).unwrap();
+        let heavy = error("vehicle.mass_kg", Change::Scale, 1e6);
+        assert!(heavy.contains(&format!(":{line}: `vehicle.mass_kg` is ")), "{heavy}");
+        assert!(error("vehicle.mas_kg", Change::Set, 1.0).contains("unknown field `mas_kg`"));
+        assert!(error("vehicle.mass_kg", Change::Scale, f64::NAN).contains("NaN"));
+        let mut tree = Tree::of(&source).unwrap();
+        for (key, message) in
+            [("name", "not a number"), ("vehicle.mass_kg.x", "single value"), ("clutch.b.x", "no value")]
+        {
+            assert!(tree.change(&path(key), Change::Scale, 1.0).unwrap_err().contains(message), "{key}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_too_large_is_an_error_with_its_line() {
+        let source = Source::built_in("x.toml", "a = 1\nb = [2, 99999999999999999999]\n");
+        assert_eq!(Tree::of(&source).unwrap_err().to_string(), "x.toml:2: the number is too large");
+    }
+}

@@ -1,28 +1,29 @@
 //! Everything that has to be fast, measured beside its rivals in one run, as the page `docs/performance.md`.
 //!
-//! `cargo bench -p study` prints the page; `cargo bench -p study -- --write` writes it. That takes about two minutes. Times are
+//! `cargo bench -p study --bench performance` prints the page; `cargo bench -p study --bench performance -- --write` writes it. That takes about two minutes. Times are
 //! the fastest of many runs. SciPy is a rival where `python3` has it.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark")]
 
 mod rivals;
+mod shared;
+mod stages;
 
 use std::fmt::Write as _;
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use config::{Experiment, GainMethod, Study, Vehicle};
+use config::{Experiment, GainMethod, ObserverKind};
 use design::rigid::design_phase;
 use design::{
     Model, Quantity, bounded, compliant_observer, design_compliant, design_discrete, design_discrete_phase,
     design_rigid, design_sliding, extended_filter, inversion, kalman_filter, requirement, rigid_observer,
     sliding_observer, super_twisting, unscented_filter,
 };
-use observer::{Estimator, Input, Phase, Reading, RigidGains};
+use observer::{Estimator, Input, Phase, RigidGains};
 use plant::{Powertrain, Simulation};
+use shared::{SAMPLE_TIME_S, THREE, campaign, estimate, log_of, observer, root, samples, vehicle};
 use study::{Campaign, StudyError, execute};
 
 fn main() {
@@ -31,29 +32,28 @@ fn main() {
     if arguments.iter().any(|argument| argument == "--test") {
         return;
     }
-    let page = page();
+    let (page, diagram) = page();
     if arguments.iter().any(|argument| argument == "--write") {
         std::fs::write(root().join("docs/performance.md"), &page).unwrap();
+        std::fs::write(root().join("docs/figures/work_precision.svg"), diagram).unwrap();
     }
     println!("{page}");
 }
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-fn page() -> String {
+/// The page, and its work-precision diagram.
+fn page() -> (String, String) {
     let mut page = format!(
-        "<!-- Written by `cargo bench -p study -- --write`; do not edit. -->\n# Performance\n\n\
-         Measured by `cargo bench -p study` on {}.\nEach time is the fastest of many runs; what is compared was measured in \
+        "<!-- Written by `cargo bench -p study --bench performance -- --write`; do not edit. -->\n# Performance\n\n\
+         Measured by `cargo bench -p study --bench performance` on {}.\nEach time is the fastest of many runs; what is compared was measured in \
          turns. Times on such a machine\nchange by half from one run of the benchmark to the next: compare within one.\n",
         machine()
     );
     observers(&mut page);
     simulation(&mut page);
-    rivals::integrators(&mut page);
+    let diagram = rivals::integrators(&mut page);
     studies(&mut page);
-    page
+    estimates(&mut page);
+    (page, diagram)
 }
 
 /// What the page was measured on.
@@ -105,36 +105,8 @@ fn time(seconds: f64) -> String {
     format!("{value:.digits$} {unit}")
 }
 
-fn vehicle() -> Vehicle {
-    Vehicle::two_speed_at().unwrap()
-}
-
-const STEPS: u32 = 1000;
-/// Sample time of the observers whose gains are made for one, s.
-const SAMPLE_TIME_S: f64 = 0.01;
-
-/// Samples that keep an observer in its inertia phase, where a step costs most.
-fn samples() -> Vec<Input<f64>> {
-    let sample = |n: u32| {
-        let (turbine, slip) = (340.0 - 0.01 * f64::from(n), 300.0 - 0.02 * f64::from(n));
-        let output = turbine - 0.6 * slip;
-        let now = |value| Some(Reading::now(value));
-        Input {
-            dt_s: if n == 1 { 10.0 } else { 0.01 },
-            engine_rad_s: now(370.0),
-            turbine_rad_s: now(turbine),
-            output_rad_s: now(output),
-            wheel_rad_s: now(output / 3.0),
-            command: now(0.25),
-            offgoing_command: now(0.1),
-            engine_torque_n_m: None,
-        }
-    };
-    (0..STEPS).map(sample).collect()
-}
-
-fn steps<'a, O: Estimator<f64> + 'a>(observer: O) -> Box<dyn FnMut() + 'a> {
-    let samples = samples();
+/// An observer over a shift.
+fn steps<'a, O: Estimator<f64> + 'a>(observer: O, samples: &'a [Input<f64>]) -> Box<dyn FnMut() + 'a> {
     Box::new(move || {
         let mut state = observer.start();
         black_box(samples.iter().fold(0.0, |sum, x| sum + observer.step(&mut state, black_box(x)).pressure_pa));
@@ -142,7 +114,8 @@ fn steps<'a, O: Estimator<f64> + 'a>(observer: O) -> Box<dyn FnMut() + 'a> {
 }
 
 fn observers(page: &mut String) {
-    let vehicle = vehicle();
+    let (vehicle, samples) = (vehicle(), samples());
+    let sensors = Experiment::bench().unwrap().sensors_told;
     let mut names = Vec::new();
     let mut jobs = Vec::new();
     // By itself and with its guaranteed range.
@@ -150,15 +123,15 @@ fn observers(page: &mut String) {
         ($name:expr, $observer:expr) => {
             let observer = $observer;
             names.push($name);
-            jobs.push(steps(observer));
-            jobs.push(steps(bounded(&vehicle, observer)));
+            jobs.push(steps(observer, &samples));
+            jobs.push(steps(bounded(&vehicle, observer), &samples));
         };
     }
     let peak_to_peak =
         design_discrete(&vehicle, Model::Rigid, GainMethod::PeakToPeak, SAMPLE_TIME_S).unwrap().rigid_gains();
-    observer!("Kalman (the default)", kalman_filter(&vehicle, None));
-    observer!("extended Kalman", extended_filter(&vehicle, None));
-    observer!("unscented", unscented_filter(&vehicle, None));
+    observer!("Kalman (the default)", kalman_filter(&vehicle, sensors.as_ref()));
+    observer!("extended Kalman", extended_filter(&vehicle, sensors.as_ref()));
+    observer!("unscented", unscented_filter(&vehicle, sensors.as_ref()));
     observer!("rigid", rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains()));
     observer!("rigid, peak-to-peak", rigid_observer(&vehicle, peak_to_peak));
     observer!("compliant", compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains()));
@@ -168,10 +141,11 @@ fn observers(page: &mut String) {
     observer!("open loop", rigid_observer(&vehicle, RigidGains::open_loop()));
     let times = fastest(2 * LONG, &mut jobs);
     page.push_str(
-        "\n## One step of an observer, f64\n\n| observer | by itself | with its guaranteed range |\n|---|---|---|\n",
+        "\n## One step of an observer, f64\n\nMean over the steps of a simulated shift of `experiments/bench.toml` at 100 Hz, through its sensors, from 1.2 s before the \
+         request.\n\n| observer | by itself | with its guaranteed range |\n|---|---|---|\n",
     );
     for (name, times) in names.iter().zip(times.chunks(2)) {
-        let [alone, with_range] = [times[0], times[1]].map(|seconds| time(seconds / f64::from(STEPS)));
+        let [alone, with_range] = [times[0], times[1]].map(|seconds| time(seconds / samples.len() as f64));
         let _ = writeln!(page, "| {name} | {alone} | {with_range} |");
     }
 }
@@ -230,14 +204,6 @@ fn simulation(page: &mut String) {
     );
 }
 
-/// The shipped study with this number of runs, and of its observers those named.
-fn campaign(runs: u64, wanted: impl Fn(&str) -> bool) -> Campaign {
-    let mut study = Study::read(&root().join("experiments/settings.toml")).unwrap();
-    study.runs = runs;
-    Arc::make_mut(&mut study.experiment).observers.retain(|entry| wanted(&entry.name));
-    Campaign::new(study).unwrap()
-}
-
 fn make(campaign: &Campaign, threads: usize) {
     execute::<StudyError>(campaign, 0..campaign.study.runs, threads, |row| {
         black_box(row);
@@ -254,8 +220,8 @@ fn seconds(job: impl FnOnce()) -> f64 {
 
 fn studies(page: &mut String) {
     page.push_str(
-        "\n## Studies\n\nRuns of `experiments/settings.toml`: files read anew, launch, shift, sensors, observers, scores.\n\n\
-         | runs | observers | threads | time | runs per second |\n|---|---|---|---|---|\n",
+        "\n## Studies\n\nRuns of `experiments/settings.toml`: files checked with the factors in place, launch, shift, sensors, observers, \
+         scores.\n\n| runs | observers | threads | time | runs per second |\n|---|---|---|---|---|\n",
     );
     let mut row = |campaign: &Campaign, threads: usize, seconds: f64| {
         let (runs, rate) = (campaign.study.runs, campaign.study.runs as f64 / seconds);
@@ -266,6 +232,7 @@ fn studies(page: &mut String) {
     let small = [
         campaign(500, |name| name == "open loop"),
         campaign(500, |name| name == "Kalman"),
+        campaign(500, |name| THREE.contains(&name)),
         campaign(500, |_| true),
         campaign(2000, |_| true),
     ];
@@ -275,10 +242,34 @@ fn studies(page: &mut String) {
         row(campaign, 1, best[0]);
         row(campaign, most, best[1]);
     }
-    let long = campaign(10_000, |_| true);
+    let long = campaign(10_000, |name| THREE.contains(&name));
     row(&long, most, one(|| make(&long, most)));
     page.push_str("\nThe aim is 10,000 runs with three observers in 10 s on two cores.\n");
-    page.push_str(&speed_up(&small[2]));
+    page.push_str(&speed_up(&small[3]));
+    stages::of_a_run(page, &small[2]);
+}
+
+/// Rows of the log that is estimated.
+const ROWS: u32 = 10_000;
+
+fn estimates(page: &mut String) {
+    let (vehicle, log) = (vehicle(), log_of(ROWS));
+    let kinds =
+        [("Kalman", ObserverKind::Kalman), ("rigid", ObserverKind::Rigid), ("open loop", ObserverKind::OpenLoop)];
+    let observers = kinds.map(|(_, kind)| observer(kind));
+    let (vehicle, log) = (&vehicle, &log);
+    let mut jobs: Vec<Box<dyn FnMut() + '_>> = Vec::new();
+    for observer in &observers {
+        jobs.push(Box::new(move || estimate(observer, vehicle, log)));
+    }
+    let times = fastest(LONG, &mut jobs);
+    page.push_str(
+        "\n## Estimates of logs\n\nA log of 10,000 rows as CSV in memory: read, estimated with the guaranteed range, all columns written as CSV; one \
+         core.\n\n| observer | rows per second |\n|---|---|\n",
+    );
+    for ((name, _), seconds) in kinds.iter().zip(times) {
+        let _ = writeln!(page, "| {name} | {:.0} |", f64::from(ROWS) / seconds);
+    }
 }
 
 /// Pairs of which each gives a ratio.

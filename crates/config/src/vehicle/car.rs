@@ -401,7 +401,7 @@ fn reaches(
                 maps.current_for(line_pressure_pa)
             );
             let at = raw.get_ref().zero_pressure_a.as_ref().map_or(raw.span().start, |zero| zero.span().start);
-            Err(check.meaning(&format!("{table}.zero_pressure_a"), at, message, Some(hint)))
+            Err(check.meaning(format!("{table}.zero_pressure_a"), at, message, Some(hint)))
         }
         ClutchValve::PulseWidth { law, .. } if law.line_pressure_pa < line_pressure_pa => {
             let message = format!(

@@ -73,7 +73,7 @@ pub(super) fn clutch_valve(
                 delay_s: delays("current_a", &delay.current_a, 0.0..=10.0)?,
             };
             let Some(zero) = &raw.zero_pressure_a else { return Ok(ClutchValve::Proportional(maps)) };
-            let zero_pressure_a = check.number(&key("zero_pressure_a"), zero, 0.01..=10.0)?;
+            let zero_pressure_a = check.number(key("zero_pressure_a"), zero, 0.01..=10.0)?;
             Ok(ClutchValve::NormallyHigh { maps, zero_pressure_a })
         }
         RawValveKind::PulseWidth => {

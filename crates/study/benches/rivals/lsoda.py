@@ -1,4 +1,4 @@
-"""Two seconds in first gear with SciPy's LSODA: a rival for `cargo bench -p study`.
+"""Two seconds in first gear with SciPy's LSODA: a rival for `cargo bench -p study --bench performance`.
 
 Reads the car's parameters as JSON; prints the fastest time in s, the derivative at the start, and the end state.
 """

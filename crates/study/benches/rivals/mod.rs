@@ -1,10 +1,13 @@
-//! The plant's integrator beside those of a Rust library and of SciPy, on the same equations.
+//! The plant's integrator beside those of a Rust library, a method of fixed step and SciPy, on the same equations.
+
+mod plot;
 
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use differential_equations::prelude::*;
 use drivetrain::{AccelerationRow, ClutchValve, Engagement};
@@ -12,17 +15,20 @@ use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::state::STATES;
 use plant::{HybridIntegrator, Inputs, Mode, Powertrain, State};
 
-use crate::{LONG, fastest, time, vehicle};
+use crate::shared::vehicle;
+use crate::{fastest, time};
+use plot::{Curve, Panel};
 
-/// Two seconds in first gear under constant inputs.
+/// First gear under inputs that stay for a while.
 struct FirstGear<'a> {
     powertrain: &'a Powertrain,
     mode: Mode,
+    inputs: Inputs,
 }
 
 impl ODE<f64, [f64; STATES]> for FirstGear<'_> {
     fn diff(&self, _time: f64, x: &[f64; STATES], slope: &mut [f64; STATES]) {
-        *slope = self.powertrain.derivative(self.mode, x, &INPUTS);
+        *slope = self.powertrain.derivative(self.mode, x, &self.inputs);
     }
 }
 
@@ -39,69 +45,170 @@ const START: State = State {
     ..State::ZERO
 };
 
-/// Solves the problem; nothing if the method fails.
-type Solve<'a> = &'a dyn Fn() -> Option<[f64; STATES]>;
+/// Two seconds as pieces of constant inputs: how long each is, s, and the inputs of each.
+struct Problem {
+    title: &'static str,
+    piece_s: f64,
+    inputs: Vec<Inputs>,
+}
 
-pub(crate) fn integrators(page: &mut String) {
-    let powertrain = Powertrain::new(vehicle());
-    let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
-    let problem = FirstGear { powertrain: &powertrain, mode };
-    let start = START.to_array();
-    let ours = |tolerance: f64| {
-        let mut plant = HybridIntegrator::with_tolerance(&powertrain, 0.0, START, &INPUTS, tolerance).unwrap();
-        plant.advance(&powertrain, &INPUTS, SPAN_S, &mut |_| {}).unwrap();
-        plant.state().to_array()
+/// The same inputs throughout, and inputs that change every 10 ms as those of a controller do.
+fn problems() -> [Problem; 2] {
+    let changing = |piece: u32| Inputs { throttle: 0.22 + 0.03 * (0.1 * f64::from(piece)).sin(), ..INPUTS };
+    [
+        Problem { title: "constant inputs", piece_s: SPAN_S, inputs: vec![INPUTS] },
+        Problem { title: "inputs that change every 10 ms", piece_s: 0.01, inputs: (0..200).map(changing).collect() },
+    ]
+}
+
+/// Solves a problem at a tolerance, or with a step in s; nothing if the method fails.
+type Solve<'a> = Box<dyn Fn(&Problem, f64) -> Option<[f64; STATES]> + 'a>;
+
+/// Solves a piece of a problem from a state.
+type Piece<'a> = &'a dyn Fn(&FirstGear<'_>, [f64; STATES]) -> Option<[f64; STATES]>;
+
+/// A method and what it is tried with.
+struct Method<'a> {
+    name: &'static str,
+    tried: &'static [f64],
+    solve: Solve<'a>,
+}
+
+const TOLERANCES: [f64; 6] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+/// Steps of the method of fixed step, s, which divide a piece; the longest ones are unstable.
+const STEPS_S: [f64; 5] = [5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4];
+
+fn ours(powertrain: &Powertrain, problem: &Problem, tolerance: f64) -> [f64; STATES] {
+    let first = problem.inputs[0];
+    let mut plant = HybridIntegrator::with_tolerance(powertrain, 0.0, START, &first, tolerance).unwrap();
+    for (piece, inputs) in (1_u32..).zip(&problem.inputs) {
+        plant.advance(powertrain, inputs, f64::from(piece) * problem.piece_s, &mut |_| {}).unwrap();
+    }
+    plant.state().to_array()
+}
+
+/// Runge-Kutta of order 4 with a fixed step, as in a model for a test bench.
+fn rk4(gear: &FirstGear<'_>, mut x: [f64; STATES], span_s: f64, step_s: f64) -> [f64; STATES] {
+    let f = |x: &[f64; STATES]| gear.powertrain.derivative(gear.mode, x, &gear.inputs);
+    let moved = |x: &[f64; STATES], by: f64, k: &[f64; STATES]| std::array::from_fn(|i| x[i] + by * k[i]);
+    for _ in 0..(span_s / step_s).round() as u32 {
+        let a = f(&x);
+        let b = f(&moved(&x, 0.5 * step_s, &a));
+        let c = f(&moved(&x, 0.5 * step_s, &b));
+        let d = f(&moved(&x, step_s, &c));
+        x = std::array::from_fn(|i| x[i] + step_s / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]));
+    }
+    x
+}
+
+fn methods<'a>(powertrain: &'a Powertrain, mode: Mode) -> Vec<Method<'a>> {
+    // Each piece anew: the inputs jump.
+    let piecewise = move |problem: &Problem, piece: Piece<'_>| {
+        let gear = |inputs: &Inputs| FirstGear { powertrain, mode, inputs: *inputs };
+        problem.inputs.iter().try_fold(START.to_array(), |x, inputs| piece(&gear(inputs), x))
     };
     macro_rules! library {
-        ($method:expr) => {
-            || {
-                let method = $method.rtol(RELATIVE_TOLERANCE).atol(RELATIVE_TOLERANCE);
-                let solution = IVP::ode(&problem, 0.0, SPAN_S, start).method(method).solve();
-                solution.ok().and_then(|solution| solution.y.last().copied())
+        ($name:expr, $method:expr) => {
+            Method {
+                name: $name,
+                tried: &TOLERANCES,
+                solve: Box::new(move |problem, tolerance| {
+                    piecewise(problem, &|gear, x| {
+                        let method = $method.rtol(tolerance).atol(tolerance);
+                        let solution = IVP::ode(gear, 0.0, problem.piece_s, x).method(method).solve();
+                        solution.ok().and_then(|solution| solution.y.last().copied())
+                    })
+                }),
             }
         };
     }
-    let reference = ours(1e-11);
-    let usual = || Some(ours(RELATIVE_TOLERANCE));
-    let dopri5 = library!(ExplicitRungeKutta::dopri5());
-    let radau5 = library!(ImplicitRungeKutta::radau5());
-    let kvaerno = library!(DiagonallyImplicitRungeKutta::kvaerno745());
-    let bdf = library!(BackwardDifferentiationFormula::adaptive());
-    let rivals: [(&str, Solve<'_>); 5] = [
-        ("wetclutch, with its events", &usual),
-        ("`differential-equations`, Dormand-Prince 5(4)", &dopri5),
-        ("`differential-equations`, Radau 5", &radau5),
-        ("`differential-equations`, Kvaerno 7(4)", &kvaerno),
-        ("`differential-equations`, BDF", &bdf),
-    ];
-    let mut jobs: Vec<Box<dyn FnMut()>> = Vec::new();
-    for (_, solve) in rivals {
-        jobs.push(Box::new(move || {
-            black_box(solve());
-        }));
-    }
-    let times = fastest(LONG, &mut jobs);
+    vec![
+        Method {
+            name: "wetclutch, with its events",
+            tried: &TOLERANCES,
+            solve: Box::new(|problem, tolerance| Some(ours(powertrain, problem, tolerance))),
+        },
+        library!("`differential-equations`, Dormand-Prince 5(4)", ExplicitRungeKutta::dopri5()),
+        library!("`differential-equations`, Radau 5", ImplicitRungeKutta::radau5()),
+        library!("`differential-equations`, Kvaerno 7(4)", DiagonallyImplicitRungeKutta::kvaerno745()),
+        library!("`differential-equations`, BDF", BackwardDifferentiationFormula::adaptive()),
+        Method {
+            name: "Runge-Kutta of order 4, fixed step",
+            tried: &STEPS_S,
+            solve: Box::new(move |problem, step_s| {
+                piecewise(problem, &|gear, x| Some(rk4(gear, x, problem.piece_s, step_s)))
+            }),
+        },
+    ]
+}
+
+/// Error that a method may have at most to be compared in the table.
+const EQUAL_ERROR: f64 = 1e-4;
+
+/// The integrator beside its rivals: a table for the page, and the diagram.
+pub(crate) fn integrators(page: &mut String) -> String {
+    let powertrain = Powertrain::new(vehicle());
+    let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
+    let methods = methods(&powertrain, mode);
+    let panels = problems().map(|problem| {
+        let reference = ours(&powertrain, &problem, 1e-11);
+        let curves = methods.iter().map(|method| curve(method, &problem, &reference)).collect();
+        Panel { title: problem.title, curves }
+    });
     page.push_str(
-        "\n## The integrator compared with others\n\nTwo seconds in first gear on the same equations at a relative tolerance of \
-         1e-5, without recording. Error: largest\nrelative error of a state at the end.\n\n\
-         | integrator | time | relative to wetclutch | error |\n|---|---|---|---|\n",
+        "\n## The integrator compared with others\n\nTwo seconds in first gear on the same equations, without recording. Error: largest relative \
+         error of a state at the\nend. Each method is run at several tolerances, that of fixed step with several steps; the table has the \
+         shortest time with an error of at\nmost 1e-4.\n\n![Time over error of each method](figures/work_precision.svg)\n\n\
+         | integrator | constant inputs | relative to wetclutch | inputs that change every 10 ms | relative |\n|---|---|---|---|---|\n",
     );
-    let mut row = |name: &str, seconds: f64, end: Option<[f64; STATES]>| {
-        let _ = match end {
-            None => writeln!(page, "| {name} | fails | | |"),
-            Some(end) => {
-                let (ratio, error) = (seconds / times[0], error(&end, &reference));
-                writeln!(page, "| {name} | {} | {ratio:.1} | {error:.0e} |", time(seconds))
-            }
-        };
+    let at = |panel: usize, method: usize| time_at(&panels[panel].curves[method].points, EQUAL_ERROR);
+    for (number, method) in methods.iter().enumerate() {
+        let _ = write!(page, "| {} ", method.name);
+        for panel in 0..panels.len() {
+            let _ = match (at(panel, number), at(panel, 0)) {
+                (Some(seconds), Some(own)) => write!(page, "| {} | {:.1} ", time(seconds), seconds / own),
+                _ => write!(page, "| does not reach it | "),
+            };
+        }
+        page.push_str("|\n");
+    }
+    let reference = ours(&powertrain, &problems()[0], 1e-11);
+    let _ = match lsoda(&powertrain) {
+        Some((seconds, end)) => writeln!(
+            page,
+            "\nSciPy `solve_ivp` with LSODA, which calls the equations in Python, takes {} for the constant inputs at a relative tolerance of 1e-5, \
+             with an error of {:.0e}: most of that is Python.",
+            time(seconds),
+            error(&end, &reference)
+        ),
+        None => writeln!(page, "\nSciPy's LSODA is not measured: there is no python3 with scipy."),
     };
-    for ((name, solve), &seconds) in rivals.iter().zip(&times) {
-        row(name, seconds, solve());
+    plot::svg(&panels)
+}
+
+/// Errors and times of a method at all that it is tried with.
+fn curve(method: &Method<'_>, problem: &Problem, reference: &[f64; STATES]) -> Curve {
+    let mut points = Vec::new();
+    for &tried in method.tried {
+        let Some(end) = (method.solve)(problem, tried) else { continue };
+        let error = error(&end, reference);
+        // A step beyond the limit of stability ends anywhere.
+        if error.is_finite() && error < 1.0 {
+            let job = || {
+                black_box((method.solve)(problem, black_box(tried)));
+            };
+            points.push((error, fastest(EACH, &mut [Box::new(job)])[0]));
+        }
     }
-    match lsoda(&powertrain) {
-        Some((seconds, end)) => row("SciPy `solve_ivp` with LSODA, equations in Python", seconds, Some(end)),
-        None => page.push_str("| SciPy with LSODA | not measured: there is no python3 with scipy | | |\n"),
-    }
+    Curve { name: method.name, points }
+}
+
+/// How long each point is measured.
+const EACH: Duration = Duration::from_millis(150);
+
+/// The shortest time with an error that is at most this.
+fn time_at(points: &[(f64, f64)], error: f64) -> Option<f64> {
+    points.iter().filter(|point| point.0 <= error).map(|point| point.1).min_by(f64::total_cmp)
 }
 
 /// Largest difference of a state, over its size.

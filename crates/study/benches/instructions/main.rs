@@ -1,0 +1,136 @@
+//! Instructions of the hot paths, against those in `instructions.toml`.
+//!
+//! `cargo bench -p study --bench instructions` counts them with Valgrind's callgrind and fails where one has grown by more than 5 %.
+//! Counts repeat on one toolchain; where the compiler, the C library or Valgrind is another than that of the file, the program
+//! says so and compares nothing. After a change that is meant, or with a new toolchain, `-- --write` renews the file.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "a benchmark")]
+
+mod paths;
+#[path = "../shared/mod.rs"]
+mod shared;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+use serde::Deserialize;
+
+use paths::{HotPath, PATHS};
+
+/// Growth of a count beyond which the comparison fails.
+const TOLERANCE: f64 = 0.05;
+
+/// The counts of a toolchain.
+#[derive(Deserialize)]
+struct Counts {
+    toolchain: String,
+    instructions: BTreeMap<String, u64>,
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let has = |option: &str| arguments.iter().any(|argument| argument == option);
+    // Tests ask only whether it starts.
+    if has("--test") {
+        return ExitCode::SUCCESS;
+    }
+    if let Some(at) = arguments.iter().position(|argument| argument == "--only") {
+        let path = PATHS.iter().find(|path| Some(path.name) == arguments.get(at + 1).map(String::as_str));
+        counted(&mut *(path.unwrap().prepare)());
+        return ExitCode::SUCCESS;
+    }
+    match check(has("--write")) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What is counted: callgrind looks at this function alone.
+#[inline(never)]
+fn counted(job: &mut dyn FnMut()) {
+    job();
+}
+
+fn check(write: bool) -> Result<bool, String> {
+    let file = shared::root().join("crates/study/benches/instructions.toml");
+    let toolchain = toolchain()?;
+    let known = (!write).then(|| read(&file)).transpose()?;
+    let same = known.as_ref().is_none_or(|known| known.toolchain == toolchain);
+    let mut grown = Vec::new();
+    let mut counts = BTreeMap::new();
+    for path in PATHS {
+        let count = count(path)?;
+        let before = known.as_ref().and_then(|known| known.instructions.get(path.name));
+        let change = before.map(|&before| count as f64 / before as f64 - 1.0);
+        let beside = change.map_or_else(String::new, |change| format!("{:+9.2} %", 100.0 * change));
+        println!("{count:>12} {beside:>12}  {}", path.name);
+        if known.is_some() && change.is_none_or(|change| change > TOLERANCE) {
+            grown.push(path.name);
+        }
+        counts.insert(path.name, count);
+    }
+    if write {
+        return std::fs::write(&file, text(&toolchain, &counts)).map(|()| true).map_err(|error| error.to_string());
+    }
+    if !same {
+        let of_file = known.map_or_else(String::new, |known| known.toolchain);
+        println!("not compared: the counts are of\n  {of_file}\nand this is\n  {toolchain}\n{RENEW}");
+        return Ok(true);
+    }
+    if !grown.is_empty() {
+        println!("more than {:.0} % above the file, or not in it: {}\n{RENEW}", 100.0 * TOLERANCE, grown.join(", "));
+    }
+    Ok(grown.is_empty())
+}
+
+const RENEW: &str = "to renew the file: cargo bench -p study --bench instructions -- --write";
+
+fn read(file: &Path) -> Result<Counts, String> {
+    let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}\n{RENEW}", file.display()))?;
+    toml::from_str(&text).map_err(|error| format!("{}: {error}\n{RENEW}", file.display()))
+}
+
+fn text(toolchain: &str, counts: &BTreeMap<&str, u64>) -> String {
+    let mut text = format!(
+        "# Instructions of the hot paths, see `benches/instructions/main.rs`; do not edit.\n\
+         toolchain = {toolchain:?}\n\n[instructions]\n"
+    );
+    for (name, count) in counts {
+        let _ = writeln!(text, "{name:?} = {count}");
+    }
+    text
+}
+
+/// Compiler, C library and Valgrind: all that the counts depend on beside the program.
+fn toolchain() -> Result<String, String> {
+    let version = |program: &str| {
+        let output = Command::new(program).arg("--version").output();
+        let output = output.map_err(|error| format!("{program}: {error}\nhint: install {program}"))?;
+        let text = String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned();
+        Ok::<_, String>(text)
+    };
+    Ok([version("rustc")?, version("ldd")?, version("valgrind")?].join("; "))
+}
+
+/// Instructions of a path for one of its units.
+fn count(path: &HotPath) -> Result<u64, String> {
+    let program = std::env::current_exe().map_err(|error| error.to_string())?;
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*instructions::counted*"])
+        .arg(program)
+        .args(["--only", path.name])
+        .output()
+        .map_err(|error| format!("valgrind: {error}"))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let collected = said.lines().find_map(|line| line.split_once("Collected :")?.1.trim().parse::<u64>().ok());
+    match collected {
+        Some(collected) if output.status.success() && collected > 0 => Ok(collected / path.units),
+        _ => Err(format!("callgrind counted nothing of \"{}\":\n{said}", path.name)),
+    }
+}

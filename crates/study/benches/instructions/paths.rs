@@ -1,0 +1,150 @@
+//! The paths in which the program spends its time.
+
+use std::hint::black_box;
+
+use config::{Car, Experiment, ObserverKind};
+use design::rigid::design_phase;
+use design::{
+    ShiftErrors, ShiftTables, any_shift_filter, design_rigid, kalman_filter, range, requirement, rigid_observer,
+};
+use observer::{Estimator, Phase};
+use plant::car::CarShift;
+use plant::{Contact, Direction, Inputs, Mode, Powertrain, Simulation, State};
+use study::any_shift::{ShiftDraw, inputs, simulated};
+
+use crate::shared::{THREE, campaign, estimate, log_of, observer, samples, vehicle};
+
+/// A path, with what it does prepared outside of the count.
+pub(crate) struct HotPath {
+    pub(crate) name: &'static str,
+    /// Counts are given for one of so many.
+    pub(crate) units: u64,
+    pub(crate) prepare: fn() -> Box<dyn FnMut()>,
+}
+
+/// All of them.
+pub(crate) const PATHS: &[HotPath] = &[
+    HotPath { name: "right-hand side of the plant", units: 1000, prepare: right_hand_side },
+    HotPath { name: "shift of 1.5 s from a warm state", units: 1, prepare: warm_shift },
+    HotPath { name: "launch and shift of 9.5 s, recorded every 1 ms", units: 1, prepare: launch_and_shift },
+    HotPath { name: "step of the Kalman filter", units: 200, prepare: kalman_step },
+    HotPath { name: "step of the rigid observer", units: 200, prepare: rigid_step },
+    HotPath { name: "step of the range", units: 200, prepare: range_step },
+    HotPath { name: "step of the filter for any shift", units: 300, prepare: any_shift_step },
+    HotPath { name: "gain design of one phase", units: 1, prepare: gain_design },
+    HotPath { name: "run of a study with three observers", units: 4, prepare: study_runs },
+    HotPath { name: "estimate of 10,000 rows of CSV, with range", units: 1, prepare: estimate_rows },
+];
+
+fn right_hand_side() -> Box<dyn FnMut()> {
+    let powertrain = Powertrain::new(vehicle());
+    let mode = Mode { offgoing: Contact::Stuck, oncoming: Contact::Slipping(Direction::Forward) };
+    let inputs = Inputs { throttle: 0.22, offgoing_settled_pa: 1e6, oncoming_settled_pa: 0.0 };
+    let x = State { engine_rad_s: 250.0, turbine_rad_s: 225.0, output_rad_s: 90.0, wheel_rad_s: 30.0, ..State::ZERO };
+    Box::new(move || {
+        for _ in 0..1000 {
+            black_box(powertrain.derivative(mode, black_box(&x.to_array()), &inputs));
+        }
+    })
+}
+
+fn warm_shift() -> Box<dyn FnMut()> {
+    let experiment: &Experiment = Box::leak(Box::new(Experiment { sample_time_s: 0.01, ..Experiment::e1().unwrap() }));
+    let powertrain: &Powertrain = Box::leak(Box::new(Powertrain::new(vehicle())));
+    let request_s = experiment.shift.request_s;
+    let mut shift = Simulation::new(powertrain, &vehicle(), experiment).unwrap();
+    shift.advance(request_s, |_| {}).unwrap();
+    Box::new(move || {
+        shift
+            .advance(request_s + 1.5, |sample| {
+                black_box(sample);
+            })
+            .unwrap();
+    })
+}
+
+fn launch_and_shift() -> Box<dyn FnMut()> {
+    let (vehicle, experiment) = (vehicle(), Experiment { sample_time_s: 0.001, ..Experiment::e1().unwrap() });
+    Box::new(move || {
+        let record = |sample: &_| {
+            black_box(sample);
+        };
+        plant::simulate(&vehicle, &experiment, record).unwrap();
+    })
+}
+
+/// How many samples of a shift are stepped over.
+const STEPS: usize = 200;
+
+/// An observer over the first samples of a real shift.
+fn steps(observer: impl Estimator<f64, State: 'static> + 'static) -> Box<dyn FnMut()> {
+    let samples = samples();
+    let mut state = observer.start();
+    Box::new(move || {
+        for sample in &samples[..STEPS] {
+            black_box(observer.step(&mut state, black_box(sample)));
+        }
+    })
+}
+
+fn kalman_step() -> Box<dyn FnMut()> {
+    let sensors = Experiment::bench().unwrap().sensors_told;
+    steps(kalman_filter(&vehicle(), sensors.as_ref()))
+}
+
+fn rigid_step() -> Box<dyn FnMut()> {
+    steps(rigid_observer(&vehicle(), design_rigid(&vehicle()).unwrap().gains()))
+}
+
+fn range_step() -> Box<dyn FnMut()> {
+    let (range, samples) = (range(&vehicle()), samples());
+    let mut state = range.start();
+    Box::new(move || {
+        for sample in &samples[..STEPS] {
+            black_box(range.step(&mut state, black_box(sample)));
+        }
+    })
+}
+
+fn any_shift_step() -> Box<dyn FnMut()> {
+    let car: &Car = Box::leak(Box::new(Car::eight_speed().unwrap()));
+    let (errors, sensors) = (ShiftErrors::STANDARD, Experiment::bench().unwrap().sensors.unwrap());
+    let tables: &ShiftTables<f64> = Box::leak(Box::new(ShiftTables::of_car(car, &errors).unwrap()));
+    let filter = any_shift_filter(car, tables, &errors, Some(&sensors));
+    let gear = |name: &str| car.gearbox.gear(name).unwrap();
+    let shift = CarShift::usual(car, gear("1"), gear("2"), 0.3);
+    let samples = simulated(car, &ShiftDraw::none(car).car(car), &shift).unwrap();
+    let inputs: Vec<_> = inputs(car, tables, &samples, &sensors, 1).into_iter().take(300).collect();
+    assert_eq!(inputs.len(), 300);
+    let mut state = filter.start();
+    Box::new(move || {
+        for (_, input) in &inputs {
+            black_box(filter.step(&mut state, black_box(input)));
+        }
+    })
+}
+
+fn gain_design() -> Box<dyn FnMut()> {
+    let vehicle = vehicle();
+    let required = requirement(&vehicle, Phase::InertiaPhase).into();
+    Box::new(move || {
+        black_box(design_phase(black_box(&vehicle), Phase::InertiaPhase, &required).unwrap());
+    })
+}
+
+fn study_runs() -> Box<dyn FnMut()> {
+    let campaign = campaign(5, |name| THREE.contains(&name));
+    // The first run makes the memory for the others.
+    campaign.row(0).unwrap();
+    Box::new(move || {
+        for run in 1..5 {
+            black_box(campaign.row(run).unwrap());
+        }
+    })
+}
+
+/// Reads rows, runs the default observer with its range, and writes rows, as `wetclutch estimate` does.
+fn estimate_rows() -> Box<dyn FnMut()> {
+    let (vehicle, observer, log) = (vehicle(), observer(ObserverKind::Kalman), log_of(10_000));
+    Box::new(move || estimate(&observer, &vehicle, &log))
+}

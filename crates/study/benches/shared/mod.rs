@@ -1,0 +1,83 @@
+//! What both benchmarks work on.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use config::{Experiment, GainMethod, ObserverKind, Study, Vehicle};
+use observer::Input;
+use study::sampling::through_sensors;
+use study::{AnyObserver, Campaign, Log, LogRow, RunColumns, simulate_shift};
+use trace::{Cell, CsvRows, CsvWriter, Trace};
+
+/// Sample time of the observers, s.
+pub(crate) const SAMPLE_TIME_S: f64 = 0.01;
+
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+pub(crate) fn vehicle() -> Vehicle {
+    Vehicle::two_speed_at().unwrap()
+}
+
+/// A shift of the bench as its observers see it: through sensors, from a second before its request.
+fn seen() -> Trace {
+    let (vehicle, bench) = (vehicle(), Experiment::bench().unwrap());
+    let shift = simulate_shift(&vehicle, &vehicle, &bench, config::study::RECORD_BEFORE_S).unwrap();
+    through_sensors(&shift, SAMPLE_TIME_S, &bench.sensors.unwrap(), &vehicle)
+}
+
+/// The samples of that shift.
+pub(crate) fn samples() -> Vec<Input<f64>> {
+    let seen = seen();
+    let columns = RunColumns::of(&seen, &vehicle()).unwrap();
+    columns.samples().map(|sample| sample.unwrap().0).collect()
+}
+
+/// A log as CSV: the readings of that shift again and again.
+pub(crate) fn log_of(rows: u32) -> Vec<u8> {
+    let measured = seen().filtered(|name| {
+        let is_speed = name.ends_with("_speed_rad_s") && !name.starts_with("vehicle");
+        is_speed || name == trace::signal::ONCOMING_CURRENT
+    });
+    let names: Vec<&str> = measured.columns.iter().map(|column| column.name.as_str()).collect();
+    let mut writer = CsvWriter::new(Vec::new(), names.iter().copied()).unwrap();
+    for row in 0..rows {
+        let at = row as usize % measured.len();
+        let cells = names.iter().map(|name| Cell::Number(measured.get(name).map_or(f64::NAN, |values| values[at])));
+        writer.row(f64::from(row) * SAMPLE_TIME_S, cells).unwrap();
+    }
+    writer.finish().unwrap()
+}
+
+/// An observer for such a log.
+pub(crate) fn observer(kind: ObserverKind) -> AnyObserver {
+    let sensors = Experiment::bench().unwrap().sensors_told;
+    AnyObserver::designed(&vehicle(), kind, GainMethod::Iss, SAMPLE_TIME_S, sensors.as_ref()).unwrap()
+}
+
+/// Reads such a log, runs an observer with its range, and writes all columns of its estimates as CSV.
+pub(crate) fn estimate(observer: &AnyObserver, vehicle: &Vehicle, log: &[u8]) {
+    let rows = CsvRows::of(Path::new("log.csv"), Box::new(io::Cursor::new(log.to_vec()))).unwrap();
+    let log = Log::of(rows, vehicle, 1).unwrap();
+    let columns = observer.columns(log.signals().has_wheel_speed()).columns();
+    let mut writer = CsvWriter::new(io::sink(), columns.iter().map(|column| column.name)).unwrap();
+    let samples = log.map(|sample| sample.map_err(|error| error.to_string()));
+    let write = |row: LogRow, estimate| {
+        let cells = columns.iter().map(|column| column.cell(&estimate));
+        writer.row(row.time_s, cells).map_err(|error| error.to_string())
+    };
+    observer.run_over(Some(vehicle), samples, write).unwrap();
+}
+
+/// Three of the observers of the shipped study.
+pub(crate) const THREE: [&str; 3] = ["Kalman", "peak-to-peak", "open loop"];
+
+/// The shipped study with this number of runs, and of its observers those named.
+pub(crate) fn campaign(runs: u64, wanted: impl Fn(&str) -> bool) -> Campaign {
+    let mut study = Study::read(&root().join("experiments/settings.toml")).unwrap();
+    study.runs = runs;
+    Arc::make_mut(&mut study.experiment).observers.retain(|entry| wanted(&entry.name));
+    Campaign::new(study).unwrap()
+}
