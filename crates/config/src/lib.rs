@@ -9,6 +9,7 @@ pub mod drive;
 pub mod error;
 pub mod experiment;
 pub mod gearbox;
+pub mod learnt;
 pub mod source;
 pub mod study;
 pub mod vehicle;
@@ -20,6 +21,7 @@ pub use experiment::{
     ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
 pub use gearbox::GearboxFile;
+pub use learnt::{read_learnt, write_learnt};
 pub use source::{Kind, Source, toml_string};
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{

@@ -7,7 +7,7 @@
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::Real;
-use observer::any_shift::{AnyShiftFilter, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
+use observer::any_shift::{AnyShiftFilter, AnyShiftState, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use observer::{Health, Reading};
 use plant::TrainError;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
@@ -91,6 +91,8 @@ pub struct ClutchRow {
     pub pressure_pa: [f64; 3],
     /// Whether it truly sticks.
     pub sticks: bool,
+    /// Whether the filter says that the speeds show nothing of its torque.
+    pub hidden: bool,
     /// The guaranteed range of the torque, N m.
     pub torque_range_n_m: Option<[f64; 2]>,
     /// Whether the truth is within the guaranteed ranges.
@@ -108,6 +110,8 @@ pub struct ShiftScoreRow {
     pub turbine_n_m: [f64; 2],
     /// True speeds of engine, turbine, output and wheels, rad/s.
     pub speeds_rad_s: [f64; 4],
+    /// Slip of the offgoing clutch away from the new gear by the filter, rad/s.
+    pub flare_rad_s: f64,
     /// Phase by the filter.
     pub phase: &'static str,
     /// What the filter says of itself.
@@ -276,10 +280,20 @@ pub fn score_samples(
     samples: &[CarSample],
     inputs: &[(usize, ShiftInput<f64>)],
 ) -> Vec<ShiftScoreRow> {
-    let mut state = filter.start();
+    score_from(tables, filter, &mut filter.start(), samples, inputs)
+}
+
+/// The same by a filter that goes on from a state: with what it has learnt.
+pub fn score_from(
+    tables: &ShiftTables<f64>,
+    filter: &AnyShiftFilter<'_, f64>,
+    state: &mut AnyShiftState<f64>,
+    samples: &[CarSample],
+    inputs: &[(usize, ShiftInput<f64>)],
+) -> Vec<ShiftScoreRow> {
     let mut rows = Vec::new();
     for (at, input) in inputs {
-        let estimate = filter.step(&mut state, input);
+        let estimate = filter.step(state, input);
         rows.extend(row(tables, &samples[*at], &estimate));
     }
     rows
@@ -298,6 +312,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
                 torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
                 pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
                 sticks: truth.sticks,
+                hidden: found.hidden,
                 torque_range_n_m: found.torque_range_n_m,
                 in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
                     && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
@@ -314,6 +329,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
             sample.torques.output_rad_s,
             sample.wheel_rad_s,
         ],
+        flare_rad_s: estimate.flare_rad_s,
         phase: estimate.phase.map_or("-", |phase| phase.name()),
         health: estimate.health,
     })

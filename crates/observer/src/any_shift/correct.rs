@@ -62,17 +62,21 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let bent = T::of(0.5) * age_s * (rate - running.rates[0][k]);
         let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
         let measured = Measured { row, value: reading.value + age_s * rates.rest[k], noise };
-        let [innovation, variance] = running.x.innovation(&measured);
+        let mut look = running.x.look(&measured);
+        let (innovation, variance) = (look.innovation, look.variance);
         if k != WHEEL {
             let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
             running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);
         }
         match running.gates[k].judge(innovation, variance) {
             Verdict::Refused => return ChannelHealth::Refused,
-            Verdict::Jumped => running.x.add(k, k, innovation * innovation),
+            Verdict::Jumped => {
+                running.x.add(k, k, innovation * innovation);
+                look = running.x.look(&measured);
+            }
             Verdict::Taken => {}
         }
-        running.x.correct(&measured);
+        running.x.correct(&look);
         running.silent_s[k] = T::zero();
         ChannelHealth::Good
     }

@@ -5,11 +5,13 @@
 
 mod attacks;
 mod cars;
+mod learning;
 
 use std::collections::BTreeMap;
 
 use cars::{Random, cars, sensors, shifts, usual};
-use drivetrain::ShiftKind;
+use config::Car;
+use drivetrain::{ClutchValve, ShiftKind, Table1};
 use observer::Health;
 use study::any_shift::{ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, score_shift};
 
@@ -51,7 +53,8 @@ fn matrix(draws: u64, verbose: bool) -> Matrix {
             for seed in 1..=draws {
                 let mut random = Random(seed * 1000 + from as u64 * 37 + to as u64);
                 let errors = design::ShiftErrors::STANDARD;
-                let truth = ShiftDraw::within(&car, &errors, || random.uniform()).car(&car);
+                let mut truth = ShiftDraw::within(&car, &errors, || random.uniform()).car(&car);
+                leave_out(&mut truth);
                 let rows = score_shift(&car, &truth, &usual(&car, from, to, throttle), &sensors, seed).unwrap();
                 matrix.rows[0] += 2 * rows.len() as u32;
                 matrix.rows[1] +=
@@ -104,6 +107,22 @@ fn matrix(draws: u64, verbose: bool) -> Matrix {
         }
     }
     matrix
+}
+
+/// Takes out of the true car what the filter has no model of, to see what it costs: `WITHOUT="drag delay"`.
+fn leave_out(truth: &mut Car) {
+    let Ok(what) = std::env::var("WITHOUT") else { return };
+    for clutch in truth.clutches.iter_mut().flatten() {
+        if what.contains("drag") {
+            clutch.drag_n_m = 0.0;
+        }
+        if what.contains("delay")
+            && let ClutchValve::Proportional(maps) = &mut clutch.valve
+        {
+            // The middle of the budget, as the filter takes it.
+            maps.delay_s = Table1::constant(0.015);
+        }
+    }
 }
 
 fn print(matrix: &Matrix) {
