@@ -113,7 +113,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torques: None,
             slow_n_m: torque.turbine_n_m,
             motion: None,
-            rates: [[T::zero(); SPEEDS]; 2],
+            rates: [T::zero(); SPEEDS],
             gates: [Gate::new(GATE); SPEEDS],
             silent_s: [T::zero(); SPEEDS],
             misfit: T::one(),

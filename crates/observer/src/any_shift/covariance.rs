@@ -66,13 +66,9 @@ impl<T: Real> Gaussian<T> {
                 }
             }
         }
-        for k in CORE..M {
-            if stay[k] == T::one() {
-                continue;
-            }
-            for j in CORE..M {
-                p[k][j] = stay[k] * p[k][j];
-                p[j][k] = stay[k] * p[j][k];
+        for (row, own) in p.iter_mut().zip(stay).take(M).skip(CORE) {
+            for (p, other) in row.iter_mut().zip(stay).take(M).skip(CORE) {
+                *p = *own * *other * *p;
             }
         }
         for i in 0..CORE {

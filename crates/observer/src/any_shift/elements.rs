@@ -74,7 +74,7 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    /// Forgets the commands: time was lost, and with it some of them.
+    /// Forgets the range and the rate: time was lost, and with it commands.
     pub(super) fn forget(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>) {
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
             range.forget(budget, limits.command_max);
@@ -121,8 +121,7 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    /// The torque at the turbine that the element holds for sure up to one deviation, and the most that it can hold at
-    /// three, N m.
+    /// The torque at the turbine that the element can hold with an error of one deviation, and of three, N m.
     #[inline]
     pub(super) fn holds(
         &self,

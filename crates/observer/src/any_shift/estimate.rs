@@ -34,7 +34,9 @@ pub struct ClutchEstimate<T> {
     pub hidden: bool,
     /// Lowest and highest pressure, Pa, for errors within the budget.
     pub pressure_range_pa: Option<[T; 2]>,
-    /// Lowest and highest torque, N m, for errors within the budget.
+    /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if turbine and output
+    /// speed were read within 50 ms and their slip errs by less than 7 deviations of its reading and 0.6 rad/s, and twice
+    /// the change since the readings; else either direction is possible.
     pub torque_range_n_m: Option<[T; 2]>,
 }
 
@@ -111,8 +113,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.phase = Some(running.phase.phase);
                 estimate.shaft_n_m = Some(x[SPRING] + damper);
                 estimate.turbine_n_m = Some(turbine_n_m);
-                let speeds = self.then_and_now(&state.newest, Some(running));
-                estimate.flare_rad_s = running.shift.map_or(T::zero(), |shift| self.flare(&shift, speeds[0]));
+                let speeds = self.then_and_now(&state.newest);
+                estimate.flare_rad_s = match (&running.shift, speeds) {
+                    (Some(shift), Some([then, _])) => self.flare(shift, then),
+                    _ => T::zero(),
+                };
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
@@ -122,7 +127,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             None => {
                 health = health.max(Health::SpeedsRejected);
-                let speeds = self.then_and_now(&state.newest, None);
+                let (then, speeds) = (self.measured(&state.newest, None), self.then_and_now(&state.newest));
                 estimate.clutches =
                     self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
                         |shift| {
@@ -130,7 +135,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                             [0, 1].map(|c| {
                                 let clutch = &shift.clutches[c];
                                 let lasting = [learnt[c], learnt[c + 2]];
-                                let estimate = self.by_valve(&state.elements, clutch, speeds[0], lasting);
+                                let estimate = self.by_valve(&state.elements, clutch, then, lasting);
                                 self.in_range(estimate, &state.elements, clutch, speeds)
                             })
                         },
@@ -239,17 +244,19 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         mut estimate: ClutchEstimate<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         clutch: &ShiftClutch<T>,
-        speeds: [[T; 2]; 2],
+        speeds: Option<[[T; 2]; 2]>,
     ) -> ClutchEstimate<T> {
-        // Since the readings were taken the slip has gone on, and may have ended.
-        let (then, now) = (self.slip(clutch.ratio, speeds[0]), self.slip(clutch.ratio, speeds[1]));
-        let threshold = now.threshold();
-        let error = (clutch.alpha * (threshold + threshold)).abs()
-            + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
-        let known = [clutch.alpha * now.value, error];
+        let known = speeds.map(|[then, now]| {
+            // Since the readings were taken the slip has gone on, and may have ended.
+            let (then, now) = (self.slip(clutch.ratio, then), self.slip(clutch.ratio, now));
+            let threshold = now.threshold();
+            let error = (clutch.alpha * (threshold + threshold)).abs()
+                + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
+            [clutch.alpha * now.value, error]
+        });
         let ranges = self
             .element(elements, clutch.element)
-            .and_then(|(memory, element)| memory.ranges(element, Some(known).filter(|[slip, _]| slip.is_finite())));
+            .and_then(|(memory, element)| memory.ranges(element, known.filter(|[slip, _]| slip.is_finite())));
         if let Some((pressure, torque)) = ranges {
             let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
             estimate.pressure_pa = nearest(pressure, estimate.pressure_pa);

@@ -35,8 +35,8 @@ pub const LEARNT: usize = TURBINE_AT + 1;
 pub(super) const ACTING: usize = 6;
 
 /// Squared distance of what a shift says from what was known, in its deviations, beyond which it counts for less, and
-/// beyond which it is refused \[chosen\]: six quantities reach them by chance in one of 6 and in 2 of a million shifts.
-const LIKELY: f64 = 9.0;
+/// beyond which it is refused \[chosen\]: six quantities reach them by chance in one of 70 and in 2 of a million shifts.
+const LIKELY: f64 = 16.0;
 const GATE: f64 = 36.0;
 /// Refused shifts in a row after which all is forgotten \[chosen\]: the car is another, as after a repair.
 const REFUSED_MOST: u8 = 8;
@@ -358,7 +358,7 @@ fn inverse<T: Real>(of: &[[T; ACTING]; ACTING]) -> Option<[[T; ACTING]; ACTING]>
 fn is_positive<T: Real>(mut of: [[T; LEARNT]; LEARNT]) -> bool {
     for k in 0..LEARNT {
         let row = of[k];
-        if !(row[k] > T::zero()) {
+        if row[k] <= T::zero() || row[k].is_nan() {
             return false;
         }
         for below in of.iter_mut().skip(k + 1) {

@@ -83,6 +83,8 @@ const PIECE_S: f64 = 0.0125;
 const MOST_PIECES: usize = 32;
 /// Time without any speed after which the filter begins anew, s.
 const LOST_S: f64 = 0.25;
+/// Time without a reading of turbine or output speed in a shift after which it teaches nothing, s \[chosen\].
+const GAP_S: f64 = 0.025;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
 /// Low-pass of the turbine torque that the share `b` multiplies, s.
@@ -232,8 +234,8 @@ struct Running<T> {
     /// Turbine torque, low-passed, N m.
     slow_n_m: T,
     motion: Option<Motion<T>>,
-    /// Rates of turbine, output and wheel speed, rad/s^2, now and at the step before.
-    rates: [[T; SPEEDS]; 2],
+    /// Rates of turbine, output and wheel speed, rad/s^2.
+    rates: [T; SPEEDS],
     gates: [Gate; SPEEDS],
     /// Time since a reading was taken, s.
     silent_s: [T; SPEEDS],
@@ -323,6 +325,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             return state.estimate;
         }
         state.started = true;
+        if dt_s > T::of(LOST_S) {
+            // Too long to be predicted.
+            state.lose();
+        }
         state.fading_s = state.fading_s + dt_s;
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);
@@ -357,6 +363,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             if let Some(memory) = memory {
                 memory.forget(element, &self.limits);
             }
+        }
+        for clutch in state.estimate.clutches.iter_mut().flatten() {
+            (clutch.pressure_range_pa, clutch.torque_range_n_m) = (None, None);
         }
         state.estimate.health = Health::TimeRejected;
         state.estimate.channels = Channels::all(ChannelHealth::Refused);

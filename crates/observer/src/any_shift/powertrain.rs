@@ -3,7 +3,7 @@
 //! ```text
 //! (w_t', w_o') = G (X, Y)         X = (1 + b + c) T_t - m M11 w_t' - U_off - U_on,   Y = -T_o + i_off U_off + i_on U_on
 //! T_o = (T_s + C_s (w_o/i_df - w_w + r))/i_df
-//! w_w' = (T_s - T_L)/J            T_s' = K_s (w_o/i_df - w_w + r)
+//! w_w' = (i_df T_o - T_L)/J       T_s' = K_s (w_o/i_df - w_w + r)
 //! ```
 //!
 //! `G` is the inverse of the mass while no clutch holds; while one holds with the ratio `i`, the torques of turbine and
@@ -160,8 +160,12 @@ impl<T: Real> Rates<T> {
             row[RATE] = per_output_torque * damping / i;
             (rates.rows[k], rates.rest[k]) = (row, rest);
         }
-        rates.rows[WHEEL][SPRING] = wheels_kg_m2.recip();
-        rates.rows[WHEEL][LOAD] = -wheels_kg_m2.recip();
+        let per_wheel_torque = wheels_kg_m2.recip();
+        rates.rows[WHEEL][SPRING] = per_wheel_torque;
+        rates.rows[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
+        rates.rows[WHEEL][WHEEL] = -per_wheel_torque * damping;
+        rates.rows[WHEEL][RATE] = per_wheel_torque * damping;
+        rates.rows[WHEEL][LOAD] = -per_wheel_torque;
         rates
     }
 
@@ -200,8 +204,11 @@ impl<T: Real> Motion<T> {
             a[k][WHEEL] = g[k][1] * damping / i;
             b[k] = [g[k][0], g[k][1], zero, -g[k][1] * damping / i];
         }
-        a[WHEEL][SPRING] = wheels_kg_m2.recip();
-        b[WHEEL][2] = -wheels_kg_m2.recip();
+        let per_wheel_torque = wheels_kg_m2.recip();
+        a[WHEEL][SPRING] = per_wheel_torque;
+        a[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
+        a[WHEEL][WHEEL] = -per_wheel_torque * damping;
+        b[WHEEL] = [zero, zero, -per_wheel_torque, per_wheel_torque * damping];
         a[SPRING][OUTPUT] = stiffness / i;
         a[SPRING][WHEEL] = -stiffness;
         b[SPRING][3] = stiffness;
@@ -329,7 +336,7 @@ mod tests {
         let (torques, g) = (torques(), free(&MASS));
         let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
         let x = state();
-        let [turbine, output, _] = rates.at(&x);
+        let [turbine, output, wheel] = rates.at(&x);
         let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
             + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
         let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);
@@ -346,5 +353,6 @@ mod tests {
             })
             .sum();
         assert!((input - shaft / LINE.final_ratio * x[OUTPUT] - heat - kinetic).abs() < 1e-6);
+        assert!((shaft - x[LOAD] - WHEELS_KG_M2 * wheel).abs() < 1e-6);
     }
 }

@@ -34,7 +34,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let u = &self.uncertainty;
         let (mut clutches, mut inertia_n_m) = ([ClutchTorque::none(); 2], T::zero());
         if let Some(shift) = &running.shift {
-            inertia_n_m = u.inertia_share * shift.mass_kg_m2[0][0] * running.rates[0][TURBINE];
+            inertia_n_m = u.inertia_share * shift.mass_kg_m2[0][0] * running.rates[TURBINE];
             for (c, (torque, clutch)) in clutches.iter_mut().zip(&shift.clutches).enumerate() {
                 let slip = self.slip(clutch.ratio, speeds);
                 let direction = running.phase.direction(c, &slip);

@@ -115,15 +115,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         })
     }
 
-    /// Speeds of turbine and output at the time of the older reading, and on the same lines now.
-    pub(super) fn then_and_now(
-        &self,
-        newest: &[Option<Newest<T>>; SPEEDS],
-        running: Option<&Running<T>>,
-    ) -> [[T; 2]; 2] {
-        let then = self.measured(newest, running);
+    /// Speeds of turbine and output at the time of the older reading, and on the same lines now; `None` where one of them has
+    /// not been read for long.
+    pub(super) fn then_and_now(&self, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[[T; 2]; 2]> {
         let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
-        [then, [TURBINE, OUTPUT].map(|k| fresh(k).map_or(then[k], |newest| newest.at(T::zero())))]
+        let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
+        Some([self.measured(newest, None), [turbine.at(T::zero()), output.at(T::zero())]])
     }
 
     /// The torque at the gearbox input now, if it is known.

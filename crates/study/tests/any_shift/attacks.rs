@@ -217,6 +217,76 @@ fn a_flare_is_said_and_no_held_clutch_is_accused() {
     assert!(flares > 20 && 10 * said > 8 * flares);
 }
 
+/// Valves anywhere in the budget, also in lag, delay and hysteresis; one speed sensor is lost in the shift, or all readings are.
+#[test]
+fn the_range_is_guaranteed_whatever_is_lost() {
+    type Loss = fn(&mut ShiftInput<f64>);
+    let losses: [(&str, Loss); 4] = [
+        ("nothing", |_| {}),
+        ("turbine", |input| input.turbine_rad_s = None),
+        ("output", |input| input.output_rad_s = None),
+        ("all speeds", |input| {
+            (input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.engine_rad_s) = (None, None, None, None);
+        }),
+    ];
+    let car = &cars()[0];
+    let mut random = Random(11);
+    for (name, loss) in losses {
+        let [mut clutches, mut ranges, mut outside] = [0_u32; 3];
+        for (from, to, throttle) in shifts(car).into_iter().step_by(3) {
+            let mut truth = draw(car, seed_of(&CarShift::usual(car, from, to, throttle)));
+            for clutch in truth.clutches.iter_mut().flatten() {
+                let [lag, delay, play] = [(); 3].map(|()| random.uniform());
+                let [least_s, most_s] = ERRORS.valve_delay_s;
+                let lag = 1.0 + ERRORS.valve_lag * (2.0 * lag - 1.0);
+                clutch.valve = clutch.valve.changed(lag, 1.0, Some(least_s + delay * (most_s - least_s)));
+                clutch.hysteresis_pa = play * ERRORS.hysteresis_pa;
+            }
+            let samples = simulated(car, &truth, &CarShift::usual(car, from, to, throttle)).unwrap();
+            let steps = std::cell::Cell::new(0);
+            let rows = rows(car, &samples, 1, |input| {
+                steps.set(steps.get() + 1);
+                // From 0.3 s after the request on.
+                if steps.get() > 130 {
+                    loss(input);
+                }
+            });
+            for clutch in rows.iter().flat_map(|row| row.clutches) {
+                clutches += 1;
+                ranges += u32::from(clutch.torque_range_n_m.is_some());
+                outside += u32::from(!clutch.in_range);
+            }
+        }
+        println!("lost {name}: {clutches} pressures and torques, {ranges} with a range, {outside} outside");
+        assert!(ranges == clutches && clutches > 1000 && outside == 0, "{name}: {clutches} {ranges} {outside}");
+    }
+}
+
+/// A gap that is too long to be predicted begins the filter anew, and does not carry it off.
+#[test]
+fn a_long_gap_in_a_shift_leaves_possible_numbers() {
+    let car = &cars()[0];
+    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let sensors = sensors();
+    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let (from, to, throttle) = shifts(car)[0];
+    let samples = simulated(car, car, &CarShift::usual(car, from, to, throttle)).unwrap();
+    let inputs = inputs(car, &tables, &samples, &sensors, 1);
+    for gap_s in [0.3, 0.5, 2.0, 100.0] {
+        let mut state = filter.start();
+        for (at, (_, input)) in inputs.iter().enumerate() {
+            let dt_s = if at == 140 { gap_s } else { input.dt_s };
+            let estimate = filter.step(&mut state, &ShiftInput { dt_s, ..*input });
+            let shaft = estimate.shaft_n_m.unwrap_or(0.0);
+            assert!(shaft.abs() < 3000.0, "{gap_s} s, {at}: {shaft} N m");
+            assert!(estimate.clutches.iter().flatten().all(|clutch| clutch.torque_n_m.abs() < 1000.0));
+            if at == 140 {
+                assert_ne!(estimate.health, Health::Good);
+            }
+        }
+    }
+}
+
 /// Where both ratios are close to each other the speeds show nothing of the torque phase, and the filter says so.
 #[test]
 fn a_torque_that_the_speeds_do_not_show_is_said_to_be_hidden() {

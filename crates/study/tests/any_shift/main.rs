@@ -39,10 +39,12 @@ struct Matrix {
     runs: [u32; 2],
     /// Rows, those in which a pressure or torque is outside its guaranteed range, and those that say that an element slips.
     rows: [u32; 3],
+    /// Pressures and torques without a range.
+    unranged: usize,
 }
 
 fn matrix(draws: u64, verbose: bool) -> Matrix {
-    let mut matrix = Matrix { pool: Pool::new(), runs: [0; 2], rows: [0; 3] };
+    let mut matrix = Matrix { pool: Pool::new(), runs: [0; 2], rows: [0; 3], unranged: 0 };
     let sensors = sensors();
     for car in cars() {
         for (from, to, throttle) in shifts(&car) {
@@ -59,6 +61,8 @@ fn matrix(draws: u64, verbose: bool) -> Matrix {
                 matrix.rows[0] += 2 * rows.len() as u32;
                 matrix.rows[1] +=
                     rows.iter().flat_map(|row| row.clutches).filter(|clutch| !clutch.in_range).count() as u32;
+                let clutches = rows.iter().flat_map(|row| row.clutches);
+                matrix.unranged += clutches.filter(|clutch| clutch.torque_range_n_m.is_none()).count();
                 matrix.rows[2] += rows.iter().filter(|row| row.health == Health::HeldClutchSlips).count() as u32;
                 for row in rows.iter().filter(|row| row.clutches.iter().any(|clutch| !clutch.in_range)) {
                     println!("  outside its range: {} {from} {to} {throttle} {seed} {row:?}", car.gearbox.name);
@@ -144,6 +148,7 @@ fn matrix_of_shifts_and_kinds() {
     let matrix = matrix(draws, std::env::var("MATRIX_VERBOSE").is_ok());
     print(&matrix);
     assert_eq!(matrix.rows[1], 0, "guaranteed");
+    assert_eq!(matrix.unranged, 0, "every pressure and torque has a range");
     // The bars are for ten draws and by class; over all classes one draw already says this.
     for (kind, bar) in [("PowerOnUp", 0.45), ("PowerOnDown", 0.6), ("PowerOffUp", 0.8), ("CoastDown", 0.55)] {
         let mut all = SquaredErrors::default();
