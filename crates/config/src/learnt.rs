@@ -89,8 +89,6 @@ pub fn read_learnt(gearbox: &Gearbox, source: &Source) -> Result<Learnt<f64>, Co
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a test may")]
-
     use super::*;
     use crate::Car;
 
