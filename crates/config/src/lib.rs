@@ -9,6 +9,7 @@ pub mod drive;
 pub mod error;
 pub mod experiment;
 pub mod gearbox;
+pub mod learnt;
 pub mod source;
 mod speed_trace;
 pub mod study;
@@ -22,6 +23,7 @@ pub use experiment::{
     ReadingErrors, SAMPLE_TIMES_S, Scenario, Sensors, ShiftCalibration, SpeedSensor,
 };
 pub use gearbox::GearboxFile;
+pub use learnt::{read_learnt, write_learnt};
 pub use source::{Kind, Source, toml_string};
 pub use speed_trace::SpeedTrace;
 pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};

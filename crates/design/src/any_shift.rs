@@ -18,6 +18,14 @@ const WHEEL_QUANTUM_RAD_S: f64 = 0.14;
 /// deviation of 12 %.
 const MAP_SHARE: f64 = 0.06;
 
+/// Standard deviations of the part of the pressure's error at rest that does not last, as of hysteresis, and of the kiss
+/// point beside the valve's gain, Pa \[chosen\]: 10 kPa together.
+const PRESSURE_PA: f64 = 7e3;
+const KISS_POINT_PA: f64 = 7e3;
+/// Standard deviation of the part of the turbine torque's error that does not last, as a share \[chosen\]: the shape of the
+/// converter's maps.
+const TURBINE_SHARE: f64 = 0.03;
+
 /// The tables of a gearbox, owned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShiftTables<T> {
@@ -86,6 +94,13 @@ impl<T: Real> ShiftTables<T> {
         GearboxTables { elements: &self.elements, gears: &self.gears, shifts: &self.shifts }
     }
 
+    /// Multiplies the turbine-side inertia `M11` of all shifts.
+    pub fn scale_inertia(&mut self, factor: T) {
+        for row in &mut self.shifts {
+            row.mass_kg_m2[0][0] = factor * row.mass_kg_m2[0][0];
+        }
+    }
+
     /// Place of an element of the gearbox in the tables; `None` if it is not in them.
     pub fn place(&self, element: usize) -> Option<usize> {
         self.places.get(element).copied().flatten()
@@ -105,6 +120,8 @@ pub struct ShiftErrors {
     pub converter: f64,
     /// Of the engine torque that the engine's controller reports.
     pub engine: f64,
+    /// Of the turbine-side inertia `M11` of a shift.
+    pub inertia: f64,
     /// Half-width of the hysteresis of a valve, Pa.
     pub hysteresis_pa: f64,
     /// Least and greatest delay of a valve, s.
@@ -119,6 +136,7 @@ impl ShiftErrors {
         valve_lag: 0.5,
         converter: 0.10,
         engine: 0.08,
+        inertia: 0.20,
         hysteresis_pa: 10e3,
         valve_delay_s: [0.0, 0.03],
     };
@@ -244,15 +262,20 @@ fn shaft_n_m(car: &Car) -> f64 {
 fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
     let parts = [deviation_of(errors.friction), deviation_of(errors.valve_gain), MAP_SHARE];
     let square: f64 = parts.iter().map(|part| part * part).sum();
+    let slow_part = 1.0 - parts[2] * parts[2] / square;
     ShiftUncertainty {
         torque_share: square.sqrt(),
-        gain_part: parts[1] * parts[1] / square,
+        slow_part,
         torque_share_s: 3.0,
+        valve_gain: parts[1],
+        kiss_point_pa: KISS_POINT_PA,
         valve_s: 0.012,
-        pressure_pa: 0.01e6,
+        pressure_pa: PRESSURE_PA,
         pressure_s: 0.15,
         kiss_pa: 0.015e6,
-        turbine_walk: 0.02,
+        turbine_share: TURBINE_SHARE,
+        turbine_share_s: 3.0,
+        inertia_share: deviation_of(errors.inertia),
         rate_rad_s: 0.1,
         rate_walk: 0.01,
         load_walk: 1500.0,

@@ -13,7 +13,7 @@ pub mod tour;
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use observer::Health;
-use observer::any_shift::{AnyShiftFilter, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
+use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use plant::TrainError;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
 use recording::{Recording, records_in_a_sample};
@@ -117,6 +117,8 @@ pub struct ShiftScoreRow {
     pub turbine_n_m: [f64; 2],
     /// True speeds of engine, turbine, output and wheels, rad/s.
     pub speeds_rad_s: [f64; 4],
+    /// Slip of the offgoing clutch away from the new gear by the filter, rad/s.
+    pub flare_rad_s: f64,
     /// Phase by the filter.
     pub phase: &'static str,
     /// What the filter says of itself.
@@ -264,10 +266,20 @@ pub fn score_samples(
     samples: &[CarSample],
     inputs: &[(usize, ShiftInput<f64>)],
 ) -> Vec<ShiftScoreRow> {
-    let mut state = filter.start();
+    score_from(tables, filter, &mut filter.start(), samples, inputs)
+}
+
+/// The same by a filter that goes on from a state: with what it has learnt.
+pub fn score_from(
+    tables: &ShiftTables<f64>,
+    filter: &AnyShiftFilter<'_, f64>,
+    state: &mut AnyShiftState<f64>,
+    samples: &[CarSample],
+    inputs: &[(usize, ShiftInput<f64>)],
+) -> Vec<ShiftScoreRow> {
     let mut rows = Vec::new();
     for (at, input) in inputs {
-        let estimate = filter.step(&mut state, input);
+        let estimate = filter.step(state, input);
         rows.extend(row(tables, &samples[*at], &estimate));
     }
     rows
@@ -304,6 +316,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
             sample.torques.output_rad_s,
             sample.wheel_rad_s,
         ],
+        flare_rad_s: estimate.flare_rad_s,
         phase: estimate.phase.map_or("-", |phase| phase.name()),
         health: estimate.health,
     })

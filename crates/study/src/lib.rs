@@ -20,6 +20,7 @@ pub mod sampling;
 pub mod score;
 pub mod sensitivity;
 pub mod shift_estimates;
+pub mod shift_learning;
 pub mod statements;
 pub mod worst_case;
 

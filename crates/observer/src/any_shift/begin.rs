@@ -1,8 +1,9 @@
 //! Begin and end of the filter.
 
+use super::running::TURBINE_ACTS;
 use super::{
-    AnyShiftFilter, AnyShiftState, FIRST_S, FRICTION, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT,
-    N, OUTPUT, PRESSURE, PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SPEEDS, SPRING, ShiftInput,
+    Acting, AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N,
+    OUTPUT, PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput,
     ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
@@ -17,7 +18,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) -> Health {
         let mut health = Health::Good;
         let speeds = self.measured(&state.newest, state.running.as_ref());
-        if let Some(running) = &state.running {
+        if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > lost;
             let slow = running.x.mean[OUTPUT].abs() <= self.uncertainty.output_least_rad_s;
@@ -29,6 +30,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             state.unfit = if unfit { state.unfit.saturating_add(1) } else { 0 };
             if running.misfit > T::of(MISFIT) {
                 health = Health::HeldClutchSlips;
+                running.before = None;
             }
             let slips = state.unfit >= SLIPS_IN_GEAR;
             if blind || slow || !possible || slips {
@@ -89,20 +91,20 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         deviations[SPRING] = at_start(SHAFT_START, shaft);
         deviations[LOAD] = at_start(LOAD_START, shaft);
         deviations[RATE] = u.rate_rad_s;
-        let share = self.turbine.share(state.reported.is_some());
-        deviations[SHARE] = share;
+        deviations[SHARE] = u.turbine_share;
         let mut x = Gaussian::of(mean, deviations);
-        for c in 0..2 {
-            x.renew(FRICTION[c], T::zero(), T::one());
-            x.renew(PRESSURE[c], T::zero(), T::one());
-        }
+        let known = state.learnt.known(&Acting::turbine());
+        x.renew(SLOW_SHARE, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
         // Turbine and output are tied.
         let output_variance = square(deviations[OUTPUT]);
         x.add(TURBINE, TURBINE, ratio * ratio * output_variance);
         x.add(TURBINE, OUTPUT, ratio * output_variance);
         // An error of the turbine torque is one of the shaft torque in balance with it.
-        x.add(SPRING, SPRING, square(share * shaft));
-        x.add(SPRING, SHARE, share * share * shaft);
+        for (share, per) in [(SHARE, shaft), (SLOW_SHARE, u.slow_share(torque.share) * shaft)] {
+            let variance = x.covariance[share][share];
+            x.add(SPRING, SPRING, variance * per * per);
+            x.add(SPRING, share, variance * per);
+        }
         let mut running = Running {
             x,
             gear: gear.from,
@@ -111,12 +113,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torques: None,
             slow_n_m: torque.turbine_n_m,
             motion: None,
-            rates: [[T::zero(); SPEEDS]; 2],
+            rates: [T::zero(); SPEEDS],
             gates: [Gate::new(GATE); SPEEDS],
             silent_s: [T::zero(); SPEEDS],
             misfit: T::one(),
+            before: None,
         };
-        running.shift = shift;
+        running.renew_shift();
+        if let Some(shift) = shift {
+            self.enter_shift(&mut running, shift, &state.learnt);
+        }
         (Some(running), false)
     }
 }

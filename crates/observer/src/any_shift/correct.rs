@@ -1,8 +1,8 @@
 //! Corrections by the readings of turbine, output and wheel speed.
 
 use super::{
-    AnyShiftFilter, ChannelHealth, Channels, MISFIT_S, Measured, Rates, Reading, Running, SPEEDS, ShiftInput, TOOTH,
-    Verdict, WHEEL, square,
+    AnyShiftFilter, ChannelHealth, Channels, GAP_S, MISFIT_S, Measured, OUTPUT, Rates, Reading, Running, SPEEDS,
+    ShiftInput, TOOTH, TURBINE, Verdict, WHEEL, square,
 };
 use drivetrain::Real;
 
@@ -29,7 +29,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             health[k] = self.correct(running, k, &reading, &rates);
         }
-        running.rates = [rates.at(&running.x.mean), running.rates[0]];
+        running.rates = rates.at(&running.x.mean);
+        if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
+            running.before = None;
+        }
         health
     }
 
@@ -59,20 +62,24 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         // The speed at the time of the reading: `w - age w'`.
         let mut row = rates.rows[k].map(|x| -age_s * x);
         row[k] = row[k] + T::one();
-        let bent = T::of(0.5) * age_s * (rate - running.rates[0][k]);
+        let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
         let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
         let measured = Measured { row, value: reading.value + age_s * rates.rest[k], noise };
-        let [innovation, variance] = running.x.innovation(&measured);
+        let mut look = running.x.look(&measured);
+        let (innovation, variance) = (look.innovation, look.variance);
         if k != WHEEL {
             let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
             running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);
         }
         match running.gates[k].judge(innovation, variance) {
             Verdict::Refused => return ChannelHealth::Refused,
-            Verdict::Jumped => running.x.add(k, k, innovation * innovation),
+            Verdict::Jumped => {
+                running.x.add(k, k, innovation * innovation);
+                look = running.x.look(&measured);
+            }
             Verdict::Taken => {}
         }
-        running.x.correct(&measured);
+        running.x.correct(&look);
         running.silent_s[k] = T::zero();
         ChannelHealth::Good
     }

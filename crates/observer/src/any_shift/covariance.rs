@@ -2,14 +2,16 @@
 
 use drivetrain::Real;
 
-use super::N;
 use super::powertrain::{CORE, dot};
+use super::{IN_GEAR, N};
 
 /// Mean and covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gaussian<T> {
     pub(super) mean: [T; N],
     pub(super) covariance: [[T; N]; N],
+    /// How many states are not independent of all others; those behind them are left out.
+    pub(super) active: usize,
 }
 
 /// A scalar measurement, as a row over the states.
@@ -21,6 +23,15 @@ pub(super) struct Measured<T> {
     pub(super) noise: T,
 }
 
+/// A measurement beside what the states say.
+pub(super) struct Look<T> {
+    pub(super) innovation: T,
+    /// Its variance.
+    pub(super) variance: T,
+    /// Covariance of the states with it.
+    with: [T; N],
+}
+
 impl<T: Real> Gaussian<T> {
     /// Independent states with these standard deviations.
     pub(super) fn of(mean: [T; N], deviations: [T; N]) -> Self {
@@ -28,32 +39,45 @@ impl<T: Real> Gaussian<T> {
         for (k, deviation) in deviations.into_iter().enumerate() {
             covariance[k][k] = deviation * deviation;
         }
-        Self { mean, covariance }
+        Self { mean, covariance, active: N }
     }
 
     /// Carries the first states on by their rows, and lets the others fade by their factors.
     pub(super) fn pass(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE], stay: &[T; N]) {
+        if self.active <= IN_GEAR {
+            self.pass_first::<IN_GEAR>(rows, rest, stay);
+        } else {
+            self.pass_first::<N>(rows, rest, stay);
+        }
+    }
+
+    /// The same for the first `M` states. With `M` known to the compiler the loops are unrolled.
+    fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE], stay: &[T; N]) {
         let before = self.mean;
-        for (k, x) in self.mean.iter_mut().enumerate() {
+        for (k, x) in self.mean.iter_mut().enumerate().take(M) {
             *x = if k < CORE { dot(&rows[k], &before) + rest[k] } else { stay[k] * *x };
         }
         let p = &mut self.covariance;
-        let mut carried = [[T::zero(); N]; CORE];
+        let mut carried = [[T::zero(); M]; CORE];
         for (carried, row) in carried.iter_mut().zip(rows) {
-            for (weight, p) in row.iter().zip(p.iter()) {
+            for (weight, p) in row.iter().zip(p.iter()).take(M) {
                 for (x, p) in carried.iter_mut().zip(p) {
                     *x = *x + *weight * *p;
                 }
             }
         }
-        for i in CORE..N {
-            for j in CORE..N {
-                p[i][j] = stay[i] * stay[j] * p[i][j];
+        for (row, own) in p.iter_mut().zip(stay).take(M).skip(CORE) {
+            for (p, other) in row.iter_mut().zip(stay).take(M).skip(CORE) {
+                *p = *own * *other * *p;
             }
         }
         for i in 0..CORE {
-            for j in i..N {
-                let value = if j < CORE { dot(&carried[i], &rows[j]) } else { stay[j] * carried[i][j] };
+            for j in i..M {
+                let value = if j < CORE {
+                    carried[i].iter().zip(&rows[j]).fold(T::zero(), |sum, (p, weight)| sum + *p * *weight)
+                } else {
+                    stay[j] * carried[i][j]
+                };
                 p[i][j] = value;
                 p[j][i] = value;
             }
@@ -62,6 +86,7 @@ impl<T: Real> Gaussian<T> {
 
     /// Adds to the covariance of two states.
     pub(super) fn add(&mut self, i: usize, j: usize, covariance: T) {
+        let (i, j) = (i.min(N - 1), j.min(N - 1));
         self.covariance[i][j] = self.covariance[i][j] + covariance;
         if i != j {
             self.covariance[j][i] = self.covariance[j][i] + covariance;
@@ -70,6 +95,7 @@ impl<T: Real> Gaussian<T> {
 
     /// Makes a state independent of the others, with this mean and variance.
     pub(super) fn renew(&mut self, state: usize, mean: T, variance: T) {
+        let state = state.min(N - 1);
         for k in 0..N {
             self.covariance[k][state] = T::zero();
             self.covariance[state][k] = T::zero();
@@ -80,6 +106,7 @@ impl<T: Real> Gaussian<T> {
 
     /// Exchanges two states.
     pub(super) fn swap(&mut self, a: usize, b: usize) {
+        let (a, b) = (a.min(N - 1), b.min(N - 1));
         self.mean.swap(a, b);
         self.covariance.swap(a, b);
         for row in &mut self.covariance {
@@ -92,34 +119,43 @@ impl<T: Real> Gaussian<T> {
         dot(&self.with(row), row).max(T::zero())
     }
 
-    /// Covariance of the states with a combination of them.
+    /// Covariance of the states with a combination of them. Most combinations are of few states.
     fn with(&self, row: &[T; N]) -> [T; N] {
-        core::array::from_fn(|k| dot(&self.covariance[k], row))
-    }
-
-    /// The innovation of a measurement, and its variance.
-    pub(super) fn innovation(&self, measured: &Measured<T>) -> [T; 2] {
-        [measured.value - dot(&measured.row, &self.mean), self.variance(&measured.row) + measured.noise]
-    }
-
-    /// Corrects by a measurement, in Joseph's form: `P - K S' - S K' + K V K'`.
-    pub(super) fn correct(&mut self, measured: &Measured<T>) {
-        let with = self.with(&measured.row);
-        let [innovation, variance] = self.innovation(measured);
-        if variance <= T::zero() {
-            return;
-        }
-        let gain = with.map(|with| with / variance);
-        let half = T::of(0.5) * variance;
-        // K w' + w K' with w = K V/2 - S: both halves come out the same.
-        let weight: [T; N] = core::array::from_fn(|k| half * gain[k] - with[k]);
-        for (i, row) in self.covariance.iter_mut().enumerate() {
-            for (j, p) in row.iter_mut().enumerate() {
-                *p = *p + (gain[i] * weight[j] + weight[i] * gain[j]);
+        let mut with = [T::zero(); N];
+        for (per, p) in row.iter().zip(&self.covariance).take(self.active) {
+            if *per != T::zero() {
+                for (with, p) in with.iter_mut().zip(p) {
+                    *with = *with + *per * *p;
+                }
             }
         }
-        for (x, gain) in self.mean.iter_mut().zip(gain) {
-            *x = *x + gain * innovation;
+        with
+    }
+
+    /// What a measurement says beside the states.
+    pub(super) fn look(&self, measured: &Measured<T>) -> Look<T> {
+        let with = self.with(&measured.row);
+        let variance = dot(&with, &measured.row).max(T::zero()) + measured.noise;
+        Look { innovation: measured.value - dot(&measured.row, &self.mean), variance, with }
+    }
+
+    /// Corrects by a measurement: `x + S e/V`, `P - S S'/V`. The product is made of two equal factors, so that `P` stays
+    /// symmetric to the last digit.
+    pub(super) fn correct(&mut self, look: &Look<T>) {
+        if look.variance <= T::zero() {
+            return;
+        }
+        let per = look.variance.sqrt().recip();
+        let factor = look.with.map(|with| per * with);
+        for (i, (row, own)) in self.covariance.iter_mut().zip(&factor).enumerate().take(self.active) {
+            for (p, other) in row.iter_mut().zip(&factor) {
+                *p = *p - *own * *other;
+            }
+            row[i] = row[i].max(T::zero());
+        }
+        let innovation = per * look.innovation;
+        for (x, factor) in self.mean.iter_mut().zip(&factor).take(self.active) {
+            *x = *x + *factor * innovation;
         }
     }
 

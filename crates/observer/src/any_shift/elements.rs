@@ -17,8 +17,6 @@ pub(super) struct ElementState<T> {
     pub(super) valve_pa: T,
     rate_pa_s: T,
     range: Option<PressureRange<T>>,
-    /// Mean and variance of the torque factor that the last shift left, in its own deviations.
-    pub(super) friction: [T; 2],
 }
 
 impl<T: Real> ElementState<T> {
@@ -28,7 +26,6 @@ impl<T: Real> ElementState<T> {
             valve_pa: T::zero(),
             rate_pa_s: T::zero(),
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
-            friction: [T::zero(), T::one()],
         }
     }
 
@@ -73,7 +70,7 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    /// Forgets the commands: time was lost, and with it some of them.
+    /// Forgets the range and the rate: time was lost, and with it commands.
     pub(super) fn forget(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>) {
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
             range.forget(budget, limits.command_max);
@@ -81,41 +78,46 @@ impl<T: Real> ElementState<T> {
         self.rate_pa_s = T::zero();
     }
 
-    /// Standard deviation of the pressure by the valve model beside its gain, Pa: errors of lag and delay while it moves,
-    /// and of the kiss point. None well below the kiss point, where no torque depends on it.
-    fn deviation_pa(&self, element: &FrictionElement<T>, u: &ShiftUncertainty<T>) -> T {
-        if self.valve_pa < element.clutch.kiss_pressure() - u.kiss_pa {
+    /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
+    /// moves, and at rest. None well below the kiss point, where no torque depends on it.
+    pub(super) fn deviation_pa(&self, kiss_pa: T, u: &ShiftUncertainty<T>) -> T {
+        if self.valve_pa < kiss_pa - u.kiss_pa {
             return T::zero();
         }
         (u.valve_s * self.rate_pa_s).hypot(u.pressure_pa)
     }
 
     /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
-    /// is its sign, less where it is uncertain.
+    /// is its sign, less where it is uncertain; `kiss` is the error of the kiss point in its deviations.
     #[inline]
     pub(super) fn torque(
         &self,
         element: &FrictionElement<T>,
         shift: &ShiftClutch<T>,
         u: &ShiftUncertainty<T>,
-        slip_rad_s: T,
-        direction: T,
+        [slip_rad_s, direction, kiss]: [T; 3],
     ) -> ClutchTorque<T> {
-        let clutch = &element.clutch;
+        let (clutch, zero) = (&element.clutch, T::zero());
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;
-        let capacity = size * clutch.torque_capacity(self.valve_pa, slip);
-        let per_pressure = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
+        let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
+        let (nominal_pa, deviation_pa) = (clutch.kiss_pressure(), u.kiss_deviation_pa(clutch));
+        let kiss_pa = nominal_pa + kiss * deviation_pa;
+        let pressed_pa = (self.valve_pa - kiss_pa).max(zero);
+        // Where the plates touch the torque is linear in pressure and kiss point.
+        let (base_pa, per_kiss_pa) =
+            if pressed_pa > zero { (self.valve_pa - nominal_pa, deviation_pa) } else { (zero, zero) };
         ClutchTorque {
             ratio: shift.ratio,
-            base_n_m: capacity,
-            per_friction_n_m: u.torque_share * capacity,
-            per_pressure_n_m: per_pressure * self.deviation_pa(element, u),
+            base_n_m: per_pa * base_pa,
+            per_friction_n_m: u.torque_share * per_pa * pressed_pa,
+            per_kiss_n_m: -per_pa * per_kiss_pa,
+            per_pressure_n_m: per_pa * self.deviation_pa(kiss_pa, u),
+            open_loop_n_m: size * clutch.torque_capacity(self.valve_pa, slip),
         }
     }
 
-    /// The torque at the turbine that the element holds for sure up to one deviation, and the most that it can hold at
-    /// three, N m.
+    /// The torque at the turbine that the element can hold with an error of one deviation, and of three, N m.
     #[inline]
     pub(super) fn holds(
         &self,
@@ -127,7 +129,8 @@ impl<T: Real> ElementState<T> {
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_force = shift.alpha.abs() * friction * clutch.lever();
         let capacity = per_force * clutch.clamp_force(self.valve_pa);
-        let wrong = per_force * clutch.piston_area_m2 * self.deviation_pa(element, u);
+        let wrong_pa = self.deviation_pa(clutch.kiss_pressure(), u).hypot(u.kiss_deviation_pa(clutch));
+        let wrong = per_force * clutch.piston_area_m2 * wrong_pa;
         [capacity * (one + u.torque_share), capacity * (one + three * u.torque_share) + three * wrong]
     }
 

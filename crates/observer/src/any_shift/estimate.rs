@@ -5,13 +5,13 @@ use drivetrain::Real;
 use super::elements::ElementState;
 use super::powertrain::{ClutchTorque, dot};
 use super::{
-    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SPRING,
-    ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SLOW_SHARE,
+    SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
 };
 use crate::{ChannelHealth, Channels, Health};
 
-/// Share of the valve model's uncertainty above which the speeds have shown nothing of a clutch's torque.
-const HIDDEN: f64 = 0.95;
+/// Share of the valve model's uncertainty above which the speeds have shown nothing of a clutch's torque \[chosen\].
+const HIDDEN: f64 = 0.9;
 
 /// Pressure and torque of one clutch of a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,9 @@ pub struct ClutchEstimate<T> {
     pub hidden: bool,
     /// Lowest and highest pressure, Pa, for errors within the budget.
     pub pressure_range_pa: Option<[T; 2]>,
-    /// Lowest and highest torque, N m, for errors within the budget.
+    /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if turbine and output
+    /// speed were read within 50 ms and their slip errs by less than 7 deviations of its reading and 0.6 rad/s, and twice
+    /// the change since the readings; else either direction is possible.
     pub torque_range_n_m: Option<[T; 2]>,
 }
 
@@ -49,6 +51,9 @@ pub struct ShiftEstimate<T> {
     pub clutches: Option<[ClutchEstimate<T>; 2]>,
     /// Pressures of all elements by their valve models, Pa.
     pub valve_pa: [T; MAX_ELEMENTS],
+    /// Slip of the offgoing clutch away from the new gear, at the turbine, rad/s, where the readings show one: a flare. Else
+    /// zero.
+    pub flare_rad_s: T,
     /// Torque at the gearbox input, N m, as corrected.
     pub turbine_n_m: Option<T>,
     /// Torque of the drive shafts, N m.
@@ -66,6 +71,7 @@ impl<T: Real> ShiftEstimate<T> {
             phase: None,
             clutches: None,
             valve_pa: [T::zero(); MAX_ELEMENTS],
+            flare_rad_s: T::zero(),
             turbine_n_m: None,
             shaft_n_m: None,
             health: Health::SpeedsRejected,
@@ -97,15 +103,21 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             Some(running) => {
                 let (x, line) = (&running.x.mean, &self.driveline);
                 let damper = line.shaft_damping_n_m_s_rad * line.twist_rate(x[OUTPUT], x[WHEEL]);
-                let turbine_n_m = running.torques.map_or(running.slow_n_m, |torques| torques.turbine_n_m);
+                let turbine_n_m = running.torques.map_or(running.slow_n_m, |torques| {
+                    torques.turbine_n_m + x[SHARE] * torques.share_n_m + x[SLOW_SHARE] * torques.slow_share_n_m
+                });
                 estimate.gear = Some(match &running.shift {
                     Some(shift) => GearCommand { from: shift.from, to: shift.to },
                     None => GearCommand { from: running.gear, to: running.gear },
                 });
                 estimate.phase = Some(running.phase.phase);
                 estimate.shaft_n_m = Some(x[SPRING] + damper);
-                estimate.turbine_n_m = Some(turbine_n_m + x[SHARE] * running.slow_n_m);
-                let speeds = self.then_and_now(&state.newest, Some(running));
+                estimate.turbine_n_m = Some(turbine_n_m);
+                let speeds = self.then_and_now(&state.newest);
+                estimate.flare_rad_s = match (&running.shift, speeds) {
+                    (Some(shift), Some([then, _])) => self.flare(shift, then),
+                    _ => T::zero(),
+                };
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
@@ -115,13 +127,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             None => {
                 health = health.max(Health::SpeedsRejected);
-                let speeds = self.then_and_now(&state.newest, None);
+                let (then, speeds) = (self.measured(&state.newest, None), self.then_and_now(&state.newest));
                 estimate.clutches =
                     self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
                         |shift| {
-                            shift.clutches.map(|clutch| {
-                                let estimate = self.by_valve(&state.elements, &clutch, speeds[0]);
-                                self.in_range(estimate, &state.elements, &clutch, speeds)
+                            let learnt = state.learnt.known(&self.acting(shift)).mean;
+                            [0, 1].map(|c| {
+                                let clutch = &shift.clutches[c];
+                                let lasting = [learnt[c], learnt[c + 2]];
+                                let estimate = self.by_valve(&state.elements, clutch, then, lasting);
+                                self.in_range(estimate, &state.elements, clutch, speeds)
                             })
                         },
                     );
@@ -131,26 +146,39 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         state.estimate
     }
 
-    /// A clutch by its valve model alone, where the speeds cannot be used.
+    /// Slip of the offgoing clutch away from the new gear, where the readings show one.
+    fn flare(&self, shift: &ShiftRow<T>, speeds: [T; 2]) -> T {
+        let [off, on] = shift.clutches.map(|clutch| clutch.ratio);
+        let slip = self.slip(off, speeds);
+        // Towards the new gear the turbine goes from `i_off w_o` to `i_on w_o`.
+        let away = slip.value * (off - on) * speeds[OUTPUT] > T::zero();
+        if away && slip.is_over() { slip.value.abs() } else { T::zero() }
+    }
+
+    /// A clutch by its valve model and what is learnt of it, where the speeds cannot be used.
     fn by_valve(
         &self,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         clutch: &ShiftClutch<T>,
         speeds: [T; 2],
+        [f, k]: [T; 2],
     ) -> ClutchEstimate<T> {
-        let slip = self.slip(clutch.ratio, speeds);
-        let torque = self.element(elements, clutch.element).map_or(ClutchTorque::none(), |(memory, element)| {
-            memory.torque(element, clutch, &self.uncertainty, slip.value, slip.direction())
-        });
-        let valve_pa = elements.get(clutch.element).copied().flatten().map_or(T::zero(), |memory| memory.valve_pa);
-        let open_loop_n_m = torque.base_n_m / clutch.alpha;
+        let (u, slip) = (&self.uncertainty, self.slip(clutch.ratio, speeds));
+        let zero = T::zero();
+        let (torque, valve_pa, gain, both) =
+            self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
+                let (memory, element) = found;
+                let torque = memory.torque(element, clutch, u, [slip.value, slip.direction(), k]);
+                (torque, memory.valve_pa, u.gain_error(element, f, k), u.correlation_in_shift(element))
+            });
+        let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
         ClutchEstimate {
             element: clutch.element,
-            pressure_pa: valve_pa,
-            torque_n_m: open_loop_n_m,
-            deviation_n_m: (torque.per_friction_n_m.hypot(torque.per_pressure_n_m) / clutch.alpha).abs(),
+            pressure_pa: self.limits.possible_pressure(valve_pa * (T::one() + gain)),
+            torque_n_m: corrected / clutch.alpha,
+            deviation_n_m: (torque.unlearnt_variance(both).sqrt() / clutch.alpha).abs(),
             valve_pa,
-            open_loop_n_m,
+            open_loop_n_m: torque.open_loop_n_m / clutch.alpha,
             holds: false,
             hidden: true,
             pressure_range_pa: None,
@@ -165,10 +193,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         shift: &ShiftRow<T>,
         c: usize,
     ) -> ClutchEstimate<T> {
-        let (u, x, zero, one) = (&self.uncertainty, &running.x, T::zero(), T::one());
+        let (u, x, zero) = (&self.uncertainty, &running.x, T::zero());
         let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
         let Some(torques) = running.torques else {
-            return self.by_valve(elements, clutch, [x.mean[0], x.mean[1]]);
+            let lasting = [x.mean[FRICTION[c]], x.mean[KISS[c]]];
+            return self.by_valve(elements, clutch, [x.mean[0], x.mean[1]], lasting);
         };
         let own = torques.clutches[c];
         let holds = running.phase.phase.holding() == Some(c);
@@ -178,34 +207,30 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             (row, rest) = self.held_torque(shift, c, &torques);
         } else {
             row[FRICTION[c]] = own.per_friction_n_m;
+            row[KISS[c]] = own.per_kiss_n_m;
             row[PRESSURE[c]] = own.per_pressure_n_m;
         }
         let mut torque = dot(&row, &x.mean) + rest;
-        // Without pressure error the direction would be lost at the kiss point.
-        let direction = own.base_n_m + own.per_pressure_n_m;
-        if !holds && torque * direction <= zero {
+        if !holds && torque * own.per_pressure_n_m <= zero {
             // A slipping clutch does not push.
             torque = zero;
         }
         let deviation = x.variance(&row).sqrt();
-        let alone = own.per_friction_n_m.hypot(own.per_pressure_n_m);
-        let (valve_pa, correction) =
-            self.element(elements, clutch.element).map_or((zero, zero), |(memory, element)| {
-                let pack = &element.clutch;
-                let above_kiss = (memory.valve_pa - pack.kiss_pressure()).max(zero);
-                // The part of the torque's error that is the valve's gain, and the error of the pressure itself.
-                let gain = above_kiss * u.torque_share * u.gain_part * x.mean[FRICTION[c]];
-                let per_pa = own.base_n_m / above_kiss.max(one);
-                let itself = if per_pa == zero { zero } else { own.per_pressure_n_m / per_pa * x.mean[PRESSURE[c]] };
-                (memory.valve_pa, gain + if holds { zero } else { itself })
+        let (valve_pa, correction, both) =
+            self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
+                let gain = memory.valve_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
+                // The error of the pressure itself.
+                let itself = memory.deviation_pa(element.clutch.kiss_pressure(), u) * x.mean[PRESSURE[c]];
+                (memory.valve_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
             });
+        let alone = own.unlearnt_variance(both).sqrt();
         ClutchEstimate {
             element: clutch.element,
             pressure_pa: self.limits.possible_pressure(valve_pa + correction),
             torque_n_m: torque / clutch.alpha,
             deviation_n_m: (deviation / clutch.alpha).abs(),
             valve_pa,
-            open_loop_n_m: own.base_n_m / clutch.alpha,
+            open_loop_n_m: own.open_loop_n_m / clutch.alpha,
             holds,
             hidden: !holds && deviation >= T::of(HIDDEN) * alone,
             pressure_range_pa: None,
@@ -219,17 +244,19 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         mut estimate: ClutchEstimate<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         clutch: &ShiftClutch<T>,
-        speeds: [[T; 2]; 2],
+        speeds: Option<[[T; 2]; 2]>,
     ) -> ClutchEstimate<T> {
-        // Since the readings were taken the slip has gone on, and may have ended.
-        let (then, now) = (self.slip(clutch.ratio, speeds[0]), self.slip(clutch.ratio, speeds[1]));
-        let threshold = now.threshold();
-        let error = (clutch.alpha * (threshold + threshold)).abs()
-            + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
-        let known = [clutch.alpha * now.value, error];
+        let known = speeds.map(|[then, now]| {
+            // Since the readings were taken the slip has gone on, and may have ended.
+            let (then, now) = (self.slip(clutch.ratio, then), self.slip(clutch.ratio, now));
+            let threshold = now.threshold();
+            let error = (clutch.alpha * (threshold + threshold)).abs()
+                + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
+            [clutch.alpha * now.value, error]
+        });
         let ranges = self
             .element(elements, clutch.element)
-            .and_then(|(memory, element)| memory.ranges(element, Some(known).filter(|[slip, _]| slip.is_finite())));
+            .and_then(|(memory, element)| memory.ranges(element, known.filter(|[slip, _]| slip.is_finite())));
         if let Some((pressure, torque)) = ranges {
             let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
             estimate.pressure_pa = nearest(pressure, estimate.pressure_pa);

@@ -6,9 +6,12 @@
 //! | `T_s` | `K_s (w_o/i_df - w_w + r)` | torque of the shafts' spring, N m |
 //! | `T_L` | random walk | load at the wheels: road, grade, mass, brake, tyre, N m |
 //! | `r` | random walk | error of the rate of twist: the scale of the wheel speed, rad/s |
-//! | `b` | random walk | share by which the turbine torque differs from its sources |
-//! | `f_off`, `f_on` | fades in seconds, unit variance | error of the clutch's torque: friction and valve gain, which show as one |
-//! | `x_off`, `x_on` | fades in 0.15 s, unit variance | error of the valve model's pressure: lag, delay, kiss point |
+//! | `b` | fades in seconds | share by which the turbine torque differs from its sources |
+//! | `c` | fades in hours, unit variance | the part of that share that lasts |
+//! | `f_off`, `f_on` | random walk, unit variance | error of the clutch's torque: friction and valve gain, which show as one |
+//! | `k_off`, `k_on` | constant, unit variance | error of its kiss point |
+//! | `x_off`, `x_on` | fades in 0.15 s, unit variance | error of the valve model's pressure: lag and delay |
+//! | `m` | constant, unit variance | error of the turbine-side inertia `M11` |
 //!
 //! Both clutches of a shift have the same equations, from [`GearboxTables`]; nothing is written for the oncoming one. A
 //! clutch that slips has the torque of its valve model, corrected by `f` and `x`; one that holds has the torque that this
@@ -16,13 +19,17 @@
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
 //! elements run all the time.
 //!
-//! Torque is estimated, and pressure follows: it is the valve model's, with the part of `f` that is the valve's gain.
+//! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
+//!
+//! `c`, `f`, `k` and `m` last longer than a shift. What a shift has shown of them is kept in [`Learnt`], which can be saved
+//! and given to another filter of the same car ([`AnyShiftFilter::start_with`]).
 
 mod begin;
 mod correct;
 mod covariance;
 mod elements;
 mod estimate;
+mod learnt;
 mod newest;
 mod phases;
 mod powertrain;
@@ -32,24 +39,28 @@ mod running;
 mod tables;
 mod turbine;
 
-use drivetrain::{Driveline, Real};
+use drivetrain::{Clutch, Driveline, Real};
 
 use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, Reading, SpeedReading};
 use covariance::{Gaussian, Measured};
 use elements::ElementState;
+use learnt::{ACTING, Acting, Correlations, Known};
 use newest::Newest;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, tied};
 use turbine::InputSide;
 
 pub use estimate::{ClutchEstimate, ShiftEstimate};
+pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
-const N: usize = 11;
+const N: usize = 15;
+/// The first of them are all that moves in a gear.
+const IN_GEAR: usize = 8;
 const TURBINE: usize = 0;
 const OUTPUT: usize = 1;
 const WHEEL: usize = 2;
@@ -58,15 +69,22 @@ const SPRING: usize = 3;
 const LOAD: usize = 4;
 const RATE: usize = 5;
 const SHARE: usize = 6;
+const SLOW_SHARE: usize = 7;
 /// Of the offgoing and of the oncoming clutch.
-const FRICTION: [usize; 2] = [7, 8];
-const PRESSURE: [usize; 2] = [9, 10];
+const FRICTION: [usize; 2] = [8, 9];
+const KISS: [usize; 2] = [10, 11];
+const PRESSURE: [usize; 2] = [12, 13];
+const INERTIA: usize = 14;
+/// The states that are learnt.
+const LASTING: [usize; ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_SHARE];
 
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
 const MOST_PIECES: usize = 32;
 /// Time without any speed after which the filter begins anew, s.
 const LOST_S: f64 = 0.25;
+/// Time without a reading of turbine or output speed in a shift after which it teaches nothing, s \[chosen\].
+const GAP_S: f64 = 0.025;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
 /// Low-pass of the turbine torque that the share `b` multiplies, s.
@@ -94,20 +112,28 @@ const SLIPS_IN_GEAR: u8 = 3;
 pub struct ShiftUncertainty<T> {
     /// `rho`: of a clutch's torque, as a share: friction, valve gain and valve map.
     pub torque_share: T,
-    /// The part of its square that is the valve's gain.
-    pub gain_part: T,
-    /// Time after which that share is another, s.
+    /// The part of its square that lasts from shift to shift: friction and gain. The same part of the kiss point's.
+    pub slow_part: T,
+    /// Time after which the rest is another, s.
     pub torque_share_s: T,
+    /// Of the valve's gain, as a share: in `torque_share`, and in the kiss point.
+    pub valve_gain: T,
+    /// Of the kiss point beside the gain, Pa: what lasts.
+    pub kiss_point_pa: T,
     /// Errors of the valve's lag and delay, s: the pressure errs by this much of its rate.
     pub valve_s: T,
-    /// Error of the pressure at rest beside the gain: the kiss point, Pa.
+    /// Error of the pressure at rest that does not last, Pa.
     pub pressure_pa: T,
     /// Time after which an error of the pressure is another, s.
     pub pressure_s: T,
     /// Pressure below the kiss point from which on a clutch is open for sure, Pa.
     pub kiss_pa: T,
-    /// Random walk of the share of the turbine torque, per root second.
-    pub turbine_walk: T,
+    /// Of the turbine torque beside what lasts, as a share.
+    pub turbine_share: T,
+    /// Time after which it is another, s.
+    pub turbine_share_s: T,
+    /// Of the turbine-side inertia `M11`, as a share.
+    pub inertia_share: T,
     /// Of the rate of twist at the start, rad/s.
     pub rate_rad_s: T,
     /// Its random walk, rad/s per root second.
@@ -188,6 +214,9 @@ pub struct AnyShiftState<T> {
     unfit: u8,
     /// Whether an element of the gear has slipped, and no gear has fitted since.
     slips: bool,
+    learnt: Learnt<T>,
+    /// Time since what is learnt was last let fade, s.
+    fading_s: T,
     estimate: ShiftEstimate<T>,
 }
 
@@ -205,28 +234,39 @@ struct Running<T> {
     /// Turbine torque, low-passed, N m.
     slow_n_m: T,
     motion: Option<Motion<T>>,
-    /// Rates of turbine, output and wheel speed, rad/s^2, now and at the step before.
-    rates: [[T; SPEEDS]; 2],
+    /// Rates of turbine, output and wheel speed, rad/s^2.
+    rates: [T; SPEEDS],
     gates: [Gate; SPEEDS],
     /// Time since a reading was taken, s.
     silent_s: [T; SPEEDS],
     /// Mean squared innovation of turbine and output speed.
     misfit: T,
+    /// What was known of the lasting states when the shift began; none if it cannot be learnt from.
+    before: Option<Known<T>>,
 }
 
 impl<T: Real> ShiftUncertainty<T> {
+    /// Standard deviation of an element's kiss point, Pa: what lasts is an own one and that of the valve's gain.
+    fn kiss_deviation_pa(&self, clutch: &Clutch<T>) -> T {
+        self.kiss_point_pa.hypot(self.valve_gain * clutch.kiss_pressure()) / self.slow_part.sqrt()
+    }
+
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> ShiftUncertainty<U> {
         let to = |x: T| U::of(x.to_f64_exact());
         ShiftUncertainty {
             torque_share: to(self.torque_share),
-            gain_part: to(self.gain_part),
+            slow_part: to(self.slow_part),
             torque_share_s: to(self.torque_share_s),
+            valve_gain: to(self.valve_gain),
+            kiss_point_pa: to(self.kiss_point_pa),
             valve_s: to(self.valve_s),
             pressure_pa: to(self.pressure_pa),
             pressure_s: to(self.pressure_s),
             kiss_pa: to(self.kiss_pa),
-            turbine_walk: to(self.turbine_walk),
+            turbine_share: to(self.turbine_share),
+            turbine_share_s: to(self.turbine_share_s),
+            inertia_share: to(self.inertia_share),
             rate_rad_s: to(self.rate_rad_s),
             rate_walk: to(self.rate_walk),
             load_walk: to(self.load_walk),
@@ -250,8 +290,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
     }
 
-    /// Its memory before the first step.
+    /// Its memory before the first step, with nothing learnt.
     pub fn start(&self) -> AnyShiftState<T> {
+        self.start_with(&Learnt::nothing(&self.correlations()))
+    }
+
+    /// Its memory before the first step, with what was learnt before.
+    pub fn start_with(&self, learnt: &Learnt<T>) -> AnyShiftState<T> {
         let mut elements = [None; MAX_ELEMENTS];
         for (state, element) in elements.iter_mut().zip(self.tables.elements) {
             *state = Some(ElementState::new(element, &self.limits));
@@ -266,6 +311,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             lost: false,
             unfit: 0,
             slips: false,
+            learnt: *learnt,
+            fading_s: T::zero(),
             estimate: ShiftEstimate::nothing(),
         }
     }
@@ -278,6 +325,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             return state.estimate;
         }
         state.started = true;
+        if dt_s > T::of(LOST_S) {
+            // Too long to be predicted.
+            state.lose();
+        }
+        state.fading_s = state.fading_s + dt_s;
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);
         // Each element has a command of its own, and the engine torque is one of the sources of the turbine torque.
@@ -312,6 +364,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 memory.forget(element, &self.limits);
             }
         }
+        for clutch in state.estimate.clutches.iter_mut().flatten() {
+            (clutch.pressure_range_pa, clutch.torque_range_n_m) = (None, None);
+        }
         state.estimate.health = Health::TimeRejected;
         state.estimate.channels = Channels::all(ChannelHealth::Refused);
     }
@@ -319,6 +374,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// Follows the shift command.
     fn take_gear(&self, state: &mut AnyShiftState<T>, command: GearCommand) -> Health {
         let speeds = self.measured(&state.newest, state.running.as_ref());
+        let (learnt, fading_s) = (&mut state.learnt, &mut state.fading_s);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.from == command.to;
         match running.shift {
@@ -328,14 +384,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 // The command may say so before the clutch holds.
                 let ends = if command.to == shift.to { ShiftPhase::OncomingHolds } else { ShiftPhase::OffgoingHolds };
                 if running.phase.phase == ends {
-                    running.end_shift(command.to, &mut state.elements);
+                    self.end_shift(running, command.to, learnt);
                 }
                 Health::Good
             }
             _ => match self.tables.shift(command.from, command.to).filter(|_| !in_gear) {
                 Some(shift) => {
                     let slips = shift.clutches.map(|clutch| self.slip(clutch.ratio, speeds));
-                    running.begin_shift(*shift, slips, &mut state.elements);
+                    self.begin_shift(running, *shift, slips, learnt, core::mem::replace(fading_s, T::zero()));
                     Health::Good
                 }
                 None => {
@@ -359,11 +415,13 @@ fn at_start<T: Real>((share, beside): (f64, f64), value: T) -> T {
 }
 
 impl<T: Real> AnyShiftState<T> {
-    /// Ends the filter; what the elements have shown is kept.
+    /// What was learnt up to now.
+    pub fn learnt(&self) -> &Learnt<T> {
+        &self.learnt
+    }
+
+    /// Ends the filter. What a shift has shown up to then is not learnt: it is not known what went wrong.
     fn lose(&mut self) {
-        if let Some(running) = self.running.take() {
-            running.keep(&mut self.elements);
-            self.lost = true;
-        }
+        self.lost = self.lost || self.running.take().is_some();
     }
 }

@@ -6,9 +6,9 @@ use drivetrain::Real;
 /// Time between two readings beyond which no line is drawn through them, s.
 const LONGEST_S: f64 = 0.05;
 
-/// Change of an acceleration within a sample that a powertrain can make, rad/s^2 \[chosen\]: a clutch that grips, and the
-/// swing of the shafts.
-const JERK_RAD_S2: f64 = 10_000.0;
+/// Rate of an acceleration that a powertrain can have over the time of two readings, rad/s^3 \[chosen\]: a clutch that grips,
+/// and the swing of the shafts.
+const JERK_RAD_S3: f64 = 10_000.0;
 /// Deviations of a reading from the line through the two before it beyond which it is no speed of this shaft.
 const DEVIATIONS: f64 = 5.0;
 
@@ -52,7 +52,7 @@ impl<T: Real> Newest<T> {
         // Of the line's end, whose ends err by one deviation each, and of the reading.
         let one = T::one();
         let noise = deviation * ((one + reach) * (one + reach) + reach * reach + one).sqrt();
-        let most = T::of(DEVIATIONS) * noise + T::of(JERK_RAD_S2) * step_s * step_s.max(line_s);
+        let most = T::of(DEVIATIONS) * noise + T::of(JERK_RAD_S3) * step_s * step_s.max(line_s);
         (value - self.at(age_s)).abs() > most
     }
 

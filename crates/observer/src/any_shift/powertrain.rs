@@ -1,9 +1,9 @@
 //! What the powertrain does over one step, for any shift.
 //!
 //! ```text
-//! (w_t', w_o') = G (X, Y)         X = (1 + b) T_t - U_off - U_on,   Y = -T_o + i_off U_off + i_on U_on
+//! (w_t', w_o') = G (X, Y)         X = (1 + b + c) T_t - m M11 w_t' - U_off - U_on,   Y = -T_o + i_off U_off + i_on U_on
 //! T_o = (T_s + C_s (w_o/i_df - w_w + r))/i_df
-//! w_w' = (T_s - T_L)/J            T_s' = K_s (w_o/i_df - w_w + r)
+//! w_w' = (i_df T_o - T_L)/J       T_s' = K_s (w_o/i_df - w_w + r)
 //! ```
 //!
 //! `G` is the inverse of the mass while no clutch holds; while one holds with the ratio `i`, the torques of turbine and
@@ -11,7 +11,9 @@
 
 use drivetrain::{Driveline, Real};
 
-use super::{FRICTION, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SPEEDS, SPRING, TURBINE, WHEEL};
+use super::{
+    FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SLOW_SHARE, SPEEDS, SPRING, TURBINE, WHEEL,
+};
 
 /// States with a law of their own.
 pub(super) const CORE: usize = 4;
@@ -37,19 +39,36 @@ pub(super) fn tied<T: Real>(ratio: T, inertia_kg_m2: T) -> Response<T> {
     [[ratio * ratio * per, ratio * per], [ratio * per, per]]
 }
 
-/// Torque of a shift clutch at the turbine: `U = base + f per_friction + x per_pressure`, N m.
+/// Torque of a shift clutch at the turbine: `U = base + f per_friction + k per_kiss + x per_pressure`, N m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ClutchTorque<T> {
     pub(super) ratio: T,
     pub(super) base_n_m: T,
     pub(super) per_friction_n_m: T,
+    pub(super) per_kiss_n_m: T,
     pub(super) per_pressure_n_m: T,
+    /// By the valve model and the budget's friction and kiss point alone.
+    pub(super) open_loop_n_m: T,
 }
 
 impl<T: Real> ClutchTorque<T> {
     pub(super) fn none() -> Self {
         let zero = T::zero();
-        Self { ratio: zero, base_n_m: zero, per_friction_n_m: zero, per_pressure_n_m: zero }
+        Self {
+            ratio: zero,
+            base_n_m: zero,
+            per_friction_n_m: zero,
+            per_kiss_n_m: zero,
+            per_pressure_n_m: zero,
+            open_loop_n_m: zero,
+        }
+    }
+
+    /// Variance of the torque with nothing learnt, with the correlation of torque factor and kiss point.
+    pub(super) fn unlearnt_variance(&self, correlation: T) -> T {
+        let square = |x: T| x * x;
+        let both = self.per_friction_n_m * self.per_kiss_n_m * correlation;
+        square(self.per_friction_n_m) + both + both + square(self.per_kiss_n_m) + square(self.per_pressure_n_m)
     }
 
     fn mean(&self, other: &Self) -> Self {
@@ -58,7 +77,9 @@ impl<T: Real> ClutchTorque<T> {
             ratio: self.ratio,
             base_n_m: half * (self.base_n_m + other.base_n_m),
             per_friction_n_m: half * (self.per_friction_n_m + other.per_friction_n_m),
+            per_kiss_n_m: half * (self.per_kiss_n_m + other.per_kiss_n_m),
             per_pressure_n_m: half * (self.per_pressure_n_m + other.per_pressure_n_m),
+            open_loop_n_m: half * (self.open_loop_n_m + other.open_loop_n_m),
         }
     }
 }
@@ -71,6 +92,10 @@ pub(super) struct Torques<T> {
     /// The same low-passed: what the share `b` multiplies. With the raw one the noise of the speeds would be in reading
     /// and factor, which pulls the share to one side.
     pub(super) share_n_m: T,
+    /// The same times the deviation of the part of its error that lasts.
+    pub(super) slow_share_n_m: T,
+    /// `M11 w_t'` times the deviation of `M11`.
+    pub(super) inertia_n_m: T,
     pub(super) clutches: [ClutchTorque<T>; 2],
 }
 
@@ -81,6 +106,8 @@ impl<T: Real> Torques<T> {
         Self {
             turbine_n_m: half * (self.turbine_n_m + other.turbine_n_m),
             share_n_m: half * (self.share_n_m + other.share_n_m),
+            slow_share_n_m: half * (self.slow_share_n_m + other.slow_share_n_m),
+            inertia_n_m: half * (self.inertia_n_m + other.inertia_n_m),
             clutches: [self.clutches[0].mean(&other.clutches[0]), self.clutches[1].mean(&other.clutches[1])],
         }
     }
@@ -101,10 +128,13 @@ impl<T: Real> Torques<T> {
         let mut row = [T::zero(); N];
         let mut rest = per[0] * self.turbine_n_m;
         row[SHARE] = per[0] * self.share_n_m;
+        row[SLOW_SHARE] = per[0] * self.slow_share_n_m;
+        row[INERTIA] = -per[0] * self.inertia_n_m;
         for (c, clutch) in self.clutches.iter().enumerate() {
             let per_clutch = clutch.ratio * per[1] - per[0];
             rest = rest + per_clutch * clutch.base_n_m;
             row[FRICTION[c]] = per_clutch * clutch.per_friction_n_m;
+            row[KISS[c]] = per_clutch * clutch.per_kiss_n_m;
             row[PRESSURE[c]] = per_clutch * clutch.per_pressure_n_m;
         }
         (row, rest)
@@ -130,8 +160,12 @@ impl<T: Real> Rates<T> {
             row[RATE] = per_output_torque * damping / i;
             (rates.rows[k], rates.rest[k]) = (row, rest);
         }
-        rates.rows[WHEEL][SPRING] = wheels_kg_m2.recip();
-        rates.rows[WHEEL][LOAD] = -wheels_kg_m2.recip();
+        let per_wheel_torque = wheels_kg_m2.recip();
+        rates.rows[WHEEL][SPRING] = per_wheel_torque;
+        rates.rows[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
+        rates.rows[WHEEL][WHEEL] = -per_wheel_torque * damping;
+        rates.rows[WHEEL][RATE] = per_wheel_torque * damping;
+        rates.rows[WHEEL][LOAD] = -per_wheel_torque;
         rates
     }
 
@@ -143,7 +177,7 @@ impl<T: Real> Rates<T> {
 
 /// The sum of the products of two rows.
 #[inline]
-pub(super) fn dot<T: Real>(a: &[T; N], b: &[T; N]) -> T {
+pub(super) fn dot<T: Real, const L: usize>(a: &[T; L], b: &[T; L]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
 }
 
@@ -170,8 +204,11 @@ impl<T: Real> Motion<T> {
             a[k][WHEEL] = g[k][1] * damping / i;
             b[k] = [g[k][0], g[k][1], zero, -g[k][1] * damping / i];
         }
-        a[WHEEL][SPRING] = wheels_kg_m2.recip();
-        b[WHEEL][2] = -wheels_kg_m2.recip();
+        let per_wheel_torque = wheels_kg_m2.recip();
+        a[WHEEL][SPRING] = per_wheel_torque;
+        a[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
+        a[WHEEL][WHEEL] = -per_wheel_torque * damping;
+        b[WHEEL] = [zero, zero, -per_wheel_torque, per_wheel_torque * damping];
         a[SPRING][OUTPUT] = stiffness / i;
         a[SPRING][WHEEL] = -stiffness;
         b[SPRING][3] = stiffness;
@@ -245,13 +282,22 @@ mod tests {
             ratio,
             base_n_m,
             per_friction_n_m: 0.12 * base_n_m,
+            per_kiss_n_m: -2.0,
             per_pressure_n_m: 3.0,
+            open_loop_n_m: base_n_m,
         };
-        Torques { turbine_n_m: 120.0, share_n_m: 115.0, clutches: [clutch(4.7, -20.0), clutch(3.13, 90.0)] }
+        let (slow_share_n_m, inertia_n_m) = (6.0, -3.0);
+        Torques {
+            turbine_n_m: 120.0,
+            share_n_m: 115.0,
+            slow_share_n_m,
+            inertia_n_m,
+            clutches: [clutch(4.7, -20.0), clutch(3.13, 90.0)],
+        }
     }
 
     fn state() -> [f64; N] {
-        [300.0, 70.0, 23.2, 900.0, 700.0, 0.05, -0.04, 0.5, -0.7, 0.3, 1.1]
+        [300.0, 70.0, 23.2, 900.0, 700.0, 0.05, -0.04, 0.4, 0.5, -0.7, 0.2, -0.3, 0.3, 1.1, 0.6]
     }
 
     /// A step as a whole is what many small ones by the rates are.
@@ -290,20 +336,23 @@ mod tests {
         let (torques, g) = (torques(), free(&MASS));
         let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
         let x = state();
-        let [turbine, output, _] = rates.at(&x);
+        let [turbine, output, wheel] = rates.at(&x);
         let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
             + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
         let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);
-        let input = (torques.turbine_n_m + x[SHARE] * torques.share_n_m) * x[TURBINE];
+        let input = torques.turbine_n_m + x[SHARE] * torques.share_n_m + x[SLOW_SHARE] * torques.slow_share_n_m;
+        let input = (input - x[INERTIA] * torques.inertia_n_m) * x[TURBINE];
         let heat: f64 = (0..2)
             .map(|c| {
                 let clutch = &torques.clutches[c];
                 let torque = clutch.base_n_m
                     + x[FRICTION[c]] * clutch.per_friction_n_m
+                    + x[KISS[c]] * clutch.per_kiss_n_m
                     + x[PRESSURE[c]] * clutch.per_pressure_n_m;
                 torque * (x[TURBINE] - clutch.ratio * x[OUTPUT])
             })
             .sum();
         assert!((input - shaft / LINE.final_ratio * x[OUTPUT] - heat - kinetic).abs() < 1e-6);
+        assert!((shaft - x[LOAD] - WHEELS_KG_M2 * wheel).abs() < 1e-6);
     }
 }

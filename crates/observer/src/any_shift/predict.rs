@@ -1,7 +1,7 @@
 //! The prediction over a step, and the phase.
 
 use super::{
-    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, LOAD, MAX_ELEMENTS,
+    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, KISS, LOAD, MAX_ELEMENTS,
     MODEL_SHARE, MOST_PIECES, Measured, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE,
     SHARE_S, ShiftRow, TURBINE, Torques, WHEEL, free, powertrain, square, tied, turbine,
 };
@@ -28,20 +28,25 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         &self,
         running: &Running<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
-        turbine_n_m: T,
+        found: &turbine::Found<T>,
         speeds: [T; 2],
     ) -> Torques<T> {
-        let mut clutches = [ClutchTorque::none(); 2];
+        let u = &self.uncertainty;
+        let (mut clutches, mut inertia_n_m) = ([ClutchTorque::none(); 2], T::zero());
         if let Some(shift) = &running.shift {
+            inertia_n_m = u.inertia_share * shift.mass_kg_m2[0][0] * running.rates[TURBINE];
             for (c, (torque, clutch)) in clutches.iter_mut().zip(&shift.clutches).enumerate() {
                 let slip = self.slip(clutch.ratio, speeds);
                 let direction = running.phase.direction(c, &slip);
                 if let Some((memory, element)) = self.element(elements, clutch.element) {
-                    *torque = memory.torque(element, clutch, &self.uncertainty, slip.value, direction);
+                    let kiss = running.x.mean[KISS[c.min(1)]];
+                    *torque = memory.torque(element, clutch, u, [slip.value, direction, kiss]);
                 }
             }
         }
-        Torques { turbine_n_m, share_n_m: running.slow_n_m, clutches }
+        let share_n_m = running.slow_n_m;
+        let slow_share_n_m = u.slow_share(found.share) * share_n_m;
+        Torques { turbine_n_m: found.turbine_n_m, share_n_m, slow_share_n_m, inertia_n_m, clutches }
     }
 
     pub(super) fn element<'s>(
@@ -63,7 +68,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) {
         let share = dt_s / (dt_s + T::of(SHARE_S));
         running.slow_n_m = running.slow_n_m + share * (torque.turbine_n_m - running.slow_n_m);
-        let now = self.torques(running, elements, torque.turbine_n_m, speeds);
+        let now = self.torques(running, elements, torque, speeds);
         let mean = running.torques.map_or(now, |before| before.mean(&now)).without(running.phase.phase.holding());
         if dt_s > T::zero() {
             let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
@@ -76,7 +81,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         self.find_phase(running, elements, &now, speeds);
         // The phase may have changed the direction of a torque.
-        running.torques = Some(self.torques(running, elements, torque.turbine_n_m, speeds));
+        running.torques = Some(self.torques(running, elements, torque, speeds));
     }
 
     pub(super) fn predict(&self, running: &mut Running<T>, torques: &Torques<T>, torque_noise: T, dt_s: T) {
@@ -88,20 +93,29 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         running.motion = Some(motion);
         let (rows, rest) = motion.rows(torques);
         let mut stay = [T::one(); N];
-        let (friction, pressure) = ((-dt_s / u.torque_share_s).exp(), (-dt_s / u.pressure_s).exp());
-        for c in 0..2 {
-            stay[FRICTION[c]] = friction;
-            stay[PRESSURE[c]] = pressure;
+        let share = (-dt_s / u.turbine_share_s).exp();
+        stay[SHARE] = share;
+        let in_shift = running.shift.is_some();
+        let pressure = if in_shift { (-dt_s / u.pressure_s).exp() } else { T::one() };
+        for state in PRESSURE {
+            stay[state] = pressure;
         }
         let x = &mut running.x;
         x.pass(&rows, &rest, &stay);
-        for c in 0..2 {
-            x.add(FRICTION[c], FRICTION[c], T::one() - friction * friction);
-            x.add(PRESSURE[c], PRESSURE[c], T::one() - pressure * pressure);
+        if in_shift {
+            let walked = u.friction_walk(dt_s);
+            for c in 0..2 {
+                x.add(FRICTION[c], FRICTION[c], walked);
+                x.add(PRESSURE[c], PRESSURE[c], T::one() - pressure * pressure);
+                if let Some(before) = &mut running.before {
+                    before.covariance[c][c] = before.covariance[c][c] + walked;
+                }
+            }
         }
-        for (state, walk) in [(LOAD, u.load_walk), (RATE, u.rate_walk), (SHARE, u.turbine_walk)] {
+        for (state, walk) in [(LOAD, u.load_walk), (RATE, u.rate_walk)] {
             x.add(state, state, walk * walk * dt_s);
         }
+        x.add(SHARE, SHARE, u.turbine_share * u.turbine_share * (T::one() - share * share));
         let by_torque = motion.per_turbine_torque();
         for i in 0..CORE {
             for j in i..CORE {
@@ -172,10 +186,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let mut row = [T::zero(); N];
         (row[TURBINE], row[OUTPUT]) = (T::one(), -ratio);
         let tie = Measured { row, value: T::zero(), noise: square(T::of(MODEL_SHARE) * deviation) };
-        let [slip, _] = running.x.innovation(&tie);
+        let slip = running.x.look(&tie).innovation;
         // The slip that is left goes where the inertia is small.
         running.x.add(TURBINE, TURBINE, slip * slip);
-        running.x.correct(&tie);
+        let look = running.x.look(&tie);
+        running.x.correct(&look);
     }
 
     /// The torque at the turbine with which a clutch holds, as a row over the states and what is left beside them:

@@ -9,8 +9,6 @@ use drivetrain::Real;
 impl<T: Real> AnyShiftFilter<'_, T> {
     /// Lets the valve models go on and takes the commands. The health of the worst of those that came.
     pub(super) fn pass_elements(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>, dt_s: T) -> ChannelHealth {
-        let u = &self.uncertainty;
-        let stay = (-dt_s / u.torque_share_s).exp();
         let (mut came, mut refused) = (false, false);
         let elements = state.elements.iter_mut().zip(self.tables.elements).zip(&input.commands);
         for ((memory, element), command) in elements {
@@ -18,7 +16,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             let health = memory.step(element, &self.limits, *command, dt_s);
             came = came || health == ChannelHealth::Good;
             refused = refused || health == ChannelHealth::Refused;
-            memory.friction = [stay * memory.friction[0], T::one() - stay * stay * (T::one() - memory.friction[1])];
         }
         match (refused, came) {
             (true, _) => ChannelHealth::Refused,
@@ -118,15 +115,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         })
     }
 
-    /// Speeds of turbine and output at the time of the older reading, and on the same lines now.
-    pub(super) fn then_and_now(
-        &self,
-        newest: &[Option<Newest<T>>; SPEEDS],
-        running: Option<&Running<T>>,
-    ) -> [[T; 2]; 2] {
-        let then = self.measured(newest, running);
+    /// Speeds of turbine and output at the time of the older reading, and on the same lines now; `None` where one of them has
+    /// not been read for long.
+    pub(super) fn then_and_now(&self, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[[T; 2]; 2]> {
         let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
-        [then, [TURBINE, OUTPUT].map(|k| fresh(k).map_or(then[k], |newest| newest.at(T::zero())))]
+        let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
+        Some([self.measured(newest, None), [turbine.at(T::zero()), output.at(T::zero())]])
     }
 
     /// The torque at the gearbox input now, if it is known.

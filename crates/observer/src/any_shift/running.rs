@@ -1,65 +1,242 @@
-//! What is kept from shift to shift.
+//! Begin and end of a shift, and what is kept from shift to shift.
 
-use super::{ElementState, FRICTION, MAX_ELEMENTS, PRESSURE, PhaseMemory, Running, ShiftPhase, ShiftRow, Slip};
+use super::{
+    ACTING, Acting, AnyShiftFilter, Correlations, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS, Known, LASTING,
+    Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SLOW_SHARE, ShiftPhase, ShiftRow,
+    ShiftUncertainty, Slip, square,
+};
 use drivetrain::Real;
 
+/// Place of the torque at the gearbox input among the lasting states.
+pub(super) const TURBINE_ACTS: usize = ACTING - 1;
+/// That of the inertia.
+const INERTIA_ACTS: usize = 4;
+/// Share of the variance by which the filter's turbine torque may differ from what is learnt of it and still be the same: by
+/// rounding, and by what each shift adds.
+const SAME: f64 = 0.1;
+
+impl<T: Real> ShiftUncertainty<T> {
+    /// Deviation of the part of the turbine torque's error that lasts, from that of the whole, as shares.
+    pub(super) fn slow_share(&self, share: T) -> T {
+        (share * share - self.turbine_share * self.turbine_share).max(T::zero()).sqrt()
+    }
+
+    /// Variance by which the error of a clutch's torque walks: after [`ShiftUncertainty::torque_share_s`] the part that
+    /// does not last is another.
+    pub(super) fn friction_walk(&self, dt_s: T) -> T {
+        (T::one() - self.slow_part) * T::of(2.0) * dt_s / self.torque_share_s
+    }
+
+    /// Error of the valve's gain, as a share, that the factor of an element's torque `f` and its kiss point `k` speak for.
+    pub(super) fn gain_error(&self, element: &FrictionElement<T>, f: T, k: T) -> T {
+        let [by_f, by_k] = self.gain_by(element, self.slow_part.sqrt());
+        by_f * f + by_k * k
+    }
+
+    /// Regression of the gain on torque factor and kiss point; `slow` is the deviation of what lasts of them in their own.
+    fn gain_by(&self, element: &FrictionElement<T>, slow: T) -> [T; 2] {
+        let variance = self.valve_gain * self.valve_gain;
+        let clutch = &element.clutch;
+        // Covariances of the gain with both, and of these two.
+        let per = variance * slow / self.slow_part.sqrt();
+        let with_f = per / self.torque_share;
+        let with_k = -per * clutch.kiss_pressure() / self.kiss_deviation_pa(clutch);
+        let both = slow * slow * self.correlation(element);
+        let left = T::one() - both * both;
+        [(with_f - both * with_k) / left, (with_k - both * with_f) / left]
+    }
+
+    /// Correlation of what lasts of torque factor and kiss point of an element: a higher gain is more torque and an earlier
+    /// kiss point.
+    pub(super) fn correlation(&self, element: &FrictionElement<T>) -> T {
+        let slow = self.torque_share * self.slow_part.sqrt();
+        let by_gain = self.valve_gain * self.valve_gain * element.clutch.kiss_pressure();
+        -by_gain / (slow * self.slow_part.sqrt() * self.kiss_deviation_pa(&element.clutch))
+    }
+
+    /// The same of the states of a shift, of which a part does not last.
+    pub(super) fn correlation_in_shift(&self, element: &FrictionElement<T>) -> T {
+        self.slow_part * self.correlation(element)
+    }
+}
+
 impl<T: Real> Running<T> {
-    /// Leaves with the elements of the shift what it has shown of them.
-    pub(super) fn keep(&self, elements: &mut [Option<ElementState<T>>; MAX_ELEMENTS]) {
-        let Some(shift) = &self.shift else { return };
-        for (clutch, k) in shift.clutches.iter().zip(FRICTION) {
-            let (mean, variance) = (self.x.mean[k], self.x.covariance[k][k]);
-            if let Some(Some(memory)) = elements.get_mut(clutch.element)
-                && mean.is_finite()
-                && variance >= T::zero()
-            {
-                memory.friction = [mean, variance.min(T::one())];
+    /// The states of a shift, as they are where there is none.
+    pub(super) fn renew_shift(&mut self) {
+        for state in IN_GEAR..N {
+            self.x.renew(state, T::zero(), T::one());
+        }
+        self.x.active = IN_GEAR;
+    }
+
+    /// The lasting states now.
+    fn lasting(&self) -> Known<T> {
+        Known {
+            mean: LASTING.map(|state| self.x.mean[state]),
+            covariance: LASTING.map(|a| LASTING.map(|b| self.x.covariance[a][b])),
+        }
+    }
+}
+
+impl<T: Real> AnyShiftFilter<'_, T> {
+    /// Correlation of torque factor and kiss point of each element unlearnt.
+    pub(super) fn correlations(&self) -> Correlations<T> {
+        let mut correlations = [T::zero(); MAX_ELEMENTS];
+        for (correlation, element) in correlations.iter_mut().zip(self.tables.elements) {
+            *correlation = self.uncertainty.correlation(element);
+        }
+        correlations
+    }
+
+    /// What is learnt of an element, by its place in [`super::GearboxTables::elements`]; `None` if there is no such element.
+    pub fn learnt_element(&self, learnt: &Learnt<T>, at: usize) -> Option<LearntElement<T>> {
+        let (u, element) = (&self.uncertainty, self.tables.elements.get(at).filter(|_| at < MAX_ELEMENTS)?);
+        let ([s, k], [[s_s, s_k], [_, k_k]]) = learnt.of_element(at)?;
+        let torque = u.torque_share * u.slow_part.sqrt();
+        let kiss_pa = u.kiss_deviation_pa(&element.clutch) * u.slow_part.sqrt();
+        let [by_s, by_k] = u.gain_by(element, T::one());
+        // Unlearnt both vary by one, with their correlation.
+        let both = u.correlation(element);
+        let seen = by_s * by_s * (T::one() - s_s)
+            + (by_s * by_k + by_s * by_k) * (both - s_k)
+            + by_k * by_k * (T::one() - k_k);
+        let gain = (u.valve_gain * u.valve_gain - seen).max(T::zero()).sqrt();
+        Some(LearntElement {
+            torque_share: [torque * s, torque * s_s.sqrt()],
+            kiss_pa: [kiss_pa * k, kiss_pa * k_k.sqrt()],
+            valve_gain: [by_s * s + by_k * k, gain],
+        })
+    }
+
+    /// What is learnt of the turbine-side inertia between two gears: its error as a share, and the deviation; `None` if it is
+    /// not learnt.
+    pub fn learnt_inertia(&self, learnt: &Learnt<T>, from: usize, to: usize) -> Option<[T; 2]> {
+        let of = learnt.of_pair(self.tables.pair(from, to)?)?;
+        Some(of.map(|value| self.uncertainty.inertia_share * value))
+    }
+
+    /// What is learnt and acts in a shift.
+    pub(super) fn acting(&self, shift: &ShiftRow<T>) -> Acting<T> {
+        let elements = shift.clutches.map(|clutch| clutch.element);
+        Acting::new(elements, self.tables.pair(shift.from, shift.to), self.uncertainty.slow_part)
+    }
+
+    /// Puts what is learnt into the states of a shift.
+    pub(super) fn enter_shift(&self, running: &mut Running<T>, shift: ShiftRow<T>, learnt: &Learnt<T>) {
+        let known = learnt.known(&self.acting(&shift));
+        let x = &mut running.x;
+        x.active = N;
+        let turbine = x.covariance[SLOW_SHARE][SLOW_SHARE];
+        for (a, state) in LASTING.into_iter().enumerate().take(TURBINE_ACTS) {
+            x.renew(state, known.mean[a], known.covariance[a][a]);
+            // What goes with the turbine torque goes with all that the speeds have shown of it.
+            let share = known.covariance[a][TURBINE_ACTS] / turbine;
+            for core in 0..IN_GEAR {
+                let covariance = share * x.covariance[SLOW_SHARE][core];
+                x.add(state, core, covariance);
+            }
+            for (b, other) in LASTING.into_iter().enumerate().take(a) {
+                x.add(state, other, known.covariance[a][b]);
             }
         }
-    }
-
-    /// The gear holds.
-    pub(super) fn end_shift(&mut self, gear: usize, elements: &mut [Option<ElementState<T>>; MAX_ELEMENTS]) {
-        self.keep(elements);
-        for c in 0..2 {
-            self.x.renew(FRICTION[c], T::zero(), T::one());
-            self.x.renew(PRESSURE[c], T::zero(), T::one());
+        for state in PRESSURE {
+            x.renew(state, T::zero(), T::one());
         }
-        (self.gear, self.shift, self.torques) = (gear, None, None);
-        self.phase = PhaseMemory::new(ShiftPhase::InGear);
+        running.shift = Some(shift);
     }
 
-    /// Another shift: an element that takes part in both keeps what is known of it.
+    /// The gear holds, and the shift is learnt from.
+    pub(super) fn end_shift(&self, running: &mut Running<T>, gear: usize, learnt: &mut Learnt<T>) {
+        if let Some((before, shift)) = running.before.take().zip(running.shift) {
+            let taken = running.x.is_sound() && learnt.take(&self.acting(&shift), &before, &running.lasting());
+            learnt.count(taken, &self.correlations());
+        }
+        self.take_turbine(running, learnt);
+        running.renew_shift();
+        (running.gear, running.shift, running.torques) = (gear, None, None);
+        running.phase = PhaseMemory::new(ShiftPhase::InGear);
+    }
+
+    /// Makes the lasting part of the turbine torque's error what is learnt of it. Where that is what the filter has, the rest
+    /// of what it knows stays tied to it.
+    fn take_turbine(&self, running: &mut Running<T>, learnt: &Learnt<T>) {
+        let known = learnt.known(&Acting::turbine());
+        let (mean, variance) = (known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
+        let x = &mut running.x;
+        let more = variance - x.covariance[SLOW_SHARE][SLOW_SHARE];
+        let same = square(x.mean[SLOW_SHARE] - mean).max(more.abs()) <= T::of(SAME) * variance;
+        if !same {
+            x.renew(SLOW_SHARE, mean, variance);
+        } else if more > T::zero() {
+            x.add(SLOW_SHARE, SLOW_SHARE, more);
+        }
+    }
+
+    /// Another shift. From a gear it begins with what is learnt; an element that takes part in both this shift and the one
+    /// before keeps what is known of it.
     pub(super) fn begin_shift(
-        &mut self,
+        &self,
+        running: &mut Running<T>,
         shift: ShiftRow<T>,
         slips: [Slip<T>; 2],
-        elements: &mut [Option<ElementState<T>>; MAX_ELEMENTS],
+        learnt: &mut Learnt<T>,
+        fading_s: T,
     ) {
-        self.keep(elements);
-        let mut before = self.shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
-        if let Some([off, on]) = &mut before
-            && (*on == shift.clutches[0].element || *off == shift.clutches[1].element)
-        {
-            self.x.swap(FRICTION[0], FRICTION[1]);
-            self.x.swap(PRESSURE[0], PRESSURE[1]);
-            core::mem::swap(off, on);
+        learnt.pass(fading_s, &self.correlations());
+        let from_gear = running.shift.is_none();
+        if from_gear {
+            self.learn_turbine(running, learnt);
+            self.enter_shift(running, shift, learnt);
+            running.before = (running.misfit <= T::of(MISFIT)).then(|| learnt.known(&self.acting(&shift)));
+        } else {
+            self.change_shift(running, shift, learnt);
+            running.before = None;
         }
-        for (c, clutch) in shift.clutches.iter().enumerate() {
-            if before.is_some_and(|before| before[c.min(1)] == clutch.element) {
-                continue;
-            }
-            let [mean, variance] =
-                elements.get(clutch.element).copied().flatten().map_or([T::zero(), T::one()], |memory| memory.friction);
-            self.x.renew(FRICTION[c.min(1)], mean, variance);
-            self.x.renew(PRESSURE[c.min(1)], T::zero(), T::one());
-        }
-        let phase = match (self.shift.is_none(), slips[0].is_over(), slips[1].is_over()) {
+        let phase = match (from_gear, slips[0].is_over(), slips[1].is_over()) {
             (true, _, _) | (false, false, _) => ShiftPhase::OffgoingHolds,
             (false, true, false) => ShiftPhase::OncomingHolds,
             (false, true, true) => ShiftPhase::BothSlip,
         };
-        (self.shift, self.torques) = (Some(shift), None);
-        self.phase = PhaseMemory::new(phase);
+        running.torques = None;
+        running.phase = PhaseMemory::new(phase);
+    }
+
+    /// Learns what the time in a gear has shown of the turbine torque.
+    fn learn_turbine(&self, running: &mut Running<T>, learnt: &mut Learnt<T>) {
+        let acting = Acting::turbine();
+        let before = learnt.known(&acting);
+        let mut after = before;
+        after.mean[TURBINE_ACTS] = running.x.mean[SLOW_SHARE];
+        after.covariance[TURBINE_ACTS][TURBINE_ACTS] = running.x.covariance[SLOW_SHARE][SLOW_SHARE];
+        learnt.take(&acting, &before, &after);
+        self.take_turbine(running, learnt);
+    }
+
+    /// Another shift before the one under way has ended: a change of mind.
+    fn change_shift(&self, running: &mut Running<T>, shift: ShiftRow<T>, learnt: &Learnt<T>) {
+        let mut before = running.shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
+        if let Some([off, on]) = &mut before
+            && (*on == shift.clutches[0].element || *off == shift.clutches[1].element)
+        {
+            for [a, b] in [FRICTION, KISS, PRESSURE] {
+                running.x.swap(a, b);
+            }
+            core::mem::swap(off, on);
+        }
+        let known = learnt.known(&self.acting(&shift));
+        for (c, clutch) in shift.clutches.iter().enumerate() {
+            let c = c.min(1);
+            if before.is_some_and(|before| before[c] == clutch.element) {
+                continue;
+            }
+            running.x.renew(FRICTION[c], known.mean[c], known.covariance[c][c]);
+            running.x.renew(KISS[c], known.mean[c + 2], known.covariance[c + 2][c + 2]);
+            running.x.renew(PRESSURE[c], T::zero(), T::one());
+        }
+        let pair = |from, to| self.tables.pair(from, to);
+        if running.shift.is_none_or(|under_way| pair(under_way.from, under_way.to) != pair(shift.from, shift.to)) {
+            running.x.renew(INERTIA, known.mean[INERTIA_ACTS], known.covariance[INERTIA_ACTS][INERTIA_ACTS]);
+        }
+        running.shift = Some(shift);
     }
 }

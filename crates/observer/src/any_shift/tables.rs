@@ -129,6 +129,12 @@ impl<T: Real> FrictionElement<T> {
 }
 
 impl<T: Real> GearboxTables<'_, T> {
+    /// The place of two neighbouring gears among the pairs of gears: up or down, the same elements hold, and so the inertia
+    /// is the same. `None` for a shift that skips a gear.
+    pub fn pair(&self, from: usize, to: usize) -> Option<usize> {
+        (from.abs_diff(to) == 1).then_some(from.min(to))
+    }
+
     /// The shift between two gears, if it is one between two known elements.
     pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
         let known = |row: &&ShiftRow<T>| {

@@ -37,10 +37,11 @@ pub(super) struct InputSide<T> {
     pub(super) lock_up_applied: bool,
 }
 
-/// The torque, N m, and its variance from the noise of the speeds.
+/// The torque, N m, its variance from the noise of the speeds, and its deviation as a share.
 pub(super) struct Found<T> {
     pub(super) turbine_n_m: T,
     pub(super) noise: T,
+    pub(super) share: T,
 }
 
 impl<T: Real> TurbineTorque<T> {
@@ -49,7 +50,7 @@ impl<T: Real> TurbineTorque<T> {
     pub(super) fn at(&self, side: &InputSide<T>) -> Option<Found<T>> {
         let (zero, one, least) = (T::zero(), T::one(), T::of(LEAST_N_M));
         let Some(converter) = &self.converter else {
-            return side.reported_n_m.map(|turbine_n_m| Found { turbine_n_m, noise: zero });
+            return side.reported_n_m.map(|turbine_n_m| Found { turbine_n_m, noise: zero, share: self.engine_share });
         };
         let square = |x: T| x * x;
         let [engine, engine_variance, acceleration] = side.engine?;
@@ -59,30 +60,21 @@ impl<T: Real> TurbineTorque<T> {
         // The torque is of second degree in both speeds (Euler's theorem).
         let per_engine = (T::of(2.0) * by_maps - turbine * slope) / engine.max(one);
         let noise = square(slope) * turbine_variance + square(per_engine) * engine_variance;
-        let maps = Found { turbine_n_m: by_maps, noise };
+        let maps = Found { turbine_n_m: by_maps, noise, share: self.converter_share };
         let Some(reported) = side.reported_n_m else {
             return (!side.lock_up_applied).then_some(maps);
         };
         let pump = if side.lock_up_applied { zero } else { torques.turbine_n_m - torques.pump_n_m };
         let by_engine = reported - self.engine_inertia_kg_m2 * acceleration + pump;
         if side.lock_up_applied {
-            return Some(Found { turbine_n_m: by_engine, noise: zero });
+            return Some(Found { turbine_n_m: by_engine, noise: zero, share: self.engine_share });
         }
         let maps_variance = square(self.converter_share * by_maps.abs().max(least));
         let engine_variance = square(self.engine_share * reported.abs().max(least));
         let share = engine_variance / (engine_variance + maps_variance);
         let turbine_n_m = share * by_maps + (one - share) * by_engine;
-        Some(Found { turbine_n_m, noise: square(share) * noise })
-    }
-
-    /// Standard deviation of the torque, as a share, with or without the reported engine torque.
-    pub(super) fn share(&self, reported: bool) -> T {
-        let square = |x: T| x * x;
-        match (self.converter.is_some(), reported) {
-            (true, false) => self.converter_share,
-            (false, _) => self.engine_share,
-            (true, true) => (square(self.converter_share).recip() + square(self.engine_share).recip()).recip().sqrt(),
-        }
+        let both = (square(self.converter_share).recip() + square(self.engine_share).recip()).recip().sqrt();
+        Some(Found { turbine_n_m, noise: square(share) * noise, share: both })
     }
 
     /// The same in another precision.

@@ -325,6 +325,7 @@ impl<'c> LoggedDrive<'c> {
             speeds_rad_s: [self.speeds_rad_s[0], turbine, output, f64::NAN],
             phase: estimate.phase.map_or("-", |phase| phase.name()),
             health: estimate.health,
+            flare_rad_s: estimate.flare_rad_s,
         });
     }
 

@@ -4,12 +4,13 @@
 use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput, ShiftRow};
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use observer::{Health, Reading};
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 use study::any_shift::{
     RECORD_S, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, inputs, score_samples, simulated,
 };
+use study::shift_learning::tables_with_inertia;
 
 use crate::cars::{Random, cars, sensors, shifts};
 use crate::controlling;
@@ -141,23 +142,19 @@ fn a_throttle_that_moves_in_the_shift_swaps_the_roles_of_the_clutches() {
 }
 
 #[test]
-fn an_inertia_that_is_wrong_by_a_fifth_leaves_the_filter_below_the_open_loop() {
+fn an_inertia_that_is_wrong_by_a_fifth_costs_little() {
     let [low, high] = [0.8, 1.2].map(|factor| {
         pooled(|car, shift, _| {
             let samples = simulated(car, &draw(car, seed_of(shift)), shift).unwrap();
-            let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+            let tables = tables_with_inertia(car, factor).unwrap();
             let sensors = sensors();
             let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
-            let mut wrong: Vec<ShiftRow<f64>> = filter.tables.shifts.to_vec();
-            wrong.iter_mut().for_each(|row| row.mass_kg_m2[0][0] *= factor);
-            let mut filter = filter;
-            filter.tables.shifts = &wrong;
             let inputs = inputs(car, &tables, &samples, &sensors, 1);
             score_samples(&tables, &filter, &samples, &inputs)
         })
     });
     println!("M11 20 % low {low:.2?}, high {high:.2?}");
-    assert!(low.iter().chain(&high).all(|&ratio| ratio < 1.0), "{low:?} {high:?}");
+    assert!(low.iter().chain(&high).all(|&ratio| ratio < 0.65), "{low:?} {high:?}");
 }
 
 #[test]
@@ -185,6 +182,146 @@ fn an_element_of_the_gear_that_slips_is_said() {
     assert_eq!(sound.0, 0);
     assert!(slipping.0 > 50, "the brake does not slip");
     assert!(sound.1 <= 2 && slipping.1 > 20, "{sound:?} {slipping:?}");
+}
+
+/// Friction 15 % low, as the budget has it, and 40 % low, so that the offgoing clutch flares; no held one slips.
+#[test]
+fn a_flare_is_said_and_no_held_clutch_is_accused() {
+    let car = &cars()[0];
+    // Rows: all, truly with a flare of more than 3 rad/s, of these said, said without any, said that a held one slips.
+    let [low, lower] = [0.85, 0.6].map(|factor| {
+        let mut draw = ShiftDraw::none(car);
+        draw.friction.iter_mut().for_each(|friction| *friction = factor);
+        let truth = draw.car(car);
+        let mut counts = [0_u32; 5];
+        for (from, to, throttle) in shifts(car) {
+            let ratios = [from, to].map(|gear| car.gearbox.gears[gear].ratio);
+            let samples = simulated(car, &truth, &CarShift::usual(car, from, to, throttle)).unwrap();
+            for row in rows(car, &samples, 1, |_| {}) {
+                let [_, turbine, output, _] = row.speeds_rad_s;
+                let flare = (turbine - ratios[0] * output) * (ratios[0] - ratios[1]).signum();
+                let said = row.flare_rad_s > 0.0;
+                counts[0] += 1;
+                counts[1] += u32::from(flare > 3.0);
+                counts[2] += u32::from(flare > 3.0 && said);
+                counts[3] += u32::from(flare < 0.1 && said);
+                counts[4] += u32::from(row.health == Health::HeldClutchSlips);
+            }
+        }
+        counts
+    });
+    println!("rows, with a flare, said, said without one, held slips said: -15 % {low:?}, -40 % {lower:?}");
+    let [rows, _, _, wrong, held] = low;
+    assert!(200 * wrong < rows && 100 * held < rows);
+    let [_, flares, said, ..] = lower;
+    assert!(flares > 20 && 10 * said > 8 * flares);
+}
+
+/// Valves anywhere in the budget, also in lag, delay and hysteresis; one speed sensor is lost in the shift, or all readings are.
+#[test]
+fn the_range_is_guaranteed_whatever_is_lost() {
+    type Loss = fn(&mut ShiftInput<f64>);
+    let losses: [(&str, Loss); 4] = [
+        ("nothing", |_| {}),
+        ("turbine", |input| input.turbine_rad_s = None),
+        ("output", |input| input.output_rad_s = None),
+        ("all speeds", |input| {
+            (input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.engine_rad_s) = (None, None, None, None);
+        }),
+    ];
+    let car = &cars()[0];
+    let mut random = Random(11);
+    for (name, loss) in losses {
+        let [mut clutches, mut ranges, mut outside] = [0_u32; 3];
+        for (from, to, throttle) in shifts(car).into_iter().step_by(3) {
+            let mut truth = draw(car, seed_of(&CarShift::usual(car, from, to, throttle)));
+            for clutch in truth.clutches.iter_mut().flatten() {
+                let [lag, delay, play] = [(); 3].map(|()| random.uniform());
+                let [least_s, most_s] = ERRORS.valve_delay_s;
+                let lag = 1.0 + ERRORS.valve_lag * (2.0 * lag - 1.0);
+                clutch.valve = clutch.valve.changed(lag, 1.0, Some(least_s + delay * (most_s - least_s)));
+                clutch.hysteresis_pa = play * ERRORS.hysteresis_pa;
+            }
+            let samples = simulated(car, &truth, &CarShift::usual(car, from, to, throttle)).unwrap();
+            let steps = std::cell::Cell::new(0);
+            let rows = rows(car, &samples, 1, |input| {
+                steps.set(steps.get() + 1);
+                // From 0.3 s after the request on.
+                if steps.get() > 130 {
+                    loss(input);
+                }
+            });
+            for clutch in rows.iter().flat_map(|row| row.clutches) {
+                clutches += 1;
+                ranges += u32::from(clutch.torque_range_n_m.is_some());
+                outside += u32::from(!clutch.in_range);
+            }
+        }
+        println!("lost {name}: {clutches} pressures and torques, {ranges} with a range, {outside} outside");
+        assert!(ranges == clutches && clutches > 1000 && outside == 0, "{name}: {clutches} {ranges} {outside}");
+    }
+}
+
+/// A gap that is too long to be predicted begins the filter anew, and does not carry it off.
+#[test]
+fn a_long_gap_in_a_shift_leaves_possible_numbers() {
+    let car = &cars()[0];
+    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let sensors = sensors();
+    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let (from, to, throttle) = shifts(car)[0];
+    let samples = simulated(car, car, &CarShift::usual(car, from, to, throttle)).unwrap();
+    let inputs = inputs(car, &tables, &samples, &sensors, 1);
+    for gap_s in [0.3, 0.5, 2.0, 100.0] {
+        let mut state = filter.start();
+        for (at, (_, input)) in inputs.iter().enumerate() {
+            let dt_s = if at == 140 { gap_s } else { input.dt_s };
+            let estimate = filter.step(&mut state, &ShiftInput { dt_s, ..*input });
+            let shaft = estimate.shaft_n_m.unwrap_or(0.0);
+            assert!(shaft.abs() < 3000.0, "{gap_s} s, {at}: {shaft} N m");
+            assert!(estimate.clutches.iter().flatten().all(|clutch| clutch.torque_n_m.abs() < 1000.0));
+            if at == 140 {
+                assert_ne!(estimate.health, Health::Good);
+            }
+        }
+    }
+}
+
+/// Where both ratios are close to each other the speeds show nothing of the torque phase, and the filter says so.
+#[test]
+fn a_torque_that_the_speeds_do_not_show_is_said_to_be_hidden() {
+    // By class of `1/|i_off - i_on|` below 2 and above 5: rows, hidden ones, squared errors there.
+    let mut classes = [(0.0, 0.0, SquaredErrors::default()); 2];
+    for car in &cars()[..4] {
+        for (from, to, throttle) in shifts(car) {
+            let gain = (car.gearbox.gears[from].ratio - car.gearbox.gears[to].ratio).abs().recip();
+            let Some(class) = [gain < 2.0, gain > 5.0].iter().position(|&is| is) else { continue };
+            let shift = CarShift::usual(car, from, to, throttle);
+            let samples = simulated(car, &draw(car, seed_of(&shift)), &shift).unwrap();
+            for row in rows(car, &samples, 1, |_| {}) {
+                let Some(clutch) = (row.phase() == Some(TruePhase::Torque))
+                    .then(|| row.clutches.iter().find(|clutch| !clutch.sticks))
+                    .flatten()
+                else {
+                    continue;
+                };
+                classes[class].0 += 1.0;
+                classes[class].1 += f64::from(u8::from(clutch.hidden));
+                let [truth, estimate, open_loop] = clutch.torque_n_m;
+                classes[class].2.estimate += (truth - estimate).powi(2);
+                classes[class].2.open_loop += (truth - open_loop).powi(2);
+                classes[class].2.rows += 1.0;
+            }
+        }
+    }
+    let shown = classes.map(|(rows, hidden, errors)| {
+        let [estimate, open_loop] = errors.rms_n_m();
+        (rows, hidden / rows, estimate / open_loop)
+    });
+    println!(
+        "torque phase, gain below 2 and above 5: rows, share said to be hidden, ratio to the open loop: {shown:.2?}"
+    );
+    assert!(shown[1].1 > shown[0].1 && shown[1].2 < 1.05, "{shown:?}");
 }
 
 #[test]

@@ -1,0 +1,535 @@
+//! What is learnt from shift to shift, and kept.
+//!
+//! | quantity | of each | meaning |
+//! |---|---|---|
+//! | `s` | element | factor of its torque: friction times the valve's gain |
+//! | `k` | element | its kiss point |
+//! | `m` | pair of gears | turbine-side inertia `M11` |
+//! | `c` | car | torque at the gearbox input: the converter's capacity |
+//!
+//! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the six of
+//! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift, and ends with `a+`, the
+//! states of the filter. All others follow by regression:
+//!
+//! ```text
+//! K = P H' (H P H' + D)^-1         theta+ = theta + K (a+ - a)         P+ = P - K (P_a - P_a+) K'
+//! ```
+//!
+//! Friction and gain are not told apart here: what the speeds show of both is `s` and `k`. A gain moves both, a
+//! friction only `s`, and [`LearntElement`] has what follows of each from what the budget says of them.
+
+use drivetrain::Real;
+
+use super::powertrain::dot;
+use super::tables::MAX_ELEMENTS;
+
+/// Most pairs of gears whose inertia is learnt.
+pub const MAX_PAIRS: usize = 16;
+/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input.
+const KISS_AT: usize = MAX_ELEMENTS;
+const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
+const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
+/// How many quantities are learnt.
+pub const LEARNT: usize = TURBINE_AT + 1;
+/// How many of them act in a shift.
+pub(super) const ACTING: usize = 6;
+
+/// Squared distance of what a shift says from what was known, in its deviations, beyond which it counts for less, and
+/// beyond which it is refused \[chosen\]: six quantities reach them by chance in one of 70 and in 2 of a million shifts.
+const LIKELY: f64 = 16.0;
+const GATE: f64 = 36.0;
+/// Refused shifts in a row after which all is forgotten \[chosen\]: the car is another, as after a repair.
+const REFUSED_MOST: u8 = 8;
+/// Variance by which each quantity is another in the next shift, in that of the budget \[chosen\]: 9 % of its deviation in 30
+/// shifts. What is well known stays open to what comes, also in single precision.
+const PER_SHIFT: f64 = 2.5e-4;
+/// Bound of a quantity in its deviations: the edge of a uniform distribution, and of the sum of two.
+const EDGE: f64 = 1.732;
+const EDGE_OF_TWO: f64 = 2.449;
+/// Variance above which a covariance was not made here, in that of the budget.
+const VARIANCE_MOST: f64 = 2.0;
+/// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the temperature of the
+/// oil, of which there is no channel; the inertia with nothing but a repair. Torque factor and kiss point have the gain in
+/// common, and fade together: else their correlation could not last.
+const WITH_OIL_S: f64 = 7200.0;
+const INERTIA_S: f64 = 3.6e6;
+
+/// What is learnt, as a Gaussian. It is plain data and can be written to a file and read again; what is read must pass
+/// [`Learnt::checked`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Learnt<T> {
+    /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
+    /// by pair of gears, torque at the gearbox input.
+    pub mean: [T; LEARNT],
+    /// Their covariance, in the same units.
+    pub covariance: [[T; LEARNT]; LEARNT],
+    /// Shifts that were learnt from.
+    pub shifts: u32,
+    /// Shifts in a row that were refused.
+    pub refused: u8,
+}
+
+/// What is learnt of an element: error and its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LearntElement<T> {
+    /// Of the torque that it carries at a pressure well above its kiss point, as a share: friction times gain.
+    pub torque_share: [T; 2],
+    /// Of its kiss point, Pa.
+    pub kiss_pa: [T; 2],
+    /// Of the valve's gain, as a share. Speeds and commands do not tell it apart from a friction and a kiss point of the
+    /// element: its deviation stays large.
+    pub valve_gain: [T; 2],
+}
+
+/// Correlation of torque factor and kiss point of each element unlearnt: the valve's gain is in both.
+pub(super) type Correlations<T> = [T; MAX_ELEMENTS];
+
+/// Which quantities act in a shift, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Acting<T> {
+    /// Place of each, if it is learnt; else it is its own in this shift.
+    places: [Option<usize>; ACTING],
+    /// Part of the variance of torque factors and kiss points that lasts.
+    slow_part: T,
+}
+
+/// Means and covariance of the acting quantities, as the filter has them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Known<T> {
+    pub(super) mean: [T; ACTING],
+    pub(super) covariance: [[T; ACTING]; ACTING],
+}
+
+impl<T: Real> Acting<T> {
+    /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input.
+    pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T) -> Self {
+        let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
+        let kiss = |at: usize| element(at).map(|at| KISS_AT + at);
+        let inertia = pair.filter(|&pair| pair < MAX_PAIRS).map(|pair| INERTIA_AT + pair);
+        Self { places: [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)], slow_part }
+    }
+
+    /// Only the torque at the gearbox input, as in a gear.
+    pub(super) fn turbine() -> Self {
+        Self { places: [None, None, None, None, None, Some(TURBINE_AT)], slow_part: T::one() }
+    }
+
+    /// Place of a quantity among all.
+    fn place(&self, a: usize) -> Option<usize> {
+        self.places.get(a).copied().flatten().filter(|&place| place < LEARNT)
+    }
+
+    /// A row of the acting quantities, `H P`, from the rows of all.
+    fn row(&self, a: usize, of: impl Fn(usize) -> [T; LEARNT]) -> [T; LEARNT] {
+        let per_unit = self.per_unit(a).0;
+        self.place(a).map_or([T::zero(); LEARNT], |place| of(place).map(|x| per_unit * x))
+    }
+
+    /// How a quantity acts per unit, `H`, and the variance beside it, `D`.
+    fn per_unit(&self, a: usize) -> (T, T) {
+        match self.place(a) {
+            None => (T::zero(), T::one()),
+            Some(INERTIA_AT..) => (T::one(), T::zero()),
+            Some(_) => (self.slow_part.sqrt(), T::one() - self.slow_part),
+        }
+    }
+}
+
+impl<T: Real> Learnt<T> {
+    /// Nothing is learnt yet.
+    pub(super) fn nothing(correlations: &Correlations<T>) -> Self {
+        let mut covariance = [[T::zero(); LEARNT]; LEARNT];
+        for (k, row) in covariance.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = unlearnt(correlations, k, j);
+            }
+        }
+        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0 }
+    }
+
+    /// Mean and covariance of torque factor and kiss point of an element.
+    pub(super) fn of_element(&self, at: usize) -> Option<([T; 2], [[T; 2]; 2])> {
+        let places = [at, KISS_AT + at].map(|place| place.min(LEARNT - 1));
+        let covariance = places.map(|a| places.map(|b| self.covariance[a][b]));
+        (at < MAX_ELEMENTS).then_some((places.map(|place| self.mean[place]), covariance))
+    }
+
+    /// Mean and deviation of the inertia of a pair of gears.
+    pub(super) fn of_pair(&self, pair: usize) -> Option<[T; 2]> {
+        let place = INERTIA_AT + pair.min(MAX_PAIRS - 1);
+        (pair < MAX_PAIRS).then_some([self.mean[place], self.covariance[place][place].sqrt()])
+    }
+
+    /// What the acting quantities are before a shift.
+    pub(super) fn known(&self, acting: &Acting<T>) -> Known<T> {
+        let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
+        for (a, place) in acting.places.iter().enumerate() {
+            let (per_unit, more) = acting.per_unit(a);
+            known.covariance[a][a] = more;
+            let Some(place) = place else { continue };
+            known.mean[a] = per_unit * self.mean.get(*place).copied().unwrap_or(T::zero());
+            for (b, other) in acting.places.iter().enumerate() {
+                let covariance = other.and_then(|other| self.covariance.get(*place)?.get(other).copied());
+                let Some(covariance) = covariance else { continue };
+                known.covariance[a][b] = known.covariance[a][b] + per_unit * acting.per_unit(b).0 * covariance;
+            }
+        }
+        known
+    }
+
+    /// Takes what a shift has shown: the acting quantities as they were before it, and after it. Whether it was taken.
+    pub(super) fn take(&mut self, acting: &Acting<T>, before: &Known<T>, after: &Known<T>) -> bool {
+        let Some(inverse) = inverse(&before.covariance) else { return false };
+        let mut moved = [T::zero(); ACTING];
+        for (moved, (after, before)) in moved.iter_mut().zip(after.mean.iter().zip(&before.mean)) {
+            *moved = *after - *before;
+        }
+        let weighted = inverse.map(|row| dot(&row, &moved));
+        let distance = dot(&weighted, &moved);
+        let numbers = after.covariance.iter().flatten().all(|x| x.is_finite());
+        if !(numbers && distance <= T::of(GATE)) {
+            return false;
+        }
+        // A shift that says more than is likely counts for less.
+        let weight = (T::of(LIKELY) / distance.max(T::of(LIKELY))).sqrt();
+        let gain = self.regression(acting, &inverse);
+        for (k, (mean, gain)) in self.mean.iter_mut().zip(&gain).enumerate() {
+            let edge = T::of(edge(k));
+            *mean = (*mean + weight * dot(gain, &moved)).max(-edge).min(edge);
+        }
+        let mut left = before.covariance;
+        for (left, after) in left.iter_mut().flatten().zip(after.covariance.iter().flatten()) {
+            *left = *left + weight * (*after - *left);
+        }
+        self.correct(acting, &gain, before, &left);
+        true
+    }
+
+    /// The covariance when that of the acting quantities has become `left`: `(I - K H) P (I - K H)' + K (P_a - H P H' + left) K'`.
+    /// In this form rounding does not add up.
+    fn correct(
+        &mut self,
+        acting: &Acting<T>,
+        gain: &[[T; ACTING]; LEARNT],
+        before: &Known<T>,
+        left: &[[T; ACTING]; ACTING],
+    ) {
+        let mut noise = *left;
+        for (a, noise) in noise.iter_mut().enumerate() {
+            let per_unit = acting.per_unit(a).0;
+            let own = acting.place(a).map_or(T::zero(), |place| self.covariance[place][place]);
+            noise[a] = noise[a] + (before.covariance[a][a] - per_unit * per_unit * own).max(T::zero());
+        }
+        // P - K (H P), then the same from the other side.
+        let rows = core::array::from_fn::<_, ACTING, _>(|a| acting.row(a, |place| self.covariance[place]));
+        for (p, gain) in self.covariance.iter_mut().zip(gain) {
+            for (gain, row) in gain.iter().zip(&rows) {
+                for (p, x) in p.iter_mut().zip(row) {
+                    *p = *p - *gain * *x;
+                }
+            }
+        }
+        for (p, own) in self.covariance.iter_mut().zip(gain) {
+            let with: [T; ACTING] =
+                core::array::from_fn(|a| acting.place(a).map_or(T::zero(), |place| acting.per_unit(a).0 * p[place]));
+            let of_noise = noise.map(|row| dot(&row, own));
+            let both: [T; ACTING] = core::array::from_fn(|a| of_noise[a] - with[a]);
+            for (p, gain) in p.iter_mut().zip(gain) {
+                *p = *p + dot(&both, gain);
+            }
+        }
+        for i in 0..LEARNT {
+            for j in 0..i {
+                let mean = T::of(0.5) * (self.covariance[i][j] + self.covariance[j][i]);
+                (self.covariance[i][j], self.covariance[j][i]) = (mean, mean);
+            }
+            if self.covariance[i][i] < T::one() {
+                self.covariance[i][i] = self.covariance[i][i] + T::of(PER_SHIFT);
+            }
+        }
+    }
+
+    /// All quantities by the acting ones: `K = P H' P_a^-1`.
+    fn regression(&self, acting: &Acting<T>, inverse: &[[T; ACTING]; ACTING]) -> [[T; ACTING]; LEARNT] {
+        let with = core::array::from_fn::<_, ACTING, _>(|a| acting.row(a, |place| self.covariance[place]));
+        core::array::from_fn(|k| {
+            let with = with.map(|row| row[k]);
+            inverse.map(|row| dot(&row, &with))
+        })
+    }
+
+    /// Counts a shift that was taken, or refused; after many refused ones in a row all is forgotten.
+    pub(super) fn count(&mut self, taken: bool, correlations: &Correlations<T>) {
+        if taken {
+            (self.shifts, self.refused) = (self.shifts.saturating_add(1), 0);
+        } else {
+            self.refused = self.refused.saturating_add(1);
+        }
+        if self.refused >= REFUSED_MOST {
+            *self = Self::nothing(correlations);
+        }
+    }
+
+    /// Lets time pass: what was learnt fades.
+    pub(super) fn pass(&mut self, dt_s: T, correlations: &Correlations<T>) {
+        let one = T::one();
+        let [oil, inertia] = [WITH_OIL_S, INERTIA_S].map(|s| (-dt_s / T::of(s)).exp());
+        let stay = |k: usize| if (INERTIA_AT..TURBINE_AT).contains(&k) { inertia } else { oil };
+        for i in 0..LEARNT {
+            self.mean[i] = stay(i) * self.mean[i];
+            for j in 0..LEARNT {
+                let both = stay(i) * stay(j);
+                self.covariance[i][j] = both * self.covariance[i][j] + (one - both) * unlearnt(correlations, i, j);
+            }
+        }
+    }
+
+    /// Whether all are numbers within their bounds, and the covariance is one.
+    fn is_sound(&self) -> bool {
+        let within = |value: T, most: f64| value.abs() <= T::of(most);
+        let means = self.mean.iter().enumerate().all(|(k, &mean)| within(mean, edge(k)));
+        let symmetric = (0..LEARNT).all(|i| (0..i).all(|j| self.covariance[i][j] == self.covariance[j][i]));
+        let variances = (0..LEARNT).all(|i| within(self.covariance[i][i], VARIANCE_MOST));
+        means && symmetric && variances && is_positive(self.covariance)
+    }
+
+    /// What was read from a file, or `None` if it cannot be what a filter has learnt: not numbers, outside the bounds, or no
+    /// covariance.
+    pub fn checked(self) -> Option<Self> {
+        self.is_sound().then_some(self)
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> Learnt<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        Learnt {
+            mean: self.mean.map(to),
+            covariance: self.covariance.map(|row| row.map(to)),
+            shifts: self.shifts,
+            refused: self.refused,
+        }
+    }
+}
+
+/// Bound of a quantity in its deviations.
+fn edge(k: usize) -> f64 {
+    if k < INERTIA_AT { EDGE_OF_TWO } else { EDGE }
+}
+
+/// Covariance of two quantities unlearnt.
+fn unlearnt<T: Real>(correlations: &Correlations<T>, i: usize, j: usize) -> T {
+    match i.abs_diff(j) {
+        0 => T::one(),
+        KISS_AT if i.max(j) < INERTIA_AT => correlations.get(i.min(j)).copied().unwrap_or(T::zero()),
+        _ => T::zero(),
+    }
+}
+
+/// The inverse of a covariance, or `None` if it has none.
+fn inverse<T: Real>(of: &[[T; ACTING]; ACTING]) -> Option<[[T; ACTING]; ACTING]> {
+    let mut left = *of;
+    let mut right = [[T::zero(); ACTING]; ACTING];
+    for (k, row) in right.iter_mut().enumerate() {
+        row[k] = T::one();
+    }
+    // Gauss and Jordan; a covariance needs no exchange of rows.
+    for k in 0..ACTING {
+        let pivot = left[k][k];
+        if !(pivot > T::epsilon() && pivot.is_finite()) {
+            return None;
+        }
+        for j in 0..ACTING {
+            left[k][j] = left[k][j] / pivot;
+            right[k][j] = right[k][j] / pivot;
+        }
+        let (left_row, right_row) = (left[k], right[k]);
+        for i in (0..ACTING).filter(|&i| i != k) {
+            let factor = left[i][k];
+            for j in 0..ACTING {
+                left[i][j] = left[i][j] - factor * left_row[j];
+                right[i][j] = right[i][j] - factor * right_row[j];
+            }
+        }
+    }
+    Some(right)
+}
+
+/// Whether a symmetric matrix is that of a covariance: all pivots are positive.
+fn is_positive<T: Real>(mut of: [[T; LEARNT]; LEARNT]) -> bool {
+    for k in 0..LEARNT {
+        let row = of[k];
+        if row[k] <= T::zero() || row[k].is_nan() {
+            return false;
+        }
+        for below in of.iter_mut().skip(k + 1) {
+            let factor = below[k] / row[k];
+            for (x, above) in below.iter_mut().zip(&row) {
+                *x = *x - factor * *above;
+            }
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORRELATIONS: Correlations<f64> = [-0.3; MAX_ELEMENTS];
+    const PART: f64 = 0.75;
+
+    fn shift() -> Acting<f64> {
+        Acting::new([1, 4], Some(2), PART)
+    }
+
+    /// What a filter knows after a measurement of `h a` with a variance of the noise.
+    fn after(before: &Known<f64>, h: &[f64; ACTING], value: f64, noise: f64) -> Known<f64> {
+        let with = before.covariance.map(|row| dot(&row, h));
+        let variance = dot(&with, h) + noise;
+        let innovation = value - dot(h, &before.mean);
+        let mut after = *before;
+        for a in 0..ACTING {
+            after.mean[a] += with[a] / variance * innovation;
+            for b in 0..ACTING {
+                after.covariance[a][b] -= with[a] * with[b] / variance;
+            }
+        }
+        after
+    }
+
+    /// Numbers from -1 to 1 (linear congruential).
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// The regression is the Kalman filter of all quantities with the part that does not last as noise.
+    #[test]
+    fn what_a_shift_shows_reaches_all_quantities_as_in_one_filter() {
+        let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
+        // Other shifts have tied the quantities to each other.
+        let mut seed = 1;
+        for pair in 0..6 {
+            let acting = Acting::new([pair, pair + 1], Some(pair), PART);
+            let h = core::array::from_fn(|_| random(&mut seed));
+            let before = learnt.known(&acting);
+            assert!(learnt.take(&acting, &before, &after(&before, &h, 0.5, 0.1)));
+        }
+        let (before, h) = (learnt.known(&acting), [0.9, -0.2, 0.4, 0.1, -0.7, 0.8]);
+        let mut taken = learnt;
+        assert!(taken.take(&acting, &before, &after(&before, &h, 0.8, 0.2)));
+        let mut row = [0.0; LEARNT];
+        let mut noise = 0.2;
+        for a in 0..ACTING {
+            let (per_unit, more) = acting.per_unit(a);
+            row[acting.places[a].unwrap()] += per_unit * h[a];
+            noise += more * h[a] * h[a];
+        }
+        let with = learnt.covariance.map(|line| dot(&line, &row));
+        let variance = dot(&with, &row) + noise;
+        let innovation = 0.8 - dot(&row, &learnt.mean);
+        for i in 0..LEARNT {
+            assert!((taken.mean[i] - learnt.mean[i] - with[i] / variance * innovation).abs() < 1e-9, "{i}");
+            for j in 0..LEARNT {
+                let drift = if i == j && learnt.covariance[i][i] < 1.0 { PER_SHIFT } else { 0.0 };
+                let expected = learnt.covariance[i][j] - with[i] * with[j] / variance + drift;
+                assert!((taken.covariance[i][j] - expected).abs() < 1e-9, "{i} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_shift_that_shows_nothing_teaches_nothing() {
+        let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
+        let (mut learnt, mut known) = (nothing, nothing.known(&acting));
+        // The part that does not last has walked, and nothing was seen of it.
+        known.covariance[0][0] += 0.3;
+        assert!(learnt.take(&acting, &known, &known));
+        let change = learnt.covariance.iter().flatten().zip(nothing.covariance.iter().flatten());
+        assert!(change.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < PER_SHIFT + 1e-12);
+        assert_eq!(learnt.mean, nothing.mean);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_and_often_refused_is_another_car() {
+        let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
+        let h = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let before = learnt.known(&acting);
+        assert!(learnt.take(&acting, &before, &after(&before, &h, 1.0, 0.01)));
+        learnt.count(true, &CORRELATIONS);
+        let known = learnt;
+        for value in [9.0, -9.0, f64::NAN, f64::INFINITY] {
+            let before = learnt.known(&acting);
+            assert!(!learnt.take(&acting, &before, &after(&before, &h, value, 0.01)), "{value}");
+            let mut odd = before;
+            odd.covariance[2][3] = f64::NAN;
+            assert!(!learnt.take(&acting, &before, &odd));
+        }
+        assert_eq!(learnt, known);
+        for refused in 1..=REFUSED_MOST {
+            learnt.count(false, &CORRELATIONS);
+            assert_eq!(learnt.shifts, u32::from(refused < REFUSED_MOST));
+        }
+        assert_eq!(learnt, Learnt::nothing(&CORRELATIONS));
+    }
+
+    /// Whatever the shifts show, in single precision too.
+    #[test]
+    fn ten_thousand_shifts_leave_a_covariance_and_means_within_the_bounds() {
+        let correlations = CORRELATIONS.map(|correlation| correlation as f32);
+        let (mut learnt, mut seed, mut taken) = (Learnt::nothing(&correlations), 5, 0);
+        for k in 0..10_000 {
+            let at = k % 7;
+            let acting = Acting::new([at, at + 1], Some(at), PART as f32);
+            let known = learnt.known(&acting);
+            let double =
+                Known { mean: known.mean.map(f64::from), covariance: known.covariance.map(|row| row.map(f64::from)) };
+            let h = core::array::from_fn(|_| random(&mut seed));
+            let shown = after(&double, &h, 3.0 * random(&mut seed), 1e-4);
+            let shown = Known {
+                mean: shown.mean.map(|x| x as f32),
+                covariance: shown.covariance.map(|row| row.map(|x| x as f32)),
+            };
+            taken += u32::from(learnt.take(&acting, &known, &shown));
+            learnt.pass(20.0, &correlations);
+            assert!(learnt.is_sound(), "{k}");
+        }
+        assert!(taken > 2000, "{taken}");
+    }
+
+    #[test]
+    fn time_makes_it_unknown_again() {
+        let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
+        let (mut learnt, before) = (nothing, nothing.known(&acting));
+        assert!(learnt.take(&acting, &before, &after(&before, &[0.5; ACTING], 1.0, 0.01)));
+        let (friction, inertia) = (learnt.mean[1], learnt.mean[INERTIA_AT + 2]);
+        assert!(friction > 0.05 && inertia > 0.05);
+        // A night: the oil is cold again, and the inertia is that of the day before.
+        learnt.pass(12.0 * 3600.0, &CORRELATIONS);
+        assert!(learnt.mean[1] < 0.01 * friction && learnt.mean[INERTIA_AT + 2] > 0.98 * inertia);
+        assert!((learnt.covariance[1][1] - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn what_is_read_must_be_what_a_filter_can_have_learnt() {
+        let nothing = Learnt::nothing(&CORRELATIONS);
+        assert_eq!(nothing.checked(), Some(nothing));
+        let wrong = |change: fn(&mut Learnt<f64>)| {
+            let mut learnt = nothing;
+            change(&mut learnt);
+            learnt.checked()
+        };
+        assert_eq!(wrong(|learnt| learnt.mean[3] = f64::NAN), None);
+        assert_eq!(wrong(|learnt| learnt.mean[3] = 2.6), None);
+        assert_eq!(wrong(|learnt| learnt.covariance[3][3] = -1.0), None);
+        assert_eq!(wrong(|learnt| learnt.covariance[3][3] = 1e9), None);
+        assert_eq!(wrong(|learnt| learnt.covariance[3][4] = 0.1), None);
+        assert_eq!(
+            wrong(|learnt| {
+                learnt.covariance[3][4] = 1.1;
+                learnt.covariance[4][3] = 1.1;
+            }),
+            None
+        );
+    }
+}
