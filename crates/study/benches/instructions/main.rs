@@ -115,7 +115,11 @@ fn toolchain() -> Result<String, String> {
         let text = String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned();
         Ok::<_, String>(text)
     };
-    Ok([version("rustc")?, version("ldd")?, version("valgrind")?].join("; "))
+    // The mathematical library chooses its routines by the processor.
+    let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = processors.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or_default();
+    let processor = model.trim_start_matches([' ', '\t', ':']).to_owned();
+    Ok([version("rustc")?, version("ldd")?, version("valgrind")?, processor].join("; "))
 }
 
 /// Instructions of a path for one of its units.
