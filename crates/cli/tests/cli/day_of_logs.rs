@@ -69,7 +69,7 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     let [suggested, _] = said(&wetclutch(&["inspect", &folder.path("log.mf4"), "--suggest"]));
     let gearbox = "ratios = [4.6957, 3.1304, 2.1039, 1.6667, 1.2845, 1.0, 0.8392, 0.6667]\noutput_rad_per_m = 10.0\n";
     let valves = "[channel.oncoming_current]\nname = \"I_E\"\n[channel.offgoing_current]\nname = \"I_C\"\n";
-    let map = folder.write("map.toml", &format!("{suggested}\n[gearbox]\n{gearbox}{valves}"));
+    let map = folder.write("map.toml", format!("{suggested}\n[gearbox]\n{gearbox}{valves}"));
     let car = folder.path("car.toml");
     let numbers = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"];
     said(&wetclutch(&[&["init", "--ratios", "4.6957,3.1304", "-o", &car], &numbers[..]].concat()));
@@ -205,7 +205,7 @@ fn a_channel_that_cannot_be_the_signal_is_an_error() {
     let drive = shift_log(&folder);
     let map = folder.path("map.toml");
     for (column, value) in [("turbine_speed_rad_s", 190.0), ("output_speed_rad_s", 70.0), ("wheel_speed_rad_s", 25.0)] {
-        let log = folder.write("log.csv", &changed(&drive, column, |_| value));
+        let log = folder.write("log.csv", changed(&drive, column, |_| value));
         let out = folder.path("out.csv");
         let text = refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out]));
         let name = column.trim_end_matches("_rad_s");
@@ -215,7 +215,7 @@ fn a_channel_that_cannot_be_the_signal_is_an_error() {
         refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &out, "--map", &map]));
     }
     for (column, factor) in [("turbine_speed_rad_s", 1.5), ("output_speed_rad_s", 0.7), ("wheel_speed_rad_s", 1.4)] {
-        let log = folder.write("log.csv", &changed(&drive, column, |value| factor * value));
+        let log = folder.write("log.csv", changed(&drive, column, |value| factor * value));
         let text = refused(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "-o", &folder.path("out.csv")]));
         assert!(text.contains("hint: ") && text.contains("scale"), "{column}: {text}");
     }
