@@ -384,6 +384,13 @@ pub(crate) struct Mapping {
     pub(crate) channel: Vec<String>,
 }
 
+impl Mapping {
+    /// The files that it names.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.dbc.iter().chain(&self.map)
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Inspect {
     /// Log

@@ -75,9 +75,16 @@ impl Extremes {
         self.count >= MANY && self.least == self.greatest
     }
 
-    /// The greatest size.
+    /// The greatest size, without the greatest hundredth of the values where that is of another order: a few readings may be wrong.
     fn size(&self) -> f64 {
-        self.greatest.abs().max(self.least.abs())
+        let all: u64 = self.sizes.iter().map(|count| u64::from(*count)).sum();
+        let mut below = 0;
+        let nearly_all = (0_i32..).zip(&self.sizes).find(|(_, count)| {
+            below += u64::from(**count);
+            100 * below >= 99 * all
+        });
+        let limit = nearly_all.map_or(f64::INFINITY, |(size, _)| f64::from(size - 31).exp2());
+        self.greatest.abs().max(self.least.abs()).min(limit)
     }
 }
 
@@ -250,6 +257,21 @@ mod tests {
             let found = findings(&[summary(role, unit, &values)]);
             assert!(found.len() == 1 && found[0].message.contains(&format!("looks like {likely}")), "{found:?}");
         }
+    }
+
+    #[test]
+    fn a_few_wrong_readings_are_no_wrong_unit() {
+        let mut speeds: Vec<f64> = (0..200).map(|i| 80.0 + f64::from(i)).collect();
+        speeds.extend([2600.0, -4e5]);
+        let mut currents = vec![0.0; 500];
+        currents.extend((0..200).map(|i| 1e-3 * f64::from(i)));
+        currents.extend([65.535, 65.535]);
+        let right = [
+            summary(Role::EngineSpeed, "rad/s", &speeds),
+            summary(Role::TurbineSpeed, "rad/s", &speeds),
+            summary(Role::OncomingCurrent, "A", &currents),
+        ];
+        assert_eq!(findings(&right), []);
     }
 
     #[test]

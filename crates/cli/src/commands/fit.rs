@@ -19,7 +19,8 @@ const REASONS_MAX: usize = 10;
 
 pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
-    not_an_input(Some(&options.output), options.logs.iter().chain(&options.sensors).chain([&options.vehicle]))?;
+    let inputs = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]).chain(options.mapping.files());
+    not_an_input(Some(&options.output), inputs)?;
     let vehicle = Vehicle::read(&options.vehicle)?;
     fit::check_vehicle(&vehicle)?;
     let ages = match options.sensors.as_deref() {
@@ -47,6 +48,8 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     let fitted = found.vehicle_file(&vehicle, &names.join(", "))?;
     let checked = found.validate(&vehicle, &fitted, &held_out, ages)?;
     bar.finish_and_clear();
+    // Nobody has to read the report to its end.
+    write_text(&options.output, &fitted.source.text)?;
     table(&found.report())?;
     for (channel, scale, gain) in &found.channels {
         let (scale, unit) = if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
@@ -56,7 +59,6 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         output::line(&statement)?;
     }
     output::line(&said_of(checked.as_ref()))?;
-    write_text(&options.output, &fitted.source.text)?;
     let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
     output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
     Ok(())

@@ -230,6 +230,35 @@ fn several_logs_give_a_file_each_and_one_that_fails_does_not_stop_the_others() {
 }
 
 #[test]
+fn no_output_replaces_an_input_or_another_output() {
+    let folder = Folder::new("replaced");
+    let (log, table) = (folder.drives("a.csv", 1, None), folder.drives("a_shifts.csv", 1, None));
+    let map = folder.write("map.toml", "");
+    let replaced = "the output would replace this input";
+    assert!(refused(&estimate(&log, &["--map", &map, "-o", &map])).contains(replaced));
+    assert!(refused(&estimate(&table, &["-o", &folder.path("a.csv")])).contains(replaced));
+    let both = wetclutch(&["estimate", &log, &table, "--vehicle", VEHICLE, "-o", &folder.path("out")]);
+    assert!(refused(&both).contains("would both give"));
+    let fitted = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "--map", &map, "-o", &map]);
+    assert!(refused(&fitted).contains(replaced));
+}
+
+#[test]
+fn an_estimate_without_a_shift_leaves_no_shifts_of_an_earlier_one() {
+    let folder = Folder::new("earlier");
+    let log = folder.drives("log.csv", 1, None);
+    let output = folder.path("out.csv");
+    said(&estimate(&log, &["-o", &output]));
+    assert!(Path::new(&folder.path("out_shifts.csv")).exists());
+    let rest: String = folder.read("log.csv").lines().take(200).map(|line| format!("{line}\n")).collect();
+    let text = said(&estimate(&folder.write("rest.csv", rest), &["-o", &output]));
+    assert!(text.contains("of an earlier estimate"), "{text}");
+    for name in ["out_shifts.csv", "out_shifts.json", "out_report.html"] {
+        assert!(!Path::new(&folder.path(name)).exists(), "{name}");
+    }
+}
+
+#[test]
 fn a_log_is_followed_through_a_pipe_to_its_end() {
     let folder = Folder::new("pipe");
     let log = folder.drives("log.csv", 1, None);

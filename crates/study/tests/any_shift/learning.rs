@@ -135,10 +135,10 @@ const WRONG: [(&str, f64, f64); 4] = [
 ];
 const SHIFTS: usize = 30;
 
-/// How many orders of the shifts, and cars of the budget: one, or for the documentation `LEARNING_DRAWS=6 cargo test --release
+/// How many orders of the shifts, and cars of the budget: two, or for the documentation `LEARNING_DRAWS=6 cargo test --release
 /// -p study --test any_shift learning -- --nocapture`.
 fn draws() -> u64 {
-    std::env::var("LEARNING_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap())
+    std::env::var("LEARNING_DRAWS").ok().map_or(2, |draws| draws.parse().unwrap())
 }
 
 /// The errors after so many shifts, over some orders of the shifts.
@@ -150,7 +150,7 @@ fn after(drive: &Drive, count: usize, inertia: f64) -> Errors {
 
 #[test]
 fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
-    let converters: &[f64] = if draws() > 1 { &[1.0, 0.9, 1.1] } else { &[1.0] };
+    let converters: &[f64] = if draws() > 2 { &[1.0, 0.9, 1.1] } else { &[1.0] };
     for &converter in converters {
         let drive = |friction, gain| Drive::new(uniform(friction, gain, converter), 1);
         let known = drive(1.0, 1.0);
@@ -167,7 +167,7 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
             // Asked for is 1.2. A gain that is 8 % high misses it (docs/any_shift.md): of what it costs, half is learnt away.
             let (cost, left) = (before.all()[0] - best, found - best);
             assert!(found < 1.2 * best || left < 0.5 * cost, "{name}, converter {converter}: {found} {best}");
-            // One order of the shifts differs from the next by some per cent.
+            // An order of the shifts differs from the next by some per cent.
             let before = before.all()[0];
             assert!(found < 1.15 * before, "{name}, converter {converter}: {found} {before}");
         }
@@ -179,7 +179,7 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
 fn cars_of_the_budget_are_learnt() {
     for inertia in [1.0, 0.8, 1.2] {
         let mut sums = [Errors::default(), Errors::default(), Errors::default()];
-        for seed in 1..=draws().max(2) {
+        for seed in 1..=draws() {
             let draw = |car: &Car| {
                 let mut random = Random(seed * 77);
                 ShiftDraw::within(car, &design::ShiftErrors::STANDARD, || random.uniform())

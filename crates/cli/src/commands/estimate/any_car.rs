@@ -11,7 +11,7 @@ use study::any_shift::logged::{CarLog, LoggedDrive, element_column};
 use trace::{Cell, ColumnKind, CsvRows};
 
 use super::observer::sensors;
-use super::outputs::{Output, beside};
+use super::outputs::{Output, beside, remove_old};
 use crate::args::{Estimate, ObserverChoice};
 use crate::commands::{check_output, json_object, not_an_input, write_cells, write_text};
 use crate::failure::Failure;
@@ -50,7 +50,11 @@ pub(super) fn estimate(options: &Estimate) -> Result<(), Failure> {
     check_options(options)?;
     let Some(path) = options.logs.first() else { return Ok(()) };
     check_output(options.output.as_ref())?;
-    not_an_input(options.output.as_ref(), options.sensors.iter().chain([&options.vehicle]))?;
+    let inputs = || options.sensors.iter().chain([&options.vehicle]);
+    not_an_input(options.output.as_ref(), inputs())?;
+    for beside in options.output.iter().filter_map(|output| beside(output)).flatten() {
+        not_an_input(Some(&beside), inputs().chain([path]))?;
+    }
     let car = Car::read(&options.vehicle)?;
     let sensors = options.sensors.as_deref().map(sensors).transpose()?;
     let tables = LoggedDrive::tables(&car)?;
@@ -99,8 +103,11 @@ fn check_ratios([all, unfit]: [u64; 2], vehicle: &Path, log: &Path) -> Result<()
 
 /// The table of shifts and the page.
 fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path) -> Result<(), Failure> {
-    let places = ["_shifts.csv", "_shifts.json", "_report.html"].map(|ending| beside(output, ending));
-    let ([Some(csv), Some(json), Some(page)], false) = (places, drive.shifts.is_empty()) else { return Ok(()) };
+    let Some(places) = beside(output) else { return Ok(()) };
+    if drive.shifts.is_empty() {
+        return remove_old(&places, output::note);
+    }
+    let [csv, json, page] = places;
     let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
     write_cells(&csv, &cells)?;
     let objects: Vec<_> = cells.into_iter().map(json_object).collect();

@@ -14,7 +14,7 @@ use study::{LogSample, OutputColumn};
 
 use super::findings::Findings;
 use super::measured::{Measured, Step};
-use super::outputs::{Output, beside, chosen};
+use super::outputs::{Output, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
 use super::{Messages, Setup, observer};
 use crate::commands::write_text;
@@ -93,8 +93,11 @@ pub(super) fn estimate(
         return Ok(());
     };
     say.note(&format!("estimate: {}", output.display()));
-    let places = ["_shifts.csv", "_shifts.json", "_report.html"].map(|ending| beside(output, ending));
-    if let ([Some(csv), Some(json), Some(page)], false) = (places, shifts.found.is_empty()) {
+    let Some(places) = beside(output) else { return Ok(()) };
+    if shifts.found.is_empty() {
+        remove_old(&places, |note| say.note(note))?;
+    } else {
+        let [csv, json, page] = places;
         shifts::write(&shifts.found, &csv, &json)?;
         let html = LogPage {
             log: path,

@@ -63,12 +63,20 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
             check_output(output.as_ref())?;
             // A log that is named as its own output is replaced; in a folder that is a mistake.
             let log_itself = folder.map(|_| log);
-            not_an_input(output.as_ref(), options.sensors.iter().chain([&options.vehicle]).chain(log_itself))?;
+            not_an_input(output.as_ref(), inputs(options).chain(log_itself))?;
+            for beside in output.iter().filter_map(|output| outputs::beside(output)).flatten() {
+                not_an_input(Some(&beside), inputs(options).chain([log]))?;
+            }
             let setup = setup(options)?;
             job::estimate(&setup, log, output.as_deref(), &mut Messages { held: None })
         }
         logs => several(options, logs),
     }
+}
+
+/// The files that an estimate reads beside its logs.
+fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
+    options.sensors.iter().chain([&options.vehicle]).chain(options.mapping.files())
 }
 
 fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
@@ -109,7 +117,9 @@ fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;
-        not_an_input(Some(output), logs.iter().chain(&options.sensors).chain([&options.vehicle]))?;
+        for output in outputs::beside(output).iter().flatten().chain([output]) {
+            not_an_input(Some(output), logs.iter().chain(inputs(options)))?;
+        }
     }
     let setup = setup(options)?;
     let next = AtomicUsize::new(0);
@@ -159,15 +169,17 @@ fn names_in(folder: &Path, logs: &[PathBuf], ending: &str) -> Result<Vec<PathBuf
             name.push(".");
             name.push(ending);
             let output = folder.join(name);
-            match taken.insert(output.clone(), log) {
-                None => Ok(output),
-                Some(other) => Err(Failure::Input(format!(
-                    "{} and {} would both give {}\nhint: estimate them one by one",
-                    other.display(),
-                    log.display(),
-                    output.display()
-                ))),
+            for name in outputs::beside(&output).into_iter().flatten().chain([output.clone()]) {
+                let both = name.display().to_string();
+                if let Some(other) = taken.insert(name, log) {
+                    return Err(Failure::Input(format!(
+                        "{} and {} would both give {both}\nhint: estimate them one by one",
+                        other.display(),
+                        log.display()
+                    )));
+                }
             }
+            Ok(output)
         })
         .collect()
 }

@@ -106,12 +106,25 @@ impl Output {
     }
 }
 
-/// Where a file beside an output goes: `drive.csv` has `drive_report.html`. None beside a device or pipe.
-pub(super) fn beside(output: &Path, ending: &str) -> Option<PathBuf> {
+/// The files beside an output: the shifts as CSV and JSON, and the page. `drive.csv` has `drive_report.html`. None beside a
+/// device or pipe.
+pub(super) fn beside(output: &Path) -> Option<[PathBuf; 3]> {
     if std::fs::metadata(output).is_ok_and(|there| !there.is_file()) {
         return None;
     }
-    let mut name = output.file_stem()?.to_owned();
-    name.push(ending);
-    Some(output.with_file_name(name))
+    let stem = output.file_stem()?;
+    Some(["_shifts.csv", "_shifts.json", "_report.html"].map(|ending| {
+        let mut name = stem.to_owned();
+        name.push(ending);
+        output.with_file_name(name)
+    }))
+}
+
+/// Removes the files beside an output that an earlier estimate left: they are not of this one, which has no shift.
+pub(super) fn remove_old(places: &[PathBuf; 3], mut note: impl FnMut(&str)) -> Result<(), Failure> {
+    for old in places.iter().filter(|old| old.is_file()) {
+        std::fs::remove_file(old).map_err(|error| Failure::writing(old, &error))?;
+        note(&format!("removed: {}, of an earlier estimate", old.display()));
+    }
+    Ok(())
 }
