@@ -49,8 +49,8 @@ fn every_car_drives_through_all_its_gears_and_every_shift_is_estimated() {
     }
     let [_, [inertia, _]] = Pooled::of(&rows, |_| true).torque;
     println!("controlling clutch, inertia phase, all shifts: {:.2}", inertia.ratio().unwrap());
-    // Better than the valve model alone; the bars by kind are those of the matrix.
-    assert!(inertia.ratio().unwrap() < 1.0, "{inertia:?}");
+    // The bars by kind are those of the matrix.
+    assert!(inertia.ratio().unwrap() < 0.55, "{inertia:?}");
 }
 
 /// A gearbox whose third gear can only be reached by two changes at once is driven without it.
