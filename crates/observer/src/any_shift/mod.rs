@@ -43,7 +43,7 @@ use drivetrain::{Clutch, Driveline, Real};
 
 use crate::kalman::engine::Engine;
 use crate::kalman::gate::{Gate, Verdict};
-use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, Reading, SpeedReading};
+use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, Reading, SpeedReading};
 use covariance::{Gaussian, Measured};
 use elements::ElementState;
 use learnt::{ACTING, Acting, Correlations, Known};
@@ -81,8 +81,6 @@ const LASTING: [usize; ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], IN
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
 const MOST_PIECES: usize = 32;
-/// Time without any speed after which the filter begins anew, s.
-const LOST_S: f64 = 0.25;
 /// Time without a reading of turbine or output speed in a shift after which it teaches nothing, s \[chosen\].
 const GAP_S: f64 = 0.025;
 /// How old the first readings may be, s.

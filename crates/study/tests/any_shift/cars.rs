@@ -2,7 +2,6 @@
 
 use config::{Car, Sensors, Source};
 use design::{ShiftErrors, ShiftTables};
-use plant::car::CarShift;
 use std::path::Path;
 use study::any_shift::matrix::neighbouring_shifts;
 
@@ -36,10 +35,6 @@ pub(crate) fn shifts(car: &Car) -> Vec<(usize, usize, f64)> {
     let (shifts, without_tables) = neighbouring_shifts(car, &tables);
     assert_eq!(without_tables, Vec::<[usize; 2]>::new());
     shifts.iter().map(|shift| (shift.from, shift.to, shift.throttle())).collect()
-}
-
-pub(crate) fn usual(car: &Car, from: usize, to: usize, throttle: f64) -> CarShift {
-    CarShift::usual(car, from, to, throttle)
 }
 
 /// Those of the bench.

@@ -8,11 +8,10 @@ mod cars;
 mod drives;
 mod learning;
 
-use cars::{cars, sensors, usual};
+use cars::{cars, sensors};
 use config::Car;
 use drivetrain::{ClutchValve, ShiftKind, Table1};
-use study::any_shift::matrix::{CLASSES, MatrixPlan, MatrixRow, Pooled, class, drawn_car, matrix};
-use study::any_shift::{ShiftScoreRow, score_shift};
+use study::any_shift::matrix::{CLASSES, MatrixPlan, MatrixRow, Pooled, class, matrix};
 
 pub(crate) use study::any_shift::matrix::controlling;
 
@@ -122,40 +121,4 @@ fn the_matrix_is_the_same_on_any_number_of_threads() {
     assert_eq!((one.rows.len(), done), (4, 8));
     assert_eq!(matrix(car, &MatrixPlan { threads: 3, ..plan }, || ()).unwrap(), one);
     assert_ne!(matrix(car, &MatrixPlan { seed: 7, ..plan }, || ()).unwrap().rows, one.rows);
-}
-
-/// One shift, row by row: `SHIFT="8hp 1 2 0.15 7"` is gearbox, gears, throttle and seed.
-#[test]
-fn one_shift() {
-    let Ok(name) = std::env::var("SHIFT") else { return };
-    let parts: Vec<&str> = name.split(' ').collect();
-    let car = cars().into_iter().find(|car| car.source.text.contains(parts[0])).unwrap();
-    let gear = |name: &str| car.gearbox.gear(name).unwrap();
-    let shift = usual(&car, gear(parts[1]), gear(parts[2]), parts[3].parse().unwrap());
-    let seed: u64 = parts[4].parse().unwrap();
-    let truth = if seed == 0 { car.clone() } else { drawn_car(&car, shift.from, shift.to, seed) };
-    let rows: Vec<ShiftScoreRow> = score_shift(&car, &truth, &shift, &sensors(), seed).unwrap();
-    for row in rows {
-        let [off, on] = row.clutches;
-        let torque = |clutch: &study::any_shift::ClutchRow| {
-            let [truth, estimate, open_loop] = clutch.torque_n_m;
-            format!(
-                "{}{truth:7.1} {estimate:7.1} {open_loop:7.1} p {:.3} {:.3}",
-                if clutch.sticks { "*" } else { " " },
-                clutch.pressure_pa[0] / 1e6,
-                clutch.pressure_pa[2] / 1e6
-            )
-        };
-        println!(
-            "{:.2} {:<15} off {}  on {}  Tt {:.3} {:.1} {} {:?}",
-            row.time_s,
-            row.phase,
-            torque(&off),
-            torque(&on),
-            row.turbine_n_m[0],
-            row.turbine_n_m[1],
-            row.health.name(),
-            row.speeds_rad_s
-        );
-    }
 }

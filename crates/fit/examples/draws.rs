@@ -1,6 +1,9 @@
-//! Cars whose parameters are all off, fitted to 20 shifts behind sensors.
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and this one prints a table")]
+//! Cars whose parameters are all off, fitted to 20 shifts behind sensors: prints the statistics of many of them.
+//!
+//! `FIT_CARS=200 cargo run --release -p fit --example draws`; `FIT_CASE=lossy` takes those of a case of `car_of`.
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
+#[path = "../tests/common/mod.rs"]
 mod common;
 
 use common::{Logs, TestCar, TestShift};
@@ -85,11 +88,7 @@ fn outcome(case: &str, seed: u64, logs: Logs, count: u64) -> (fit::Fit, Outcome)
     (fit, outcome)
 }
 
-/// Prints the statistics of many cars: `FIT_CARS=200 cargo test --release -p fit --test draws -- --ignored --nocapture`, with
-/// `FIT_CASE=lossy` those of a case of [`car_of`].
-#[test]
-#[ignore = "minutes"]
-fn many_cars() {
+fn main() {
     let cars: u64 = std::env::var("FIT_CARS").map_or(10, |text| text.parse().unwrap());
     let case = std::env::var("FIT_CASE").unwrap_or_default();
     let first: u64 = std::env::var("FIT_FIRST").map_or(0, |text| text.parse().unwrap());
