@@ -254,6 +254,14 @@ pub struct Table2<T> {
     values: [[T; MAX_COLUMNS]; MAX_POINTS],
 }
 
+/// Where a value lies on the columns of a [`Table2`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnPlace<T> {
+    segment: usize,
+    /// Share of the segment, 0 to 1.
+    share: T,
+}
+
 impl<T: Real> Table2<T> {
     /// A table with `values[i][j]` at `(rows[i], columns[j])`.
     ///
@@ -284,10 +292,24 @@ impl<T: Real> Table2<T> {
     /// The value at `(row, column)`, bilinear inside the grid, the edge value outside it.
     #[inline]
     pub fn at(&self, row: T, column: T) -> T {
-        let (row, column) = (self.rows.clamp(row), self.columns.clamp(column));
-        let (i, j) = (self.rows.segment(row), self.columns.segment(column));
+        self.at_place(row, &self.place(column))
+    }
+
+    /// Where a value of the column lies, for [`Self::at_place`].
+    #[inline]
+    pub fn place(&self, column: T) -> ColumnPlace<T> {
+        let column = self.columns.clamp(column);
+        let j = self.columns.segment(column);
+        let share = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
+        ColumnPlace { segment: j, share }
+    }
+
+    /// As [`Self::at`], for many rows at one value of the column.
+    #[inline]
+    pub fn at_place(&self, row: T, column: &ColumnPlace<T>) -> T {
+        let row = self.rows.clamp(row);
+        let (i, j, c) = (self.rows.segment(row), column.segment.min(MAX_COLUMNS - 2), column.share);
         let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
-        let c = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
         let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
         across(i) + r * (across(i + 1) - across(i))
     }
@@ -327,6 +349,20 @@ mod tests {
     fn outside_the_axis_the_end_value_holds() {
         let table = Table1::new(&[0.0, 1.0, 3.0], &[10.0, 20.0, 0.0]).unwrap();
         assert_eq!((table.at(-5.0), table.at(9.0)), (10.0, 0.0));
+    }
+
+    #[test]
+    fn a_place_on_the_columns_stands_for_its_value_at_every_row() {
+        let table =
+            Table2::new(&[0.0, 10.0, 40.0], &[0.0, 0.3, 1.0], &[[1.0, 2.0, 5.0], [0.0, 7.0, 3.0], [4.0, 4.0, 9.0]])
+                .unwrap();
+        for column in [-1.0, 0.0, 0.2999, 0.3, 0.71, 1.0, 2.0] {
+            let place = table.place(column);
+            for row in [-5.0, 0.0, 3.3, 10.0, 39.9, 50.0] {
+                assert_eq!(table.at_place(row, &place), table.at(row, column), "{row} {column}");
+            }
+        }
+        assert!(table.at_place(5.0, &table.place(f64::NAN)).is_nan());
     }
 
     #[test]

@@ -19,7 +19,9 @@ impl<T: Real> ValveMaps<T> {
     /// [`Self::settled_pressure`] of the current that has arrived.
     #[inline]
     pub fn pressure_rate(&self, pressure_pa: T, settled_pa: T) -> T {
-        (settled_pa - pressure_pa) / self.time_constant_s.at(pressure_pa)
+        let missing_pa = settled_pa - pressure_pa;
+        // Most of a drive a valve rests, where its lag does not matter.
+        if missing_pa == T::zero() { missing_pa } else { missing_pa / self.time_constant_s.at(pressure_pa) }
     }
 
     /// Pressure that a constant current ends at, Pa: `K_cv(i) i`.
