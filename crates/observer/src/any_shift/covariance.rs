@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 use super::powertrain::{CORE, dot};
-use super::{IN_GEAR, N};
+use super::{IN_GEAR, N, OUTPUT, TURBINE};
 
 /// Mean and covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,6 +111,22 @@ impl<T: Real> Gaussian<T> {
         self.covariance.swap(a, b);
         for row in &mut self.covariance {
             row.swap(a, b);
+        }
+    }
+
+    /// Makes the first state the second times a ratio; the second becomes the sum of both with these shares.
+    pub(super) fn tie(&mut self, ratio: T, share: [T; 2]) {
+        let joined = |a: T, b: T| share[0] * a + share[1] * b;
+        let output = joined(self.mean[TURBINE], self.mean[OUTPUT]);
+        (self.mean[TURBINE], self.mean[OUTPUT]) = (ratio * output, output);
+        let p = &mut self.covariance;
+        for row in p.iter_mut() {
+            let output = joined(row[TURBINE], row[OUTPUT]);
+            (row[TURBINE], row[OUTPUT]) = (ratio * output, output);
+        }
+        for k in 0..N {
+            let output = joined(p[TURBINE][k], p[OUTPUT][k]);
+            (p[TURBINE][k], p[OUTPUT][k]) = (ratio * output, output);
         }
     }
 

@@ -177,20 +177,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         if let Some(held) = after.holding() {
             let held = held.min(1);
-            self.tie(running, shift.clutches[held].ratio, contacts[held].slip.deviation);
+            Self::tie(running, &shift, shift.clutches[held].ratio);
         }
     }
 
-    /// Makes turbine and output speed those of a ratio.
-    pub(super) fn tie(&self, running: &mut Running<T>, ratio: T, deviation: T) {
-        let mut row = [T::zero(); N];
-        (row[TURBINE], row[OUTPUT]) = (T::one(), -ratio);
-        let tie = Measured { row, value: T::zero(), noise: square(T::of(MODEL_SHARE) * deviation) };
-        let slip = running.x.look(&tie).innovation;
-        // The slip that is left goes where the inertia is small.
-        running.x.add(TURBINE, TURBINE, slip * slip);
-        let look = running.x.look(&tie);
-        running.x.correct(&look);
+    /// A clutch that grips ties both speeds with its ratio `i`. Its impulse acts between them, so that what is kept is the
+    /// momentum of both along `(w_t, w_o) = (i, 1)`, whenever since the last sample it has gripped. Nothing else follows.
+    pub(super) fn tie(running: &mut Running<T>, shift: &ShiftRow<T>, ratio: T) {
+        let (m, per) = (&shift.mass_kg_m2, shift.inertia_at(ratio).recip());
+        let share = [TURBINE, OUTPUT].map(|k| per * (ratio * m[0][k] + m[1][k]));
+        running.x.tie(ratio, share);
     }
 
     /// The torque at the turbine with which a clutch holds, as a row over the states and what is left beside them:
