@@ -2,7 +2,7 @@
 
 use super::{
     AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, KISS, LOAD, MAX_ELEMENTS,
-    MODEL_SHARE, MOST_PIECES, Measured, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE,
+    MODEL_SHARE, MOST_PIECES, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE,
     SHARE_S, ShiftRow, TURBINE, Torques, WHEEL, free, powertrain, square, tied, turbine,
 };
 use drivetrain::Real;
