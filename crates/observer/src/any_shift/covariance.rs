@@ -2,8 +2,9 @@
 
 use drivetrain::Real;
 
+use super::elements::PressureError;
 use super::powertrain::{CORE, dot};
-use super::{IN_GEAR, N, OUTPUT, TURBINE};
+use super::{IN_GEAR, KISS, N, OUTPUT, PRESSURE, TURBINE};
 
 /// Mean and covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +113,13 @@ impl<T: Real> Gaussian<T> {
         for row in &mut self.covariance {
             row.swap(a, b);
         }
+    }
+
+    /// What is known of the errors of a shift clutch's pressure and kiss point.
+    pub(super) fn pressure_error(&self, clutch: usize) -> PressureError<T> {
+        let (x, k) = (PRESSURE[clutch.min(1)], KISS[clutch.min(1)]);
+        let p = &self.covariance;
+        PressureError { pressure: self.mean[x], kiss: self.mean[k], variance: [p[x][x], p[k][k]], covariance: p[x][k] }
     }
 
     /// Makes the first state the second times a ratio; the second becomes the sum of both with these shares.

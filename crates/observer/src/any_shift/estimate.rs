@@ -2,7 +2,7 @@
 
 use drivetrain::Real;
 
-use super::elements::ElementState;
+use super::elements::{ElementState, PressureError};
 use super::powertrain::{ClutchTorque, dot};
 use super::{
     AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SLOW_SHARE,
@@ -168,7 +168,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (torque, valve_pa, gain, both) =
             self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
                 let (memory, element) = found;
-                let torque = memory.torque(element, clutch, u, [slip.value, slip.direction(), k]);
+                let torque =
+                    memory.torque(element, clutch, u, [slip.value, slip.direction()], &PressureError::unseen(k));
                 (torque, memory.valve_pa, u.gain_error(element, f, k), u.correlation_in_shift(element))
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
@@ -220,7 +221,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
                 let gain = memory.valve_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
-                let itself = memory.deviation_pa(element.clutch.kiss_pressure(), u) * x.mean[PRESSURE[c]];
+                let itself = memory.deviation_pa(u) * x.mean[PRESSURE[c]];
                 (memory.valve_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
             });
         let alone = own.unlearnt_variance(both).sqrt();

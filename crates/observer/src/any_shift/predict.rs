@@ -1,9 +1,9 @@
 //! The prediction over a step, and the phase.
 
 use super::{
-    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, KISS, LOAD, MAX_ELEMENTS,
-    MODEL_SHARE, MOST_PIECES, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE,
-    SHARE_S, ShiftRow, TURBINE, Torques, WHEEL, free, powertrain, square, tied, turbine,
+    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, LOAD, MAX_ELEMENTS,
+    MODEL_SHARE, MOST_PIECES, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE, SHARE_S,
+    SPRING, ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, powertrain, square, tied, turbine,
 };
 use drivetrain::Real;
 
@@ -39,8 +39,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 let slip = self.slip(clutch.ratio, speeds);
                 let direction = running.phase.direction(c, &slip);
                 if let Some((memory, element)) = self.element(elements, clutch.element) {
-                    let kiss = running.x.mean[KISS[c.min(1)]];
-                    *torque = memory.torque(element, clutch, u, [slip.value, direction, kiss]);
+                    let wrong = running.x.pressure_error(c.min(1));
+                    *torque = memory.torque(element, clutch, u, [slip.value, direction], &wrong);
                 }
             }
         }
@@ -100,8 +100,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         for state in PRESSURE {
             stay[state] = pressure;
         }
+        let twist_rate =
+            self.driveline.twist_rate(running.x.mean[OUTPUT], running.x.mean[WHEEL]) + running.x.mean[RATE];
         let x = &mut running.x;
         x.pass(&rows, &rest, &stay);
+        // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
+        let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
+        x.add(SPRING, SPRING, T::of(2.0 * TWIST_S) * dt_s * square(by_stiffness));
         if in_shift {
             let walked = u.friction_walk(dt_s);
             for c in 0..2 {
