@@ -7,7 +7,7 @@ use super::tables::{FrictionElement, ShiftClutch};
 use super::{PIECE_S, ShiftUncertainty, square};
 use crate::bound::pressure_and_torque;
 use crate::kalman::valve_model::Commands;
-use crate::{ChannelHealth, InputLimits, PressureRange, Reading};
+use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
 
 /// What is known of the errors of an element's pressure and kiss point, in their deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +93,7 @@ impl<T: Real> ElementState<T> {
             range.step(budget, dt_s, usable, limits.command_max);
         }
         match (command, usable) {
-            (None, _) if self.commands.newest_pa().is_none() => ChannelHealth::Lost,
+            (None, _) if !self.commands.is_fresh(T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
             (Some(_), Some(reading)) => {

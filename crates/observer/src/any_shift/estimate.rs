@@ -60,8 +60,11 @@ pub struct ShiftEstimate<T> {
     pub shaft_n_m: Option<T>,
     /// Whether the input could be used, and whether the estimate can be believed.
     pub health: Health,
-    /// What became of the reading of each channel; of the commands the worst.
+    /// What became of the reading of each channel; of the commands together a refused one, or a lost one
+    /// of an element that shifts.
     pub channels: Channels<ChannelHealth>,
+    /// The same of the command of each element.
+    pub commands: [ChannelHealth; MAX_ELEMENTS],
 }
 
 impl<T: Real> ShiftEstimate<T> {
@@ -76,6 +79,7 @@ impl<T: Real> ShiftEstimate<T> {
             shaft_n_m: None,
             health: Health::SpeedsRejected,
             channels: Channels::all(ChannelHealth::Lost),
+            commands: [ChannelHealth::Lost; MAX_ELEMENTS],
         }
     }
 }
@@ -85,7 +89,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         &self,
         state: &mut AnyShiftState<T>,
         input: &ShiftInput<T>,
-        channels: &Channels<ChannelHealth>,
+        (channels, commands): (&Channels<ChannelHealth>, &[ChannelHealth; MAX_ELEMENTS]),
         mut health: Health,
     ) -> ShiftEstimate<T> {
         let refused = channels.each().contains(&ChannelHealth::Refused);
@@ -98,7 +102,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         });
         let valve_pa = state.elements.map(|element| element.map_or(T::zero(), |element| element.valve_pa));
         let estimate = &mut state.estimate;
-        *estimate = ShiftEstimate { valve_pa, channels: *channels, ..ShiftEstimate::nothing() };
+        *estimate = ShiftEstimate { valve_pa, channels: *channels, commands: *commands, ..ShiftEstimate::nothing() };
         match &state.running {
             Some(running) => {
                 let (x, line) = (&running.x.mean, &self.driveline);

@@ -207,6 +207,8 @@ pub struct AnyShiftState<T> {
     engine: Option<Engine<T>>,
     /// Newest reported engine torque, N m, and its age, s.
     reported: Option<(T, T)>,
+    /// Whether there ever was one.
+    reports: bool,
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
     running: Option<Running<T>>,
@@ -309,6 +311,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             elements,
             engine: None,
             reported: None,
+            reports: false,
             newest: [None; SPEEDS],
             running: None,
             lost: false,
@@ -335,9 +338,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         state.fading_s = state.fading_s + dt_s;
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);
-        // Each element has a command of its own, and the engine torque is one of the sources of the turbine torque.
-        (channels.offgoing_command, channels.engine_torque) = (ChannelHealth::Unused, ChannelHealth::Unused);
-        channels.command = self.pass_elements(state, input, dt_s);
+        // Each element has a command of its own.
+        channels.offgoing_command = ChannelHealth::Unused;
+        let commands = self.pass_elements(state, input, dt_s);
+        channels.command = self.of_commands(&commands, input.gear);
+        channels.engine_torque = self.take_reported(state, input, dt_s);
         channels.engine = self.take_engine(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
         health = health.max(self.take_gear(state, input.gear));
@@ -354,7 +359,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         health = health.max(self.settle(state, input, torque.as_ref()));
-        self.conclude(state, input, &channels, health)
+        self.conclude(state, input, (&channels, &commands), health)
     }
 
     fn reject_time(&self, state: &mut AnyShiftState<T>) {
@@ -372,6 +377,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         state.estimate.health = Health::TimeRejected;
         state.estimate.channels = Channels::all(ChannelHealth::Refused);
+        state.estimate.commands = [ChannelHealth::Refused; MAX_ELEMENTS];
     }
 
     /// Follows the shift command.
