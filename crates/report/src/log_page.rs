@@ -22,7 +22,9 @@ pub const MOST_DRAWN: usize = 200;
 /// Rows of the table on the page; the files beside it have them all.
 const MOST_ROWS: usize = 1000;
 /// Points of the curves of all drawn shifts together: a point takes about a dozen bytes of the page.
-const POINTS: usize = 140_000;
+const POINTS: usize = 120_000;
+/// Bytes of the figures of shifts. The rest of the page takes up to one megabyte, and a page stays below five.
+const MOST_BYTES: usize = 3_800_000;
 /// Curves in the figure of a shift, about.
 const CURVES: usize = 12;
 
@@ -53,16 +55,23 @@ impl LogPage<'_> {
         let drawn: Vec<&ShiftEstimate> =
             self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
-        let figures = drawn.iter().map(|shift| {
-            context! {
-                number => shift.number,
-                title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
-                at => format!("{:.2}", shift.begin_s()),
-                remark => remark(shift),
-                svg => inline(&compact(&shift_figure(shift, self.vehicle.observer_valve.command_kind(), points).svg())),
-            }
+        let command = self.vehicle.observer_valve.command_kind();
+        let mut bytes = 0;
+        let figures = drawn.iter().map_while(|shift| {
+            let svg = compact(&shift_figure(shift, command, points).svg());
+            bytes += svg.len();
+            (bytes <= MOST_BYTES).then(|| {
+                context! {
+                    number => shift.number,
+                    title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
+                    at => format!("{:.2}", shift.begin_s()),
+                    remark => remark(shift),
+                    svg => inline(&svg),
+                }
+            })
         });
         let figures: Vec<Value> = figures.collect();
+        let drawn = figures.len();
         let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)]);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         Ok(templates()?.get_template("log.html")?.render(context! {
@@ -74,12 +83,12 @@ impl LogPage<'_> {
             log => self.log.display().to_string(),
             shifts_of_log => self.shifts_of_log,
             shown => self.shifts.len(),
-            undrawn => self.shifts.len() - drawn.len(),
+            undrawn => self.shifts.len() - drawn,
             findings => self.findings.to_vec(),
             overview => inline(&overview_figure(self.overview, self.shifts).svg()),
             titles => titles,
             left_out => self.shifts.len() - rows.len(),
-            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn.len() }).collect::<Vec<_>>(),
+            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn }).collect::<Vec<_>>(),
             figures => figures,
             others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
             inputs => origin(&[&self.vehicle.source]),

@@ -39,7 +39,7 @@ pub(super) fn estimate(
             Some(stop) => Log::follow(path, &map.open, stop)?,
             None => Log::open(path, &map.open)?,
         };
-        Measured::channels(opened.insert(log), map, vehicle, is_followed)?
+        Measured::channels(path, opened.insert(log), map, vehicle, is_followed)?
     };
     let chosen_observer = observer::choose(options, vehicle, &log, say)?;
     let columns = chosen(chosen_observer.observer.columns(log.has_wheel_speed()), &options.columns)?;

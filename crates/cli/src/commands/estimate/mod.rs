@@ -18,7 +18,7 @@ use std::sync::{Mutex, PoisonError};
 use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
 
-use crate::args::Estimate;
+use crate::args::{Estimate, FormatChoice};
 use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
@@ -49,6 +49,7 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    outputs::check_name(options)?;
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         return any_car::estimate(options);
     }
@@ -57,7 +58,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         [log] => {
             let folder = options.output.as_ref().filter(|output| output.is_dir());
             let output = match folder {
-                Some(folder) => names_in(folder, &options.logs, options.format.ending())?.pop(),
+                Some(folder) => names_in(folder, &options.logs, ending(options))?.pop(),
                 None => options.output.clone(),
             };
             check_output(output.as_ref())?;
@@ -72,6 +73,11 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
         }
         logs => several(options, logs),
     }
+}
+
+/// The ending of files in a folder.
+fn ending(options: &Estimate) -> &'static str {
+    options.format.unwrap_or(FormatChoice::Csv).ending()
 }
 
 /// The files that an estimate reads beside its logs.
@@ -113,7 +119,7 @@ fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
     if options.follow {
         return Err(Failure::Input("--follow takes one log\nhint: start the command once for each".to_owned()));
     }
-    let outputs = names_in(folder, logs, options.format.ending())?;
+    let outputs = names_in(folder, logs, ending(options))?;
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;
