@@ -28,6 +28,6 @@ pub use source::{Kind, Source, toml_number, toml_string};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CompliantRequirement, DefaultTaken, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,
-    ValveUncertainty, Vehicle,
+    Car, CompliantRequirement, DefaultTaken, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch,
+    Uncertainty, ValveUncertainty, Vehicle,
 };

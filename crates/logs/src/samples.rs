@@ -288,7 +288,8 @@ struct Newest {
 
 impl<'a> Samples<'a> {
     pub(crate) fn new(channels: usize, streams: Vec<Box<dyn Stream + 'a>>) -> Result<Self, LogError> {
-        let merged = |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None, too_late: None };
+        let merged =
+            |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None, too_late: None };
         let mut samples = Self {
             streams: streams.into_iter().map(merged).collect(),
             heap: BinaryHeap::new(),

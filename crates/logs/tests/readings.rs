@@ -100,8 +100,9 @@ fn a_speed_is_frozen_by_its_own_quanta_and_more_than_the_slip_of_tyres() {
         let mut text = "time_s,t_rpm,o_rpm\n".to_owned();
         for i in 0..400 {
             let output = 1000.0 + change * f64::from((i - 200).max(0)) + 0.5 * f64::from(i % 2);
-            let turbine = 2.0 * (1000.0 + f64::from((i % 8).min(8 - i % 8)) * quantum * f64::from(u8::from(i < 200)));
-            writeln!(text, "{},{},{output}", f64::from(i) * 0.01, (turbine / quantum).round() * quantum).unwrap();
+            let turbine =
+                2000.0 + quantum * f64::from(u8::from(i < 200) * u8::try_from((i % 8).min(8 - i % 8)).unwrap());
+            writeln!(text, "{},{turbine},{output}", f64::from(i) * 0.01).unwrap();
         }
         let (_, summary, _) = readings(&text, &map(&["turbine_speed=t_rpm", "output_speed=o_rpm"])).unwrap();
         count(&summary, Quality::Frozen)

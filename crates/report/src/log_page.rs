@@ -56,19 +56,15 @@ impl LogPage<'_> {
             self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
         let command = self.vehicle.observer_valve.command_kind();
-        let mut bytes = 0;
-        let figures = drawn.iter().map_while(|shift| {
-            let svg = compact(&shift_figure(shift, command, points).svg());
-            bytes += svg.len();
-            (bytes <= MOST_BYTES).then(|| {
-                context! {
-                    number => shift.number,
-                    title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
-                    at => format!("{:.2}", shift.begin_s()),
-                    remark => remark(shift),
-                    svg => inline(&svg),
-                }
-            })
+        let figures = within_bytes(drawn.iter().map(|shift| compact(&shift_figure(shift, command, points).svg())));
+        let figures = drawn.iter().zip(figures).map(|(shift, svg)| {
+            context! {
+                number => shift.number,
+                title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
+                at => format!("{:.2}", shift.begin_s()),
+                remark => remark(shift),
+                svg => inline(&svg),
+            }
         });
         let figures: Vec<Value> = figures.collect();
         let drawn = figures.len();
@@ -94,6 +90,15 @@ impl LogPage<'_> {
             inputs => origin(&[&self.vehicle.source]),
         })?)
     }
+}
+
+/// The first figures, as many as a page has room for.
+pub(crate) fn within_bytes(figures: impl Iterator<Item = String>) -> impl Iterator<Item = String> {
+    let mut bytes = 0;
+    figures.take_while(move |svg| {
+        bytes += svg.len();
+        bytes <= MOST_BYTES
+    })
 }
 
 /// The same figure with its curves to a tenth of a pixel, which is half of their text.
@@ -391,6 +396,14 @@ fn held(healths: &[(f64, [bool; HEALTHS])], wanted: Health, height: f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_page_takes_as_many_figures_as_it_has_room_for() {
+        let figures = |size: usize| within_bytes(std::iter::repeat_with(move || "x".repeat(size)).take(300)).count();
+        assert_eq!(figures(1000), 300);
+        assert_eq!(figures(100_000), MOST_BYTES / 100_000);
+        assert_eq!(figures(MOST_BYTES + 1), 0);
+    }
 
     #[test]
     fn a_compact_figure_has_its_curves_to_a_tenth_of_a_pixel() {

@@ -229,14 +229,16 @@ impl Log {
             )));
         }
         let mut notes: Vec<String> = notes.into_iter().chain(self.clock.notes()).collect();
-        for (role, (readings, frozen)) in WATCHED.iter().zip(self.frozen.counts).filter(|(_, (_, frozen))| *frozen > 0) {
+        for (role, (readings, frozen)) in WATCHED.iter().zip(self.frozen.counts).filter(|(_, (_, frozen))| *frozen > 0)
+        {
             let name = role.name();
-            notes.push(format!("{frozen} of {readings} readings of {name} stand still while the car does not, and are not used"));
+            notes.push(format!(
+                "{frozen} of {readings} readings of {name} stand still while the car does not, and are not used"
+            ));
             if 2 * frozen > readings {
-                return Err(self.rows.refused(format!(
-                    "{}\nhint: check the sensor of {name} and its column",
-                    notes.join(", ")
-                )));
+                return Err(self
+                    .rows
+                    .refused(format!("{}\nhint: check the sensor of {name} and its column", notes.join(", "))));
             }
         }
         Ok(notes)

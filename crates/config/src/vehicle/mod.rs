@@ -28,12 +28,12 @@ pub use budget::ErrorBounds;
 pub use car::{Car, LockUp};
 pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
+use raw::{
+    RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
+    RawRequirement, RawRoad, RawTyre, RawVehicleFile,
+};
 pub use short::DefaultTaken;
 use short::{Short, refuse_facts};
-use raw::{
-    RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter,
-    RawObserver, RawOil, RawRequirement, RawRoad, RawTyre, RawVehicleFile,
-};
 
 /// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
 const SHAFT_OVER_TYRES: f64 = 2.0;
@@ -271,7 +271,8 @@ impl Vehicle {
         }
         let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
         let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
-        let error_bounds = budget::error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
+        let error_bounds =
+            budget::error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
         let road = road(check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
         let limits = InputLimits {

@@ -22,6 +22,7 @@ use crate::args::{Estimate, FormatChoice};
 use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
+use crate::signals::stop_then_end;
 
 pub(super) use observer::{best, kind, sensors};
 
@@ -93,19 +94,9 @@ fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
         stop: Arc::new(AtomicBool::new(false)),
     };
     if options.follow {
-        end_on_signals(&setup.stop)?;
+        stop_then_end(&setup.stop)?;
     }
     Ok(setup)
-}
-
-/// The first interrupt ends the log that is followed, a second one the program.
-fn end_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(stop))?;
-        signal_hook::flag::register(signal, Arc::clone(stop))?;
-    }
-    Ok(())
 }
 
 /// Several logs, each into a file of its own. One that fails does not stop the others.

@@ -44,7 +44,8 @@ pub(super) fn check_name(options: &args::Estimate) -> Result<(), Failure> {
             None | Some(FormatChoice::Csv) => Ok(()),
             Some(format) => {
                 let ending = format.ending();
-                let message = format!("--format {ending} needs a file\nhint: name one with -o, such as estimate.{ending}");
+                let message =
+                    format!("--format {ending} needs a file\nhint: name one with -o, such as estimate.{ending}");
                 Err(Failure::Input(message))
             }
         };

@@ -123,14 +123,17 @@ pub(super) fn complete(defaults: &Source, own: &Source) -> Result<(String, Vec<D
         text += &format!("\n[{table}]\n{lines}");
     }
     let is_given = |default: &Leaf<'_, '_>| above.iter().any(|leaf| leaf.key == default.key);
-    let taken = below.iter().filter(|default| !is_given(default) && !default.key.starts_with("gear_train.planetary_set"));
+    let taken =
+        below.iter().filter(|default| !is_given(default) && !default.key.starts_with("gear_train.planetary_set"));
     Ok((text, taken.filter_map(|leaf| taken_of(leaf, &defaults.text)).collect()))
 }
 
 /// A default with numbers; none where it is a name.
 fn taken_of(leaf: &Leaf<'_, '_>, text: &str) -> Option<DefaultTaken> {
     let numbers = match leaf.value {
-        DeValue::Array(rows) => rows.iter().map(|row| number_of(row.get_ref())).collect::<Option<_>>().unwrap_or_default(),
+        DeValue::Array(rows) => {
+            rows.iter().map(|row| number_of(row.get_ref())).collect::<Option<_>>().unwrap_or_default()
+        }
         value => vec![number_of(value)?],
     };
     let value = text[leaf.place.clone()].split_whitespace().collect::<Vec<_>>().join(" ");

@@ -118,9 +118,10 @@ impl Facts {
             check.number(&key, &Spanned::new(at..at, value), range)
         };
         let (ratio_before, ratio_after) = ratios(&check, located(table.get_ref(), &["gear_train", "ratios"]))?;
-        let is_pulse_width = [&["clutch", "a", "valve", "kind"][..], &["clutch", "b", "valve", "kind"], &["observer", "valve", "kind"]]
-            .into_iter()
-            .any(|path| matches!(value(path), Some(DeValue::String(kind)) if kind == ValveKind::PulseWidth.word()));
+        let is_pulse_width =
+            [&["clutch", "a", "valve", "kind"][..], &["clutch", "b", "valve", "kind"], &["observer", "valve", "kind"]]
+                .into_iter()
+                .any(|path| matches!(value(path), Some(DeValue::String(kind)) if kind == ValveKind::PulseWidth.word()));
         Ok(Self {
             name: match value(&["name"]) {
                 Some(DeValue::String(name)) => name.to_string(),

@@ -154,14 +154,16 @@ mod tests {
         for valve in [ValveKind::Proportional, ValveKind::PulseWidth] {
             for has_stroke in [false, true] {
                 let facts = Facts { valve, ..facts(4.17, 2.34) };
-                let short = Vehicle::from_source(Source::built_in("x", &short_file(&facts, has_stroke).unwrap())).unwrap();
+                let short =
+                    Vehicle::from_source(Source::built_in("x", &short_file(&facts, has_stroke).unwrap())).unwrap();
                 let text = complete_file(&facts, has_stroke).unwrap();
                 assert_eq!(text, short.source.text);
                 let complete = Vehicle::from_source(Source::built_in("x", &text)).unwrap();
                 assert!(complete.defaults_taken.is_empty(), "{:?}", complete.defaults_taken);
                 assert!(short.defaults_taken.len() > 50, "{}", short.defaults_taken.len());
                 assert_eq!(short.oncoming.has_stroke, has_stroke);
-                let same = Vehicle { source: short.source.clone(), defaults_taken: short.defaults_taken.clone(), ..complete };
+                let same =
+                    Vehicle { source: short.source.clone(), defaults_taken: short.defaults_taken.clone(), ..complete };
                 assert_eq!(same, short);
             }
         }

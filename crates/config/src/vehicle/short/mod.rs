@@ -115,7 +115,8 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
     let map = &given.engine.torque_n_m;
     let row = |speed: &f64| scaled(map.columns().iter().map(|throttle| map.at(*speed, *throttle)).collect());
     let rows = map.rows().iter().map(|speed| format!("  {},\n", row(speed))).collect::<String>();
-    let elements = train::elements([facts.ratio_before, facts.ratio_after]).map_err(|wrong| facts.wrong_ratios(wrong))?;
+    let elements =
+        train::elements([facts.ratio_before, facts.ratio_after]).map_err(|wrong| facts.wrong_ratios(wrong))?;
     let area = |i: usize| torque * AREAS_M2[i] * elements[i].torque_share;
     let weight_n = facts.mass_kg * drivetrain::road::GRAVITY_M_S2;
     let mut fields = vec![
@@ -146,7 +147,9 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
     ];
     let of_valve = facts.valve.fields();
     let is_of_valve = |key: &str| of_valve.iter().any(|(name, _)| *name == key);
-    fields.extend(budget::OPTIONAL.iter().filter(|(key, _)| !is_of_valve(key)).map(|(key, value)| (*key, numbers(value))));
+    fields.extend(
+        budget::OPTIONAL.iter().filter(|(key, _)| !is_of_valve(key)).map(|(key, value)| (*key, numbers(value))),
+    );
     fields.extend(of_valve.iter().map(|(key, value)| (*key, (*value).to_owned())));
     // The name goes in last, so that braces in it stay what they are.
     fields.push(("name", crate::toml_string(&facts.name)));

@@ -116,7 +116,8 @@ mod tests {
             assert!(cars.iter().any(has), "{pattern}");
         }
         // Axes of maps, the engine's map, requirements of designs, limits of signals: no estimate changes with them.
-        let without = ["speed_ratio", "slip_rad_s", "pressure_pa", "current_a", "duty_percent", "throttle", "speed_rad_s"];
+        let without =
+            ["speed_ratio", "slip_rad_s", "pressure_pa", "current_a", "duty_percent", "throttle", "speed_rad_s"];
         for car in &cars {
             for taken in &car.defaults_taken {
                 let name = taken.key.rsplit('.').next().unwrap();
