@@ -217,7 +217,7 @@ struct Merged<'a> {
     clock: Clock,
     batch: Vec<Sample>,
     at: usize,
-    /// The sample whose place in time is on the heap or in front of it.
+    /// The sample whose place in time is on the heap.
     next: Option<Sample>,
     /// How many stamps were seen to be far too late before they were used, and the last of them.
     too_late: Option<(u32, f64)>,
@@ -243,7 +243,7 @@ impl Merged<'_> {
 }
 
 /// Time and stream, earliest first.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Next(f64, usize);
 
 impl Eq for Next {}
@@ -267,9 +267,10 @@ impl Ord for Next {
 /// where nothing could be read it is an error.
 pub struct Samples<'a> {
     streams: Vec<Merged<'a>>,
-    /// The next sample of each stream but the one that gave the last sample: that one often gives the next one too.
+    /// Where the next samples of the streams are in time, but for the stream in front.
     heap: BinaryHeap<Reverse<Next>>,
-    front: Option<Next>,
+    /// The stream that gave the last sample: it often gives the next ones too. It does so up to this place in time.
+    front: Option<(usize, Next)>,
     channels: Vec<Newest>,
     notes: Vec<String>,
     /// Resets of clocks so far.
@@ -301,8 +302,9 @@ impl<'a> Samples<'a> {
             damage: None,
         };
         for i in 0..samples.streams.len() {
-            let next = samples.refill(i)?;
-            samples.heap.extend(next.map(Reverse));
+            if let Some(sample) = samples.next_of(i)? {
+                samples.put_back(i, sample);
+            }
         }
         Ok(samples)
     }
@@ -344,8 +346,8 @@ impl<'a> Samples<'a> {
         Ok(true)
     }
 
-    /// Takes the next sample of a stream; its place in time.
-    fn refill(&mut self, i: usize) -> Result<Option<Next>, LogError> {
+    /// Takes the next sample of a stream.
+    fn next_of(&mut self, i: usize) -> Result<Option<Sample>, LogError> {
         if self.streams[i].at == self.streams[i].batch.len() && !self.read(i)? {
             return Ok(None);
         }
@@ -388,24 +390,33 @@ impl<'a> Samples<'a> {
                 sample.time_s = newest_s;
             }
         }
-        self.streams[i].next = Some(sample);
-        Ok(Some(Next(sample.time_s, i)))
+        Ok(Some(sample))
     }
 
     fn advance(&mut self) -> Result<Option<Sample>, LogError> {
-        if let (Some(front), Some(Reverse(other))) = (&self.front, self.heap.peek())
-            && other < front
-        {
-            self.heap.extend(self.front.take().map(Reverse));
+        if let Some((i, until)) = self.front {
+            match self.next_of(i)? {
+                Some(sample) if Next(sample.time_s, i) <= until => {
+                    self.given += 1;
+                    return Ok(Some(sample));
+                }
+                Some(sample) => self.put_back(i, sample),
+                None => {}
+            }
         }
-        let next = self.front.take().or_else(|| self.heap.pop().map(|Reverse(next)| next));
-        let Some(Next(_, i)) = next else {
+        let Some(Reverse(Next(_, i))) = self.heap.pop() else {
+            self.front = None;
             return self.damage.take().filter(|_| self.given == 0).map_or(Ok(None), Err);
         };
+        self.front = Some((i, self.heap.peek().map_or(Next(f64::INFINITY, i), |Reverse(next)| *next)));
         self.given += 1;
-        let sample = self.streams[i].next.take();
-        self.front = self.refill(i)?;
-        Ok(sample)
+        Ok(self.streams[i].next.take())
+    }
+
+    /// Puts a sample where it waits for its time.
+    fn put_back(&mut self, i: usize, sample: Sample) {
+        self.streams[i].next = Some(sample);
+        self.heap.push(Reverse(Next(sample.time_s, i)));
     }
 }
 

@@ -39,7 +39,16 @@ fn slow(value: impl Fn(f64) -> f64) -> impl ExactSizeIterator<Item = (f64, f64, 
 
 #[test]
 fn mdf_of_every_version_and_layout_gives_the_same_values() {
-    for file in ["plain_400.mf4", "plain_410.mf4", "plain_420.mf4", "deflate.mf4", "transposed.mf4", "unsorted.mf4"] {
+    for file in [
+        "plain_400.mf4",
+        "plain_410.mf4",
+        "plain_420.mf4",
+        "deflate.mf4",
+        "transposed.mf4",
+        "zstd.mf4",
+        "lz4.mf4",
+        "unsorted.mf4",
+    ] {
         let (log, samples, notes) = read(&data(file), &OpenOptions::default()).unwrap();
         assert_eq!(notes, Vec::<String>::new(), "{file}");
         check(&channel(&log, &samples, "N_Eng"), fast(|i| 800.0 + 10.0 * i), file);
@@ -59,7 +68,7 @@ fn mdf_of_every_version_and_layout_gives_the_same_values() {
 
 #[test]
 fn mdf_conversions_give_physical_values() {
-    for file in ["deflate.mf4", "transposed.mf4"] {
+    for file in ["deflate.mf4", "transposed.mf4", "zstd.mf4", "lz4.mf4"] {
         let (log, samples, _) = read(&data(file), &OpenOptions::default()).unwrap();
         let of = |name: &str| channel(&log, &samples, name);
         check(&of("Rational"), slow(|i| (2.0 * i + 6.0) / 4.0), "Rational");

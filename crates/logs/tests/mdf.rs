@@ -1,7 +1,5 @@
 //! MDF files that a test writes: the block compressions of MDF 4.3.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 mod common;
 
 use common::{Folder, channel, read};

@@ -5,19 +5,34 @@ use super::{Facts, Short, ValveKind, text_of};
 use crate::source::toml_number;
 use crate::{ConfigError, Source, Vehicle, toml_string};
 
-/// Defaults that stand in a short file as comments, table by table: what an estimate uses and somebody may know. The second
-/// list is that of pulse-width valves where it is another.
-const SHOWN: [(&str, &[&str], Option<&[&str]>); 6] = [
-    ("engine", &["inertia_kg_m2"], None),
-    ("converter", &["speed_ratio", "capacity_n_m_s2", "torque_ratio"], None),
-    (
+/// Defaults of a table that stand in a short file as comments: what an estimate uses and somebody may know.
+struct Shown {
+    table: &'static str,
+    keys: &'static [&'static str],
+    /// The same with pulse-width valves.
+    pulse_width: &'static [&'static str],
+}
+
+impl Shown {
+    const fn of(table: &'static str, keys: &'static [&'static str]) -> Self {
+        Self { table, keys, pulse_width: keys }
+    }
+}
+
+const SHOWN: [Shown; 6] = [
+    Shown::of("engine", &["inertia_kg_m2"]),
+    Shown::of("converter", &["speed_ratio", "capacity_n_m_s2", "torque_ratio"]),
+    Shown::of(
         "clutch.b",
         &["mean_radius_m", "friction_faces", "piston_area_m2", "return_spring_n", "static_friction", "friction"],
-        None,
     ),
-    ("clutch.b.valve", &["lag", "gain", "delay"], Some(&["flow_sqrt_pa_s", "line_pressure_pa", "delay"])),
-    ("driveline", &["shaft_stiffness_n_m_rad", "wheel_inertia_kg_m2"], None),
-    ("design.error_bounds", &["turbine_torque_share", "friction_factor", "valve_gain_factor", "mass_kg"], None),
+    Shown {
+        table: "clutch.b.valve",
+        keys: &["lag", "gain", "delay"],
+        pulse_width: &["flow_sqrt_pa_s", "line_pressure_pa", "delay"],
+    },
+    Shown::of("driveline", &["shaft_stiffness_n_m_rad", "wheel_inertia_kg_m2"]),
+    Shown::of("design.error_bounds", &["turbine_torque_share", "friction_factor", "valve_gain_factor", "mass_kg"]),
 ];
 
 const HEAD: &str = "\
@@ -37,10 +52,10 @@ pub fn short_file(facts: &Facts, has_stroke: bool) -> Result<String, ConfigError
     let table = defaults.table()?;
     let shown = |of: &str| -> Result<String, ConfigError> {
         let mut lines = String::new();
-        for (name, keys, pulse_width) in SHOWN.iter().filter(|(name, ..)| *name == of) {
+        for Shown { table: name, keys, pulse_width } in SHOWN.iter().filter(|shown| shown.table == of) {
             let path: Vec<&str> = name.split('.').collect();
-            let keys = pulse_width.filter(|_| facts.valve == ValveKind::PulseWidth).unwrap_or(keys);
-            for key in keys {
+            let keys = if facts.valve == ValveKind::PulseWidth { pulse_width } else { keys };
+            for key in *keys {
                 let place = match find(table.get_ref(), &path) {
                     Some(toml::de::DeValue::Table(inner)) => inner.get(*key).map(toml::Spanned::span),
                     _ => None,
