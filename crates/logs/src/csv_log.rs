@@ -151,6 +151,54 @@ impl Rows<'_> {
         self.text.extend(cell.iter().map(|&byte| if comma && byte == b',' { '.' } else { char::from(byte) }));
         self.text.parse::<f64>().map(Some).map_err(drop)
     }
+
+    /// Appends the samples of the row that was read.
+    fn take_row(&mut self, batch: &mut Vec<Sample>) {
+        self.rows += 1;
+        // The reader finds the end of the text before it gives a last line without an end.
+        let is_cut = self.reader.get_ref().ends_within_a_line();
+        if is_cut && self.row.len() < self.log.width {
+            self.cut = Some("is left out");
+            return;
+        }
+        self.short += u64::from(self.row.len() < self.log.width);
+        self.long += u64::from((self.log.width..self.row.len()).any(|i| !self.row[i].trim_ascii().is_empty()));
+        let time_s = match self.number(self.log.time.0) {
+            _ if is_cut && self.log.time.0 + 1 == self.row.len() => {
+                self.cut = Some("is left out");
+                return;
+            }
+            Ok(Some(time)) if time.is_finite() => time * self.log.time.1,
+            _ => {
+                self.without_time += 1;
+                return;
+            }
+        };
+        for i in 0..self.columns.len() {
+            let (channel, column) = self.columns[i];
+            if is_cut && column + 1 == self.row.len() {
+                self.cut = Some("counts without its last cell, of which digits may be missing");
+                continue;
+            }
+            // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
+            let (value, quality) = match self.number(column) {
+                Ok(None) => continue,
+                Ok(Some(value)) if value.is_nan() => continue,
+                Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
+                Ok(Some(value)) => (value, Quality::Missing),
+                Err(()) => {
+                    self.no_numbers += 1;
+                    if self.first_text.is_none() {
+                        let line =
+                            self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
+                        self.first_text = Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
+                    }
+                    (f64::NAN, Quality::Missing)
+                }
+            };
+            batch.push(Sample { channel, time_s, value, quality });
+        }
+    }
 }
 
 impl Stream for Rows<'_> {
@@ -168,51 +216,7 @@ impl Stream for Rows<'_> {
                 }
                 return Ok(false);
             }
-            self.rows += 1;
-            // The reader finds the end of the text before it gives a last line without an end.
-            let is_cut = self.reader.get_ref().ends_within_a_line();
-            if is_cut && self.row.len() < self.log.width {
-                self.cut = Some("is left out");
-                continue;
-            }
-            self.short += u64::from(self.row.len() < self.log.width);
-            self.long += u64::from((self.log.width..self.row.len()).any(|i| !self.row[i].trim_ascii().is_empty()));
-            let time_s = match self.number(self.log.time.0) {
-                _ if is_cut && self.log.time.0 + 1 == self.row.len() => {
-                    self.cut = Some("is left out");
-                    continue;
-                }
-                Ok(Some(time)) if time.is_finite() => time * self.log.time.1,
-                _ => {
-                    self.without_time += 1;
-                    continue;
-                }
-            };
-            for i in 0..self.columns.len() {
-                let (channel, column) = self.columns[i];
-                if is_cut && column + 1 == self.row.len() {
-                    self.cut = Some("counts without its last cell, of which digits may be missing");
-                    continue;
-                }
-                // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
-                let (value, quality) = match self.number(column) {
-                    Ok(None) => continue,
-                    Ok(Some(value)) if value.is_nan() => continue,
-                    Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
-                    Ok(Some(value)) => (value, Quality::Missing),
-                    Err(()) => {
-                        self.no_numbers += 1;
-                        if self.first_text.is_none() {
-                            let line =
-                                self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
-                            self.first_text =
-                                Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
-                        }
-                        (f64::NAN, Quality::Missing)
-                    }
-                };
-                batch.push(Sample { channel, time_s, value, quality });
-            }
+            self.take_row(batch);
         }
         Ok(true)
     }

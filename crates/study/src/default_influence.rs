@@ -3,7 +3,7 @@
 //! The car of the file makes a power-on upshift. Its readings at 100 Hz, without errors, are estimated with the file, and again with
 //! each default changed by its stated uncertainty, one way and the other.
 
-use config::{Change, ConfigError, DefaultTaken, Experiment, GainMethod, ObserverKind, Vehicle};
+use config::{Change, DefaultTaken, Experiment, GainMethod, ObserverKind, Vehicle};
 use drivetrain::Table1;
 use observer::{Estimate, Phase};
 use trace::Trace;
@@ -57,7 +57,7 @@ pub fn default_influences(vehicle: &Vehicle) -> Result<Option<Vec<Influence>>, S
         let mut limits = Vec::new();
         let mut changes = [ChangeOfEstimate { pressure_pa: 0.0, torque_n_m: 0.0 }; OBSERVERS.len()];
         for limit in off.limits {
-            let Ok(changed) = changed(vehicle, taken, off.change, limit) else { continue };
+            let Ok(changed) = taken.at_limit(vehicle, off.change, limit) else { continue };
             limits.push(limit);
             for ((kind, nominal), most) in OBSERVERS.iter().zip(&nominal).zip(&mut changes) {
                 let (Ok(nominal), Ok(other)) = (nominal, estimates(&changed, *kind, &readings.trace)) else { continue };
@@ -73,14 +73,6 @@ pub fn default_influences(vehicle: &Vehicle) -> Result<Option<Vec<Influence>>, S
     let weight = |influence: &Influence| influence.changes[OBSERVERS.len() - 1].pressure_pa;
     found.sort_by(|one, other| weight(other).total_cmp(&weight(one)));
     Ok(Some(found))
-}
-
-/// The vehicle with a default changed. One that the file leaves out altogether is set.
-fn changed(vehicle: &Vehicle, taken: &DefaultTaken, change: Change, limit: f64) -> Result<Vehicle, ConfigError> {
-    vehicle.changed(&taken.key, change, limit).or_else(|refused| match (change, taken.numbers.as_slice()) {
-        (Change::Scale, [value]) => vehicle.changed(&taken.key, Change::Set, limit * value),
-        _ => Err(refused),
-    })
 }
 
 /// Readings of a shift, and which of them are in its torque and inertia phase.

@@ -1,8 +1,10 @@
 //! How far off a default may be.
 
+use drivetrain::Table1;
+
 use super::DefaultTaken;
-use crate::ErrorBounds;
 use crate::study::Change;
+use crate::{ConfigError, ErrorBounds, Vehicle};
 
 /// By how much the right value of a key may differ from its default: what the two limits do to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +74,31 @@ impl DefaultTaken {
     }
 }
 
+/// The torque ratio of a converter: what is above 1 may be off, at the coupling point it is 1.
+const TORQUE_RATIO: &str = "converter.torque_ratio";
+
+impl DefaultTaken {
+    /// The vehicle with this value at a limit of its uncertainty.
+    ///
+    /// # Errors
+    /// A vehicle file cannot have that value.
+    pub fn at_limit(&self, vehicle: &Vehicle, change: Change, limit: f64) -> Result<Vehicle, ConfigError> {
+        if self.key == TORQUE_RATIO {
+            let given = &vehicle.converter.torque_ratio;
+            let values: Vec<f64> = given.values().iter().map(|ratio| 1.0 + limit * (ratio - 1.0)).collect();
+            let mut changed = vehicle.clone();
+            // The axis is that of the map.
+            changed.converter.torque_ratio = Table1::new(given.axis(), &values).unwrap_or(*given);
+            return Ok(changed);
+        }
+        // A key that the file leaves out altogether has no value to change.
+        vehicle.changed(&self.key, change, limit).or_else(|refused| match (change, self.numbers.as_slice()) {
+            (Change::Scale, [value]) => vehicle.changed(&self.key, Change::Set, limit * value),
+            _ => Err(refused),
+        })
+    }
+}
+
 fn is_setting(key: &str) -> bool {
     ["observer.filter.", "observer.supervisor.", "observer.shaft_settling_s", "design.error_bounds."]
         .iter()
@@ -91,8 +118,8 @@ fn without_names(key: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Source;
     use crate::vehicle::short::{Facts, ValveKind, short_file};
-    use crate::{Source, Vehicle};
 
     fn short(valve: ValveKind) -> Vehicle {
         let facts = Facts {
@@ -137,7 +164,7 @@ mod tests {
         for car in [short(ValveKind::Proportional), short(ValveKind::PulseWidth)] {
             for taken in &car.defaults_taken {
                 let Some(off) = taken.uncertainty(&car.error_bounds) else { continue };
-                let changed = off.limits.map(|limit| car.changed(&taken.key, off.change, limit));
+                let changed = off.limits.map(|limit| taken.at_limit(&car, off.change, limit));
                 assert!(changed.iter().any(Result::is_ok), "{}: {}", taken.key, changed[0].as_ref().unwrap_err());
             }
         }
