@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod any_car;
+mod any_car_logs;
 mod commands;
 mod day_of_logs;
 mod drives;

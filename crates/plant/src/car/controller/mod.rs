@@ -342,7 +342,8 @@ impl CarShiftController {
         self.open_at_low_speed(measured);
         let c = &self.calibration;
         if let Some(launch) = &mut self.launch {
-            let (element, command) = launch.step((&self.car, c), time_s, throttle, measured);
+            let piston = self.strokes.of(launch.element());
+            let (element, command) = launch.step((&self.car, c), time_s, throttle, measured, piston);
             elements[element] = command;
             if launch.is_over(c, time_s, measured) {
                 self.launch = None;
