@@ -263,23 +263,7 @@ impl<'a> Measured<'a> {
             }
             Source::Channels(channels) => channels,
         };
-        let readings = channels.steps.readings();
-        for role in readings.summary() {
-            let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
-            if good < total {
-                say.note(&format!(
-                    "{} of {} samples of {} are not used: {}",
-                    output::grouped(total - good),
-                    output::grouped(total),
-                    role.role.name(),
-                    role.counts.faults()
-                ));
-            }
-        }
-        for note in readings.notes() {
-            say.note(&format!("warning: {note}"));
-        }
-        Ok(readings.check()?)
+        report_readings(channels.steps.readings(), say)
     }
 }
 
@@ -312,6 +296,29 @@ fn check_step(path: &Path, median_s: f64, hint: &str) -> Result<(), Failure> {
          hint: if the time is in ms, {hint}",
         path.display()
     )))
+}
+
+/// Says what was met in mapped channels, after their last step.
+///
+/// # Errors
+/// Most samples of a channel could not be used, or a unit is wrong by all appearances.
+pub(super) fn report_readings(readings: &Readings<'_>, say: &mut Messages) -> Result<(), Failure> {
+    for role in readings.summary() {
+        let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+        if good < total {
+            say.note(&format!(
+                "{} of {} samples of {} are not used: {}",
+                output::grouped(total - good),
+                output::grouped(total),
+                role.role.name(),
+                role.counts.faults()
+            ));
+        }
+    }
+    for note in readings.notes() {
+        say.note(&format!("warning: {note}"));
+    }
+    Ok(readings.check()?)
 }
 
 /// What the vehicle file says about the gearbox.
