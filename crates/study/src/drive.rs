@@ -97,7 +97,7 @@ pub(crate) fn over_shift(
 const EXPECTED_SAMPLES: usize = 4096;
 
 /// Samples on their way to a trace, with this number of columns beside the time and the phase.
-pub(crate) struct Recording<const N: usize = COLUMNS> {
+pub struct Recording<const N: usize = COLUMNS> {
     names: [&'static str; N],
     time_s: Vec<f64>,
     columns: [Vec<f64>; N],
@@ -106,11 +106,12 @@ pub(crate) struct Recording<const N: usize = COLUMNS> {
 
 impl Recording {
     /// Every signal of a vehicle; nothing recorded yet, in the memory of a spare trace.
-    pub(crate) fn new(vehicle: &Vehicle, spare: Trace) -> Self {
+    pub fn new(vehicle: &Vehicle, spare: Trace) -> Self {
         Self::of(column_names(vehicle), spare)
     }
 
-    pub(crate) fn take(&mut self, sample: &Sample) {
+    /// Takes the next sample.
+    pub fn take(&mut self, sample: &Sample) {
         let row = DriveRow::of(sample);
         self.push(row.time_s, row.phase, row.values);
     }
@@ -151,7 +152,8 @@ impl<const N: usize> Recording<N> {
         self.phases.push(phase.name().into());
     }
 
-    pub(crate) fn finish(self) -> Trace {
+    /// The trace, with the true phase of the shift as words.
+    pub fn finish(self) -> Trace {
         let column = |(name, values): (&str, _)| Column { name: name.to_owned(), values: Values::Numbers(values) };
         let mut columns = Vec::with_capacity(N + 1);
         columns.extend(self.names.into_iter().zip(self.columns).map(column));
