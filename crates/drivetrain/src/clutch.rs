@@ -7,6 +7,7 @@ use crate::{Real, Table1};
 /// Sign: slip is input side minus output side; a positive torque drives the output side. Left out:
 /// the drag of the open clutch ([`drag_torque`]), heat, and the time oil needs to leave the plates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Clutch<T> {
     /// Effective radius `R` of the friction force, m.
     pub mean_radius_m: T,

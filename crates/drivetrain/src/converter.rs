@@ -12,6 +12,7 @@ const SLOWEST_ENGINE_RAD_S: f64 = 1.0;
 /// In overrun (`lambda > 1`) the capacity factor is negative: the turbine drives the pump. Left out:
 /// fluid inertia and the lock-up clutch.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Converter<T> {
     /// Capacity factor `C(lambda)`, N m s^2, positive below `lambda = 1` and negative above it.
     pub capacity_n_m_s2: Table1<T>,

@@ -6,6 +6,7 @@ use crate::{Clutch, Real};
 /// A passage with a laminar and an orifice part in series: `|d| = R_l nu Q + R_t Q^2`, `d` the pressure drop, `Q` the
 /// flow and `nu` the viscosity.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Passage<T> {
     /// `R_l`, Pa s^2/m^5: laminar resistance over kinematic viscosity.
     pub laminar_pa_s2_m5: T,

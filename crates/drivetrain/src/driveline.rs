@@ -6,6 +6,7 @@ use crate::{Real, RoadLoad};
 ///
 /// Sign: twist is gearbox side minus wheel side; a positive torque drives the wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Driveline<T> {
     /// Gear ratio `i_df` of the differential.
     pub final_ratio: T,

@@ -51,8 +51,13 @@ const BINS: usize = 32;
 ///
 /// Every index is bounded by the size of an array and not by `len` alone: an observer's step must hold no panic.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Axis<T, const N: usize> {
     /// Past `len` the last one again.
+    #[cfg_attr(
+        feature = "serde",
+        serde(with = "serde_big_array::BigArray", bound(deserialize = "T: serde::Deserialize<'de>"))
+    )]
     points: [T; N],
     len: usize,
     first_segment: [u8; BINS],
@@ -134,6 +139,7 @@ impl<T: Real, const N: usize> Axis<T, N> {
 
 /// A function of one variable given by breakpoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Table1<T> {
     axis: Axis<T, MAX_POINTS>,
     values: [T; MAX_POINTS],

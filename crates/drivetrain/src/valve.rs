@@ -29,6 +29,7 @@ pub enum CommandKind {
 
 /// The valve model of an observer: pressure dynamics with constant parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Valve<T> {
     /// Proportional valve, `tau_cv dp/dt = -p + K_cv i`, Eq. (2.15). The command is a current, A.
     Proportional {

@@ -16,6 +16,7 @@ use crate::{
 
 /// Largest errors under which the ranges of pressure and clutch torque hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget<T> {
     /// The valve as measured: lag, gain and delay over the operating point.
     pub valve: ClutchValve<T>,
@@ -56,6 +57,7 @@ pub struct Bounds<T> {
 
 /// Computes the ranges of a run, once for all observers.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeEstimator<T> {
     /// What the ranges of pressure and clutch torque are made from.
     pub budget: Budget<T>,
@@ -81,6 +83,7 @@ pub struct RangeState<T> {
 
 /// Any observer with the ranges around its estimates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounded<T, O> {
     /// The observer.
     pub observer: O,

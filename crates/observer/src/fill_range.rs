@@ -36,6 +36,7 @@ use drivetrain::{Passage, Real};
 
 /// Limits of the cylinder and its passages under which the range holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FillBudget<T> {
     /// Least and greatest volume of the stroke `V_k`, m^3.
     pub volume_m3: [T; 2],

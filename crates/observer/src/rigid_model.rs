@@ -12,6 +12,7 @@ use crate::Phase;
 /// Left out, against the real car: torsion of the drive shafts, tyre slip, grade, the delay and the
 /// varying lag and gain of the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RigidModel<T> {
     /// Kinematics of the shift.
     pub shift: ReducedShift<T>,

@@ -10,6 +10,7 @@ pub trait Mix<T> {
 
 /// Gains at the ends of a range of friction coefficients, linear between them and constant beyond.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Schedule<T, G> {
     /// Least and greatest friction coefficient; of a constant gain, both the same.
     pub friction: [T; 2],

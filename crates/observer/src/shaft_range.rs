@@ -30,6 +30,7 @@ use crate::{Phase, Sample};
 
 /// What the range is made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShaftRange<T> {
     shift: ReducedShift<T>,
     /// The balance that holds for any torque of the offgoing clutch.
@@ -43,6 +44,7 @@ pub struct ShaftRange<T> {
 
 /// Largest errors for which the range is expected to hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShaftErrors<T> {
     /// Of the turbine torque, as a share.
     pub turbine_torque_share: T,
@@ -81,6 +83,7 @@ impl<T: Real> ShaftErrors<T> {
 
 /// The torque at the gearbox output from two accelerations, the turbine torque and the torque of one clutch.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Balance<T> {
     per_turbine_rad_s2: T,
     per_output_rad_s2: T,

@@ -6,6 +6,7 @@ use crate::{ChannelHealth, Channels, Estimate, Health, InputLimits, Phase, Sampl
 
 /// How the frozen dynamics are carried over a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Discretisation {
     /// By the matrix exponential: exact for coefficients that stand still over the sample.
     Exact,
@@ -15,6 +16,7 @@ pub enum Discretisation {
 
 /// Checks sample, follows the valve model and the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker<T> {
     /// The oncoming clutch's valve.
     pub valve: Valve<T>,

@@ -6,6 +6,7 @@ use crate::{Real, Table1};
 /// The valve that fills a clutch of the real car: what the plant simulates, the shift controller is calibrated for, and the
 /// range of an estimate is made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ClutchValve<T> {
     /// Commanded by a current, A; its maps as measured.
     Proportional(ValveMaps<T>),

@@ -5,6 +5,7 @@ use crate::{Real, Table1};
 /// The proportional valve of the real car, `tau_cv dp/dt = -p + K_cv i(t - L_cv)`, Eq. (2.4), with lag, gain and
 /// delay that vary with the operating point.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ValveMaps<T> {
     /// `tau_cv` over pressure: s over Pa.
     pub time_constant_s: Table1<T>,

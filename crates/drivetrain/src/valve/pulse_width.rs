@@ -9,6 +9,7 @@ use crate::valve::{LinearValve, ValveStep};
 /// Below [`Self::LAMINAR_DROP_PA`] the flow is in proportion to the drop, as laminar flow is: the slope of the root
 /// is infinite where the drop is zero. Left out: the ripple of the pulses and the supply's own dynamics.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PulseWidth<T> {
     /// Flow constant `C_z`, sqrt(Pa)/s.
     pub flow_sqrt_pa_s: T,

@@ -14,6 +14,7 @@ const GATE: u8 = 3;
 
 /// What the engine's filter knows beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EngineNoise<T> {
     /// Standard deviation of a reading, rad/s.
     pub reading_rad_s: T,

@@ -17,6 +17,7 @@ const IMPOSSIBLE: f64 = 4.0;
 
 /// What is known of the reported torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReportedTorque<T> {
     /// Inertia of engine and pump, kg m^2.
     pub engine_kg_m2: T,

@@ -82,6 +82,7 @@ const FIRST_S: f64 = 0.05;
 
 /// How a toothed wheel is read.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SpeedReading<T> {
     /// Standard deviation of a reading, rad/s.
     pub deviation_rad_s: T,
@@ -96,6 +97,7 @@ pub struct SpeedReading<T> {
 
 /// What the filter does not know: standard deviations, and limits from the error budget.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Uncertainty<T> {
     /// Of the turbine torque, as a share.
     pub turbine_share: T,
@@ -140,6 +142,7 @@ pub struct Uncertainty<T> {
 
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KalmanFilter<T> {
     /// The powertrain.
     pub model: CompliantModel<T>,

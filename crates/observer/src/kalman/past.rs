@@ -43,8 +43,9 @@ pub(super) struct Place<T> {
 impl<T: Real> Past<T> {
     /// As it would be with accelerations that have stood for long.
     pub(super) fn steady(speeds: [T; SPEEDS], accelerations: [T; SPEEDS]) -> Self {
-        let points = core::array::from_fn(|n| {
-            let age_s = T::of(EVERY_S * (n + 1) as f64);
+        let mut age_s = T::zero();
+        let points = core::array::from_fn(|_| {
+            age_s = age_s + T::of(EVERY_S);
             Point { age_s, speeds: core::array::from_fn(|k| speeds[k] - age_s * accelerations[k]) }
         });
         Self { points }

@@ -64,7 +64,7 @@ impl<T: Real> KalmanFilter<T> {
         for k in [TURBINE, OUTPUT] {
             // In a shift, or on a hill, the acceleration is another one.
             let old = (ages[k] + u.skew_s) * accelerations[k];
-            deviations[k] = self.readings[k].deviation_rad_s.hypot(old);
+            deviations[k] = hypot(self.readings[k].deviation_rad_s, old);
         }
         // Out of balance the shafts swing, at the start of a log as much as the torque itself.
         deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
@@ -252,6 +252,12 @@ impl<T: Real> KalmanFilter<T> {
 #[inline]
 pub(super) fn at_start<T: Real>((share, beside): (f64, f64), torque_n_m: T) -> T {
     T::of(share) * torque_n_m.abs() + T::of(beside)
+}
+
+/// Length of the hypotenuse. That of the mathematical library computes in double precision.
+#[inline]
+pub(super) fn hypot<T: Real>(a: T, b: T) -> T {
+    (a * a + b * b).sqrt()
 }
 
 /// What is left after `dt_s` of a random number that lasts for a time, as implicit Euler has it.

@@ -7,6 +7,7 @@ const REMEMBERED: usize = 32;
 
 /// The valve model.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ValveModel<T> {
     /// Lag and gain over the operating point.
     pub valve: ClutchValve<T>,
