@@ -61,7 +61,7 @@ impl<T: Real> Clutch<T> {
     /// Force that presses the plates together, N: `max(A p - F_s, 0)`.
     #[inline]
     pub fn clamp_force(&self, pressure_pa: T) -> T {
-        (self.piston_area_m2 * pressure_pa - self.return_spring_n).max(T::zero())
+        (self.piston_area_m2 * pressure_pa - self.return_spring_n).at_least(T::zero())
     }
 
     /// Size of the torque the slipping clutch carries, N m: `mu(|dw|) R N max(A p - F_s, 0)`, Eq. (2.13).

@@ -142,7 +142,7 @@ impl<T: Real> Cylinder<T> {
     #[inline]
     pub fn pressure(&self, volume_m3: T) -> T {
         if volume_m3 < T::zero() {
-            (self.preload_pa + volume_m3 / self.home_capacity_m3_pa).max(T::zero())
+            (self.preload_pa + volume_m3 / self.home_capacity_m3_pa).at_least(T::zero())
         } else if volume_m3 < self.stroke_m3 {
             self.preload_pa + (self.kiss_pa - self.preload_pa) * volume_m3 / self.stroke_m3
         } else {
@@ -181,7 +181,7 @@ impl<T: Real> Cylinder<T> {
         if drop_pa < T::zero() {
             self.exhaust.flow(drop_pa, self.viscosity_m2_s)
         } else {
-            self.supply.flow(drop_pa, self.viscosity_m2_s).min(self.flow_max_m3_s)
+            self.supply.flow(drop_pa, self.viscosity_m2_s).at_most(self.flow_max_m3_s)
         }
     }
 

@@ -50,7 +50,7 @@ impl<T: Real> Driveline<T> {
             None => T::zero(),
             Some(twist) => {
                 let torque = self.shaft_torque(twist, twist_rate_rad_s);
-                if twist_rad > T::zero() { torque.max(T::zero()) } else { torque.min(T::zero()) }
+                if twist_rad > T::zero() { torque.at_least(T::zero()) } else { torque.at_most(T::zero()) }
             }
         }
     }

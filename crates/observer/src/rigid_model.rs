@@ -138,7 +138,7 @@ impl<T: Real> RigidModel<T> {
         if phase == Phase::AfterShift {
             let known = self.known_torques(engine_rad_s, turbine_rad_s, slip_rad_s);
             let limit = self.clutch.static_capacity(pressure_pa);
-            return self.after_shift.holding_oncoming.at(&known).max(-limit).min(limit);
+            return self.after_shift.holding_oncoming.at(&known).at_least(-limit).at_most(limit);
         }
         self.clutch.torque_capacity(pressure_pa, slip_rad_s) * direction(slip_rad_s)
     }

@@ -39,7 +39,7 @@ impl<T: Real, G: Mix<T> + Copy> Schedule<T, G> {
     pub fn at(&self, friction: T) -> G {
         let [least, greatest] = self.friction;
         if greatest > least {
-            let share = ((friction - least) / (greatest - least)).max(T::zero()).min(T::one());
+            let share = ((friction - least) / (greatest - least)).at_least(T::zero()).at_most(T::one());
             self.ends[0].mixed(&self.ends[1], share)
         } else {
             self.ends[0]

@@ -138,7 +138,7 @@ impl<T: Real> InputLimits<T> {
     /// The nearest pressure that the supply can give, Pa.
     #[inline]
     pub fn possible_pressure(&self, pressure_pa: T) -> T {
-        pressure_pa.max(T::zero()).min(self.pressure_max_pa)
+        pressure_pa.at_least(T::zero()).at_most(self.pressure_max_pa)
     }
 
     /// The same limits in another precision.

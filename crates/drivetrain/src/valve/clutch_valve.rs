@@ -65,7 +65,7 @@ impl<T: Real> ClutchValve<T> {
         match self {
             Self::Proportional(maps) => maps.settled_pressure(command),
             Self::NormallyHigh { maps, zero_pressure_a } => {
-                maps.settled_pressure((*zero_pressure_a - command).max(T::zero()))
+                maps.settled_pressure((*zero_pressure_a - command).at_least(T::zero()))
             }
             Self::PulseWidth { law, .. } => law.settled_pressure(command),
         }
@@ -76,7 +76,7 @@ impl<T: Real> ClutchValve<T> {
         match self {
             Self::Proportional(maps) => maps.current_for(pressure_pa),
             Self::NormallyHigh { maps, zero_pressure_a } => {
-                (*zero_pressure_a - maps.current_for(pressure_pa)).max(T::zero())
+                (*zero_pressure_a - maps.current_for(pressure_pa)).at_least(T::zero())
             }
             Self::PulseWidth { law, .. } => law.duty_for(pressure_pa),
         }

@@ -109,8 +109,8 @@ impl<T: Real> KalmanFilter<T> {
             return;
         }
         let mut with = [T::zero(); ALL];
-        running.covariance.add_row(&mut with, OFFGOING, T::one());
-        let variance = with[OFFGOING].max(T::zero()) + deviation * deviation;
+        running.covariance.add_row::<OFFGOING>(&mut with, T::one());
+        let variance = with[OFFGOING].at_least(T::zero()) + deviation * deviation;
         let beyond = if torque > T::zero() { most - torque } else { -most - torque };
         let gain = running.covariance.correct(&Measured { with, variance }, &[T::one(); CONSIDERED]);
         running.shift_by(&gain, beyond);

@@ -102,7 +102,8 @@ impl<T: Real> Past<T> {
     #[inline]
     pub(super) fn accelerations(&self, k: usize, now: T) -> [T; 2] {
         let [newest, oldest] = &self.points;
-        let over = |late: T, early: &Point<T>, span_s: T| (late - early.speeds[k]) / span_s.max(T::of(LEAST_SPAN_S));
+        let over =
+            |late: T, early: &Point<T>, span_s: T| (late - early.speeds[k]) / span_s.at_least(T::of(LEAST_SPAN_S));
         let before = over(newest.speeds[k], oldest, oldest.age_s - newest.age_s);
         let after = if newest.age_s >= T::of(LEAST_SPAN_S) { newest } else { oldest };
         [over(now, after, after.age_s), before]
