@@ -4,9 +4,12 @@
 //! toothed wheels. Errors are counted by what the true clutches do: in the *torque phase* one of them holds and the other
 //! carries torque while it slips; in the *inertia phase* both slip.
 
+pub mod campaign;
+pub mod channels;
 pub mod drive;
 pub mod logged;
 pub mod matrix;
+pub mod measured;
 pub mod recording;
 pub mod tour;
 
@@ -42,6 +45,9 @@ pub enum AnyShiftError {
     /// There are more clutches than the filter has room for.
     #[error("the gearbox has {0} clutches and brakes, and the filter has room for {MAX_ELEMENTS}")]
     TooManyElements(usize),
+    /// A shift is none from one clutch with plates and valve to another.
+    #[error("the filter has no tables for {0}\nhint: `wetclutch check` lists the shifts from one clutch to another")]
+    NoTables(String),
 }
 
 /// How a car differs from the one that is known.

@@ -96,7 +96,7 @@ pub(crate) fn simulate_shift_over(
 const EXPECTED_SAMPLES: usize = 4096;
 
 /// Samples on their way to a trace.
-struct Recording {
+pub struct Recording {
     names: [&'static str; COLUMNS],
     time_s: Vec<f64>,
     columns: [Vec<f64>; COLUMNS],
@@ -105,7 +105,7 @@ struct Recording {
 
 impl Recording {
     /// Nothing recorded yet, in the memory of a spare trace.
-    fn new(vehicle: &Vehicle, spare: Trace) -> Self {
+    pub fn new(vehicle: &Vehicle, spare: Trace) -> Self {
         let (mut numbers, mut phases) = (vec![spare.time_s], Vec::new());
         for column in spare.columns {
             match column.values {
@@ -123,7 +123,8 @@ impl Recording {
         Self { names: column_names(vehicle), time_s: column(), columns: std::array::from_fn(|_| column()), phases }
     }
 
-    fn take(&mut self, sample: &Sample) {
+    /// Takes the next sample.
+    pub fn take(&mut self, sample: &Sample) {
         let row = DriveRow::of(sample);
         self.time_s.push(row.time_s);
         for (column, value) in self.columns.iter_mut().zip(row.values) {
@@ -132,7 +133,8 @@ impl Recording {
         self.phases.push(row.phase.name().into());
     }
 
-    fn finish(self) -> Trace {
+    /// The trace, with the true phase of the shift as words.
+    pub fn finish(self) -> Trace {
         let column = |(name, values): (&str, _)| Column { name: name.to_owned(), values: Values::Numbers(values) };
         let mut columns = Vec::with_capacity(COLUMNS + 1);
         columns.extend(self.names.into_iter().zip(self.columns).map(column));

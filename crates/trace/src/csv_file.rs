@@ -253,6 +253,14 @@ pub fn read_csv(path: &Path) -> Result<Trace, TraceError> {
 /// # Errors
 /// The file cannot be written.
 pub fn write_csv(path: &Path, trace: &Trace) -> io::Result<()> {
+    csv_written(path, trace)?.finish()
+}
+
+/// The same in a file that still has to get its name.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn csv_written(path: &Path, trace: &Trace) -> io::Result<WholeFile> {
     let names = trace.columns.iter().map(|column| column.name.as_str());
     let mut writer = CsvWriter::new(WholeFile::create(path)?, names)?;
     for (i, &time_s) in trace.time_s.iter().enumerate() {
@@ -262,7 +270,7 @@ pub fn write_csv(path: &Path, trace: &Trace) -> io::Result<()> {
         });
         writer.row(time_s, cells)?;
     }
-    writer.finish()?.finish()
+    writer.finish()
 }
 
 /// What stands in a row.

@@ -16,6 +16,11 @@ use crate::campaign::in_order;
 
 /// Throttle of the shifts with power, 0 to 1 \[chosen\]: a car in traffic.
 const POWER_ON: f64 = 0.15;
+/// Throttle of the shifts with power.
+pub(super) fn power_throttle() -> f64 {
+    POWER_ON
+}
+
 /// Turbine torque, over the throttle, at which a shift counts as one with power.
 const KIND_FROM: f64 = 0.01;
 /// Where the open loop errs by less than this over a shift there is nothing to gain, N m.
@@ -118,7 +123,8 @@ impl PhaseErrors {
         Self { torque, pressure }
     }
 
-    fn add(&mut self, more: &Self) {
+    /// Adds those of more rows.
+    pub fn add(&mut self, more: &Self) {
         self.torque.add(&more.torque);
         self.pressure.add(&more.pressure);
     }

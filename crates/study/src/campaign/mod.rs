@@ -9,7 +9,7 @@ pub mod plan;
 pub mod row;
 pub mod summary;
 
-pub use execute::{execute, in_order};
+pub use execute::{BLOCK, execute, in_blocks, in_order};
 pub use layout::{Layout, Metric, PHASES};
 pub use plan::{factor_values, run_seed};
 pub use row::{Campaign, Row, Run, Status, keep_scored};
