@@ -26,10 +26,10 @@ pub use experiment::{
 };
 pub use gearbox::GearboxFile;
 pub use learnt::{read_learnt, write_learnt};
-pub use source::{Kind, Source, toml_string};
+pub use source::{Kind, Source, toml_number, toml_string};
 pub use speed_trace::SpeedTrace;
-pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
+pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,
-    ValveUncertainty, Vehicle,
+    Car, CompliantRequirement, DefaultTaken, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch,
+    Uncertainty, ValveUncertainty, Vehicle,
 };

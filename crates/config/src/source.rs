@@ -42,6 +42,24 @@ pub fn toml_string(text: &str) -> String {
     format!("\"{}\"", escaped.collect::<String>())
 }
 
+/// A number with five digits as TOML has it.
+pub fn toml_number(value: f64) -> String {
+    const DIGITS: i32 = 5;
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value:.1}");
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "the exponent of a number is small")]
+    let exponent = value.abs().log10().floor() as i32;
+    if (-3..6).contains(&exponent) {
+        let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
+        let text = format!("{value:.decimals$}");
+        let trimmed = text.trim_end_matches('0');
+        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
 /// The tables of a vehicle file.
 const VEHICLE_TABLES: [&str; 10] =
     ["engine", "converter", "gear_train", "clutch", "driveline", "tyre", "vehicle", "oil", "observer", "design"];
@@ -189,6 +207,16 @@ mod tests {
             let quoted = toml_string(text);
             let table: toml::Table = toml::from_str(&format!("# {quoted}\ntext = {quoted}\n")).unwrap();
             assert_eq!(table["text"].as_str(), Some(text), "{quoted}");
+        }
+    }
+
+    #[test]
+    fn numbers_keep_five_digits() {
+        let cases =
+            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
+        for (value, text) in cases {
+            assert_eq!(toml_number(value), text);
+            assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
         }
     }
 }

@@ -11,7 +11,6 @@ pub mod drive;
 pub mod error;
 mod fitted_file;
 pub mod fitting;
-pub mod init;
 pub mod intervals;
 mod motion;
 pub mod open_loop;

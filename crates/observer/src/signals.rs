@@ -226,7 +226,7 @@ pub enum ChannelHealth {
     Unused,
     /// Its reading was taken.
     Good,
-    /// No reading came; the channel goes on as before.
+    /// No reading came, or none that can be compared now; the channel goes on as before.
     Absent,
     /// Its reading was refused.
     Refused,

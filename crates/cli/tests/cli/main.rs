@@ -4,6 +4,7 @@
 
 mod any_car;
 mod any_car_logs;
+mod attacks;
 mod commands;
 mod day_of_logs;
 mod drives;
@@ -14,5 +15,6 @@ mod log_to_fit;
 mod logs;
 mod long_logs;
 mod measured;
+mod own_car;
 mod studies;
 mod support;

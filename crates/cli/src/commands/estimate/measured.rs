@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use config::Vehicle;
 use drivetrain::CommandKind;
@@ -16,7 +16,7 @@ use logs::{
 };
 use observer::{Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
-use trace::{CsvRows, Following, signal};
+use trace::{CsvRows, Following, LastLine, TraceError, signal};
 
 use super::Messages;
 use crate::failure::Failure;
@@ -51,6 +51,8 @@ struct Rows {
     rows: u64,
     /// Rows that were looked at before the first estimate.
     look: u64,
+    /// Whether the last line has no end.
+    was_cut: Arc<AtomicBool>,
 }
 
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
@@ -134,12 +136,14 @@ impl<'a> Measured<'a> {
             None if is_pipe => Box::new(io::stdin()),
             None => Box::new(File::open(path).map_err(opening)?),
         };
-        let rows = CsvRows::of(path, input)?;
+        let (input, was_cut) = LastLine::new(input);
+        let rows = CsvRows::of(path, Box::new(input)).map_err(|error| other_delimiter(path, error))?;
         let summary = summary(&rows, vehicle);
         let log = study::log::Log::of(rows, vehicle, look)?;
-        let mut rows = Rows { log, summary, rows: 0, look: look as u64 };
+        let mut rows = Rows { log, summary, rows: 0, look: look as u64, was_cut };
         let looked_at: Vec<Input<f64>> = rows.log.looked_at().map(|(input, _)| *input).collect();
         looked_at.iter().for_each(|input| watch(&mut rows.summary, input));
+        check_step(path, rows.log.median_step_s(), "divide it by 1000")?;
         rows.check_units()?;
         let gearbox = of_vehicle(vehicle);
         // Turbine and output speed are there, and tell shifts.
@@ -150,6 +154,7 @@ impl<'a> Measured<'a> {
 
     /// Channels of a log by a map.
     pub(super) fn channels(
+        path: &Path,
         log: &'a mut Log,
         map: &ChannelMap,
         vehicle: &Vehicle,
@@ -202,6 +207,7 @@ impl<'a> Measured<'a> {
         channels.steps.readings().check_units()?;
         let steps_s = channels.looked_at.iter().skip(1).map(|step| step.input.dt_s);
         channels.median_step_s = trace::median_step_s(steps_s.collect());
+        check_step(path, channels.median_step_s, "set `unit = \"ms\"` under [time] in the channel map")?;
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
         let source = Source::Channels(Box::new(channels));
@@ -247,8 +253,11 @@ impl<'a> Measured<'a> {
     pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
         let channels = match &self.source {
             Source::Rows(rows) => {
-                for note in rows.log.check_times()? {
+                for note in rows.log.check_readings()? {
                     say.note(&format!("warning: {note}"));
+                }
+                if rows.was_cut.load(Ordering::Relaxed) {
+                    say.note("warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells");
                 }
                 return rows.check_units();
             }
@@ -256,6 +265,37 @@ impl<'a> Measured<'a> {
         };
         report_readings(channels.steps.readings(), say)
     }
+}
+
+/// A table with another delimiter than the comma is one of a single column; a channel map reads it.
+fn other_delimiter(path: &Path, error: TraceError) -> Failure {
+    let delimiter = match &error {
+        TraceError::MissingColumn { present, .. } => match present.as_slice() {
+            [only] => [';', '\t', '|'].into_iter().find(|delimiter| only.contains(*delimiter)),
+            _ => None,
+        },
+        _ => None,
+    };
+    let Some(delimiter) = delimiter else { return error.into() };
+    let path = path.display();
+    Failure::Input(format!(
+        "{path}: the columns are separated by `{}`, which is read by a channel map only\n\
+         hint: `wetclutch inspect {path} --suggest > map.toml` writes one; check it, then add --map map.toml",
+        delimiter.escape_debug()
+    ))
+}
+
+/// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
+fn check_step(path: &Path, median_s: f64, hint: &str) -> Result<(), Failure> {
+    const LONGEST_S: f64 = 1.0;
+    if median_s < LONGEST_S || median_s.is_nan() {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
+         hint: if the time is in ms, {hint}",
+        path.display()
+    )))
 }
 
 /// Says what was met in mapped channels, after their last step.

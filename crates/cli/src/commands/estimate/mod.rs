@@ -19,10 +19,11 @@ use std::sync::{Mutex, PoisonError};
 use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
 
-use crate::args::Estimate;
+use crate::args::{Estimate, FormatChoice};
 use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
+use crate::signals::stop_then_end;
 
 pub(super) use observer::{best, kind, sensors};
 
@@ -50,6 +51,7 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    outputs::check_name(options)?;
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         any_car::check_options(options)?;
         let prepare = || any_car::CarSetup::new(options);
@@ -70,7 +72,7 @@ fn each_log<S: Sync>(
     };
     let folder = options.output.as_ref().filter(|output| output.is_dir());
     let output = match folder {
-        Some(folder) => names_in(folder, &options.logs, options.format.ending())?.pop(),
+        Some(folder) => names_in(folder, &options.logs, ending(options))?.pop(),
         None => options.output.clone(),
     };
     check_output(output.as_ref())?;
@@ -81,6 +83,11 @@ fn each_log<S: Sync>(
         not_an_input(Some(&beside), inputs(options).chain([log]))?;
     }
     estimate(&prepare()?, log, output.as_deref(), &mut Messages { held: None })
+}
+
+/// The ending of files in a folder.
+fn ending(options: &Estimate) -> &'static str {
+    options.format.unwrap_or(FormatChoice::Csv).ending()
 }
 
 /// The files that an estimate reads beside its logs.
@@ -97,19 +104,9 @@ fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
 fn stop(options: &Estimate) -> Result<Arc<AtomicBool>, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     if options.follow {
-        end_on_signals(&stop)?;
+        stop_then_end(&stop)?;
     }
     Ok(stop)
-}
-
-/// The first interrupt ends the log that is followed, a second one the program.
-fn end_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(stop))?;
-        signal_hook::flag::register(signal, Arc::clone(stop))?;
-    }
-    Ok(())
 }
 
 /// Several logs, each into a file of its own. One that fails does not stop the others.
@@ -128,7 +125,7 @@ fn several<S: Sync>(
     if options.follow {
         return Err(Failure::Input("--follow takes one log\nhint: start the command once for each".to_owned()));
     }
-    let outputs = names_in(folder, logs, options.format.ending())?;
+    let outputs = names_in(folder, logs, ending(options))?;
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;

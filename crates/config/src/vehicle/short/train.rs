@@ -1,7 +1,5 @@
 //! A gear train with two given ratios: one planetary set for each clutch.
 
-use crate::FitError;
-
 /// A clutch of the train, and what it needs.
 pub(super) struct Element {
     /// Its set and the shaft that it brakes; nothing for a ratio of 1.
@@ -24,12 +22,12 @@ const BRAKED_KG_M2: f64 = 0.0044;
 const INERTIA_MIN_KG_M2: f64 = 1e-4;
 
 /// The elements of the gears before and after the shift.
-pub(super) fn elements(ratios: [f64; 2]) -> Result<[Element; 2], FitError> {
+pub(super) fn elements(ratios: [f64; 2]) -> Result<[Element; 2], String> {
     let [before, after] = ratios;
     Ok([element(before, "brake_a")?, element(after, "brake_b")?])
 }
 
-fn element(ratio: f64, shaft: &str) -> Result<Element, FitError> {
+fn element(ratio: f64, shaft: &str) -> Result<Element, String> {
     if (ratio - 1.0).abs() < DIRECT {
         let sides = "input = \"turbine\"\noutput = \"output\"".to_owned();
         return Ok(Element { text: String::new(), sides, torque_share: 1.0 });
@@ -40,9 +38,8 @@ fn element(ratio: f64, shaft: &str) -> Result<Element, FitError> {
         _ if ratio > 1.0 => (ratio - 1.0, [shaft, "turbine", "output"]),
         _ => (1.0 / ratio - 1.0, [shaft, "output", "turbine"]),
     };
-    let (sun_teeth, ring_teeth) = numbers_of_teeth(teeth).ok_or_else(|| {
-        FitError::input(format!("no planetary set has the ratio {ratio}\nhint: ratios are from 0.6 to 20; near 1 only direct drive, 1, has a gear train: give 1, or a ratio below 0.96 or above 1.04"))
-    })?;
+    let (sun_teeth, ring_teeth) =
+        numbers_of_teeth(teeth).ok_or_else(|| format!("no planetary set has the ratio {ratio}"))?;
     let inertia = (BRAKED_KG_M2 * (ratio - 1.0).powi(2)).max(INERTIA_MIN_KG_M2);
     let text = format!(
         "[[gear_train.shaft]]\nname = \"{shaft}\"\ninertia_kg_m2 = {inertia:.5}\n\n\
