@@ -50,6 +50,7 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    not_an_input(options.output.as_ref(), inputs(options))?;
     outputs::check_name(options)?;
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         return any_car::estimate(options);
