@@ -1,7 +1,8 @@
 //! What a fit has found, in words.
 
 use crate::fitted_file::SIDES;
-use crate::parameters::DELAY_UNIT_S;
+use crate::freeing::LEVEL;
+use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
 use crate::{Channel, Fit, Parameter, Verdict};
 
 /// A row of the table of parameters.
@@ -43,6 +44,7 @@ impl Fit {
             let kind = match prior.parameter {
                 p if p.is_delay() => Kind::Delay,
                 p if p.is_shape() => Kind::Share,
+                Parameter::Hysteresis => Kind::Pressure,
                 _ => Kind::Factor,
             };
             row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), kind)
@@ -67,6 +69,13 @@ impl Fit {
             self.torque_scale_verdict().name()
         )];
         lines.extend(self.correlations());
+        if !self.freed.is_empty() {
+            let names: Vec<&str> = self.freed.iter().map(|map| map.name()).collect();
+            lines.push(format!(
+                "freed, because the shifts ask for another shape than the file's: {} (Hotelling's T2 over the shifts, level {LEVEL})",
+                names.join(", ")
+            ));
+        }
         lines.extend(self.misfits());
         if !self.is_converged {
             lines.push(
@@ -100,8 +109,8 @@ impl Fit {
     fn misfits(&self) -> Vec<String> {
         let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
         let warn = |_: &(Channel, f64, f64)| {
-            "warning: the model does not follow the turbine speed: its errors last. The maps of converter, friction or valve have \
-             another shape than in the vehicle file, which the fit does not change; the intervals are too small"
+            "warning: the model does not follow the turbine speed: its errors last. The converter or the valve works in another way \
+             than in the vehicle file, which the fit does not change; the intervals are too small"
                 .to_owned()
         };
         let limited = (!self.at_limit.is_empty()).then(|| {
@@ -166,6 +175,11 @@ impl Fit {
             "for the lag of the valve, shifts with a longer inertia phase",
         );
         when(
+            true,
+            "for the backlash of the driveline, which shifts under load do not tell: press and release the pedal in one gear, so that the \
+             torque of the shafts changes its sign; for rolling resistance and air drag: coast down in neutral on a level road, both ways",
+        );
+        when(
             self.shifts < 15,
             "20 upshifts: 6 at light throttle (0.15), 6 early ones from low speed, 4 at medium throttle, 4 with a tip-in at the shift",
         );
@@ -177,6 +191,7 @@ enum Kind {
     Factor,
     Delay,
     Share,
+    Pressure,
 }
 
 fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {
@@ -186,6 +201,10 @@ fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -
         Kind::Delay => {
             let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
             (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))
+        }
+        Kind::Pressure => {
+            let kpa = |x: f64| 1e-3 * HYSTERESIS_UNIT_PA * x;
+            (format!("{:.1} kPa", kpa(x)), format!("{:.1} to {:.1} kPa", kpa((x - half).max(0.0)), kpa(x + half)))
         }
         Kind::Share => {
             (format!("{:+.1} %", 100.0 * x), format!("{:+.1} to {:+.1} %", 100.0 * (x - half), 100.0 * (x + half)))
