@@ -77,6 +77,11 @@ impl Fit {
             ));
         }
         lines.extend(self.misfits());
+        if self.freed.is_empty() && self.given_is_possible() {
+            lines.push(
+                "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned(),
+            );
+        }
         if !self.is_converged {
             lines.push(
                 "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
@@ -104,6 +109,17 @@ impl Fit {
             strong.iter().map(|(i, j, c)| format!("{} and {} {c:+.2}", self.priors[*i].name, self.priors[*j].name));
         let words: Vec<String> = words.collect();
         (!words.is_empty()).then(|| format!("correlated: {}", words.join("; ")))
+    }
+
+    /// Whether the values of the given file lie in the intervals of the car's parameters that all hold in 95 %: by Bonferroni, of so many
+    /// parameters each in 95 % of one over their number.
+    fn given_is_possible(&self) -> bool {
+        /// Standard deviations on either side that 99.7 % lie within: 5 % over 17 parameters, about as many as there are.
+        const SIDES_OF_ALL: f64 = 3.0;
+        let mut of_car = self.priors.iter().enumerate().filter(|(_, prior)| !prior.parameter.is_of_signals());
+        of_car.all(|(i, prior)| {
+            (self.unknowns[i] - prior.mean).abs() <= SIDES_OF_ALL * self.precision.stated[(i, i)].sqrt()
+        })
     }
 
     fn misfits(&self) -> Vec<String> {
