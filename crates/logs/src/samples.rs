@@ -302,9 +302,7 @@ impl<'a> Samples<'a> {
             damage: None,
         };
         for i in 0..samples.streams.len() {
-            if let Some(sample) = samples.next_of(i)? {
-                samples.put_back(i, sample);
-            }
+            samples.refill(i)?;
         }
         Ok(samples)
     }
@@ -346,11 +344,9 @@ impl<'a> Samples<'a> {
         Ok(true)
     }
 
-    /// Takes the next sample of a stream.
-    fn next_of(&mut self, i: usize) -> Result<Option<Sample>, LogError> {
-        if self.streams[i].at == self.streams[i].batch.len() && !self.read(i)? {
-            return Ok(None);
-        }
+    /// Takes the next sample of a stream out of its batch, which has one.
+    #[inline]
+    fn stamped(&mut self, i: usize) -> Sample {
         let merged = &mut self.streams[i];
         let mut sample = merged.batch[merged.at];
         merged.at += 1;
@@ -390,27 +386,29 @@ impl<'a> Samples<'a> {
                 sample.time_s = newest_s;
             }
         }
-        Ok(Some(sample))
+        sample
     }
 
-    fn advance(&mut self) -> Result<Option<Sample>, LogError> {
-        if let Some((i, until)) = self.front {
-            match self.next_of(i)? {
-                Some(sample) if Next(sample.time_s, i) <= until => {
-                    self.given += 1;
-                    return Ok(Some(sample));
-                }
-                Some(sample) => self.put_back(i, sample),
-                None => {}
-            }
+    /// Goes on to the stream whose next sample is the earliest, and gives that.
+    fn of_the_earliest(&mut self) -> Result<Option<Sample>, LogError> {
+        if let Some((i, _)) = self.front.take() {
+            self.refill(i)?;
         }
         let Some(Reverse(Next(_, i))) = self.heap.pop() else {
-            self.front = None;
             return self.damage.take().filter(|_| self.given == 0).map_or(Ok(None), Err);
         };
         self.front = Some((i, self.heap.peek().map_or(Next(f64::INFINITY, i), |Reverse(next)| *next)));
         self.given += 1;
         Ok(self.streams[i].next.take())
+    }
+
+    /// Reads the next batch of a stream if there is none, and lets its first sample wait for its time.
+    fn refill(&mut self, i: usize) -> Result<(), LogError> {
+        if self.streams[i].next.is_none() && (self.streams[i].at < self.streams[i].batch.len() || self.read(i)?) {
+            let sample = self.stamped(i);
+            self.put_back(i, sample);
+        }
+        Ok(())
     }
 
     /// Puts a sample where it waits for its time.
@@ -424,7 +422,17 @@ impl Iterator for Samples<'_> {
     type Item = Result<Sample, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.advance().transpose()
+        if let Some((i, until)) = self.front
+            && self.streams[i].at < self.streams[i].batch.len()
+        {
+            let sample = self.stamped(i);
+            if Next(sample.time_s, i) <= until {
+                self.given += 1;
+                return Some(Ok(sample));
+            }
+            self.put_back(i, sample);
+        }
+        self.of_the_earliest().transpose()
     }
 }
 

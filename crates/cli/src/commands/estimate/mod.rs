@@ -51,6 +51,7 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    not_an_input(options.output.as_ref(), inputs(options))?;
     outputs::check_name(options)?;
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         any_car::check_options(options)?;
