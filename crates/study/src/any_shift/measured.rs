@@ -1,6 +1,6 @@
 //! A simulated drive as its car measures it: speeds through toothed wheels, currents through their sensor.
 //!
-//! Readings are made in blocks of [`BLOCK_S`], so that the memory does not grow with the drive. What the sensors count by the shift
+//! Readings are made in blocks of 60 s, so that the memory does not grow with the drive. What the sensors count by the shift
 //! (`burst_s`, `frozen_s`, `outliers`) is counted by the block here: a drive has many shifts.
 
 use std::collections::VecDeque;
@@ -18,8 +18,6 @@ use super::logged::element_commands;
 use super::recording::input;
 use crate::campaign::plan::mixed;
 
-/// Longest time between two records from which teeth are counted, s.
-const RECORD_S: f64 = super::RECORD_S;
 /// Length of a block, s.
 const BLOCK_S: f64 = 60.0;
 /// Records before a block that its first readings need, s: sample time, delay, offset and the time of a standstill, 0.2 s each at most.
@@ -91,7 +89,7 @@ pub struct SensedDrive<'s> {
 impl<'s> SensedDrive<'s> {
     /// For a row every `row_s` seconds.
     pub fn new(car: &Car, sensors: &'s Sensors, row_s: f64) -> Self {
-        let every = (row_s / RECORD_S - 1e-9).ceil().max(1.0);
+        let every = (row_s / super::RECORD_S - 1e-9).ceil().max(1.0);
         let record_s = row_s / every;
         let recorded = |name: &str| Recorded { name: name.to_owned(), values: Vec::new() };
         let is_current = |element: usize| {
@@ -218,4 +216,66 @@ impl<'s> SensedDrive<'s> {
 pub fn has_ages(sample_time_s: f64, offset_s: f64, row_s: f64) -> bool {
     let is_multiple = |a: f64, b: f64| ((a / b).round() - a / b).abs() < 1e-6;
     offset_s != 0.0 || !(is_multiple(sample_time_s, row_s) || is_multiple(row_s, sample_time_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use config::Source;
+    use plant::car::{CarCalibration, CarModel, simulate_car_drive};
+
+    use super::*;
+
+    fn car() -> Car {
+        let gearbox = include_str!("../../../../gearboxes/ravigneaux_4.toml");
+        let source = Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
+        Car::from_sources(source, Source::built_in("g.toml", gearbox)).unwrap()
+    }
+
+    /// Rows of a drive of 150 s, two and a half blocks.
+    fn rows(sensors: &Sensors, row_s: f64) -> Vec<MeasuredRow> {
+        let text = "name = \"d\"\n[[segment]]\nduration_s = 150\nthrottle = [0.05, 0.15]\n";
+        let drive = config::Drive::from_source(Source::built_in("d.toml", text)).unwrap();
+        let (car, mut rows) = (car(), Vec::new());
+        let mut sensed = SensedDrive::new(&car, sensors, row_s);
+        let drive = config::Drive { sample_time_s: sensed.record_s(), ..drive };
+        let model = CarModel::new(car.clone()).unwrap();
+        simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
+            sensed.each(sample, |row| rows.push(*row));
+        })
+        .unwrap();
+        sensed.last(|row| rows.push(*row));
+        rows
+    }
+
+    #[test]
+    fn every_row_of_a_drive_is_read_once_and_blocks_leave_no_seam() {
+        let sensors = config::Experiment::bench().unwrap().sensors.unwrap();
+        let rows = rows(&sensors, 0.01);
+        assert!(rows.len() == 15_001 || rows.len() == 15_000, "{}", rows.len());
+        assert!(rows.windows(2).all(|pair| (pair[1].sample.time_s - pair[0].sample.time_s - 0.01).abs() < 1e-6));
+        let fast = rows.iter().filter(|row| row.sample.torques.output_rad_s > 50.0);
+        for row in fast.clone() {
+            let truth = speeds_of(&row.sample);
+            for (at, ([read, age_s], truth)) in row.speeds.iter().zip(truth).enumerate() {
+                // Five deviations of noise, and some 15 ms of delay at 500 rad/s^2.
+                assert!(*age_s == 0.0 && (read - truth).abs() < 8.0, "{at} {}: {read} {truth}", row.sample.time_s);
+            }
+        }
+        assert!(fast.count() > 10_000);
+        // Noise of one block is not that of another.
+        let noise = |row: &MeasuredRow| row.commands[0][0] - row.sample.commands[0];
+        let same = (0..5000).filter(|&at| noise(&rows[at]) == noise(&rows[at + 6001]) && noise(&rows[at]) != 0.0);
+        assert!(same.count() < 1500);
+    }
+
+    #[test]
+    fn a_slow_channel_has_a_reading_in_every_second_row_in_every_block() {
+        let mut sensors = config::Experiment::bench().unwrap().sensors.unwrap();
+        sensors.turbine.sample_time_s = 0.02;
+        sensors.row_offset_s = 0.004;
+        let rows = rows(&sensors, 0.01);
+        assert!((rows[0].sample.time_s - 0.004).abs() < 1e-9);
+        let came: Vec<bool> = rows.iter().map(|row| !row.speeds[1][0].is_nan()).collect();
+        assert!(came.windows(2).all(|pair| pair[0] != pair[1]));
+    }
 }

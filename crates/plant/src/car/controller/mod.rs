@@ -314,31 +314,8 @@ impl CarShiftController {
         let stage_share = self.active.as_ref().map(ActiveShift::engine_share);
         let engine_share = self.engine.step((&self.car, &self.calibration), throttle, stage_share, measured);
         let turbine_n_m = self.engine.turbine_n_m(&self.car, measured);
-        let open = |element: usize| self.car.clutches.get(element).and_then(Option::as_ref);
-        let mut elements: [f64; MAX_ELEMENTS] =
-            std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
-        let mut dogs = [false; MAX_ELEMENTS];
+        let (mut elements, dogs) = self.held();
         let line_pa = self.car.line_pressure_pa;
-        let opened = if self.is_neutral {
-            self.partner(self.gear).and_then(|partner| self.single(self.gear, partner))
-        } else {
-            None
-        };
-        let opened = opened.map(|(clutches, _)| clutches[0].0);
-        // The clutches of a shift get their commands below.
-        let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
-        for gear in [Some(self.gear), next].into_iter().flatten() {
-            for holding in &self.car.gearbox.gears[gear].holding {
-                let element = holding.element;
-                match &self.car.clutches[element] {
-                    Some(clutch) if gear == self.gear && opened != Some(element) => {
-                        elements[element] = clutch.valve.command_for(line_pa)
-                    }
-                    Some(_) => (),
-                    None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
-                }
-            }
-        }
         self.open_at_low_speed(measured);
         let c = &self.calibration;
         if let Some(launch) = &mut self.launch {
@@ -366,6 +343,36 @@ impl CarShiftController {
         let lock_up_n_m = self.lock_up.torque_n_m((&self.car, &self.calibration), in_gear, engine_n_m, measured);
         self.strokes.follow(&self.car, &elements, period_s);
         CarCommands { elements, dogs, engine_share, lock_up_n_m }
+    }
+
+    /// Commands of the elements that the gear holds, and the dogs that are in; the clutches of a shift are open.
+    fn held(&self) -> ([f64; MAX_ELEMENTS], [bool; MAX_ELEMENTS]) {
+        let open = |element: usize| self.car.clutches.get(element).and_then(Option::as_ref);
+        let mut elements: [f64; MAX_ELEMENTS] =
+            std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
+        let mut dogs = [false; MAX_ELEMENTS];
+        let line_pa = self.car.line_pressure_pa;
+        let opened = if self.is_neutral {
+            self.partner(self.gear).and_then(|partner| self.single(self.gear, partner))
+        } else {
+            None
+        };
+        let opened = opened.map(|(clutches, _)| clutches[0].0);
+        // The clutches of a shift get their commands from it.
+        let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
+        for gear in [Some(self.gear), next].into_iter().flatten() {
+            for holding in &self.car.gearbox.gears[gear].holding {
+                let element = holding.element;
+                match &self.car.clutches[element] {
+                    Some(clutch) if gear == self.gear && opened != Some(element) => {
+                        elements[element] = clutch.valve.command_for(line_pa)
+                    }
+                    Some(_) => (),
+                    None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
+                }
+            }
+        }
+        (elements, dogs)
     }
 
     /// Without a converter the clutch opens before the engine turns too slowly, in a shift too.
