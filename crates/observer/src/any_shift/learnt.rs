@@ -46,6 +46,10 @@ const PER_SHIFT: f64 = 2.5e-4;
 /// Bound of a quantity in its deviations: the edge of a uniform distribution, and of the sum of two.
 const EDGE: f64 = 1.732;
 const EDGE_OF_TWO: f64 = 2.449;
+/// Correlation of the torque factors of two elements unlearnt \[chosen\]: half of the variance of the friction is that of the oil,
+/// which all of them share, and friction is two thirds of that of the factor. Without it a friction that is wrong in all
+/// elements alike would be taken for an error of the converter, of which there is one.
+const COMMON: f64 = 0.33;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the temperature of the
@@ -320,6 +324,7 @@ fn edge(k: usize) -> f64 {
 fn unlearnt<T: Real>(correlations: &Correlations<T>, i: usize, j: usize) -> T {
     match i.abs_diff(j) {
         0 => T::one(),
+        _ if i.max(j) < KISS_AT => T::of(COMMON),
         KISS_AT if i.max(j) < INERTIA_AT => correlations.get(i.min(j)).copied().unwrap_or(T::zero()),
         _ => T::zero(),
     }

@@ -207,8 +207,6 @@ pub struct AnyShiftState<T> {
     engine: Option<Engine<T>>,
     /// Newest reported engine torque, N m, and its age, s.
     reported: Option<(T, T)>,
-    /// Whether there ever was one.
-    reports: bool,
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
     running: Option<Running<T>>,
@@ -311,7 +309,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             elements,
             engine: None,
             reported: None,
-            reports: false,
             newest: [None; SPEEDS],
             running: None,
             lost: false,

@@ -62,9 +62,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             state.reported = Some((reading.value, reading.age_s));
         }
         state.reported = state.reported.filter(|(_, age_s)| *age_s <= lost);
-        state.reports = state.reports || reading.is_some();
-        // Beside a converter it is a second source, which many cars do not have.
-        let needed = state.reports || self.turbine.converter.is_none() || input.lock_up_applied;
+        // Beside a converter it is a second source, and the filter does without it.
+        let needed = self.turbine.converter.is_none() || input.lock_up_applied;
         match (input.engine_n_m, reading, state.reported) {
             (_, Some(_), _) => ChannelHealth::Good,
             (Some(_), None, _) => ChannelHealth::Refused,

@@ -5,7 +5,7 @@ use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
-use observer::{Health, Reading};
+use observer::{ChannelHealth, Health, Reading};
 use plant::car::{CarCalibration, CarModel, CarRun, CarSample, CarShift, Driver};
 use study::any_shift::{
     RECORD_S, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, inputs, score_samples, simulated,
@@ -373,6 +373,48 @@ fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
         commands: input.commands.map(to),
         gear: input.gear,
     }
+}
+
+/// A gear that the tables do not have is said to be none the filter can use, and no element is accused of slip; a command
+/// that stays away is said of its element.
+#[test]
+fn an_unknown_gear_and_a_lost_command_are_said() {
+    let car = &cars()[0];
+    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let sensors = sensors();
+    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let gear = |name: &str| car.gearbox.gear(name).unwrap();
+    let samples = simulated(car, car, &CarShift::usual(car, gear("2"), gear("3"), 0.15)).unwrap();
+    let inputs = inputs(car, &tables, &samples, &sensors, 1);
+    let said = |change: fn(&mut ShiftInput<f64>)| {
+        let mut state = filter.start();
+        let estimates = inputs.iter().take(80).enumerate().map(|(at, (_, input))| {
+            let mut input = *input;
+            if at >= 20 {
+                change(&mut input);
+            }
+            filter.step(&mut state, &input)
+        });
+        estimates.last().unwrap()
+    };
+    assert_eq!(said(|_| ()).health, Health::Good);
+    let unknown = said(|input| input.gear = GearCommand { from: 77, to: 77 });
+    assert_eq!((unknown.health, unknown.gear), (Health::SpeedsRejected, None));
+    let lost = said(|input| input.commands[2] = None);
+    assert_eq!((lost.commands[1], lost.commands[2]), (ChannelHealth::Good, ChannelHealth::Lost));
+    // The converter's maps do without it; what makes no sense is refused.
+    assert_eq!(said(|_| ()).channels.engine_torque, ChannelHealth::Unused);
+    let torque = |value: f64| move |input: &mut ShiftInput<f64>| input.engine_n_m = Some(Reading::now(value));
+    let mut state = filter.start();
+    let mut with = |value: f64| {
+        let mut input = inputs[0].1;
+        torque(value)(&mut input);
+        filter.step(&mut state, &input).channels.engine_torque
+    };
+    assert_eq!(
+        [with(100.0), with(f64::NAN), with(1e9)],
+        [ChannelHealth::Good, ChannelHealth::Refused, ChannelHealth::Refused]
+    );
 }
 
 /// Forty seconds of driving off through several gears: one filter without a new start.
