@@ -72,7 +72,8 @@ pub(crate) enum Command {
     /// Simulates an experiment and writes two files: NAME.csv with every signal, true values included, and
     /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
     /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
-    /// the drive is simulated without them, or with the scenario given by --scenario.
+    /// the drive is simulated without them, or with the scenario given by --scenario. With a [sensors] table NAME_measured.csv
+    /// has what the sensors read.
     ///
     /// A drive file (with segments) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
     /// listed shifts, and a vehicle file with a gearbox. The columns of the offgoing and oncoming clutch are empty between
@@ -130,8 +131,8 @@ pub(crate) enum Command {
     ///
     /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
     ///
-    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a CSV log with the
-    /// columns that `simulate` writes for a drive:
+    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a log with the
+    /// columns that `simulate` writes for a drive, or by a channel map with the commands of all elements:
     ///
     ///   wetclutch estimate city_measured.csv --vehicle vehicles/eight_speed.toml -o out.csv
     ///
@@ -190,7 +191,8 @@ pub(crate) enum Command {
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
     ///
-    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary. Writes
+    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary; or a drive, or
+    /// shifts, of many cars with a gearbox, which differ in friction, valves and converter (no page and figures). Writes
     ///
     ///   runs.csv, runs.parquet    one row for each run: factors, seed, status, shift quality, scores
     ///   study.html                distributions, sensitivity of the error, worst runs; opens from disk

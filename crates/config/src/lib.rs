@@ -4,6 +4,7 @@
 //! no further checks. An error names file, line, key, value and allowed range, and gives a hint for a
 //! likely mistake.
 
+mod car_study;
 pub mod check;
 pub mod drive;
 pub mod error;
@@ -16,6 +17,7 @@ pub mod study;
 mod tree;
 pub mod vehicle;
 
+pub use car_study::{CarStudy, CarStudyRuns, DrawnErrors};
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
 pub use experiment::{

@@ -22,6 +22,8 @@ pub enum Kind {
     Drive,
     /// Drives with varied parameters.
     Study,
+    /// Cars with a gearbox, drawn at random.
+    CarStudy,
     /// Values in place of some of a vehicle file's.
     Overlay,
     /// The sensors of a car.
@@ -108,6 +110,7 @@ impl Source {
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
+            (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
@@ -119,7 +122,7 @@ impl Source {
                 line: 1,
                 message:
                     "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
-                          file (with [[segment]] or [trace]), study file (with [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
+                          file (with [[segment]] or [trace]), study file (with [[factor]], or with `runs` for a car with a gearbox), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
                           with tables of a vehicle file)"
                         .to_owned(),
             }),

@@ -1,6 +1,7 @@
 //! Cars whose parameters are all off, fitted to 20 shifts behind sensors: prints the statistics of many of them.
 //!
-//! `FIT_CARS=200 cargo run --release -p fit --example draws`; `FIT_CASE=lossy` takes those of a case of `car_of`.
+//! `FIT_CARS=200 cargo run --release -p fit --example draws`; `FIT_CASE=lossy` takes those of a case of `car_of`. The seeds of the
+//! cars are their numbers, from `FIT_FIRST` (0) on; `FIT_LOGS=torque` or `speeds` takes one kind of logs only.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
 #[path = "../tests/common/mod.rs"]
@@ -10,20 +11,27 @@ use config::vehicle::short::{Facts, ValveKind, short_file};
 use config::{Source, Vehicle};
 
 use common::{Logs, TestCar, TestShift};
+use fit::Map;
+
+/// Shifts that are fitted, and shifts that are held out.
+const SHIFTS: u64 = 20;
+const HELD_OUT: u64 = 8;
 
 /// What came of one car.
 struct Outcome {
+    fit: fit::Fit,
     /// RMS error of the open loop's torque on held-out shifts, N m: given file, fitted file.
     torque_n_m: [f64; 2],
     /// The same of the pressure, Pa.
     pressure_pa: [f64; 2],
     /// Of each parameter the error in stated standard deviations.
     errors: Vec<(String, f64)>,
-    seconds: f64,
+    cpu_s: f64,
     iterations: u32,
 }
 
-/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`; all others are cars of the two-speed file.
+/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`, `hysteresis`, `other converter`; all others are cars of the
+/// two-speed file.
 fn car_of(case: &str, seed: u64) -> TestCar {
     let mut car = match case {
         "other car" => {
@@ -40,6 +48,8 @@ fn car_of(case: &str, seed: u64) -> TestCar {
             let file = Source::built_in("another car", &short_file(&facts, false).unwrap());
             TestCar::of(Vehicle::from_source(file).unwrap(), seed)
         }
+        "other shape" => TestCar::drawn(seed).with_other_maps(),
+        "hysteresis" => TestCar::drawn(seed).with_hysteresis(),
         _ => TestCar::drawn(seed),
     };
     if case == "lossy" {
@@ -50,104 +60,144 @@ fn car_of(case: &str, seed: u64) -> TestCar {
             sensor.errors.outliers = 1.0;
         }
     }
-    if case == "other shape" {
-        let friction = &mut car.car.oncoming.clutch.friction;
-        let values: Vec<f64> = friction
-            .axis()
-            .iter()
-            .zip(friction.values())
-            .map(|(slip, mu)| mu * (1.0 - 0.25 * (slip / 150.0).min(1.0).sqrt()))
-            .collect();
-        *friction = drivetrain::Table1::new(friction.axis(), &values).unwrap();
+    if case == "other converter" {
+        // A capacity that is 15 % less around a speed ratio of 0.8: a shape that the fit cannot give.
+        let capacity = &mut car.car.converter.capacity_n_m_s2;
+        let values = capacity.axis().iter().zip(capacity.values());
+        let dented: Vec<f64> =
+            values.map(|(v, c)| c * (1.0 - 0.15 * (1.0 - (v - 0.8).abs() / 0.15).max(0.0))).collect();
+        *capacity = drivetrain::Table1::new(capacity.axis(), &dented).unwrap();
     }
     car
 }
 
-fn outcome(case: &str, seed: u64, logs: Logs, count: u64) -> (fit::Fit, Outcome) {
+/// Time that this thread has run, s, which other programs on the machine do not lengthen; not a number where it is unknown.
+fn cpu_s() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map_or(f64::NAN, |ns| 1e-9 * ns)
+}
+
+fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let mut car = car_of(case, seed);
     let ages = if case == "sensors unknown" { fit::ReadingAges::default() } else { car.ages() };
-    let shifts: Vec<TestShift> = (0..count).map(|number| car.shift(number, logs)).collect();
-    let records: Vec<_> = shifts.iter().map(|shift| shift.record.clone()).collect();
-    let begin = std::time::Instant::now();
+    let records: Vec<_> = (0..SHIFTS).map(|number| car.shift(number, logs).record).collect();
+    let begin_s = cpu_s();
     let mut iterations = 0;
     let fit = fit::fit(&car.file, &records, ages, &mut |_| iterations += 1).unwrap();
-    let seconds = begin.elapsed().as_secs_f64();
+    let cpu_s = cpu_s() - begin_s;
     let fitted = fit.vehicle_file(&car.file, "a simulation").unwrap();
-    let held_out: Vec<TestShift> = (100..108).map(|number| car.shift(number, logs)).collect();
+    let held_out: Vec<TestShift> = (100..100 + HELD_OUT).map(|number| car.shift(number, logs)).collect();
     let mean = |vehicle, at: usize| {
-        (held_out.iter().map(|shift: &TestShift| shift.errors(vehicle)[at]).sum::<f64>() / 8.0).sqrt()
+        (held_out.iter().map(|shift: &TestShift| shift.errors(vehicle)[at]).sum::<f64>() / HELD_OUT as f64).sqrt()
     };
     let errors = (fit.priors.iter().enumerate())
         .map(|(i, prior)| {
-            let truth = car.truth.iter().find(|(parameter, _)| *parameter == prior.parameter).unwrap().1;
-            (prior.name.clone(), (fit.unknowns[i] - truth) / fit.precision.stated[(i, i)].sqrt())
+            let error = fit.unknowns[i] - car.true_value(prior.parameter);
+            (prior.name.clone(), error / fit.precision.stated[(i, i)].sqrt())
         })
         .collect();
-    let outcome = Outcome {
-        torque_n_m: [mean(&car.file, 0), mean(&fitted, 0)],
-        pressure_pa: [mean(&car.file, 1), mean(&fitted, 1)],
-        errors,
-        seconds,
-        iterations,
+    let torque_n_m = [mean(&car.file, 0), mean(&fitted, 0)];
+    let pressure_pa = [mean(&car.file, 1), mean(&fitted, 1)];
+    Outcome { fit, torque_n_m, pressure_pa, errors, cpu_s, iterations }
+}
+
+fn print_car(seed: u64, o: &Outcome) {
+    let worst = o.errors.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
+    let freed: Vec<&str> = o.fit.freed.iter().map(|map| map.name()).collect();
+    println!(
+        "car {seed}: torque N m {:.2} -> {:.2}, pressure kPa {:.2} -> {:.2}, {} iterations, CPU {:.2} s, worst {} {:+.1}, freed {freed:?}",
+        o.torque_n_m[0],
+        o.torque_n_m[1],
+        1e-3 * o.pressure_pa[0],
+        1e-3 * o.pressure_pa[1],
+        o.iterations,
+        o.cpu_s,
+        worst.0,
+        worst.1
+    );
+}
+
+/// Of each parameter how many truths lie in the stated 95 %, the mean and the spread of the errors in stated standard deviations.
+fn print_parameters(outcomes: &[Outcome]) {
+    let mut names: Vec<&String> = Vec::new();
+    for (name, _) in outcomes.iter().flat_map(|o| &o.errors) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let (mut inside, mut all) = (0, 0);
+    for name in names {
+        let of_car = |o: &Outcome| {
+            let (i, (_, error)) = o.errors.iter().enumerate().find(|(_, (other, _))| other == name)?;
+            Some((*error, o.fit.precision.stated[(i, i)].sqrt(), o.fit.priors[i].sd))
+        };
+        let found: Vec<(f64, f64, f64)> = outcomes.iter().filter_map(of_car).collect();
+        let count = found.len() as f64;
+        let held = found.iter().filter(|(error, ..)| error.abs() <= 1.96).count();
+        (inside, all) = (inside + held, all + found.len());
+        println!(
+            "{name:34} cars {count} held {:.2}  mean {:+.2}  spread {:.2}  sd {:.4} of {:.4}",
+            held as f64 / count,
+            found.iter().map(|(error, ..)| error).sum::<f64>() / count,
+            (found.iter().map(|(error, ..)| error * error).sum::<f64>() / count).sqrt(),
+            found.iter().map(|(_, sd, _)| sd).sum::<f64>() / count,
+            found[0].2
+        );
+    }
+    println!("all held {:.3}; torque scale {:.4}", inside as f64 / all as f64, outcomes[0].fit.torque_scale_sd());
+}
+
+fn print_all(outcomes: &[Outcome]) {
+    let cars = outcomes.len();
+    let rms = |of: &dyn Fn(&Outcome) -> f64| {
+        (outcomes.iter().map(|outcome| of(outcome).powi(2)).sum::<f64>() / cars as f64).sqrt()
     };
-    (fit, outcome)
+    let torque = [0, 1].map(|i| rms(&|o| o.torque_n_m[i]));
+    let pressure = [0, 1].map(|i| 1e-3 * rms(&|o| o.pressure_pa[i]));
+    println!(
+        "torque N m: file {:.2}, fitted {:.2}, ratio {:.3}; pressure kPa: file {:.2}, fitted {:.2}; CPU s mean {:.2}, most {:.2}; \
+         iterations at most {}",
+        torque[0],
+        torque[1],
+        torque[1] / torque[0],
+        pressure[0],
+        pressure[1],
+        outcomes.iter().map(|o| o.cpu_s).sum::<f64>() / cars as f64,
+        outcomes.iter().map(|o| o.cpu_s).fold(0.0, f64::max),
+        outcomes.iter().map(|o| o.iterations).max().unwrap_or(0),
+    );
+    let count = |is: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| is(o)).count();
+    println!(
+        "of {cars}: below the file {}, with a warning of a misfit {}, not converged {}, freed: {:?}",
+        count(&|o| o.torque_n_m[1] < o.torque_n_m[0]),
+        count(&|o| o.fit.statements().iter().any(|line| line.contains("warning: the"))),
+        count(&|o| !o.fit.is_converged),
+        Map::ALL.map(|map| (map.name(), count(&|o| o.fit.freed.contains(&map)))),
+    );
 }
 
 fn main() {
     let cars: u64 = std::env::var("FIT_CARS").map_or(10, |text| text.parse().unwrap());
     let case = std::env::var("FIT_CASE").unwrap_or_default();
     let first: u64 = std::env::var("FIT_FIRST").map_or(0, |text| text.parse().unwrap());
-    for (title, logs) in [
-        ("speeds and current", Logs::SpeedsAndCurrent),
-        ("with engine torque, and pressure in one shift", Logs::TorqueAndOnePressure),
+    let only = std::env::var("FIT_LOGS").unwrap_or_default();
+    for (word, title, logs) in [
+        ("speeds", "speeds and current", Logs::SpeedsAndCurrent),
+        ("torque", "with engine torque, and pressure in one shift", Logs::TorqueAndOnePressure),
     ] {
-        let outcomes: Vec<(fit::Fit, Outcome)> =
-            (first..first + cars).map(|seed| outcome(&case, seed, logs, 20)).collect();
-        let rms = |of: &dyn Fn(&Outcome) -> f64| {
-            (outcomes.iter().map(|(_, outcome)| of(outcome).powi(2)).sum::<f64>() / cars as f64).sqrt()
-        };
-        println!("\n{title}: {cars} cars");
-        for (seed, (_, o)) in outcomes.iter().enumerate() {
-            let worst = o.errors.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
-            println!(
-                "car {seed}: torque N m {:.2} -> {:.2}, pressure kPa {:.2} -> {:.2}, {} iterations, worst {} {:+.1}",
-                o.torque_n_m[0],
-                o.torque_n_m[1],
-                1e-3 * o.pressure_pa[0],
-                1e-3 * o.pressure_pa[1],
-                o.iterations,
-                worst.0,
-                worst.1
-            );
+        if !only.is_empty() && only != word {
+            continue;
         }
-        println!(
-            "torque N m: file {:.2}, fitted {:.2}; pressure kPa: file {:.2}, fitted {:.2}; seconds {:.2}, iterations {}",
-            rms(&|o| o.torque_n_m[0]),
-            rms(&|o| o.torque_n_m[1]),
-            1e-3 * rms(&|o| o.pressure_pa[0]),
-            1e-3 * rms(&|o| o.pressure_pa[1]),
-            outcomes.iter().map(|(_, o)| o.seconds).sum::<f64>() / cars as f64,
-            outcomes.iter().map(|(_, o)| o.iterations).max().unwrap_or(0),
-        );
-        let better = outcomes.iter().filter(|(_, o)| o.torque_n_m[1] < o.torque_n_m[0]).count();
-        println!("below the file: {better} of {cars}");
-        let (mut inside, mut all) = (0, 0);
-        for (i, prior) in outcomes[0].0.priors.iter().enumerate() {
-            let errors: Vec<f64> = outcomes.iter().map(|(_, o)| o.errors[i].1).collect();
-            let held = errors.iter().filter(|error| error.abs() <= 1.96).count();
-            (inside, all) = (inside + held, all + errors.len());
-            let sd = outcomes.iter().map(|(fit, _)| fit.precision.stated[(i, i)].sqrt()).sum::<f64>() / cars as f64;
-            let mean = errors.iter().sum::<f64>() / cars as f64;
-            println!(
-                "{:34} held {:.2}  mean {mean:+.2}  spread {:.2}  sd {sd:.4} of {:.4}",
-                prior.name,
-                held as f64 / cars as f64,
-                (errors.iter().map(|e| e * e).sum::<f64>() / cars as f64).sqrt(),
-                prior.sd
-            );
-        }
-        let scale = outcomes[0].0.torque_scale_sd();
-        println!("all held {:.3}; torque scale {scale:.4}", inside as f64 / all as f64);
-        println!("channels {:?}", outcomes[0].0.channels);
+        println!("\n{title}: {cars} cars from {first} on");
+        let outcomes: Vec<Outcome> = (first..first + cars)
+            .map(|seed| {
+                let outcome = outcome(&case, seed, logs);
+                print_car(seed, &outcome);
+                outcome
+            })
+            .collect();
+        print_all(&outcomes);
+        print_parameters(&outcomes);
+        println!("channels {:?}", outcomes[0].fit.channels);
     }
 }

@@ -2,12 +2,13 @@
 
 use config::{SpeedSensor, Vehicle};
 use drivetrain::{
-    Clutch, ClutchValve, Converter, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Table1, Tyre,
+    Clutch, ClutchValve, Converter, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Tyre,
 };
 
 use crate::Parameter;
 use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
 use crate::record::SegmentKind;
+use crate::shape::{Knots, Map, mapped};
 
 /// How far a speed wheel turns while a reading ages, rad: a reading is the mean over some teeth, and the last of them passed
 /// half a tooth ago. Zero where the sensor is not known; its delay then takes the mean.
@@ -62,6 +63,7 @@ pub(crate) struct Car {
     pub(crate) engine_torque_delay_s: f64,
     pub(crate) pressure_scale: f64,
     pub(crate) ages: ReadingAges,
+    pub(crate) knots: Knots,
 }
 
 impl Car {
@@ -91,6 +93,7 @@ impl Car {
             engine_torque_delay_s: 0.0,
             pressure_scale: 1.0,
             ages,
+            knots: Knots::of(vehicle),
         }
     }
 
@@ -148,6 +151,11 @@ impl Car {
             Parameter::EngineTorqueScale => self.engine_torque_scale = value,
             Parameter::EngineTorqueDelay => self.engine_torque_delay_s = value,
             Parameter::PressureScale => self.pressure_scale = value,
+            Parameter::Hysteresis => self.hysteresis_pa = value,
+            Parameter::Shape(Map::Friction, i) => {
+                self.clutch.friction = self.knots.friction(&self.clutch.friction, i, value);
+            }
+            Parameter::Shape(map, i) => self.valve = self.knots.valve(self.valve, map, i, value),
         }
     }
 
@@ -168,13 +176,6 @@ pub(crate) fn friction_shape([at_rest, slope]: [f64; 2], slip_rad_s: f64) -> f64
     let below = (1.0 - slip_rad_s / SHAPE_MIDDLE_RAD_S).max(0.0);
     let above = ((slip_rad_s - SHAPE_MIDDLE_RAD_S) / SLOPE_SPAN_RAD_S).clamp(0.0, 1.0);
     (1.0 + at_rest * below) * (1.0 + slope * above)
-}
-
-/// The table with other values on its axis.
-fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Table1<f64> {
-    let values: Vec<f64> = table.axis().iter().zip(table.values()).map(|(x, y)| value(*x, *y)).collect();
-    // The axis is that of a table; only a value that is not finite can be refused, and the fit rejects such a step.
-    Table1::new(table.axis(), &values).unwrap_or(*table)
 }
 
 fn coefficients(shift: &ReducedShift<f64>) -> [ShiftCoefficients<f64>; 3] {

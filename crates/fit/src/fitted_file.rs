@@ -1,11 +1,11 @@
 //! The vehicle file of a fit: the text of the given one with other values.
 
 use config::{Source, Vehicle};
-use drivetrain::CommandKind;
 
-use crate::car::friction_shape;
+use crate::car::Car;
+use crate::parameters::HYSTERESIS_UNIT_PA;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
-use crate::{Fit, FitError, Parameter};
+use crate::{Fit, FitError, Map, Parameter, ReadingAges, parameters};
 
 /// Least error of the turbine torque, as a share \[chosen\].
 const CONVERTER_SHARE_MIN: f64 = 0.03;
@@ -25,8 +25,10 @@ impl Fit {
     pub fn vehicle_file(&self, vehicle: &Vehicle, logs: &str) -> Result<Vehicle, FitError> {
         let mut text = VehicleText::new(&vehicle.source.text)?;
         let oncoming = oncoming_name(&vehicle.source.text)?;
+        let shafts = parameters::shafts(vehicle)?;
+        let fitted = Car::of_file(vehicle, ReadingAges::default()).with(&shafts, &self.priors, &self.unknowns);
         for prior in &self.priors {
-            self.write(&mut text, vehicle, &oncoming, prior.parameter)?;
+            self.write(&mut text, &fitted, &oncoming, prior.parameter)?;
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
@@ -40,59 +42,57 @@ impl Fit {
         })
     }
 
-    fn write(
-        &self,
-        text: &mut VehicleText,
-        vehicle: &Vehicle,
-        clutch: &str,
-        parameter: Parameter,
-    ) -> Result<(), FitError> {
+    fn write(&self, text: &mut VehicleText, fitted: &Car, clutch: &str, parameter: Parameter) -> Result<(), FitError> {
         let Some(value) = self.value(parameter) else { return Ok(()) };
-        let comment = self.comment(parameter);
-        let comment = Some(comment.as_str());
+        let words = self.comment(parameter);
+        let comment = Some(words.as_str());
         let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
-        let is_current = vehicle.oncoming.valve.command_kind() == CommandKind::Current;
         match parameter {
             Parameter::Capacity => text.map(&keys(&["converter", "capacity_n_m_s2"]), |c| value * c, comment),
             Parameter::TorqueRatio => {
                 text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
             }
             Parameter::Friction => {
-                let shape = [Parameter::FrictionAtRest, Parameter::FrictionSlope].map(|p| self.value(p).unwrap_or(0.0));
-                let friction = of_clutch(&["friction", "coefficient"]);
-                let slips = text.numbers(&of_clutch(&["friction", "slip_rad_s"]))?;
-                let values = text.numbers(&friction)?;
-                let fitted: Vec<f64> =
-                    slips.iter().zip(values).map(|(slip, mu)| value * friction_shape(shape, *slip) * mu).collect();
-                text.set(&friction, &fitted, comment)?;
+                let friction = &fitted.clutch.friction;
+                set_axis(text, &of_clutch(&["friction", "slip_rad_s"]), friction.axis())?;
+                text.set(&of_clutch(&["friction", "coefficient"]), friction.values(), comment)?;
                 // A clutch that sticks holds at least what it carries as it begins to slip.
-                let at_rest = fitted.first().copied().unwrap_or(0.0);
+                let at_rest = friction.values().first().copied().unwrap_or(0.0);
                 let more = "keeps its ratio to the fitted friction, and is not below it";
                 text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
             }
             Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
-            Parameter::Gain => {
-                let (own, observer) = if is_current {
-                    (of_clutch(&["valve", "gain", "gain_pa_a"]), keys(&["observer", "valve", "gain_pa_a"]))
+            Parameter::Gain => match fitted.valve.maps() {
+                Some(maps) => {
+                    set_axis(text, &of_clutch(&["valve", "gain", "current_a"]), maps.gain_pa_a.axis())?;
+                    text.set(&of_clutch(&["valve", "gain", "gain_pa_a"]), maps.gain_pa_a.values(), comment)?;
+                    text.map(&keys(&["observer", "valve", "gain_pa_a"]), |gain| value * gain, comment)
+                }
+                None => {
+                    text.map(&of_clutch(&["valve", "line_pressure_pa"]), |pressure| value * pressure, comment)?;
+                    text.map(&keys(&["observer", "valve", "line_pressure_pa"]), |pressure| value * pressure, comment)
+                }
+            },
+            Parameter::Lag => match fitted.valve.maps() {
+                Some(maps) => {
+                    set_axis(text, &of_clutch(&["valve", "lag", "pressure_pa"]), maps.time_constant_s.axis())?;
+                    text.set(&of_clutch(&["valve", "lag", "time_constant_s"]), maps.time_constant_s.values(), comment)?;
+                    text.map(&keys(&["observer", "valve", "time_constant_s"]), |lag| value * lag, comment)
+                }
+                None => {
+                    text.map(&of_clutch(&["valve", "flow_sqrt_pa_s"]), |flow| flow / value, comment)?;
+                    text.map(&keys(&["observer", "valve", "flow_sqrt_pa_s"]), |flow| flow / value, comment)
+                }
+            },
+            Parameter::Hysteresis => {
+                let own = of_clutch(&["valve", "hysteresis_pa"]);
+                if text.has(&own) {
+                    text.set(&own, &[value], comment)
+                } else if value == 0.0 {
+                    Ok(())
                 } else {
-                    (of_clutch(&["valve", "line_pressure_pa"]), keys(&["observer", "valve", "line_pressure_pa"]))
-                };
-                text.map(&own, |gain| value * gain, comment)?;
-                text.map(&observer, |gain| value * gain, comment)
-            }
-            Parameter::Lag => {
-                let (own, observer, power) = if is_current {
-                    (
-                        of_clutch(&["valve", "lag", "time_constant_s"]),
-                        keys(&["observer", "valve", "time_constant_s"]),
-                        1.0,
-                    )
-                } else {
-                    (of_clutch(&["valve", "flow_sqrt_pa_s"]), keys(&["observer", "valve", "flow_sqrt_pa_s"]), -1.0)
-                };
-                let factor = value.powf(power);
-                text.map(&own, |lag| factor * lag, comment)?;
-                text.map(&observer, |lag| factor * lag, comment)
+                    text.add_beside(&of_clutch(&["valve", "gain"]), "hysteresis_pa", value, &words)
+                }
             }
             Parameter::CommandDelay => {
                 text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
@@ -121,6 +121,9 @@ impl Fit {
         if parameter.is_delay() {
             let half_ms = 1e3 * SIDES * crate::parameters::DELAY_UNIT_S * sd;
             return format!("{:+.1} ms, 95 % +- {half_ms:.1} ms, {told}", 1e3 * value);
+        }
+        if parameter == Parameter::Hysteresis {
+            return format!("95 % +- {:.1} kPa, {told}", 1e-3 * SIDES * HYSTERESIS_UNIT_PA * sd);
         }
         let (least, greatest) = (value * (-SIDES * sd).exp(), value * (SIDES * sd).exp());
         format!("x {value:.3}, 95 % {least:.3} to {greatest:.3}, {told}")
@@ -152,14 +155,20 @@ impl Fit {
             .clamp(CONVERTER_SHARE_MIN, known.max(CONVERTER_SHARE_MIN));
         set(budget("turbine_torque_share"), &[share])?;
         set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
-        let friction = [Parameter::Friction, Parameter::FrictionAtRest, Parameter::FrictionSlope];
+        use Parameter as P;
+        let with_shape = |map: Map, some: &[P]| [some, &map.parameters()].concat();
+        let friction = with_shape(Map::Friction, &[P::Friction, P::FrictionAtRest, P::FrictionSlope]);
         set(budget("friction_factor"), &factors(&friction, given.friction_factor))?;
-        set(budget("valve_gain_factor"), &factors(&[Parameter::Gain], given.valve_gain_factor))?;
-        set(budget("valve_lag_factor"), &factors(&[Parameter::Lag], given.valve_lag_factor))?;
+        set(budget("valve_gain_factor"), &factors(&with_shape(Map::Gain, &[P::Gain]), given.valve_gain_factor))?;
+        set(budget("valve_lag_factor"), &factors(&with_shape(Map::Lag, &[P::Lag]), given.valve_lag_factor))?;
         set(budget("shaft_stiffness_factor"), &factors(&[Parameter::Stiffness], given.shaft_stiffness_factor))?;
         let mass = self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg;
         let known_kg = given.mass_kg + (mass - vehicle.road.mass_kg).abs();
         set(budget("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
+        if let Some(hysteresis_pa) = self.value(P::Hysteresis) {
+            let most_pa = hysteresis_pa + HYSTERESIS_UNIT_PA * half(&[P::Hysteresis]);
+            set(budget("valve_hysteresis_pa"), &[most_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
+        }
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
             let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
@@ -168,6 +177,11 @@ impl Fit {
         }
         Ok(())
     }
+}
+
+/// Puts in the axis of a map that has more points than in the file; any other stays as it is written.
+fn set_axis(text: &mut VehicleText, path: &[Step], axis: &[f64]) -> Result<(), FitError> {
+    if text.numbers(path)?.len() == axis.len() { Ok(()) } else { text.set(path, axis, None) }
 }
 
 /// Name of the oncoming clutch.

@@ -4,18 +4,24 @@ use config::Vehicle;
 use nalgebra::DVector;
 
 use crate::car::Car;
+use crate::freeing::Freed;
 use crate::intervals::{self, Precision};
 use crate::parameters::{self, Available, Prior};
 use crate::record::OutputClock;
+use crate::shape::Map;
 use crate::shift_model::ShiftModel;
 use crate::solver::{Problem, Solved, Unknowns};
 use crate::weights::Weights;
-use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord};
+use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord, freeing};
 
 /// More shifts only shrink what is below the floor of the intervals.
 pub const SHIFTS_MAX: usize = 30;
 /// So many shifts are fitted first; the others start from their result.
 const FIRST_SHIFTS: usize = 5;
+
+/// Iterations with new scales, and all of them, on these, and then on all shifts until near a minimum.
+const FIRST_ITERATIONS: (u32, u32) = (3, 5);
+const NEAR_ITERATIONS: (u32, u32) = (4, 5);
 
 /// A fitted vehicle.
 #[derive(Debug, Clone)]
@@ -38,6 +44,8 @@ pub struct Fit {
     pub is_converged: bool,
     /// Names of the parameters that ended where nothing beyond is held possible.
     pub at_limit: Vec<String>,
+    /// Maps that were given another shape than that of the file, because the residuals ask for it.
+    pub freed: Vec<Map>,
     pub(crate) weights: Weights,
 }
 
@@ -87,54 +95,128 @@ pub fn fit(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Fit, FitError> {
     check_vehicle(vehicle)?;
+    let (shifts, mut left_out) = sound(shifts);
     if shifts.is_empty() {
-        return Err(FitError::input("there is no shift to fit"));
+        let reasons = left_out.iter().map(|reason| format!("\n{reason}")).collect::<String>();
+        return Err(FitError::input(format!("there is no shift to fit{reasons}")));
     }
-    let available = available(shifts);
+    let available = available(&shifts);
     let shafts = parameters::shafts(vehicle)?;
-    let priors = parameters::priors(vehicle, &shafts, available);
+    let mut priors = parameters::priors(vehicle, &shafts, available);
+    let untold_gain_sd = if available.pressure { None } else { hold_gain(&mut priors) };
     let file = Car::of_file(vehicle, ages);
     let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
-    let few: Vec<ShiftModel> = spread_over(shifts, FIRST_SHIFTS).map(|record| ShiftModel::new(record, &file)).collect();
-    let shared: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+    let first = fit_some(&problem, &shifts, progress)?;
+    // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
+    let clock = OutputClock { delay_s: file.with(&shafts, &priors, &first.at.shared).output_delay_s, ages };
+    let (models, unusable) = usable(vehicle, &file, &shifts, clock)?;
+    left_out.extend(unusable);
+    let at = Unknowns { shared: first.at.shared, own: models.iter().map(ShiftModel::start).collect() };
+    let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
+    let near = problem.solve(&models, at, first.weights, NEAR_ITERATIONS, &mut say)?;
+    let before = near.at.shared.clone();
+    let Freed { priors: all, solved, lines, freed } =
+        freeing::with_freed_maps(vehicle, &file, &shafts, priors, &models, near, &mut say)?;
+    let Solved { mut at, weights, is_converged } = solved;
+    let problem = Problem { file: &file, shafts: &shafts, priors: &all };
+    let known = all.len() - 2 * (file.knots.maps().len() - freed.len());
+    // What is not freed is not known either: the intervals contain what it may be.
+    let mut precision = intervals::precision(&problem, &models, &lines, &at, &weights, untold_gain_sd)?.of_first(known);
+    let mut priors = all[..known].to_vec();
+    release_gain(&mut priors, untold_gain_sd);
+    at.shared.truncate(known);
+    if !freed.is_empty() {
+        precision.with_moved(&freeing::moved(&priors, &before, &at.shared));
+    }
+    let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
+    Ok(Fit {
+        at_limit: at_limit.map(|(prior, _)| prior.name.clone()).collect(),
+        unknowns: scaled_by_priors(&priors, at.shared),
+        channels: channels(&models, &weights),
+        precision,
+        available,
+        shifts: models.len(),
+        unusable: left_out,
+        is_converged,
+        freed,
+        weights,
+        priors,
+    })
+}
+
+/// The shifts without those that have readings which are no numbers, and without copies: a shift tells what it has to tell once.
+fn sound(shifts: &[ShiftRecord]) -> (Vec<ShiftRecord>, Vec<String>) {
+    let (mut sound, mut left_out): (Vec<ShiftRecord>, Vec<String>) = (Vec::new(), Vec::new());
+    for record in shifts {
+        let first = sound.iter().find(|other| other.engine == record.engine && other.turbine == record.turbine);
+        if let Some(role) = record.not_finite() {
+            left_out.push(format!("{}: readings of {role} are not finite numbers", record.name));
+        } else if let Some(first) = first {
+            left_out.push(format!("{}: the same readings as {}", record.name, first.name));
+        } else {
+            sound.push(record.clone());
+        }
+    }
+    (sound, left_out)
+}
+
+/// A fit of a few of the shifts, from the vehicle file.
+fn fit_some(
+    problem: &Problem<'_>,
+    shifts: &[ShiftRecord],
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Solved, FitError> {
+    let few: Vec<ShiftModel> =
+        spread_over(shifts, FIRST_SHIFTS).map(|record| ShiftModel::new(record, problem.file)).collect();
+    let shared: Vec<f64> = problem.priors.iter().map(|prior| prior.mean).collect();
     let start = Unknowns { shared, own: few.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: few.len(), iteration });
-    let Solved { at: first, weights, .. } = problem.solve(&few, start, Weights::START, (3, 5), &mut say)?;
-    // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
-    let clock = OutputClock { delay_s: file.with(&shafts, &priors, &first.shared).output_delay_s, ages };
-    let mut unusable = Vec::new();
-    let mut models = Vec::new();
+    problem.solve(&few, start, Weights::START, FIRST_ITERATIONS, &mut say)
+}
+
+/// The shifts that can be used now that the clock of the output speed is known, and why the others cannot.
+fn usable(
+    vehicle: &Vehicle,
+    file: &Car,
+    shifts: &[ShiftRecord],
+    clock: OutputClock,
+) -> Result<(Vec<ShiftModel>, Vec<String>), FitError> {
+    let (mut models, mut unusable) = (Vec::new(), Vec::new());
     for mut record in shifts.iter().cloned() {
         match record.find_by(&vehicle.shift, Some(clock)) {
-            Ok(()) => models.push(ShiftModel::new(record, &file)),
+            Ok(()) => models.push(ShiftModel::new(record, file)),
             Err(reason) => unusable.push(format!("{}: {reason}", record.name)),
         }
     }
     if models.is_empty() {
         return Err(FitError::input(format!("no shift can be used\n{}", unusable.join("\n"))));
     }
-    let at = Unknowns { shared: first.shared, own: models.iter().map(ShiftModel::start).collect() };
-    let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
-    let Solved { at, weights, is_converged } = problem.solve(&models, at, weights, (4, 12), &mut say)?;
-    let precision = intervals::precision(&problem, &models, &at, &weights, available.pressure)?;
-    let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
-    let at_limit = at_limit.map(|(prior, _)| prior.name.clone()).collect();
-    let unknowns = scaled_by_priors(&priors, at.shared);
+    Ok((models, unusable))
+}
+
+/// Scale and gain of the channels that the shifts have.
+fn channels(models: &[ShiftModel], weights: &Weights) -> Vec<(Channel, f64, f64)> {
     let has = |channel| models.iter().any(|model| model.blocks.iter().any(|block| block.channel == channel));
     let channels = Channel::ALL.into_iter().filter(|channel| has(*channel));
-    let channels = channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect();
-    Ok(Fit {
-        unknowns,
-        precision,
-        available,
-        shifts: models.len(),
-        unusable,
-        channels,
-        is_converged,
-        at_limit,
-        weights,
-        priors,
-    })
+    channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect()
+}
+
+/// Without a pressure the gain of the valve cannot be told: what speeds seem to say of it rests on the shape of the lag over pressure. It
+/// stays near that of the file, and the intervals get back what was known of it, which is returned.
+fn hold_gain(priors: &mut [Prior]) -> Option<f64> {
+    /// Share of its standard deviation in which it is held; none would make it a constant, with which nothing is correlated.
+    const HELD_SHARE: f64 = 0.1;
+    let gain = priors.iter_mut().find(|prior| prior.parameter == Parameter::Gain)?;
+    let sd = gain.sd;
+    gain.sd *= HELD_SHARE;
+    Some(sd)
+}
+
+/// Gives the gain back what was known of it.
+fn release_gain(priors: &mut [Prior], sd: Option<f64>) {
+    for prior in priors.iter_mut().filter(|prior| prior.parameter == Parameter::Gain) {
+        prior.sd = sd.unwrap_or(prior.sd);
+    }
 }
 
 /// At most so many of the shifts, evenly over all.
@@ -179,7 +261,7 @@ impl Fit {
 
 /// Moves the unknowns along the factor of all torques to where the priors want it. What data seem to say of it rests on
 /// loads that the file takes as exact, see [`intervals`].
-fn scaled_by_priors(priors: &[Prior], unknowns: Vec<f64>) -> Vec<f64> {
+pub(crate) fn scaled_by_priors(priors: &[Prior], unknowns: Vec<f64>) -> Vec<f64> {
     let (weights, _) = intervals::torque_scale(priors);
     let off: f64 = (priors.iter().zip(&unknowns).zip(weights.iter())).map(|((p, x), w)| w * (x - p.mean)).sum();
     (priors.iter().zip(unknowns)).map(|(prior, x)| x - off * prior.parameter.power_of_torque()).collect()

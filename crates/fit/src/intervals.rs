@@ -7,8 +7,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::parameters::{DELAY_UNIT_S, Prior};
-use crate::shift_model::ShiftModel;
+use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, Prior};
+use crate::shape::Map;
+use crate::shift_model::{Linearised, ShiftModel};
 use crate::solver::{NO_INFLATION, Problem, Unknowns};
 use crate::weights::{Weights, correlation_factor};
 use crate::{Channel, FitError, Parameter};
@@ -26,6 +27,20 @@ pub struct Precision {
 }
 
 impl Precision {
+    /// Of the first unknowns, whatever the others are.
+    pub(crate) fn of_first(&self, count: usize) -> Self {
+        let first = |covariance: &DMatrix<f64>| covariance.view((0, 0), (count, count)).into_owned();
+        Self { stated: first(&self.stated), auto: first(&self.auto) }
+    }
+
+    /// Widens what is known by how far the unknowns moved as the maps were given a freer shape. A shape that is freer still is taken to move
+    /// them by half of that, the next by a quarter and so on: no further than as much again, which is two standard deviations \[chosen\].
+    pub(crate) fn with_moved(&mut self, moved: &DVector<f64>) {
+        let outer = 0.25 * moved * moved.transpose();
+        self.auto += &outer / (FACTOR * FACTOR);
+        self.stated += outer;
+    }
+
     /// Standard deviation of a combination of unknowns as it is stated.
     pub(crate) fn combination_sd(&self, along: &DVector<f64>) -> f64 {
         /// Least one: what the model leaves out does not shrink with more shifts.
@@ -35,10 +50,11 @@ impl Precision {
 }
 
 /// Least standard deviation of a parameter: what the model leaves out does not shrink with more shifts.
-fn floor(parameter: Parameter) -> f64 {
+pub(crate) fn floor(parameter: Parameter) -> f64 {
     match parameter {
         Parameter::Inertia(_) | Parameter::Stiffness => 0.015,
-        Parameter::Damping | Parameter::Tyre | Parameter::Lag => 0.02,
+        Parameter::Damping | Parameter::Tyre | Parameter::Lag | Parameter::Shape(Map::Lag, _) => 0.02,
+        Parameter::Hysteresis => 300.0 / HYSTERESIS_UNIT_PA,
         Parameter::WheelScale => 1e-4,
         Parameter::PressureScale => 1e-3,
         _ if parameter.is_delay() => 0.3e-3 / DELAY_UNIT_S,
@@ -50,14 +66,14 @@ fn floor(parameter: Parameter) -> f64 {
 pub(crate) fn precision(
     problem: &Problem<'_>,
     shifts: &[ShiftModel],
+    lines: &[Linearised],
     at: &Unknowns,
     weights: &Weights,
-    has_pressure: bool,
+    untold_gain_sd: Option<f64>,
 ) -> Result<Precision, FitError> {
-    let lines = problem.linearised(shifts, at);
-    let plain = problem.normal(shifts, &lines, at, weights, &NO_INFLATION, 0.0)?;
+    let plain = problem.normal(shifts, lines, at, weights, &NO_INFLATION, 0.0)?;
     let inflation = inflation(shifts, lines.iter().map(|line| &line.residuals), weights);
-    let auto = problem.normal(shifts, &lines, at, weights, &inflation, 0.0)?;
+    let auto = problem.normal(shifts, lines, at, weights, &inflation, 0.0)?;
     let count = problem.priors.len();
     let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, problem.priors.iter().map(|p| p.sd.powi(-2))));
     let inverse = |matrix: DMatrix<f64>| {
@@ -85,7 +101,7 @@ pub(crate) fn precision(
     }
     let mut auto = auto_covariance;
     for covariance in [&mut auto, &mut stated] {
-        for (weights, variance) in untold(problem.priors, has_pressure) {
+        for (weights, variance) in untold(problem.priors, untold_gain_sd) {
             forget(covariance, &weights, variance);
         }
     }
@@ -97,14 +113,14 @@ pub(crate) fn precision(
 /// The factor of all torques: what speeds seem to say of it comes from rolling resistance, drag and the inertia of
 /// the wheels, which the file takes as exact. The gain of the valve, where no pressure is measured: what speeds seem to say
 /// of it comes from the shape of its lag over pressure.
-fn untold(priors: &[Prior], has_pressure: bool) -> Vec<(DVector<f64>, f64)> {
+fn untold(priors: &[Prior], untold_gain_sd: Option<f64>) -> Vec<(DVector<f64>, f64)> {
     let (scale, precision) = torque_scale(priors);
     let mut combinations = vec![(scale, precision.recip())];
     let gain = priors.iter().position(|prior| prior.parameter == Parameter::Gain);
-    if let Some(gain) = gain.filter(|_| !has_pressure) {
+    if let Some((gain, sd)) = gain.zip(untold_gain_sd) {
         let mut only = DVector::zeros(priors.len());
         only[gain] = 1.0;
-        combinations.push((only, priors[gain].sd.powi(2)));
+        combinations.push((only, sd * sd));
     }
     combinations
 }

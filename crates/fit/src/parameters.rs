@@ -3,10 +3,13 @@
 use config::Vehicle;
 
 use crate::FitError;
+use crate::shape::{Knots, Map};
 use crate::vehicle_text;
 
 /// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
+/// The hysteresis is fitted in units of this, Pa.
+pub(crate) const HYSTERESIS_UNIT_PA: f64 = 1e4;
 /// The slip at which the shape of the friction changes nothing, rad/s.
 pub(crate) const SHAPE_MIDDLE_RAD_S: f64 = 100.0;
 /// The friction slope is the change over this slip above it, rad/s.
@@ -61,15 +64,19 @@ pub enum Parameter {
     EngineTorqueDelay,
     /// Factor on the reading of the pressure sensor.
     PressureScale,
+    /// Half-width of the hysteresis of the oncoming clutch's valve, Pa.
+    Hysteresis,
+    /// Relative change of a freed map at one of two points of its own.
+    Shape(Map, usize),
 }
 
 impl Parameter {
-    /// Whether it is a relative change of the shape of the friction.
+    /// Whether it is a relative change of the shape of a map.
     pub fn is_shape(self) -> bool {
-        matches!(self, Self::FrictionAtRest | Self::FrictionSlope)
+        matches!(self, Self::FrictionAtRest | Self::FrictionSlope | Self::Shape(..))
     }
 
-    /// Whether it is a delay; all others but the shape of the friction are factors.
+    /// Whether it is a delay; all others but shapes and the hysteresis are factors.
     pub fn is_delay(self) -> bool {
         matches!(
             self,
@@ -112,13 +119,14 @@ impl Parameter {
         match self {
             _ if self.is_delay() => DELAY_UNIT_S * x,
             _ if self.is_shape() => x,
+            Self::Hysteresis => HYSTERESIS_UNIT_PA * x.max(0.0),
             _ => x.exp(),
         }
     }
 }
 
 /// A parameter with what is known of it before the fit: mean and standard deviation of its unknown, which is the logarithm
-/// of a factor, a delay in units of 10 ms, or a relative change.
+/// of a factor, a delay in units of 10 ms, a half-width in units of 10 kPa, or a relative change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// What it is.
@@ -137,7 +145,8 @@ const POSSIBLE: f64 = 4.0;
 impl Prior {
     /// Least and greatest value that is held possible.
     pub(crate) fn limits(&self) -> [f64; 2] {
-        [self.mean - POSSIBLE * self.sd, self.mean + POSSIBLE * self.sd]
+        let least = self.mean - POSSIBLE * self.sd;
+        [if self.parameter == Parameter::Hysteresis { least.max(0.0) } else { least }, self.mean + POSSIBLE * self.sd]
     }
 
     /// Whether a value is at its limit.
@@ -222,6 +231,8 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         (P::Tyre, "tyre slip", 0.0, uniform(0.25)),
         (P::Mass, "vehicle mass", 0.0, uniform(budget.mass_kg / vehicle.road.mass_kg)),
     ];
+    let [file, most] = [vehicle.oncoming.hysteresis_pa, budget.valve_hysteresis_pa].map(|pa| pa / HYSTERESIS_UNIT_PA);
+    more.push((P::Hysteresis, "valve hysteresis, half-width", file, uniform(most).max(0.02)));
     if has.offgoing {
         more.push((P::OffgoingFriction, "friction of the offgoing clutch", 0.0, between(budget.friction_factor)));
     }
@@ -245,4 +256,25 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
     (list.into_iter().zip(names))
         .map(|((parameter, _, mean, sd), name)| Prior { parameter, name, mean, sd: sd.max(1e-4) })
         .collect()
+}
+
+/// The two numbers of a freed shape, with the range of the map in the error budget as what is known of them: any map within it is
+/// possible. A friction point between two others is half as free as they are against each other, as in a random walk.
+pub(crate) fn shape_priors(vehicle: &Vehicle, knots: &Knots, map: Map) -> [Prior; 2] {
+    let sd = match map {
+        Map::Friction => 0.5 * between(vehicle.error_bounds.friction_factor),
+        Map::Lag => between(vehicle.error_bounds.valve_lag_factor),
+        Map::Gain => between(vehicle.error_bounds.valve_gain_factor),
+    };
+    [0, 1].map(|i| Prior { parameter: Parameter::Shape(map, i), name: knots.name(map, i), mean: 0.0, sd })
+}
+
+/// What is known of the friction's change at rest and above the middle once its shape is free: the whole range of the error budget.
+pub(crate) fn free_friction(vehicle: &Vehicle, priors: &mut [Prior]) {
+    let sd = between(vehicle.error_bounds.friction_factor);
+    for prior in priors {
+        if matches!(prior.parameter, Parameter::FrictionAtRest | Parameter::FrictionSlope) {
+            prior.sd = prior.sd.max(sd);
+        }
+    }
 }

@@ -78,6 +78,22 @@ pub(crate) struct OutputClock {
 }
 
 impl ShiftRecord {
+    /// The first of the signals with times or values that are not finite.
+    pub(crate) fn not_finite(&self) -> Option<&'static str> {
+        let signals = [
+            ("the engine speed", &self.engine),
+            ("the turbine speed", &self.turbine),
+            ("the output speed", &self.output),
+            ("the wheel speed", &self.wheel),
+            ("the oncoming clutch's command", &self.oncoming),
+            ("the offgoing clutch's command", &self.offgoing),
+            ("the pressure", &self.pressure),
+            ("the engine torque", &self.engine_torque),
+        ];
+        let is_finite = |series: &Series| series.time_s.iter().chain(&series.value).all(|x| x.is_finite());
+        signals.into_iter().find(|(_, series)| !is_finite(series)).map(|(name, _)| name)
+    }
+
     /// Finds the segments; an error says why the shift cannot be used.
     ///
     /// # Errors

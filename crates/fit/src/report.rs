@@ -1,7 +1,8 @@
 //! What a fit has found, in words.
 
 use crate::fitted_file::SIDES;
-use crate::parameters::DELAY_UNIT_S;
+use crate::freeing::LEVEL;
+use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
 use crate::{Channel, Fit, Parameter, Verdict};
 
 /// A row of the table of parameters.
@@ -43,6 +44,7 @@ impl Fit {
             let kind = match prior.parameter {
                 p if p.is_delay() => Kind::Delay,
                 p if p.is_shape() => Kind::Share,
+                Parameter::Hysteresis => Kind::Pressure,
                 _ => Kind::Factor,
             };
             row(&prior.name, self.unknowns[i], sd, prior.sd, self.verdict(prior.parameter), kind)
@@ -67,7 +69,19 @@ impl Fit {
             self.torque_scale_verdict().name()
         )];
         lines.extend(self.correlations());
+        if !self.freed.is_empty() {
+            let names: Vec<&str> = self.freed.iter().map(|map| map.name()).collect();
+            lines.push(format!(
+                "freed, because the shifts ask for another shape than the file's: {} (Hotelling's T2 over the shifts, level {LEVEL})",
+                names.join(", ")
+            ));
+        }
         lines.extend(self.misfits());
+        if self.freed.is_empty() && self.given_is_possible() {
+            lines.push(
+                "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned(),
+            );
+        }
         if !self.is_converged {
             lines.push(
                 "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
@@ -97,11 +111,22 @@ impl Fit {
         (!words.is_empty()).then(|| format!("correlated: {}", words.join("; ")))
     }
 
+    /// Whether the values of the given file lie in the intervals of the car's parameters that all hold in 95 %: by Bonferroni, of so many
+    /// parameters each in 95 % of one over their number.
+    fn given_is_possible(&self) -> bool {
+        /// Standard deviations on either side that 99.7 % lie within: 5 % over 17 parameters, about as many as there are.
+        const SIDES_OF_ALL: f64 = 3.0;
+        let mut of_car = self.priors.iter().enumerate().filter(|(_, prior)| !prior.parameter.is_of_signals());
+        of_car.all(|(i, prior)| {
+            (self.unknowns[i] - prior.mean).abs() <= SIDES_OF_ALL * self.precision.stated[(i, i)].sqrt()
+        })
+    }
+
     fn misfits(&self) -> Vec<String> {
         let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
         let warn = |_: &(Channel, f64, f64)| {
-            "warning: the model does not follow the turbine speed: its errors last. The maps of converter, friction or valve have \
-             another shape than in the vehicle file, which the fit does not change; the intervals are too small"
+            "warning: the model does not follow the turbine speed: its errors last. The converter or the valve works in another way \
+             than in the vehicle file, which the fit does not change; the intervals are too small"
                 .to_owned()
         };
         let limited = (!self.at_limit.is_empty()).then(|| {
@@ -166,6 +191,11 @@ impl Fit {
             "for the lag of the valve, shifts with a longer inertia phase",
         );
         when(
+            true,
+            "for the backlash of the driveline, which shifts under load do not tell: press and release the pedal in one gear, so that the \
+             torque of the shafts changes its sign; for rolling resistance and air drag: coast down in neutral on a level road, both ways",
+        );
+        when(
             self.shifts < 15,
             "20 upshifts: 6 at light throttle (0.15), 6 early ones from low speed, 4 at medium throttle, 4 with a tip-in at the shift",
         );
@@ -177,6 +207,7 @@ enum Kind {
     Factor,
     Delay,
     Share,
+    Pressure,
 }
 
 fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {
@@ -186,6 +217,10 @@ fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -
         Kind::Delay => {
             let ms = |x: f64| 1e3 * DELAY_UNIT_S * x;
             (format!("{:+.1} ms", ms(x)), format!("{:+.1} to {:+.1} ms", ms(x - half), ms(x + half)))
+        }
+        Kind::Pressure => {
+            let kpa = |x: f64| 1e-3 * HYSTERESIS_UNIT_PA * x;
+            (format!("{:.1} kPa", kpa(x)), format!("{:.1} to {:.1} kPa", kpa((x - half).max(0.0)), kpa(x + half)))
         }
         Kind::Share => {
             (format!("{:+.1} %", 100.0 * x), format!("{:+.1} to {:+.1} %", 100.0 * (x - half), 100.0 * (x + half)))

@@ -7,7 +7,8 @@ use crate::motion::{Circumstances, Inputs, Motion, Part, STEP_S, State};
 use crate::parameters::{Prior, Shaft};
 use crate::pressure::{Grid, pressures};
 use crate::record::{Segment, SegmentKind, ShiftRecord, age_s};
-use crate::{Parameter, Series};
+use crate::shape::Map;
+use crate::{Parameter as P, Series};
 
 /// Steps of the differences for derivatives, in the unit of the unknown.
 const DIFFERENCE: f64 = 1e-3;
@@ -341,13 +342,13 @@ impl ShiftModel {
             moved[j] = unknowns[j];
             let mut changed = None;
             match prior.parameter {
-                Parameter::Gain | Parameter::Lag | Parameter::CommandDelay => {
+                P::Gain | P::Lag | P::CommandDelay | P::Hysteresis | P::Shape(Map::Lag | Map::Gain, _) => {
                     changed.get_or_insert_with(|| inputs.clone()).oncoming_pa = self.oncoming(&other);
                 }
-                Parameter::EngineDelay => {
+                P::EngineDelay => {
                     changed.get_or_insert_with(|| inputs.clone()).engine_rad_s = self.engine(&other);
                 }
-                Parameter::EngineTorqueDelay => {
+                P::EngineTorqueDelay => {
                     changed.get_or_insert_with(|| inputs.clone()).engine_n_m = self.engine_torque(&other);
                 }
                 _ => {}

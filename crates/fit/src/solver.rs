@@ -12,8 +12,9 @@ use crate::shift_model::{Linearised, ShiftModel};
 use crate::weights::{HUBER, Weights};
 use crate::{Channel, FitError};
 
-/// A step that changes no unknown by more than this share of its standard deviation ends the fit.
-const CONVERGED: f64 = 0.02;
+/// A step that changes no unknown by more than this share of its plain standard deviation, of which the stated one is 1.4 times or
+/// more, ends the fit.
+const CONVERGED: f64 = 0.1;
 /// Dampings tried in one iteration.
 const TRIES: u32 = 8;
 
@@ -187,9 +188,7 @@ impl Problem<'_> {
             matrix[(j, j)] = (matrix[(j, j)] + precision) * (1.0 + damping);
             gradient[j] += precision * (x - prior.mean);
         }
-        let cholesky = matrix.cholesky().ok_or_else(|| not_finite("the parameters"))?;
-        let whole = -cholesky.solve(&gradient);
-        let inverse = cholesky.inverse();
+        let (whole, inverse) = self.within_limits(at, matrix, &gradient)?;
         let limited = |j: usize| {
             let [least, greatest] = self.priors[j].limits();
             (at.shared[j] + whole[j]).clamp(least, greatest)
@@ -204,6 +203,37 @@ impl Problem<'_> {
             })
             .collect();
         Ok((Unknowns { shared, own }, size))
+    }
+}
+
+impl Problem<'_> {
+    /// The step of the parameters and the inverse of their matrix. A parameter that is at its limit and would leave it is held there
+    /// before the others are solved for: clamped afterwards, it would have made their steps wrong again and again.
+    fn within_limits(
+        &self,
+        at: &Unknowns,
+        mut matrix: DMatrix<f64>,
+        gradient: &DVector<f64>,
+    ) -> Result<(DVector<f64>, DMatrix<f64>), FitError> {
+        /// Precision over that of the data with which a parameter is held.
+        const HELD: f64 = 1e9;
+        let mut is_held = vec![false; gradient.len()];
+        loop {
+            let cholesky = matrix.clone().cholesky().ok_or_else(|| not_finite("the parameters"))?;
+            let step = -cholesky.solve(gradient);
+            let leaves = |j: usize| {
+                let [least, greatest] = self.priors[j].limits();
+                (at.shared[j] <= least && step[j] < 0.0) || (at.shared[j] >= greatest && step[j] > 0.0)
+            };
+            let leaving: Vec<usize> = (0..step.len()).filter(|j| !is_held[*j] && leaves(*j)).collect();
+            if leaving.is_empty() {
+                return Ok((step, cholesky.inverse()));
+            }
+            for j in leaving {
+                is_held[j] = true;
+                matrix[(j, j)] *= HELD;
+            }
+        }
     }
 }
 

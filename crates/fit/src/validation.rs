@@ -3,10 +3,10 @@
 use config::Vehicle;
 
 use crate::car::Car;
-use crate::parameters::{self, Prior};
+use crate::parameters::{self, HYSTERESIS_UNIT_PA, Prior};
 use crate::shift_model::ShiftModel;
 use crate::solver::{Problem, Unknowns};
-use crate::{Channel, Fit, FitError, ReadingAges, ShiftRecord, open_loop};
+use crate::{Channel, Fit, FitError, Parameter, ReadingAges, ShiftRecord, open_loop};
 
 /// Errors over shifts that were held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,14 +35,8 @@ impl Fit {
         if held_out.is_empty() {
             return Ok(None);
         }
-        // The car is what it is in its file; what is of the signals is that of the fit.
-        let of_file =
-            |i: usize| if self.priors[i].parameter.is_of_signals() { self.unknowns[i] } else { self.priors[i].mean };
-        let unfitted: Vec<f64> = (0..self.priors.len()).map(of_file).collect();
-        let turbine_rad_s = [
-            self.turbine_error(given, &unfitted, held_out, ages)?,
-            self.turbine_error(given, &self.unknowns, held_out, ages)?,
-        ];
+        // Either car is what is written in its file; what is of the signals is that of the fit.
+        let turbine_rad_s = [self.turbine_error(given, held_out, ages)?, self.turbine_error(fitted, held_out, ages)?];
         let pressure = |vehicle: &Vehicle| {
             let errors = held_out.iter().flat_map(|record| {
                 let [from_s, to_s] = [record.pressure.time_s.first(), record.pressure.time_s.last()]
@@ -58,11 +52,10 @@ impl Fit {
         Ok(Some(HeldOut { shifts: held_out.len(), turbine_rad_s, pressure_pa }))
     }
 
-    /// RMS of the one-step errors of the turbine speed with these parameters.
+    /// RMS of the one-step errors of the turbine speed with a vehicle file, and the fitted delays and scales of the signals.
     fn turbine_error(
         &self,
         vehicle: &Vehicle,
-        unknowns: &[f64],
         held_out: &[ShiftRecord],
         ages: ReadingAges,
     ) -> Result<Option<f64>, FitError> {
@@ -70,11 +63,19 @@ impl Fit {
         const HELD_SD: f64 = 1e-7;
         let file = Car::of_file(vehicle, ages);
         let shafts = parameters::shafts(vehicle)?;
-        let held = |(prior, x): (&Prior, &f64)| Prior { mean: *x, sd: HELD_SD, ..prior.clone() };
-        let priors: Vec<Prior> = self.priors.iter().zip(unknowns).map(held).collect();
+        let of_file = |prior: &Prior, x: f64| match prior.parameter {
+            parameter if parameter.is_of_signals() => x,
+            Parameter::Hysteresis => vehicle.oncoming.hysteresis_pa / HYSTERESIS_UNIT_PA,
+            _ => 0.0,
+        };
+        let held = |(prior, x): (&Prior, &f64)| Prior { mean: of_file(prior, *x), sd: HELD_SD, ..prior.clone() };
+        let priors: Vec<Prior> = self.priors.iter().zip(&self.unknowns).map(held).collect();
         let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
         let models: Vec<ShiftModel> = held_out.iter().map(|record| ShiftModel::new(record.clone(), &file)).collect();
-        let start = Unknowns { shared: unknowns.to_vec(), own: models.iter().map(ShiftModel::start).collect() };
+        let start = Unknowns {
+            shared: priors.iter().map(|prior| prior.mean).collect(),
+            own: models.iter().map(ShiftModel::start).collect(),
+        };
         let at = problem.solve(&models, start, self.weights, (0, 6), &mut |_| {})?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {

@@ -97,6 +97,18 @@ impl VehicleText {
         Ok(())
     }
 
+    /// Adds a number to the table of another value, on the line above it.
+    pub(crate) fn add_beside(&mut self, path: &[Step], key: &str, value: f64, comment: &str) -> Result<(), FitError> {
+        let (_, key_at) = self.place(path)?;
+        let line_at = self.text[..key_at].rfind('\n').map_or(0, |end| end + 1);
+        if !self.text[line_at..key_at].trim().is_empty() {
+            return Err(missing(path));
+        }
+        self.edits
+            .push((line_at..line_at, format!("{FITTED}{comment}; the file had none\n{key} = {}\n", number(value))));
+        Ok(())
+    }
+
     /// The text with all changes.
     pub(crate) fn finish(mut self) -> String {
         // From the end on, so that the places before stay right; a comment goes before a value on its line.

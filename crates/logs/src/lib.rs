@@ -33,5 +33,5 @@ pub use readings::{Reading, Readings, RoleSummary};
 pub use role::Role;
 pub use samples::{Clock, Quality, QualityCounts, Sample, Samples};
 pub use shifts::{Direction, GearsOfShift, Load, Shift, ShiftFinder, ShiftPhase, ShiftQuality};
-pub use steps::{Step, Steps};
+pub use steps::{Places, Step, Steps};
 pub use suggest::suggest;

@@ -59,6 +59,8 @@ pub struct Readings<'a> {
     /// Roles that the last sample still has to be given to.
     pending: Vec<(usize, usize)>,
     sample: Option<crate::Sample>,
+    /// Place of the last reading's entry in the map.
+    entry: usize,
     speeds: Speeds,
     /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
     friction_n_m: Option<f64>,
@@ -93,6 +95,7 @@ impl<'a> Readings<'a> {
             users,
             pending: Vec::new(),
             sample: None,
+            entry: 0,
             speeds: [None; SPEEDS],
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
@@ -107,6 +110,11 @@ impl<'a> Readings<'a> {
             unit_name: channels.resolved.unit_name.clone(),
         };
         self.roles.iter().map(summary).collect()
+    }
+
+    /// The place in the map of the entry that gave the last reading.
+    pub fn entry(&self) -> usize {
+        self.entry
     }
 
     /// What is to be said about the log, complete after the last reading.
@@ -147,10 +155,10 @@ impl<'a> Readings<'a> {
     /// Most samples are unusable, or a unit is wrong by all appearances.
     pub fn check(&self) -> Result<(), LogError> {
         let summary = self.summary();
-        for role in &summary {
+        for (role, channels) in summary.iter().zip(&self.roles) {
+            let name = channels.resolved.entry.key();
             let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
             if total == 0 {
-                let name = role.role.name();
                 return Err(LogError::map(format!(
                     "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
                 )));
@@ -158,9 +166,8 @@ impl<'a> Readings<'a> {
             // A request that is rarely made is rightly absent.
             if 2 * good < total && role.role != Role::TorqueReductionRequest {
                 return Err(LogError::map(format!(
-                    "{} of {total} samples of {} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
+                    "{} of {total} samples of {name} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
                     total - good,
-                    role.role.name(),
                     role.counts.faults()
                 )));
             }
@@ -235,6 +242,7 @@ impl Iterator for Readings<'_> {
         loop {
             while let (Some(user), Some(sample)) = (self.pending.pop(), self.sample) {
                 if let Some(reading) = self.take(user, &sample) {
+                    self.entry = user.0;
                     return Some(Ok(reading));
                 }
             }

@@ -22,6 +22,7 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
         Kind::Car => describe_car(&Car::read(&options.file)?),
+        Kind::CarStudy => super::study::describe_cars(&options.file),
         Kind::Drive => describe_drive(&Drive::from_source(source)?, &options.file),
         Kind::Vehicle => {
             let vehicle = Vehicle::from_source(source)?;

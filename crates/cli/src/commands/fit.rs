@@ -1,6 +1,6 @@
 //! `wetclutch fit`.
 
-use config::Vehicle;
+use config::{Kind, Source, Vehicle};
 use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -21,7 +21,11 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
     let inputs = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]).chain(options.mapping.files());
     not_an_input(Some(&options.output), inputs)?;
-    let vehicle = Vehicle::read(&options.vehicle)?;
+    let source = Source::read(&options.vehicle)?;
+    if source.kind()? == Kind::Car {
+        return Err(whole_gearbox(options).into());
+    }
+    let vehicle = Vehicle::from_source(source)?;
     fit::check_vehicle(&vehicle)?;
     let ages = match options.sensors.as_deref() {
         Some(path) => ReadingAges::of(&sensors(path)?),
@@ -86,6 +90,18 @@ fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>)
         if count < LEAST_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
     let some = SHIFTS_MAX.min(shifts.len());
     ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
+}
+
+/// What can be found for a car with a whole gearbox.
+fn whole_gearbox(options: &Fit) -> FitError {
+    let log = options.logs.first().map(|log| shell_quoted(log)).unwrap_or_default();
+    FitError::Input(format!(
+        "{}: is a vehicle with a whole gearbox; a fit finds the values of a file with one shift\n\
+         hint: for one shift of this car, `wetclutch init --ratios FROM,TO` with the ratios of both gears makes such a file, and a fit to the same \
+         logs finds friction, spring and valve of its oncoming clutch and the inertia M11 of the shift; they go into this file by hand. For the \
+         converter and the torque of each shift, `wetclutch inspect {log} --map MAP.toml --shifts -o PAGE.html` with an engine torque signal",
+        options.vehicle.display()
+    ))
 }
 
 fn no_shift(vehicle: &Vehicle, options: &Fit) -> Failure {

@@ -3,7 +3,7 @@
 
 use config::{Experiment, Sensors, Source, Vehicle};
 use drivetrain::{ClutchValve, Table1};
-use fit::{Parameter, ReadingAges, Series, ShiftRecord};
+use fit::{Map, Parameter, ReadingAges, Series, ShiftRecord};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
 use study::sampling::through_sensors;
@@ -123,16 +123,15 @@ impl TestCar {
             let (below, above) = ((1.0 - slip / 100.0).max(0.0), ((slip - 100.0) / 200.0).clamp(0.0, 1.0));
             mu * (1.0 + rest * below) * (1.0 + slope * above)
         });
-        truth.push((Parameter::FrictionAtRest, rest));
         let at_rest = car.oncoming.clutch.friction.at(0.0);
         car.oncoming.clutch.static_friction = car.oncoming.clutch.static_friction.max(1.0001 * at_rest);
-        truth.push((Parameter::FrictionSlope, slope));
         let mut sensors = Experiment::bench().unwrap().sensors.unwrap();
         let valve_late_s = draw.between(0.0, 0.015);
         if let ClutchValve::Proportional(maps) = &mut car.oncoming.valve {
             maps.delay_s = mapped(&maps.delay_s, |_, delay_s| delay_s + valve_late_s);
         }
         truth.push((Parameter::CommandDelay, valve_late_s / 0.01));
+        truth.push((Parameter::Hysteresis, 0.0));
         sensors.output.delay_s = draw.between(0.0, 0.01);
         sensors.engine.delay_s = draw.between(0.0, 0.01);
         sensors.wheel.delay_s = draw.between(0.0, 0.03);
@@ -146,7 +145,87 @@ impl TestCar {
         // The plant holds the throttle for 10 ms: a line between the readings is late by half of it.
         truth.push((Parameter::EngineTorqueDelay, -0.5));
         truth.push((Parameter::PressureScale, pressure_scale.ln()));
-        Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, draw }
+        let mut drawn = Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, draw };
+        drawn.tell_maps();
+        drawn
+    }
+
+    /// Gives the maps of the oncoming clutch courses that no factor on those of the file has: friction that changes with the root of the
+    /// slip by up to a quarter, lag with up to the power 0.3 of the pressure, gain by up to 10 % for twice the current.
+    pub(crate) fn with_other_maps(mut self) -> Self {
+        let [friction, lag, gain] = [0.25, 0.3, 0.1].map(|most| self.draw.between(-most, most));
+        let (_, [_, pressure_pa, _], [_, current_a, _]) = self.points();
+        let clutch = &mut self.car.oncoming.clutch;
+        let fine = |table: &Table1<f64>, more: &[f64]| {
+            let mut axis = [table.axis(), more].concat();
+            axis.sort_by(f64::total_cmp);
+            axis.dedup();
+            let values: Vec<f64> = axis.iter().map(|x| table.at(*x)).collect();
+            Table1::new(&axis, &values).unwrap()
+        };
+        let slips = [3.0, 20.0, 30.0, 75.0, 100.0, 125.0, 175.0, 200.0, 250.0, 300.0, 350.0];
+        clutch.friction = mapped(&fine(&clutch.friction, &slips), |slip, mu| {
+            mu * (1.0 + friction * (1.0 - (slip / 100.0).min(4.0).sqrt()))
+        });
+        clutch.static_friction = clutch.static_friction.max(1.0001 * clutch.friction.at(0.0));
+        if let ClutchValve::Proportional(maps) = &mut self.car.oncoming.valve {
+            let pressures = [0.06e6, 0.08e6, 0.13e6, 0.16e6, 0.26e6, 0.32e6, 0.36e6, 0.5e6];
+            maps.time_constant_s = mapped(&fine(&maps.time_constant_s, &pressures), |p, lag_s| {
+                lag_s * (p.max(2e4) / pressure_pa).powf(lag)
+            });
+            maps.gain_pa_a = mapped(&fine(&maps.gain_pa_a, &[0.08, 0.15, 0.25, 0.35, 0.4]), |a, k| {
+                k * (1.0 + gain * (a / current_a - 1.0).clamp(-1.0, 1.5))
+            });
+        }
+        self.tell_maps();
+        self
+    }
+
+    /// Gives the valve of the oncoming clutch a hysteresis that the file does not have, of up to 10 kPa to each side.
+    pub(crate) fn with_hysteresis(mut self) -> Self {
+        self.car.oncoming.hysteresis_pa = self.draw.between(0.0, 10e3);
+        self.truth.retain(|(parameter, _)| *parameter != Parameter::Hysteresis);
+        self.truth.push((Parameter::Hysteresis, self.car.oncoming.hysteresis_pa / 1e4));
+        self
+    }
+
+    /// Slips, pressures and commands at which the shapes of the maps count.
+    fn points(&self) -> ([f64; 5], [f64; 3], [f64; 3]) {
+        let kiss_pa = self.file.oncoming.clutch.kiss_pressure();
+        let pressures = [0.0, 0.5, 1.5].map(|share| kiss_pa + share * self.file.error_bounds.shift_pressure_pa);
+        let commands = pressures.map(|p| self.file.oncoming.valve.command_for(p));
+        ([0.0, 30.0, 100.0, 200.0, 300.0], pressures, commands)
+    }
+
+    /// The true values of what a fit finds of the maps of the oncoming clutch.
+    fn tell_maps(&mut self) {
+        use Parameter as P;
+        let (slips, pressures, commands) = self.points();
+        let (car, file) = (&self.car.oncoming, &self.file.oncoming);
+        let friction = slips.map(|slip| car.clutch.friction.at(slip) / file.clutch.friction.at(slip));
+        let mut told = vec![
+            (P::Friction, friction[2].ln()),
+            (P::FrictionAtRest, friction[0] / friction[2] - 1.0),
+            (P::FrictionSlope, friction[4] / friction[2] - 1.0),
+            (P::Shape(Map::Friction, 0), friction[1] / (0.3 * friction[2] + 0.7 * friction[0]) - 1.0),
+            (P::Shape(Map::Friction, 1), friction[3] / (0.5 * friction[2] + 0.5 * friction[4]) - 1.0),
+        ];
+        if let (Some(car), Some(file)) = (car.valve.maps(), file.valve.maps()) {
+            let lag = pressures.map(|p| car.time_constant_s.at(p) / file.time_constant_s.at(p));
+            let gain = commands.map(|a| car.gain_pa_a.at(a) / file.gain_pa_a.at(a));
+            for (whole, map, [low, middle, high]) in [(P::Lag, Map::Lag, lag), (P::Gain, Map::Gain, gain)] {
+                told.push((whole, middle.ln()));
+                told.push((P::Shape(map, 0), low / middle - 1.0));
+                told.push((P::Shape(map, 1), high / middle - 1.0));
+            }
+        }
+        self.truth.retain(|(parameter, _)| told.iter().all(|(other, _)| other != parameter));
+        self.truth.extend(told);
+    }
+
+    /// The unknown of a perfect fit.
+    pub(crate) fn true_value(&self, parameter: Parameter) -> f64 {
+        self.truth.iter().find(|(other, _)| *other == parameter).unwrap().1
     }
 
     /// What the log says of the sensors.

@@ -109,7 +109,7 @@ pub(super) fn estimate(
             observer: &chosen_observer.name,
             overview: &shifts.overview,
             shifts: &shifts.found,
-            shifts_of_log: shifts.seen,
+            shifts_of_log: shifts.seen(),
             findings: &sentences,
         }
         .html()?;

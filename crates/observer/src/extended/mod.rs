@@ -16,7 +16,11 @@
 //! afterwards. A reading of a toothed wheel is delayed by a few milliseconds: it is compared with the speed at the
 //! time of the reading, not with the newest speed.
 
-use drivetrain::{AccelerationRow, Engagement, Real, ShiftCoefficients, clutch::direction};
+mod passage;
+
+use drivetrain::{Engagement, Real, ShiftCoefficients, clutch::direction};
+
+use passage::{Passage, spread};
 
 use crate::{CompliantModel, Estimate, Health, Interval, Phase, Sample, SampleEstimator, Track, Tracker};
 
@@ -153,7 +157,7 @@ impl<T: Real> ExtendedFilter<T> {
     /// Age of a reading that lags by this angle at this speed, s.
     #[inline]
     fn age(&self, lag_rad: T, speed_rad_s: T) -> T {
-        lag_rad / speed_rad_s.abs().max(self.noise.output_least_rad_s)
+        lag_rad / speed_rad_s.abs().at_least(self.noise.output_least_rad_s)
     }
 
     /// The same filter in another precision.
@@ -203,10 +207,10 @@ impl<T: Real> ExtendedFilter<T> {
     #[inline]
     pub(crate) fn follow(&self, running: &mut Running<T>, interval: &Interval<T>, sample: &Sample<T>) {
         let wheel = T::of(0.5) * (running.last.wheel_rad_s + sample.wheel_rad_s);
-        let share = (interval.dt_s / T::of(WHEEL_AVERAGE_S)).min(T::one());
+        let share = (interval.dt_s / T::of(WHEEL_AVERAGE_S)).at_most(T::one());
         running.slow_wheel = running.slow_wheel + share * (wheel - running.slow_wheel);
         let rate = interval.start_rate(running.mean[PRESSURE]).abs();
-        running.motion_pa_s = rate.max(running.motion_pa_s * lasting(interval.dt_s, self.noise.valve_rate_s));
+        running.motion_pa_s = rate.at_least(running.motion_pa_s * lasting(interval.dt_s, self.noise.valve_rate_s));
     }
 
     /// What the powertrain does over the interval that ends with `sample`.
@@ -347,7 +351,7 @@ impl<T: Real> ExtendedFilter<T> {
         for (k, (reading, lag_rad, deviation)) in readings.into_iter().enumerate() {
             let p = &mut running.covariance;
             // An age of many samples is cut: so far back the line through both ends does not reach.
-            let old = (self.age(lag_rad, reading) / interval.dt_s).min(T::of(OLDEST_SAMPLES));
+            let old = (self.age(lag_rad, reading) / interval.dt_s).at_most(T::of(OLDEST_SAMPLES));
             let new = one - old;
             // Covariance of the states at the end with the reading.
             let with_reading: [T; N] = core::array::from_fn(|i| new * p[k][i] + old * start.across[i][k]);
@@ -387,134 +391,10 @@ pub(crate) struct Start<T> {
     pub(crate) across: [[T; 2]; N],
 }
 
-/// What the powertrain does over one interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Passage<T> {
-    interval: Interval<T>,
-    /// Of turbine and output.
-    rows: [AccelerationRow<T>; 2],
-    /// Acceleration of turbine and output per shaft torque.
-    shaft: [T; 2],
-    turbine_n_m: T,
-    /// Clutch torque per pressure above the kiss point.
-    per_pressure: T,
-    kiss_pa: T,
-    wheel_rad_s: T,
-    h: T,
-    u: T,
-    turn: T,
-    twist: T,
-    /// Solves the output speed at the end, on which the shaft torque depends.
-    solve: T,
-    stay: T,
-    keep: T,
-    released: bool,
-    shifting: bool,
-}
-
-impl<T: Real> Passage<T> {
-    /// Mean pressure over the interval above the kiss point, Pa; none below it.
-    #[inline]
-    pub(crate) fn above_kiss(&self, pressure_pa: T) -> T {
-        (self.interval.pressure_integral(pressure_pa) / self.interval.dt_s - self.kiss_pa).max(T::zero())
-    }
-
-    /// Pressure above the kiss point and its derivative by the pressure at the start, at the mean.
-    #[inline]
-    fn tangent(&self, pressure_pa: T) -> (T, T) {
-        let above = self.above_kiss(pressure_pa);
-        (above, if above > T::zero() { self.interval.valve.psi / self.interval.dt_s } else { T::zero() })
-    }
-
-    /// The states at the end, with this mean pressure above the kiss point.
-    #[inline]
-    pub(crate) fn propagate(&self, x: &[T; N], above_kiss_pa: T) -> [T; N] {
-        let dt = self.interval.dt_s;
-        let oncoming = self.per_pressure * above_kiss_pa;
-        let free = |row: &AccelerationRow<T>| {
-            row.per_turbine_torque * self.turbine_n_m * (T::one() + x[SHARE])
-                + row.per_oncoming_torque * oncoming
-                + row.per_offgoing_torque * x[OFFGOING]
-        };
-        let [shaft_t, shaft_o] = self.shaft;
-        let held = x[SPRING] - self.u * self.wheel_rad_s;
-        let output = self.solve
-            * ((T::one() + dt * shaft_o * self.h) * x[OUTPUT] + dt * free(&self.rows[1]) + dt * shaft_o * held);
-        let shaft = held + self.h * (x[OUTPUT] + output);
-        [
-            x[TURBINE] + dt * (free(&self.rows[0]) + shaft_t * shaft),
-            output,
-            x[SPRING] + self.turn * (x[OUTPUT] + output) - self.twist * self.wheel_rad_s,
-            self.interval.pressure(x[PRESSURE]),
-            self.stay * x[SHARE],
-            self.keep * x[OFFGOING],
-        ]
-    }
-
-    /// Derivatives of the first three states at the end by all states; the others depend on themselves alone. `slope`
-    /// is that of the mean pressure above the kiss point.
-    #[inline]
-    fn derivative(&self, slope: T) -> [[T; N]; 3] {
-        let (zero, one, dt) = (T::zero(), T::one(), self.interval.dt_s);
-        let per_pressure = self.per_pressure * slope;
-        let by = |row: &AccelerationRow<T>| {
-            [row.per_oncoming_torque * per_pressure, row.per_turbine_torque * self.turbine_n_m, row.per_offgoing_torque]
-        };
-        let [shaft_t, shaft_o] = self.shaft;
-        let mut f = [[zero; N]; 3];
-        f[OUTPUT][OUTPUT] = self.solve * (one + dt * shaft_o * self.h);
-        f[OUTPUT][SPRING] = self.solve * dt * shaft_o;
-        for (k, by) in by(&self.rows[1]).into_iter().enumerate() {
-            f[OUTPUT][PRESSURE + k] = self.solve * dt * by;
-        }
-        f[SPRING] = f[OUTPUT].map(|x| self.turn * x);
-        f[TURBINE] = f[OUTPUT].map(|x| dt * shaft_t * self.h * x);
-        f[SPRING][OUTPUT] = f[SPRING][OUTPUT] + self.turn;
-        f[SPRING][SPRING] = f[SPRING][SPRING] + one;
-        f[TURBINE][TURBINE] = one;
-        f[TURBINE][OUTPUT] = f[TURBINE][OUTPUT] + dt * shaft_t * self.h;
-        f[TURBINE][SPRING] = f[TURBINE][SPRING] + dt * shaft_t;
-        for (k, by) in by(&self.rows[0]).into_iter().enumerate() {
-            f[TURBINE][PRESSURE + k] = f[TURBINE][PRESSURE + k] + dt * by;
-        }
-        f
-    }
-}
-
 /// What is left after `dt_s` of a random number that lasts for a time, as implicit Euler has it.
 #[inline]
 fn lasting<T: Real>(dt_s: T, time_s: T) -> T {
     time_s / (time_s + dt_s)
-}
-
-/// `P = F P F'`, where `F` has three full rows, of which only the first has the turbine speed, and three of the
-/// diagonal alone. Returns the first two columns of `F P`.
-#[inline]
-fn spread<T: Real>(p: &mut [[T; N]; N], f: &[[T; N]; 3], diagonal: &[T; 3]) -> [[T; 2]; N] {
-    let mut fp = [[T::zero(); N]; N];
-    for (i, row) in f.iter().enumerate() {
-        let first = if i == TURBINE { TURBINE } else { OUTPUT };
-        for (weight, p) in row.iter().zip(p.iter()).skip(first) {
-            for (sum, p) in fp[i].iter_mut().zip(p) {
-                *sum = *sum + *weight * *p;
-            }
-        }
-    }
-    for i in 3..N {
-        fp[i] = p[i].map(|p| diagonal[i - 3] * p);
-    }
-    for i in 0..N {
-        for j in i..N {
-            let value = if j < 3 {
-                fp[i].iter().zip(&f[j]).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
-            } else {
-                fp[i][j] * diagonal[j - 3]
-            };
-            p[i][j] = value;
-            p[j][i] = value;
-        }
-    }
-    fp.map(|row| [row[TURBINE], row[OUTPUT]])
 }
 
 impl<T: Real> SampleEstimator<T> for ExtendedFilter<T> {
@@ -601,7 +481,8 @@ impl<T: Real> ExtendedFilter<T> {
         let line = &self.model.rigid.driveline;
         let rate = line.twist_rate(running.mean[OUTPUT], sample.wheel_rad_s);
         let shaft = running.mean[SPRING] + line.shaft_damping_n_m_s_rad * rate;
-        state.shaft_torque_n_m = Some(shaft.max(-limits.shaft_torque_max_n_m).min(limits.shaft_torque_max_n_m));
+        state.shaft_torque_n_m =
+            Some(shaft.at_least(-limits.shaft_torque_max_n_m).at_most(limits.shaft_torque_max_n_m));
         state.track.clutch_torque_n_m = self.model.rigid.clutch_torque(
             acting,
             running.mean[PRESSURE],

@@ -15,7 +15,7 @@ pub(crate) struct Panel {
     pub(crate) curves: Vec<Curve>,
 }
 
-const COLOURS: [&str; 6] = ["#0b6e99", "#c8553d", "#6a994e", "#8a5a9e", "#b07d12", "#555555"];
+const COLOURS: [&str; 8] = ["#0b6e99", "#c8553d", "#6a994e", "#8a5a9e", "#b07d12", "#555555", "#d16ba5", "#2b3a67"];
 /// Size of a panel and its place, in pixels.
 const WIDTH: f64 = 380.0;
 const HEIGHT: f64 = 300.0;
@@ -41,7 +41,7 @@ pub(crate) fn svg(panels: &[Panel]) -> String {
     for (at, panel) in panels.iter().enumerate() {
         draw(&mut svg, panel, LEFT + STEP * at as f64, at == 0);
     }
-    for (at, curve) in panels.iter().flat_map(|panel| &panel.curves).take(COLOURS.len()).enumerate() {
+    for (at, curve) in panels.iter().take(1).flat_map(|panel| &panel.curves).take(COLOURS.len()).enumerate() {
         let (x, y) = (LEFT + STEP * (at % 2) as f64, TOP + HEIGHT + 60.0 + 20.0 * (at / 2) as f64);
         let colour = COLOURS[at];
         let _ = writeln!(

@@ -5,21 +5,22 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use plant::{Powertrain, Simulation};
-use study::campaign::{factor_values, keep_scored, run_seed};
+use study::campaign::{factor_values, run_seed, scored_shift};
 use study::comparison::observers;
 use study::observers::ranges;
 use study::sampling::through_sensors;
-use study::{Campaign, RunColumns, ShiftQuality, simulate_shift};
+use study::{Campaign, RunColumns};
+use trace::Trace;
 
+use crate::bars::{self, Bar};
 use crate::shared::SAMPLE_TIME_S;
-use crate::time;
+use crate::{Figure, time};
 
 /// The parts of a run in their order.
-const STAGES: [&str; 8] = [
+const STAGES: [&str; 7] = [
     "files with the factors in place",
     "launch until the record begins",
-    "shift and its record",
-    "rating of the shift",
+    "shift, its record and its rating",
     "sensors",
     "ranges, once for all observers",
     "observers",
@@ -32,7 +33,7 @@ const RUNS: u64 = 200;
 const PASSES: usize = 5;
 
 /// The stages of a run, each made by itself, with their shares of the whole.
-pub(crate) fn of_a_run(page: &mut String, campaign: &Campaign) {
+pub(crate) fn of_a_run(page: &mut String, campaign: &Campaign) -> Figure {
     let mut best = [f64::INFINITY; STAGES.len()];
     for _ in 0..PASSES {
         let pass = timed(campaign);
@@ -43,12 +44,16 @@ pub(crate) fn of_a_run(page: &mut String, campaign: &Campaign) {
     let whole: f64 = best.iter().sum();
     let _ = write!(
         page,
-        "\n### Stages of a run\n\nObservers: {}. Each stage by itself, over {RUNS} runs.\n\n| stage | time per run | share |\n|---|---|---|\n",
+        "\n### Stages of a run\n\nObservers: {}. Each stage by itself, over {RUNS} runs.\n\n\
+         ![Time of each stage of a run](figures/stages.svg)\n\n| stage | time per run | share |\n|---|---|---|\n",
         campaign.layout.observers.join(", ")
     );
     for (name, seconds) in STAGES.iter().zip(best) {
         let _ = writeln!(page, "| {name} | {} | {:.0} % |", time(seconds), 100.0 * seconds / whole);
     }
+    let bar = |(name, seconds): (&&str, f64)| Bar { label: (*name).to_owned(), parts: vec![1e6 * seconds] };
+    let bars: Vec<Bar> = STAGES.iter().zip(best).map(bar).collect();
+    ("stages.svg", bars::svg("time per run, µs", &[], &bars))
 }
 
 /// Mean times of the stages, s.
@@ -56,6 +61,7 @@ fn timed(campaign: &Campaign) -> [f64; STAGES.len()] {
     let study = &campaign.study;
     let mut sums = [0.0; STAGES.len()];
     let ready = observers(&study.vehicle, &study.experiment).unwrap();
+    let mut spare = Trace::default();
     for run in 0..RUNS {
         let mut clock = Instant::now();
         let mut stage = |at: usize| {
@@ -72,27 +78,26 @@ fn timed(campaign: &Campaign) -> [f64; STAGES.len()] {
         let powertrain = Powertrain::new(experiment.simulated_vehicle(&varied.car));
         Simulation::new(&powertrain, &varied.vehicle, experiment).unwrap().advance(begin_s, |_| {}).unwrap();
         stage(1);
-        let mut trace = simulate_shift(&varied.car, &varied.vehicle, experiment, study.record_before_s).unwrap();
+        let (car, vehicle) = (&varied.car, &varied.vehicle);
+        let shift = scored_shift(std::mem::take(&mut spare), car, vehicle, experiment, study.record_before_s).unwrap();
         stage(2);
-        black_box(ShiftQuality::of(&trace, &varied.vehicle.shift));
+        let seen = through_sensors(&shift.trace, SAMPLE_TIME_S, &sensors, vehicle);
         stage(3);
-        keep_scored(&mut trace);
-        let seen = through_sensors(&trace, SAMPLE_TIME_S, &sensors, &varied.vehicle);
+        let columns = RunColumns::of(&seen, vehicle).unwrap();
+        black_box(ranges(vehicle, &columns));
         stage(4);
-        let columns = RunColumns::of(&seen, &varied.vehicle).unwrap();
-        black_box(ranges(&varied.vehicle, &columns));
-        stage(5);
         for observer in &ready {
             black_box(observer.run_alone(&columns));
         }
-        stage(6);
+        stage(5);
         black_box(campaign.row(run).unwrap());
-        stage(7);
+        stage(6);
+        spare = shift.trace;
     }
     let mut means = sums.map(|sum| sum / RUNS as f64);
     // The simulation begins with the launch, and the whole run with all the others.
     means[2] -= means[1];
-    let others: f64 = means[..7].iter().sum();
-    means[7] = (means[7] - others).max(0.0);
+    let others: f64 = means[..6].iter().sum();
+    means[6] = (means[6] - others).max(0.0);
     means
 }

@@ -1,4 +1,4 @@
-//! The guaranteed range, around an observer that has no panic of its own.
+//! The rigid reduced-order observer with the guaranteed range around it.
 #![no_std]
 #![no_main]
 

@@ -1,22 +1,19 @@
-//! The plant's integrator beside those of a Rust library, a method of fixed step and SciPy, on the same equations.
+//! The plant's integrator beside those of a Rust library, a method of fixed step, CVODE and SciPy, on the same equations.
 
+mod outside;
 mod plot;
 
 use std::fmt::Write as _;
 use std::hint::black_box;
-use std::io::Write as _;
-use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use differential_equations::prelude::*;
-use drivetrain::{AccelerationRow, ClutchValve, Engagement};
-use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::state::STATES;
 use plant::{HybridIntegrator, Inputs, Mode, Powertrain, State};
 
 use crate::shared::vehicle;
-use crate::{fastest, time};
+use crate::{Figure, fastest, time};
+use outside::Outside;
 use plot::{Curve, Panel};
 
 /// First gear under inputs that stay for a while.
@@ -145,16 +142,31 @@ fn methods<'a>(powertrain: &'a Powertrain, mode: Mode) -> Vec<Method<'a>> {
 /// Error that a method may have at most to be compared in the table.
 const EQUAL_ERROR: f64 = 1e-4;
 
-/// The integrator beside its rivals: a table for the page, and the diagram.
-pub(crate) fn integrators(page: &mut String) -> String {
+/// Says which rivals that are other programs are there. Where one has other equations, this ends with an error.
+pub(crate) fn check() {
     let powertrain = Powertrain::new(vehicle());
     let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
-    let methods = methods(&powertrain, mode);
-    let panels = problems().map(|problem| {
-        let reference = ours(&powertrain, &problem, 1e-11);
-        let curves = methods.iter().map(|method| curve(method, &problem, &reference)).collect();
-        Panel { title: problem.title, curves }
-    });
+    let outside = Outside::new(&powertrain, mode, &problems());
+    let said = |there: bool| if there { "has our equations" } else { "is not there" };
+    println!("CVODE {}", said(outside.cvode().is_some()));
+    println!("SciPy's LSODA {}", said(outside.lsoda().is_some()));
+}
+
+/// The integrator beside its rivals: a table for the page, and the diagram.
+pub(crate) fn integrators(page: &mut String) -> Figure {
+    let powertrain = Powertrain::new(vehicle());
+    let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
+    let (methods, problems) = (methods(&powertrain, mode), problems());
+    let references = problems.each_ref().map(|problem| ours(&powertrain, problem, 1e-11));
+    let outside = Outside::new(&powertrain, mode, &problems);
+    let cvode = outside.cvode();
+    let panels: Vec<Panel> = (problems.iter().zip(&references).enumerate())
+        .map(|(at, (problem, reference))| {
+            let mut curves: Vec<Curve> = methods.iter().map(|method| curve(method, problem, reference)).collect();
+            curves.extend(cvode.iter().flatten().map(|rival| rival.curve(at, reference)));
+            Panel { title: problem.title, curves }
+        })
+        .collect();
     page.push_str(
         "\n## The integrator compared with others\n\nTwo seconds in first gear on the same equations, without recording. Error: largest relative \
          error of a state at the\nend. Each method is run at several tolerances, that of fixed step with several steps; the table has the \
@@ -162,8 +174,8 @@ pub(crate) fn integrators(page: &mut String) -> String {
          | integrator | constant inputs | relative to wetclutch | inputs that change every 10 ms | relative |\n|---|---|---|---|---|\n",
     );
     let at = |panel: usize, method: usize| time_at(&panels[panel].curves[method].points, EQUAL_ERROR);
-    for (number, method) in methods.iter().enumerate() {
-        let _ = write!(page, "| {} ", method.name);
+    for (number, curve) in panels[0].curves.iter().enumerate() {
+        let _ = write!(page, "| {} ", curve.name);
         for panel in 0..panels.len() {
             let _ = match (at(panel, number), at(panel, 0)) {
                 (Some(seconds), Some(own)) => write!(page, "| {} | {:.1} ", time(seconds), seconds / own),
@@ -172,18 +184,23 @@ pub(crate) fn integrators(page: &mut String) -> String {
         }
         page.push_str("|\n");
     }
-    let reference = ours(&powertrain, &problems()[0], 1e-11);
-    let _ = match lsoda(&powertrain) {
+    page.push_str(match cvode {
+        Some(_) => {
+            "\nCVODE is the C library of SUNDIALS; its equations are compiled C, and it starts anew where the inputs jump.\n"
+        }
+        None => "\nCVODE is not measured: there is no `cc` with SUNDIALS (Debian: `libsundials-dev`).\n",
+    });
+    let _ = match outside.lsoda() {
         Some((seconds, end)) => writeln!(
             page,
-            "\nSciPy `solve_ivp` with LSODA, which calls the equations in Python, takes {} for the constant inputs at a relative tolerance of 1e-5, \
+            "SciPy `solve_ivp` with LSODA, which calls the equations in Python, takes {} for the constant inputs at a relative tolerance of 1e-5, \
              with an error of {:.0e}: most of that is Python.",
             time(seconds),
-            error(&end, &reference)
+            error(&end, &references[0])
         ),
-        None => writeln!(page, "\nSciPy's LSODA is not measured: there is no python3 with scipy."),
+        None => writeln!(page, "SciPy's LSODA is not measured: there is no python3 with scipy."),
     };
-    plot::svg(&panels)
+    ("work_precision.svg", plot::svg(&panels))
 }
 
 /// Errors and times of a method at all that it is tried with.
@@ -215,79 +232,4 @@ fn time_at(points: &[(f64, f64)], error: f64) -> Option<f64> {
 fn error(end: &[f64; STATES], reference: &[f64; STATES]) -> f64 {
     let share = |i: usize| (end[i] - reference[i]).abs() / (State::SCALE.to_array()[i].max(reference[i].abs()));
     (0..STATES).map(share).fold(0.0, f64::max)
-}
-
-/// The same problem in SciPy: fastest time and end state.
-fn lsoda(powertrain: &Powertrain) -> Option<(f64, [f64; STATES])> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/rivals/lsoda.py");
-    let mut child = Command::new("python3")
-        .arg(script)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .ok()?;
-    child.stdin.take()?.write_all(parameters(powertrain).as_bytes()).ok()?;
-    let output = child.wait_with_output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    let mut numbers = text.split_whitespace().map(str::parse::<f64>);
-    let mut next = || numbers.next()?.ok();
-    let seconds = next()?;
-    // The equations in Python are ours: their derivative at the start is the same.
-    let mode = HybridIntegrator::new(powertrain, 0.0, START, &INPUTS).ok()?.mode();
-    for slope in powertrain.derivative(mode, &START.to_array(), &INPUTS) {
-        let theirs = next()?;
-        assert!((slope - theirs).abs() <= 1e-9 * slope.abs().max(1.0), "{slope}, but {theirs} in Python");
-    }
-    let mut end = [0.0; STATES];
-    for x in &mut end {
-        *x = next()?;
-    }
-    Some((seconds, end))
-}
-
-/// The car as JSON.
-fn parameters(powertrain: &Powertrain) -> String {
-    let v = &powertrain.vehicle;
-    let numbers = |values: &[f64]| format!("{values:?}");
-    let row =
-        |row: &AccelerationRow<f64>| numbers(&[row.per_turbine_torque, row.per_oncoming_torque, row.per_output_torque]);
-    let gear = v.shift.coefficients(Engagement::OffgoingStuck);
-    let map = &v.engine.torque_n_m;
-    let torque: Vec<f64> = map.rows().iter().map(|&speed| map.at(speed, INPUTS.throttle)).collect();
-    let ClutchValve::Proportional(valve) = &v.oncoming.valve else {
-        panic!("the built-in car has proportional valves")
-    };
-    let (clutch, lag) = (&v.oncoming.clutch, &valve.time_constant_s);
-    let line = &v.driveline;
-    let road = &v.road;
-    let shafts =
-        [line.final_ratio, line.shaft_stiffness_n_m_rad, line.shaft_damping_n_m_s_rad, line.wheel_inertia_kg_m2];
-    let rolling = road.rolling_moment(START.wheel_rad_s);
-    let vehicle = [road.mass_kg, road.wheel_radius_m, road.drag_force(1.0), rolling, road.grade_force()];
-    let fields = [
-        ("engine", numbers(&[v.engine.inertia_kg_m2, v.engine.drag_n_m_s])),
-        ("engine_speed", numbers(map.rows())),
-        ("engine_torque", numbers(&torque)),
-        ("speed_ratio", numbers(v.converter.capacity_n_m_s2.axis())),
-        ("capacity", numbers(v.converter.capacity_n_m_s2.values())),
-        ("torque_ratio", numbers(v.converter.torque_ratio.values())),
-        ("turbine_row", row(&gear.turbine)),
-        ("output_row", row(&gear.output)),
-        ("slip_row", numbers(&[v.shift.oncoming_slip(1.0, 0.0), v.shift.oncoming_slip(0.0, 1.0)])),
-        ("friction_slip", numbers(clutch.friction.axis())),
-        ("friction", numbers(clutch.friction.values())),
-        ("clutch", numbers(&[clutch.lever(), clutch.piston_area_m2, clutch.return_spring_n])),
-        ("lag_pressure", numbers(lag.axis())),
-        ("lag", numbers(lag.values())),
-        ("settled", numbers(&[INPUTS.offgoing_settled_pa, INPUTS.oncoming_settled_pa])),
-        ("driveline", numbers(&shafts)),
-        ("tyre", numbers(&[v.tyre.max_force_n, v.tyre.slip_scale, v.tyre.floor_m_s])),
-        ("road", numbers(&vehicle)),
-        ("start", numbers(&START.to_array())),
-        ("scale", numbers(&State::SCALE.to_array())),
-        ("span", numbers(&[SPAN_S, RELATIVE_TOLERANCE])),
-    ];
-    let json: Vec<String> = fields.iter().map(|(name, value)| format!("{name:?}: {value}")).collect();
-    format!("{{{}}}", json.join(", "))
 }
