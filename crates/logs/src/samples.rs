@@ -347,11 +347,13 @@ impl<'a> Samples<'a> {
     /// Takes the next sample of a stream out of its batch, which has one.
     #[inline]
     fn stamped(&mut self, i: usize) -> Sample {
+        // Where streams wait for each other, a wrong stamp would hold its stream back until the others end.
+        let looks_ahead = self.streams.len() > 1;
         let merged = &mut self.streams[i];
         let mut sample = merged.batch[merged.at];
         merged.at += 1;
         let (resets, wrong_jumps) = (merged.clock.resets, merged.clock.wrong_jumps);
-        let is_wrong = merged.clock.would_jump(sample.time_s) && {
+        let is_wrong = looks_ahead && merged.clock.would_jump(sample.time_s) && {
             let after = merged.batch[merged.at..].iter().find(|after| after.time_s != sample.time_s);
             after.is_some_and(|after| merged.clock.goes_on(after.time_s) && after.time_s < sample.time_s)
         };
