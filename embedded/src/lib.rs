@@ -4,7 +4,10 @@
 //! - **No panic:** the panic handler calls a function that exists nowhere. The linker drops what nothing calls. While
 //!   a panic can be reached from `step`, the handler stays, and the program does not link.
 //!
-//! The programs are never run. The proof rests on the optimiser: it must see that an index is within its bounds, so
+//! - **No double precision:** `cargo bench -p study --bench controller` looks for its routines in the programs. It also runs the
+//!   observers in QEMU (package `count`) and counts their instructions.
+//!
+//! These programs are never run. The proof rests on the optimiser: it must see that an index is within its bounds, so
 //! they are built with full optimisation over all crates. `panicking` is the control: an observer with a panic, which
 //! must not link.
 //!

@@ -6,8 +6,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use config::vehicle::short::ValveKind;
 use config::{GainMethod, SAMPLE_TIMES_S};
 use design::Quantity;
+use trace::TableFormat;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -70,7 +72,8 @@ pub(crate) enum Command {
     /// Simulates an experiment and writes two files: NAME.csv with every signal, true values included, and
     /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
     /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
-    /// the drive is simulated without them, or with the scenario given by --scenario.
+    /// the drive is simulated without them, or with the scenario given by --scenario. With a [sensors] table NAME_measured.csv
+    /// has what the sensors read.
     ///
     /// A drive file (with segments) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
     /// listed shifts, and a vehicle file with a gearbox. The columns of the offgoing and oncoming clutch are empty between
@@ -128,8 +131,8 @@ pub(crate) enum Command {
     ///
     /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
     ///
-    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a CSV log with the
-    /// columns that `simulate` writes for a drive:
+    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a log with the
+    /// columns that `simulate` writes for a drive, or by a channel map with the commands of all elements:
     ///
     ///   wetclutch estimate city_measured.csv --vehicle vehicles/eight_speed.toml -o out.csv
     ///
@@ -154,8 +157,9 @@ pub(crate) enum Command {
     Fit(Fit),
     /// Write a first vehicle file for a car from a few numbers
     ///
-    /// Writes a vehicle file for one upshift. What is not given is a default, scaled to the car where it depends on its size; each
-    /// value says where it is from. `fit` then finds the values from logs.
+    /// Writes a short vehicle file for one upshift. What is not in it is a default, scaled to the car where it depends on its size.
+    /// What an estimate uses and somebody may know stands in it as comments. `check` lists the defaults, and says which of them matter
+    /// most for the estimate; `fit` finds the values from logs. With --complete, the file has every key, and each says where its value is from.
     ///
     ///   wetclutch init --mass-kg 1650 --wheel-radius-m 0.32 --ratios 4.17,2.34 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
     #[command(verbatim_doc_comment)]
@@ -187,7 +191,8 @@ pub(crate) enum Command {
     Bench(Bench),
     /// Run thousands of shifts with varied parameters
     ///
-    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary. Writes
+    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary; or a drive, or
+    /// shifts, of many cars with a gearbox, which differ in friction, valves and converter (no page and figures). Writes
     ///
     ///   runs.csv, runs.parquet    one row for each run: factors, seed, status, shift quality, scores
     ///   study.html                distributions, sensitivity of the error, worst runs; opens from disk
@@ -226,6 +231,10 @@ pub(crate) enum Command {
     /// Checks a vehicle, gearbox, experiment or study file, and the files that it names, and prints a summary. Also checks a
     /// bounds file for `design --bounds` and a sensors file for `estimate --sensors`. Warns of given gains that are
     /// unstable at a vertex.
+    ///
+    /// Of a vehicle file it lists what the file leaves to defaults, and which of them matter most: the RMS change of the estimated
+    /// pressure and clutch torque in the torque and inertia phase of a simulated upshift, where each default is off by as much as the
+    /// error budget or a stated share allows. --all shows every one.
     ///
     /// Of a gearbox file it prints the gears with ratios and holding torques, the capacity of the elements, and the
     /// shifts with their elements. With -o it draws them:
@@ -447,9 +456,9 @@ pub(crate) struct Estimate {
     /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
     #[arg(long)]
     pub(crate) follow: bool,
-    /// Format of files in a folder
-    #[arg(long, value_enum, default_value_t = FormatChoice::Csv)]
-    pub(crate) format: FormatChoice,
+    /// Format of files in a folder [default: csv]; the ending of a file after -o says its format
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FormatChoice>,
     #[command(flatten)]
     pub(crate) threads: Threads,
 }
@@ -462,6 +471,16 @@ pub(crate) enum FormatChoice {
     Parquet,
     /// ASAM MDF 4.10
     Mf4,
+}
+
+impl From<FormatChoice> for TableFormat {
+    fn from(choice: FormatChoice) -> Self {
+        match choice {
+            FormatChoice::Csv => Self::Csv,
+            FormatChoice::Parquet => Self::Parquet,
+            FormatChoice::Mf4 => Self::Mdf,
+        }
+    }
 }
 
 impl FormatChoice {
@@ -522,9 +541,37 @@ pub(crate) struct Init {
     /// Greatest engine torque, N m
     #[arg(long, value_name = "N_M", value_parser = within(20.0..=2000.0))]
     pub(crate) engine_torque_n_m: f64,
+    /// Kind of the clutches' valves
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) valve: ValveChoice,
+    /// The pistons of the clutches have a stroke: the fill takes time
+    #[arg(long)]
+    pub(crate) stroke: bool,
+    /// Write every key, with where its value is from, in place of a short file
+    #[arg(long)]
+    pub(crate) complete: bool,
     /// The vehicle file
     #[arg(short, long, value_name = "CAR.toml")]
     pub(crate) output: PathBuf,
+}
+
+/// Kind of a clutch's valve.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub(crate) enum ValveChoice {
+    /// The pressure follows a current
+    #[default]
+    Proportional,
+    /// The pressure follows a duty cycle
+    PulseWidth,
+}
+
+impl From<ValveChoice> for ValveKind {
+    fn from(choice: ValveChoice) -> Self {
+        match choice {
+            ValveChoice::Proportional => Self::Proportional,
+            ValveChoice::PulseWidth => Self::PulseWidth,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -757,6 +804,9 @@ pub(crate) struct Check {
     /// Folder for the diagrams of a gearbox file
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
+    /// Show every default of a vehicle file
+    #[arg(long)]
+    pub(crate) all: bool,
 }
 
 /// A number in this range, as a vehicle file has it.

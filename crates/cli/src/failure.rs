@@ -114,7 +114,9 @@ impl From<AnyShiftError> for Failure {
     fn from(error: AnyShiftError) -> Self {
         match error {
             AnyShiftError::Car(error) => error.into(),
-            AnyShiftError::Train(_) | AnyShiftError::TooManyElements(_) => Self::Input(error.to_string()),
+            AnyShiftError::Train(_) | AnyShiftError::TooManyElements(_) | AnyShiftError::NoTables(_) => {
+                Self::Input(error.to_string())
+            }
         }
     }
 }

@@ -7,6 +7,7 @@ mod args;
 mod commands;
 mod failure;
 mod output;
+mod signals;
 
 use std::process::ExitCode;
 
@@ -16,7 +17,21 @@ use args::{Arguments, Command};
 use failure::Failure;
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let command = Arguments::parse().command;
+    let result = signals::end_cleanly(&command).and_then(|()| run(command));
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of standard output, such as `head`, has closed it: this is not an error.
+        Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::error(&failure.to_string());
+            failure.exit_code()
+        }
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    match command {
         Command::Demo(options) => commands::demo(&options),
         Command::Simulate(options) => commands::simulate(&options),
         Command::Design(options) => commands::design(&options),
@@ -32,14 +47,5 @@ fn main() -> ExitCode {
         Command::Sensitivity(options) => commands::sensitivity(&options),
         Command::WorstCase(options) => commands::worst_case(&options),
         Command::Check(options) => commands::check(&options),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        // The reader of standard output, such as `head`, has closed it: this is not an error.
-        Err(Failure::BrokenPipe) => ExitCode::SUCCESS,
-        Err(failure) => {
-            output::error(&failure.to_string());
-            failure.exit_code()
-        }
     }
 }

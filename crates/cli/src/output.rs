@@ -29,8 +29,7 @@ fn coloured_hints(message: &str) -> String {
 
 /// A table on standard output, see [`lines`].
 pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
-    let mut stdout = io::stdout().lock();
-    lines(left, rows).iter().try_for_each(|line| writeln!(stdout, "{line}"))
+    lines(left, rows).iter().try_for_each(|line| self::line(line))
 }
 
 /// The lines of a table: the first `left` columns to the left, the others to the right.
@@ -48,9 +47,13 @@ pub(crate) fn lines(left: usize, rows: &[Vec<String>]) -> Vec<String> {
     rows.iter().map(line).collect()
 }
 
-/// A line on standard output.
+/// A line on standard output. A reader that has closed it, such as `head`, misses the rest: that is no error, and the files of the
+/// command are still written.
 pub(crate) fn line(text: &str) -> io::Result<()> {
-    writeln!(io::stdout().lock(), "{text}")
+    match writeln!(io::stdout().lock(), "{text}") {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written,
+    }
 }
 
 /// A count with commas between the thousands: 60,000,000.

@@ -7,7 +7,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, Word};
-use crate::{Car, ConfigError, Source, SpeedTrace};
+use crate::experiment::raw::RawSensors;
+use crate::experiment::sensors::sensors;
+use crate::{Car, ConfigError, Sensors, Source, SpeedTrace};
 
 /// Most repetitions of the segments.
 const MOST_REPETITIONS: f64 = 1e6;
@@ -74,6 +76,8 @@ pub struct Drive {
     pub repetitions: u32,
     /// When the gearbox shifts.
     pub shifts: ShiftPlan,
+    /// The sensors that the measured signals go through; without them a car measures exactly.
+    pub sensors: Option<Sensors>,
 }
 
 impl Drive {
@@ -140,6 +144,7 @@ impl Drive {
             sample_time_s: optional("sample_time_s", &raw.sample_time_s, 1e-4..=10.0, 0.01)?,
             start_m_s: optional("start.vehicle_m_s", &raw.start.vehicle_m_s, 0.0..=100.0, 0.0)?,
             start_gear: raw.start.gear.map(Spanned::into_inner),
+            sensors: raw.sensors.as_ref().map(|raw| sensors(&check, "sensors", raw, None)).transpose()?,
             segments,
             trace,
             repetitions,
@@ -162,6 +167,7 @@ struct RawDrive {
     shift: Option<Spanned<Vec<RawShift>>>,
     segment: Option<Spanned<Vec<RawSegment>>>,
     trace: Option<RawTrace>,
+    sensors: Option<Spanned<RawSensors>>,
 }
 
 #[derive(Deserialize)]

@@ -4,6 +4,7 @@
 //! no further checks. An error names file, line, key, value and allowed range, and gives a hint for a
 //! likely mistake.
 
+mod car_study;
 pub mod check;
 pub mod drive;
 pub mod error;
@@ -16,6 +17,7 @@ pub mod study;
 mod tree;
 pub mod vehicle;
 
+pub use car_study::{CarStudy, CarStudyRuns, DrawnErrors};
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
 pub use experiment::{
@@ -24,10 +26,10 @@ pub use experiment::{
 };
 pub use gearbox::GearboxFile;
 pub use learnt::{read_learnt, write_learnt};
-pub use source::{Kind, Source, toml_string};
+pub use source::{Kind, Source, toml_number, toml_string};
 pub use speed_trace::SpeedTrace;
-pub use study::{Factor, Plan, Sometimes, Study, Target, Values, Varied};
+pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CompliantRequirement, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch, Uncertainty,
-    ValveUncertainty, Vehicle,
+    Car, CompliantRequirement, DefaultTaken, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch,
+    Uncertainty, ValveUncertainty, Vehicle,
 };

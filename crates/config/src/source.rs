@@ -22,6 +22,8 @@ pub enum Kind {
     Drive,
     /// Drives with varied parameters.
     Study,
+    /// Cars with a gearbox, drawn at random.
+    CarStudy,
     /// Values in place of some of a vehicle file's.
     Overlay,
     /// The sensors of a car.
@@ -38,6 +40,24 @@ pub fn toml_string(text: &str) -> String {
         _ => c.to_string(),
     });
     format!("\"{}\"", escaped.collect::<String>())
+}
+
+/// A number with five digits as TOML has it.
+pub fn toml_number(value: f64) -> String {
+    const DIGITS: i32 = 5;
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value:.1}");
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "the exponent of a number is small")]
+    let exponent = value.abs().log10().floor() as i32;
+    if (-3..6).contains(&exponent) {
+        let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
+        let text = format!("{value:.decimals$}");
+        let trimmed = text.trim_end_matches('0');
+        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
+    } else {
+        format!("{value:.4e}")
+    }
 }
 
 /// The tables of a vehicle file.
@@ -90,6 +110,7 @@ impl Source {
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
+            (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
             (false, true, false) => Ok(Kind::Experiment),
             (false, false, true) => Ok(Kind::Study),
@@ -101,7 +122,7 @@ impl Source {
                 line: 1,
                 message:
                     "expected a vehicle file (with [gear_train] or `gearbox`), experiment file (with [shift]), drive \
-                          file (with [[segment]] or [trace]), study file (with [[factor]]), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
+                          file (with [[segment]] or [trace]), study file (with [[factor]], or with `runs` for a car with a gearbox), gearbox file (with `gear`), sensors file (with [sensors]) or bounds file (only \
                           with tables of a vehicle file)"
                         .to_owned(),
             }),
@@ -186,6 +207,16 @@ mod tests {
             let quoted = toml_string(text);
             let table: toml::Table = toml::from_str(&format!("# {quoted}\ntext = {quoted}\n")).unwrap();
             assert_eq!(table["text"].as_str(), Some(text), "{quoted}");
+        }
+    }
+
+    #[test]
+    fn numbers_keep_five_digits() {
+        let cases =
+            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
+        for (value, text) in cases {
+            assert_eq!(toml_number(value), text);
+            assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
         }
     }
 }

@@ -122,6 +122,8 @@ pub struct ShiftErrors {
     pub engine: f64,
     /// Of the turbine-side inertia `M11` of a shift.
     pub inertia: f64,
+    /// Of the stiffness of the drive shafts.
+    pub stiffness: f64,
     /// Half-width of the hysteresis of a valve, Pa.
     pub hysteresis_pa: f64,
     /// Least and greatest delay of a valve, s.
@@ -137,6 +139,7 @@ impl ShiftErrors {
         converter: 0.10,
         engine: 0.08,
         inertia: 0.20,
+        stiffness: 0.20,
         hysteresis_pa: 10e3,
         valve_delay_s: [0.0, 0.03],
     };
@@ -269,13 +272,14 @@ fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
         torque_share_s: 3.0,
         valve_gain: parts[1],
         kiss_point_pa: KISS_POINT_PA,
-        valve_s: 0.012,
+        valve_lag_share: deviation_of(errors.valve_lag),
+        valve_delay_s: deviation_of(0.5 * (errors.valve_delay_s[1] - errors.valve_delay_s[0])),
         pressure_pa: PRESSURE_PA,
         pressure_s: 0.15,
-        kiss_pa: 0.015e6,
         turbine_share: TURBINE_SHARE,
         turbine_share_s: 3.0,
         inertia_share: deviation_of(errors.inertia),
+        stiffness_share: deviation_of(errors.stiffness),
         rate_rad_s: 0.1,
         rate_walk: 0.01,
         load_walk: 1500.0,

@@ -7,6 +7,7 @@ use crate::{Real, Table1};
 /// Sign: slip is input side minus output side; a positive torque drives the output side. Left out:
 /// the drag of the open clutch ([`drag_torque`]), heat, and the time oil needs to leave the plates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Clutch<T> {
     /// Effective radius `R` of the friction force, m.
     pub mean_radius_m: T,
@@ -60,7 +61,7 @@ impl<T: Real> Clutch<T> {
     /// Force that presses the plates together, N: `max(A p - F_s, 0)`.
     #[inline]
     pub fn clamp_force(&self, pressure_pa: T) -> T {
-        (self.piston_area_m2 * pressure_pa - self.return_spring_n).max(T::zero())
+        (self.piston_area_m2 * pressure_pa - self.return_spring_n).at_least(T::zero())
     }
 
     /// Size of the torque the slipping clutch carries, N m: `mu(|dw|) R N max(A p - F_s, 0)`, Eq. (2.13).

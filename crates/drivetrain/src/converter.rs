@@ -12,6 +12,7 @@ const SLOWEST_ENGINE_RAD_S: f64 = 1.0;
 /// In overrun (`lambda > 1`) the capacity factor is negative: the turbine drives the pump. Left out:
 /// fluid inertia and the lock-up clutch.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Converter<T> {
     /// Capacity factor `C(lambda)`, N m s^2, positive below `lambda = 1` and negative above it.
     pub capacity_n_m_s2: Table1<T>,
@@ -32,7 +33,7 @@ impl<T: Real> Converter<T> {
     /// Pump and turbine torque at these speeds, Eq. (2.11).
     #[inline]
     pub fn torques(&self, engine_rad_s: T, turbine_rad_s: T) -> ConverterTorques<T> {
-        let engine_rad_s = engine_rad_s.max(T::of(SLOWEST_ENGINE_RAD_S));
+        let engine_rad_s = engine_rad_s.at_least(T::of(SLOWEST_ENGINE_RAD_S));
         let speed_ratio = turbine_rad_s / engine_rad_s;
         let pump_n_m = self.capacity_n_m_s2.at(speed_ratio) * engine_rad_s * engine_rad_s;
         ConverterTorques { pump_n_m, turbine_n_m: self.torque_ratio.at(speed_ratio) * pump_n_m }
@@ -41,7 +42,7 @@ impl<T: Real> Converter<T> {
     /// Turbine torque, N m, and its derivative by the turbine speed, N m s/rad.
     #[inline]
     pub fn turbine_with_slope(&self, engine_rad_s: T, turbine_rad_s: T) -> (T, T) {
-        let engine_rad_s = engine_rad_s.max(T::of(SLOWEST_ENGINE_RAD_S));
+        let engine_rad_s = engine_rad_s.at_least(T::of(SLOWEST_ENGINE_RAD_S));
         let (capacity, capacity_slope) = self.capacity_n_m_s2.at_with_slope(turbine_rad_s / engine_rad_s);
         let (ratio, ratio_slope) = self.torque_ratio.at_with_slope(turbine_rad_s / engine_rad_s);
         let per_speed_ratio = ratio_slope * capacity + ratio * capacity_slope;
@@ -50,7 +51,7 @@ impl<T: Real> Converter<T> {
 
     /// Least and greatest turbine torque with both speeds anywhere in these ranges, N m.
     pub fn turbine_range(&self, engine_rad_s: [T; 2], turbine_rad_s: [T; 2]) -> [T; 2] {
-        let engine = engine_rad_s.map(|speed| speed.max(T::of(SLOWEST_ENGINE_RAD_S)));
+        let engine = engine_rad_s.map(|speed| speed.at_least(T::of(SLOWEST_ENGINE_RAD_S)));
         // A quotient is greatest where the divisor is smallest, unless it is negative.
         let least = turbine_rad_s[0] / if turbine_rad_s[0] < T::zero() { engine[0] } else { engine[1] };
         let most = turbine_rad_s[1] / if turbine_rad_s[1] < T::zero() { engine[1] } else { engine[0] };

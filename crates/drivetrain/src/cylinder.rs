@@ -6,6 +6,7 @@ use crate::{Clutch, Real};
 /// A passage with a laminar and an orifice part in series: `|d| = R_l nu Q + R_t Q^2`, `d` the pressure drop, `Q` the
 /// flow and `nu` the viscosity.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Passage<T> {
     /// `R_l`, Pa s^2/m^5: laminar resistance over kinematic viscosity.
     pub laminar_pa_s2_m5: T,
@@ -141,7 +142,7 @@ impl<T: Real> Cylinder<T> {
     #[inline]
     pub fn pressure(&self, volume_m3: T) -> T {
         if volume_m3 < T::zero() {
-            (self.preload_pa + volume_m3 / self.home_capacity_m3_pa).max(T::zero())
+            (self.preload_pa + volume_m3 / self.home_capacity_m3_pa).at_least(T::zero())
         } else if volume_m3 < self.stroke_m3 {
             self.preload_pa + (self.kiss_pa - self.preload_pa) * volume_m3 / self.stroke_m3
         } else {
@@ -180,7 +181,7 @@ impl<T: Real> Cylinder<T> {
         if drop_pa < T::zero() {
             self.exhaust.flow(drop_pa, self.viscosity_m2_s)
         } else {
-            self.supply.flow(drop_pa, self.viscosity_m2_s).min(self.flow_max_m3_s)
+            self.supply.flow(drop_pa, self.viscosity_m2_s).at_most(self.flow_max_m3_s)
         }
     }
 

@@ -6,6 +6,7 @@ use crate::{Real, RoadLoad};
 ///
 /// Sign: twist is gearbox side minus wheel side; a positive torque drives the wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Driveline<T> {
     /// Gear ratio `i_df` of the differential.
     pub final_ratio: T,
@@ -49,7 +50,7 @@ impl<T: Real> Driveline<T> {
             None => T::zero(),
             Some(twist) => {
                 let torque = self.shaft_torque(twist, twist_rate_rad_s);
-                if twist_rad > T::zero() { torque.max(T::zero()) } else { torque.min(T::zero()) }
+                if twist_rad > T::zero() { torque.at_least(T::zero()) } else { torque.at_most(T::zero()) }
             }
         }
     }

@@ -34,6 +34,6 @@ pub use real::Real;
 pub use road::RoadLoad;
 pub use shift::{AccelerationRow, Engagement, ReducedShift, ShiftCoefficients, ShiftTorques};
 pub use shift_kind::{PhaseOrder, ShiftKind};
-pub use table::{Table1, Table2, TableError};
+pub use table::{ColumnPlace, Place, Table1, Table2, TableError};
 pub use tyre::Tyre;
-pub use valve::{ClutchValve, CommandKind, LinearValve, Play, PulseWidth, Valve, ValveMaps, ValveStep};
+pub use valve::{ClutchValve, CommandKind, Lag, LinearValve, Play, PulseWidth, Valve, ValveMaps, ValveStep};

@@ -10,6 +10,19 @@ pub trait Real: num_traits::Float + core::fmt::Debug + Send + Sync + 'static {
 
     /// The whole number below a value that is not negative; zero for NaN.
     fn whole(self) -> usize;
+
+    /// The larger of this and `least`; `least` if this is NaN. Unlike `max`, which is a call of the mathematical library on a
+    /// controller, it says nothing for a `least` that is NaN.
+    #[inline]
+    fn at_least(self, least: Self) -> Self {
+        if self > least { self } else { least }
+    }
+
+    /// The smaller of this and `most`; `most` if this is NaN.
+    #[inline]
+    fn at_most(self, most: Self) -> Self {
+        if self < most { self } else { most }
+    }
 }
 
 impl Real for f64 {

@@ -9,6 +9,7 @@ const ROLLING_TURN_RAD_S: f64 = 0.5;
 
 /// Aerodynamic drag, grade and rolling resistance of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoadLoad<T> {
     /// Mass `m` of the vehicle, kg.
     pub mass_kg: T,

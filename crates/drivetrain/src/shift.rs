@@ -27,6 +27,7 @@ pub struct ShiftTorques<T> {
 
 /// An acceleration (rad/s^2) or a constraint torque (N m) as a combination of [`ShiftTorques`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AccelerationRow<T> {
     /// Coefficient of the turbine torque, e.g. `C11`.
     pub per_turbine_torque: T,
@@ -87,6 +88,7 @@ impl Engagement {
 
 /// Accelerations and constraint torques in one engagement.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShiftCoefficients<T> {
     /// Turbine acceleration.
     pub turbine: AccelerationRow<T>,
@@ -102,6 +104,7 @@ pub struct ShiftCoefficients<T> {
 
 /// A gear train reduced to the shift between two clutches.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReducedShift<T> {
     /// Mass matrix `M` in `(w_t, w_0)`, kg m^2.
     pub mass_kg_m2: [[T; 2]; 2],

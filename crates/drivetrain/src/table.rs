@@ -43,6 +43,8 @@ impl core::error::Error for TableError {}
 
 /// Bins of equal width that an axis is divided into for the search of a segment.
 const BINS: usize = 32;
+/// By how much of the axis rounding may move a value across the edge of a bin, in single precision.
+const BIN_ROUNDING: f64 = 1e-5;
 
 /// Breakpoints of one axis, strictly rising.
 ///
@@ -51,10 +53,16 @@ const BINS: usize = 32;
 ///
 /// Every index is bounded by the size of an array and not by `len` alone: an observer's step must hold no panic.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Axis<T, const N: usize> {
-    /// Past `len` the last one again.
+    /// Past `len` infinity: no value is beyond it.
+    #[cfg_attr(
+        feature = "serde",
+        serde(with = "serde_big_array::BigArray", bound(deserialize = "T: serde::Deserialize<'de>"))
+    )]
     points: [T; N],
     len: usize,
+    last: T,
     first_segment: [u8; BINS],
     bins_per_unit: T,
 }
@@ -91,32 +99,32 @@ impl<T: Real, const N: usize> Axis<T, N> {
     #[expect(clippy::cast_precision_loss, reason = "the number of bins is small")]
     fn with_bins(mut points: [T; N], len: usize) -> Self {
         let (first, last) = (points[0], points[len - 1]);
-        points[len..].fill(last);
+        points[len..].fill(T::infinity());
         let span = last - first;
-        let mut axis = Self { points, len, first_segment: [0; BINS], bins_per_unit: T::of(BINS as f64) / span };
+        let mut axis = Self { points, len, last, first_segment: [0; BINS], bins_per_unit: T::of(BINS as f64) / span };
         for (bin, segment) in axis.first_segment.iter_mut().enumerate() {
-            let edge = first + span * T::of(bin as f64 / BINS as f64);
-            // A breakpoint in the bin before may round to either side of the edge: start one early.
+            // A value that is rounded into this bin may be that much below its edge.
+            let edge = first + span * T::of(bin as f64 / BINS as f64 - BIN_ROUNDING);
             let below = points[1..len - 1].iter().filter(|&&point| point <= edge).count();
-            *segment = u8::try_from(below.saturating_sub(1)).unwrap_or(0);
+            *segment = u8::try_from(below).unwrap_or(0);
         }
         axis
     }
 
-    /// Index of the segment that holds `x`, a value within the axis.
+    /// Index of the segment that holds `x`, a value within the axis; for its end that of the last breakpoint.
     #[inline]
     fn segment(&self, x: T) -> usize {
         let bin = ((x - self.points[0]) * self.bins_per_unit).whole();
         let mut segment = usize::from(self.first_segment[bin.min(BINS - 1)]);
-        while segment + 2 < self.len && self.points[(segment + 1).min(N - 1)] <= x {
+        while self.points.get(segment + 1).is_some_and(|next| *next <= x) {
             segment += 1;
         }
-        segment.min(N - 2)
+        segment.min(N - 1)
     }
 
     #[inline]
     fn clamp(&self, x: T) -> T {
-        let (first, last) = (self.points[0], self.points[N - 1]);
+        let (first, last) = (self.points[0], self.last);
         // NaN stays NaN.
         if x < first {
             first
@@ -134,10 +142,19 @@ impl<T: Real, const N: usize> Axis<T, N> {
 
 /// A function of one variable given by breakpoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Table1<T> {
     axis: Axis<T, MAX_POINTS>,
     values: [T; MAX_POINTS],
     slopes: [T; MAX_POINTS],
+}
+
+/// An argument of a table: the segment that it is in, and the value there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place<T> {
+    segment: usize,
+    /// The value of the table.
+    pub value: T,
 }
 
 impl<T: Real> Table1<T> {
@@ -172,9 +189,7 @@ impl<T: Real> Table1<T> {
     /// The value at `x`, linear between breakpoints, the end value outside them.
     #[inline]
     pub fn at(&self, x: T) -> T {
-        let x = self.axis.clamp(x);
-        let i = self.axis.segment(x);
-        self.values[i] + self.slopes[i] * (x - self.axis.points[i])
+        self.place(x).value
     }
 
     /// The value at `x` and its derivative, which is zero outside the breakpoints.
@@ -224,15 +239,32 @@ impl<T: Real> Table1<T> {
     /// Smallest and largest value between two arguments, the first not above the second.
     #[inline]
     pub fn range_within(&self, from: T, to: T) -> (T, T) {
-        let (a, b) = (self.at(from), self.at(to));
-        let points = self.axis.points.iter().zip(&self.values).take(self.axis.len);
-        let inside = points.filter(|(x, _)| **x > from && **x < to);
-        inside.fold((a.min(b), a.max(b)), |(low, high), (_, &y)| (low.min(y), high.max(y)))
+        self.range_between(self.place(from), self.place(to))
+    }
+
+    /// Where an argument is, for [`Self::range_between`].
+    #[inline]
+    pub fn place(&self, x: T) -> Place<T> {
+        let x = self.axis.clamp(x);
+        let segment = self.axis.segment(x);
+        Place { segment, value: self.values[segment] + self.slopes[segment] * (x - self.axis.points[segment]) }
+    }
+
+    /// Smallest and largest value between two arguments, the first not above the second.
+    #[inline]
+    pub fn range_between(&self, from: Place<T>, to: Place<T>) -> (T, T) {
+        let (mut low, mut high) = (from.value.at_most(to.value), from.value.at_least(to.value));
+        let mut at = from.segment + 1;
+        while let Some(&y) = self.values.get(at).filter(|_| at <= to.segment) {
+            (low, high) = (low.at_most(y), high.at_least(y));
+            at += 1;
+        }
+        (low, high)
     }
 
     /// Smallest and largest value.
     pub fn range(&self) -> (T, T) {
-        self.values().iter().fold((self.values[0], self.values[0]), |(lo, hi), &y| (lo.min(y), hi.max(y)))
+        self.values().iter().fold((self.values[0], self.values[0]), |(lo, hi), &y| (lo.at_most(y), hi.at_least(y)))
     }
 
     /// The same table in another precision.
@@ -252,6 +284,14 @@ pub struct Table2<T> {
     rows: Axis<T, MAX_POINTS>,
     columns: Axis<T, MAX_COLUMNS>,
     values: [[T; MAX_COLUMNS]; MAX_POINTS],
+}
+
+/// Where a value lies on the columns of a [`Table2`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnPlace<T> {
+    segment: usize,
+    /// Share of the segment, 0 to 1.
+    share: T,
 }
 
 impl<T: Real> Table2<T> {
@@ -284,10 +324,25 @@ impl<T: Real> Table2<T> {
     /// The value at `(row, column)`, bilinear inside the grid, the edge value outside it.
     #[inline]
     pub fn at(&self, row: T, column: T) -> T {
-        let (row, column) = (self.rows.clamp(row), self.columns.clamp(column));
-        let (i, j) = (self.rows.segment(row), self.columns.segment(column));
+        self.at_place(row, &self.place(column))
+    }
+
+    /// Where a value of the column lies, for [`Self::at_place`].
+    #[inline]
+    pub fn place(&self, column: T) -> ColumnPlace<T> {
+        let column = self.columns.clamp(column);
+        let j = self.columns.segment(column).min(MAX_COLUMNS - 2);
+        let share = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
+        ColumnPlace { segment: j, share }
+    }
+
+    /// As [`Self::at`], for many rows at one value of the column.
+    #[inline]
+    pub fn at_place(&self, row: T, column: &ColumnPlace<T>) -> T {
+        let row = self.rows.clamp(row);
+        let (i, j, c) =
+            (self.rows.segment(row).min(MAX_POINTS - 2), column.segment.min(MAX_COLUMNS - 2), column.share);
         let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
-        let c = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
         let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
         across(i) + r * (across(i + 1) - across(i))
     }
@@ -327,6 +382,20 @@ mod tests {
     fn outside_the_axis_the_end_value_holds() {
         let table = Table1::new(&[0.0, 1.0, 3.0], &[10.0, 20.0, 0.0]).unwrap();
         assert_eq!((table.at(-5.0), table.at(9.0)), (10.0, 0.0));
+    }
+
+    #[test]
+    fn a_place_on_the_columns_stands_for_its_value_at_every_row() {
+        let table =
+            Table2::new(&[0.0, 10.0, 40.0], &[0.0, 0.3, 1.0], &[[1.0, 2.0, 5.0], [0.0, 7.0, 3.0], [4.0, 4.0, 9.0]])
+                .unwrap();
+        for column in [-1.0, 0.0, 0.2999, 0.3, 0.71, 1.0, 2.0] {
+            let place = table.place(column);
+            for row in [-5.0, 0.0, 3.3, 10.0, 39.9, 50.0] {
+                assert_eq!(table.at_place(row, &place), table.at(row, column), "{row} {column}");
+            }
+        }
+        assert!(table.at_place(5.0, &table.place(f64::NAN)).is_nan());
     }
 
     #[test]

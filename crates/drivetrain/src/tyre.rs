@@ -21,13 +21,13 @@ impl<T: Real> Tyre<T> {
     /// Longitudinal slip `S_x` at this circumferential and vehicle speed.
     #[inline]
     pub fn slip(&self, rim_m_s: T, vehicle_m_s: T) -> T {
-        (rim_m_s - vehicle_m_s) / rim_m_s.abs().max(vehicle_m_s.abs()).max(self.floor_m_s)
+        (rim_m_s - vehicle_m_s) / rim_m_s.abs().at_least(vehicle_m_s.abs()).at_least(self.floor_m_s)
     }
 
     /// How fast the force rises with the speed of the rim, N s/m, at a constant reference speed, where it is
     /// `force_n`.
     pub fn damping(&self, rim_m_s: T, vehicle_m_s: T, force_n: T) -> T {
-        let reference = rim_m_s.abs().max(vehicle_m_s.abs()).max(self.floor_m_s);
+        let reference = rim_m_s.abs().at_least(vehicle_m_s.abs()).at_least(self.floor_m_s);
         let saturation = force_n / self.max_force_n;
         self.max_force_n * T::of(2.0) / (self.slip_scale * reference) * (T::one() - saturation * saturation)
     }

@@ -29,6 +29,7 @@ pub enum CommandKind {
 
 /// The valve model of an observer: pressure dynamics with constant parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Valve<T> {
     /// Proportional valve, `tau_cv dp/dt = -p + K_cv i`, Eq. (2.15). The command is a current, A.
     Proportional {
@@ -116,6 +117,50 @@ impl<T: Real> Valve<T> {
     }
 }
 
+/// `dp/dt = a p + b` over a time, for any `b`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lag<T> {
+    a22_per_s: T,
+    dt_s: T,
+    phi: T,
+    psi: T,
+    psi_integral: T,
+}
+
+impl<T: Real> Lag<T> {
+    /// Over `dt_s` by the matrix exponential: exact.
+    #[inline]
+    pub fn over(a22_per_s: T, dt_s: T) -> Self {
+        let x = a22_per_s * dt_s;
+        // `phi - 1` and `psi - dt` cancel at short steps.
+        let less_one = x.exp_m1();
+        let psi = less_one / a22_per_s;
+        let psi_integral = if x.abs() < T::of(SHORT) {
+            dt_s * dt_s * (T::of(0.5) + x * (T::of(1.0 / 6.0) + x * (T::of(1.0 / 24.0) + x * T::of(1.0 / 120.0))))
+        } else {
+            (psi - dt_s) / a22_per_s
+        };
+        Self { a22_per_s, dt_s, phi: T::one() + less_one, psi, psi_integral }
+    }
+
+    /// Whether it is that of this `a` over this time.
+    #[inline]
+    pub fn is_over(&self, a22_per_s: T, dt_s: T) -> bool {
+        self.a22_per_s == a22_per_s && self.dt_s == dt_s
+    }
+
+    /// With this `b`.
+    #[inline]
+    pub fn driven(&self, b2_pa_s: T) -> ValveStep<T> {
+        ValveStep {
+            phi: self.phi,
+            psi: self.psi,
+            drift_pa: self.psi * b2_pa_s,
+            drift_integral_pa_s: self.psi_integral * b2_pa_s,
+        }
+    }
+}
+
 impl<T: Real> LinearValve<T> {
     /// Pressure after `dt_s` under a constant command, exactly: `p e^{a22 dt} + b2 (e^{a22 dt} - 1)/a22`.
     #[inline]
@@ -127,18 +172,7 @@ impl<T: Real> LinearValve<T> {
     /// Over `dt_s` by the matrix exponential: exact.
     #[inline]
     pub fn step(&self, dt_s: T) -> ValveStep<T> {
-        let a = self.a22_per_s;
-        let x = a * dt_s;
-        // `phi - 1` and `psi - dt` cancel at short steps.
-        let less_one = x.exp_m1();
-        let phi = T::one() + less_one;
-        let psi = less_one / a;
-        let psi_integral = if x.abs() < T::of(SHORT) {
-            dt_s * dt_s * (T::of(0.5) + x * (T::of(1.0 / 6.0) + x * (T::of(1.0 / 24.0) + x * T::of(1.0 / 120.0))))
-        } else {
-            (psi - dt_s) / a
-        };
-        ValveStep { phi, psi, drift_pa: psi * self.b2_pa_s, drift_integral_pa_s: psi_integral * self.b2_pa_s }
+        Lag::over(self.a22_per_s, dt_s).driven(self.b2_pa_s)
     }
 
     /// Over `dt_s` by forward Euler, as the chapter did.

@@ -7,6 +7,9 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
+use config::vehicle::short::{Facts, ValveKind, short_file};
+use config::{Source, Vehicle};
+
 use common::{Logs, TestCar, TestShift};
 use fit::Map;
 
@@ -32,7 +35,7 @@ struct Outcome {
 fn car_of(case: &str, seed: u64) -> TestCar {
     let mut car = match case {
         "other car" => {
-            let facts = fit::init::Facts {
+            let facts = Facts {
                 name: "another car".to_owned(),
                 mass_kg: 1800.0,
                 wheel_radius_m: 0.33,
@@ -40,8 +43,10 @@ fn car_of(case: &str, seed: u64) -> TestCar {
                 ratio_after: 2.34,
                 final_ratio: 3.2,
                 engine_torque_n_m: 250.0,
+                valve: ValveKind::Proportional,
             };
-            TestCar::of(fit::init::vehicle_file(&facts).unwrap(), seed)
+            let file = Source::built_in("another car", &short_file(&facts, false).unwrap());
+            TestCar::of(Vehicle::from_source(file).unwrap(), seed)
         }
         "other shape" => TestCar::drawn(seed).with_other_maps(),
         "hysteresis" => TestCar::drawn(seed).with_hysteresis(),

@@ -13,7 +13,6 @@ mod fitted_file;
 pub mod fitting;
 mod freeing;
 mod hotelling;
-pub mod init;
 pub mod intervals;
 mod motion;
 pub mod open_loop;

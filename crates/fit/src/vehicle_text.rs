@@ -2,6 +2,8 @@
 
 use toml::de::{DeTable, DeValue};
 
+pub(crate) use config::toml_number as number;
+
 use crate::FitError;
 
 /// How the comment of a fitted value begins.
@@ -160,37 +162,9 @@ fn missing(path: &[Step]) -> FitError {
     FitError::input(format!("the vehicle file has no numbers at `{}`", steps.collect::<Vec<_>>().join(".")))
 }
 
-/// A number with five digits as TOML has it.
-pub(crate) fn number(value: f64) -> String {
-    const DIGITS: i32 = 5;
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value:.1}");
-    }
-    #[expect(clippy::cast_possible_truncation, reason = "the exponent of a number is small")]
-    let exponent = value.abs().log10().floor() as i32;
-    if (-3..6).contains(&exponent) {
-        let decimals = usize::try_from((DIGITS - 1 - exponent).max(1)).unwrap_or(1);
-        let text = format!("{value:.decimals$}");
-        let trimmed = text.trim_end_matches('0');
-        if trimmed.ends_with('.') { format!("{trimmed}0") } else { trimmed.to_owned() }
-    } else {
-        format!("{value:.4e}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_keep_five_digits() {
-        let cases =
-            [(0.123_456_7, "0.12346"), (13_000.0, "13000.0"), (1.0e6, "1.0000e6"), (2.5e-4, "2.5000e-4"), (0.0, "0.0")];
-        for (value, text) in cases {
-            assert_eq!(number(value), text);
-            assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
-        }
-    }
 
     #[test]
     fn a_value_is_replaced_and_everything_else_stays() {

@@ -1,15 +1,16 @@
 //! The readers of files, and what a command does next with a file that they take.
 
 use std::fs;
-use std::path::PathBuf;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
 
 use config::{Car, Experiment, GearboxFile, Source, Study, Vehicle};
 use design::{design_compliant, design_rigid};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_shift};
 use report::gearbox_figure::{gear_figure, train_figure};
 use study::campaign::{factor_values, run_seed};
-use study::{Row, RunColumns, simulate_shift};
-use trace::{ColumnKind, GrowingTable, partial_path, read_csv, read_rows, write_csv, write_parquet};
+use study::{Log, Row, RunColumns, simulate_shift};
+use trace::{ColumnKind, CsvRows, GrowingTable, LastLine, partial_path, read_csv, read_rows, write_csv, write_parquet};
 
 use crate::{Depth, Fuzzer, samples};
 
@@ -68,6 +69,7 @@ pub(crate) fn study(fuzzer: &Fuzzer, input: &[u8]) {
 }
 
 pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
+    row_by_row(fuzzer, input);
     let Ok(trace) = read_csv(&written(fuzzer, "input", input)) else { return };
     let _ = trace.median_step_s();
     if let Ok(columns) = RunColumns::of(&trace, &fuzzer.vehicle) {
@@ -76,6 +78,17 @@ pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
         }
     }
     let _ = write_csv(&fuzzer.folder.join("output"), &trace);
+}
+
+/// Reads a log as `estimate` does.
+fn row_by_row(fuzzer: &Fuzzer, input: &[u8]) {
+    let (lines, _) = LastLine::new(Box::new(Cursor::new(input.to_vec())));
+    let Ok(rows) = CsvRows::of(Path::new("input"), Box::new(lines)) else { return };
+    let Ok(mut log) = Log::of(rows, &fuzzer.vehicle, 10) else { return };
+    for (input, row) in log.by_ref().map_while(Result::ok) {
+        assert!(input.dt_s >= 0.0 && row.time_s.is_finite());
+    }
+    let _ = log.check_readings();
 }
 
 pub(crate) fn table(fuzzer: &Fuzzer, input: &[u8]) {

@@ -167,7 +167,11 @@ impl Fuzzer {
         let mut seeds = Self::corpus(target);
         let experiments = self.folder.join("experiments");
         match target {
-            Target::Vehicle => seeds.extend(texts(&[self.folder.join("vehicles")])),
+            Target::Vehicle => {
+                seeds.extend(texts(&[self.folder.join("vehicles")]));
+                // A short file is the shortest of them, and most of its lines are read: as many seeds as of the others.
+                seeds.extend(std::iter::repeat_n(SHORT_FILE.to_vec(), seeds.len()));
+            }
             Target::Experiment => {
                 seeds.extend(["bench", "e1", "e4"].map(|name| text(&experiments.join(name).with_extension("toml"))));
             }
@@ -203,6 +207,35 @@ impl Drop for Fuzzer {
         let _ = fs::remove_dir_all(&self.folder);
     }
 }
+
+/// A short vehicle file with some of the keys that it may have.
+const SHORT_FILE: &[u8] = b"\
+name = \"short\"
+[gear_train]
+ratios = [4.17, 2.34]
+[engine]
+max_torque_n_m = 250
+[clutch.b]
+piston_area_m2 = 0.02
+friction = { slip_rad_s = [0.0, 100.0], coefficient = [0.12, 0.14] }
+[clutch.b.valve]
+hysteresis_pa = 5e3
+[clutch.b.fill]
+enabled = true
+stroke_m = 1e-3
+[driveline]
+final_ratio = 3.2
+backlash_rad = 0.01
+[vehicle]
+mass_kg = 1650
+wheel_radius_m = 0.32
+[oil]
+temperature_degc = 60
+[design.error_bounds]
+mass_kg = 100
+[design.error_bounds.fill]
+volume_factor = [0.8, 1.2]
+";
 
 fn project() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")

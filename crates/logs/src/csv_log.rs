@@ -56,7 +56,7 @@ impl CsvLog {
             .has_headers(false)
             .flexible(true)
             .delimiter(dialect.delimiter)
-            .from_reader(RowByRow { input: Box::new(input), left: LONGEST_ROW });
+            .from_reader(RowByRow { input: Box::new(input), left: LONGEST_ROW, last: b'\n', has_ended: false });
         let mut row = csv::ByteRecord::new();
         let mut next = |row: &mut csv::ByteRecord| read_row(path, &mut reader, dialect.preamble, row);
         next(&mut row)?;
@@ -115,6 +115,7 @@ impl CsvLog {
             long: 0,
             no_numbers: 0,
             first_text: None,
+            cut: None,
         }))
     }
 }
@@ -133,6 +134,8 @@ struct Rows<'a> {
     long: u64,
     no_numbers: u64,
     first_text: Option<String>,
+    /// What became of a last line without an end.
+    cut: Option<&'static str>,
 }
 
 impl Rows<'_> {
@@ -147,6 +150,54 @@ impl Rows<'_> {
         // Cells of numbers are ASCII; anything else fails to parse below.
         self.text.extend(cell.iter().map(|&byte| if comma && byte == b',' { '.' } else { char::from(byte) }));
         self.text.parse::<f64>().map(Some).map_err(drop)
+    }
+
+    /// Appends the samples of the row that was read.
+    fn take_row(&mut self, batch: &mut Vec<Sample>) {
+        self.rows += 1;
+        // The reader finds the end of the text before it gives a last line without an end.
+        let is_cut = self.reader.get_ref().ends_within_a_line();
+        if is_cut && self.row.len() < self.log.width {
+            self.cut = Some("is left out");
+            return;
+        }
+        self.short += u64::from(self.row.len() < self.log.width);
+        self.long += u64::from((self.log.width..self.row.len()).any(|i| !self.row[i].trim_ascii().is_empty()));
+        let time_s = match self.number(self.log.time.0) {
+            _ if is_cut && self.log.time.0 + 1 == self.row.len() => {
+                self.cut = Some("is left out");
+                return;
+            }
+            Ok(Some(time)) if time.is_finite() => time * self.log.time.1,
+            _ => {
+                self.without_time += 1;
+                return;
+            }
+        };
+        for i in 0..self.columns.len() {
+            let (channel, column) = self.columns[i];
+            if is_cut && column + 1 == self.row.len() {
+                self.cut = Some("counts without its last cell, of which digits may be missing");
+                continue;
+            }
+            // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
+            let (value, quality) = match self.number(column) {
+                Ok(None) => continue,
+                Ok(Some(value)) if value.is_nan() => continue,
+                Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
+                Ok(Some(value)) => (value, Quality::Missing),
+                Err(()) => {
+                    self.no_numbers += 1;
+                    if self.first_text.is_none() {
+                        let line =
+                            self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
+                        self.first_text = Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
+                    }
+                    (f64::NAN, Quality::Missing)
+                }
+            };
+            batch.push(Sample { channel, time_s, value, quality });
+        }
     }
 }
 
@@ -165,37 +216,7 @@ impl Stream for Rows<'_> {
                 }
                 return Ok(false);
             }
-            self.rows += 1;
-            self.short += u64::from(self.row.len() < self.log.width);
-            self.long += u64::from((self.log.width..self.row.len()).any(|i| !self.row[i].trim_ascii().is_empty()));
-            let time_s = match self.number(self.log.time.0) {
-                Ok(Some(time)) if time.is_finite() => time * self.log.time.1,
-                _ => {
-                    self.without_time += 1;
-                    continue;
-                }
-            };
-            for i in 0..self.columns.len() {
-                let (channel, column) = self.columns[i];
-                // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
-                let (value, quality) = match self.number(column) {
-                    Ok(None) => continue,
-                    Ok(Some(value)) if value.is_nan() => continue,
-                    Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
-                    Ok(Some(value)) => (value, Quality::Missing),
-                    Err(()) => {
-                        self.no_numbers += 1;
-                        if self.first_text.is_none() {
-                            let line =
-                                self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
-                            self.first_text =
-                                Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
-                        }
-                        (f64::NAN, Quality::Missing)
-                    }
-                };
-                batch.push(Sample { channel, time_s, value, quality });
-            }
+            self.take_row(batch);
         }
         Ok(true)
     }
@@ -208,8 +229,11 @@ impl Stream for Rows<'_> {
             }
         };
         count(self.without_time, "have no time and are left out");
-        count(self.short, "have fewer cells than there are columns; the last line may be cut");
+        count(self.short, "have fewer cells than there are columns");
         count(self.long, "have more cells than there are columns");
+        if let Some(cut) = self.cut {
+            notes.push(format!("the last line has no end and {cut}"));
+        }
         if let Some(first) = &self.first_text {
             notes.push(format!("{} cells are not numbers and count as missing, the first in {first}", self.no_numbers));
         }
@@ -244,6 +268,16 @@ fn read_row(
 struct RowByRow {
     input: Box<dyn Read>,
     left: usize,
+    /// The last byte that was read, and whether it is the last of all.
+    last: u8,
+    has_ended: bool,
+}
+
+impl RowByRow {
+    /// Whether the text ended within a line.
+    fn ends_within_a_line(&self) -> bool {
+        self.has_ended && !matches!(self.last, b'\n' | b'\r')
+    }
 }
 
 impl Read for RowByRow {
@@ -254,6 +288,10 @@ impl Read for RowByRow {
         let most = buffer.len().min(self.left);
         let read = self.input.read(&mut buffer[..most])?;
         self.left -= read;
+        match buffer[..read].last() {
+            Some(last) => self.last = *last,
+            None => self.has_ended = true,
+        }
         Ok(read)
     }
 }

@@ -52,7 +52,8 @@ impl LogError {
         Self::Damaged { path: path.to_owned(), position: position.into(), message: message.into() }
     }
 
-    pub(crate) fn map(message: impl Into<String>) -> Self {
+    /// Something in a channel map is wrong, or does not fit the log.
+    pub fn map(message: impl Into<String>) -> Self {
         Self::Map { message: message.into() }
     }
 }

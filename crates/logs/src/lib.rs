@@ -10,6 +10,7 @@
 pub mod can;
 pub mod csv_log;
 pub mod error;
+pub mod frozen;
 pub mod inspect;
 pub mod log;
 pub mod map;
@@ -24,6 +25,7 @@ pub mod steps;
 pub mod suggest;
 
 pub use error::LogError;
+pub use frozen::{FrozenSpeed, Speeds};
 pub use inspect::{ChannelSummary, Inspection, inspect};
 pub use log::{Channel, Log, OpenOptions, TimeColumn, needs_map};
 pub use map::{ChannelMap, Combine, Gearbox, Mapped};
@@ -31,5 +33,5 @@ pub use readings::{Reading, Readings, RoleSummary};
 pub use role::Role;
 pub use samples::{Clock, Quality, QualityCounts, Sample, Samples};
 pub use shifts::{Direction, GearsOfShift, Load, Shift, ShiftFinder, ShiftPhase, ShiftQuality};
-pub use steps::{Step, Steps};
+pub use steps::{Places, Step, Steps};
 pub use suggest::suggest;

@@ -23,6 +23,8 @@ pub enum Combine {
 pub struct Mapped {
     /// What they are.
     pub role: Role,
+    /// The element of the gearbox, in small letters, where the role is the command of one.
+    pub element: Option<String>,
     /// Their names.
     pub names: Vec<String>,
     /// The group of them all; needed where a name stands in several.
@@ -46,6 +48,7 @@ impl Mapped {
     pub fn new(role: Role, name: &str) -> Self {
         Self {
             role,
+            element: None,
             names: vec![name.to_owned()],
             group: None,
             combine: Combine::Mean,
@@ -54,6 +57,15 @@ impl Mapped {
             offset: 0.0,
             delay_s: 0.0,
             valid_range: None,
+        }
+    }
+
+    /// Its name in a map.
+    pub fn key(&self) -> String {
+        match (&self.element, self.role) {
+            (Some(element), Role::ElementDuty) => format!("element_{element}_duty"),
+            (Some(element), _) => format!("element_{element}_current"),
+            (None, role) => role.name().to_owned(),
         }
     }
 }
@@ -166,10 +178,10 @@ impl ChannelMap {
         if name.is_empty() {
             return Err(wrong());
         }
-        let role = known_role(role.trim()).map_err(LogError::map)?;
+        let (role, element) = known_role(role.trim()).map_err(LogError::map)?;
         let unit = Some(unit).filter(|unit| !unit.is_empty());
-        self.channels.retain(|entry| entry.role != role);
-        self.channels.push(Mapped { unit, ..Mapped::new(role, &name) });
+        self.channels.retain(|entry| entry.role != role || entry.element != element);
+        self.channels.push(Mapped { unit, element, ..Mapped::new(role, &name) });
         Ok(())
     }
 
@@ -187,15 +199,19 @@ impl ChannelMap {
     }
 }
 
-fn known_role(name: &str) -> Result<Role, String> {
+/// The role of a name in a map, and the element of the gearbox that it is about.
+fn known_role(name: &str) -> Result<(Role, Option<String>), String> {
     let names = || Role::all().map(Role::name).collect::<Vec<_>>().join(", ");
-    Role::parse(name)
+    let of_element = Role::of_element(name).map(|(role, element)| (role, Some(element.to_lowercase())));
+    of_element
+        .or_else(|| Role::parse(name).map(|role| (role, None)))
         .ok_or_else(|| format!("there is no role `{}`\nhint: the roles are {}", error::shown(name), names()))
 }
 
 fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
-    let role = known_role(role)?;
-    let key = |key: &str| format!("`channel.{}.{key}`", role.name());
+    let role_name = role;
+    let (role, element) = known_role(role)?;
+    let key = |key: &str| format!("`channel.{role_name}.{key}`");
     let names = match (raw.name, raw.names) {
         (Some(name), None) => vec![name],
         (None, Some(names)) if !names.is_empty() => names,
@@ -222,6 +238,7 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     }
     Ok(Mapped {
         role,
+        element,
         names,
         group: raw.group,
         combine: raw.combine.unwrap_or(Combine::Mean),
@@ -283,14 +300,14 @@ impl Resolved {
             None => {
                 return Err(LogError::map(format!(
                     "the channels of {} have the units {}\nhint: say one in `channel.{}.unit`",
-                    entry.role.name(),
+                    entry.key(),
                     units.join(" and "),
-                    entry.role.name()
+                    entry.key()
                 )));
             }
         };
         let (unit_name, size, zero) =
-            conversion(entry.role, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
+            conversion(entry, &text, &log.channels()[channels[0]], gearbox).map_err(LogError::map)?;
         Ok(Self { entry: entry.clone(), channels, unit_name, size, zero })
     }
 
@@ -306,9 +323,9 @@ impl Resolved {
 }
 
 /// Name, size and zero of the unit of a role.
-fn conversion(role: Role, text: &str, channel: &Channel, gearbox: &Gearbox) -> Result<(String, f64, f64), String> {
+fn conversion(entry: &Mapped, text: &str, channel: &Channel, gearbox: &Gearbox) -> Result<(String, f64, f64), String> {
+    let (role, name) = (entry.role, entry.key());
     let Some(wanted) = role.quantity() else { return Ok((String::new(), 1.0, 0.0)) };
-    let name = role.name();
     let channel = error::shown(&channel.name);
     if text.trim().is_empty() && wanted != Quantity::Share {
         return Err(format!(
@@ -324,7 +341,7 @@ fn conversion(role: Role, text: &str, channel: &Channel, gearbox: &Gearbox) -> R
             Unit::known()
         ));
     };
-    let duty = matches!(role, Role::OncomingDuty | Role::OffgoingDuty);
+    let duty = matches!(role, Role::OncomingDuty | Role::OffgoingDuty | Role::ElementDuty);
     let (size, zero) = match (role, unit.quantity) {
         // A duty cycle is in % inside.
         _ if duty && unit.quantity == Quantity::Share => (100.0 * unit.size, 0.0),

@@ -4,7 +4,8 @@ use trace::Quantity;
 use trace::units::{mpa, rpm};
 
 use crate::Role;
-use crate::readings::{COUPLED, FROZEN_CHANGE, RoleSummary};
+use crate::frozen::{COUPLED, FROZEN_CHANGE_FROM_START};
+use crate::readings::RoleSummary;
 
 /// Least and greatest of some values, and the middle of their sizes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -158,7 +159,7 @@ fn stands_still(entry: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding>
         let Extremes { least, greatest, .. } = other.extremes;
         let turns = takes_along.contains(&other.role) && greatest > MOVING_RAD_S;
         let is_coupled = entry.role != Role::EngineSpeed || greatest > COUPLED * value;
-        turns && is_coupled && greatest - least > FROZEN_CHANGE * greatest
+        turns && is_coupled && greatest - least > FROZEN_CHANGE_FROM_START * greatest
     };
     let other = summary.iter().find(changes)?;
     let (role, name) = (entry.role, entry.role.name());

@@ -4,27 +4,14 @@
 //!
 //! - a value outside `valid_range` of the map is not used;
 //! - several channels of one signal count where all of them have the same time stamp;
-//! - a speed is frozen that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples
-//!   and three times as many samples as ever before, while a speed that it cannot part from changes by [`FROZEN_CHANGE`]: it is
-//!   not used until it changes. Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from
-//!   a turbine that is nearly as fast or faster: below that the idle control may hold the engine while the car comes to rest;
+//! - a speed that stands still while it cannot is not used until it changes, see [`crate::frozen`];
 //! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
+use crate::frozen::{FrozenSpeed, SPEEDS, Speeds};
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Likely};
 use crate::samples::{Quality, QualityCounts};
 use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
-
-/// A speed is frozen when it stood still for so long, s.
-pub const FROZEN_S: f64 = 0.5;
-/// When it has not changed since the log began, s: how coarse it is, is not known then.
-pub const FROZEN_FROM_START_S: f64 = 5.0;
-/// And for so many samples.
-pub const FROZEN_SAMPLES: u32 = 10;
-/// While a speed that it cannot part from changed by this share of its value.
-pub const FROZEN_CHANGE: f64 = 0.1;
-/// A turbine above this share of the engine's speed takes the engine along when it changes.
-pub const COUPLED: f64 = 0.95;
 
 /// A value of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,24 +47,8 @@ struct Channels {
     parts_s: f64,
     counts: QualityCounts,
     extremes: Extremes,
-    still: Option<Still>,
-    /// Samples of the longest time so far in which the speed stood still and was not frozen: coarse signals do so often.
-    longest_still: u32,
+    frozen: FrozenSpeed,
 }
-
-/// A speed that stands still.
-#[derive(Debug, Clone, Copy)]
-struct Still {
-    value: f64,
-    since_s: f64,
-    samples: u32,
-    /// The other speeds when it began.
-    others: [Option<f64>; SPEEDS],
-    frozen: bool,
-}
-
-/// Roles that are speeds: the first five.
-const SPEEDS: usize = 5;
 
 /// The readings of a log in the order of their time stamps.
 pub struct Readings<'a> {
@@ -88,7 +59,9 @@ pub struct Readings<'a> {
     /// Roles that the last sample still has to be given to.
     pending: Vec<(usize, usize)>,
     sample: Option<crate::Sample>,
-    speeds: [Option<f64>; SPEEDS],
+    /// Place of the last reading's entry in the map.
+    entry: usize,
+    speeds: Speeds,
     /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
     friction_n_m: Option<f64>,
 }
@@ -110,11 +83,10 @@ impl<'a> Readings<'a> {
         let roles = resolved.into_iter().map(|resolved| Channels {
             parts: vec![None; resolved.channels.len()],
             parts_s: f64::NAN,
+            frozen: FrozenSpeed::new(resolved.entry.role),
             resolved,
             counts: QualityCounts::default(),
             extremes: Extremes::default(),
-            still: None,
-            longest_still: 0,
         });
         let roles = roles.collect();
         Ok(Self {
@@ -123,6 +95,7 @@ impl<'a> Readings<'a> {
             users,
             pending: Vec::new(),
             sample: None,
+            entry: 0,
             speeds: [None; SPEEDS],
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
@@ -137,6 +110,11 @@ impl<'a> Readings<'a> {
             unit_name: channels.resolved.unit_name.clone(),
         };
         self.roles.iter().map(summary).collect()
+    }
+
+    /// The place in the map of the entry that gave the last reading.
+    pub fn entry(&self) -> usize {
+        self.entry
     }
 
     /// What is to be said about the log, complete after the last reading.
@@ -177,10 +155,10 @@ impl<'a> Readings<'a> {
     /// Most samples are unusable, or a unit is wrong by all appearances.
     pub fn check(&self) -> Result<(), LogError> {
         let summary = self.summary();
-        for role in &summary {
+        for (role, channels) in summary.iter().zip(&self.roles) {
+            let name = channels.resolved.entry.key();
             let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
             if total == 0 {
-                let name = role.role.name();
                 return Err(LogError::map(format!(
                     "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
                 )));
@@ -188,9 +166,8 @@ impl<'a> Readings<'a> {
             // A request that is rarely made is rightly absent.
             if 2 * good < total && role.role != Role::TorqueReductionRequest {
                 return Err(LogError::map(format!(
-                    "{} of {total} samples of {} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
+                    "{} of {total} samples of {name} cannot be used: {}\nhint: check the channel with `wetclutch inspect`, and its entry in the channel map",
                     total - good,
-                    role.role.name(),
                     role.counts.faults()
                 )));
             }
@@ -243,7 +220,7 @@ impl<'a> Readings<'a> {
         }
         let time_s = sample.time_s - entry.delay_s;
         if quality == Quality::Good && kind.is_speed() {
-            if channels.is_frozen(value, sample.time_s, &self.speeds) {
+            if channels.frozen.is_frozen(value, sample.time_s, &self.speeds) {
                 quality = Quality::Frozen;
             } else {
                 self.speeds[kind as usize] = Some(value);
@@ -258,40 +235,6 @@ impl<'a> Readings<'a> {
     }
 }
 
-impl Channels {
-    fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &[Option<f64>; SPEEDS]) -> bool {
-        let role = self.resolved.entry.role;
-        let partners: &[Role] = match role {
-            Role::EngineSpeed => &[Role::TurbineSpeed],
-            Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed, Role::VehicleSpeed],
-            Role::OutputSpeed => &[Role::WheelSpeed, Role::VehicleSpeed],
-            Role::WheelSpeed => &[Role::OutputSpeed, Role::VehicleSpeed],
-            _ => &[Role::OutputSpeed, Role::WheelSpeed],
-        };
-        let Some(still) = self.still.as_mut().filter(|still| still.value == value) else {
-            if let Some(before) = self.still.filter(|before| !before.frozen) {
-                self.longest_still = self.longest_still.max(before.samples);
-            }
-            self.still = Some(Still { value, since_s: time_s, samples: 1, others: *speeds, frozen: false });
-            return false;
-        };
-        still.samples += 1;
-        let limit_s = if self.longest_still == 0 { FROZEN_FROM_START_S } else { FROZEN_S };
-        let long = still.samples >= FROZEN_SAMPLES.max(3 * self.longest_still) && time_s - still.since_s >= limit_s;
-        if !still.frozen && value != 0.0 && long {
-            still.frozen =
-                partners.iter().any(|partner| match (speeds[*partner as usize], still.others[*partner as usize]) {
-                    (Some(now), Some(then)) => {
-                        let takes_along = role != Role::EngineSpeed || then.max(now) > COUPLED * value;
-                        takes_along && (now - then).abs() > FROZEN_CHANGE * then.abs().max(now.abs())
-                    }
-                    _ => false,
-                });
-        }
-        still.frozen
-    }
-}
-
 impl Iterator for Readings<'_> {
     type Item = Result<Reading, LogError>;
 
@@ -299,6 +242,7 @@ impl Iterator for Readings<'_> {
         loop {
             while let (Some(user), Some(sample)) = (self.pending.pop(), self.sample) {
                 if let Some(reading) = self.take(user, &sample) {
+                    self.entry = user.0;
                     return Some(Ok(reading));
                 }
             }

@@ -49,6 +49,12 @@ pub enum Role {
     Selector,
     /// Oil temperature, degC.
     OilTemperature,
+    /// Whether the lock-up clutch of the converter carries torque: 0 or 1.
+    LockUpApplied,
+    /// Current of the valve of an element of the gearbox, A. Its name in a map has that of the element: `element_a_current`.
+    ElementCurrent,
+    /// Duty cycle of the valve of an element of the gearbox, %: `element_a_duty`.
+    ElementDuty,
 }
 
 /// Role, its name in maps, what it measures, and its unit in readings.
@@ -75,6 +81,9 @@ const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
     (Role::ShiftActive, "shift_active", None, ""),
     (Role::Selector, "selector", None, ""),
     (Role::OilTemperature, "oil_temperature", Some(Quantity::Temperature), "degC"),
+    (Role::LockUpApplied, "lock_up_applied", None, ""),
+    (Role::ElementCurrent, "element_NAME_current", Some(Quantity::Current), "A"),
+    (Role::ElementDuty, "element_NAME_duty", Some(Quantity::Share), "%"),
 ];
 
 impl Role {
@@ -108,9 +117,25 @@ impl Role {
         Self::all().find(|role| role.name() == name)
     }
 
+    /// The element of the gearbox that a name in a map is about, and its role: `element_a_current` is the current of `a`.
+    pub fn of_element(name: &str) -> Option<(Self, &str)> {
+        let rest = name.strip_prefix("element_")?;
+        let found = rest.strip_suffix("_current").map(|element| (Self::ElementCurrent, element));
+        let found = found.or_else(|| rest.strip_suffix("_duty").map(|element| (Self::ElementDuty, element)));
+        found.filter(|(_, element)| !element.is_empty())
+    }
+
     /// Whether it is the command of a valve.
     pub fn is_command(self) -> bool {
-        matches!(self, Self::OncomingCurrent | Self::OffgoingCurrent | Self::OncomingDuty | Self::OffgoingDuty)
+        matches!(
+            self,
+            Self::OncomingCurrent
+                | Self::OffgoingCurrent
+                | Self::OncomingDuty
+                | Self::OffgoingDuty
+                | Self::ElementCurrent
+                | Self::ElementDuty
+        )
     }
 
     /// Whether it is the speed of a shaft or of the car.
@@ -132,6 +157,8 @@ mod tests {
             assert_eq!(role as usize, i);
             assert_eq!(Role::parse(role.name()), Some(role));
         }
-        assert_eq!(Role::OilTemperature as usize, TABLE.len() - 1);
+        assert_eq!(Role::ElementDuty as usize, TABLE.len() - 1);
+        assert_eq!(Role::of_element("element_k1_duty"), Some((Role::ElementDuty, "k1")));
+        assert_eq!(Role::of_element("element__current"), None);
     }
 }

@@ -25,7 +25,7 @@ pub enum Quality {
     Backward,
     /// It is outside `valid_range` of the channel map.
     OutOfRange,
-    /// The value stands still while another speed changes, see [`crate::readings`].
+    /// The value stands still while another speed changes, see [`crate::frozen`].
     Frozen,
 }
 
@@ -113,6 +113,8 @@ pub(crate) trait Stream {
 pub const BEHIND_S: f64 = 0.5;
 /// So many rising time stamps behind the newest one are a reset of the clock.
 pub const RESET_AFTER: u32 = 20;
+/// A time stamp this far after the one before is wrong where the next one goes on from the one before, s.
+pub const FAR_S: f64 = 2.0;
 /// Time from the last sample before a reset to the first after it: unknown, so this is set, s.
 pub const RESET_GAP_S: f64 = 1.0;
 
@@ -155,6 +157,17 @@ impl Clock {
             notes.push(format!("{} time stamps are far too late: the time goes on before them", self.wrong_jumps));
         }
         notes
+    }
+
+    /// Whether a stamp is far after the newest one.
+    fn would_jump(&self, stamp_s: f64) -> bool {
+        self.newest_s.is_some_and(|newest_s| stamp_s + self.shift_s > newest_s + FAR_S)
+    }
+
+    /// Whether a stamp simply goes on from the newest one.
+    fn goes_on(&self, stamp_s: f64) -> bool {
+        let time_s = stamp_s + self.shift_s;
+        self.newest_s.is_some_and(|newest_s| time_s >= newest_s && time_s <= newest_s + FAR_S)
     }
 
     /// The time of a stamp, s; none if it is backward.
@@ -204,12 +217,33 @@ struct Merged<'a> {
     clock: Clock,
     batch: Vec<Sample>,
     at: usize,
-    /// The sample that is on the heap.
+    /// The sample whose place in time is on the heap.
     next: Option<Sample>,
+    /// How many stamps were seen to be far too late before they were used, and the last of them.
+    too_late: Option<(u32, f64)>,
+}
+
+impl Merged<'_> {
+    /// Counts a stamp that is far too late; those of one record are one.
+    fn note_too_late(&mut self) {
+        let stamp_s = self.batch[self.at - 1].time_s;
+        if self.too_late.is_none_or(|(_, last_s)| last_s != stamp_s) {
+            self.too_late = Some((self.too_late.map_or(0, |(count, _)| count) + 1, stamp_s));
+        }
+    }
+
+    /// What was met in the stamps, in sentences.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = self.clock.notes();
+        if let Some((count, _)) = self.too_late {
+            notes.push(format!("{count} time stamps are far later than those after them and are not used"));
+        }
+        notes
+    }
 }
 
 /// Time and stream, earliest first.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Next(f64, usize);
 
 impl Eq for Next {}
@@ -233,7 +267,10 @@ impl Ord for Next {
 /// where nothing could be read it is an error.
 pub struct Samples<'a> {
     streams: Vec<Merged<'a>>,
+    /// Where the next samples of the streams are in time, but for the stream in front.
     heap: BinaryHeap<Reverse<Next>>,
+    /// The stream that gave the last sample: it often gives the next ones too. It does so up to this place in time.
+    front: Option<(usize, Next)>,
     channels: Vec<Newest>,
     notes: Vec<String>,
     /// Resets of clocks so far.
@@ -252,10 +289,12 @@ struct Newest {
 
 impl<'a> Samples<'a> {
     pub(crate) fn new(channels: usize, streams: Vec<Box<dyn Stream + 'a>>) -> Result<Self, LogError> {
-        let merged = |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None };
+        let merged =
+            |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None, too_late: None };
         let mut samples = Self {
             streams: streams.into_iter().map(merged).collect(),
             heap: BinaryHeap::new(),
+            front: None,
             channels: vec![Newest { time_s: f64::NEG_INFINITY, stream: 0 }; channels],
             notes: Vec::new(),
             resets: 0,
@@ -298,23 +337,30 @@ impl<'a> Samples<'a> {
             // What came with the end or before the damage is given first.
             merged.stream = Box::new(Ended);
             if merged.batch.is_empty() {
-                self.notes.append(&mut merged.clock.notes());
+                self.notes.append(&mut merged.notes());
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// Puts the next sample of a stream on the heap.
-    fn refill(&mut self, i: usize) -> Result<(), LogError> {
-        if self.streams[i].at == self.streams[i].batch.len() && !self.read(i)? {
-            return Ok(());
-        }
+    /// Takes the next sample of a stream out of its batch, which has one.
+    #[inline]
+    fn stamped(&mut self, i: usize) -> Sample {
         let merged = &mut self.streams[i];
         let mut sample = merged.batch[merged.at];
         merged.at += 1;
         let (resets, wrong_jumps) = (merged.clock.resets, merged.clock.wrong_jumps);
-        let stamped = merged.clock.time(sample.time_s);
+        let is_wrong = merged.clock.would_jump(sample.time_s) && {
+            let after = merged.batch[merged.at..].iter().find(|after| after.time_s != sample.time_s);
+            after.is_some_and(|after| merged.clock.goes_on(after.time_s) && after.time_s < sample.time_s)
+        };
+        let stamped = if is_wrong {
+            merged.note_too_late();
+            None
+        } else {
+            merged.clock.time(sample.time_s)
+        };
         let newest_s = merged.clock.newest_s.unwrap_or(sample.time_s);
         self.resets += merged.clock.resets - resets;
         if merged.clock.wrong_jumps > wrong_jumps {
@@ -340,19 +386,35 @@ impl<'a> Samples<'a> {
                 sample.time_s = newest_s;
             }
         }
-        self.heap.push(Reverse(Next(sample.time_s, i)));
-        self.streams[i].next = Some(sample);
-        Ok(())
+        sample
     }
 
-    fn advance(&mut self) -> Result<Option<Sample>, LogError> {
+    /// Goes on to the stream whose next sample is the earliest, and gives that.
+    fn of_the_earliest(&mut self) -> Result<Option<Sample>, LogError> {
+        if let Some((i, _)) = self.front.take() {
+            self.refill(i)?;
+        }
         let Some(Reverse(Next(_, i))) = self.heap.pop() else {
             return self.damage.take().filter(|_| self.given == 0).map_or(Ok(None), Err);
         };
+        self.front = Some((i, self.heap.peek().map_or(Next(f64::INFINITY, i), |Reverse(next)| *next)));
         self.given += 1;
-        let sample = self.streams[i].next.take();
-        self.refill(i)?;
-        Ok(sample)
+        Ok(self.streams[i].next.take())
+    }
+
+    /// Reads the next batch of a stream if there is none, and lets its first sample wait for its time.
+    fn refill(&mut self, i: usize) -> Result<(), LogError> {
+        if self.streams[i].next.is_none() && (self.streams[i].at < self.streams[i].batch.len() || self.read(i)?) {
+            let sample = self.stamped(i);
+            self.put_back(i, sample);
+        }
+        Ok(())
+    }
+
+    /// Puts a sample where it waits for its time.
+    fn put_back(&mut self, i: usize, sample: Sample) {
+        self.streams[i].next = Some(sample);
+        self.heap.push(Reverse(Next(sample.time_s, i)));
     }
 }
 
@@ -360,7 +422,17 @@ impl Iterator for Samples<'_> {
     type Item = Result<Sample, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.advance().transpose()
+        if let Some((i, until)) = self.front
+            && self.streams[i].at < self.streams[i].batch.len()
+        {
+            let sample = self.stamped(i);
+            if Next(sample.time_s, i) <= until {
+                self.given += 1;
+                return Some(Ok(sample));
+            }
+            self.put_back(i, sample);
+        }
+        self.of_the_earliest().transpose()
     }
 }
 
@@ -370,5 +442,44 @@ struct Ended;
 impl Stream for Ended {
     fn next_batch(&mut self, _: &mut Vec<Sample>) -> Result<bool, LogError> {
         Ok(false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Records of two channels at these times, in one batch.
+    struct Records(Vec<f64>, usize);
+
+    impl Stream for Records {
+        fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+            let Self(times, first) = self;
+            let both = |time_s: f64| {
+                [*first, *first + 1].map(|channel| Sample { channel, time_s, value: time_s, quality: Quality::Good })
+            };
+            batch.extend(times.drain(..).flat_map(both));
+            Ok(!batch.is_empty())
+        }
+    }
+
+    #[test]
+    fn a_stamp_of_the_future_in_one_group_does_not_hold_it_back_until_the_others_end() {
+        let times: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.01).collect();
+        let mut wrong = times.clone();
+        wrong[200] = 3600.0;
+        let streams: Vec<Box<dyn Stream>> = vec![Box::new(Records(wrong, 0)), Box::new(Records(times, 2))];
+        let mut samples = Samples::new(4, streams).unwrap();
+        let read = samples.by_ref().collect::<Result<Vec<_>, _>>().unwrap();
+        // Both groups come side by side up to the end; of the wrong record nothing is used.
+        assert!(read.windows(2).all(|pair| pair[0].time_s <= pair[1].time_s));
+        let good = |channel: usize| {
+            read.iter().filter(|sample| sample.channel == channel && sample.quality == Quality::Good).count()
+        };
+        assert_eq!([0, 1, 2, 3].map(good), [499, 499, 500, 500]);
+        assert_eq!(read.len(), 2000);
+        assert!((read[1999].time_s - 4.99).abs() < 1e-9);
+        assert_eq!(samples.notes(), ["1 time stamps are far later than those after them and are not used"]);
+        assert_eq!(samples.resets(), 0);
     }
 }

@@ -18,18 +18,41 @@ pub struct Step {
     pub input: Input<f64>,
 }
 
-/// The steps of a log.
-pub struct Steps<'a> {
+/// What a step takes readings into.
+pub trait Places {
+    /// What becomes of it.
+    type Step;
+
+    /// The same without readings.
+    #[must_use]
+    fn emptied(&self) -> Self;
+
+    /// Where a reading of an entry of the map belongs; none if nothing reads it.
+    fn place(&mut self, entry: usize, role: Role) -> Option<&mut Option<Reading>>;
+
+    /// The step at this time, `dt_s` after the one before.
+    fn close(&self, time_s: f64, dt_s: f64) -> Self::Step;
+}
+
+/// The steps of a log, by default those of the observer of one shift.
+pub struct Steps<'a, P: Places = OfOneShift> {
     readings: Readings<'a>,
-    open: Option<Open>,
+    places: P,
+    open: Option<Open<P>>,
     last_s: Option<f64>,
     ended: bool,
 }
 
 /// A step that still takes readings.
 #[derive(Debug, Clone, Copy)]
-struct Open {
+struct Open<P> {
     time_s: f64,
+    places: P,
+}
+
+/// What the observer of one shift reads.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct OfOneShift {
     engine: Option<Reading>,
     turbine: Option<Reading>,
     output: Option<Reading>,
@@ -39,22 +62,14 @@ struct Open {
     engine_torque: Option<Reading>,
 }
 
-impl Open {
-    fn new(time_s: f64) -> Self {
-        Self {
-            time_s,
-            engine: None,
-            turbine: None,
-            output: None,
-            wheel: None,
-            command: None,
-            offgoing_command: None,
-            engine_torque: None,
-        }
+impl Places for OfOneShift {
+    type Step = Step;
+
+    fn emptied(&self) -> Self {
+        Self::default()
     }
 
-    /// Where a reading belongs; none if no observer reads it.
-    fn place(&mut self, role: Role) -> Option<&mut Option<Reading>> {
+    fn place(&mut self, _entry: usize, role: Role) -> Option<&mut Option<Reading>> {
         match role {
             Role::EngineSpeed => Some(&mut self.engine),
             Role::TurbineSpeed => Some(&mut self.turbine),
@@ -67,14 +82,14 @@ impl Open {
         }
     }
 
-    fn close(&self, last_s: Option<f64>) -> Step {
+    fn close(&self, time_s: f64, dt_s: f64) -> Step {
         let measured = |reading: Option<Reading>| {
-            reading.map(|reading| Measured { value: reading.value, age_s: self.time_s - reading.time_s })
+            reading.map(|reading| Measured { value: reading.value, age_s: time_s - reading.time_s })
         };
         Step {
-            time_s: self.time_s,
+            time_s,
             input: Input {
-                dt_s: last_s.map_or(0.0, |last_s| self.time_s - last_s),
+                dt_s,
                 engine_rad_s: measured(self.engine),
                 turbine_rad_s: measured(self.turbine),
                 output_rad_s: measured(self.output),
@@ -90,7 +105,14 @@ impl Open {
 impl<'a> Steps<'a> {
     /// The steps of these readings.
     pub fn new(readings: Readings<'a>) -> Self {
-        Self { readings, open: None, last_s: None, ended: false }
+        Self::into(OfOneShift::default(), readings)
+    }
+}
+
+impl<'a, P: Places> Steps<'a, P> {
+    /// The steps of these readings, taken into places.
+    pub fn into(places: P, readings: Readings<'a>) -> Self {
+        Self { readings, places, open: None, last_s: None, ended: false }
     }
 
     /// The readings, with their summary and notes.
@@ -98,17 +120,19 @@ impl<'a> Steps<'a> {
         &self.readings
     }
 
-    fn close(&mut self, open: Open) -> Step {
-        let step = open.close(self.last_s);
-        self.last_s = Some(open.time_s);
-        step
+    fn opened(&self, time_s: f64) -> Open<P> {
+        Open { time_s, places: self.places.emptied() }
     }
-}
 
-impl Steps<'_> {
+    fn close(&mut self, open: &Open<P>) -> P::Step {
+        let dt_s = self.last_s.map_or(0.0, |last_s| open.time_s - last_s);
+        self.last_s = Some(open.time_s);
+        open.places.close(open.time_s, dt_s)
+    }
+
     /// The next step; `seen` takes every reading that was met on the way, also those that no observer reads. A reading that
     /// begins the step after is among them.
-    pub fn next_seeing(&mut self, mut seen: impl FnMut(Reading)) -> Option<Result<Step, LogError>> {
+    pub fn next_seeing(&mut self, mut seen: impl FnMut(Reading)) -> Option<Result<P::Step, LogError>> {
         while !self.ended {
             let reading = match self.readings.next() {
                 None => {
@@ -122,12 +146,18 @@ impl Steps<'_> {
                 Some(Ok(reading)) => reading,
             };
             seen(reading);
-            let mut open = self.open.unwrap_or(Open::new(reading.stamp_s));
-            let Some(place) = open.place(reading.role) else { continue };
+            let entry = self.readings.entry();
+            let before = self.open.take();
+            let is_first = before.is_none();
+            let mut open = before.unwrap_or_else(|| self.opened(reading.stamp_s));
+            let Some(place) = open.places.place(entry, reading.role) else {
+                self.open = (!is_first).then_some(open);
+                continue;
+            };
             if place.is_some() {
-                let mut next = Open::new(reading.stamp_s);
-                next.place(reading.role).map(|place| place.replace(reading));
-                let step = self.close(open);
+                let mut next = self.opened(reading.stamp_s);
+                next.places.place(entry, reading.role).map(|place| place.replace(reading));
+                let step = self.close(&open);
                 if open.time_s - next.time_s > BEHIND_S {
                     // The step had a stamp that was far too late: what comes now follows the step before it.
                     self.last_s = None;
@@ -142,12 +172,12 @@ impl Steps<'_> {
             open.time_s = open.time_s.max(reading.stamp_s);
             self.open = Some(open);
         }
-        self.open.take().map(|open| Ok(self.close(open)))
+        self.open.take().map(|open| Ok(self.close(&open)))
     }
 }
 
-impl Iterator for Steps<'_> {
-    type Item = Result<Step, LogError>;
+impl<P: Places> Iterator for Steps<'_, P> {
+    type Item = Result<P::Step, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.next_seeing(drop)

@@ -39,7 +39,16 @@ fn slow(value: impl Fn(f64) -> f64) -> impl ExactSizeIterator<Item = (f64, f64, 
 
 #[test]
 fn mdf_of_every_version_and_layout_gives_the_same_values() {
-    for file in ["plain_400.mf4", "plain_410.mf4", "plain_420.mf4", "deflate.mf4", "transposed.mf4", "unsorted.mf4"] {
+    for file in [
+        "plain_400.mf4",
+        "plain_410.mf4",
+        "plain_420.mf4",
+        "deflate.mf4",
+        "transposed.mf4",
+        "zstd.mf4",
+        "lz4.mf4",
+        "unsorted.mf4",
+    ] {
         let (log, samples, notes) = read(&data(file), &OpenOptions::default()).unwrap();
         assert_eq!(notes, Vec::<String>::new(), "{file}");
         check(&channel(&log, &samples, "N_Eng"), fast(|i| 800.0 + 10.0 * i), file);
@@ -59,7 +68,7 @@ fn mdf_of_every_version_and_layout_gives_the_same_values() {
 
 #[test]
 fn mdf_conversions_give_physical_values() {
-    for file in ["deflate.mf4", "transposed.mf4"] {
+    for file in ["deflate.mf4", "transposed.mf4", "zstd.mf4", "lz4.mf4"] {
         let (log, samples, _) = read(&data(file), &OpenOptions::default()).unwrap();
         let of = |name: &str| channel(&log, &samples, name);
         check(&of("Rational"), slow(|i| (2.0 * i + 6.0) / 4.0), "Rational");
@@ -188,7 +197,8 @@ fn csv_that_is_not_clean_says_so() {
     let text = "time_ms,a_rpm,b\n0,1,2\n10,,n/a\n,3,3\n20,nan,x\n30,5,6\n40,7";
     let (log, samples, notes) = read(&folder.write("log.csv", text), &OpenOptions::default()).unwrap();
     let missing = |time_s: f64| (time_s, f64::NAN, Quality::Missing);
-    check(&channel(&log, &samples, "a_rpm"), [good(0.0, 1.0), good(0.03, 5.0), good(0.04, 7.0)].into_iter(), "a");
+    // The last line ends within its second cell: `7` may have been `70`.
+    check(&channel(&log, &samples, "a_rpm"), [good(0.0, 1.0), good(0.03, 5.0)].into_iter(), "a");
     check(
         &channel(&log, &samples, "b"),
         [good(0.0, 2.0), missing(0.01), missing(0.02), good(0.03, 6.0)].into_iter(),
@@ -198,10 +208,33 @@ fn csv_that_is_not_clean_says_so() {
         notes,
         [
             "1 of 6 rows have no time and are left out",
-            "1 of 6 rows have fewer cells than there are columns; the last line may be cut",
+            "the last line has no end and is left out",
             "2 cells are not numbers and count as missing, the first in line 3: `n/a`",
         ]
     );
+}
+
+#[test]
+fn a_last_line_without_an_end_is_never_used_silently() {
+    let folder = Folder::new("cut-line");
+    let rows = "time_s,a,b\n0,1,2\n1,3,4\n";
+    let of = |tail: &str| {
+        let (log, samples, notes) =
+            read(&folder.write("log.csv", format!("{rows}{tail}")), &OpenOptions::default()).unwrap();
+        (channel(&log, &samples, "a").len(), channel(&log, &samples, "b").len(), notes)
+    };
+    let (out, without) = (
+        "the last line has no end and is left out".to_owned(),
+        "the last line has no end and counts without its last cell, of which digits may be missing".to_owned(),
+    );
+    assert_eq!(of(""), (2, 2, vec![]));
+    assert_eq!(of("2,5,6\n"), (3, 3, vec![]));
+    assert_eq!(of("2,5,6\r\n"), (3, 3, vec![]));
+    assert_eq!(of("2,5,6"), (3, 2, vec![without]));
+    assert_eq!(of("2,5"), (2, 2, vec![out.clone()]));
+    assert_eq!(of("2"), (2, 2, vec![out]));
+    // A row with too few cells that has its end is a row.
+    assert_eq!(of("2,5\n"), (3, 2, vec!["1 of 3 rows have fewer cells than there are columns".to_owned()]));
 }
 
 #[test]

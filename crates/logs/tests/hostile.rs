@@ -17,11 +17,13 @@ fn most_memory() -> Option<usize> {
     line.trim().strip_suffix(" kB")?.parse::<usize>().ok().map(|kilobytes| kilobytes << 10)
 }
 
-const FILES: [&str; 16] = [
+const FILES: [&str; 18] = [
     "plain_400.mf4",
     "plain_420.mf4",
     "deflate.mf4",
     "transposed.mf4",
+    "zstd.mf4",
+    "lz4.mf4",
     "invalidation.mf4",
     "unsorted.mf4",
     "bus.mf4",

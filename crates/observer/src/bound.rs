@@ -16,6 +16,7 @@ use crate::{
 
 /// Largest errors under which the ranges of pressure and clutch torque hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget<T> {
     /// The valve as measured: lag, gain and delay over the operating point.
     pub valve: ClutchValve<T>,
@@ -56,6 +57,7 @@ pub struct Bounds<T> {
 
 /// Computes the ranges of a run, once for all observers.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RangeEstimator<T> {
     /// What the ranges of pressure and clutch torque are made from.
     pub budget: Budget<T>,
@@ -81,6 +83,7 @@ pub struct RangeState<T> {
 
 /// Any observer with the ranges around its estimates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounded<T, O> {
     /// The observer.
     pub observer: O,
@@ -131,7 +134,7 @@ impl<T: Real> RangeEstimator<T> {
             Some(phase) if seen.dt_s.is_some() && seen.read => {
                 let range = self.shaft.step(&mut state.shaft, phase, &seen.sample, clutch_torque_n_m);
                 let limit = limits.shaft_torque_max_n_m;
-                range.map(|range| range.map(|torque| torque.max(-limit).min(limit)))
+                range.map(|range| range.map(|torque| torque.at_least(-limit).at_most(limit)))
             }
             _ => {
                 state.shaft = ShaftMemory::new();
@@ -191,7 +194,7 @@ pub(crate) fn pressure_and_torque<T: Real>(
         Some([slip, error]) => clutch.friction.range_within(slip.abs() - error, slip.abs() + error),
         None => {
             let (lowest, highest) = clutch.friction.range();
-            (lowest.min(clutch.static_friction), highest.max(clutch.static_friction))
+            (lowest.at_most(clutch.static_friction), highest.at_least(clutch.static_friction))
         }
     };
     let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
@@ -218,7 +221,7 @@ fn clamp_force<T: Real>(
         return [lower_pa, upper_pa].map(|pressure_pa| clutch.clamp_force(pressure_pa));
     };
     let [kiss, kissed] = fill.kiss_pressure_pa;
-    let force = |above_kiss: T| clutch.piston_area_m2 * above_kiss.max(zero);
+    let force = |above_kiss: T| clutch.piston_area_m2 * above_kiss.at_least(zero);
     let greatest = if piston.stroke()[1] < T::one() { zero } else { force(upper_pa - kiss) };
     [force(lower_pa - kissed), greatest]
 }
@@ -260,7 +263,7 @@ impl<T: Real> Bounds<T> {
     /// as it is, is outside the expected range; unless it was worse before.
     #[inline]
     pub fn clip(&self, estimate: Estimate<T>) -> Estimate<T> {
-        let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
+        let nearest = |[low, high]: [T; 2], value: T| value.at_least(low).at_most(high);
         let limited = Estimate {
             pressure_pa: nearest(self.pressure_pa, estimate.pressure_pa),
             clutch_torque_n_m: nearest(self.clutch_torque_n_m, estimate.clutch_torque_n_m),

@@ -46,9 +46,9 @@ impl<T: Real> Commands<T> {
         if full {
             // No room: the two oldest become one that may have been either.
             let (last, before) = (self.sent[REMEMBERED - 1], &mut self.sent[REMEMBERED - 2]);
-            before.lowest = before.lowest.min(last.lowest);
-            before.highest = before.highest.max(last.highest);
-            (before.age_s, before.early_s) = (last.age_s, before.early_s.max(last.early_s));
+            before.lowest = before.lowest.at_most(last.lowest);
+            before.highest = before.highest.at_least(last.highest);
+            (before.age_s, before.early_s) = (last.age_s, before.early_s.at_least(last.early_s));
         }
         let kept = if full { REMEMBERED - 1 } else { kept };
         for at in (1..=kept.min(REMEMBERED - 1)).rev() {
@@ -56,6 +56,12 @@ impl<T: Real> Commands<T> {
         }
         self.sent[0] = Sent { age_s, early_s, lowest, highest };
         self.count = kept + 1;
+    }
+
+    /// Whether every one of them is this command.
+    #[inline]
+    pub(crate) fn are_all(&self, command: T) -> bool {
+        self.sent.iter().take(self.count).all(|sent| sent.lowest == command && sent.highest == command)
     }
 
     /// Carries all of them on by `dt_s`.
@@ -74,8 +80,8 @@ impl<T: Real> Commands<T> {
             if sent.age_s + sent.early_s + end_s < least_s {
                 continue;
             }
-            lowest = lowest.min(sent.lowest);
-            highest = highest.max(sent.highest);
+            lowest = lowest.at_most(sent.lowest);
+            highest = highest.at_least(sent.highest);
             if sent.age_s + start_s >= most_s {
                 break;
             }

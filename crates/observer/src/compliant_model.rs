@@ -9,6 +9,7 @@ use crate::{Phase, RigidModel};
 /// Left out, against the real car: tyre slip, damping of the shafts, wheel inertia, grade, the delay and
 /// the varying lag and gain of the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CompliantModel<T> {
     /// Converter, clutch, valve, road load, and the torque of the locked clutch.
     pub rigid: RigidModel<T>,

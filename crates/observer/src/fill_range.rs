@@ -36,6 +36,7 @@ use drivetrain::{Passage, Real};
 
 /// Limits of the cylinder and its passages under which the range holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FillBudget<T> {
     /// Least and greatest volume of the stroke `V_k`, m^3.
     pub volume_m3: [T; 2],
@@ -79,7 +80,7 @@ impl<T: Real> FillBudget<T> {
     fn leak_share(&self, line_pa: T) -> T {
         let ([_, passage], leak) = (&self.supply, self.leak_m3_s_pa);
         let laminar = passage.laminar_pa_s2_m5 * self.viscosity_m2_s[1];
-        (leak * (laminar + passage.orifice_pa_s2_m6 * leak * line_pa)).min(T::one())
+        (leak * (laminar + passage.orifice_pa_s2_m6 * leak * line_pa)).at_most(T::one())
     }
 
     /// Greatest flow in at this pressure drop, m^3/s.
@@ -91,7 +92,7 @@ impl<T: Real> FillBudget<T> {
     /// Least flow in at this pressure drop, m^3/s.
     #[inline]
     fn least_in(&self, drop_pa: T) -> T {
-        self.supply[1].flow(drop_pa, self.viscosity_m2_s[1]).min(self.flow_max_m3_s)
+        self.supply[1].flow(drop_pa, self.viscosity_m2_s[1]).at_most(self.flow_max_m3_s)
     }
 
     /// Greatest flow out at this pressure drop, m^3/s.
@@ -143,13 +144,13 @@ impl<T: Real> PistonRange<T> {
     pub fn pressure_pa(&self, fill: &FillBudget<T>) -> [T; 2] {
         let [least, greatest] = self.stroke;
         let (home, kiss) = (T::zero(), T::one());
-        let lower = if least > home { self.lowest_pa.max(fill.preload_pressure_pa[0]) } else { self.lowest_pa };
+        let lower = if least > home { self.lowest_pa.at_least(fill.preload_pressure_pa[0]) } else { self.lowest_pa };
         let upper = if greatest <= home {
             self.highest_pa
         } else if greatest < kiss {
             fill.kiss_pressure_pa[1]
         } else {
-            self.highest_pa.max(fill.kiss_pressure_pa[1])
+            self.highest_pa.at_least(fill.kiss_pressure_pa[1])
         };
         [lower, upper]
     }
@@ -174,7 +175,7 @@ impl<T: Real> PistonRange<T> {
             -fill.least_out(p0[0] - s) / fill.volume_m3[1]
         };
         // Rounded away from the truth, so that no flow is too small to count in single precision.
-        let stroke = ((before + dt_s * rate) * (one + T::epsilon())).max(zero).min(one);
+        let stroke = ((before + dt_s * rate) * (one + T::epsilon())).at_least(zero).at_most(one);
         let mut highest = if s >= f {
             s
         } else {
@@ -182,10 +183,10 @@ impl<T: Real> PistonRange<T> {
             s + drop * (-dt_s * fill.least_out(drop) / (fill.capacity_m3_pa * drop)).exp()
         };
         if stroke < one {
-            highest = highest.min(fill.kiss_pressure_pa[1]);
+            highest = highest.at_most(fill.kiss_pressure_pa[1]);
         }
         if stroke <= zero && before > zero {
-            highest = highest.max(p0[1]);
+            highest = highest.at_least(p0[1]);
         }
         (self.stroke[1], self.highest_pa) = (stroke, highest);
     }
@@ -197,7 +198,7 @@ impl<T: Real> PistonRange<T> {
         let (before, m, leak) = (self.stroke[0], self.lowest_pa, fill.leak_m3_s_pa);
         let ([p0, _], [p1, kissed]) = (fill.preload_pressure_pa, fill.kiss_pressure_pa);
         let target = s * (one - leak_share);
-        let fallen = m.min(target);
+        let fallen = m.at_most(target);
         let net = if s > kissed {
             fill.least_in(s - kissed) - leak * kissed
         } else {
@@ -207,12 +208,12 @@ impl<T: Real> PistonRange<T> {
             one
         } else {
             let volume = if net > zero { fill.volume_m3[1] } else { fill.volume_m3[0] };
-            ((before + dt_s * net / volume) * (one - T::epsilon())).max(zero).min(one)
+            ((before + dt_s * net / volume) * (one - T::epsilon())).at_least(zero).at_most(one)
         };
         let ceiling = if before >= one && stroke >= one || m >= kissed {
             target
         } else if m < p0 {
-            target.min(p0)
+            target.at_most(p0)
         } else {
             m
         };
@@ -221,11 +222,11 @@ impl<T: Real> PistonRange<T> {
             // The net flow at a drop, less that of the leak, is concave in the drop and not below zero at the target: the
             // chord from there to the start of the step is below it.
             let (drop, inflow) = (target - m, fill.least_in(s - m) - leak * m);
-            let share = (-dt_s * inflow.max(zero) / (fill.capacity_m3_pa * drop)).exp();
-            lowest = (target - drop * share).min(ceiling);
+            let share = (-dt_s * inflow.at_least(zero) / (fill.capacity_m3_pa * drop)).exp();
+            lowest = (target - drop * share).at_most(ceiling);
         }
         if stroke >= one {
-            lowest = lowest.max(p1);
+            lowest = lowest.at_least(p1);
         }
         (self.stroke[0], self.lowest_pa) = (stroke, lowest);
     }

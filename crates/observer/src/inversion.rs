@@ -141,7 +141,7 @@ impl<T: Real> Inversion<T> {
             if shifting {
                 let torque = self.clutch_torque(&last, sample, mean);
                 let share = T::one() - (-dt / self.smoothing_s).exp();
-                let size = (direction(slip) * torque).max(T::zero());
+                let size = (direction(slip) * torque).at_least(T::zero());
                 // Below the kiss point the clutch carries nothing, and the valve model is all there is.
                 if size > T::zero() {
                     let found = self.model.rigid.clutch.pressure_for(size, slip);

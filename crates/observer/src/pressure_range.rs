@@ -48,6 +48,8 @@ pub struct PressureRange<T> {
     stepped: bool,
     /// Usual time between two readings, s.
     period_s: T,
+    /// A command under which the limits at the newest reading stand still, and the longest time over which they did, s.
+    still: Option<(T, T)>,
 }
 
 /// What is known of the valve and the cylinder at one time.
@@ -71,6 +73,7 @@ impl<T: Real> PressureRange<T> {
             since_reading_s: None,
             stepped: false,
             period_s: T::infinity(),
+            still: None,
         }
     }
 
@@ -120,9 +123,14 @@ impl<T: Real> PressureRange<T> {
             self.commands.send(zero, zero, [zero, command_max], delay_max_s);
         }
         if interval_s > zero {
-            self.period_s = interval_s.min(self.period_s * T::of(SLOWER));
+            self.period_s = interval_s.at_most(self.period_s * T::of(SLOWER));
         }
-        let early_s = if lost { interval_s } else { budget.command_age_s.min(interval_s) };
+        // As all commands are alike, their ages do not matter.
+        if self.still.is_some_and(|(still, longest_s)| !lost && still == command && interval_s <= longest_s) {
+            return;
+        }
+        let (before, alike) = (self.at_reading, !lost && self.commands.are_all(command));
+        let early_s = if lost { interval_s } else { budget.command_age_s.at_most(interval_s) };
         if early_s > zero {
             self.commands.send(-interval_s, early_s, [command; 2], delay_max_s);
         }
@@ -133,6 +141,7 @@ impl<T: Real> PressureRange<T> {
         if early_s <= zero {
             self.commands.send(zero, zero, [command; 2], delay_max_s);
         }
+        self.still = (alike && before == self.at_reading).then_some((command, interval_s));
     }
 
     /// Carries the limits for now from `start_s` to `end_s` after the newest reading. Its command holds until the next one
@@ -140,7 +149,7 @@ impl<T: Real> PressureRange<T> {
     #[inline]
     fn carry_on(&mut self, budget: &Budget<T>, start_s: T, end_s: T, command_max: T) {
         let usual_s = if self.period_s.is_finite() { T::of(SOONEST) * self.period_s } else { T::zero() };
-        let any_s = (usual_s - budget.command_age_s).max(T::zero()) + budget.delay_s[0];
+        let any_s = (usual_s - budget.command_age_s).at_least(T::zero()) + budget.delay_s[0];
         let commands = &self.commands;
         self.now.carry(budget, start_s, end_s, |start_s, end_s| {
             if end_s <= any_s { commands.in_effect(budget.delay_s, start_s, end_s) } else { [T::zero(), command_max] }
@@ -183,14 +192,14 @@ impl<T: Real> Limits<T> {
         let lag = budget.lag_factor;
         let lower = budget.valve.moved(lowest, low, dt_s, lag, low < lowest);
         let upper = budget.valve.moved(highest, high, dt_s, lag, high > highest);
-        let lower = lower.max(T::zero()).min(budget.pressure_max_pa);
+        let lower = lower.at_least(T::zero()).at_most(budget.pressure_max_pa);
         // Where both ends have settled at one pressure, rounding may put them in the wrong order.
-        let upper = upper.max(lower).min(budget.pressure_max_pa);
+        let upper = upper.at_least(lower).at_most(budget.pressure_max_pa);
         self.outlet_pa = [lower, upper];
         if let Some(fill) = &budget.fill {
             let outlet = Outlet {
-                lowest_pa: lowest.min(lower),
-                highest_pa: highest.max(upper),
+                lowest_pa: lowest.at_most(lower),
+                highest_pa: highest.at_least(upper),
                 line_pa: budget.line_pressure_pa[1],
             };
             self.piston.advance(fill, &outlet, dt_s);
@@ -207,18 +216,21 @@ impl<T: Real> Budget<T> {
     #[inline]
     fn asked(&self, [low, high]: [T; 2], [lowest, highest]: [T; 2]) -> [T; 2] {
         let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
-        let (weakest, strongest) = ((lowest - self.command).max(T::zero()), highest + self.command);
+        let (weakest, strongest) = ((lowest - self.command).at_least(T::zero()), highest + self.command);
         let (weakest, strongest) = if self.valve.falls() { (strongest, weakest) } else { (weakest, strongest) };
         let bottom = settled(weakest, self.gain_factor[0]);
         let top = settled(strongest, self.gain_factor[1]);
-        [bottom.min(low.max(bottom - self.hysteresis_pa)), top.max(high.min(top + self.hysteresis_pa))]
+        [
+            bottom.at_most(low.at_least(bottom - self.hysteresis_pa)),
+            top.at_least(high.at_most(top + self.hysteresis_pa)),
+        ]
     }
 
     /// What the supply gives of settled pressures, Pa.
     #[inline]
     fn supplied(&self, [low, high]: [T; 2]) -> [T; 2] {
         let [least, greatest] = self.line_pressure_pa;
-        [low.max(T::zero()).min(least), high.min(greatest)]
+        [low.at_least(T::zero()).at_most(least), high.at_most(greatest)]
     }
 }
 
@@ -451,5 +463,28 @@ mod tests {
         range.step(&b, 0.001, Some(Reading { value: 1.0, age_s: 0.005 }), 1.2);
         other.step(&b, 0.001, None, 1.2);
         assert_eq!(range, other);
+    }
+
+    #[test]
+    fn leaving_out_what_stands_still_changes_nothing() {
+        for b in [budget(), pulse_width_budget(), Budget { command_age_s: 0.01, hysteresis_pa: 1e4, ..budget() }] {
+            let mut range = PressureRange::unknown(&b, 1.0);
+            let mut whole = range;
+            let mut still = 0;
+            for k in 0..4000_u32 {
+                let held = if k < 2000 { 0.3 } else { 0.6 };
+                // After a long time with one command some are others, and some readings are late or missing.
+                let moves = k % 1000 > 900;
+                let command = if moves { held + 1e-3 * f64::from(k % 7) } else { held };
+                let reading = Reading { value: command, age_s: if moves && k % 13 == 0 { 0.004 } else { 0.0 } };
+                let reading = (!moves || k % 31 != 0).then_some(reading);
+                still += u32::from(range.still.is_some());
+                whole.still = None;
+                range.step(&b, 0.01, reading, 1.0);
+                whole.step(&b, 0.01, reading, 1.0);
+                assert_eq!(range.pressure_pa(&b), whole.pressure_pa(&b), "step {k}");
+            }
+            assert!(still > 100, "{still}");
+        }
     }
 }

@@ -9,6 +9,7 @@ use crate::{
 
 /// Gains of the rigid observer, Pa per rad/s. A gain of zero is open loop: the valve model alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RigidGains<T> {
     /// Torque phase: `L` on `w_t`.
     pub torque_phase_pa_s_rad: T,
@@ -73,6 +74,7 @@ impl<T: Real> Mix<T> for RigidGains<T> {
 /// `L` is designed for forward slip. With backward slip `G` changes its sign, and `L` with it: `L G` and with it the
 /// certificate do not change.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RigidObserver<T> {
     /// The powertrain.
     pub model: RigidModel<T>,

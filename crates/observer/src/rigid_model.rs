@@ -12,6 +12,7 @@ use crate::Phase;
 /// Left out, against the real car: torsion of the drive shafts, tyre slip, grade, the delay and the
 /// varying lag and gain of the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RigidModel<T> {
     /// Kinematics of the shift.
     pub shift: ReducedShift<T>,
@@ -137,7 +138,7 @@ impl<T: Real> RigidModel<T> {
         if phase == Phase::AfterShift {
             let known = self.known_torques(engine_rad_s, turbine_rad_s, slip_rad_s);
             let limit = self.clutch.static_capacity(pressure_pa);
-            return self.after_shift.holding_oncoming.at(&known).max(-limit).min(limit);
+            return self.after_shift.holding_oncoming.at(&known).at_least(-limit).at_most(limit);
         }
         self.clutch.torque_capacity(pressure_pa, slip_rad_s) * direction(slip_rad_s)
     }

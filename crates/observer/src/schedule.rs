@@ -10,6 +10,7 @@ pub trait Mix<T> {
 
 /// Gains at the ends of a range of friction coefficients, linear between them and constant beyond.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Schedule<T, G> {
     /// Least and greatest friction coefficient; of a constant gain, both the same.
     pub friction: [T; 2],
@@ -38,7 +39,7 @@ impl<T: Real, G: Mix<T> + Copy> Schedule<T, G> {
     pub fn at(&self, friction: T) -> G {
         let [least, greatest] = self.friction;
         if greatest > least {
-            let share = ((friction - least) / (greatest - least)).max(T::zero()).min(T::one());
+            let share = ((friction - least) / (greatest - least)).at_least(T::zero()).at_most(T::one());
             self.ends[0].mixed(&self.ends[1], share)
         } else {
             self.ends[0]

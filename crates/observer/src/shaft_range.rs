@@ -30,6 +30,7 @@ use crate::{Phase, Sample};
 
 /// What the range is made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShaftRange<T> {
     shift: ReducedShift<T>,
     /// The balance that holds for any torque of the offgoing clutch.
@@ -43,6 +44,7 @@ pub struct ShaftRange<T> {
 
 /// Largest errors for which the range is expected to hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShaftErrors<T> {
     /// Of the turbine torque, as a share.
     pub turbine_torque_share: T,
@@ -81,6 +83,7 @@ impl<T: Real> ShaftErrors<T> {
 
 /// The torque at the gearbox output from two accelerations, the turbine torque and the torque of one clutch.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Balance<T> {
     per_turbine_rad_s2: T,
     per_output_rad_s2: T,
@@ -243,8 +246,8 @@ impl<T: Real> ShaftRange<T> {
             mean = common(mean, scaled(self.any_oncoming.output(&seen, offgoing), ratio));
         }
         let balanced = [
-            mean[0] - damping[1] + (reach_s * turned[0]).min(zero),
-            mean[1] - damping[0] + (reach_s * turned[1]).max(zero),
+            mean[0] - damping[1] + (reach_s * turned[0]).at_most(zero),
+            mean[1] - damping[0] + (reach_s * turned[1]).at_least(zero),
         ];
         let spring = match memory.spring {
             None => balanced,
@@ -279,7 +282,7 @@ impl<T: Real> ShaftRange<T> {
 impl<T: Real> Span<T> {
     /// Both together, as long as this one.
     fn joined(&self, other: &Self) -> Self {
-        let join = |a: [T; 2], b: [T; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let join = |a: [T; 2], b: [T; 2]| [a[0].at_most(b[0]), a[1].at_least(b[1])];
         Self {
             engine: join(self.engine, other.engine),
             turbine: join(self.turbine, other.turbine),
@@ -297,8 +300,8 @@ impl<T: Real> Span<T> {
 
 /// What is in both; of ranges that exclude each other something is beyond its bound, and the wider one is the safer.
 fn common<T: Real>(a: [T; 2], b: [T; 2]) -> [T; 2] {
-    let both = [a[0].max(b[0]), a[1].min(b[1])];
-    if both[0] <= both[1] { both } else { [a[0].min(b[0]), a[1].max(b[1])] }
+    let both = [a[0].at_least(b[0]), a[1].at_most(b[1])];
+    if both[0] <= both[1] { both } else { [a[0].at_most(b[0]), a[1].at_least(b[1])] }
 }
 
 /// A range made wider by a share of its width and an error at both ends.
@@ -310,7 +313,7 @@ fn widened<T: Real>([low, high]: [T; 2], share: T, error: T) -> [T; 2] {
 /// A range times a factor of either sign.
 fn scaled<T: Real>([low, high]: [T; 2], factor: T) -> [T; 2] {
     let (a, b) = (low * factor, high * factor);
-    [a.min(b), a.max(b)]
+    [a.at_most(b), a.at_least(b)]
 }
 
 #[cfg(test)]

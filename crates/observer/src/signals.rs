@@ -6,6 +6,7 @@ use crate::{Bounds, Phase, Tracker};
 
 /// What a sensor or a controller told last, and how old it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reading<T> {
     /// The value, in the unit of its channel.
     pub value: T,
@@ -24,6 +25,7 @@ impl<T: Real> Reading<T> {
 /// What came since the step before: of each channel the newest reading, or none. Channels may come at any rate, in any
 /// phase and in any order.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Input<T> {
     /// Time since the step before, s. Ignored in the first step.
     pub dt_s: T,
@@ -81,6 +83,7 @@ pub struct Sample<T> {
 
 /// Ranges outside which an input cannot be a measurement, and an estimate cannot be a pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct InputLimits<T> {
     /// Largest size of a speed, rad/s.
     pub speed_max_rad_s: T,
@@ -135,7 +138,7 @@ impl<T: Real> InputLimits<T> {
     /// The nearest pressure that the supply can give, Pa.
     #[inline]
     pub fn possible_pressure(&self, pressure_pa: T) -> T {
-        pressure_pa.max(T::zero()).min(self.pressure_max_pa)
+        pressure_pa.at_least(T::zero()).at_most(self.pressure_max_pa)
     }
 
     /// The same limits in another precision.
@@ -226,7 +229,7 @@ pub enum ChannelHealth {
     Unused,
     /// Its reading was taken.
     Good,
-    /// No reading came; the channel goes on as before.
+    /// No reading came, or none that can be compared now; the channel goes on as before.
     Absent,
     /// Its reading was refused.
     Refused,

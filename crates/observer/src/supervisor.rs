@@ -32,6 +32,7 @@ impl Phase {
 
 /// Thresholds of the phase supervisor.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Supervisor<T> {
     /// Pressure at which the oncoming clutch starts to carry torque, Pa.
     pub kiss_pressure_pa: T,

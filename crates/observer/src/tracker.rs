@@ -1,11 +1,12 @@
 //! The part of a step that all observers share: checks, valve, phase.
 
-use drivetrain::{LinearValve, Real, ReducedShift, Valve, ValveStep};
+use drivetrain::{Lag, LinearValve, Real, ReducedShift, Valve, ValveStep};
 
 use crate::{ChannelHealth, Channels, Estimate, Health, InputLimits, Phase, Sample, Supervisor, SupervisorState};
 
 /// How the frozen dynamics are carried over a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Discretisation {
     /// By the matrix exponential: exact for coefficients that stand still over the sample.
     Exact,
@@ -15,6 +16,7 @@ pub enum Discretisation {
 
 /// Checks sample, follows the valve model and the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker<T> {
     /// The oncoming clutch's valve.
     pub valve: Valve<T>,
@@ -39,6 +41,8 @@ pub struct TrackerState<T> {
     /// The phase.
     pub supervisor: SupervisorState<T>,
     command: T,
+    /// A proportional valve over the last time step: most steps are as long as the one before.
+    lag: Lag<T>,
     started: bool,
 }
 
@@ -99,7 +103,13 @@ impl<T: Real> TrackerState<T> {
     /// An empty cylinder before the shift.
     pub fn new() -> Self {
         let zero = T::zero();
-        Self { valve_pressure_pa: zero, supervisor: SupervisorState::new(), command: zero, started: false }
+        Self {
+            valve_pressure_pa: zero,
+            supervisor: SupervisorState::new(),
+            command: zero,
+            lag: Lag::over(-T::one(), zero),
+            started: false,
+        }
     }
 }
 
@@ -187,16 +197,22 @@ impl<T: Real> Tracker<T> {
     }
 
     #[inline]
-    fn interval(&self, state: &TrackerState<T>, dt_s: T, health: Health) -> Interval<T> {
+    fn interval(&self, state: &mut TrackerState<T>, dt_s: T, health: Health) -> Interval<T> {
         // A valve that is not linear is linearised along the way of the valve model alone: the error dynamics of an
         // observer then depend on the command and not on its own estimate.
         let start = self.valve.linear(state.command, state.valve_pressure_pa);
         let short = dt_s <= self.sample_max_s;
         let valve = match self.discretisation {
             Discretisation::Euler if short => start.euler_step(dt_s),
-            Discretisation::Exact | Discretisation::Euler => {
-                self.valve.step(state.command, state.valve_pressure_pa, dt_s)
-            }
+            Discretisation::Exact | Discretisation::Euler => match self.valve {
+                Valve::Proportional { .. } => {
+                    if !state.lag.is_over(start.a22_per_s, dt_s) {
+                        state.lag = Lag::over(start.a22_per_s, dt_s);
+                    }
+                    state.lag.driven(start.b2_pa_s)
+                }
+                Valve::PulseWidth(_) => self.valve.step(state.command, state.valve_pressure_pa, dt_s),
+            },
         };
         Interval { dt_s, valve, start, health, short }
     }

@@ -99,7 +99,7 @@ fn square_root<T: Real>(p: &[[T; N]; N]) -> [[T; N]; N] {
         for j in 0..=i {
             let rest = p[i][j] - (0..j).fold(zero, |sum, k| sum + root[i][k] * root[j][k]);
             root[i][j] = if i == j {
-                rest.max(zero).sqrt()
+                rest.at_least(zero).sqrt()
             } else if root[j][j] > zero {
                 rest / root[j][j]
             } else {

@@ -1,5 +1,6 @@
 //! The hybrid integrator: smooth steps within a mode, events between modes.
 
+use crate::powertrain::Acting;
 use crate::rosenbrock::{self, LONGEST_STEP_S, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
 use crate::state::{STATES, STATES_WITH_STROKE, State};
 use crate::{Contact, Direction, Inputs, Mode, Powertrain, Torques};
@@ -87,8 +88,8 @@ struct Rates<const N: usize> {
 }
 
 impl<const N: usize> Rates<N> {
-    fn of(powertrain: &Powertrain, mode: Mode, state: &State, inputs: &Inputs) -> Self {
-        let (slope, applied) = powertrain.derivative_with_torques(mode, &state.to_vector(), inputs);
+    fn of(powertrain: &Powertrain, mode: Mode, state: &State, acting: &Acting) -> Self {
+        let (slope, applied) = powertrain.derivative_with_torques(mode, &state.to_vector(), acting);
         Self { slope, applied }
     }
 
@@ -181,15 +182,16 @@ impl HybridIntegrator {
         record: &mut impl FnMut(&Segment<'_>),
     ) -> Result<(), PlantError> {
         // New inputs change pressures and speeds only by and by: the mode is still the right one.
+        let acting = powertrain.acting(inputs);
         let mut rates: Rates<N> = match self.known.take() {
             Some((same, rates)) if same == *inputs => rates.resized(),
-            _ => Rates::of(powertrain, self.mode, &self.state, inputs),
+            _ => Rates::of(powertrain, self.mode, &self.state, &acting),
         };
         let mut changes = 0;
         while until_s - self.time_s > EVENT_TIME_S {
             let mut size = self.step_size;
             let accepted =
-                size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(powertrain, inputs, &rates, h));
+                size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(powertrain, &acting, &rates, h));
             self.step_size = size;
             let (step_s, trial) = accepted.ok_or(PlantError::Diverged { time_s: self.time_s })?;
             let Some(theta) = self.first_event(powertrain, inputs, &trial) else {
@@ -199,14 +201,14 @@ impl HybridIntegrator {
                 continue;
             };
             // Repeat the step up to the event, so that its state has the accuracy of a step and not of the interpolant.
-            let to_event = self.trial::<N, ROWS>(powertrain, inputs, &rates, theta * step_s);
+            let to_event = self.trial::<N, ROWS>(powertrain, &acting, &rates, theta * step_s);
             changes = if theta * step_s > SHORTEST_STEP_S { 1 } else { changes + 1 };
             if changes > MOST_CHANGES {
                 return Err(PlantError::Chatter { time_s: self.time_s });
             }
             self.take(&to_event, self.time_s + theta * step_s, inputs, record);
             self.change_mode(powertrain, inputs)?;
-            rates = Rates::of(powertrain, self.mode, &self.state, inputs);
+            rates = Rates::of(powertrain, self.mode, &self.state, &acting);
         }
         self.time_s = until_s;
         self.known = Some((*inputs, rates.resized()));
@@ -230,13 +232,13 @@ impl HybridIntegrator {
     fn trial<const N: usize, const ROWS: usize>(
         &self,
         powertrain: &Powertrain,
-        inputs: &Inputs,
+        acting: &Acting,
         rates: &Rates<N>,
         step_s: f64,
     ) -> Trial<N, Torques> {
         let mode = self.mode;
-        let f = |x: &[f64; N]| powertrain.derivative_with_torques(mode, x, inputs).0;
-        let at_end = |x: &[f64; N]| powertrain.derivative_with_torques(mode, x, inputs);
+        let f = |x: &[f64; N]| powertrain.derivative_with_torques(mode, x, acting).0;
+        let at_end = |x: &[f64; N]| powertrain.derivative_with_torques(mode, x, acting);
         let rows: [_; ROWS] = powertrain.stiff_rows(&self.state, rates.applied.tyre_n);
         let tolerance = Tolerance { relative: self.relative_tolerance, scale: State::SCALE.to_vector() };
         rosenbrock::step(&f, &at_end, &self.state.to_vector(), &rates.slope, &rows, step_s, &tolerance)

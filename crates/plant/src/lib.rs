@@ -42,5 +42,5 @@ pub use gear_train::{Limits, TrainError, TrainInputs, TrainModel, TrainRun};
 pub use hybrid::{HybridIntegrator, PlantError, Segment};
 pub use mode::{Contact, Direction, Mode};
 pub use powertrain::{Inputs, Powertrain, Torques};
-pub use simulate::{Sample, Simulation, simulate};
+pub use simulate::{Moment, Sample, Simulation, simulate};
 pub use state::State;

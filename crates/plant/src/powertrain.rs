@@ -2,7 +2,7 @@
 
 use config::{ShiftClutch, Vehicle};
 use drivetrain::clutch::drag_torque;
-use drivetrain::{Clutch, Driveline, Engagement, ShiftCoefficients, ShiftTorques};
+use drivetrain::{Clutch, ColumnPlace, Driveline, Engagement, ShiftCoefficients, ShiftTorques};
 
 use crate::rosenbrock::StiffRow;
 use crate::state::{CYLINDERS, STATES, State, WHEEL};
@@ -28,6 +28,14 @@ impl Inputs {
             oncoming_settled_pa: vehicle.oncoming.valve.settled_pressure(oncoming),
         }
     }
+}
+
+/// Inputs with what follows from them alone, found once for a segment of the integration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Acting {
+    inputs: Inputs,
+    /// Where the throttle lies in the engine's map.
+    throttle: ColumnPlace<f64>,
 }
 
 /// Every torque and force of the powertrain.
@@ -96,10 +104,42 @@ impl Powertrain {
         ]
     }
 
+    /// These inputs on this powertrain.
+    #[inline]
+    pub(crate) fn acting(&self, inputs: &Inputs) -> Acting {
+        Acting { inputs: *inputs, throttle: self.vehicle.engine.torque_n_m.place(inputs.throttle) }
+    }
+
     /// Every torque at this state.
     #[inline]
     pub fn torques(&self, mode: Mode, x: &State, inputs: &Inputs) -> Torques {
-        self.with_holding_torques(mode, &self.applied_torques(mode, x, inputs))
+        self.with_holding_torques(mode, &self.applied_torques(mode, x, &self.acting(inputs)))
+    }
+
+    /// Torque of the oncoming clutch at this state, N m, as in [`Self::torques`]: of one that slips no other has to be known.
+    #[inline]
+    pub fn oncoming_torque(&self, mode: Mode, x: &State, inputs: &Inputs) -> f64 {
+        match mode.oncoming {
+            Contact::Stuck => self.torques(mode, x, inputs).shift.oncoming_n_m,
+            Contact::Slipping(_) => {
+                let slip = self.vehicle.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s);
+                friction(mode.oncoming, &self.vehicle.oncoming, self.pressures(x)[1], slip)
+            }
+        }
+    }
+
+    /// Drive-shaft torque at this state, N m.
+    #[inline]
+    pub fn shaft_torque(&self, x: &State) -> f64 {
+        let v = &self.vehicle;
+        let twist_rate = v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s);
+        v.driveline.shaft_torque_with_backlash(x.twist_rad, twist_rate, v.backlash_rad)
+    }
+
+    /// Tyre force at this state, N.
+    #[inline]
+    fn tyre_force(&self, x: &State) -> f64 {
+        self.vehicle.tyre.force(self.vehicle.road.wheel_radius_m * x.wheel_rad_s, x.vehicle_m_s)
     }
 
     /// The torques with those that the sticking clutches hold.
@@ -117,25 +157,17 @@ impl Powertrain {
     }
 
     /// Every torque but the holding torques, which stay zero: sticking clutches drop out of the
-    /// equations of motion.
-    #[inline]
-    fn applied_torques(&self, mode: Mode, x: &State, inputs: &Inputs) -> Torques {
+    /// equations of motion. Always inlined: it is most of the right-hand side of the integrator.
+    #[inline(always)]
+    fn applied_torques(&self, mode: Mode, x: &State, acting: &Acting) -> Torques {
         let v = &self.vehicle;
         let converter = v.converter.torques(x.engine_rad_s, x.turbine_rad_s);
-        let twist_rate = v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s);
-        let shaft_n_m = v.driveline.shaft_torque_with_backlash(x.twist_rad, twist_rate, v.backlash_rad);
-        let friction = |contact: Contact, clutch: &ShiftClutch, pressure_pa: f64, slip: f64| match contact {
-            Contact::Stuck => 0.0,
-            Contact::Slipping(direction) => {
-                let torque_n_m = direction.sign() * clutch.clutch.torque_capacity(pressure_pa, slip);
-                if clutch.drag_n_m > 0.0 { torque_n_m + drag_torque(clutch.drag_n_m, slip) } else { torque_n_m }
-            }
-        };
+        let shaft_n_m = self.shaft_torque(x);
         let [offgoing_pa, oncoming_pa] = self.pressures(x);
         let offgoing_slip = v.shift.offgoing_slip(x.turbine_rad_s, x.output_rad_s);
         let oncoming_slip = v.shift.oncoming_slip(x.turbine_rad_s, x.output_rad_s);
         Torques {
-            engine_n_m: v.engine.torque(x.engine_rad_s, inputs.throttle),
+            engine_n_m: v.engine.torque_n_m.at_place(x.engine_rad_s, &acting.throttle),
             pump_n_m: converter.pump_n_m,
             shift: ShiftTorques {
                 turbine_n_m: converter.turbine_n_m,
@@ -144,14 +176,14 @@ impl Powertrain {
                 output_n_m: shaft_n_m / v.driveline.final_ratio,
             },
             shaft_n_m,
-            tyre_n: v.tyre.force(v.road.wheel_radius_m * x.wheel_rad_s, x.vehicle_m_s),
+            tyre_n: self.tyre_force(x),
         }
     }
 
     /// Time derivative of the state of a car whose pistons have no stroke.
     #[inline]
     pub fn derivative(&self, mode: Mode, x: &[f64; STATES], inputs: &Inputs) -> [f64; STATES] {
-        self.derivative_with_torques(mode, x, inputs).0
+        self.derivative_with_torques(mode, x, &self.acting(inputs)).0
     }
 
     /// Time derivative of the state, and the torques that make it but for the holding torques.
@@ -160,11 +192,11 @@ impl Powertrain {
         &self,
         mode: Mode,
         x: &[f64; N],
-        inputs: &Inputs,
+        acting: &Acting,
     ) -> ([f64; N], Torques) {
         let x = State::from_array(*x);
-        let v = &self.vehicle;
-        let torques = self.applied_torques(mode, &x, inputs);
+        let (v, inputs) = (&self.vehicle, &acting.inputs);
+        let torques = self.applied_torques(mode, &x, acting);
         let gear = self.coefficients(mode.engagement());
         let rates = State {
             engine_rad_s: v.engine.acceleration(x.engine_rad_s, torques.engine_n_m, torques.pump_n_m),
@@ -172,7 +204,7 @@ impl Powertrain {
             output_rad_s: gear.output.at(&torques.shift),
             twist_rad: v.driveline.twist_rate(x.output_rad_s, x.wheel_rad_s),
             wheel_rad_s: self.wheel_acceleration(&x, &torques),
-            vehicle_m_s: self.vehicle_acceleration(&x, &torques),
+            vehicle_m_s: self.acceleration_under(&x, torques.tyre_n),
             offgoing_valve_pa: v.offgoing.valve.pressure_rate(x.offgoing_valve_pa, inputs.offgoing_settled_pa),
             oncoming_valve_pa: v.oncoming.valve.pressure_rate(x.oncoming_valve_pa, inputs.oncoming_settled_pa),
             offgoing_m3: v.offgoing.volume_rate(x.offgoing_m3, x.offgoing_valve_pa),
@@ -233,11 +265,17 @@ impl Powertrain {
             / self.vehicle.driveline.wheel_inertia_kg_m2
     }
 
+    /// Acceleration of the vehicle at this state, m/s^2.
+    #[inline]
+    pub fn vehicle_acceleration(&self, x: &State) -> f64 {
+        self.acceleration_under(x, self.tyre_force(x))
+    }
+
     /// `m dv/dt = F_x - F_A - F_G`, m/s^2.
     #[inline]
-    pub fn vehicle_acceleration(&self, x: &State, torques: &Torques) -> f64 {
+    pub(crate) fn acceleration_under(&self, x: &State, tyre_n: f64) -> f64 {
         let road = &self.vehicle.road;
-        (torques.tyre_n - road.drag_force(x.vehicle_m_s) - self.grade_force_n) / road.mass_kg
+        (tyre_n - road.drag_force(x.vehicle_m_s) - self.grade_force_n) / road.mass_kg
     }
 
     /// How far the offgoing and the oncoming clutch are from a change of mode: the slip of a slipping
@@ -245,7 +283,7 @@ impl Powertrain {
     /// ends where one of them turns negative.
     #[inline]
     pub fn margins(&self, mode: Mode, x: &State, inputs: &Inputs) -> [f64; 2] {
-        self.margins_under(mode, x, &self.applied_torques(mode, x, inputs))
+        self.margins_under(mode, x, &self.applied_torques(mode, x, &self.acting(inputs)))
     }
 
     /// As [`Self::margins`], under torques that are known but for the holding torques.
@@ -266,5 +304,17 @@ impl Powertrain {
             margin(mode.offgoing, slips[0], &v.offgoing.clutch, offgoing_pa, torques.offgoing_n_m),
             margin(mode.oncoming, slips[1], &v.oncoming.clutch, oncoming_pa, torques.oncoming_n_m),
         ]
+    }
+}
+
+/// Friction and drag of a clutch that slips, N m; nothing of one that sticks.
+#[inline]
+fn friction(contact: Contact, clutch: &ShiftClutch, pressure_pa: f64, slip: f64) -> f64 {
+    match contact {
+        Contact::Stuck => 0.0,
+        Contact::Slipping(direction) => {
+            let torque_n_m = direction.sign() * clutch.clutch.torque_capacity(pressure_pa, slip);
+            if clutch.drag_n_m > 0.0 { torque_n_m + drag_torque(clutch.drag_n_m, slip) } else { torque_n_m }
+        }
     }
 }

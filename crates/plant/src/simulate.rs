@@ -36,6 +36,70 @@ pub struct Sample {
     pub vehicle_m_s2: f64,
 }
 
+/// The plant at the time of a sample. What does not stand here follows from it when it is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    /// Time, s.
+    pub time_s: f64,
+    /// The states.
+    pub state: State,
+    /// Which clutches stick.
+    pub mode: Mode,
+    /// What the shift controller is about.
+    pub stage: Stage,
+    /// What the controller commands.
+    pub commands: &'a Commands,
+    inputs: &'a Inputs,
+    powertrain: &'a Powertrain,
+}
+
+impl Moment<'_> {
+    /// Slip of the oncoming clutch, rad/s.
+    pub fn oncoming_slip_rad_s(&self) -> f64 {
+        self.powertrain.vehicle.shift.oncoming_slip(self.state.turbine_rad_s, self.state.output_rad_s)
+    }
+
+    /// Torque of the oncoming clutch, N m.
+    pub fn oncoming_n_m(&self) -> f64 {
+        self.powertrain.oncoming_torque(self.mode, &self.state, self.inputs)
+    }
+
+    /// Pressure of the oncoming clutch, Pa.
+    pub fn oncoming_pa(&self) -> f64 {
+        self.powertrain.pressures(&self.state)[1]
+    }
+
+    /// Drive-shaft torque, N m.
+    pub fn shaft_n_m(&self) -> f64 {
+        self.powertrain.shaft_torque(&self.state)
+    }
+
+    /// Acceleration of the vehicle, m/s^2.
+    pub fn vehicle_m_s2(&self) -> f64 {
+        self.powertrain.vehicle_acceleration(&self.state)
+    }
+
+    /// All of it.
+    pub fn sample(&self) -> Sample {
+        let (state, shift) = (self.state, &self.powertrain.vehicle.shift);
+        let [offgoing_pa, oncoming_pa] = self.powertrain.pressures(&state);
+        let torques = self.powertrain.torques(self.mode, &state, self.inputs);
+        Sample {
+            time_s: self.time_s,
+            state,
+            mode: self.mode,
+            stage: self.stage,
+            torques,
+            commands: *self.commands,
+            offgoing_slip_rad_s: shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),
+            oncoming_slip_rad_s: self.oncoming_slip_rad_s(),
+            offgoing_pa,
+            oncoming_pa,
+            vehicle_m_s2: self.powertrain.acceleration_under(&state, torques.tyre_n),
+        }
+    }
+}
+
 /// Simulates the experiment on the nominal `vehicle` with its differences applied, and shows a sample to
 /// `record` at every multiple of the sample time, from zero to the duration.
 ///
@@ -115,8 +179,8 @@ impl<'a> Simulation<'a> {
     ///
     /// # Errors
     /// See [`PlantError`].
-    pub fn advance(&mut self, until_s: f64, record: impl FnMut(&Sample)) -> Result<(), PlantError> {
-        self.advance_with_steps(until_s, |_| {}, record)
+    pub fn advance(&mut self, until_s: f64, mut record: impl FnMut(&Sample)) -> Result<(), PlantError> {
+        self.advance_over(until_s, |_| {}, |moment| record(&moment.sample()))
     }
 
     /// As [`Self::advance`], with every step of the integrator shown to `on_step`.
@@ -126,8 +190,25 @@ impl<'a> Simulation<'a> {
     pub fn advance_with_steps(
         &mut self,
         until_s: f64,
-        mut on_step: impl FnMut(&Segment<'_>),
+        on_step: impl FnMut(&Segment<'_>),
         mut record: impl FnMut(&Sample),
+    ) -> Result<(), PlantError> {
+        self.advance_over(until_s, on_step, |moment| record(&moment.sample()))
+    }
+
+    /// As [`Self::advance`], where `record` takes of each sample only what it needs.
+    ///
+    /// # Errors
+    /// See [`PlantError`].
+    pub fn advance_to(&mut self, until_s: f64, record: impl FnMut(&Moment<'_>)) -> Result<(), PlantError> {
+        self.advance_over(until_s, |_| {}, record)
+    }
+
+    fn advance_over(
+        &mut self,
+        until_s: f64,
+        mut on_step: impl FnMut(&Segment<'_>),
+        mut record: impl FnMut(&Moment<'_>),
     ) -> Result<(), PlantError> {
         let period_s = self.experiment.shift.control_period_s;
         let until_s = until_s.min(self.experiment.duration_s);
@@ -268,7 +349,7 @@ impl Recorder {
         commands: &Commands,
         stage: Stage,
         segment: &Segment<'_>,
-        record: &mut impl FnMut(&Sample),
+        record: &mut impl FnMut(&Moment<'_>),
     ) {
         // A sample on the border of two steps belongs to the second: at the instant of a new command it shows
         // that command, as the controller that gave it would log it. Only the very last has no second.
@@ -280,22 +361,8 @@ impl Recorder {
                 return;
             }
             let state = segment.at(time_s.clamp(segment.start_s, segment.end_s));
-            let torques = powertrain.torques(segment.mode, &state, segment.inputs);
-            let shift = &powertrain.vehicle.shift;
-            let [offgoing_pa, oncoming_pa] = powertrain.pressures(&state);
-            record(&Sample {
-                time_s,
-                state,
-                mode: segment.mode,
-                stage,
-                torques,
-                commands: *commands,
-                offgoing_slip_rad_s: shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),
-                oncoming_slip_rad_s: shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s),
-                offgoing_pa,
-                oncoming_pa,
-                vehicle_m_s2: powertrain.vehicle_acceleration(&state, &torques),
-            });
+            let Segment { mode, inputs, .. } = *segment;
+            record(&Moment { time_s, state, mode, stage, commands, inputs, powertrain });
             self.next += 1;
         }
     }

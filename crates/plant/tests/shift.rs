@@ -6,7 +6,7 @@ mod common;
 
 use common::{e1, each_step, samples, vehicle};
 use plant::hybrid::RELATIVE_TOLERANCE;
-use plant::{Contact, Mode, Powertrain, Sample};
+use plant::{Contact, Mode, Powertrain, Sample, Simulation};
 
 #[test]
 fn the_shift_changes_mode_twice_and_does_not_chatter() {
@@ -76,4 +76,26 @@ fn a_car_on_a_downhill_grade_overruns_its_engine_and_stays_finite() {
     assert!(last.state.turbine_rad_s > last.state.engine_rad_s, "overrun");
     assert!(last.torques.shift.turbine_n_m < 0.0, "the engine brakes");
     assert!(samples.iter().all(|s| s.state.to_array().iter().all(|x| x.is_finite())));
+}
+
+#[test]
+fn what_is_asked_of_a_moment_is_what_its_sample_holds() {
+    let (experiment, nominal) = (e1(), vehicle());
+    let powertrain = Powertrain::new(experiment.simulated_vehicle(&nominal));
+    let (mut modes, mut drive) = (Vec::new(), Simulation::new(&powertrain, &nominal, &experiment).unwrap());
+    let asked = |moment: &plant::Moment<'_>| {
+        let sample = moment.sample();
+        let asked = [moment.oncoming_n_m(), moment.shaft_n_m(), moment.vehicle_m_s2(), moment.oncoming_pa()];
+        let held =
+            [sample.torques.shift.oncoming_n_m, sample.torques.shaft_n_m, sample.vehicle_m_s2, sample.oncoming_pa];
+        assert_eq!(asked.map(f64::to_bits), held.map(f64::to_bits), "{}", moment.time_s);
+        let road = &powertrain.vehicle.road;
+        let force_n = sample.torques.tyre_n - road.drag_force(sample.state.vehicle_m_s) - road.grade_force();
+        assert_eq!(sample.vehicle_m_s2, force_n / road.mass_kg);
+        if modes.last() != Some(&moment.mode) {
+            modes.push(moment.mode);
+        }
+    };
+    drive.advance_to(experiment.duration_s, asked).unwrap();
+    assert!(modes.len() > 2, "{modes:?}");
 }

@@ -22,7 +22,9 @@ pub const MOST_DRAWN: usize = 200;
 /// Rows of the table on the page; the files beside it have them all.
 const MOST_ROWS: usize = 1000;
 /// Points of the curves of all drawn shifts together: a point takes about a dozen bytes of the page.
-const POINTS: usize = 140_000;
+const POINTS: usize = 120_000;
+/// Bytes of the figures of shifts. The rest of the page takes up to one megabyte, and a page stays below five.
+const MOST_BYTES: usize = 3_800_000;
 /// Curves in the figure of a shift, about.
 const CURVES: usize = 12;
 
@@ -53,16 +55,19 @@ impl LogPage<'_> {
         let drawn: Vec<&ShiftEstimate> =
             self.shifts.iter().filter(|shift| !shift.samples.is_empty()).take(MOST_DRAWN).collect();
         let points = POINTS / CURVES / drawn.len().max(1);
-        let figures = drawn.iter().map(|shift| {
+        let command = self.vehicle.observer_valve.command_kind();
+        let figures = within_bytes(drawn.iter().map(|shift| compact(&shift_figure(shift, command, points).svg())));
+        let figures = drawn.iter().zip(figures).map(|(shift, svg)| {
             context! {
                 number => shift.number,
                 title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
                 at => format!("{:.2}", shift.begin_s()),
                 remark => remark(shift),
-                svg => inline(&compact(&shift_figure(shift, self.vehicle.observer_valve.command_kind(), points).svg())),
+                svg => inline(&svg),
             }
         });
         let figures: Vec<Value> = figures.collect();
+        let drawn = figures.len();
         let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)]);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         Ok(templates()?.get_template("log.html")?.render(context! {
@@ -74,17 +79,26 @@ impl LogPage<'_> {
             log => self.log.display().to_string(),
             shifts_of_log => self.shifts_of_log,
             shown => self.shifts.len(),
-            undrawn => self.shifts.len() - drawn.len(),
+            undrawn => self.shifts.len() - drawn,
             findings => self.findings.to_vec(),
             overview => inline(&overview_figure(self.overview, self.shifts).svg()),
             titles => titles,
             left_out => self.shifts.len() - rows.len(),
-            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn.len() }).collect::<Vec<_>>(),
+            rows => rows.iter().enumerate().map(|(i, cells)| context! { cells, linked => i < drawn }).collect::<Vec<_>>(),
             figures => figures,
             others => self.shifts.iter().filter(|shift| !shift.of_vehicle).count(),
             inputs => origin(&[&self.vehicle.source]),
         })?)
     }
+}
+
+/// The first figures, as many as a page has room for.
+pub(crate) fn within_bytes(figures: impl Iterator<Item = String>) -> impl Iterator<Item = String> {
+    let mut bytes = 0;
+    figures.take_while(move |svg| {
+        bytes += svg.len();
+        bytes <= MOST_BYTES
+    })
 }
 
 /// The same figure with its curves to a tenth of a pixel, which is half of their text.
@@ -382,6 +396,14 @@ fn held(healths: &[(f64, [bool; HEALTHS])], wanted: Health, height: f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_page_takes_as_many_figures_as_it_has_room_for() {
+        let figures = |size: usize| within_bytes(std::iter::repeat_with(move || "x".repeat(size)).take(300)).count();
+        assert_eq!(figures(1000), 300);
+        assert_eq!(figures(100_000), MOST_BYTES / 100_000);
+        assert_eq!(figures(MOST_BYTES + 1), 0);
+    }
 
     #[test]
     fn a_compact_figure_has_its_curves_to_a_tenth_of_a_pixel() {

@@ -10,7 +10,7 @@ use minijinja::{Value, context};
 use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
-use crate::log_page::{MOST_DRAWN, compact, kind_of, panel};
+use crate::log_page::{MOST_DRAWN, compact, kind_of, panel, within_bytes};
 use crate::page::{PageError, inline, origin, templates};
 use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
@@ -51,18 +51,23 @@ impl SpeedsPage<'_> {
     /// None in a released program; the tests render the template.
     pub fn html(&self) -> Result<String, PageError> {
         let torques: Vec<Option<ShiftTorque>> = self.torques();
-        let drawn = self.shifts.iter().zip(&torques).take(MOST_DRAWN).enumerate();
-        let figures: Vec<Value> = drawn
-            .map(|(i, (shift, torque))| {
+        let drawn = || self.shifts.iter().zip(&torques).take(MOST_DRAWN);
+        let svgs =
+            within_bytes(drawn().map(|(shift, torque)| compact(&self.shift_figure(shift, torque.as_ref()).svg())));
+        let figures: Vec<Value> = drawn()
+            .zip(svgs)
+            .enumerate()
+            .map(|(i, ((shift, torque), svg))| {
                 context! {
                     number => i + 1,
                     title => format!("{}-{}, {}", shift.from, shift.to, kind_of(shift)),
                     at => number(shift.start_s(), 2),
                     remark => self.remark(torque.as_ref()),
-                    svg => inline(&compact(&self.shift_figure(shift, torque.as_ref()).svg())),
+                    svg => inline(&svg),
                 }
             })
             .collect();
+        let drawn = figures.len();
         let (titles, rows) = self.table(&torques);
         let converter = self.converter.as_ref().ok();
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
@@ -78,7 +83,7 @@ impl SpeedsPage<'_> {
             faults => self.faults.to_vec(),
             overview => inline(&compact(&self.overview().svg())),
             titles, rows, figures,
-            undrawn => self.shifts.len().saturating_sub(MOST_DRAWN),
+            undrawn => self.shifts.len() - drawn,
             converter => converter.map(|fit| inline(&self.converter_figure(fit).svg())),
             engine => converter.map(|fit| inline(&compact(&self.engine_figure(fit).svg()))),
             inputs => origin(&inputs),

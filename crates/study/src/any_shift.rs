@@ -4,9 +4,12 @@
 //! toothed wheels. Errors are counted by what the true clutches do: in the *torque phase* one of them holds and the other
 //! carries torque while it slips; in the *inertia phase* both slip.
 
+pub mod campaign;
+pub mod channels;
 pub mod drive;
 pub mod logged;
 pub mod matrix;
+pub mod measured;
 pub mod recording;
 pub mod tour;
 
@@ -42,6 +45,9 @@ pub enum AnyShiftError {
     /// There are more clutches than the filter has room for.
     #[error("the gearbox has {0} clutches and brakes, and the filter has room for {MAX_ELEMENTS}")]
     TooManyElements(usize),
+    /// A shift is none from one clutch with plates and valve to another.
+    #[error("the filter has no tables for {0}\nhint: `wetclutch check` lists the shifts from one clutch to another")]
+    NoTables(String),
 }
 
 /// How a car differs from the one that is known.
@@ -53,32 +59,66 @@ pub struct ShiftDraw {
     pub valve_gain: Vec<f64>,
     /// Factor on the converter's capacity.
     pub converter: f64,
+    /// Lag, delay and hysteresis of each element's valve; none as in the known car.
+    pub timing: Vec<Option<ValveTiming>>,
+}
+
+/// Lag, delay and hysteresis of a valve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValveTiming {
+    /// Factor on the lag.
+    pub lag: f64,
+    /// Delay, s.
+    pub delay_s: f64,
+    /// Half-width of the hysteresis, Pa.
+    pub hysteresis_pa: f64,
 }
 
 impl ShiftDraw {
     /// The known car.
     pub fn none(car: &Car) -> Self {
         let ones = vec![1.0; car.clutches.len()];
-        Self { friction: ones.clone(), valve_gain: ones, converter: 1.0 }
+        Self { timing: vec![None; ones.len()], friction: ones.clone(), valve_gain: ones, converter: 1.0 }
     }
 
-    /// Within the bounds, each factor by a number from 0 to 1.
+    /// Friction, gain and converter within the bounds, each factor by a number from 0 to 1.
     pub fn within(car: &Car, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
         let mut factor = |share: f64| 1.0 + share * (2.0 * uniform() - 1.0);
         let friction = car.clutches.iter().map(|_| factor(errors.friction)).collect();
         let valve_gain = car.clutches.iter().map(|_| factor(errors.valve_gain)).collect();
-        Self { friction, valve_gain, converter: factor(errors.converter) }
+        Self { friction, valve_gain, converter: factor(errors.converter), ..Self::none(car) }
+    }
+
+    /// The same with lag, delay and hysteresis of the valves within the bounds too.
+    #[must_use]
+    pub fn with_timing(mut self, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
+        for timing in &mut self.timing {
+            let [least_s, most_s] = errors.valve_delay_s;
+            *timing = Some(ValveTiming {
+                lag: 1.0 + errors.valve_lag * (2.0 * uniform() - 1.0),
+                delay_s: least_s + uniform() * (most_s - least_s),
+                hysteresis_pa: uniform() * errors.hysteresis_pa,
+            });
+        }
+        self
     }
 
     /// The car that differs from this one so.
     pub fn car(&self, known: &Car) -> Car {
         let mut car = known.clone();
-        let factors = self.friction.iter().zip(&self.valve_gain);
-        for (clutch, (friction, gain)) in car.clutches.iter_mut().zip(factors) {
+        let factors = self.friction.iter().zip(&self.valve_gain).zip(&self.timing);
+        for (clutch, ((friction, gain), timing)) in car.clutches.iter_mut().zip(factors) {
             let Some(clutch) = clutch else { continue };
             clutch.clutch.friction = clutch.clutch.friction.scaled(*friction);
             clutch.clutch.static_friction *= friction;
-            clutch.valve = clutch.valve.changed(1.0, *gain, None);
+            clutch.valve = clutch.valve.changed(
+                timing.map_or(1.0, |timing| timing.lag),
+                *gain,
+                timing.map(|timing| timing.delay_s),
+            );
+            if let Some(timing) = timing {
+                clutch.hysteresis_pa = timing.hysteresis_pa;
+            }
         }
         if let Some(converter) = &mut car.converter {
             converter.capacity_n_m_s2 = converter.capacity_n_m_s2.scaled(self.converter);

@@ -2,7 +2,7 @@
 
 use config::{Experiment, Vehicle};
 use observer::Phase;
-use plant::{Contact, Mode, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
+use plant::{Contact, Mode, Moment, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
 use trace::{Cell, Column, Trace, Values, Word, signal};
 
 use crate::ShiftSample;
@@ -63,30 +63,31 @@ pub fn simulate_shift(
     experiment: &Experiment,
     before_s: f64,
 ) -> Result<Trace, PlantError> {
-    simulate_shift_over(Trace::default(), car, nominal, experiment, before_s)
+    let mut recording = Recording::new(car, Trace::default());
+    over_shift(car, nominal, experiment, before_s, |moment| recording.take(&moment.sample()))?;
+    Ok(recording.finish())
 }
 
-/// As [`simulate_shift`], in the memory of a trace that is no longer needed.
+/// As [`simulate_shift`], where `take` gets every sample and records what it needs.
 ///
 /// # Errors
 /// See [`PlantError`].
-pub(crate) fn simulate_shift_over(
-    spare: Trace,
+pub(crate) fn over_shift(
     car: &Vehicle,
     nominal: &Vehicle,
     experiment: &Experiment,
     before_s: f64,
-) -> Result<Trace, PlantError> {
+    mut take: impl FnMut(&Moment<'_>),
+) -> Result<(), PlantError> {
     let powertrain = Powertrain::new(experiment.simulated_vehicle(car));
     let mut drive = Simulation::new(&powertrain, nominal, experiment)?;
     drive.record_from(experiment.shift.request_s - before_s);
-    let mut recording = Recording::new(car, spare);
     let mut until_s = experiment.shift.request_s;
     loop {
-        drive.advance(until_s, |sample| recording.take(sample))?;
+        drive.advance_to(until_s, &mut take)?;
         let ended = matches!(drive.stage(), Stage::Locked(since_s) if drive.time_s() > since_s + AFTER_LOCK_UP_S);
         if ended || until_s >= experiment.duration_s {
-            return Ok(recording.finish());
+            return Ok(());
         }
         until_s += LOOK_S;
     }
@@ -95,17 +96,30 @@ pub(crate) fn simulate_shift_over(
 /// Samples for which room is made at once: a shift at a millisecond.
 const EXPECTED_SAMPLES: usize = 4096;
 
-/// Samples on their way to a trace.
-struct Recording {
-    names: [&'static str; COLUMNS],
+/// Samples on their way to a trace, with this number of columns beside the time and the phase.
+pub struct Recording<const N: usize = COLUMNS> {
+    names: [&'static str; N],
     time_s: Vec<f64>,
-    columns: [Vec<f64>; COLUMNS],
+    columns: [Vec<f64>; N],
     phases: Vec<Word>,
 }
 
 impl Recording {
-    /// Nothing recorded yet, in the memory of a spare trace.
-    fn new(vehicle: &Vehicle, spare: Trace) -> Self {
+    /// Every signal of a vehicle; nothing recorded yet, in the memory of a spare trace.
+    pub fn new(vehicle: &Vehicle, spare: Trace) -> Self {
+        Self::of(column_names(vehicle), spare)
+    }
+
+    /// Takes the next sample.
+    pub fn take(&mut self, sample: &Sample) {
+        let row = DriveRow::of(sample);
+        self.push(row.time_s, row.phase, row.values);
+    }
+}
+
+impl<const N: usize> Recording<N> {
+    /// Columns of these names; nothing recorded yet, in the memory of a spare trace.
+    pub(crate) fn of(names: [&'static str; N], spare: Trace) -> Self {
         let (mut numbers, mut phases) = (vec![spare.time_s], Vec::new());
         for column in spare.columns {
             match column.values {
@@ -120,21 +134,28 @@ impl Recording {
             column.reserve(EXPECTED_SAMPLES);
             column
         };
-        Self { names: column_names(vehicle), time_s: column(), columns: std::array::from_fn(|_| column()), phases }
+        Self { names, time_s: column(), columns: std::array::from_fn(|_| column()), phases }
     }
 
-    fn take(&mut self, sample: &Sample) {
-        let row = DriveRow::of(sample);
-        self.time_s.push(row.time_s);
-        for (column, value) in self.columns.iter_mut().zip(row.values) {
+    /// Number of the samples so far.
+    pub(crate) fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Appends a row.
+    #[inline]
+    pub(crate) fn push(&mut self, time_s: f64, phase: Phase, values: [f64; N]) {
+        self.time_s.push(time_s);
+        for (column, value) in self.columns.iter_mut().zip(values) {
             column.push(value);
         }
-        self.phases.push(row.phase.name().into());
+        self.phases.push(phase.name().into());
     }
 
-    fn finish(self) -> Trace {
+    /// The trace, with the true phase of the shift as words.
+    pub fn finish(self) -> Trace {
         let column = |(name, values): (&str, _)| Column { name: name.to_owned(), values: Values::Numbers(values) };
-        let mut columns = Vec::with_capacity(COLUMNS + 1);
+        let mut columns = Vec::with_capacity(N + 1);
         columns.extend(self.names.into_iter().zip(self.columns).map(column));
         let mut trace = Trace { path: None, time_s: self.time_s, columns };
         trace.add_words(signal::TRUE_PHASE, self.phases);
@@ -155,7 +176,7 @@ pub struct DriveRow {
 impl DriveRow {
     /// The row of a sample.
     pub fn of(sample: &Sample) -> Self {
-        Self { time_s: sample.time_s, values: values(sample), phase: phase(sample) }
+        Self { time_s: sample.time_s, values: values(sample), phase: phase(sample.stage, sample.mode) }
     }
 }
 
@@ -190,7 +211,7 @@ impl ShiftSample {
     pub fn of(sample: &Sample) -> Self {
         Self {
             time_s: sample.time_s,
-            phase: phase(sample),
+            phase: phase(sample.stage, sample.mode),
             turbine_rad_s: sample.state.turbine_rad_s,
             output_rad_s: sample.state.output_rad_s,
             oncoming_slip_rad_s: sample.oncoming_slip_rad_s,
@@ -228,9 +249,9 @@ fn values(sample: &Sample) -> [f64; COLUMNS] {
 
 /// The true phase: the torque phase begins when the controller starts the load transfer, the inertia
 /// phase when the offgoing clutch lets go, and the shift ends when the oncoming clutch sticks.
-fn phase(sample: &Sample) -> Phase {
-    let begun = matches!(sample.stage, Stage::TorquePhase(_) | Stage::InertiaPhase { .. } | Stage::Locked(_));
-    match sample.mode {
+pub(crate) fn phase(stage: Stage, mode: Mode) -> Phase {
+    let begun = matches!(stage, Stage::TorquePhase(_) | Stage::InertiaPhase { .. } | Stage::Locked(_));
+    match mode {
         _ if !begun => Phase::BeforeShift,
         Mode { offgoing: Contact::Stuck, .. } => Phase::TorquePhase,
         Mode { oncoming: Contact::Slipping(_), .. } => Phase::InertiaPhase,

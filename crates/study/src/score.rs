@@ -284,6 +284,11 @@ impl ShiftRating {
         }
     }
 
+    /// Whether the oncoming clutch has locked; from then on its torque counts no more.
+    pub fn is_locked(&self) -> bool {
+        self.lock_up_s.is_some()
+    }
+
     /// Takes the next sample.
     pub fn push(&mut self, sample: &ShiftSample) {
         let (time_s, friction_w) = (sample.time_s, sample.oncoming_n_m * sample.oncoming_slip_rad_s);
@@ -307,6 +312,9 @@ impl ShiftRating {
 
     /// Takes an acceleration, if it is felt as part of the shift.
     fn feel(&mut self, time_s: f64, acceleration: f64) {
+        if self.torque_phase_start_s.is_some() && self.before.is_empty() {
+            return self.felt(time_s, acceleration);
+        }
         self.before.push_back((time_s, acceleration));
         let from_s = self.torque_phase_start_s.unwrap_or(time_s) - FELT_BEFORE_S;
         if self.jerk.is_unused() {
@@ -317,8 +325,13 @@ impl ShiftRating {
         if self.torque_phase_start_s.is_none() {
             return;
         }
-        let to_s = self.lock_up_s.map_or(f64::INFINITY, |lock_up_s| lock_up_s + FELT_AFTER_S);
-        for (time_s, acceleration) in self.before.drain(..).filter(|&(time_s, _)| time_s <= to_s) {
+        for (time_s, acceleration) in std::mem::take(&mut self.before) {
+            self.felt(time_s, acceleration);
+        }
+    }
+
+    fn felt(&mut self, time_s: f64, acceleration: f64) {
+        if self.lock_up_s.is_none_or(|lock_up_s| time_s <= lock_up_s + FELT_AFTER_S) {
             self.jerk.push(time_s, acceleration);
             self.vibration.push(time_s, acceleration);
         }

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use config::{Experiment, GivenGains, ObserverKind, Study, Values, Vehicle};
-use observer::RigidGains;
-use study::campaign::{Metric, PHASES, factor_values};
-use study::{Campaign, StudyError, Summary, Target, error_bound, execute, worst_case};
+use observer::{Phase, RigidGains};
+use study::campaign::{Metric, PHASES, factor_values, scored_shift};
+use study::{Campaign, ShiftQuality, StudyError, Summary, Target, error_bound, execute, simulate_shift, worst_case};
+use trace::Trace;
 
 fn experiments() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments")
@@ -346,4 +347,32 @@ fn the_guaranteed_range_holds_over_the_whole_budget_and_not_beyond_it() {
     // A valve with a third more gain than the budget allows leaves the range.
     let beyond = covered(&[("runs = 5000", "runs = 8"), ("range = [0.9, 1.1]", "range = [1.45, 1.5]")]);
     assert!(beyond.iter().any(|(covered, all)| covered < all), "{beyond:?}");
+}
+
+#[test]
+fn a_shift_recorded_for_its_row_is_the_shift_recorded_whole() {
+    for (file, run) in [("settings.toml", 3), ("settings.toml", 8), ("combined.toml", 5)] {
+        let study = study_of(file, &[]);
+        let varied = study.varied(&factor_values(&study, run)).unwrap();
+        let (car, nominal) = (&varied.car, &varied.vehicle);
+        let whole = simulate_shift(car, nominal, &varied.experiment, study.record_before_s).unwrap();
+        // The memory of another trace leaves nothing behind.
+        let scored = scored_shift(whole.clone(), car, nominal, &varied.experiment, study.record_before_s).unwrap();
+        let fresh = scored_shift(Trace::default(), car, nominal, &varied.experiment, study.record_before_s).unwrap();
+        assert_eq!(scored.quality, ShiftQuality::of(&whole, &nominal.shift));
+        assert!(scored.quality.is_some());
+        let (phases, rows) = (study::true_phases(&whole).unwrap(), scored.trace.len());
+        assert_eq!(rows, 1 + phases.iter().rposition(|phase| PHASES.contains(phase)).unwrap());
+        assert_eq!(scored.trace.time_s, whole.time_s[..rows]);
+        assert_eq!(study::true_phases(&scored.trace).unwrap(), phases[..rows]);
+        for column in scored.trace.columns.iter().filter(|column| column.name != trace::signal::TRUE_PHASE) {
+            let (recorded, all) = (scored.trace.get(&column.name).unwrap(), whole.get(&column.name).unwrap());
+            let again = fresh.trace.get(&column.name).unwrap();
+            for (at, value) in recorded.iter().enumerate() {
+                let not_scored = value.is_nan() && phases[at] == Phase::AfterShift;
+                assert!(not_scored || value.to_bits() == all[at].to_bits(), "{} in row {at}", column.name);
+                assert_eq!(value.to_bits(), again[at].to_bits());
+            }
+        }
+    }
 }

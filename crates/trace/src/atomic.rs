@@ -9,6 +9,7 @@ use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
 #[derive(Debug)]
@@ -22,6 +23,21 @@ pub struct WholeFile {
 struct Replacement {
     partial: PathBuf,
     target: PathBuf,
+}
+
+/// The partial files of this program.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the partial files of this program, which is about to end on a signal. The files at their paths stay as they were.
+pub fn remove_unfinished() {
+    for partial in unfinished().drain(..) {
+        // The next run removes what cannot be removed now.
+        let _ = fs::remove_file(partial);
+    }
 }
 
 impl WholeFile {
@@ -47,7 +63,9 @@ impl WholeFile {
         let mut partial = name.to_owned();
         partial.push(format!(".{}.partial", std::process::id()));
         let partial = target.with_file_name(partial);
-        let file = Self { writer: BufWriter::new(locked(&partial)?), replaces: Some(Replacement { partial, target }) };
+        let writer = BufWriter::new(locked(&partial)?);
+        unfinished().push(partial.clone());
+        let file = Self { writer, replaces: Some(Replacement { partial, target }) };
         if let Some(permissions) = permissions {
             file.writer.get_ref().set_permissions(permissions)?;
         }
@@ -78,6 +96,7 @@ impl WholeFile {
         for file in &mut files {
             if let Some(Replacement { partial, target }) = &file.replaces {
                 fs::rename(partial, target)?;
+                unfinished().retain(|other| other != partial);
                 file.replaces = None;
             }
         }
@@ -112,6 +131,7 @@ impl Drop for WholeFile {
         if let Some(replaces) = &self.replaces {
             // The caller already reports the error that ended the writing.
             let _ = fs::remove_file(&replaces.partial);
+            unfinished().retain(|other| *other != replaces.partial);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -14,7 +14,8 @@ const LOOK: Duration = Duration::from_millis(50);
 const READ_AT_ONCE: usize = 64 << 10;
 
 /// Gives the lines of a text as they come. Only whole lines are given: when it is stopped, a line that was not complete is left
-/// out; at the end of a pipe the last line needs no end.
+/// out; at the end of a pipe the last line needs no end. A file ends where it became shorter, or where another file has its path: its
+/// recorder began a new one.
 pub struct Following {
     source: Source,
     stop: Arc<AtomicBool>,
@@ -26,7 +27,8 @@ pub struct Following {
 }
 
 enum Source {
-    File(File),
+    /// With its path.
+    File(File, PathBuf),
     /// Chunks from a thread that waits for a pipe, so that a stop is seen while nothing comes.
     Pipe(Receiver<io::Result<Vec<u8>>>),
 }
@@ -41,7 +43,7 @@ impl Following {
             Source::Pipe(chunks(io::stdin()))
         } else {
             let file = File::open(path)?;
-            if file.metadata()?.is_file() { Source::File(file) } else { Source::Pipe(chunks(file)) }
+            if file.metadata()?.is_file() { Source::File(file, path.to_owned()) } else { Source::Pipe(chunks(file)) }
         };
         Ok(Self { source, stop, bytes: Vec::new(), given: 0, whole: 0, ended: false })
     }
@@ -54,7 +56,7 @@ impl Following {
                 return Ok(None);
             }
             match &mut self.source {
-                Source::File(file) => {
+                Source::File(file, path) => {
                     let mut chunk = vec![0; READ_AT_ONCE];
                     let read = match file.read(&mut chunk) {
                         Err(error) if error.kind() == ErrorKind::Interrupted => continue,
@@ -64,8 +66,9 @@ impl Following {
                         chunk.truncate(read);
                         return Ok(Some(chunk));
                     }
-                    if file.metadata()?.len() < file.stream_position()? {
-                        return Err(io::Error::other("the file became shorter while it was followed"));
+                    if file.metadata()?.len() < file.stream_position()? || is_replaced(file, path)? {
+                        self.bytes.truncate(self.whole);
+                        return Ok(None);
                     }
                     std::thread::sleep(LOOK);
                 }
@@ -77,6 +80,21 @@ impl Following {
             }
         }
     }
+}
+
+/// Whether another file has the path now: the recorder began a new one.
+#[cfg(unix)]
+fn is_replaced(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    // Where nothing has the path, the recorder may still write to this file.
+    let Ok(there) = std::fs::metadata(path) else { return Ok(false) };
+    let own = file.metadata()?;
+    Ok((there.dev(), there.ino()) != (own.dev(), own.ino()))
+}
+
+#[cfg(not(unix))]
+fn is_replaced(_: &File, _: &Path) -> io::Result<bool> {
+    Ok(false)
 }
 
 /// Reads in a thread of its own.
@@ -156,14 +174,24 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_becomes_shorter_is_an_error() {
+    fn a_file_ends_where_it_becomes_shorter_or_is_replaced() {
         let path = std::env::temp_dir().join(format!("wetclutch-follow-cut-{}", std::process::id()));
         std::fs::write(&path, "a\nb\n").unwrap();
         let mut following = Following::open(&path, Arc::new(AtomicBool::new(false))).unwrap();
         let mut buffer = [0; 64];
         assert_eq!(following.read(&mut buffer).unwrap(), 4);
         std::fs::write(&path, "a\n").unwrap();
-        assert!(following.read(&mut buffer).unwrap_err().to_string().contains("became shorter"));
+        assert_eq!(following.read(&mut buffer).unwrap(), 0);
+
+        let mut following = Following::open(&path, Arc::new(AtomicBool::new(false))).unwrap();
+        let moved = path.with_extension("old");
+        std::fs::rename(&path, &moved).unwrap();
+        // What the recorder writes until it begins the new file belongs to the old one.
+        std::fs::write(&moved, "a\nb\nc").unwrap();
+        std::fs::write(&path, "x\n").unwrap();
+        assert_eq!(following.read(&mut buffer).unwrap(), 4);
+        assert_eq!(following.read(&mut buffer).unwrap(), 0);
         std::fs::remove_file(path).unwrap();
+        std::fs::remove_file(moved).unwrap();
     }
 }

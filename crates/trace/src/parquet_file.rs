@@ -8,9 +8,9 @@ use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type;
+use parquet::schema::types::{ColumnPath, Type};
 
 use crate::{Cell, write_whole};
 
@@ -52,7 +52,11 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// What the writer meets.
     pub fn new<'a>(writer: W, columns: impl IntoIterator<Item = (&'a str, ColumnKind)>) -> io::Result<Self> {
         let (mut fields, mut values) = (Vec::new(), Vec::new());
+        let mut properties = WriterProperties::builder().set_statistics_enabled(EnabledStatistics::Chunk);
         for (name, kind) in columns {
+            // Hardly two numbers of a column are the same: a dictionary of them costs time and saves nothing.
+            let path = ColumnPath::new(vec![name.to_owned()]);
+            properties = properties.set_column_dictionary_enabled(path, kind == ColumnKind::Word);
             fields.push(field(name, kind).map_err(io::Error::other)?);
             values.push(match kind {
                 ColumnKind::Whole => Values::Whole(Vec::new()),
@@ -61,7 +65,7 @@ impl<W: Write + Send> ParquetWriter<W> {
             });
         }
         let schema = Type::group_type_builder("rows").with_fields(fields).build().map_err(io::Error::other)?;
-        let properties = Arc::new(WriterProperties::builder().build());
+        let properties = Arc::new(properties.build());
         let file = SerializedFileWriter::new(writer, Arc::new(schema), properties).map_err(io::Error::other)?;
         Ok(Self { file, columns: values, rows: 0, words: Vec::new() })
     }

@@ -5,6 +5,7 @@ use design::{longest_step_of, unstable_corners};
 
 use report::tables::phase_name;
 
+use super::check_defaults::describe_defaults;
 use super::gearbox;
 use super::simulate_drive::{describe_car, describe_drive};
 use crate::args::Check;
@@ -21,8 +22,13 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
         Kind::Car => describe_car(&Car::read(&options.file)?),
+        Kind::CarStudy => super::study::describe_cars(&options.file),
         Kind::Drive => describe_drive(&Drive::from_source(source)?, &options.file),
-        Kind::Vehicle => describe(&Vehicle::from_source(source)?),
+        Kind::Vehicle => {
+            let vehicle = Vehicle::from_source(source)?;
+            describe(&vehicle)?;
+            describe_defaults(&vehicle, options.all)
+        }
         Kind::Experiment => {
             let experiment = Experiment::from_source(source)?;
             let vehicle = experiment.read_vehicle()?;

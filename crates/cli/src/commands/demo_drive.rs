@@ -9,6 +9,7 @@ use report::drive_page::{DrivePage, findings, shift_cells, shift_rows};
 use report::matrix_page::kind_rows;
 use study::any_shift::drive::{ScoredDrive, score_drive};
 use study::any_shift::matrix::Random;
+use study::any_shift::measured::MeasuredRow;
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::drive_tour;
 use study::any_shift::{RECORD_S, ShiftDraw};
@@ -63,8 +64,8 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
 
 /// The signals of the drive, as `simulate` writes them.
 fn write_signals(folder: &Path, car: &Car, recording: &Recording) -> Result<(), Failure> {
-    let mut tables = DriveTables::create(folder, NAME, car)?;
-    recording.samples.iter().try_for_each(|sample| tables.write(car, sample))?;
+    let mut tables = DriveTables::create(folder, NAME, car, None)?;
+    recording.samples.iter().try_for_each(|sample| tables.write(car, &MeasuredRow::exact(sample)))?;
     tables.finish(folder).map(drop)
 }
 

@@ -1,6 +1,6 @@
 //! `wetclutch init`.
 
-use fit::init::{Facts, vehicle_file};
+use config::vehicle::short::{Facts, complete_file, short_file};
 
 use crate::args::Init;
 use crate::commands::{check_output, shell_quoted, write_text};
@@ -19,7 +19,7 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
         let message = "--ratios needs two ratios, those of the gears before and after the shift\nhint: for example --ratios 4.17,2.34";
         return Err(Failure::Input(message.to_owned()));
     };
-    let vehicle = vehicle_file(&Facts {
+    let facts = Facts {
         name: options.name.clone(),
         mass_kg: options.mass_kg,
         wheel_radius_m: options.wheel_radius_m,
@@ -27,11 +27,14 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
         ratio_after,
         final_ratio: options.final_ratio,
         engine_torque_n_m: options.engine_torque_n_m,
-    })?;
-    write_text(&options.output, &vehicle.source.text)?;
+        valve: options.valve.into(),
+    };
+    let text = if options.complete { complete_file } else { short_file }(&facts, options.stroke)?;
+    write_text(&options.output, &text)?;
     let file = shell_quoted(&options.output);
     output::note(&format!(
-        "vehicle file: {}\nnext: `wetclutch fit LOG --vehicle {file} -o fitted.toml`, or `wetclutch estimate LOG --vehicle {file}`",
+        "vehicle file: {}\nnext: `wetclutch check {file}` says which of its defaults matter most; `wetclutch fit LOG --vehicle {file} -o fitted.toml`, \
+         or `wetclutch estimate LOG --vehicle {file}`",
         options.output.display()
     ));
     Ok(())

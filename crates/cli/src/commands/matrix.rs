@@ -34,7 +34,8 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     }
     output::note(&format!("running the filter and the open loop on {all} shifts"));
     let bar = progress(all, 0);
-    let plan = MatrixPlan { draws, seed, sensors: &sensors, change: |_| (), threads: options.threads.count() };
+    let plan =
+        MatrixPlan { draws, seed, sensors: &sensors, timing: false, change: |_| (), threads: options.threads.count() };
     let result = matrix(&car, &plan, || bar.inc(1))?;
     bar.finish_and_clear();
     let cells: Vec<Vec<(String, Cell<'_>)>> = result.rows.iter().map(|row| shift_cells(row, &car)).collect();

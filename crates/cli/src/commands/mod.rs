@@ -2,6 +2,7 @@
 
 mod bench;
 mod check;
+mod check_defaults;
 mod demo;
 mod demo_drive;
 mod design;

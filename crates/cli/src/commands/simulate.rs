@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use config::{Experiment, Kind, Source, Vehicle};
-use study::drive::{DriveColumns, DriveRow};
+use config::{Experiment, Kind, Sensors, Source, Vehicle};
+use study::drive::{DriveColumns, DriveRow, Recording};
+use study::sampling::through_sensors;
 use study::{ShiftRating, ShiftSample};
-use trace::{CsvWriter, WholeFile, signal};
+use trace::{CsvWriter, Trace, WholeFile, signal};
 
 use super::simulate_drive::simulate_drive;
 use crate::args::Simulate;
@@ -25,9 +26,8 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     let vehicle = experiment.read_vehicle()?;
     let (experiment, name) = chosen(experiment, options)?;
     let mut whole = Table::create(options.output.join(format!("{name}.csv")), &vehicle, |_| true)?;
-    let mut measured = Table::create(options.output.join(format!("{name}_measured.csv")), &vehicle, |name| {
-        signal::MEASURABLE.contains(&name)
-    })?;
+    let path = options.output.join(format!("{name}_measured.csv"));
+    let mut measured = Measured::create(path, &vehicle, &experiment)?;
     if let Some(note) = size_note(&experiment) {
         output::note(&note);
     }
@@ -38,7 +38,7 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
         if written.is_ok() {
             rating.push(&ShiftSample::of(sample));
             let row = DriveRow::of(sample);
-            written = whole.write(&row).and_then(|()| measured.write(&row));
+            written = whole.write(&row).and_then(|()| measured.take(sample, &row));
         }
     })?;
     written?;
@@ -58,6 +58,54 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     output::line(&whole.display().to_string())?;
     output::line(&measured.display().to_string())?;
     Ok(())
+}
+
+/// The signals that a car measures: exact ones as they come, or what its sensors read of the whole drive.
+enum Measured<'a> {
+    Exact(Table),
+    Sensed { path: PathBuf, recording: Box<Recording>, sensors: &'a Sensors, row_s: f64, vehicle: &'a Vehicle },
+}
+
+impl<'a> Measured<'a> {
+    fn create(path: PathBuf, vehicle: &'a Vehicle, experiment: &'a Experiment) -> Result<Self, Failure> {
+        let Some(sensors) = &experiment.sensors else {
+            let table = Table::create(path, vehicle, |name| signal::MEASURABLE.contains(&name))?;
+            return Ok(Self::Exact(table));
+        };
+        // Teeth are counted in the whole drive.
+        experiment.check_size()?;
+        let recording = Box::new(Recording::new(vehicle, Trace::default()));
+        Ok(Self::Sensed { path, recording, sensors, row_s: row_s(experiment, sensors), vehicle })
+    }
+
+    fn take(&mut self, sample: &plant::Sample, row: &DriveRow) -> Result<(), Failure> {
+        match self {
+            Self::Exact(table) => table.write(row)?,
+            Self::Sensed { recording, .. } => recording.take(sample),
+        }
+        Ok(())
+    }
+
+    fn complete(self) -> Result<(WholeFile, PathBuf), Failure> {
+        match self {
+            Self::Exact(table) => table.complete(),
+            Self::Sensed { path, recording, sensors, row_s, vehicle } => {
+                let read = through_sensors(&recording.finish(), row_s, sensors, vehicle);
+                let is_age = |name: &str| signal::AGES.iter().any(|(_, age)| *age == name);
+                let read = read.filtered(|name| signal::MEASURABLE.contains(&name) || is_age(name));
+                let file = trace::csv_written(&path, &read).map_err(|error| Failure::writing(&path, &error))?;
+                Ok((file, path))
+            }
+        }
+    }
+}
+
+/// Time between two rows of readings, s: that of the observers that read them, else of the fastest channel.
+fn row_s(experiment: &Experiment, sensors: &Sensors) -> f64 {
+    let observers = experiment.observers.iter().filter(|entry| entry.real_sensors).map(|entry| entry.sample_time_s);
+    let channels = [&sensors.engine, &sensors.turbine, &sensors.output, &sensors.wheel].map(|of| of.sample_time_s);
+    let fastest_s = channels.into_iter().fold(f64::INFINITY, f64::min);
+    observers.reduce(f64::min).unwrap_or(fastest_s).max(experiment.sample_time_s)
 }
 
 /// Some columns of the drive, written as it is simulated.

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use config::{Car, Drive};
+use config::{Car, Drive, Sensors};
 use drivetrain::CommandKind;
-use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, simulate_car_drive};
-use study::any_shift::logged::element_commands;
+use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, ShiftUnderWay, simulate_car_drive};
+use study::any_shift::logged::{command_age, element_commands};
+use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
 use study::any_shift::recording::{lock_up_is_applied, reported_engine_n_m};
 use trace::units::km_h;
 use trace::{Cell, CsvWriter, WholeFile, signal};
@@ -26,15 +27,25 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     }
     let name = drive.name.to_lowercase();
     let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
-    let mut tables = DriveTables::create(&options.output, &name, &car)?;
+    let mut tables =
+        DriveTables::create(&options.output, &name, &car, drive.sensors.as_ref().zip(Some(drive.sample_time_s)))?;
+    let mut sensed = drive.sensors.as_ref().map(|sensors| SensedDrive::new(&car, sensors, drive.sample_time_s));
+    let recorded_s = sensed.as_ref().map_or(drive.sample_time_s, SensedDrive::record_s);
+    let recorded = Drive { sample_time_s: recorded_s, ..drive };
     let mut written = Ok(());
-    let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &drive, |sample| {
+    let summary = simulate_car_drive(&model, &car, CarCalibration::STANDARD, &recorded, |sample| {
         // After a write error the simulation continues to its end without writing: this takes seconds.
         if written.is_ok() {
-            written = tables.write(&car, sample);
+            written = match &mut sensed {
+                Some(sensed) => sensed.push(sample, |row| tables.write(&car, row)),
+                None => tables.write(&car, &MeasuredRow::exact(sample)),
+            };
         }
     })?;
     written?;
+    if let Some(sensed) = &mut sensed {
+        sensed.finish(|row| tables.write(&car, row))?;
+    }
     let paths = tables.finish(&options.output)?;
     output::note(&format!(
         "drive: {:.0} s, {:.2} km, {} shifts, at most {:.0} km/h",
@@ -64,19 +75,25 @@ pub(super) struct DriveTables {
 }
 
 impl DriveTables {
-    /// Begins `NAME.csv` and `NAME_measured.csv`.
-    pub(super) fn create(folder: &Path, name: &str, car: &Car) -> Result<Self, Failure> {
+    /// Begins `NAME.csv` and `NAME_measured.csv`; the latter goes through sensors where there are some, with this time between rows.
+    pub(super) fn create(
+        folder: &Path,
+        name: &str,
+        car: &Car,
+        sensors: Option<(&Sensors, f64)>,
+    ) -> Result<Self, Failure> {
         let columns = columns(car);
+        let measured = columns.iter().filter(|column| column.is_measured).cloned();
+        let measured: Vec<_> = measured.chain(sensors.iter().flat_map(|of| ages(car, *of))).collect();
         Ok(Self {
-            whole: Table::create(folder.join(format!("{name}.csv")), &columns, |_| true)?,
-            measured: Table::create(folder.join(format!("{name}_measured.csv")), &columns, |column| {
-                column.is_measured
-            })?,
+            whole: Table::create(folder.join(format!("{name}.csv")), columns)?,
+            measured: Table::create(folder.join(format!("{name}_measured.csv")), measured)?,
         })
     }
 
-    pub(super) fn write(&mut self, car: &Car, sample: &CarSample) -> Result<(), Failure> {
-        self.whole.write(car, sample).and_then(|()| self.measured.write(car, sample))
+    pub(super) fn write(&mut self, car: &Car, row: &MeasuredRow) -> Result<(), Failure> {
+        self.whole.write(car, &MeasuredRow::exact(&row.sample))?;
+        self.measured.write(car, row)
     }
 
     /// Gives both files their names.
@@ -100,17 +117,53 @@ struct DriveColumn {
 #[derive(Clone, Copy)]
 enum DriveValue {
     Of(for<'c> fn(&'c Car, &CarSample) -> Cell<'c>),
-    /// The command of an element's valve.
-    Command(usize),
+    /// A speed as it is read, or its age.
+    Speed(usize, Reading),
+    /// The command of an element's valve as it is read, or its age.
+    Command(usize, Reading),
+    /// The command of the offgoing or oncoming clutch.
+    OfShift(fn(&ShiftUnderWay) -> usize),
+}
+
+/// What of a reading.
+#[derive(Clone, Copy)]
+enum Reading {
+    Value,
+    Age,
 }
 
 impl DriveValue {
-    fn cell<'c>(self, car: &'c Car, sample: &CarSample) -> Cell<'c> {
+    fn cell<'c>(self, car: &'c Car, row: &MeasuredRow) -> Cell<'c> {
+        let of = |reading: Option<&[f64; 2]>, what: Reading| reading.map_or(f64::NAN, |reading| reading[what as usize]);
         match self {
-            Self::Of(value) => value(car, sample),
-            Self::Command(element) => Cell::Number(sample.commands.get(element).copied().unwrap_or(f64::NAN)),
+            Self::Of(value) => value(car, &row.sample),
+            Self::Speed(speed, what) => Cell::Number(of(row.speeds.get(speed), what)),
+            Self::Command(element, what) => Cell::Number(of(row.commands.get(element), what)),
+            Self::OfShift(which) => {
+                let element = row.sample.shift.as_ref().map(which);
+                Cell::Number(of(element.and_then(|element| row.commands.get(element)), Reading::Value))
+            }
         }
     }
+}
+
+/// The speeds of the rows, with their names, in the order of [`MeasuredRow::speeds`].
+const SPEEDS: [&str; 4] = [signal::ENGINE_SPEED, signal::TURBINE_SPEED, signal::OUTPUT_SPEED, signal::WHEEL_SPEED];
+
+/// The columns of the ages of readings that may be older than their rows.
+fn ages(car: &Car, (sensors, row_s): (&Sensors, f64)) -> Vec<DriveColumn> {
+    let measured = |name: String, value: DriveValue| DriveColumn { name, is_measured: true, value };
+    let speeds = [&sensors.engine, &sensors.turbine, &sensors.output, &sensors.wheel];
+    let speeds = speeds.into_iter().enumerate().filter(|(_, of)| has_ages(of.sample_time_s, of.offset_s, row_s));
+    let named = speeds.filter_map(|(at, _)| Some((at, signal::age_of(SPEEDS[at])?)));
+    let mut columns: Vec<_> =
+        named.map(|(at, age)| measured(age.to_owned(), DriveValue::Speed(at, Reading::Age))).collect();
+    let current = sensors.current.and_then(|of| Some(has_ages(of.sample_time_s?, of.offset_s, row_s)));
+    if current.unwrap_or(false) {
+        let commands = element_commands(car).into_iter();
+        columns.extend(commands.map(|(at, name)| measured(command_age(&name), DriveValue::Command(at, Reading::Age))));
+    }
+    columns
 }
 
 /// A number of a shift clutch; an empty cell where no shift is under way.
@@ -135,11 +188,10 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         move |name: &str, value: Value| DriveColumn { name: name.to_owned(), is_measured, value: DriveValue::Of(value) }
     };
     let (measured, truth) = (column(true), column(false));
-    let mut columns = vec![
-        measured(signal::ENGINE_SPEED, |_, s| Cell::Number(s.torques.engine_rad_s)),
-        measured(signal::TURBINE_SPEED, |_, s| Cell::Number(s.torques.turbine_rad_s)),
-        measured(signal::OUTPUT_SPEED, |_, s| Cell::Number(s.torques.output_rad_s)),
-        measured(signal::WHEEL_SPEED, |_, s| Cell::Number(s.wheel_rad_s)),
+    let read = |name: &str, value: DriveValue| DriveColumn { name: name.to_owned(), is_measured: true, value };
+    let speeds = SPEEDS.iter().enumerate().map(|(at, name)| read(name, DriveValue::Speed(at, Reading::Value)));
+    let mut columns: Vec<_> = speeds.collect();
+    columns.extend([
         measured(signal::THROTTLE, |_, s| Cell::Number(s.driver.throttle)),
         measured(signal::BRAKE, |_, s| Cell::Number(s.driver.brake)),
         measured("engine_share", |_, s| Cell::Number(s.engine_share)),
@@ -154,8 +206,8 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
         measured("offgoing", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.offgoing.element))),
         measured("oncoming", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.oncoming.element))),
-        measured(offgoing, of_shift!(offgoing, command)),
-        measured(oncoming, of_shift!(oncoming, command)),
+        read(offgoing, DriveValue::OfShift(|shift| shift.offgoing.element)),
+        read(oncoming, DriveValue::OfShift(|shift| shift.oncoming.element)),
         truth(signal::OFFGOING_PRESSURE, of_shift!(offgoing, pressure_pa)),
         truth(signal::ONCOMING_PRESSURE, of_shift!(oncoming, pressure_pa)),
         truth(signal::OFFGOING_TORQUE, of_shift!(offgoing, torque_n_m)),
@@ -168,12 +220,9 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         truth("grade_rad", |_, s| Cell::Number(s.driver.grade_rad)),
         truth(signal::VEHICLE_SPEED, |_, s| Cell::Number(s.vehicle_m_s)),
         truth(signal::VEHICLE_ACCELERATION, |_, s| Cell::Number(s.vehicle_m_s2)),
-    ];
-    columns.extend(element_commands(car).into_iter().map(|(element, name)| DriveColumn {
-        name,
-        is_measured: true,
-        value: DriveValue::Command(element),
-    }));
+    ]);
+    let commands = element_commands(car).into_iter();
+    columns.extend(commands.map(|(element, name)| read(&name, DriveValue::Command(element, Reading::Value))));
     columns
 }
 
@@ -204,17 +253,16 @@ struct Table {
 }
 
 impl Table {
-    fn create(path: PathBuf, columns: &[DriveColumn], keep: impl Fn(&DriveColumn) -> bool) -> Result<Self, Failure> {
-        let columns: Vec<DriveColumn> = columns.iter().filter(|column| keep(column)).cloned().collect();
+    fn create(path: PathBuf, columns: Vec<DriveColumn>) -> Result<Self, Failure> {
         let names = columns.iter().map(|column| column.name.as_str());
         let writer = WholeFile::create(&path).and_then(|file| CsvWriter::new(file, names));
         let writer = writer.map_err(|error| Failure::writing(&path, &error))?;
         Ok(Self { path, columns, writer })
     }
 
-    fn write(&mut self, car: &Car, sample: &CarSample) -> Result<(), Failure> {
-        let cells = self.columns.iter().map(|column| column.value.cell(car, sample));
-        self.writer.row(sample.time_s, cells).map_err(|error| Failure::writing(&self.path, &error))
+    fn write(&mut self, car: &Car, row: &MeasuredRow) -> Result<(), Failure> {
+        let cells = self.columns.iter().map(|column| column.value.cell(car, row));
+        self.writer.row(row.sample.time_s, cells).map_err(|error| Failure::writing(&self.path, &error))
     }
 
     /// The file, which contains every row, and its path.

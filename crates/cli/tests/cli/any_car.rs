@@ -207,7 +207,7 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
     folder.write("log.csv", first);
     said(&estimate(&folder, "log.csv", &["-o", &folder.path("row.csv")]));
     assert_eq!(folder.read("row.csv").lines().count(), 2);
-    for option in [["--observer", "rigid"], ["--map", "map.toml"], ["--shift", "2"]] {
+    for option in [["--observer", "rigid"], ["--method", "iss"]] {
         let error = refused(&estimate(&folder, "log.csv", &option));
         assert!(error.contains("has no effect with the vehicle file of a car with a gearbox"), "{error}");
     }

@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod any_car;
+mod any_car_logs;
+mod attacks;
 mod commands;
 mod day_of_logs;
 mod drives;
@@ -13,5 +15,6 @@ mod log_to_fit;
 mod logs;
 mod long_logs;
 mod measured;
+mod own_car;
 mod studies;
 mod support;

@@ -2,8 +2,8 @@
 
 mod observers;
 mod off_nominal;
-mod raw;
-mod sensors;
+pub(crate) mod raw;
+pub(crate) mod sensors;
 
 use std::path::{Path, PathBuf};
 

@@ -53,7 +53,7 @@ pub(super) struct RawSensorsFile {
 /// The sensors of a file, or what a scenario changes in them.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a table")]
-pub(super) struct RawSensors {
+pub(crate) struct RawSensors {
     pub(super) seed: Option<Spanned<u64>>,
     pub(super) row_offset_s: Option<Number>,
     pub(super) missing_share: Option<Number>,

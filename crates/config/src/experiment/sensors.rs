@@ -207,7 +207,7 @@ impl Keys<'_> {
 }
 
 /// The sensors that a table describes, or `base` with what the table changes.
-pub(super) fn sensors(
+pub(crate) fn sensors(
     check: &Check<'_>,
     table: &str,
     raw: &Spanned<RawSensors>,

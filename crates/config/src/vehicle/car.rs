@@ -134,7 +134,13 @@ impl Car {
             name: check.title("name", &raw.name)?,
             clutches,
             line_pressure_pa,
-            engine: engine(&check, &raw.engine)?,
+            engine: match &raw.engine.max_torque_n_m {
+                None => engine(&check, &raw.engine)?,
+                Some(value) => {
+                    let message = "is for vehicle files with `gear_train.ratios`".to_owned();
+                    return Err(check.meaning("engine.max_torque_n_m", value.span().start, message, None));
+                }
+            },
             converter: match raw.launch {
                 RawLaunch::Converter => Some(converter(&check, &raw.converter)?),
                 RawLaunch::Clutch => None,

@@ -1,18 +1,19 @@
 //! Checked vehicle files.
 
+mod budget;
 mod car;
 mod clutch;
 mod fill;
 mod fill_bounds;
 mod gear_train;
 mod raw;
+pub mod short;
 mod valves;
 
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use drivetrain::{Converter, Driveline, Engine, ReducedShift, RoadLoad, Table2, TableError, Tyre, Valve};
-use observer::{FillBudget, InputLimits, Supervisor};
+use observer::{InputLimits, Supervisor};
 
 use drivetrain::oil::WARM_OIL_DEGC;
 use drivetrain::table::{MAX_COLUMNS, MAX_POINTS};
@@ -20,30 +21,33 @@ use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers, significant};
 use crate::source::Layers;
+use crate::study::Change;
 use crate::tree::Tree;
 use crate::{ConfigError, Kind, Source};
+pub use budget::ErrorBounds;
 pub use car::{Car, LockUp};
 pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
 use raw::{
-    RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawErrorBounds, RawFilter,
-    RawObserver, RawOil, RawRequirement, RawRoad, RawTyre, RawVehicleFile,
+    RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
+    RawRequirement, RawRoad, RawTyre, RawVehicleFile,
 };
+pub use short::DefaultTaken;
+use short::{Short, refuse_facts};
 
 /// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
 const SHAFT_OVER_TYRES: f64 = 2.0;
 
+/// Masses of vehicles, kg.
+const MASSES_KG: std::ops::RangeInclusive<f64> = 200.0..=60e3;
+/// Rolling radii of wheels, m.
+const WHEEL_RADII_M: std::ops::RangeInclusive<f64> = 0.1..=1.0;
+/// Ratios from gearbox to wheels.
+const FINAL_RATIOS: std::ops::RangeInclusive<f64> = 0.5..=10.0;
 /// Temperatures of transmission oil, degC.
 pub(crate) const OIL_TEMPERATURES_DEGC: std::ops::RangeInclusive<f64> = -40.0..=150.0;
 /// Backlash of the driveline at the wheel, rad.
 pub(crate) const BACKLASHES_RAD: std::ops::RangeInclusive<f64> = 0.0..=0.5;
-
-/// Half-width of a valve's hysteresis where the file says nothing, Pa [chosen]: trade data sheets of proportional pressure
-/// reducers give 2 to 4 % of full scale for the whole width.
-const VALVE_HYSTERESIS_PA: f64 = 10e3;
-
-/// Age of a command where the file says nothing, s [chosen]: one time step of any log at 20 Hz or more.
-const COMMAND_AGE_S: f64 = 0.05;
 
 /// Ranges of what varies in the observer's model; their corners span the polytope of Eq. (2.46).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,79 +95,6 @@ pub struct CompliantRequirement {
     /// `H` for `|w| <= 1`, normalised, if it is given and not to follow from the error bounds: a row for each output
     /// of the phase; what is beyond them is zero.
     pub error_matrix: Option<[[f64; 3]; 3]>,
-}
-
-/// The error budget: bounds on the errors of the observers' model of the car.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ErrorBounds {
-    /// Turbine torque from the converter's maps, N m.
-    pub turbine_torque_n_m: f64,
-    /// The same as a share of the torque.
-    pub turbine_torque_share: f64,
-    /// Pressure from the valve model alone, Pa.
-    pub pressure_pa: f64,
-    /// Mass of the vehicle, kg.
-    pub mass_kg: f64,
-    /// Grade, rad.
-    pub grade_rad: f64,
-    /// Largest drive-shaft torque of a shift, N m: a mass error acts in its proportion.
-    pub shaft_torque_n_m: f64,
-    /// Torque at the gearbox output that the rigid model leaves out (torsion, tyre slip, grade), N m.
-    pub output_torque_n_m: f64,
-    /// Torque left in the offgoing clutch when it has let go, N m.
-    pub offgoing_torque_n_m: f64,
-    /// Time from its first slip until no more than that is left, s.
-    pub offgoing_drain_s: f64,
-    /// Error of the change of the turbine speed from one sample to the next, rad/s.
-    pub turbine_quantum_rad_s: f64,
-    /// Error of the change of the output speed from one sample to the next, rad/s.
-    pub output_quantum_rad_s: f64,
-    /// Error of the change of the slip from one sample to the next, rad/s.
-    pub slip_quantum_rad_s: f64,
-    /// Error of the change of the wheel speed from one sample to the next, rad/s.
-    pub wheel_quantum_rad_s: f64,
-    /// Greatest age of a reading, s.
-    pub sampling_delay_s: f64,
-    /// Rounding of one operation in single precision, as a share.
-    pub float32_rounding: f64,
-    /// Pressure above the kiss point in a shift, at which errors of gain and friction are weighed, Pa.
-    pub shift_pressure_pa: f64,
-    /// Rate of the pressure in a shift, at which errors of lag and delay are weighed, Pa/s.
-    pub shift_ramp_pa_s: f64,
-    /// Least and greatest factor on the lag of the oncoming clutch's valve.
-    pub valve_lag_factor: [f64; 2],
-    /// Least and greatest factor on its gain.
-    pub valve_gain_factor: [f64; 2],
-    /// Its least and greatest delay, s.
-    pub valve_delay_s: [f64; 2],
-    /// Greatest half-width of its hysteresis, Pa.
-    pub valve_hysteresis_pa: f64,
-    /// Greatest time between a command and the sample that first shows it, s.
-    pub command_age_s: f64,
-    /// Least and greatest line pressure, Pa.
-    pub line_pressure_pa: [f64; 2],
-    /// Limits of the oncoming clutch's piston stroke, if it is part of the budget.
-    pub fill: Option<FillBudget<f64>>,
-    /// Least and greatest factor on the friction of the oncoming clutch.
-    pub friction_factor: [f64; 2],
-    /// Error of a reading of the valve's command, A or %.
-    pub command: f64,
-    /// Error of a reading of the slip, rad/s, its age included.
-    pub slip_rad_s: f64,
-    /// Highest pressure that the supply can give, Pa.
-    pub pressure_max_pa: f64,
-    /// Error of the scale of the wheel speed, as a share: tyres that are worn, or of another size.
-    pub wheel_scale: f64,
-    /// Largest delay of the wheel speed, s.
-    pub wheel_delay_s: f64,
-    /// Largest delay of the turbine speed and of the output speed, each against the other, s.
-    pub channel_skew_s: f64,
-    /// Error of the torque that the engine controller reports, as a share.
-    pub engine_torque_share: f64,
-    /// Least and greatest factor on the stiffness of the drive shafts.
-    pub shaft_stiffness_factor: [f64; 2],
-    /// Twist over which the driveline carries no torque, rad at the wheels.
-    pub backlash_rad: f64,
 }
 
 /// The Kalman filter's model of the unknown torques, in addition to the error bounds.
@@ -236,6 +167,8 @@ pub struct Vehicle {
     pub filter: FilterSettings,
     /// Time in which the estimated shaft torque leans towards its steady value outside the shift, s.
     pub shaft_settling_s: f64,
+    /// What the file leaves out.
+    pub defaults_taken: Vec<DefaultTaken>,
 }
 
 impl Vehicle {
@@ -264,7 +197,9 @@ impl Vehicle {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_with(path: &Path, overlay: &Path) -> Result<Self, ConfigError> {
-        Self::laid_over(Source::read(path)?, &Source::read(overlay)?)
+        // Of a short file, the values go over its defaults too.
+        let Self { source, defaults_taken, .. } = Self::read(path)?;
+        Ok(Self { defaults_taken, ..Self::laid_over(source, &Source::read(overlay)?)? })
     }
 
     fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
@@ -296,8 +231,26 @@ impl Vehicle {
             let hint = "`simulate`, `demo`, `bench`, `estimate` and `check` take it; designs, studies and fits need a file with [gear_train]";
             return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
         }
+        if let Some(short) = Short::of(&source)? {
+            let layers = short.layers(&source);
+            let vehicle = Self::checked(&Check { layers }, &layers.parse()?)?;
+            let (source, defaults_taken) = short.complete(&source)?;
+            return Ok(Self { source, defaults_taken, ..vehicle });
+        }
         let vehicle = Self::checked(&Check::of(&source), &source.parse()?)?;
-        Ok(Self { source, ..vehicle })
+        Ok(Self { defaults_taken: short::left_out(&source)?, source, ..vehicle })
+    }
+
+    /// The vehicle with another value at a key: `change` of what stands there by `value`. Names of a list's items are keys.
+    ///
+    /// # Errors
+    /// There is no such value, or the changed one is not one that a vehicle file may have.
+    pub fn changed(&self, key: &str, change: Change, value: f64) -> Result<Self, ConfigError> {
+        let mut tree = Tree::of(&self.source)?;
+        let path: Vec<String> = key.split('.').map(str::to_owned).collect();
+        let wrong = |message| Check::of(&self.source).meaning(key, 0, message, None);
+        tree.change(&path, change, value).map_err(wrong)?;
+        Self::from_tree(&self.source, &tree)
     }
 
     /// The vehicle of a file some of whose values may have been changed.
@@ -308,6 +261,7 @@ impl Vehicle {
 
     /// The vehicle that these values describe, whose source is left to be filled in.
     fn checked(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Self, ConfigError> {
+        refuse_facts(check, raw)?;
         let gear = gear_train::check(check, raw)?;
         let oil_temperature_degc = oil_temperature(check, &raw.oil)?;
         let clutch = |name: &str| clutch::check(check, name, raw, oil_temperature_degc);
@@ -317,7 +271,8 @@ impl Vehicle {
         }
         let (offgoing, oncoming) = (clutch(&gear.offgoing)?, clutch(&gear.oncoming)?);
         let (driveline, tyre) = (driveline(check, &raw.driveline)?, tyre(check, &raw.tyre)?);
-        let error_bounds = error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
+        let error_bounds =
+            budget::error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
         let road = road(check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
         let limits = InputLimits {
@@ -365,6 +320,7 @@ impl Vehicle {
             filter: filter(check, &raw.observer.filter)?,
             shaft_settling_s: check.number("observer.shaft_settling_s", &raw.observer.shaft_settling_s, 0.01..=10.0)?,
             source: Source { path: PathBuf::new(), text: String::new() },
+            defaults_taken: Vec::new(),
         })
     }
 }
@@ -380,7 +336,7 @@ fn engine(check: &Check<'_>, raw: &RawEngine) -> Result<Engine<f64>, ConfigError
 fn driveline(check: &Check<'_>, raw: &RawDriveline) -> Result<Driveline<f64>, ConfigError> {
     let number = |key: &str, value: &Number, range| check.number(format_args!("driveline.{key}"), value, range);
     Ok(Driveline {
-        final_ratio: number("final_ratio", &raw.final_ratio, 0.5..=10.0)?,
+        final_ratio: number("final_ratio", &raw.final_ratio, FINAL_RATIOS)?,
         shaft_stiffness_n_m_rad: number("shaft_stiffness_n_m_rad", &raw.shaft_stiffness_n_m_rad, 500.0..=200e3)?,
         shaft_damping_n_m_s_rad: number("shaft_damping_n_m_s_rad", &raw.shaft_damping_n_m_s_rad, 0.0..=2e3)?,
         wheel_inertia_kg_m2: number("wheel_inertia_kg_m2", &raw.wheel_inertia_kg_m2, 0.2..=50.0)?,
@@ -482,8 +438,8 @@ fn oil_temperature(check: &Check<'_>, raw: &RawOil) -> Result<f64, ConfigError> 
 
 fn road(check: &Check<'_>, raw: &RawRoad) -> Result<RoadLoad<f64>, ConfigError> {
     Ok(RoadLoad {
-        mass_kg: check.number("vehicle.mass_kg", &raw.mass_kg, 200.0..=60e3)?,
-        wheel_radius_m: check.number("vehicle.wheel_radius_m", &raw.wheel_radius_m, 0.1..=1.0)?,
+        mass_kg: check.number("vehicle.mass_kg", &raw.mass_kg, MASSES_KG)?,
+        wheel_radius_m: check.number("vehicle.wheel_radius_m", &raw.wheel_radius_m, WHEEL_RADII_M)?,
         front_area_m2: check.number("vehicle.front_area_m2", &raw.front_area_m2, 0.5..=15.0)?,
         drag_coefficient: check.number("vehicle.drag_coefficient", &raw.drag_coefficient, 0.05..=2.0)?,
         air_density_kg_m3: check.number("vehicle.air_density_kg_m3", &raw.air_density_kg_m3, 0.5..=2.0)?,
@@ -559,95 +515,5 @@ fn filter(check: &Check<'_>, raw: &RawFilter) -> Result<FilterSettings, ConfigEr
         offgoing_n_m: number("offgoing_n_m", &raw.offgoing_n_m, 0.1..=1e5)?,
         offgoing_release_s: number("offgoing_release_s", &raw.offgoing_release_s, 1e-3..=10.0)?,
         output_least_rad_s: number("output_least_rad_s", &raw.output_least_rad_s, 0.1..=500.0)?,
-    })
-}
-
-/// Tyres: size, wear and pressure.
-const WHEEL_SCALE: f64 = 0.02;
-/// Filter and bus of the brakes' controller.
-const WHEEL_DELAY_S: f64 = 0.03;
-/// Error of a reported engine torque [chosen].
-const ENGINE_TORQUE_SHARE: f64 = 0.08;
-/// One cycle of a bus.
-const CHANNEL_SKEW_S: f64 = 0.01;
-const SHAFT_STIFFNESS_FACTOR: [f64; 2] = [0.8, 1.2];
-const BACKLASH_RAD: f64 = 0.03;
-
-fn error_bounds(
-    check: &Check<'_>,
-    spanned: &Spanned<RawErrorBounds>,
-    oncoming: &ShiftClutch,
-    oil_degc: f64,
-) -> Result<ErrorBounds, ConfigError> {
-    let (at, raw) = (spanned.span().start, spanned.get_ref());
-    let number =
-        |key: &str, value: &Number, range| check.number(format_args!("design.error_bounds.{key}"), value, range);
-    let range =
-        |key: &str, values: &Numbers, allowed| check.pair(format_args!("design.error_bounds.{key}"), values, allowed);
-    let factor = |key: &str, values: &Numbers, allowed| {
-        let factors = range(key, values, allowed)?;
-        if (factors[0]..=factors[1]).contains(&1.0) {
-            return Ok(factors);
-        }
-        let key = format!("design.error_bounds.{key}");
-        let [least, greatest] = factors;
-        let message = format!(
-            "{least} to {greatest} does not contain 1: the car of this file would be outside its own error budget"
-        );
-        Err(check.meaning(&key, values.span().start, message, Some("an error of 10 % is [0.9, 1.1]".to_owned())))
-    };
-    let optional = |key: &str, value: &Option<Number>, range: RangeInclusive<f64>, default: f64| match value {
-        Some(value) => number(key, value, range),
-        None => Ok(default),
-    };
-    let pressure_max_pa = number("pressure_max_pa", &raw.pressure_max_pa, 1e5..=10e6)?;
-    let line = raw.line_pressure_pa.as_ref();
-    let line_pressure_pa = line.map(|line| range("line_pressure_pa", line, 0.0..=pressure_max_pa)).transpose()?;
-    Ok(ErrorBounds {
-        wheel_scale: optional("wheel_scale", &raw.wheel_scale, 0.0..=0.2, WHEEL_SCALE)?,
-        wheel_delay_s: optional("wheel_delay_s", &raw.wheel_delay_s, 0.0..=0.2, WHEEL_DELAY_S)?,
-        channel_skew_s: optional("channel_skew_s", &raw.channel_skew_s, 0.0..=0.1, CHANNEL_SKEW_S)?,
-        engine_torque_share: optional("engine_torque_share", &raw.engine_torque_share, 0.0..=1.0, ENGINE_TORQUE_SHARE)?,
-        shaft_stiffness_factor: match &raw.shaft_stiffness_factor {
-            Some(factors) => factor("shaft_stiffness_factor", factors, 0.2..=5.0)?,
-            None => SHAFT_STIFFNESS_FACTOR,
-        },
-        backlash_rad: optional("backlash_rad", &raw.backlash_rad, 0.0..=0.2, BACKLASH_RAD)?,
-        turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
-        pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
-        mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
-        grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
-        shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
-        output_torque_n_m: number("output_torque_n_m", &raw.output_torque_n_m, 0.0..=50e3)?,
-        offgoing_torque_n_m: number("offgoing_torque_n_m", &raw.offgoing_torque_n_m, 0.0..=1e4)?,
-        offgoing_drain_s: number("offgoing_drain_s", &raw.offgoing_drain_s, 0.0..=2.0)?,
-        turbine_torque_share: number("turbine_torque_share", &raw.turbine_torque_share, 0.0..=0.9)?,
-        turbine_quantum_rad_s: number("turbine_quantum_rad_s", &raw.turbine_quantum_rad_s, 0.0..=50.0)?,
-        output_quantum_rad_s: number("output_quantum_rad_s", &raw.output_quantum_rad_s, 0.0..=50.0)?,
-        slip_quantum_rad_s: number("slip_quantum_rad_s", &raw.slip_quantum_rad_s, 0.0..=50.0)?,
-        wheel_quantum_rad_s: number("wheel_quantum_rad_s", &raw.wheel_quantum_rad_s, 0.0..=50.0)?,
-        sampling_delay_s: number("sampling_delay_s", &raw.sampling_delay_s, 0.0..=0.2)?,
-        float32_rounding: number("float32_rounding", &raw.float32_rounding, 0.0..=1e-3)?,
-        shift_pressure_pa: number("shift_pressure_pa", &raw.shift_pressure_pa, 0.0..=2e6)?,
-        shift_ramp_pa_s: number("shift_ramp_pa_s", &raw.shift_ramp_pa_s, 0.0..=1e8)?,
-        valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
-        valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
-        valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
-        valve_hysteresis_pa: match &raw.valve_hysteresis_pa {
-            Some(half_width) => {
-                number("valve_hysteresis_pa", half_width, oncoming.hysteresis_pa..=*HYSTERESES_PA.end())?
-            }
-            None => VALVE_HYSTERESIS_PA.max(oncoming.hysteresis_pa),
-        },
-        command_age_s: match &raw.command_age_s {
-            Some(age) => number("command_age_s", age, 0.0..=1.0)?,
-            None => COMMAND_AGE_S,
-        },
-        line_pressure_pa: line_pressure_pa.unwrap_or([pressure_max_pa; 2]),
-        fill: fill_bounds::bounds(check, raw.fill.as_ref(), oncoming, oil_degc)?,
-        friction_factor: factor("friction_factor", &raw.friction_factor, 0.1..=10.0)?,
-        command: valves::command_error(check, at, raw, oncoming.valve.command_kind())?,
-        slip_rad_s: number("slip_rad_s", &raw.slip_rad_s, 0.0..=200.0)?,
-        pressure_max_pa,
     })
 }

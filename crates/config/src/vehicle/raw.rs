@@ -29,6 +29,8 @@ pub(super) struct RawVehicleFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawEngine {
+    /// Of a short file.
+    pub(super) max_torque_n_m: Option<Number>,
     pub(super) inertia_kg_m2: Number,
     pub(super) drag_n_m_s: Number,
     pub(super) torque: RawEngineMap,
@@ -53,6 +55,8 @@ pub(super) struct RawConverter {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawGearTrain {
+    /// Of a short file.
+    pub(super) ratios: Option<Numbers>,
     pub(super) input: Word,
     pub(super) output: Word,
     pub(super) offgoing: Word,

@@ -6,6 +6,7 @@ use crate::{Real, Table1};
 /// The valve that fills a clutch of the real car: what the plant simulates, the shift controller is calibrated for, and the
 /// range of an estimate is made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ClutchValve<T> {
     /// Commanded by a current, A; its maps as measured.
     Proportional(ValveMaps<T>),
@@ -64,7 +65,7 @@ impl<T: Real> ClutchValve<T> {
         match self {
             Self::Proportional(maps) => maps.settled_pressure(command),
             Self::NormallyHigh { maps, zero_pressure_a } => {
-                maps.settled_pressure((*zero_pressure_a - command).max(T::zero()))
+                maps.settled_pressure((*zero_pressure_a - command).at_least(T::zero()))
             }
             Self::PulseWidth { law, .. } => law.settled_pressure(command),
         }
@@ -75,7 +76,7 @@ impl<T: Real> ClutchValve<T> {
         match self {
             Self::Proportional(maps) => maps.current_for(pressure_pa),
             Self::NormallyHigh { maps, zero_pressure_a } => {
-                (*zero_pressure_a - maps.current_for(pressure_pa)).max(T::zero())
+                (*zero_pressure_a - maps.current_for(pressure_pa)).at_least(T::zero())
             }
             Self::PulseWidth { law, .. } => law.duty_for(pressure_pa),
         }

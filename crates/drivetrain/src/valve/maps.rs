@@ -5,6 +5,7 @@ use crate::{Real, Table1};
 /// The proportional valve of the real car, `tau_cv dp/dt = -p + K_cv i(t - L_cv)`, Eq. (2.4), with lag, gain and
 /// delay that vary with the operating point.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ValveMaps<T> {
     /// `tau_cv` over pressure: s over Pa.
     pub time_constant_s: Table1<T>,
@@ -19,7 +20,9 @@ impl<T: Real> ValveMaps<T> {
     /// [`Self::settled_pressure`] of the current that has arrived.
     #[inline]
     pub fn pressure_rate(&self, pressure_pa: T, settled_pa: T) -> T {
-        (settled_pa - pressure_pa) / self.time_constant_s.at(pressure_pa)
+        let missing_pa = settled_pa - pressure_pa;
+        // Most of a drive a valve rests, where its lag does not matter.
+        if missing_pa == T::zero() { missing_pa } else { missing_pa / self.time_constant_s.at(pressure_pa) }
     }
 
     /// Pressure that a constant current ends at, Pa: `K_cv(i) i`.
@@ -41,7 +44,7 @@ impl<T: Real> ValveMaps<T> {
         };
         let slope = (gains[last] - gains[first]) / (currents[last] - currents[first]);
         let linear = gains[first] - slope * currents[first];
-        let root = (linear * linear + T::of(4.0) * slope * pressure_pa).max(T::zero()).sqrt();
+        let root = (linear * linear + T::of(4.0) * slope * pressure_pa).at_least(T::zero()).sqrt();
         // This form of the solution has no difference of near numbers and holds for a zero slope.
         T::of(2.0) * pressure_pa / (linear + root)
     }
@@ -50,12 +53,15 @@ impl<T: Real> ValveMaps<T> {
     /// meet times `lag_factor[0]`, or at the nearest, with the longest times `lag_factor[1]`.
     #[inline]
     pub fn moved(&self, pressure_pa: T, settled_pa: T, dt_s: T, lag_factor: [T; 2], furthest: bool) -> T {
+        let here = self.time_constant_s.place(pressure_pa);
         let lags = |to: T| {
-            let (shortest, longest) = self.time_constant_s.range_within(pressure_pa.min(to), pressure_pa.max(to));
+            let there = self.time_constant_s.place(to);
+            let (from, to) = if to < pressure_pa { (there, here) } else { (here, there) };
+            let (shortest, longest) = self.time_constant_s.range_between(from, to);
             [shortest * lag_factor[0], longest * lag_factor[1]]
         };
         // It cannot get further than at its first speed, which tells what lags it meets.
-        let share = (dt_s / lags(settled_pa)[0]).min(T::one());
+        let share = (dt_s / lags(settled_pa)[0]).at_most(T::one());
         let reach = pressure_pa + share * (settled_pa - pressure_pa);
         let [shortest, longest] = lags(reach);
         let lag_s = if furthest { shortest } else { longest };

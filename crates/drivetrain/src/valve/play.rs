@@ -24,8 +24,8 @@ impl<T: Real> Play<T> {
     #[inline]
     pub fn follow(&mut self, input_pa: T) -> T {
         let (least, most) = (input_pa - self.half_width_pa, input_pa + self.half_width_pa);
-        self.output_pa = self.output_pa.max(least).min(most);
-        self.output_pa.max(T::zero())
+        self.output_pa = self.output_pa.at_least(least).at_most(most);
+        self.output_pa.at_least(T::zero())
     }
 }
 

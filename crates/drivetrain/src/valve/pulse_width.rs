@@ -9,6 +9,7 @@ use crate::valve::{LinearValve, ValveStep};
 /// Below [`Self::LAMINAR_DROP_PA`] the flow is in proportion to the drop, as laminar flow is: the slope of the root
 /// is infinite where the drop is zero. Left out: the ripple of the pulses and the supply's own dynamics.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PulseWidth<T> {
     /// Flow constant `C_z`, sqrt(Pa)/s.
     pub flow_sqrt_pa_s: T,
@@ -37,14 +38,14 @@ impl<T: Real> PulseWidth<T> {
     #[inline]
     pub fn pressure_rate(&self, pressure_pa: T, settled_pa: T) -> T {
         let drop = settled_pa - pressure_pa;
-        self.flow_sqrt_pa_s * drop / drop.abs().max(T::of(Self::LAMINAR_DROP_PA)).sqrt()
+        self.flow_sqrt_pa_s * drop / drop.abs().at_least(T::of(Self::LAMINAR_DROP_PA)).sqrt()
     }
 
     /// How much faster the pressure rises for each pascal more of pressure drop, 1/s: `-A22` of Remark 2.1.
     #[inline]
     pub fn rate_per_drop(&self, drop_pa: T) -> T {
         let laminar = T::of(Self::LAMINAR_DROP_PA);
-        let root = drop_pa.abs().max(laminar).sqrt();
+        let root = drop_pa.abs().at_least(laminar).sqrt();
         let share = if drop_pa.abs() < laminar { T::one() } else { T::of(0.5) };
         share * self.flow_sqrt_pa_s / root
     }
@@ -65,7 +66,7 @@ impl<T: Real> PulseWidth<T> {
     /// Time by which the pressure lags behind its settled value while it moves at this rate, s.
     pub fn lag(&self, rate_pa_s: T) -> T {
         let root = (rate_pa_s / self.flow_sqrt_pa_s).abs();
-        root.max(T::of(Self::LAMINAR_DROP_PA).sqrt()) / self.flow_sqrt_pa_s
+        root.at_least(T::of(Self::LAMINAR_DROP_PA).sqrt()) / self.flow_sqrt_pa_s
     }
 
     /// Pressure drop at which the pressure moves at this rate, Pa.
@@ -105,7 +106,7 @@ impl<T: Real> PulseWidth<T> {
         let (zero, one, two) = (T::zero(), T::one(), T::of(2.0));
         let (root, laminar_root) = (drop_pa.abs().sqrt(), T::of(Self::LAMINAR_DROP_PA).sqrt());
         let flow = self.flow_sqrt_pa_s;
-        let turbulent_s = (two * (root - laminar_root) / flow).max(zero).min(dt_s);
+        let turbulent_s = (two * (root - laminar_root) / flow).at_least(zero).at_most(dt_s);
         let r = if turbulent_s > zero { one - flow * turbulent_s / (two * root) } else { one };
         // Integrals of r/r_0 and of its square.
         let psi = turbulent_s * (one + r) / two;

@@ -75,6 +75,8 @@ def mdf():
             file.append(group, acq_name="fast" if len(group) == 1 else "slow", common_timebase=True)
         file.save(HERE / "deflate.mf4", overwrite=True, compression=1)
         file.save(HERE / "transposed.mf4", overwrite=True, compression=2)
+        for name, algorithm in [("zstd", v4c.CompressionAlgorithm.TRANSPOSED_ZSTD), ("lz4", v4c.CompressionAlgorithm.LZ4)]:
+            file.save(HERE / f"{name}.mf4", overwrite=True, compression=algorithm)
     with MDF(version="4.10") as file:
         for group in signals(invalid=True):
             file.append(group, acq_name="fast" if len(group) == 1 else "slow", common_timebase=True)

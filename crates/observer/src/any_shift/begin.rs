@@ -75,7 +75,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 (!self.slip(ratio, [turbine, output]).is_over()).then_some((ratio, phase))
             },
         );
-        let Some((ratio, phase)) = held else { return (None, gear.from == gear.to) };
+        // Of a gear that is in no table nothing can be said.
+        let known = self.tables.gears.get(gear.from).is_some();
+        let Some((ratio, phase)) = held else { return (None, known && gear.from == gear.to) };
         if gear.from != gear.to && shift.is_none() {
             return (None, false);
         }

@@ -18,13 +18,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         let mut health = [channels.turbine, channels.output, channels.wheel];
         let unseen = self.may_slip_unseen(running, speeds);
-        let Some(torques) = running.torques else { return health };
+        let Some(torques) = running.torques else { return health.map(unused) };
         let torques = torques.without(running.phase.phase.holding());
         let rates = Rates::new(&self.response(running), &torques, &self.driveline, self.wheels_kg_m2);
         for k in 0..SPEEDS {
             let Some(reading) = given[k].filter(|_| health[k] == ChannelHealth::Good) else { continue };
             if unseen && k != WHEEL {
-                running.silent_s[k] = T::zero();
+                // The sensor is not silent, but its reading is not taken.
+                (running.silent_s[k], health[k]) = (T::zero(), ChannelHealth::Absent);
                 continue;
             }
             health[k] = self.correct(running, k, &reading, &rates);
@@ -83,4 +84,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         running.silent_s[k] = T::zero();
         ChannelHealth::Good
     }
+}
+
+/// What becomes of a reading that is not taken although it could be.
+fn unused(health: ChannelHealth) -> ChannelHealth {
+    if health == ChannelHealth::Good { ChannelHealth::Absent } else { health }
 }

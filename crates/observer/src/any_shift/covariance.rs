@@ -2,8 +2,9 @@
 
 use drivetrain::Real;
 
+use super::elements::PressureError;
 use super::powertrain::{CORE, dot};
-use super::{IN_GEAR, N};
+use super::{IN_GEAR, KISS, N, OUTPUT, PRESSURE, TURBINE};
 
 /// Mean and covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,6 +112,29 @@ impl<T: Real> Gaussian<T> {
         self.covariance.swap(a, b);
         for row in &mut self.covariance {
             row.swap(a, b);
+        }
+    }
+
+    /// What is known of the errors of a shift clutch's pressure and kiss point.
+    pub(super) fn pressure_error(&self, clutch: usize) -> PressureError<T> {
+        let (x, k) = (PRESSURE[clutch.min(1)], KISS[clutch.min(1)]);
+        let p = &self.covariance;
+        PressureError { pressure: self.mean[x], kiss: self.mean[k], variance: [p[x][x], p[k][k]], covariance: p[x][k] }
+    }
+
+    /// Makes the first state the second times a ratio; the second becomes the sum of both with these shares.
+    pub(super) fn tie(&mut self, ratio: T, share: [T; 2]) {
+        let joined = |a: T, b: T| share[0] * a + share[1] * b;
+        let output = joined(self.mean[TURBINE], self.mean[OUTPUT]);
+        (self.mean[TURBINE], self.mean[OUTPUT]) = (ratio * output, output);
+        let p = &mut self.covariance;
+        for row in p.iter_mut() {
+            let output = joined(row[TURBINE], row[OUTPUT]);
+            (row[TURBINE], row[OUTPUT]) = (ratio * output, output);
+        }
+        for k in 0..N {
+            let output = joined(p[TURBINE][k], p[OUTPUT][k]);
+            (p[TURBINE][k], p[OUTPUT][k]) = (ratio * output, output);
         }
     }
 

@@ -4,10 +4,43 @@ use drivetrain::Real;
 
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
-use super::{PIECE_S, ShiftUncertainty};
+use super::{PIECE_S, ShiftUncertainty, square};
 use crate::bound::pressure_and_torque;
 use crate::kalman::valve_model::Commands;
-use crate::{ChannelHealth, InputLimits, PressureRange, Reading};
+use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
+
+/// What is known of the errors of an element's pressure and kiss point, in their deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PressureError<T> {
+    pub(super) pressure: T,
+    pub(super) kiss: T,
+    /// Of both.
+    pub(super) variance: [T; 2],
+    pub(super) covariance: T,
+}
+
+impl<T: Real> PressureError<T> {
+    /// Nothing but what is learnt of the kiss point.
+    pub(super) fn unseen(kiss: T) -> Self {
+        Self { pressure: T::zero(), kiss, variance: [T::one(); 2], covariance: T::zero() }
+    }
+}
+
+/// Mean of the pressure that presses the plates, Pa, and its derivative by the pressure above the kiss point, whose
+/// mean and variance these are. The plates do not pull: near the kiss point the mean of `max(p, 0)` is more than that of the
+/// mean. Of a uniform distribution, which has no tail far from its bounds.
+fn pressed<T: Real>(mean_pa: T, variance: T) -> (T, T) {
+    let half_pa = (T::of(3.0) * variance.max(T::zero())).sqrt();
+    let above_pa = mean_pa + half_pa;
+    if mean_pa >= half_pa {
+        (mean_pa, T::one())
+    } else if above_pa > T::zero() {
+        let slope = above_pa / (half_pa + half_pa);
+        (T::of(0.5) * slope * above_pa, slope)
+    } else {
+        (T::zero(), T::zero())
+    }
+}
 
 /// Memory of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +49,8 @@ pub(super) struct ElementState<T> {
     /// Pressure by the valve model, Pa, and its rate over the last step, Pa/s.
     pub(super) valve_pa: T,
     rate_pa_s: T,
+    /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
+    per_lag_pa: T,
     range: Option<PressureRange<T>>,
 }
 
@@ -25,6 +60,7 @@ impl<T: Real> ElementState<T> {
             commands: Commands::new(),
             valve_pa: T::zero(),
             rate_pa_s: T::zero(),
+            per_lag_pa: T::zero(),
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
         }
     }
@@ -46,7 +82,9 @@ impl<T: Real> ElementState<T> {
                 self.commands.pass(piece_s);
                 let settled_pa = element.valve.target_pa(&self.commands, piece_s);
                 let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
-                self.valve_pa = limits.possible_pressure(step.phi * self.valve_pa + step.drift_pa);
+                let before_pa = self.valve_pa;
+                self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
+                self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
             }
             self.rate_pa_s = (self.valve_pa - before_pa) / dt_s;
         }
@@ -55,7 +93,7 @@ impl<T: Real> ElementState<T> {
             range.step(budget, dt_s, usable, limits.command_max);
         }
         match (command, usable) {
-            (None, _) if self.commands.newest_pa().is_none() => ChannelHealth::Lost,
+            (None, _) if !self.commands.is_fresh(T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
             (Some(_), Some(reading)) => {
@@ -75,44 +113,42 @@ impl<T: Real> ElementState<T> {
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
             range.forget(budget, limits.command_max);
         }
-        self.rate_pa_s = T::zero();
+        (self.rate_pa_s, self.per_lag_pa) = (T::zero(), T::zero());
     }
 
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
-    /// moves, and at rest. None well below the kiss point, where no torque depends on it.
-    pub(super) fn deviation_pa(&self, kiss_pa: T, u: &ShiftUncertainty<T>) -> T {
-        if self.valve_pa < kiss_pa - u.kiss_pa {
-            return T::zero();
-        }
-        (u.valve_s * self.rate_pa_s).hypot(u.pressure_pa)
+    /// moves, and at rest.
+    pub(super) fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
+        let moving = (u.valve_lag_share * self.per_lag_pa).hypot(u.valve_delay_s * self.rate_pa_s);
+        moving.hypot(u.pressure_pa)
     }
 
     /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
-    /// is its sign, less where it is uncertain; `kiss` is the error of the kiss point in its deviations.
+    /// is its sign, less where it is uncertain.
     #[inline]
     pub(super) fn torque(
         &self,
         element: &FrictionElement<T>,
         shift: &ShiftClutch<T>,
         u: &ShiftUncertainty<T>,
-        [slip_rad_s, direction, kiss]: [T; 3],
+        [slip_rad_s, direction]: [T; 2],
+        wrong: &PressureError<T>,
     ) -> ClutchTorque<T> {
-        let (clutch, zero) = (&element.clutch, T::zero());
+        let clutch = &element.clutch;
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
-        let (nominal_pa, deviation_pa) = (clutch.kiss_pressure(), u.kiss_deviation_pa(clutch));
-        let kiss_pa = nominal_pa + kiss * deviation_pa;
-        let pressed_pa = (self.valve_pa - kiss_pa).max(zero);
-        // Where the plates touch the torque is linear in pressure and kiss point.
-        let (base_pa, per_kiss_pa) =
-            if pressed_pa > zero { (self.valve_pa - nominal_pa, deviation_pa) } else { (zero, zero) };
+        let (kiss_pa, moving_pa) = (u.kiss_deviation_pa(clutch), self.deviation_pa(u));
+        let error_pa = moving_pa * wrong.pressure - kiss_pa * wrong.kiss;
+        let variance = square(moving_pa) * wrong.variance[0] + square(kiss_pa) * wrong.variance[1]
+            - T::of(2.0) * moving_pa * kiss_pa * wrong.covariance;
+        let (pressed_pa, slope) = pressed(self.valve_pa - clutch.kiss_pressure() + error_pa, variance);
         ClutchTorque {
             ratio: shift.ratio,
-            base_n_m: per_pa * base_pa,
+            base_n_m: per_pa * (pressed_pa - slope * error_pa),
             per_friction_n_m: u.torque_share * per_pa * pressed_pa,
-            per_kiss_n_m: -per_pa * per_kiss_pa,
-            per_pressure_n_m: per_pa * self.deviation_pa(kiss_pa, u),
+            per_kiss_n_m: -per_pa * slope * kiss_pa,
+            per_pressure_n_m: per_pa * slope * moving_pa,
             open_loop_n_m: size * clutch.torque_capacity(self.valve_pa, slip),
         }
     }
@@ -129,7 +165,7 @@ impl<T: Real> ElementState<T> {
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_force = shift.alpha.abs() * friction * clutch.lever();
         let capacity = per_force * clutch.clamp_force(self.valve_pa);
-        let wrong_pa = self.deviation_pa(clutch.kiss_pressure(), u).hypot(u.kiss_deviation_pa(clutch));
+        let wrong_pa = self.deviation_pa(u).hypot(u.kiss_deviation_pa(clutch));
         let wrong = per_force * clutch.piston_area_m2 * wrong_pa;
         [capacity * (one + u.torque_share), capacity * (one + three * u.torque_share) + three * wrong]
     }

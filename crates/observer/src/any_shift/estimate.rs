@@ -2,7 +2,7 @@
 
 use drivetrain::Real;
 
-use super::elements::ElementState;
+use super::elements::{ElementState, PressureError};
 use super::powertrain::{ClutchTorque, dot};
 use super::{
     AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SLOW_SHARE,
@@ -60,8 +60,11 @@ pub struct ShiftEstimate<T> {
     pub shaft_n_m: Option<T>,
     /// Whether the input could be used, and whether the estimate can be believed.
     pub health: Health,
-    /// What became of the reading of each channel; of the commands the worst.
+    /// What became of the reading of each channel; of the commands together a refused one, or a lost one
+    /// of an element that shifts.
     pub channels: Channels<ChannelHealth>,
+    /// The same of the command of each element.
+    pub commands: [ChannelHealth; MAX_ELEMENTS],
 }
 
 impl<T: Real> ShiftEstimate<T> {
@@ -76,6 +79,7 @@ impl<T: Real> ShiftEstimate<T> {
             shaft_n_m: None,
             health: Health::SpeedsRejected,
             channels: Channels::all(ChannelHealth::Lost),
+            commands: [ChannelHealth::Lost; MAX_ELEMENTS],
         }
     }
 }
@@ -85,7 +89,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         &self,
         state: &mut AnyShiftState<T>,
         input: &ShiftInput<T>,
-        channels: &Channels<ChannelHealth>,
+        (channels, commands): (&Channels<ChannelHealth>, &[ChannelHealth; MAX_ELEMENTS]),
         mut health: Health,
     ) -> ShiftEstimate<T> {
         let refused = channels.each().contains(&ChannelHealth::Refused);
@@ -98,7 +102,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         });
         let valve_pa = state.elements.map(|element| element.map_or(T::zero(), |element| element.valve_pa));
         let estimate = &mut state.estimate;
-        *estimate = ShiftEstimate { valve_pa, channels: *channels, ..ShiftEstimate::nothing() };
+        *estimate = ShiftEstimate { valve_pa, channels: *channels, commands: *commands, ..ShiftEstimate::nothing() };
         match &state.running {
             Some(running) => {
                 let (x, line) = (&running.x.mean, &self.driveline);
@@ -168,7 +172,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (torque, valve_pa, gain, both) =
             self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
                 let (memory, element) = found;
-                let torque = memory.torque(element, clutch, u, [slip.value, slip.direction(), k]);
+                let torque =
+                    memory.torque(element, clutch, u, [slip.value, slip.direction()], &PressureError::unseen(k));
                 (torque, memory.valve_pa, u.gain_error(element, f, k), u.correlation_in_shift(element))
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
@@ -220,7 +225,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
                 let gain = memory.valve_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
-                let itself = memory.deviation_pa(element.clutch.kiss_pressure(), u) * x.mean[PRESSURE[c]];
+                let itself = memory.deviation_pa(u) * x.mean[PRESSURE[c]];
                 (memory.valve_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
             });
         let alone = own.unlearnt_variance(both).sqrt();

@@ -87,6 +87,8 @@ const GAP_S: f64 = 0.025;
 const FIRST_S: f64 = 0.05;
 /// Low-pass of the turbine torque that the share `b` multiplies, s.
 const SHARE_S: f64 = 0.06;
+/// How long the drive shafts twist in one direction, s: half a swing \[chosen\].
+const TWIST_S: f64 = 0.1;
 /// Deviation of the age of the last tooth, in the time between two.
 const TOOTH: f64 = 0.6;
 /// Deviation of the model of the speeds over 10 ms, in deviations of a reading.
@@ -118,20 +120,22 @@ pub struct ShiftUncertainty<T> {
     pub valve_gain: T,
     /// Of the kiss point beside the gain, Pa: what lasts.
     pub kiss_point_pa: T,
-    /// Errors of the valve's lag and delay, s: the pressure errs by this much of its rate.
-    pub valve_s: T,
+    /// Of the valve's lag, as a share.
+    pub valve_lag_share: T,
+    /// Of the valve's delay, s: the pressure errs by this much of its rate.
+    pub valve_delay_s: T,
     /// Error of the pressure at rest that does not last, Pa.
     pub pressure_pa: T,
     /// Time after which an error of the pressure is another, s.
     pub pressure_s: T,
-    /// Pressure below the kiss point from which on a clutch is open for sure, Pa.
-    pub kiss_pa: T,
     /// Of the turbine torque beside what lasts, as a share.
     pub turbine_share: T,
     /// Time after which it is another, s.
     pub turbine_share_s: T,
     /// Of the turbine-side inertia `M11`, as a share.
     pub inertia_share: T,
+    /// Of the stiffness of the drive shafts, as a share.
+    pub stiffness_share: T,
     /// Of the rate of twist at the start, rad/s.
     pub rate_rad_s: T,
     /// Its random walk, rad/s per root second.
@@ -203,6 +207,8 @@ pub struct AnyShiftState<T> {
     engine: Option<Engine<T>>,
     /// Newest reported engine torque, N m, and its age, s.
     reported: Option<(T, T)>,
+    /// Whether there ever was one.
+    reports: bool,
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
     running: Option<Running<T>>,
@@ -258,13 +264,14 @@ impl<T: Real> ShiftUncertainty<T> {
             torque_share_s: to(self.torque_share_s),
             valve_gain: to(self.valve_gain),
             kiss_point_pa: to(self.kiss_point_pa),
-            valve_s: to(self.valve_s),
+            valve_lag_share: to(self.valve_lag_share),
+            valve_delay_s: to(self.valve_delay_s),
             pressure_pa: to(self.pressure_pa),
             pressure_s: to(self.pressure_s),
-            kiss_pa: to(self.kiss_pa),
             turbine_share: to(self.turbine_share),
             turbine_share_s: to(self.turbine_share_s),
             inertia_share: to(self.inertia_share),
+            stiffness_share: to(self.stiffness_share),
             rate_rad_s: to(self.rate_rad_s),
             rate_walk: to(self.rate_walk),
             load_walk: to(self.load_walk),
@@ -304,6 +311,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             elements,
             engine: None,
             reported: None,
+            reports: false,
             newest: [None; SPEEDS],
             running: None,
             lost: false,
@@ -330,9 +338,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         state.fading_s = state.fading_s + dt_s;
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);
-        // Each element has a command of its own, and the engine torque is one of the sources of the turbine torque.
-        (channels.offgoing_command, channels.engine_torque) = (ChannelHealth::Unused, ChannelHealth::Unused);
-        channels.command = self.pass_elements(state, input, dt_s);
+        // Each element has a command of its own.
+        channels.offgoing_command = ChannelHealth::Unused;
+        let commands = self.pass_elements(state, input, dt_s);
+        channels.command = self.of_commands(&commands, input.gear);
+        channels.engine_torque = self.take_reported(state, input, dt_s);
         channels.engine = self.take_engine(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
         health = health.max(self.take_gear(state, input.gear));
@@ -349,7 +359,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         health = health.max(self.settle(state, input, torque.as_ref()));
-        self.conclude(state, input, &channels, health)
+        self.conclude(state, input, (&channels, &commands), health)
     }
 
     fn reject_time(&self, state: &mut AnyShiftState<T>) {
@@ -367,6 +377,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         state.estimate.health = Health::TimeRejected;
         state.estimate.channels = Channels::all(ChannelHealth::Refused);
+        state.estimate.commands = [ChannelHealth::Refused; MAX_ELEMENTS];
     }
 
     /// Follows the shift command.

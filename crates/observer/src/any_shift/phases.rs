@@ -18,6 +18,8 @@ const THRESHOLD: (f64, f64) = (3.5, 0.3);
 const MAYBE: f64 = 2.0;
 /// Share of the threshold below which a clutch has caught, and samples in a row.
 const CAUGHT: (f64, u8) = (0.7, 2);
+/// Share of a new slip in the mean of those of a clutch that holds \[chosen\]: some five samples.
+const MEAN: f64 = 0.3;
 /// Multiple of the threshold above which the oncoming clutch slips again.
 const SLIPS_AGAIN: f64 = 1.5;
 
@@ -108,11 +110,13 @@ pub(super) struct PhaseMemory<T> {
     caught: u8,
     /// Direction of a clutch that was released by its load, until its slip is seen.
     pub(super) released: [Option<T>; 2],
+    /// Slip of the clutch that holds, averaged.
+    mean_rad_s: T,
 }
 
 impl<T: Real> PhaseMemory<T> {
     pub(super) fn new(phase: ShiftPhase) -> Self {
-        Self { phase, caught: 0, released: [None; 2] }
+        Self { phase, caught: 0, released: [None; 2], mean_rad_s: T::zero() }
     }
 
     /// Direction of the torque of a slipping clutch.
@@ -131,11 +135,12 @@ impl<T: Real> PhaseMemory<T> {
                 *released = None;
             }
         }
+        let lasts = self.phase.holding().is_some_and(|held| self.slip_lasts(&contacts[held.min(1)].slip));
         let next = match self.phase {
-            ShiftPhase::OffgoingHolds if off.slip.is_over() || off.is_overloaded() => ShiftPhase::BothSlip,
+            ShiftPhase::OffgoingHolds if off.slip.is_over() || off.is_overloaded() || lasts => ShiftPhase::BothSlip,
             ShiftPhase::BothSlip => self.both_slip(off, on),
             ShiftPhase::OncomingHolds
-                if on.slip.value.abs() > T::of(SLIPS_AGAIN) * on.slip.threshold() || on.is_overloaded() =>
+                if on.slip.value.abs() > T::of(SLIPS_AGAIN) * on.slip.threshold() || on.is_overloaded() || lasts =>
             {
                 ShiftPhase::BothSlip
             }
@@ -151,7 +156,20 @@ impl<T: Real> PhaseMemory<T> {
             self.released = [None; 2];
             self.caught = 0;
         }
+        if next != self.phase {
+            self.mean_rad_s = T::zero();
+        }
         self.phase = next;
+    }
+
+    /// Whether the slip of the clutch that holds is small and lasts: the mean of it is over a threshold of its own.
+    fn slip_lasts(&mut self, slip: &Slip<T>) -> bool {
+        let share = T::of(MEAN);
+        if slip.value.is_finite() {
+            self.mean_rad_s = self.mean_rad_s + share * (slip.value - self.mean_rad_s);
+        }
+        let deviation = slip.deviation * (share / (T::of(2.0) - share)).sqrt();
+        Slip { value: self.mean_rad_s, deviation }.is_over()
     }
 
     fn both_slip(&mut self, off: &Contact<T>, on: &Contact<T>) -> ShiftPhase {

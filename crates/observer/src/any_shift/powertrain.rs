@@ -19,6 +19,8 @@ use super::{
 pub(super) const CORE: usize = 4;
 /// What drives them: torque on the turbine side, on the output side, load at the wheels, rate error of the twist.
 const DRIVES: usize = 4;
+const LOAD_DRIVES: usize = 2;
+const RATE_DRIVES: usize = 3;
 /// Terms of the series of the exponential: a step is at most [`super::PIECE_S`] long, which is less than a quarter of the
 /// fastest swing of the shafts, so the terms left out are below 1e-7.
 const TERMS: usize = 14;
@@ -141,6 +143,46 @@ impl<T: Real> Torques<T> {
     }
 }
 
+/// The equations of the first states: `x' = A x + B d`, with what drives them `d`.
+struct Equations<T> {
+    a: [[T; CORE]; CORE],
+    b: [[T; DRIVES]; CORE],
+}
+
+impl<T: Real> Equations<T> {
+    fn new(g: &Response<T>, line: &Driveline<T>, wheels_kg_m2: T) -> Self {
+        let zero = T::zero();
+        let (i, damping, stiffness) = (line.final_ratio, line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad);
+        let mut equations = Self { a: [[zero; CORE]; CORE], b: [[zero; DRIVES]; CORE] };
+        let Self { a, b } = &mut equations;
+        for k in [TURBINE, OUTPUT] {
+            let per_shaft_torque = -g[k][1] / i;
+            a[k][SPRING] = per_shaft_torque;
+            a[k][OUTPUT] = per_shaft_torque * damping / i;
+            a[k][WHEEL] = -per_shaft_torque * damping;
+            b[k] = [g[k][0], g[k][1], zero, per_shaft_torque * damping];
+        }
+        let per_wheel_torque = wheels_kg_m2.recip();
+        a[WHEEL][SPRING] = per_wheel_torque;
+        a[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
+        a[WHEEL][WHEEL] = -per_wheel_torque * damping;
+        b[WHEEL] = [zero, zero, -per_wheel_torque, per_wheel_torque * damping];
+        a[SPRING][OUTPUT] = stiffness / i;
+        a[SPRING][WHEEL] = -stiffness;
+        b[SPRING][RATE_DRIVES] = stiffness;
+        equations
+    }
+}
+
+/// The row over all states of something that depends on the first of them and on what drives them, and what is left beside it.
+fn row<T: Real>(of: &[T; CORE], drives: &[T; DRIVES], torques: &Torques<T>) -> ([T; N], T) {
+    let (mut row, rest) = torques.row([drives[0], drives[1]]);
+    row[..CORE].copy_from_slice(of);
+    row[LOAD] = drives[LOAD_DRIVES];
+    row[RATE] = drives[RATE_DRIVES];
+    (row, rest)
+}
+
 /// Rates of turbine, output and wheel speed as rows over the states, and what is left beside them, rad/s^2.
 pub(super) struct Rates<T> {
     pub(super) rows: [[T; N]; SPEEDS],
@@ -149,23 +191,11 @@ pub(super) struct Rates<T> {
 
 impl<T: Real> Rates<T> {
     pub(super) fn new(g: &Response<T>, torques: &Torques<T>, line: &Driveline<T>, wheels_kg_m2: T) -> Self {
+        let equations = Equations::new(g, line, wheels_kg_m2);
         let mut rates = Self { rows: [[T::zero(); N]; SPEEDS], rest: [T::zero(); SPEEDS] };
-        let (i, damping) = (line.final_ratio, line.shaft_damping_n_m_s_rad);
-        for k in [TURBINE, OUTPUT] {
-            let (mut row, rest) = torques.row(g[k]);
-            let per_output_torque = -g[k][1];
-            row[SPRING] = per_output_torque / i;
-            row[OUTPUT] = per_output_torque * damping / (i * i);
-            row[WHEEL] = -per_output_torque * damping / i;
-            row[RATE] = per_output_torque * damping / i;
-            (rates.rows[k], rates.rest[k]) = (row, rest);
+        for k in 0..SPEEDS {
+            (rates.rows[k], rates.rest[k]) = row(&equations.a[k], &equations.b[k], torques);
         }
-        let per_wheel_torque = wheels_kg_m2.recip();
-        rates.rows[WHEEL][SPRING] = per_wheel_torque;
-        rates.rows[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
-        rates.rows[WHEEL][WHEEL] = -per_wheel_torque * damping;
-        rates.rows[WHEEL][RATE] = per_wheel_torque * damping;
-        rates.rows[WHEEL][LOAD] = -per_wheel_torque;
         rates
     }
 
@@ -195,23 +225,7 @@ impl<T: Real> Motion<T> {
     /// By the series of the matrix exponential.
     pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T) -> Self {
         let (zero, one) = (T::zero(), T::one());
-        let (i, damping, stiffness) = (line.final_ratio, line.shaft_damping_n_m_s_rad, line.shaft_stiffness_n_m_rad);
-        let mut a = [[zero; CORE]; CORE];
-        let mut b = [[zero; DRIVES]; CORE];
-        for k in [TURBINE, OUTPUT] {
-            a[k][SPRING] = -g[k][1] / i;
-            a[k][OUTPUT] = -g[k][1] * damping / (i * i);
-            a[k][WHEEL] = g[k][1] * damping / i;
-            b[k] = [g[k][0], g[k][1], zero, -g[k][1] * damping / i];
-        }
-        let per_wheel_torque = wheels_kg_m2.recip();
-        a[WHEEL][SPRING] = per_wheel_torque;
-        a[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
-        a[WHEEL][WHEEL] = -per_wheel_torque * damping;
-        b[WHEEL] = [zero, zero, -per_wheel_torque, per_wheel_torque * damping];
-        a[SPRING][OUTPUT] = stiffness / i;
-        a[SPRING][WHEEL] = -stiffness;
-        b[SPRING][3] = stiffness;
+        let Equations { a, b } = Equations::new(&g, line, wheels_kg_m2);
         // sum of (A h)^n/n!, and of h (A h)^n/(n+1)!.
         let mut power = [[zero; CORE]; CORE];
         for (k, row) in power.iter_mut().enumerate() {
@@ -249,11 +263,7 @@ impl<T: Real> Motion<T> {
         let mut rows = [[T::zero(); N]; CORE];
         let mut rest = [T::zero(); CORE];
         for k in 0..CORE {
-            let gamma = &self.gamma[k];
-            (rows[k], rest[k]) = torques.row([gamma[0], gamma[1]]);
-            rows[k][..CORE].copy_from_slice(&self.phi[k]);
-            rows[k][LOAD] = gamma[2];
-            rows[k][RATE] = gamma[3];
+            (rows[k], rest[k]) = row(&self.phi[k], &self.gamma[k], torques);
         }
         (rows, rest)
     }

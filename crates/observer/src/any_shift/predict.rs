@@ -1,9 +1,9 @@
 //! The prediction over a step, and the phase.
 
 use super::{
-    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, KISS, LOAD, MAX_ELEMENTS,
-    MODEL_SHARE, MOST_PIECES, Measured, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE,
-    SHARE_S, ShiftRow, TURBINE, Torques, WHEEL, free, powertrain, square, tied, turbine,
+    AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, LOAD, MAX_ELEMENTS,
+    MODEL_SHARE, MOST_PIECES, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE, SHARE_S,
+    SPRING, ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, powertrain, square, tied, turbine,
 };
 use drivetrain::Real;
 
@@ -39,8 +39,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 let slip = self.slip(clutch.ratio, speeds);
                 let direction = running.phase.direction(c, &slip);
                 if let Some((memory, element)) = self.element(elements, clutch.element) {
-                    let kiss = running.x.mean[KISS[c.min(1)]];
-                    *torque = memory.torque(element, clutch, u, [slip.value, direction, kiss]);
+                    let wrong = running.x.pressure_error(c.min(1));
+                    *torque = memory.torque(element, clutch, u, [slip.value, direction], &wrong);
                 }
             }
         }
@@ -100,8 +100,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         for state in PRESSURE {
             stay[state] = pressure;
         }
+        let twist_rate =
+            self.driveline.twist_rate(running.x.mean[OUTPUT], running.x.mean[WHEEL]) + running.x.mean[RATE];
         let x = &mut running.x;
         x.pass(&rows, &rest, &stay);
+        // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
+        let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
+        x.add(SPRING, SPRING, T::of(2.0 * TWIST_S) * dt_s * square(by_stiffness));
         if in_shift {
             let walked = u.friction_walk(dt_s);
             for c in 0..2 {
@@ -177,20 +182,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         if let Some(held) = after.holding() {
             let held = held.min(1);
-            self.tie(running, shift.clutches[held].ratio, contacts[held].slip.deviation);
+            Self::tie(running, &shift, shift.clutches[held].ratio);
         }
     }
 
-    /// Makes turbine and output speed those of a ratio.
-    pub(super) fn tie(&self, running: &mut Running<T>, ratio: T, deviation: T) {
-        let mut row = [T::zero(); N];
-        (row[TURBINE], row[OUTPUT]) = (T::one(), -ratio);
-        let tie = Measured { row, value: T::zero(), noise: square(T::of(MODEL_SHARE) * deviation) };
-        let slip = running.x.look(&tie).innovation;
-        // The slip that is left goes where the inertia is small.
-        running.x.add(TURBINE, TURBINE, slip * slip);
-        let look = running.x.look(&tie);
-        running.x.correct(&look);
+    /// A clutch that grips ties both speeds with its ratio `i`. Its impulse acts between them, so that what is kept is the
+    /// momentum of both along `(w_t, w_o) = (i, 1)`, whenever since the last sample it has gripped. Nothing else follows.
+    pub(super) fn tie(running: &mut Running<T>, shift: &ShiftRow<T>, ratio: T) {
+        let (m, per) = (&shift.mass_kg_m2, shift.inertia_at(ratio).recip());
+        let share = [TURBINE, OUTPUT].map(|k| per * (ratio * m[0][k] + m[1][k]));
+        running.x.tie(ratio, share);
     }
 
     /// The torque at the turbine with which a clutch holds, as a row over the states and what is left beside them:

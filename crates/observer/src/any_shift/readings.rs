@@ -1,26 +1,76 @@
 //! What a step gives: commands, readings, and from them slip and torque at the gearbox input.
 
 use super::{
-    AnyShiftFilter, AnyShiftState, ChannelHealth, Channels, Engine, FIRST_S, InputSide, LOST_S, MOST_PIECES, Newest,
-    OUTPUT, PIECE_S, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, turbine,
+    AnyShiftFilter, AnyShiftState, ChannelHealth, Channels, Engine, FIRST_S, GearCommand, InputSide, LOST_S,
+    MAX_ELEMENTS, MOST_PIECES, Newest, OUTPUT, PIECE_S, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading,
+    TURBINE, Verdict, turbine,
 };
 use drivetrain::Real;
 
+/// Largest torque over the largest speed that is one of an engine, N m s \[chosen\]: far above all.
+const MOST_TORQUE_S: f64 = 10.0;
+
 impl<T: Real> AnyShiftFilter<'_, T> {
-    /// Lets the valve models go on and takes the commands. The health of the worst of those that came.
-    pub(super) fn pass_elements(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>, dt_s: T) -> ChannelHealth {
-        let (mut came, mut refused) = (false, false);
+    /// Lets the valve models go on and takes the commands. The health of each element's command.
+    pub(super) fn pass_elements(
+        &self,
+        state: &mut AnyShiftState<T>,
+        input: &ShiftInput<T>,
+        dt_s: T,
+    ) -> [ChannelHealth; MAX_ELEMENTS] {
+        let mut health = [ChannelHealth::Unused; MAX_ELEMENTS];
         let elements = state.elements.iter_mut().zip(self.tables.elements).zip(&input.commands);
-        for ((memory, element), command) in elements {
-            let Some(memory) = memory else { continue };
-            let health = memory.step(element, &self.limits, *command, dt_s);
-            came = came || health == ChannelHealth::Good;
-            refused = refused || health == ChannelHealth::Refused;
+        for (health, ((memory, element), command)) in health.iter_mut().zip(elements) {
+            if let Some(memory) = memory {
+                *health = memory.step(element, &self.limits, *command, dt_s);
+            }
         }
-        match (refused, came) {
-            (true, _) => ChannelHealth::Refused,
-            (false, true) => ChannelHealth::Good,
-            (false, false) => ChannelHealth::Absent,
+        health
+    }
+
+    /// The health of all commands together: a refused one first, then a lost one of an element that shifts, which is what the
+    /// estimate rests on.
+    pub(super) fn of_commands(&self, each: &[ChannelHealth; MAX_ELEMENTS], gear: GearCommand) -> ChannelHealth {
+        let shifts = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
+        let lost = shifts.is_some_and(|shift| {
+            shift.clutches.iter().any(|clutch| each.get(clutch.element) == Some(&ChannelHealth::Lost))
+        });
+        if each.contains(&ChannelHealth::Refused) {
+            ChannelHealth::Refused
+        } else if lost {
+            ChannelHealth::Lost
+        } else if each.contains(&ChannelHealth::Good) {
+            ChannelHealth::Good
+        } else {
+            ChannelHealth::Absent
+        }
+    }
+
+    /// Takes the engine torque that the engine's controller reports, if it comes.
+    pub(super) fn take_reported(&self, state: &mut AnyShiftState<T>, input: &ShiftInput<T>, dt_s: T) -> ChannelHealth {
+        let lost = T::of(LOST_S);
+        if let Some((_, age_s)) = &mut state.reported {
+            *age_s = *age_s + dt_s;
+        }
+        // A torque without sense is none.
+        let torque_max = T::of(MOST_TORQUE_S) * self.limits.speed_max_rad_s;
+        let usable = |reading: &Reading<T>| {
+            reading.value.abs() <= torque_max && reading.age_s >= T::zero() && reading.age_s <= lost
+        };
+        let reading = input.engine_n_m.filter(usable);
+        if let Some(reading) = reading {
+            state.reported = Some((reading.value, reading.age_s));
+        }
+        state.reported = state.reported.filter(|(_, age_s)| *age_s <= lost);
+        state.reports = state.reports || reading.is_some();
+        // Beside a converter it is a second source, which many cars do not have.
+        let needed = state.reports || self.turbine.converter.is_none() || input.lock_up_applied;
+        match (input.engine_n_m, reading, state.reported) {
+            (_, Some(_), _) => ChannelHealth::Good,
+            (Some(_), None, _) => ChannelHealth::Refused,
+            (None, None, Some(_)) => ChannelHealth::Absent,
+            (None, None, None) if needed => ChannelHealth::Lost,
+            (None, None, None) => ChannelHealth::Unused,
         }
     }
 
@@ -36,18 +86,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 state.engine = None;
             }
         }
-        if let Some((_, age_s)) = &mut state.reported {
-            *age_s = *age_s + dt_s;
-        }
-        let torque_max = T::of(10.0) * self.limits.speed_max_rad_s;
-        if let Some(reading) = input.engine_n_m {
-            // A torque without sense is none.
-            let usable = reading.value.abs() <= torque_max && reading.age_s >= T::zero() && reading.age_s <= lost;
-            if usable {
-                state.reported = Some((reading.value, reading.age_s));
-            }
-        }
-        state.reported = state.reported.filter(|(_, age_s)| *age_s <= lost);
         let Some(reading) = input.engine_rad_s else {
             return if state.engine.is_some() { ChannelHealth::Absent } else { ChannelHealth::Lost };
         };
@@ -133,7 +171,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         };
         let engine = state.engine.as_ref().map(|engine| {
             let now = engine.speed_before(T::zero());
-            [now, engine.variance(), now - engine.speed_before(T::one())]
+            let (acceleration, deviation) = engine.acceleration();
+            [now, engine.variance(), acceleration, deviation * deviation]
         });
         let deviation = self.readings[TURBINE].deviation_rad_s;
         let reported_n_m = state.reported.map(|(torque, _)| torque);

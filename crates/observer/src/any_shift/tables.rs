@@ -87,12 +87,6 @@ impl<T: Real> ShiftRow<T> {
         m[1][1] + ratio * (m[0][1] + m[1][0]) + ratio * ratio * m[0][0]
     }
 
-    /// By how much an error of the gearbox output torque shows in a clutch torque while the other clutch holds, both at
-    /// the turbine: `1/|i_off - i_on|`.
-    pub fn output_error_gain(&self) -> T {
-        (self.clutches[0].ratio - self.clutches[1].ratio).abs().recip()
-    }
-
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> ShiftRow<U> {
         let to = |x: T| U::of(x.to_f64_exact());

@@ -5,7 +5,8 @@
 //! by the engine     T_2 = T_e - I_e w_e' + (t - 1) T_p        whatever the lock-up clutch does
 //! ```
 //!
-//! Where both are known the mean is taken, weighted by their variances. With the lock-up clutch applied only the second
+//! Where both are known the mean is taken, weighted by their variances; that of `T_2` has the variance of `I_e w_e'` in it, and
+//! the maps' part of `(t - 1) T_p`. With the lock-up clutch applied only the second
 //! holds. Without a converter the engine is on the input shaft: its inertia belongs to the mass of the shifts.
 
 use drivetrain::{Converter, Real};
@@ -28,8 +29,8 @@ pub struct TurbineTorque<T> {
 
 /// What is known at a time.
 pub(super) struct InputSide<T> {
-    /// Engine speed, rad/s, its variance, (rad/s)^2, and acceleration, rad/s^2; none without a reading.
-    pub(super) engine: Option<[T; 3]>,
+    /// Engine speed, rad/s, and its variance, its acceleration, rad/s^2, and its variance; none without a reading.
+    pub(super) engine: Option<[T; 4]>,
     /// Turbine speed, rad/s, and its variance.
     pub(super) turbine: [T; 2],
     /// Reported engine torque, N m.
@@ -53,7 +54,7 @@ impl<T: Real> TurbineTorque<T> {
             return side.reported_n_m.map(|turbine_n_m| Found { turbine_n_m, noise: zero, share: self.engine_share });
         };
         let square = |x: T| x * x;
-        let [engine, engine_variance, acceleration] = side.engine?;
+        let [engine, engine_variance, acceleration, acceleration_variance] = side.engine?;
         let [turbine, turbine_variance] = side.turbine;
         let torques = converter.torques(engine, turbine);
         let (by_maps, slope) = converter.turbine_with_slope(engine, turbine);
@@ -66,15 +67,21 @@ impl<T: Real> TurbineTorque<T> {
         };
         let pump = if side.lock_up_applied { zero } else { torques.turbine_n_m - torques.pump_n_m };
         let by_engine = reported - self.engine_inertia_kg_m2 * acceleration + pump;
+        let by_engine_noise = square(self.engine_inertia_kg_m2) * acceleration_variance;
         if side.lock_up_applied {
-            return Some(Found { turbine_n_m: by_engine, noise: zero, share: self.engine_share });
+            return Some(Found { turbine_n_m: by_engine, noise: by_engine_noise, share: self.engine_share });
         }
+        // Variances of what lasts: of the maps, and of the reported torque with the part that the maps have in it.
         let maps_variance = square(self.converter_share * by_maps.abs().max(least));
-        let engine_variance = square(self.engine_share * reported.abs().max(least));
-        let share = engine_variance / (engine_variance + maps_variance);
-        let turbine_n_m = share * by_maps + (one - share) * by_engine;
-        let both = (square(self.converter_share).recip() + square(self.engine_share).recip()).recip().sqrt();
-        Some(Found { turbine_n_m, noise: square(share) * noise, share: both })
+        let reported_variance =
+            square(self.engine_share * reported.abs().max(least)) + square(self.converter_share * pump);
+        let (by_maps_all, by_engine_all) = (maps_variance + noise, reported_variance + by_engine_noise);
+        let weight = by_engine_all / (by_engine_all + by_maps_all);
+        let rest = one - weight;
+        let turbine_n_m = weight * by_maps + rest * by_engine;
+        let lasting = square(weight) * maps_variance + square(rest) * reported_variance;
+        let noise = square(weight) * noise + square(rest) * by_engine_noise;
+        Some(Found { turbine_n_m, noise, share: lasting.sqrt() / turbine_n_m.abs().max(least) })
     }
 
     /// The same in another precision.

@@ -4,7 +4,7 @@ use drivetrain::Real;
 
 use super::past::{CLONES, PASTS, SPEEDS};
 use super::powertrain::{COLUMNS, LAWS, Tangent};
-use super::{FRICTION, GAIN, N, OFFGOING, SHARE};
+use super::{FRICTION, GAIN, N, OFFGOING, PRESSURE, SHARE};
 
 /// The states, and after them the speeds at earlier times.
 pub(super) const ALL: usize = N + CLONES;
@@ -59,18 +59,25 @@ impl<T: Real> Covariance<T> {
 
     /// Adds a multiple of a row.
     #[inline]
-    pub(super) fn add_row(&self, sum: &mut [T; ALL], row: usize, weight: T) {
+    pub(super) fn add_row<const ROW: usize>(&self, sum: &mut [T; ALL], weight: T) {
         if weight == T::zero() {
             return;
         }
-        let row = row.min(ALL - 1);
-        let (before, after) = sum.split_at_mut(row);
-        for (sum, above) in before.iter_mut().zip(&self.upper) {
-            *sum = *sum + weight * above[row];
+        for (i, sum) in sum.iter_mut().enumerate() {
+            *sum = *sum + weight * self.entry::<ROW>(i);
         }
-        for (sum, value) in after.iter_mut().zip(&self.upper[row][row..]) {
-            *sum = *sum + weight * *value;
-        }
+    }
+
+    /// The sum of multiples of two rows.
+    #[inline(always)]
+    pub(super) fn sum_of<const A: usize, const B: usize>(&self, [a, b]: [T; 2]) -> [T; ALL] {
+        core::array::from_fn(|i| a * self.entry::<A>(i) + b * self.entry::<B>(i))
+    }
+
+    /// An entry of a row that is known when this is compiled.
+    #[inline(always)]
+    fn entry<const ROW: usize>(&self, i: usize) -> T {
+        if i < ROW { self.upper[i][ROW] } else { self.upper[ROW][i] }
     }
 
     /// A past of these ages: the speeds were as uncertain as now, and have changed by accelerations with these variances.
@@ -120,28 +127,34 @@ impl<T: Real> Covariance<T> {
                 *value = row[i];
             }
         }
-        let Some(rows) = p.first_chunk::<COLUMNS>() else { return };
-        let moved = step.of(rows);
-        let turned: [[T; LAWS]; COLUMNS] = core::array::from_fn(|c| moved.map(|row| row[c]));
-        let laws = step.of(&turned);
-        for i in 0..LAWS {
-            p[i][i..LAWS].copy_from_slice(&laws[i][i..]);
-            p[i][LAWS..].copy_from_slice(&moved[i][LAWS..]);
+        for c in 0..ALL {
+            let next = step.of(&core::array::from_fn(|i| p[i][c]));
+            for (row, next) in p.iter_mut().zip(next) {
+                row[c] = next;
+            }
         }
-        let fading = [(OFFGOING, step.keep), (SHARE, step.stay), (FRICTION, step.last), (GAIN, step.last)];
-        for (state, left) in fading {
-            self.fade(state, left);
+        for c in 0..LAWS {
+            let next = step.of(&core::array::from_fn(|i| p[c][i]));
+            for (row, next) in p.iter_mut().zip(next).take(c + 1) {
+                row[c] = next;
+            }
         }
+        self.fade::<OFFGOING>(step.keep);
+        self.fade::<SHARE>(step.stay);
+        self.fade::<FRICTION>(step.last);
+        self.fade::<GAIN>(step.last);
     }
 
     /// Leaves a share of a state.
     #[inline]
-    fn fade(&mut self, state: usize, left: T) {
-        let state = state.min(ALL - 1);
-        for row in self.upper.iter_mut().take(state + 1) {
-            row[state] = left * row[state];
+    fn fade<const STATE: usize>(&mut self, left: T) {
+        if left == T::one() {
+            return;
         }
-        for value in &mut self.upper[state][state..] {
+        for row in self.upper.iter_mut().take(STATE + 1) {
+            row[STATE] = left * row[STATE];
+        }
+        for value in &mut self.upper[STATE][STATE..] {
             *value = left * *value;
         }
     }
@@ -156,7 +169,7 @@ impl<T: Real> Covariance<T> {
     #[inline]
     pub(super) fn hold_above(&mut self, state: usize, variance: T) {
         let own = &mut self.upper[state][state];
-        *own = own.max(variance);
+        *own = own.at_least(variance);
     }
 
     /// Makes a state independent of all others, with this standard deviation.
@@ -173,19 +186,13 @@ impl<T: Real> Covariance<T> {
     /// With `K = a S/V`, each entry of `S` with its own share `a`, the form is `P - (S S' - R R')/V` with `R = (1 - a) S`.
     #[inline]
     pub(super) fn correct(&mut self, measured: &Measured<T>, shares: &[T; CONSIDERED]) -> [T; ALL] {
-        let per_deviation = measured.variance.sqrt().recip();
-        let scaled = measured.with.map(|with| with * per_deviation);
-        subtract_square(&mut self.upper, &scaled);
-        let mut gain = scaled.map(|scaled| scaled * per_deviation);
-        let mut rest = [T::zero(); CONSIDERED];
-        for (a, share) in shares.iter().enumerate() {
-            rest[a] = (T::one() - *share) * scaled[SHARE + a];
-            gain[SHARE + a] = *share * gain[SHARE + a];
-        }
-        for a in 0..CONSIDERED {
-            for b in a..CONSIDERED {
-                self.upper[SHARE + a][SHARE + b] = self.upper[SHARE + a][SHARE + b] + rest[a] * rest[b];
-            }
+        let per_variance = measured.variance.recip();
+        let mut gain = measured.with.map(|with| with * per_variance);
+        // What of the considered states' best gain is not taken.
+        let left: [T; CONSIDERED] = core::array::from_fn(|a| T::one() - shares[a]);
+        subtract_product(&mut self.upper, &gain, &measured.with, &left);
+        for (gain, share) in gain[SHARE..].iter_mut().zip(shares) {
+            *gain = *share * *gain;
         }
         gain
     }
@@ -202,28 +209,38 @@ impl<T: Real> Covariance<T> {
         for i in 0..N {
             let own = self.upper[i][i];
             sum = sum + own;
-            least = least.min(own);
+            least = least.at_most(own);
         }
         // A sum with a number that is not finite is not finite.
         least >= T::zero() && sum.is_finite()
     }
 }
 
-/// Subtracts `x x'` on and above the diagonal.
+/// Subtracts `x y'`, which is symmetric, on and above the diagonal; between two considered states less, as `left` says.
 ///
 /// Most of the filter's time is spent here. Each row has its own length, known at compile time, so that the compiler writes
 /// it without a loop.
-fn subtract_square<T: Real>(upper: &mut [[T; ALL]; ALL], x: &[T; ALL]) {
+fn subtract_product<T: Real>(upper: &mut [[T; ALL]; ALL], x: &[T; ALL], y: &[T; ALL], left: &[T; CONSIDERED]) {
     #[inline(always)]
-    fn row<T: Real, const I: usize>(row: &mut [T; ALL], x: &[T; ALL]) {
+    fn row<T: Real, const I: usize>(row: &mut [T; ALL], x: &[T; ALL], y: &[T; ALL], left: &[T; CONSIDERED]) {
+        // In gear the pressure, and what belongs to it, has to do with no reading.
+        if matches!(I, PRESSURE | FRICTION | GAIN) && x[I] == T::zero() {
+            return;
+        }
         for j in I..ALL {
-            row[j] = row[j] - x[I] * x[j];
+            row[j] = row[j] - x[I] * y[j];
+        }
+        if (SHARE..N).contains(&I) && left[I - SHARE] != T::zero() {
+            let back = left[I - SHARE] * x[I];
+            for j in I..N {
+                row[j] = row[j] + back * left[j - SHARE] * y[j];
+            }
         }
     }
     macro_rules! rows {
         ($($i:literal)*) => {
             const { assert!(ALL == [$($i),*].len(), "one row each") };
-            $(row::<T, $i>(&mut upper[$i], x);)*
+            $(row::<T, $i>(&mut upper[$i], x, y, left);)*
         };
     }
     rows!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18);

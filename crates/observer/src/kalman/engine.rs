@@ -14,6 +14,7 @@ const GATE: u8 = 3;
 
 /// What the engine's filter knows beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EngineNoise<T> {
     /// Standard deviation of a reading, rad/s.
     pub reading_rad_s: T,
@@ -72,7 +73,7 @@ impl<T: Real> Engine<T> {
     /// Acceleration, rad/s^2, and its standard deviation.
     #[inline]
     pub(crate) fn acceleration(&self) -> (T, T) {
-        (self.mean[1], self.acceleration_variance.max(T::zero()).sqrt())
+        (self.mean[1], self.acceleration_variance.at_least(T::zero()).sqrt())
     }
 
     /// Variance of the speed now, (rad/s)^2.
@@ -95,7 +96,7 @@ impl<T: Real> Engine<T> {
         self.mean[0] = self.mean[0] + dt_s * self.mean[1];
         // Without readings an acceleration does not last for ever.
         let silent = if self.silent_s > T::of(SILENT_S) { T::of(SILENT_S) / (T::of(SILENT_S) + dt_s) } else { stay };
-        self.mean[1] = self.mean[1].max(-limit).min(limit) * silent;
+        self.mean[1] = self.mean[1].at_least(-limit).at_most(limit) * silent;
         self.speed_variance = self.speed_variance
             + dt_s * (two * self.covariance + dt_s * self.acceleration_variance)
             + third * walk * dt_s * dt_s;
@@ -115,7 +116,7 @@ impl<T: Real> Engine<T> {
                 engine.covariance - age_s * engine.acceleration_variance,
             ]
         };
-        let total = |with: [T; 2]| (with[0] - age_s * with[1]).max(T::zero()) + reading;
+        let total = |with: [T; 2]| (with[0] - age_s * with[1]).at_least(T::zero()) + reading;
         let mut with = with_reading(self);
         let verdict = self.gate.judge(surprise, total(with));
         match verdict {

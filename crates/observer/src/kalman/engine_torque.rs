@@ -17,6 +17,7 @@ const IMPOSSIBLE: f64 = 4.0;
 
 /// What is known of the reported torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReportedTorque<T> {
     /// Inertia of engine and pump, kg m^2.
     pub engine_kg_m2: T,
@@ -55,9 +56,9 @@ impl<T: Real> KalmanFilter<T> {
         let new = LastTorque { torque_n_m: reading.value, since_s: zero, rate_n_m_s: zero };
         state.reported = Some(new);
         let Some(last) = last.filter(|last| last.since_s > zero) else { return ChannelHealth::Good };
-        let since_s = last.since_s.min(lost);
+        let since_s = last.since_s.at_most(lost);
         let fade = T::of(SETTLED_S) / (T::of(SETTLED_S) + since_s);
-        let rate_n_m_s = ((reading.value - last.torque_n_m) / since_s).abs().max(fade * last.rate_n_m_s);
+        let rate_n_m_s = ((reading.value - last.torque_n_m) / since_s).abs().at_least(fade * last.rate_n_m_s);
         state.reported = Some(LastTorque { rate_n_m_s, ..new });
         if let Some(engine) = state.engine {
             self.correct_share(state, &engine, reading, since_s, rate_n_m_s);
@@ -79,18 +80,18 @@ impl<T: Real> KalmanFilter<T> {
         let (acceleration, acceleration_deviation) = engine.acceleration();
         let (speed, turbine) = (engine.speed_before(reading.age_s), running.mean[TURBINE]);
         let by_map = self.model.rigid.converter.torques(speed, turbine);
-        let ratio = self.model.rigid.converter.torque_ratio.at(turbine / speed.max(one));
+        let ratio = self.model.rigid.converter.torque_ratio.at(turbine / speed.at_least(one));
         let found = ratio * (reading.value - told.engine_kg_m2 * acceleration);
         let square = |x: T| x * x;
         // Its error lasts as long as that of the maps: readings within this time count as one.
-        let alike = (T::of(2.0) * self.uncertainty.turbine_share_s / since_s).max(one);
+        let alike = (T::of(2.0) * self.uncertainty.turbine_share_s / since_s).at_least(one);
         // It is old, and compared with an acceleration that is found late.
         let changed = rate_n_m_s * (reading.age_s + T::of(SETTLED_S));
         let own = alike * (square(told.share * reading.value.abs() + told.beside_n_m) + square(changed));
         let noise = square(ratio) * (own + square(told.engine_kg_m2 * acceleration_deviation));
         let mut with = [T::zero(); ALL];
-        running.covariance.add_row(&mut with, SHARE, by_map.turbine_n_m);
-        let variance = (by_map.turbine_n_m * with[SHARE]).max(T::zero()) + noise;
+        running.covariance.add_row::<SHARE>(&mut with, by_map.turbine_n_m);
+        let variance = (by_map.turbine_n_m * with[SHARE]).at_least(T::zero()) + noise;
         let innovation = found - by_map.turbine_n_m * (one + running.mean[SHARE]);
         if !(variance.is_finite() && innovation.is_finite()) {
             return;

@@ -31,6 +31,7 @@ pub(crate) mod engine;
 mod engine_torque;
 pub(crate) mod gate;
 mod offgoing;
+mod parameters;
 mod past;
 mod phases;
 mod powertrain;
@@ -55,6 +56,7 @@ use valve_model::Commands;
 pub use engine::EngineNoise;
 pub use engine_torque::ReportedTorque;
 pub use offgoing::OffgoingClutch;
+pub use parameters::{SpeedReading, Uncertainty};
 pub use valve_model::ValveModel;
 
 const N: usize = 13;
@@ -80,66 +82,9 @@ const PIECE_S: f64 = 0.0125;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
 
-/// How a toothed wheel is read.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpeedReading<T> {
-    /// Standard deviation of a reading, rad/s.
-    pub deviation_rad_s: T,
-    /// Angle by which a reading lags, rad: it spans several teeth, and its middle is half of them ago. Zero for a
-    /// reading of the moment.
-    pub lag_rad: T,
-    /// Angle between two teeth, rad: the last one passed up to that long ago.
-    pub pitch_rad: T,
-    /// Delay that is known, s.
-    pub delay_s: T,
-}
-
-/// What the filter does not know: standard deviations, and limits from the error budget.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uncertainty<T> {
-    /// Of the turbine torque, as a share.
-    pub turbine_share: T,
-    /// Time after which that share is another, s.
-    pub turbine_share_s: T,
-    /// Of the shafts' stiffness, as a share.
-    pub stiffness_share: T,
-    /// Torque that the shafts gain over the backlash, N m: while their torque is smaller they may carry none.
-    pub backlash_n_m: T,
-    /// Of the rate of the pressure, as a share of it: errors of lag and delay.
-    pub valve_share: T,
-    /// Of the valve's gain, as a share.
-    pub valve_gain: T,
-    /// Time for which an error of a rate persists, s. The filter takes it as white noise of the same power.
-    pub rate_s: T,
-    /// Of the friction, as a share.
-    pub friction: T,
-    /// Time after which friction and gain are others, s: errors of the model that shifts have in common would otherwise make
-    /// the filter surer of both with every shift.
-    pub clutch_s: T,
-    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
-    pub offgoing_n_m: T,
-    /// Time constant with which it goes once the clutch has let go, s.
-    pub offgoing_release_s: T,
-    /// How fast the load of the wheels changes in a shift, N m per root second.
-    pub load_shifting_n_m: T,
-    /// The same in a gear.
-    pub load_in_gear_n_m: T,
-    /// Of the scale of the wheel speed.
-    pub wheel_scale: T,
-    /// Least and greatest delay of the wheel speed against the earlier one of turbine and output, s.
-    pub wheel_delay_s: [T; 2],
-    /// Largest delay of output and turbine against each other, s.
-    pub skew_s: T,
-    /// How well a scale can be known at best: the standard deviation stays above it.
-    pub scale_least: T,
-    /// The same of a delay, s.
-    pub delay_least_s: T,
-    /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
-    pub output_least_rad_s: T,
-}
-
 /// The filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KalmanFilter<T> {
     /// The powertrain.
     pub model: CompliantModel<T>,
@@ -345,7 +290,7 @@ impl<T: Real> KalmanFilter<T> {
             return ChannelHealth::Refused;
         }
         let slowest = self.uncertainty.output_least_rad_s;
-        let age_s = reading.age_s + sensor.delay_s + sensor.lag_rad / reading.value.abs().max(slowest);
+        let age_s = reading.age_s + sensor.delay_s + sensor.lag_rad / reading.value.abs().at_least(slowest);
         match &mut state.engine {
             None => state.engine = Some(Engine::new(reading.value, noise)),
             Some(engine) => {
@@ -363,13 +308,13 @@ impl<T: Real> KalmanFilter<T> {
     /// Takes the readings of turbine, output and wheel.
     #[inline]
     fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>, dt_s: T) -> [ChannelHealth; 3] {
-        let given = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
+        let given = [&input.turbine_rad_s, &input.output_rad_s, &input.wheel_rad_s];
         let mut health = [ChannelHealth::Absent; 3];
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
         for (k, reading) in given.into_iter().enumerate() {
-            let Some(reading) = reading else { continue };
+            let Some(reading) = *reading else { continue };
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
             if !(self.limits.speed_valid(reading.value) && aged) {
                 health[k] = ChannelHealth::Refused;
@@ -419,7 +364,7 @@ impl<T: Real> KalmanFilter<T> {
     fn settle(&self, state: &mut KalmanState<T>) -> Health {
         let mut health = Health::Good;
         if let Some(running) = &mut state.running {
-            let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > T::of(LOST_S);
+            let blind = running.silent_s[TURBINE].at_most(running.silent_s[OUTPUT]) > T::of(LOST_S);
             let slow = running.mean[OUTPUT] <= self.uncertainty.output_least_rad_s;
             let possible = running.is_sound() && self.limits.shaft_torque_possible(running.mean[SPRING]);
             let limited = self.limits.possible_pressure(running.mean[PRESSURE]);
@@ -482,7 +427,7 @@ impl<T: Real> KalmanFilter<T> {
                     health = health.max(Health::Flare);
                 }
                 estimate.pressure_pa = x[PRESSURE];
-                estimate.shaft_torque_n_m = Some(shaft.max(-limit).min(limit));
+                estimate.shaft_torque_n_m = Some(shaft.at_least(-limit).at_most(limit));
                 estimate.clutch_torque_n_m = if running.acting == Phase::AfterShift {
                     self.model.rigid.clutch_torque(running.acting, x[PRESSURE], engine, x[TURBINE], slip)
                 } else {
@@ -537,7 +482,7 @@ fn holds_offgoing<T: Real>(
     match newest {
         [Some((turbine, _)), Some((output, _)), _] => {
             let slip = model.shift.offgoing_slip(*turbine, *output);
-            slip.abs() <= supervisor.release_slip_rad_s.max(T::of(0.02) * turbine.abs())
+            slip.abs() <= supervisor.release_slip_rad_s.at_least(T::of(0.02) * turbine.abs())
         }
         _ => false,
     }
@@ -556,7 +501,9 @@ impl<T: Real> Running<T> {
     /// Whether mean and covariance are numbers, and no variance is negative.
     #[inline]
     fn is_sound(&self) -> bool {
-        self.mean.iter().all(|x| x.is_finite()) && self.covariance.is_sound()
+        // A sum with a number that is not finite is not finite.
+        let sum = self.mean.iter().fold(T::zero(), |sum, x| sum + *x);
+        sum.is_finite() && self.covariance.is_sound()
     }
 }
 
@@ -581,7 +528,7 @@ impl<T: Real> KalmanState<T> {
     /// Mean and standard deviation of each of the [`STATES`], while the filter runs.
     pub fn states(&self) -> Option<[(T, T); N]> {
         let running = self.running.as_ref()?;
-        Some(core::array::from_fn(|i| (running.mean[i], running.covariance.at(i, i).max(T::zero()).sqrt())))
+        Some(core::array::from_fn(|i| (running.mean[i], running.covariance.at(i, i).at_least(T::zero()).sqrt())))
     }
 
     /// Squared innovations over their variances of the readings of turbine, output and wheel speed that were taken in the last
@@ -595,47 +542,6 @@ impl<T: Real> KalmanState<T> {
         if let Some(running) = self.running.take() {
             self.learnt = Some((LEARNT.map(|i| running.mean[i]), running.covariance.block(LEARNT)));
             self.lost = true;
-        }
-    }
-}
-
-impl<T: Real> SpeedReading<T> {
-    /// The same in another precision.
-    pub fn cast<U: Real>(&self) -> SpeedReading<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
-        SpeedReading {
-            deviation_rad_s: to(self.deviation_rad_s),
-            lag_rad: to(self.lag_rad),
-            pitch_rad: to(self.pitch_rad),
-            delay_s: to(self.delay_s),
-        }
-    }
-}
-
-impl<T: Real> Uncertainty<T> {
-    /// The same in another precision.
-    pub fn cast<U: Real>(&self) -> Uncertainty<U> {
-        let to = |x: T| U::of(x.to_f64_exact());
-        Uncertainty {
-            turbine_share: to(self.turbine_share),
-            turbine_share_s: to(self.turbine_share_s),
-            stiffness_share: to(self.stiffness_share),
-            backlash_n_m: to(self.backlash_n_m),
-            valve_share: to(self.valve_share),
-            valve_gain: to(self.valve_gain),
-            rate_s: to(self.rate_s),
-            friction: to(self.friction),
-            clutch_s: to(self.clutch_s),
-            offgoing_n_m: to(self.offgoing_n_m),
-            offgoing_release_s: to(self.offgoing_release_s),
-            load_shifting_n_m: to(self.load_shifting_n_m),
-            load_in_gear_n_m: to(self.load_in_gear_n_m),
-            wheel_scale: to(self.wheel_scale),
-            wheel_delay_s: self.wheel_delay_s.map(to),
-            skew_s: to(self.skew_s),
-            scale_least: to(self.scale_least),
-            delay_least_s: to(self.delay_least_s),
-            output_least_rad_s: to(self.output_least_rad_s),
         }
     }
 }

@@ -3,6 +3,7 @@
 use drivetrain::{Clutch, Real};
 
 use super::covariance::{ALL, CONSIDERED, Measured};
+use super::predict::hypot;
 use super::valve_model::Commands;
 use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
 use crate::{ChannelHealth, InputLimits, LOST_S, Reading};
@@ -12,6 +13,7 @@ const SETTLED_PA: f64 = 1.0;
 
 /// The offgoing clutch as the filter knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OffgoingClutch<T> {
     /// Its valve.
     pub valve: ValveModel<T>,
@@ -99,16 +101,16 @@ impl<T: Real> KalmanFilter<T> {
             return;
         }
         // Lag and delay err in proportion to what the pressure still has to go.
-        let by_valve = (u.valve_gain * pressure_pa).hypot(u.valve_share * (pressure_pa - offgoing.settled_pa));
+        let by_valve = hypot(u.valve_gain * pressure_pa, u.valve_share * (pressure_pa - offgoing.settled_pa));
         let per_pa = clutch.static_friction * clutch.lever() * clutch.piston_area_m2;
-        let deviation = (u.friction * capacity).hypot(per_pa * by_valve) + self.offgoing.open_n_m;
+        let deviation = hypot(u.friction * capacity, per_pa * by_valve) + self.offgoing.open_n_m;
         let most = capacity + deviation;
         if torque.abs() <= most {
             return;
         }
         let mut with = [T::zero(); ALL];
-        running.covariance.add_row(&mut with, OFFGOING, T::one());
-        let variance = with[OFFGOING].max(T::zero()) + deviation * deviation;
+        running.covariance.add_row::<OFFGOING>(&mut with, T::one());
+        let variance = with[OFFGOING].at_least(T::zero()) + deviation * deviation;
         let beyond = if torque > T::zero() { most - torque } else { -most - torque };
         let gain = running.covariance.correct(&Measured { with, variance }, &[T::one(); CONSIDERED]);
         running.shift_by(&gain, beyond);

@@ -43,8 +43,9 @@ pub(super) struct Place<T> {
 impl<T: Real> Past<T> {
     /// As it would be with accelerations that have stood for long.
     pub(super) fn steady(speeds: [T; SPEEDS], accelerations: [T; SPEEDS]) -> Self {
-        let points = core::array::from_fn(|n| {
-            let age_s = T::of(EVERY_S * (n + 1) as f64);
+        let mut age_s = T::zero();
+        let points = core::array::from_fn(|_| {
+            age_s = age_s + T::of(EVERY_S);
             Point { age_s, speeds: core::array::from_fn(|k| speeds[k] - age_s * accelerations[k]) }
         });
         Self { points }
@@ -101,7 +102,8 @@ impl<T: Real> Past<T> {
     #[inline]
     pub(super) fn accelerations(&self, k: usize, now: T) -> [T; 2] {
         let [newest, oldest] = &self.points;
-        let over = |late: T, early: &Point<T>, span_s: T| (late - early.speeds[k]) / span_s.max(T::of(LEAST_SPAN_S));
+        let over =
+            |late: T, early: &Point<T>, span_s: T| (late - early.speeds[k]) / span_s.at_least(T::of(LEAST_SPAN_S));
         let before = over(newest.speeds[k], oldest, oldest.age_s - newest.age_s);
         let after = if newest.age_s >= T::of(LEAST_SPAN_S) { newest } else { oldest };
         [over(now, after, after.age_s), before]

@@ -29,7 +29,7 @@ impl<T: Real> KalmanFilter<T> {
     pub(super) fn find_phase(&self, state: &mut KalmanState<T>, dt_s: T) {
         let shift = &self.model.shift;
         let readings = match state.newest {
-            [Some((turbine, a)), Some((output, b)), _] if a.max(b) < T::of(FRESH_S) => Some((turbine, output)),
+            [Some((turbine, a)), Some((output, b)), _] if a.at_least(b) < T::of(FRESH_S) => Some((turbine, output)),
             _ => None,
         };
         let filtered = state.running.as_ref().map(|running| (running.mean[TURBINE], running.mean[OUTPUT]));

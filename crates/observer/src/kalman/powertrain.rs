@@ -175,33 +175,31 @@ pub(super) struct Tangent<T> {
 }
 
 impl<T: Real> Tangent<T> {
-    /// Changes of the states that have a law at the end, of changes of the states that it depends on, for several changes
-    /// side by side.
-    #[inline]
-    pub(super) fn of<const W: usize>(&self, x: &[[T; W]; COLUMNS]) -> [[T; W]; LAWS] {
+    /// Changes of the states that have a law at the end, of changes of the states that it depends on.
+    #[inline(always)]
+    pub(super) fn of(&self, x: &[T; COLUMNS]) -> [T; LAWS] {
         let half = T::of(0.5);
-        let mut next = [[T::zero(); W]; LAWS];
-        for c in 0..W {
-            let (output, wheel, spring) = (x[OUTPUT][c], x[WHEEL][c], x[SPRING][c]);
-            let twist = output * self.per_ratio - wheel;
-            let middle = wheel + half * self.per_inertia * (spring + self.damping * twist - x[LOAD][c]);
-            let held = (spring + self.shaft_per_twist * (output * self.per_ratio - middle)) * self.per_ratio;
-            let turbine_torque = self.turbine_per_share * x[SHARE][c] + self.turbine_per_speed * x[TURBINE][c];
-            let oncoming = self.oncoming_per_pressure * x[PRESSURE][c] + self.oncoming_per_friction * x[FRICTION][c];
-            let by = |end: usize| {
-                self.per_turbine_torque[end] * turbine_torque
-                    + self.per_oncoming_torque[end] * oncoming
-                    + self.per_offgoing_torque[end] * x[OFFGOING][c]
-                    + self.per_output_torque[end] * held
-            };
-            let mean_twist = (output + half * by(1)) * self.per_ratio - middle;
-            let shaft = spring + self.shaft_per_twist * mean_twist;
-            next[TURBINE][c] = x[TURBINE][c] + by(0);
-            next[OUTPUT][c] = output + by(1);
-            next[WHEEL][c] = wheel + self.per_inertia * (shaft - x[LOAD][c]);
-            next[SPRING][c] = spring + self.stiffness * self.dt_s * mean_twist;
-            next[PRESSURE][c] = self.phi * x[PRESSURE][c] + self.per_gain * x[GAIN][c];
-        }
+        let (output, wheel, spring) = (x[OUTPUT], x[WHEEL], x[SPRING]);
+        let twist = output * self.per_ratio - wheel;
+        let middle = wheel + half * self.per_inertia * (spring + self.damping * twist - x[LOAD]);
+        let held = (spring + self.shaft_per_twist * (output * self.per_ratio - middle)) * self.per_ratio;
+        let turbine_torque = self.turbine_per_share * x[SHARE] + self.turbine_per_speed * x[TURBINE];
+        let oncoming = self.oncoming_per_pressure * x[PRESSURE] + self.oncoming_per_friction * x[FRICTION];
+        let by = |end: usize| {
+            self.per_turbine_torque[end] * turbine_torque
+                + self.per_oncoming_torque[end] * oncoming
+                + self.per_offgoing_torque[end] * x[OFFGOING]
+                + self.per_output_torque[end] * held
+        };
+        let (by_turbine, by_output) = (by(0), by(1));
+        let mean_twist = (output + half * by_output) * self.per_ratio - middle;
+        let shaft = spring + self.shaft_per_twist * mean_twist;
+        let mut next = [T::zero(); LAWS];
+        next[TURBINE] = x[TURBINE] + by_turbine;
+        next[OUTPUT] = output + by_output;
+        next[WHEEL] = wheel + self.per_inertia * (shaft - x[LOAD]);
+        next[SPRING] = spring + self.stiffness * self.dt_s * mean_twist;
+        next[PRESSURE] = self.phi * x[PRESSURE] + self.per_gain * x[GAIN];
         next
     }
 }
@@ -268,8 +266,9 @@ mod tests {
         ] {
             x[state] = value;
         }
-        let unit = core::array::from_fn(|i| core::array::from_fn(|c| if i == c { 1.0 } else { 0.0 }));
-        let f: [[f64; COLUMNS]; LAWS] = step.tangent(&x, &step.propagate(&x)).of(&unit);
+        let tangent = step.tangent(&x, &step.propagate(&x));
+        let unit = |c: usize| core::array::from_fn(|i| if i == c { 1.0 } else { 0.0 });
+        let columns: [[f64; LAWS]; COLUMNS] = core::array::from_fn(|c| tangent.of(&unit(c)));
         for c in 0..COLUMNS {
             let small = 1e-5 * x[c].abs().max(1e-2);
             let moved = |by: f64| {
@@ -290,7 +289,7 @@ mod tests {
                 let slope = (up[r] - down[r]) / (2.0 * small);
                 // The difference of two states near `up[r]` is rounded.
                 let tolerance = 1e-6 * slope.abs() + 4.0 * f64::EPSILON * up[r].abs() / small;
-                assert!((slope - f[r][c]).abs() <= tolerance, "{r} {c}: {slope} {}", f[r][c]);
+                assert!((slope - columns[c][r]).abs() <= tolerance, "{r} {c}: {slope} {}", columns[c][r]);
             }
         }
     }

@@ -49,7 +49,7 @@ impl<T: Real> KalmanFilter<T> {
         let ages = [(TURBINE, turbine), (OUTPUT, output)].map(|(k, speed)| {
             let sensor = &self.readings[k];
             let read_s = state.newest[k].map_or(zero, |(_, age_s)| age_s);
-            read_s + sensor.delay_s + sensor.lag_rad / speed.abs().max(u.output_least_rad_s)
+            read_s + sensor.delay_s + sensor.lag_rad / speed.abs().at_least(u.output_least_rad_s)
         });
         let mut mean = [zero; N];
         mean[TURBINE] = turbine + ages[TURBINE] * accelerations[TURBINE];
@@ -64,7 +64,7 @@ impl<T: Real> KalmanFilter<T> {
         for k in [TURBINE, OUTPUT] {
             // In a shift, or on a hill, the acceleration is another one.
             let old = (ages[k] + u.skew_s) * accelerations[k];
-            deviations[k] = self.readings[k].deviation_rad_s.hypot(old);
+            deviations[k] = hypot(self.readings[k].deviation_rad_s, old);
         }
         // Out of balance the shafts swing, at the start of a log as much as the torque itself.
         deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
@@ -180,7 +180,7 @@ impl<T: Real> KalmanFilter<T> {
         let valve = self.valve.step(settled_pa, x[PRESSURE], dt_s);
         let per_start = valve.psi / dt_s;
         let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s / dt_s;
-        let sigma_pa = running.covariance.at(PRESSURE, PRESSURE).max(zero).sqrt();
+        let sigma_pa = running.covariance.at(PRESSURE, PRESSURE).at_least(zero).sqrt();
         let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), sigma_pa);
         let (turbine_n_m, slope_n_m_s) =
             rigid.converter.turbine_with_slope(engine.speed_before(left_s + half * dt_s), x[TURBINE]);
@@ -188,7 +188,7 @@ impl<T: Real> KalmanFilter<T> {
             dt_s,
             rows,
             // A torque that rises with the turbine speed is taken as it is at the start: implicit it might have no solution.
-            turbine: [turbine_n_m, slope_n_m_s.min(zero)],
+            turbine: [turbine_n_m, slope_n_m_s.at_most(zero)],
             held: !released,
             per_pressure: if locked {
                 zero
@@ -217,7 +217,7 @@ impl<T: Real> KalmanFilter<T> {
         let per_10_ms = dt / T::of(0.01);
         // How the pressure moves or moved a while ago.
         let rate = ((one - step.valve.phi) * (settled_pa - x[PRESSURE]) / dt).abs();
-        running.motion_pa_s = rate.max(running.motion_pa_s * lasting(dt, u.rate_s));
+        running.motion_pa_s = rate.at_least(running.motion_pa_s * lasting(dt, u.rate_s));
         let shifting = matches!(running.acting, Phase::TorquePhase | Phase::InertiaPhase);
         let released = matches!(running.acting, Phase::InertiaPhase | Phase::AfterShift);
         let twist_rate = x[OUTPUT] / step.ratio - x[WHEEL];
@@ -240,7 +240,8 @@ impl<T: Real> KalmanFilter<T> {
         p.add(LOAD, dt * square(if shifting { u.load_shifting_n_m } else { u.load_in_gear_n_m }));
         if engine.silent_s > T::of(0.5) * T::of(FIRST_S) {
             // A missing engine speed leaves the turbine torque open.
-            let torque = square(step.turbine[0]) * engine.variance() / square(engine.speed_before(T::zero())).max(one);
+            let torque =
+                square(step.turbine[0]) * engine.variance() / square(engine.speed_before(T::zero())).at_least(one);
             for (k, row) in [(TURBINE, &step.rows[0]), (OUTPUT, &step.rows[1])] {
                 p.add(k, square(two * dt * row.per_turbine_torque) * torque);
             }
@@ -254,6 +255,12 @@ pub(super) fn at_start<T: Real>((share, beside): (f64, f64), torque_n_m: T) -> T
     T::of(share) * torque_n_m.abs() + T::of(beside)
 }
 
+/// Length of the hypotenuse. That of the mathematical library computes in double precision.
+#[inline]
+pub(super) fn hypot<T: Real>(a: T, b: T) -> T {
+    (a * a + b * b).sqrt()
+}
+
 /// What is left after `dt_s` of a random number that lasts for a time, as implicit Euler has it.
 #[inline]
 fn lasting<T: Real>(dt_s: T, time_s: T) -> T {
@@ -263,7 +270,7 @@ fn lasting<T: Real>(dt_s: T, time_s: T) -> T {
 /// Mean of `max(x, 0)` and its derivative, of a normal distribution about `x`.
 #[inline]
 pub(super) fn above<T: Real>(x: T, deviation: T) -> (T, T) {
-    let z = x / deviation.max(T::min_positive_value());
+    let z = x / deviation.at_least(T::min_positive_value());
     if z.abs() >= T::of(6.0) || z.is_nan() {
         return if x > T::zero() { (x, T::one()) } else { (T::zero(), T::zero()) };
     }

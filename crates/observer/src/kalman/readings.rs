@@ -2,10 +2,10 @@
 
 use drivetrain::Real;
 
-use super::covariance::{ALL, CONSIDERED, Measured, speed_at};
+use super::covariance::{CONSIDERED, Measured, speed_at};
 use super::gate::Verdict;
-use super::past::Place;
-use super::{DELAY, FRICTION, GAIN, KalmanFilter, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
+use super::past::{PASTS, Place, SPEEDS};
+use super::{DELAY, FRICTION, GAIN, KalmanFilter, N, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
 use crate::{ChannelHealth, Phase, Reading};
 
 /// Standard deviation of a uniform distribution, in its width.
@@ -31,15 +31,15 @@ impl<T: Real> KalmanFilter<T> {
         let (zero, one, sensor) = (T::zero(), T::one(), &self.readings[k]);
         let skew = running.mean[SKEW];
         // The earlier one of turbine and output has no delay.
-        let (late_turbine, late_output) = ((-skew).max(zero), skew.max(zero));
+        let (late_turbine, late_output) = ((-skew).at_least(zero), skew.at_least(zero));
         let learnt_s = match k {
             TURBINE => late_turbine,
             OUTPUT => late_output,
             _ => running.mean[DELAY] + late_turbine,
         };
         let slowest = self.uncertainty.output_least_rad_s * if k == WHEEL { self.wheel_per_output() } else { one };
-        let size = reading.value.abs().max(slowest);
-        let age_s = (reading.age_s + sensor.delay_s + sensor.lag_rad / size + learnt_s).max(zero);
+        let size = reading.value.abs().at_least(slowest);
+        let age_s = (reading.age_s + sensor.delay_s + sensor.lag_rad / size + learnt_s).at_least(zero);
         let line = self.line(running, k, age_s, size);
         let scale = if k == WHEEL { one + running.mean[SCALE] } else { one };
         let by_delay = scale * line.per_age;
@@ -57,12 +57,11 @@ impl<T: Real> KalmanFilter<T> {
         };
         // Readings that come more often than teeth tell no more than the teeth do.
         let since_s = core::mem::replace(&mut running.silent_s[k], zero);
-        let repeated = if since_s > zero { (sensor.pitch_rad / (size * since_s)).max(one) } else { one };
+        let repeated = if since_s > zero { (sensor.pitch_rad / (size * since_s)).at_least(one) } else { one };
         let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
         let place = Place { shares: line.place.shares.map(|share| scale * share), ..line.place };
-        let mut measured = Measured { with: [zero; ALL], variance: noise };
-        with_reading(&mut measured, running, k, &place, by);
+        let mut measured = with_reading(running, k, &place, by, noise);
         let verdict = running.gates[k].judge(innovation, measured.variance);
         match verdict {
             Verdict::Refused => {
@@ -71,8 +70,7 @@ impl<T: Real> KalmanFilter<T> {
             }
             Verdict::Jumped => {
                 running.covariance.add(k, innovation * innovation);
-                measured = Measured { with: [zero; ALL], variance: noise };
-                with_reading(&mut measured, running, k, &place, by);
+                measured = with_reading_again(running, k, &place, by, noise);
             }
             Verdict::Taken => {}
         }
@@ -120,11 +118,9 @@ impl<T: Real> KalmanFilter<T> {
     #[inline]
     pub(super) fn tie(&self, running: &mut Running<T>, dt_s: T) {
         let ratio = self.model.shift.ratio_offgoing();
-        let mut with = [T::zero(); ALL];
-        running.covariance.add_row(&mut with, TURBINE, T::one());
-        running.covariance.add_row(&mut with, OUTPUT, -ratio);
+        let with = running.covariance.sum_of::<TURBINE, OUTPUT>([T::one(), -ratio]);
         let deviation = self.readings[TURBINE].deviation_rad_s;
-        let variance = (with[TURBINE] - ratio * with[OUTPUT]).max(T::zero()) + deviation * deviation;
+        let variance = (with[TURBINE] - ratio * with[OUTPUT]).at_least(T::zero()) + deviation * deviation;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
         self.apply(running, &Measured { with, variance }, innovation, dt_s);
     }
@@ -146,7 +142,7 @@ impl<T: Real> KalmanFilter<T> {
         let least = [(SCALE, u.scale_least), (DELAY, u.delay_least_s), (SKEW, u.delay_least_s)];
         for (state, least) in least {
             if running.covariance.at(state, state) <= least * least {
-                shares[state - SHARE] = (since_s / T::of(SLOWLY_S)).min(T::one());
+                shares[state - SHARE] = (since_s / T::of(SLOWLY_S)).at_most(T::one());
             }
         }
         let gain = running.covariance.correct(measured, &shares);
@@ -156,8 +152,8 @@ impl<T: Real> KalmanFilter<T> {
         running.shift_by(&gain, innovation);
         let [least, most] = u.wheel_delay_s;
         let x = &mut running.mean;
-        x[DELAY] = x[DELAY].max(least).min(most);
-        x[SKEW] = x[SKEW].max(-u.skew_s).min(u.skew_s);
+        x[DELAY] = x[DELAY].at_least(least).at_most(most);
+        x[SKEW] = x[SKEW].at_least(-u.skew_s).at_most(u.skew_s);
     }
 }
 
@@ -166,18 +162,34 @@ impl<T: Real> KalmanFilter<T> {
 fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2]) -> T {
     let [late, early] = points.map(|point| speed_at(k, point));
     let p = &running.covariance;
-    (p.at(late, late) - T::of(2.0) * p.at(late, early) + p.at(early, early)).max(T::zero())
+    (p.at(late, late) - T::of(2.0) * p.at(late, early) + p.at(early, early)).at_least(T::zero())
 }
 
-/// Adds to a measurement that is noise so far what a reading of the speed `k` at a place in time has to do with the states: it
-/// also depends on scale, wheel delay and skew as `by` says.
-#[inline]
-fn with_reading<T: Real>(measured: &mut Measured<T>, running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3]) {
-    let [late, early] = place.between.map(|point| speed_at(k, point));
-    let weights = [(late, place.shares[0]), (early, place.shares[1]), (SCALE, by[0]), (DELAY, by[1]), (SKEW, by[2])];
-    for (row, weight) in weights {
-        running.covariance.add_row(&mut measured.with, row, weight);
-    }
-    let total = weights.into_iter().fold(T::zero(), |sum, (row, weight)| sum + weight * measured.with[row]);
-    measured.variance = measured.variance + total.max(T::zero());
+/// The measurement that a reading of the speed `k` at a place in time is, with this noise: it also depends on scale, wheel
+/// delay and skew as `by` says.
+#[inline(always)]
+fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
+    const { assert!(PASTS == 2, "a reading is between now and the newer of the past, or between both") };
+    let (p, shares, recent) = (&running.covariance, place.shares, place.between[0] == 0);
+    let mut with = match (k, recent) {
+        (TURBINE, true) => p.sum_of::<TURBINE, { N + TURBINE }>(shares),
+        (TURBINE, false) => p.sum_of::<{ N + TURBINE }, { N + SPEEDS + TURBINE }>(shares),
+        (OUTPUT, true) => p.sum_of::<OUTPUT, { N + OUTPUT }>(shares),
+        (OUTPUT, false) => p.sum_of::<{ N + OUTPUT }, { N + SPEEDS + OUTPUT }>(shares),
+        (_, true) => p.sum_of::<WHEEL, { N + WHEEL }>(shares),
+        (_, false) => p.sum_of::<{ N + WHEEL }, { N + SPEEDS + WHEEL }>(shares),
+    };
+    p.add_row::<SCALE>(&mut with, by[0]);
+    p.add_row::<DELAY>(&mut with, by[1]);
+    p.add_row::<SKEW>(&mut with, by[2]);
+    let [late, early] = place.between.map(|point| with[speed_at(k, point)]);
+    let total = shares[0] * late + shares[1] * early + by[0] * with[SCALE] + by[1] * with[DELAY] + by[2] * with[SKEW];
+    Measured { with, variance: noise + total.at_least(T::zero()) }
+}
+
+/// The same after the speed has jumped, which is rare.
+#[cold]
+#[inline(never)]
+fn with_reading_again<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
+    with_reading(running, k, place, by, noise)
 }

@@ -7,6 +7,7 @@ const REMEMBERED: usize = 32;
 
 /// The valve model.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ValveModel<T> {
     /// Lag and gain over the operating point.
     pub valve: ClutchValve<T>,
@@ -56,7 +57,7 @@ impl<T: Real> Commands<T> {
     #[inline]
     pub(crate) fn send(&mut self, age_s: T, settled_pa: T, needed_s: T) {
         // Commands arrive in their order; the oldest one gives way.
-        let age_s = self.sent.iter().take(self.count.min(1)).fold(age_s, |age, newest| age.min(newest.age_s));
+        let age_s = self.sent.iter().take(self.count.min(1)).fold(age_s, |age, newest| age.at_most(newest.age_s));
         let oldest = self.sent.iter().take(self.count).position(|sent| sent.age_s >= needed_s);
         let kept = oldest.map_or(self.count, |at| at + 1).min(REMEMBERED - 1);
         let mut moved = Sent { age_s, settled_pa };
@@ -79,7 +80,7 @@ impl<T: Real> Commands<T> {
         }
         let (mut until, mut sum) = (newest, T::zero());
         for sent in self.sent.iter().take(self.count) {
-            let begun = sent.age_s.max(newest).min(oldest);
+            let begun = sent.age_s.at_least(newest).at_most(oldest);
             sum = sum + (begun - until) * sent.settled_pa;
             until = begun;
             if sent.age_s >= oldest {

@@ -1,7 +1,7 @@
 //! The teeth of a wheel that have passed its sensor.
 //!
-//! Thousands of teeth pass, but a reading needs the times of two of them. Every tooth is counted; its time is computed
-//! when a reading asks for it.
+//! Thousands of teeth pass, but a reading needs the times of two of them. The teeth of every interval are counted; the time of
+//! one is computed when a reading asks for it.
 
 use config::SpeedSensor;
 
@@ -13,12 +13,25 @@ pub(super) struct Teeth<'a> {
     truth: Channel<'a>,
     timer_s: f64,
     ticks_per_s: f64,
+    /// Angle between two teeth, rad.
+    pitch: f64,
     /// Times of the teeth that the first readings need, before the record, s.
     before_s: Vec<f64>,
-    passes: Vec<Pass>,
-    /// How many of the record's times and passes are surely over.
+    /// Between each time of the record and the next one.
+    intervals: Vec<Interval>,
+    /// How many pass in the whole record.
+    count: usize,
+    /// How many of the record's times are surely over.
     times: usize,
+}
+
+/// What passes between two times of the record.
+#[derive(Debug, Clone, Copy)]
+struct Interval {
+    /// How many teeth have passed before.
     passed: usize,
+    /// How far the wheel turns until the first one passes, rad.
+    to_go: f64,
 }
 
 /// A tooth of the record.
@@ -39,20 +52,21 @@ impl<'a> Teeth<'a> {
             truth,
             timer_s: sensor.timer_s,
             ticks_per_s,
+            pitch,
             before_s: Vec::new(),
-            passes: Vec::new(),
+            intervals: Vec::with_capacity(time_s.len().saturating_sub(1)),
+            count: 0,
             times: 0,
-            passed: 0,
         };
-        teeth.passes.reserve(expected(truth, pitch));
         teeth.before_s = before_the_record(sensor, truth, pitch).map(|edge_s| teeth.tick(edge_s)).collect();
         // How far the wheel has to turn until the next tooth passes.
         let mut to_go = pitch;
         for end in 1..time_s.len() {
+            teeth.intervals.push(Interval { passed: teeth.count, to_go });
             let turned = 0.5 * (speed[end - 1].abs() + speed[end].abs()) * (time_s[end] - time_s[end - 1]);
             let mut next = to_go;
             while next <= turned {
-                teeth.passes.push(Pass { end, turned_rad: next });
+                teeth.count += 1;
                 next += pitch;
             }
             to_go = next - turned;
@@ -62,16 +76,19 @@ impl<'a> Teeth<'a> {
 
     /// How many have passed by a time, s, not before the time of the last question.
     pub(super) fn passed(&mut self, now_s: f64) -> usize {
-        // The timer moves a tooth by half a tick: only those about now have to be timed.
+        // The timer moves a tooth by half a tick: only those of the intervals about now have to be timed.
         let surely_s = now_s - self.timer_s - SAME_TIME_S;
         while self.truth.time_s.get(self.times).is_some_and(|&time_s| time_s <= surely_s) {
             self.times += 1;
         }
-        while self.passes.get(self.passed).is_some_and(|pass| pass.end < self.times) {
-            self.passed += 1;
-        }
-        let about_now = self.passes[self.passed..].iter().take_while(|pass| self.pass_s(pass) <= now_s).count();
-        match self.passed + about_now {
+        let begun = self.times.saturating_sub(1);
+        let perhaps_s = now_s + self.timer_s + SAME_TIME_S;
+        let about_now = (begun..self.intervals.len())
+            .take_while(|&interval| self.truth.time_s[interval] <= perhaps_s)
+            .flat_map(|interval| self.passes(interval))
+            .take_while(|pass| self.pass_s(pass) <= now_s)
+            .count();
+        match self.passed_before(begun) + about_now {
             0 => self.before_s.partition_point(|&edge_s| edge_s <= now_s),
             passed => self.before_s.len() + passed,
         }
@@ -81,8 +98,28 @@ impl<'a> Teeth<'a> {
     pub(super) fn time_s(&self, tooth: usize) -> f64 {
         match self.before_s.get(tooth) {
             Some(&edge_s) => edge_s,
-            None => self.pass_s(&self.passes[tooth - self.before_s.len()]),
+            None => {
+                let number = tooth - self.before_s.len();
+                // The last interval that begins with no more.
+                let interval = self.intervals.partition_point(|interval| interval.passed <= number).saturating_sub(1);
+                let within = number - self.passed_before(interval);
+                self.passes(interval).nth(within).map_or(f64::NAN, |pass| self.pass_s(&pass))
+            }
         }
+    }
+
+    /// How many have passed before an interval.
+    fn passed_before(&self, interval: usize) -> usize {
+        self.intervals.get(interval).map_or(self.count, |interval| interval.passed)
+    }
+
+    /// The teeth of an interval.
+    fn passes(&self, interval: usize) -> impl Iterator<Item = Pass> {
+        let count = self.passed_before(interval + 1) - self.passed_before(interval);
+        let first = self.intervals.get(interval).map_or(0.0, |interval| interval.to_go);
+        // Each is one pitch after the one before, by the same sums as they were counted.
+        let turned = std::iter::successors(Some(first), |turned| Some(turned + self.pitch)).take(count);
+        turned.map(move |turned_rad| Pass { end: interval + 1, turned_rad })
     }
 
     fn pass_s(&self, pass: &Pass) -> f64 {
@@ -97,17 +134,6 @@ impl<'a> Teeth<'a> {
     fn tick(&self, time_s: f64) -> f64 {
         if self.ticks_per_s > 0.0 { (time_s * self.ticks_per_s).round() * self.timer_s } else { time_s }
     }
-}
-
-/// About how many teeth pass; no more than make sense to make room for.
-fn expected(truth: Channel<'_>, pitch: f64) -> usize {
-    const MOST: f64 = 1e5;
-    let ends = |values: &[f64]| Some((*values.first()?, *values.last()?));
-    let (Some((from_s, to_s)), Some((from, to))) = (ends(truth.time_s), ends(truth.values)) else { return 0 };
-    let turned = from.abs().max(to.abs()) * (to_s - from_s);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited")]
-    let count = (turned / pitch).clamp(0.0, MOST) as usize;
-    count
 }
 
 /// Times of the teeth that the first readings need. Before the record begins, the wheel turns as at its beginning.
@@ -150,7 +176,7 @@ mod tests {
                 outlier_rad_s: 0.0,
             };
             let mut teeth = Teeth::new(&sensor, from(start));
-            let count = teeth.before_s.len() + teeth.passes.len();
+            let count = teeth.before_s.len() + teeth.count;
             let times: Vec<f64> = (0..count).map(|tooth| teeth.time_s(tooth)).collect();
             assert!(count > 500 && times.is_sorted(), "{count}");
             let grid = (-10..7000).map(|i| f64::from(i) * 1e-4);

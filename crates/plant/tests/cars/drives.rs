@@ -99,6 +99,27 @@ fn a_dual_clutch_launches_shifts_up_comes_to_rest_and_launches_again() {
     assert!(least > 60.0 && jerk.0 < 70.0);
 }
 
+/// A launch clutch whose piston has a stroke is filled before it takes torque: the car moves as soon as without a stroke, but for
+/// the time of the fill.
+#[test]
+fn a_launch_clutch_with_a_stroke_is_filled() {
+    let text = "name = \"d\"\n[[segment]]\nduration_s = 2\nthrottle = 0.0\nbrake = 0.15\n\
+                [[segment]]\nduration_s = 0.1\nthrottle = [0.0, 0.2]\n[[segment]]\nduration_s = 4\nthrottle = 0.2\n";
+    let launch = |car: &Car| {
+        let driven = samples(car, &drive(text)).unwrap();
+        let jerk = driven.windows(2).map(|pair| (pair[1].vehicle_m_s2 - pair[0].vehicle_m_s2).abs() / 0.01);
+        let carries = driven.iter().find(|sample| sample.time_s > 2.0 && sample.vehicle_m_s > 0.1).unwrap();
+        (carries.time_s - 2.0, jerk.fold(0.0, f64::max), driven.last().unwrap().vehicle_m_s)
+    };
+    let (without, with) = (launch(&crate::dual_clutch()), launch(&crate::with_stroke(crate::dual_clutch())));
+    println!(
+        "launch: moves after {:.2} s, with stroke {:.2} s; jerk {:.0}, {:.0} m/s^3",
+        without.0, with.0, without.1, with.1
+    );
+    assert!(with.0 < without.0 + 0.35 && with.1 < 70.0, "{without:?} {with:?}");
+    assert!((with.2 - without.2).abs() < 0.5, "{without:?} {with:?}");
+}
+
 #[test]
 fn a_dual_clutch_creeps_without_throttle_and_stands_with_the_brake() {
     let car = crate::dual_clutch();

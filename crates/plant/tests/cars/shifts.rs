@@ -113,7 +113,7 @@ fn pulse_width_valves_shift_too() {
 #[test]
 fn with_friction_15_percent_off_every_shift_is_completed_and_flares_are_caught() {
     for friction in [0.85, 1.15] {
-        each_shift("nominal", cars(), friction, [1.8, 7.0, 10.0, 70.0, 0.1, 70.0]);
+        each_shift("nominal", cars(), friction, [1.8, 5.0, 10.0, 70.0, 0.1, 70.0]);
     }
 }
 
@@ -121,7 +121,7 @@ fn with_friction_15_percent_off_every_shift_is_completed_and_flares_are_caught()
 fn with_a_stroke_and_friction_15_percent_off_every_shift_is_completed_and_flares_are_caught() {
     for friction in [0.85, 1.15] {
         let cars = cars().into_iter().map(crate::with_stroke).collect();
-        each_shift("with stroke", cars, friction, [2.0, 8.0, 10.0, 70.0, 0.1, 70.0]);
+        each_shift("with stroke", cars, friction, [2.0, 5.0, 10.0, 70.0, 0.1, 70.0]);
     }
 }
 

@@ -1,8 +1,10 @@
 //! The paths in which the program spends its time.
 
 use std::hint::black_box;
+use std::io;
+use std::path::Path;
 
-use config::{Car, Experiment, ObserverKind};
+use config::{Car, Experiment, GainMethod, ObserverKind, Vehicle};
 use design::rigid::design_phase;
 use design::{
     ShiftErrors, ShiftTables, any_shift_filter, design_rigid, kalman_filter, range, requirement, rigid_observer,
@@ -11,8 +13,10 @@ use observer::{Estimator, Phase};
 use plant::car::CarShift;
 use plant::{Contact, Direction, Inputs, Mode, Powertrain, Simulation, State};
 use study::any_shift::{ShiftDraw, inputs, simulated};
+use study::{AnyObserver, Log, LogRow};
+use trace::{CsvRows, CsvWriter};
 
-use crate::shared::{THREE, campaign, estimate, log_of, observer, samples, vehicle};
+use crate::shared::{SAMPLE_TIME_S, THREE, campaign, samples, vehicle, write_log};
 
 /// A path, with what it does prepared outside of the count.
 pub(crate) struct HotPath {
@@ -145,6 +149,26 @@ fn study_runs() -> Box<dyn FnMut()> {
 
 /// Reads rows, runs the default observer with its range, and writes rows, as `wetclutch estimate` does.
 fn estimate_rows() -> Box<dyn FnMut()> {
-    let (vehicle, observer, log) = (vehicle(), observer(ObserverKind::Kalman), log_of(10_000));
+    let (vehicle, observer, log) = (vehicle(), observer(ObserverKind::Kalman), write_log(Vec::new(), 10_000));
     Box::new(move || estimate(&observer, &vehicle, &log))
+}
+
+/// An observer for such a log.
+fn observer(kind: ObserverKind) -> AnyObserver {
+    let sensors = Experiment::bench().unwrap().sensors_told;
+    AnyObserver::designed(&vehicle(), kind, GainMethod::Iss, SAMPLE_TIME_S, sensors.as_ref()).unwrap()
+}
+
+/// Reads such a log, runs an observer with its range, and writes all columns of its estimates as CSV.
+fn estimate(observer: &AnyObserver, vehicle: &Vehicle, log: &[u8]) {
+    let rows = CsvRows::of(Path::new("log.csv"), Box::new(io::Cursor::new(log.to_vec()))).unwrap();
+    let log = Log::of(rows, vehicle, 1).unwrap();
+    let columns = observer.columns(log.signals().has_wheel_speed()).columns();
+    let mut writer = CsvWriter::new(io::sink(), columns.iter().map(|column| column.name)).unwrap();
+    let samples = log.map(|sample| sample.map_err(|error| error.to_string()));
+    let write = |row: LogRow, estimate| {
+        let cells = columns.iter().map(|column| column.cell(&estimate));
+        writer.row(row.time_s, cells).map_err(|error| error.to_string())
+    };
+    observer.run_over(Some(vehicle), samples, write).unwrap();
 }

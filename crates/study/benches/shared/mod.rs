@@ -4,11 +4,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use config::{Experiment, GainMethod, ObserverKind, Study, Vehicle};
+use config::{Experiment, Study, Vehicle};
 use observer::Input;
 use study::sampling::through_sensors;
-use study::{AnyObserver, Campaign, Log, LogRow, RunColumns, simulate_shift};
-use trace::{Cell, CsvRows, CsvWriter, Trace};
+use study::{Campaign, RunColumns, simulate_shift};
+use trace::{Cell, CsvWriter, Trace};
 
 /// Sample time of the observers, s.
 pub(crate) const SAMPLE_TIME_S: f64 = 0.01;
@@ -35,40 +35,20 @@ pub(crate) fn samples() -> Vec<Input<f64>> {
     columns.samples().map(|sample| sample.unwrap().0).collect()
 }
 
-/// A log as CSV: the readings of that shift again and again.
-pub(crate) fn log_of(rows: u32) -> Vec<u8> {
+/// Writes a log as CSV: the readings of that shift again and again.
+pub(crate) fn write_log<W: io::Write>(writer: W, rows: u32) -> W {
     let measured = seen().filtered(|name| {
         let is_speed = name.ends_with("_speed_rad_s") && !name.starts_with("vehicle");
         is_speed || name == trace::signal::ONCOMING_CURRENT
     });
     let names: Vec<&str> = measured.columns.iter().map(|column| column.name.as_str()).collect();
-    let mut writer = CsvWriter::new(Vec::new(), names.iter().copied()).unwrap();
+    let mut writer = CsvWriter::new(writer, names.iter().copied()).unwrap();
     for row in 0..rows {
         let at = row as usize % measured.len();
         let cells = names.iter().map(|name| Cell::Number(measured.get(name).map_or(f64::NAN, |values| values[at])));
         writer.row(f64::from(row) * SAMPLE_TIME_S, cells).unwrap();
     }
     writer.finish().unwrap()
-}
-
-/// An observer for such a log.
-pub(crate) fn observer(kind: ObserverKind) -> AnyObserver {
-    let sensors = Experiment::bench().unwrap().sensors_told;
-    AnyObserver::designed(&vehicle(), kind, GainMethod::Iss, SAMPLE_TIME_S, sensors.as_ref()).unwrap()
-}
-
-/// Reads such a log, runs an observer with its range, and writes all columns of its estimates as CSV.
-pub(crate) fn estimate(observer: &AnyObserver, vehicle: &Vehicle, log: &[u8]) {
-    let rows = CsvRows::of(Path::new("log.csv"), Box::new(io::Cursor::new(log.to_vec()))).unwrap();
-    let log = Log::of(rows, vehicle, 1).unwrap();
-    let columns = observer.columns(log.signals().has_wheel_speed()).columns();
-    let mut writer = CsvWriter::new(io::sink(), columns.iter().map(|column| column.name)).unwrap();
-    let samples = log.map(|sample| sample.map_err(|error| error.to_string()));
-    let write = |row: LogRow, estimate| {
-        let cells = columns.iter().map(|column| column.cell(&estimate));
-        writer.row(row.time_s, cells).map_err(|error| error.to_string())
-    };
-    observer.run_over(Some(vehicle), samples, write).unwrap();
 }
 
 /// Three of the observers of the shipped study.

@@ -4,6 +4,7 @@ use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Health;
+use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating};
 
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
@@ -207,34 +208,69 @@ pub fn score_drive(
     let errors = ShiftErrors::STANDARD;
     let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
     let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
-    let mut state = filter.start();
-    let mut passing = PassingShifts::default();
-    let mut rating: Option<CarShiftRating> = None;
+    let mut scorer = DriveScorer::new(known, model, &tables, &filter);
     for (sample, input) in recording.samples.iter().zip(recording.inputs(known, &tables, sensors, seed)) {
-        let estimate = filter.step(&mut state, &input);
+        scorer.push(sample, &input);
+    }
+    Ok(scorer.finish())
+}
+
+/// Scores the estimates of a drive row by row.
+pub struct DriveScorer<'a> {
+    known: &'a Car,
+    model: &'a CarModel,
+    tables: &'a ShiftTables<f64>,
+    filter: &'a AnyShiftFilter<'a, f64>,
+    state: AnyShiftState<f64>,
+    passing: PassingShifts,
+    rating: Option<CarShiftRating>,
+    last: Option<CarSample>,
+}
+
+impl<'a> DriveScorer<'a> {
+    /// Of the filter of the car `known`, on a drive of the car `model`.
+    pub fn new(
+        known: &'a Car,
+        model: &'a CarModel,
+        tables: &'a ShiftTables<f64>,
+        filter: &'a AnyShiftFilter<'a, f64>,
+    ) -> Self {
+        let (state, passing) = (filter.start(), PassingShifts::default());
+        Self { known, model, tables, filter, state, passing, rating: None, last: None }
+    }
+
+    /// Takes the next sample and what the filter is shown of it.
+    pub fn push(&mut self, sample: &CarSample, input: &ShiftInput<f64>) {
+        let Self { known, passing, rating, .. } = self;
+        let estimate = self.filter.step(&mut self.state, input);
         passing.drive.states.push(state_of(sample, estimate.health));
+        self.last = Some(*sample);
         let gears = sample.shift.as_ref().map(|shift| [shift.from, shift.to]);
         if passing.ends(gears) {
-            end(&mut passing, &mut rating, sample);
+            end(passing, rating, sample);
         }
-        let Some(under_way) = &sample.shift else { continue };
+        let Some(under_way) = &sample.shift else { return };
         let (from, to) = (under_way.from, under_way.to);
         if passing.open.is_none() {
             let elements = [under_way.offgoing.element, under_way.oncoming.element];
             passing.begin(known, [from, to], elements, (sample.time_s, sample.turbine_n_m));
             let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(known, from, to, 0.0) };
-            rating = Some(CarShiftRating::new(model, &begun));
+            *rating = Some(CarShiftRating::new(self.model, &begun));
         }
-        if let (Some(shift), Some(rating)) = (&mut passing.open, &mut rating) {
+        if let (Some(shift), Some(rating)) = (&mut passing.open, rating) {
             rating.push(sample);
             shift.time_s[1] = sample.time_s;
-            shift.rows.extend(row(&tables, sample, &estimate));
+            shift.rows.extend(row(self.tables, sample, &estimate));
         }
     }
-    if let Some(last) = recording.samples.last() {
-        end(&mut passing, &mut rating, last);
+
+    /// The drive.
+    pub fn finish(mut self) -> ScoredDrive {
+        if let Some(last) = &self.last {
+            end(&mut self.passing, &mut self.rating, last);
+        }
+        self.passing.drive
     }
-    Ok(passing.drive)
 }
 
 /// Ends the open shift with the first sample after it.

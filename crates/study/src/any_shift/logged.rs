@@ -26,7 +26,7 @@ const RATIO_SHARE: f64 = 0.1;
 
 /// Names for neither a forward gear nor reverse, and their place: that of no gear.
 const NEUTRAL: [&str; 2] = ["N", "P"];
-const NO_GEAR: usize = usize::MAX;
+pub(super) const NO_GEAR: usize = usize::MAX;
 
 /// The columns with the commands of the valves: element of the gearbox, and name.
 pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
@@ -39,6 +39,12 @@ pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
         Some((at, format!("{}_{unit}", element_column(&element.name))))
     });
     columns.collect()
+}
+
+/// The column with the age of a command: how long before its row it was read, s.
+pub fn command_age(command: &str) -> String {
+    let name = command.rsplit_once('_').map_or(command, |(name, _)| name);
+    format!("{name}_age_s")
 }
 
 /// How the names of an element's columns begin.
@@ -83,7 +89,7 @@ struct Columns {
     gear: usize,
     target: usize,
     /// Place in the filter's tables, and column.
-    commands: Vec<(usize, usize)>,
+    commands: Vec<(usize, ReadingColumn)>,
     pedals: [Option<usize>; 2],
     vehicle: Option<usize>,
     /// Pressure, torque and slip of offgoing and oncoming clutch.
@@ -96,7 +102,8 @@ impl Columns {
         let require = |name: &str| ReadingColumn::require(rows, name);
         let commands = element_commands(car).into_iter().filter_map(|(element, name)| {
             let place = tables.place(element)?;
-            Some(rows.require(&name).map(|column| (place, column)))
+            let age = rows.find(&command_age(&name));
+            Some(rows.require(&name).map(|value| (place, ReadingColumn { value, age })))
         });
         let truth = |names: [&str; 3]| -> Option<[usize; 3]> {
             let places: Option<Vec<usize>> = names.iter().map(|name| rows.find(name)).collect();
@@ -176,8 +183,7 @@ impl<'c> CarLog<'c> {
         let number = |column: Option<usize>| column.map_or(Ok(f64::NAN), |column| rows.number(column));
         let mut commands = [None; MAX_ELEMENTS];
         for &(place, column) in &columns.commands {
-            let command = rows.number(column)?;
-            commands[place] = (!command.is_nan()).then_some(Reading::now(command));
+            commands[place] = column.read(rows)?;
         }
         let wheel_rad_s = reading(columns.wheel)?;
         let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);

@@ -16,6 +16,11 @@ use crate::campaign::in_order;
 
 /// Throttle of the shifts with power, 0 to 1 \[chosen\]: a car in traffic.
 const POWER_ON: f64 = 0.15;
+/// Throttle of the shifts with power.
+pub(super) fn power_throttle() -> f64 {
+    POWER_ON
+}
+
 /// Turbine torque, over the throttle, at which a shift counts as one with power.
 const KIND_FROM: f64 = 0.01;
 /// Where the open loop errs by less than this over a shift there is nothing to gain, N m.
@@ -40,10 +45,15 @@ impl Random {
     }
 }
 
-/// The car of a draw of a shift: the same whatever else is drawn.
+/// The car of a draw of a shift, with other friction, valve gains and converter: the same whatever else is drawn.
 pub fn drawn_car(known: &Car, from: usize, to: usize, seed: u64) -> Car {
+    draw(known, from, to, seed, false).car(known)
+}
+
+fn draw(known: &Car, from: usize, to: usize, seed: u64, timing: bool) -> ShiftDraw {
     let mut random = Random(seed.wrapping_mul(1000).wrapping_add(from as u64 * 37 + to as u64));
-    ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform()).car(known)
+    let draw = ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform());
+    if timing { draw.with_timing(&ShiftErrors::STANDARD, || random.uniform()) } else { draw }
 }
 
 /// A shift of the matrix.
@@ -118,7 +128,8 @@ impl PhaseErrors {
         Self { torque, pressure }
     }
 
-    fn add(&mut self, more: &Self) {
+    /// Adds those of more rows.
+    pub fn add(&mut self, more: &Self) {
         self.torque.add(&more.torque);
         self.pressure.add(&more.pressure);
     }
@@ -202,6 +213,8 @@ pub struct MatrixPlan<'a> {
     pub seed: u64,
     /// Toothed wheels and their noise.
     pub sensors: &'a Sensors,
+    /// Whether lag, delay and hysteresis of the valves are drawn too.
+    pub timing: bool,
     /// Changes every drawn car further.
     pub change: fn(&mut Car),
     /// Threads.
@@ -217,7 +230,7 @@ struct Run {
 
 fn run(known: &Car, shift: &MatrixShift, seed: u64, plan: &MatrixPlan<'_>) -> Run {
     let MatrixShift { from, to, kind, .. } = *shift;
-    let mut truth = drawn_car(known, from, to, seed);
+    let mut truth = draw(known, from, to, seed, plan.timing).car(known);
     (plan.change)(&mut truth);
     let usual = CarShift::usual(known, from, to, shift.throttle());
     match score_shift(known, &truth, &usual, plan.sensors, seed) {

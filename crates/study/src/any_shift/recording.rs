@@ -63,25 +63,31 @@ impl Recording {
             let ((name, sensor), values) = columns.next().unwrap_or((channels[0], &self.speeds_rad_s[0]));
             read_speed(sensor, Channel { name, time_s: &self.time_s, values }, rows)
         });
-        (0..self.samples.len()).map(move |row| input(car, tables, &self.samples[row], &speeds, row))
+        (0..self.samples.len()).map(move |row| {
+            let sample = &self.samples[row];
+            let reading = |of: &Readings| {
+                let (value, age_s) = (of.values[row], of.age_s[row]);
+                (!value.is_nan()).then_some(Reading { value, age_s })
+            };
+            let command = |element: usize| Some(Reading::now(sample.commands[element]));
+            input(car, tables, sample, speeds.each_ref().map(reading), command)
+        })
     }
 }
 
-fn input(
+/// What the filter is shown of a sample: the readings of engine, turbine, output and wheel speed, the commands of the elements, and what
+/// the controller and the engine say.
+pub(super) fn input(
     car: &Car,
     tables: &ShiftTables<f64>,
     sample: &CarSample,
-    speeds: &[Readings; 4],
-    row: usize,
+    speeds: [Option<Reading<f64>>; 4],
+    command: impl Fn(usize) -> Option<Reading<f64>>,
 ) -> ShiftInput<f64> {
-    let reading = |channel: usize| {
-        let (value, age_s) = (speeds[channel].values[row], speeds[channel].age_s[row]);
-        (!value.is_nan()).then_some(Reading { value, age_s })
-    };
     let mut commands = [None; MAX_ELEMENTS];
-    for (element, &command) in sample.commands.iter().enumerate() {
+    for element in 0..sample.commands.len() {
         if let Some(place) = tables.place(element) {
-            commands[place] = Some(Reading::now(command));
+            commands[place] = command(element);
         }
     }
     let gear = match &sample.shift {
@@ -91,12 +97,13 @@ fn input(
     let lock_up_applied = lock_up_is_applied(car, sample);
     // Without a converter, or where it is locked, nothing else gives the torque at the gearbox input.
     let engine_n_m = reported_engine_n_m(car, sample);
+    let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s] = speeds;
     ShiftInput {
         dt_s: SAMPLE_S,
-        engine_rad_s: reading(0),
-        turbine_rad_s: reading(1),
-        output_rad_s: reading(2),
-        wheel_rad_s: reading(3),
+        engine_rad_s,
+        turbine_rad_s,
+        output_rad_s,
+        wheel_rad_s,
         engine_n_m: (car.converter.is_none() || lock_up_applied).then_some(Reading::now(engine_n_m)),
         lock_up_applied,
         commands,

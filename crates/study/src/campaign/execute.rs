@@ -13,7 +13,7 @@ use super::row::{Campaign, Row};
 use crate::StudyError;
 
 /// Runs that a thread takes at once.
-const BLOCK: u64 = 16;
+pub const BLOCK: u64 = 16;
 /// Blocks that may be finished ahead of the one that is due, for each thread: memory does not grow with the
 /// number of runs.
 const AHEAD: u64 = 4;
@@ -49,9 +49,24 @@ pub fn in_order<T: Send, E: From<StudyError>>(
     runs: Range<u64>,
     threads: usize,
     work: impl Fn(u64) -> T + Sync,
+    sink: impl FnMut(T) -> Result<(), E>,
+) -> Result<(), E> {
+    in_blocks(BLOCK, runs, threads, work, sink)
+}
+
+/// The same, where a thread takes so many numbers at once: one where the work for each takes long.
+///
+/// # Errors
+/// As [`in_order`].
+pub fn in_blocks<T: Send, E: From<StudyError>>(
+    block_size: u64,
+    runs: Range<u64>,
+    threads: usize,
+    work: impl Fn(u64) -> T + Sync,
     mut sink: impl FnMut(T) -> Result<(), E>,
 ) -> Result<(), E> {
-    let blocks = runs.end.saturating_sub(runs.start).div_ceil(BLOCK);
+    let block_size = block_size.max(1);
+    let blocks = runs.end.saturating_sub(runs.start).div_ceil(block_size);
     let shared = Mutex::new(Shared { next_block: 0, due_block: 0, finished: BTreeMap::new(), stopped: false });
     let changed = Condvar::new();
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -79,8 +94,8 @@ pub fn in_order<T: Send, E: From<StudyError>>(
         }
     };
     let numbers = |block: u64| {
-        let first = runs.start + block * BLOCK;
-        first..(first + BLOCK).min(runs.end)
+        let first = runs.start + block * block_size;
+        first..(first + block_size).min(runs.end)
     };
     let worker = || {
         while let Some(block) = next_block() {

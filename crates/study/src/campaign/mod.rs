@@ -7,10 +7,12 @@ pub mod execute;
 pub mod layout;
 pub mod plan;
 pub mod row;
+pub mod scored;
 pub mod summary;
 
-pub use execute::{execute, in_order};
+pub use execute::{BLOCK, execute, in_blocks, in_order};
 pub use layout::{Layout, Metric, PHASES};
 pub use plan::{factor_values, run_seed};
-pub use row::{Campaign, Row, Run, Status, keep_scored};
+pub use row::{Campaign, Row, Run, Status};
+pub use scored::{ScoredShift, scored_shift};
 pub use summary::{COMPARED, Distribution, FactorEffect, Relative, Summary};

@@ -11,11 +11,11 @@ use design::DesignError;
 use plant::PlantError;
 use trace::Trace;
 
-use super::layout::{Layout, PHASES};
+use super::layout::Layout;
 use super::plan::{factor_values, run_seed};
+use super::scored::scored_shift;
 use crate::comparison::{ObserverRun, observers, run_observers};
-use crate::drive::simulate_shift_over;
-use crate::{AnyObserver, ShiftQuality, StudyError, true_phases};
+use crate::{AnyObserver, ShiftQuality, StudyError, simulate_shift};
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -209,22 +209,23 @@ impl Campaign {
     fn scored(&self, values: &[f64], seed: u64) -> Result<Option<(ShiftQuality, Vec<ObserverRun>)>, RunError> {
         let spare = self.spare().pop().unwrap_or_default();
         let (varied, ready) = self.prepared(values, seed)?;
-        let mut trace = self.drive(&varied, spare)?;
-        let scored = match ShiftQuality::of(&trace, &varied.vehicle.shift) {
+        let Varied { car, vehicle, experiment } = &varied;
+        let before_s = self.study.record_before_s;
+        let shift = scored_shift(spare, car, vehicle, experiment, before_s).map_err(RunError::Plant)?;
+        let scored = match shift.quality {
             None => None,
-            Some(quality) => {
-                keep_scored(&mut trace);
-                Some((quality, observed(&varied, &ready, &trace)?))
-            }
+            Some(quality) => Some((quality, observed(&varied, &ready, &shift.trace)?)),
         };
-        self.spare().push(trace);
+        self.spare().push(shift.trace);
         Ok(scored)
     }
 
     /// The whole of a run.
     fn full(&self, values: &[f64], seed: u64) -> Result<Run, RunError> {
         let (varied, ready) = self.prepared(values, seed)?;
-        let trace = self.drive(&varied, Trace::default())?;
+        let Varied { car, vehicle, experiment } = &varied;
+        let before_s = self.study.record_before_s;
+        let trace = simulate_shift(car, vehicle, experiment, before_s).map_err(RunError::Plant)?;
         let quality = ShiftQuality::of(&trace, &varied.vehicle.shift);
         Ok(Run { observers: observed(&varied, &ready, &trace)?, trace, quality, varied })
     }
@@ -243,21 +244,9 @@ impl Campaign {
         Ok((varied, ready))
     }
 
-    fn drive(&self, varied: &Varied, spare: Trace) -> Result<Trace, RunError> {
-        let before_s = self.study.record_before_s;
-        simulate_shift_over(spare, &varied.car, &varied.vehicle, &varied.experiment, before_s).map_err(RunError::Plant)
-    }
-
     fn spare(&self) -> MutexGuard<'_, Vec<Trace>> {
         self.spare.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// Cuts a recorded shift off after the last of the phases whose scores a row holds.
-pub fn keep_scored(trace: &mut Trace) {
-    let phases = true_phases(trace).unwrap_or_default();
-    let last = phases.iter().rposition(|phase| PHASES.contains(phase));
-    trace.truncate(last.map_or(0, |last| last + 1));
 }
 
 /// The observers over a recorded shift.

@@ -234,14 +234,8 @@ fn the_range_is_guaranteed_whatever_is_lost() {
     for (name, loss) in losses {
         let [mut clutches, mut ranges, mut outside] = [0_u32; 3];
         for (from, to, throttle) in shifts(car).into_iter().step_by(3) {
-            let mut truth = draw(car, seed_of(&CarShift::usual(car, from, to, throttle)));
-            for clutch in truth.clutches.iter_mut().flatten() {
-                let [lag, delay, play] = [(); 3].map(|()| random.uniform());
-                let [least_s, most_s] = ERRORS.valve_delay_s;
-                let lag = 1.0 + ERRORS.valve_lag * (2.0 * lag - 1.0);
-                clutch.valve = clutch.valve.changed(lag, 1.0, Some(least_s + delay * (most_s - least_s)));
-                clutch.hysteresis_pa = play * ERRORS.hysteresis_pa;
-            }
+            let draw = ShiftDraw::within(car, &ERRORS, || random.uniform());
+            let truth = draw.with_timing(&ERRORS, || random.uniform()).car(car);
             let samples = simulated(car, &truth, &CarShift::usual(car, from, to, throttle)).unwrap();
             let steps = std::cell::Cell::new(0);
             let rows = rows(car, &samples, 1, |input| {

@@ -122,6 +122,7 @@ fn uniform(friction: f64, gain: f64, converter: f64) -> impl Fn(&Car) -> ShiftDr
             friction: none.friction.iter().map(|_| friction).collect(),
             valve_gain: none.valve_gain.iter().map(|_| gain).collect(),
             converter,
+            ..none
         }
     }
 }

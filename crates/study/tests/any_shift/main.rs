@@ -20,10 +20,10 @@ const PHASES: [&str; 2] = ["torque", "inertia"];
 const CLUTCHES: [&str; 2] = ["controlling", "other"];
 
 /// The rows of all shipped gearboxes.
-fn rows(draws: u64, verbose: bool) -> Vec<MatrixRow> {
+fn rows(draws: u64, timing: bool, verbose: bool) -> Vec<MatrixRow> {
     let sensors = sensors();
     let threads = std::thread::available_parallelism().unwrap().get();
-    let plan = MatrixPlan { draws, seed: 1, sensors: &sensors, change: leave_out, threads };
+    let plan = MatrixPlan { draws, seed: 1, sensors: &sensors, timing, change: leave_out, threads };
     let mut all = Vec::new();
     for car in cars() {
         let matrix = matrix(&car, &plan, || ()).unwrap();
@@ -88,11 +88,32 @@ fn leave_out(truth: &mut Car) {
     }
 }
 
+fn draws() -> u64 {
+    std::env::var("MATRIX_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap())
+}
+
+/// Lag, delay and hysteresis of the valves anywhere in the budget too: `MATRIX_DRAWS=10 cargo test --release -p study --test
+/// any_shift whole_budget -- --nocapture`.
+#[test]
+fn matrix_of_cars_of_the_whole_budget() {
+    let rows = rows(draws(), true, std::env::var("MATRIX_VERBOSE").is_ok());
+    print(&rows);
+    let pooled = Pooled::of(&rows, |_| true);
+    assert_eq!((pooled.counts.outside, pooled.counts.unranged), (0, 0), "guaranteed");
+    // Of no kind and no phase is the filter worse than the valve model, over all classes.
+    for kind in ShiftKind::ALL {
+        for (phase, [main, _]) in PHASES.iter().zip(Pooled::of(&rows, |shift| shift.kind == kind).torque) {
+            let [estimate, open_loop] = main.rms_n_m();
+            println!("{kind:?}, {phase} phase, all classes: {:.2}", estimate / open_loop);
+            assert!(estimate < open_loop, "{kind:?}, {phase} phase: {estimate} / {open_loop}");
+        }
+    }
+}
+
 /// The numbers of the documentation: `MATRIX_DRAWS=10 cargo test --release -p study --test any_shift matrix -- --nocapture`.
 #[test]
 fn matrix_of_shifts_and_kinds() {
-    let draws = std::env::var("MATRIX_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap());
-    let rows = rows(draws, std::env::var("MATRIX_VERBOSE").is_ok());
+    let rows = rows(draws(), false, std::env::var("MATRIX_VERBOSE").is_ok());
     print(&rows);
     let counts = Pooled::of(&rows, |_| true).counts;
     assert_eq!(counts.outside, 0, "guaranteed");
@@ -115,7 +136,7 @@ fn matrix_of_shifts_and_kinds() {
 #[test]
 fn the_matrix_is_the_same_on_any_number_of_threads() {
     let (car, sensors) = (&cars()[4], sensors());
-    let plan = MatrixPlan { draws: 2, seed: 1, sensors: &sensors, change: leave_out, threads: 1 };
+    let plan = MatrixPlan { draws: 2, seed: 1, sensors: &sensors, timing: false, change: leave_out, threads: 1 };
     let mut done = 0;
     let one = matrix(car, &plan, || done += 1).unwrap();
     assert_eq!((one.rows.len(), done), (4, 8));

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ::observer::Estimate;
 use config::ObserverKind;
@@ -39,7 +40,7 @@ pub(super) fn estimate(
             Some(stop) => Log::follow(path, &map.open, stop)?,
             None => Log::open(path, &map.open)?,
         };
-        Measured::channels(opened.insert(log), map, vehicle, is_followed)?
+        Measured::channels(path, opened.insert(log), map, vehicle, is_followed)?
     };
     let chosen_observer = observer::choose(options, vehicle, &log, say)?;
     let columns = chosen(chosen_observer.observer.columns(log.has_wheel_speed()), &options.columns)?;
@@ -76,6 +77,9 @@ pub(super) fn estimate(
         table.flush()?;
     }
     log.finish(say)?;
+    if options.follow && !setup.stop.load(Ordering::Relaxed) && path.is_file() {
+        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
+    }
     let commands = match vehicle.observer_valve.command_kind() {
         CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
         CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
@@ -105,7 +109,7 @@ pub(super) fn estimate(
             observer: &chosen_observer.name,
             overview: &shifts.overview,
             shifts: &shifts.found,
-            shifts_of_log: shifts.seen,
+            shifts_of_log: shifts.seen(),
             findings: &sentences,
         }
         .html()?;

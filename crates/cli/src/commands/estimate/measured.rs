@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use config::Vehicle;
 use drivetrain::CommandKind;
@@ -16,7 +16,7 @@ use logs::{
 };
 use observer::{Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
-use trace::{CsvRows, Following, signal};
+use trace::{CsvRows, Following, LastLine, TraceError, signal};
 
 use super::Messages;
 use crate::failure::Failure;
@@ -51,12 +51,14 @@ struct Rows {
     rows: u64,
     /// Rows that were looked at before the first estimate.
     look: u64,
+    /// Whether the last line has no end.
+    was_cut: Arc<AtomicBool>,
 }
 
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
 struct Channels<'a> {
     steps: Steps<'a>,
-    looked_at: VecDeque<Step>,
+    looked_at: VecDeque<(Step, Vec<Reading>)>,
     median_step_s: f64,
     has_wheel_speed: bool,
 }
@@ -69,8 +71,6 @@ pub(super) struct Step {
     pub(super) input: Input<f64>,
     /// The truth, in a simulated log.
     pub(super) truth: Option<Truth>,
-    /// Every reading that came.
-    readings: Vec<Reading>,
     resets: u32,
     /// Whether the car is in another gear than those of the vehicle file's shift: its observer is not valid there.
     pub(super) is_other_gear: bool,
@@ -83,38 +83,56 @@ pub(super) struct Step {
 }
 
 impl Step {
-    fn new(time_s: f64, input: Input<f64>, readings: Vec<Reading>) -> Self {
+    fn new(time_s: f64, input: Input<f64>, resets: u32) -> Self {
+        let (truth, pressure_pa, torque_n_m, shifts) = (None, None, None, Vec::new());
+        Self { time_s, input, truth, resets, is_other_gear: false, pressure_pa, torque_n_m, shifts }
+    }
+
+    /// A row of a table with the names of the program.
+    fn of_row(input: Input<f64>, row: &LogRow, resets: u32) -> Self {
+        let now = |value: f64| Some(Measurement::now(value)).filter(|_| value.is_finite());
+        Self {
+            truth: row.truth,
+            pressure_pa: now(row.beside.pressure_pa),
+            torque_n_m: now(row.beside.torque_n_m),
+            ..Self::new(row.time_s, input, resets)
+        }
+    }
+
+    /// A step of channels with these readings.
+    fn of_channels(time_s: f64, input: Input<f64>, resets: u32, readings: &[Reading]) -> Self {
         let newest = |role: Role| {
             let reading = readings.iter().rev().find(|reading| reading.role == role)?;
             Some(Measurement { value: reading.value, age_s: (time_s - reading.time_s).max(0.0) })
         };
-        let (pressure_pa, torque_n_m) = (newest(Role::OncomingPressure), newest(Role::OncomingTorque));
-        let (truth, shifts) = (None, Vec::new());
-        Self { time_s, input, truth, readings, resets: 0, is_other_gear: false, pressure_pa, torque_n_m, shifts }
+        Self {
+            pressure_pa: newest(Role::OncomingPressure),
+            torque_n_m: newest(Role::OncomingTorque),
+            ..Self::new(time_s, input, resets)
+        }
     }
+}
 
-    /// A row of a table with the names of the program.
-    fn of_row(input: Input<f64>, row: &LogRow) -> Self {
-        let Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 } = row.beside;
-        let now = |value: f64| Some(Measurement::now(value)).filter(|_| !value.is_nan());
-        let readings = [
-            (Role::EngineSpeed, input.engine_rad_s),
-            (Role::TurbineSpeed, input.turbine_rad_s),
-            (Role::OutputSpeed, input.output_rad_s),
-            (Role::OncomingPressure, now(pressure_pa)),
-            (Role::OncomingTorque, now(torque_n_m)),
-            (Role::EngineTorque, now(engine_n_m)),
-            (Role::Throttle, now(throttle)),
-            (Role::VehicleSpeed, now(vehicle_m_s)),
-            (Role::VehicleAcceleration, now(vehicle_m_s2)),
-        ];
-        let reading = |(role, reading): (Role, Option<Measurement<f64>>)| {
-            let Measurement { value, age_s } = reading.filter(|reading| reading.value.is_finite())?;
-            Some(Reading { role, time_s: row.time_s - age_s, stamp_s: row.time_s, value })
-        };
-        let readings = readings.into_iter().filter_map(reading).collect();
-        Self { truth: row.truth, ..Self::new(row.time_s, input, readings) }
-    }
+/// Readings of a row of a table with the names of the program, for the shift finder.
+fn readings(input: &Input<f64>, row: &LogRow) -> impl Iterator<Item = Reading> + use<> {
+    let Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 } = row.beside;
+    let now = |value: f64| Some(Measurement::now(value)).filter(|_| !value.is_nan());
+    let stamp_s = row.time_s;
+    let readings = [
+        (Role::EngineSpeed, input.engine_rad_s),
+        (Role::TurbineSpeed, input.turbine_rad_s),
+        (Role::OutputSpeed, input.output_rad_s),
+        (Role::OncomingPressure, now(pressure_pa)),
+        (Role::OncomingTorque, now(torque_n_m)),
+        (Role::EngineTorque, now(engine_n_m)),
+        (Role::Throttle, now(throttle)),
+        (Role::VehicleSpeed, now(vehicle_m_s)),
+        (Role::VehicleAcceleration, now(vehicle_m_s2)),
+    ];
+    readings.into_iter().filter_map(move |(role, reading)| {
+        let Measurement { value, age_s } = reading.filter(|reading| reading.value.is_finite())?;
+        Some(Reading { role, time_s: stamp_s - age_s, stamp_s, value })
+    })
 }
 
 impl<'a> Measured<'a> {
@@ -134,12 +152,14 @@ impl<'a> Measured<'a> {
             None if is_pipe => Box::new(io::stdin()),
             None => Box::new(File::open(path).map_err(opening)?),
         };
-        let rows = CsvRows::of(path, input)?;
+        let (input, was_cut) = LastLine::new(input);
+        let rows = CsvRows::of(path, Box::new(input)).map_err(|error| other_delimiter(path, error))?;
         let summary = summary(&rows, vehicle);
         let log = study::log::Log::of(rows, vehicle, look)?;
-        let mut rows = Rows { log, summary, rows: 0, look: look as u64 };
+        let mut rows = Rows { log, summary, rows: 0, look: look as u64, was_cut };
         let looked_at: Vec<Input<f64>> = rows.log.looked_at().map(|(input, _)| *input).collect();
         looked_at.iter().for_each(|input| watch(&mut rows.summary, input));
+        check_step(path, rows.log.median_step_s(), "divide it by 1000")?;
         rows.check_units()?;
         let gearbox = of_vehicle(vehicle);
         // Turbine and output speed are there, and tell shifts.
@@ -150,6 +170,7 @@ impl<'a> Measured<'a> {
 
     /// Channels of a log by a map.
     pub(super) fn channels(
+        path: &Path,
         log: &'a mut Log,
         map: &ChannelMap,
         vehicle: &Vehicle,
@@ -200,8 +221,9 @@ impl<'a> Measured<'a> {
         }
         // Wrong units are an error before the first estimate.
         channels.steps.readings().check_units()?;
-        let steps_s = channels.looked_at.iter().skip(1).map(|step| step.input.dt_s);
+        let steps_s = channels.looked_at.iter().skip(1).map(|(step, _)| step.input.dt_s);
         channels.median_step_s = trace::median_step_s(steps_s.collect());
+        check_step(path, channels.median_step_s, "set `unit = \"ms\"` under [time] in the channel map")?;
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
         let source = Source::Channels(Box::new(channels));
@@ -247,31 +269,72 @@ impl<'a> Measured<'a> {
     pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
         let channels = match &self.source {
             Source::Rows(rows) => {
-                for note in rows.log.check_times()? {
+                for note in rows.log.check_readings()? {
                     say.note(&format!("warning: {note}"));
+                }
+                if rows.was_cut.load(Ordering::Relaxed) {
+                    say.note("warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells");
                 }
                 return rows.check_units();
             }
             Source::Channels(channels) => channels,
         };
-        let readings = channels.steps.readings();
-        for role in readings.summary() {
-            let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
-            if good < total {
-                say.note(&format!(
-                    "{} of {} samples of {} are not used: {}",
-                    output::grouped(total - good),
-                    output::grouped(total),
-                    role.role.name(),
-                    role.counts.faults()
-                ));
-            }
-        }
-        for note in readings.notes() {
-            say.note(&format!("warning: {note}"));
-        }
-        Ok(readings.check()?)
+        report_readings(channels.steps.readings(), say)
     }
+}
+
+/// A table with another delimiter than the comma is one of a single column; a channel map reads it.
+fn other_delimiter(path: &Path, error: TraceError) -> Failure {
+    let delimiter = match &error {
+        TraceError::MissingColumn { present, .. } => match present.as_slice() {
+            [only] => [';', '\t', '|'].into_iter().find(|delimiter| only.contains(*delimiter)),
+            _ => None,
+        },
+        _ => None,
+    };
+    let Some(delimiter) = delimiter else { return error.into() };
+    let path = path.display();
+    Failure::Input(format!(
+        "{path}: the columns are separated by `{}`, which is read by a channel map only\n\
+         hint: `wetclutch inspect {path} --suggest > map.toml` writes one; check it, then add --map map.toml",
+        delimiter.escape_debug()
+    ))
+}
+
+/// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
+fn check_step(path: &Path, median_s: f64, hint: &str) -> Result<(), Failure> {
+    const LONGEST_S: f64 = 1.0;
+    if median_s < LONGEST_S || median_s.is_nan() {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
+         hint: if the time is in ms, {hint}",
+        path.display()
+    )))
+}
+
+/// Says what was met in mapped channels, after their last step.
+///
+/// # Errors
+/// Most samples of a channel could not be used, or a unit is wrong by all appearances.
+pub(super) fn report_readings(readings: &Readings<'_>, say: &mut Messages) -> Result<(), Failure> {
+    for role in readings.summary() {
+        let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+        if good < total {
+            say.note(&format!(
+                "{} of {} samples of {} are not used: {}",
+                output::grouped(total - good),
+                output::grouped(total),
+                role.role.name(),
+                role.counts.faults()
+            ));
+        }
+    }
+    for note in readings.notes() {
+        say.note(&format!("warning: {note}"));
+    }
+    Ok(readings.check()?)
 }
 
 /// What the vehicle file says about the gearbox.
@@ -359,7 +422,8 @@ impl Rows {
         )))
     }
 
-    fn read(&mut self) -> Option<Result<Step, Failure>> {
+    /// The next step; `see` gets its readings, with the resets of the clock so far.
+    fn read(&mut self, mut see: impl FnMut(u32, &Reading)) -> Option<Result<Step, Failure>> {
         /// Rows after the first look of which one is watched for its units.
         const EVERY: u64 = 32;
         let row = self.log.next()?;
@@ -368,17 +432,22 @@ impl Rows {
             if self.rows > self.look && self.rows.is_multiple_of(EVERY) {
                 watch(&mut self.summary, &input);
             }
-            Step { resets: self.log.resets(), ..Step::of_row(input, &row) }
+            let resets = self.log.resets();
+            readings(&input, &row).for_each(|reading| see(resets, &reading));
+            Step::of_row(input, &row, resets)
         }))
     }
 }
 
 impl Channels<'_> {
-    fn read(&mut self) -> Option<Result<Step, Failure>> {
+    fn read(&mut self) -> Option<Result<(Step, Vec<Reading>), Failure>> {
         let mut readings = Vec::new();
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;
         let resets = self.steps.readings().resets();
-        Some(step.map_err(Failure::from).map(|step| Step { resets, ..Step::new(step.time_s, step.input, readings) }))
+        Some(step.map_err(Failure::from).map(|step| {
+            let step = Step::of_channels(step.time_s, step.input, resets, &readings);
+            (step, readings)
+        }))
     }
 }
 
@@ -386,23 +455,36 @@ impl Iterator for Measured<'_> {
     type Item = Result<Step, Failure>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let step = match &mut self.source {
-            Source::Rows(rows) => rows.read()?,
-            Source::Channels(channels) => match channels.looked_at.pop_front() {
-                Some(step) => Ok(step),
-                None => channels.read()?,
-            },
+        let Self { source, finder, resets, gears, .. } = self;
+        // A clock that begins anew begins a new log for the finder, before the first reading of it.
+        let mut see = |log_resets: u32, reading: &Reading| {
+            if log_resets > *resets {
+                *resets = log_resets;
+                finder.restart();
+            }
+            finder.push(reading);
+            if let Some(gears) = gears.as_mut() {
+                gears.push(reading);
+            }
+        };
+        let step = match source {
+            Source::Rows(rows) => rows.read(see)?,
+            Source::Channels(channels) => {
+                let next = match channels.looked_at.pop_front() {
+                    Some(next) => Ok(next),
+                    None => channels.read()?,
+                };
+                next.map(|(step, readings)| {
+                    readings.iter().for_each(|reading| see(step.resets, reading));
+                    step
+                })
+            }
         };
         Some(step.map(|mut step| {
             if step.resets > self.resets {
+                // It had no reading.
                 self.resets = step.resets;
                 self.finder.restart();
-            }
-            for reading in &step.readings {
-                self.finder.push(reading);
-                if let Some(gears) = &mut self.gears {
-                    gears.push(reading);
-                }
             }
             step.is_other_gear = self.gears.as_ref().is_some_and(|gears| !gears.is_inside());
             if step.is_other_gear {

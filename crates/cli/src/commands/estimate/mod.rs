@@ -7,6 +7,7 @@ mod measured;
 pub(super) mod observer;
 mod outputs;
 mod ratios;
+mod selection;
 mod shifts;
 
 use std::collections::HashMap;
@@ -18,10 +19,11 @@ use std::sync::{Mutex, PoisonError};
 use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
 
-use crate::args::Estimate;
+use crate::args::{Estimate, FormatChoice};
 use crate::commands::{channel_map, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
+use crate::signals::stop_then_end;
 
 pub(super) use observer::{best, kind, sensors};
 
@@ -49,29 +51,44 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
+    not_an_input(options.output.as_ref(), inputs(options))?;
+    outputs::check_name(options)?;
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
-        return any_car::estimate(options);
+        any_car::check_options(options)?;
+        let prepare = || any_car::CarSetup::new(options);
+        return each_log(options, prepare, any_car::estimate);
     }
     observer::check_options(options)?;
-    match options.logs.as_slice() {
-        [log] => {
-            let folder = options.output.as_ref().filter(|output| output.is_dir());
-            let output = match folder {
-                Some(folder) => names_in(folder, &options.logs, options.format.ending())?.pop(),
-                None => options.output.clone(),
-            };
-            check_output(output.as_ref())?;
-            // A log that is named as its own output is replaced; in a folder that is a mistake.
-            let log_itself = folder.map(|_| log);
-            not_an_input(output.as_ref(), inputs(options).chain(log_itself))?;
-            for beside in output.iter().filter_map(|output| outputs::beside(output)).flatten() {
-                not_an_input(Some(&beside), inputs(options).chain([log]))?;
-            }
-            let setup = setup(options)?;
-            job::estimate(&setup, log, output.as_deref(), &mut Messages { held: None })
-        }
-        logs => several(options, logs),
+    each_log(options, || setup(options), job::estimate)
+}
+
+/// Estimates the logs; `prepare` makes what is common to them.
+fn each_log<S: Sync>(
+    options: &Estimate,
+    prepare: impl FnOnce() -> Result<S, Failure>,
+    estimate: impl Fn(&S, &Path, Option<&Path>, &mut Messages) -> Result<(), Failure> + Sync,
+) -> Result<(), Failure> {
+    let [log] = options.logs.as_slice() else {
+        return several(options, &options.logs, prepare, estimate);
+    };
+    let folder = options.output.as_ref().filter(|output| output.is_dir());
+    let output = match folder {
+        Some(folder) => names_in(folder, &options.logs, ending(options))?.pop(),
+        None => options.output.clone(),
+    };
+    check_output(output.as_ref())?;
+    // A log that is named as its own output is replaced; in a folder that is a mistake.
+    let log_itself = folder.map(|_| log);
+    not_an_input(output.as_ref(), inputs(options).chain(log_itself))?;
+    for beside in output.iter().filter_map(|output| outputs::beside(output)).flatten() {
+        not_an_input(Some(&beside), inputs(options).chain([log]))?;
     }
+    estimate(&prepare()?, log, output.as_deref(), &mut Messages { held: None })
+}
+
+/// The ending of files in a folder.
+fn ending(options: &Estimate) -> &'static str {
+    options.format.unwrap_or(FormatChoice::Csv).ending()
 }
 
 /// The files that an estimate reads beside its logs.
@@ -80,30 +97,26 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
 }
 
 fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
-    let setup = Setup {
-        options,
-        vehicle: Vehicle::read(&options.vehicle)?,
-        map: channel_map(&options.mapping)?,
-        stop: Arc::new(AtomicBool::new(false)),
-    };
-    if options.follow {
-        end_on_signals(&setup.stop)?;
-    }
-    Ok(setup)
+    let (vehicle, map) = (Vehicle::read(&options.vehicle)?, channel_map(&options.mapping)?);
+    Ok(Setup { options, vehicle, map, stop: stop(options)? })
 }
 
-/// The first interrupt ends the log that is followed, a second one the program.
-fn end_on_signals(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(stop))?;
-        signal_hook::flag::register(signal, Arc::clone(stop))?;
+/// What is set when a log that is followed is to end.
+fn stop(options: &Estimate) -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    if options.follow {
+        stop_then_end(&stop)?;
     }
-    Ok(())
+    Ok(stop)
 }
 
 /// Several logs, each into a file of its own. One that fails does not stop the others.
-fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
+fn several<S: Sync>(
+    options: &Estimate,
+    logs: &[PathBuf],
+    prepare: impl FnOnce() -> Result<S, Failure>,
+    estimate: impl Fn(&S, &Path, Option<&Path>, &mut Messages) -> Result<(), Failure> + Sync,
+) -> Result<(), Failure> {
     let Some(folder) = &options.output else {
         return Err(Failure::Input(
             "several logs need a folder for their estimates\nhint: name one with -o; each log gets a file in it"
@@ -113,7 +126,7 @@ fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
     if options.follow {
         return Err(Failure::Input("--follow takes one log\nhint: start the command once for each".to_owned()));
     }
-    let outputs = names_in(folder, logs, options.format.ending())?;
+    let outputs = names_in(folder, logs, ending(options))?;
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;
@@ -121,7 +134,7 @@ fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
             not_an_input(Some(output), logs.iter().chain(inputs(options)))?;
         }
     }
-    let setup = setup(options)?;
+    let setup = prepare()?;
     let next = AtomicUsize::new(0);
     let failures: Mutex<Vec<(usize, Failure)>> = Mutex::new(Vec::new());
     let work = || {
@@ -129,7 +142,7 @@ fn several(options: &Estimate, logs: &[PathBuf]) -> Result<(), Failure> {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let (Some(log), Some(output)) = (logs.get(at), outputs.get(at)) else { return };
             let mut messages = Messages { held: Some(vec![format!("log: {}", log.display())]) };
-            let result = job::estimate(&setup, log, Some(output), &mut messages);
+            let result = estimate(&setup, log, Some(output), &mut messages);
             output::note(&(messages.held.unwrap_or_default().join("\n") + "\n"));
             if let Err(failure) = result {
                 output::error(&failure.to_string());

@@ -70,7 +70,14 @@ pub(super) fn choose(
     }
     let kind = kind(choice);
     if options.sensors.is_some() && !is_filter(kind) {
-        return Err(sensors_without_effect());
+        return Err(match options.observer {
+            ObserverChoice::Best => Failure::Input(
+                "the log has no wheel speed: the best observer is then rigid, which does not use --sensors\n\
+                 hint: leave --sensors out, or give the log a wheel_speed_rad_s (in a channel map: wheel_speed), with which it is kalman"
+                    .to_owned(),
+            ),
+            _ => sensors_without_effect(),
+        });
     }
     if is_filter(kind) || [ObserverKind::Compliant, ObserverKind::Inversion].contains(&kind) {
         log.require_wheel_speed()?;

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use observer::Estimate;
 use study::{EstimateColumns, OutputColumn};
-use trace::{Cell, ColumnKind, CsvWriter, TableWriter};
+use trace::{Cell, ColumnKind, CsvWriter, TableFormat, TableWriter};
 
+use crate::args::{self, FormatChoice};
 use crate::failure::Failure;
 
 /// The columns of these names, or all.
@@ -31,6 +32,49 @@ pub(super) fn chosen(columns: EstimateColumns, names: &[String]) -> Result<Vec<O
         chosen.push(*column);
     }
     Ok(chosen)
+}
+
+/// Endings of names whose files are CSV.
+const TEXT: [&str; 4] = ["csv", "txt", "tsv", "dat"];
+
+/// Refuses an output whose name asks for what is not written.
+pub(super) fn check_name(options: &args::Estimate) -> Result<(), Failure> {
+    let Some(output) = &options.output else {
+        return match options.format {
+            None | Some(FormatChoice::Csv) => Ok(()),
+            Some(format) => {
+                let ending = format.ending();
+                let message =
+                    format!("--format {ending} needs a file\nhint: name one with -o, such as estimate.{ending}");
+                Err(Failure::Input(message))
+            }
+        };
+    };
+    if output == Path::new("-") {
+        let message = "-o -: standard output is where an estimate goes without -o\nhint: leave -o out";
+        return Err(Failure::Input(message.to_owned()));
+    }
+    // A folder gets files with the ending of their format; a device or pipe has no name of its own.
+    if options.logs.len() > 1 || std::fs::metadata(output).is_ok_and(|there| !there.is_file()) {
+        return Ok(());
+    }
+    let ending = output.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let by_name = TableFormat::of(output);
+    if let Some(ending) = ending.filter(|ending| by_name == TableFormat::Csv && !TEXT.contains(&ending.as_str())) {
+        return Err(Failure::Input(format!(
+            "{}: no table is written as .{}\nhint: estimates are CSV (.csv), Parquet (.parquet) or MDF (.mf4)",
+            output.display(),
+            ending.escape_debug()
+        )));
+    }
+    match options.format {
+        Some(format) if TableFormat::from(format) != by_name => Err(Failure::Input(format!(
+            "{}: the name is not that of a file in --format {}\nhint: the ending says the format; leave --format out, or end the name in .{1}",
+            output.display(),
+            format.ending()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// The table of the estimates.

@@ -17,6 +17,10 @@ pub struct CarCalibration {
     pub below_kiss_pa: f64,
     /// Torque that the offgoing clutch can hold over what it must, before and during the torque phase.
     pub holding_margin: f64,
+    /// Torque that the oncoming clutch is given over what it must take, in the torque phase.
+    pub taking_margin: f64,
+    /// Time constant with which a clutch that holds gives up what it no longer must hold, s.
+    pub holding_s: f64,
     /// Duration of the torque phase, s.
     pub torque_phase_s: f64,
     /// Slip of the old gear in the wrong direction that counts as a flare, rad/s at the turbine.
@@ -78,6 +82,9 @@ pub struct CarCalibration {
     pub engine_way: f64,
     /// Time in which the share of the engine torque changes by one, s.
     pub engine_ramp_s: f64,
+    /// Time in which the engine torque rises from none to the greatest in a shift, s, when the driver asks for it: a pedal that is
+    /// moved in a shift is followed as fast as the clutches can answer.
+    pub tip_in_s: f64,
     /// Time in which the lock-up clutch opens, s: less than that of the fill.
     pub unlock_s: f64,
     /// Gain of the slip of the lock-up clutch, 1/s.
@@ -120,7 +127,9 @@ impl CarCalibration {
         fast_fill: FastFill { hold_s: 0.14, ..FastFill::STANDARD },
         filled_n_m: 6.0,
         below_kiss_pa: 4e3,
-        holding_margin: 1.15,
+        holding_margin: 1.2,
+        taking_margin: 1.1,
+        holding_s: 0.2,
         torque_phase_s: 0.20,
         flare_slip_rad_s: 1.0,
         flare_per_s: 30.0,
@@ -151,6 +160,7 @@ impl CarCalibration {
         down_engine_share: 0.7,
         engine_way: 0.8,
         engine_ramp_s: 0.2,
+        tip_in_s: 0.5,
         unlock_s: 0.12,
         slip_per_s: 12.0,
         slip_per_s2: 30.0,

@@ -13,6 +13,7 @@
 //! the nominal car; it does not know pressures, torques, or the errors of the valves.
 
 mod calibration;
+mod engine;
 mod launch;
 mod lock_up;
 mod pressure;
@@ -29,6 +30,7 @@ use geartrain::{Change, ElementKind};
 use super::integrate::CarError;
 use crate::gear_train::MAX_ELEMENTS;
 pub use calibration::CarCalibration;
+use engine::EngineControl;
 use launch::Launch;
 use lock_up::LockUpControl;
 use pressure::Controlled;
@@ -99,7 +101,7 @@ pub struct CarShiftController {
     completed: usize,
     preselected: Option<usize>,
     output: Track,
-    engine_share: f64,
+    engine: EngineControl,
     lock_up: LockUpControl,
     strokes: Strokes,
     /// The clutch of a car without a converter, while it is not closed.
@@ -126,7 +128,7 @@ impl CarShiftController {
             completed: 0,
             preselected: None,
             output,
-            engine_share: 1.0,
+            engine: EngineControl::new(),
             lock_up: LockUpControl::default(),
             strokes: Strokes::new(car, gear),
             launch: None,
@@ -309,7 +311,9 @@ impl CarShiftController {
         }
         let period_s = self.calibration.control_period_s;
         self.output.follow(measured.wheel_rad_s * self.car.driveline.final_ratio, period_s);
-        let turbine_n_m = self.turbine_torque(throttle, measured);
+        let stage_share = self.active.as_ref().map(ActiveShift::engine_share);
+        let engine_share = self.engine.step((&self.car, &self.calibration), throttle, stage_share, measured);
+        let turbine_n_m = self.engine.turbine_n_m(&self.car, measured);
         let open = |element: usize| self.car.clutches.get(element).and_then(Option::as_ref);
         let mut elements: [f64; MAX_ELEMENTS] =
             std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
@@ -338,32 +342,30 @@ impl CarShiftController {
         self.open_at_low_speed(measured);
         let c = &self.calibration;
         if let Some(launch) = &mut self.launch {
-            let (element, command) = launch.step((&self.car, c), time_s, throttle, measured);
+            let piston = self.strokes.of(launch.element());
+            let (element, command) = launch.step((&self.car, c), time_s, throttle, measured, piston);
             elements[element] = command;
             if launch.is_over(c, time_s, measured) {
                 self.launch = None;
             }
         }
-        let mut wanted = 1.0;
         if let Some(shift) = &mut self.active {
             let pressures = shift.step(&self.calibration, time_s, turbine_n_m, measured, &self.output);
             for (clutch, pressure_pa) in [&shift.offgoing, &shift.oncoming].into_iter().zip(pressures) {
                 elements[clutch.element] = clutch.valve_command(pressure_pa.clamp(0.0, line_pa));
             }
-            wanted = shift.engine_share(&self.calibration, turbine_n_m, measured);
+            shift.choose_engine_share(&self.calibration, turbine_n_m, measured);
             if shift.stage == ShiftStage::Done {
                 self.gear = shift.to;
                 self.active = None;
                 self.completed += 1;
             }
         }
-        let step = period_s / self.calibration.engine_ramp_s;
-        self.engine_share += (wanted - self.engine_share).clamp(-step, step);
-        let engine_n_m = self.engine_torque(throttle, measured.engine_rad_s);
+        let engine_n_m = self.engine.torque_n_m(&self.car, measured);
         let in_gear = self.active.is_none().then_some(self.gear).filter(|_| !self.is_neutral);
         let lock_up_n_m = self.lock_up.torque_n_m((&self.car, &self.calibration), in_gear, engine_n_m, measured);
         self.strokes.follow(&self.car, &elements, period_s);
-        CarCommands { elements, dogs, engine_share: self.engine_share, lock_up_n_m }
+        CarCommands { elements, dogs, engine_share, lock_up_n_m }
     }
 
     /// Without a converter the clutch opens before the engine turns too slowly, in a shift too.
@@ -379,21 +381,5 @@ impl CarShiftController {
             (self.gear, self.active) = (to, None);
             self.route.clear();
         }
-    }
-
-    /// Torque on the gearbox input as the nominal maps give it, N m. The engine controller's reductions are known.
-    fn turbine_torque(&self, throttle: f64, measured: &CarMeasured) -> f64 {
-        match &self.car.converter {
-            Some(converter) => converter.torques(measured.engine_rad_s, measured.turbine_rad_s).turbine_n_m,
-            None => self.engine_torque(throttle, measured.turbine_rad_s),
-        }
-    }
-
-    /// Torque of the engine less its drag, N m, with the reduction of the transmission controller.
-    fn engine_torque(&self, throttle: f64, engine_rad_s: f64) -> f64 {
-        let engine = &self.car.engine;
-        let torque = engine.torque(engine_rad_s, throttle);
-        let reduced = if torque > 0.0 { torque * self.engine_share } else { torque };
-        reduced - engine.drag_n_m_s * engine_rad_s
     }
 }

@@ -47,6 +47,8 @@ pub(super) struct ActiveShift {
     /// Share of the load that the oncoming clutch has taken in the torque phase.
     transferred: f64,
     has_flared: bool,
+    /// Size of the torque that the offgoing clutch is to hold, N m at the turbine.
+    held_n_m: f64,
     is_slipping: bool,
     /// Oncoming slip at the start of the inertia phase, and its duration.
     from_rad_s: f64,
@@ -60,7 +62,9 @@ pub(super) struct ActiveShift {
     locked_since_s: Option<f64>,
     /// Offgoing torque at the start of the hand-over, N m at the turbine.
     handed_n_m: f64,
-    slip_before_rad_s: Option<f64>,
+    /// Offgoing and oncoming slip one period before, with the output speed of the wheels, rad/s.
+    slips_before_rad_s: Option<[f64; 2]>,
+    engine_share: f64,
 }
 
 /// What a step of the controller looks at.
@@ -100,6 +104,7 @@ impl ActiveShift {
             is_filled_by_plan: false,
             transferred: 0.0,
             has_flared: false,
+            held_n_m: 0.0,
             is_slipping: false,
             from_rad_s: 0.0,
             duration_s: 1.0,
@@ -109,7 +114,8 @@ impl ActiveShift {
             taken_over_n_m: None,
             locked_since_s: None,
             handed_n_m: 0.0,
-            slip_before_rad_s: None,
+            slips_before_rad_s: None,
+            engine_share: 1.0,
         }
     }
 
@@ -138,6 +144,7 @@ impl ActiveShift {
                 back.is_slipping = true;
                 back.controlled_n_m = self.controlled_n_m;
                 back.taken_over_n_m = Some(self.controlled_n_m);
+                back.slips_before_rad_s = self.slips_before_rad_s.map(|[y, z]| [z, y]);
             }
             ShiftStage::Fill | ShiftStage::InertiaPhase => back.stage = ShiftStage::Lock,
             ShiftStage::HandOver | ShiftStage::Lock | ShiftStage::Done => return None,
@@ -168,6 +175,9 @@ impl ActiveShift {
             z_wheels: self.oncoming.slip_at_turbine(turbine, output.speed_rad_s()),
             output_rad_s2: output.rate_rad_s2,
         };
+        // A clutch that holds takes more at once and gives it up by and by: the torque may come back with the other sign.
+        let kept = self.held_n_m * (1.0 - c.control_period_s / c.holding_s);
+        self.held_n_m = now.turbine_n_m.abs().max(kept).max(c.lock_least_n_m);
         self.change_stage(c, &now);
         self.is_filled_by_plan = false;
         let torques = match self.stage {
@@ -177,7 +187,8 @@ impl ActiveShift {
             ShiftStage::HandOver => self.hand_over(c, &now),
             ShiftStage::Lock | ShiftStage::Done => [0.0, self.locked_pa(c, &now)],
         };
-        self.slip_before_rad_s = Some(now.z_wheels);
+        let y_wheels = self.offgoing.slip_at_turbine(turbine, output.speed_rad_s());
+        self.slips_before_rad_s = Some([y_wheels, now.z_wheels]);
         let [off_pa, on_pa] = if self.is_from_neutral { [self.opening_pa(&now), torques[1]] } else { torques };
         let on_pa = if self.is_filled_by_plan {
             self.oncoming.without_lead(c, on_pa, self.line_pa)
@@ -245,14 +256,17 @@ impl ActiveShift {
         self.is_slipping = true;
         self.from_rad_s = now.z_wheels;
         self.slipping_since_s = now.time_s;
-        let scale = (self.from_rad_s.abs() / 120.0).clamp(0.55, 1.3);
         let at_full = match (self.order(now.turbine_n_m), self.direction > 0.0) {
             _ if self.is_from_neutral => c.from_neutral_s,
             (PhaseOrder::TorqueFirst, _) => c.inertia_phase_s,
             (PhaseOrder::InertiaFirst, true) => c.power_off_up_s,
             (PhaseOrder::InertiaFirst, false) => c.power_on_down_s,
         };
-        self.duration_s = at_full * scale;
+        // A slip that still grows, after a change of mind, has further to go: with a cubic reference of the same start, end and
+        // duration by 4/27 of rate and duration.
+        let growth = (self.slip_rate(c, now) * self.from_rad_s.signum()).max(0.0) * 4.0 / 27.0 * at_full;
+        let growth = if self.taken_over_n_m.is_some() { growth } else { 0.0 };
+        self.duration_s = at_full * ((self.from_rad_s.abs() + growth) / 120.0).clamp(0.55, 1.3);
     }
 
     /// The same, with this torque of the slip controller, N m at the turbine.
@@ -264,8 +278,12 @@ impl ActiveShift {
 
     /// Whether the slip reaches zero soon.
     fn nears(&self, c: &CarCalibration, now: &Now) -> bool {
-        let rate = self.slip_before_rad_s.map_or(0.0, |before| (now.z_wheels - before) / c.control_period_s);
-        (now.z + c.hand_over_lead_s * rate) * self.direction <= 0.0
+        (now.z + c.hand_over_lead_s * self.slip_rate(c, now)) * self.direction <= 0.0
+    }
+
+    /// Rate of the oncoming slip, rad/s^2; zero in the first period.
+    fn slip_rate(&self, c: &CarCalibration, now: &Now) -> f64 {
+        self.slips_before_rad_s.map_or(0.0, |[_, before]| (now.z_wheels - before) / c.control_period_s)
     }
 
     /// Pressure with which the oncoming clutch waits, Pa: just below its kiss point, or on the plan of its fill and then with
@@ -292,7 +310,7 @@ impl ActiveShift {
 
     fn fill(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
         let share = ((now.time_s - self.since_s + c.control_period_s) / self.fill_s(c)).min(1.0);
-        let held = self.offgoing.pressure_for(c.holding_margin * now.turbine_n_m, 0.0);
+        let held = self.offgoing.pressure_for(c.holding_margin * self.held_n_m, 0.0);
         let offgoing_pa = self.line_pa.min(held + (1.0 - share) * (self.line_pa - held).max(0.0));
         if self.oncoming.fill.is_some() {
             return [offgoing_pa, self.waiting_pa(c, now)];
@@ -312,8 +330,8 @@ impl ActiveShift {
         let held = if flare { held.max(c.flare_holding) } else { held };
         let caught = if flare { c.flare_per_s * self.mass_kg_m2[0][0] * now.y } else { 0.0 };
         [
-            self.offgoing.pressure_for(held * now.turbine_n_m, now.y),
-            self.oncoming.pressure_for(taken * now.turbine_n_m + caught, now.z),
+            self.offgoing.pressure_for(held * self.held_n_m, now.y),
+            self.oncoming.pressure_for(c.taking_margin * taken * now.turbine_n_m + caught, now.z),
         ]
     }
 
@@ -344,12 +362,17 @@ impl ActiveShift {
                 return [self.offgoing.pressure_for(self.controlled_n_m, 0.0), self.waiting_pa(c, now)];
             }
         }
-        if let Some(torque_n_m) = self.taken_over_n_m.take() {
+        if let Some(torque_n_m) = self.taken_over_n_m {
             self.begin_slip_with(c, now, torque_n_m);
+            self.taken_over_n_m = None;
         }
         let u = self.slip_controlled_n_m(c, now);
         if u * self.direction > 0.0 {
-            [0.0, self.oncoming.pressure_for(u, now.z)]
+            // Beyond the old gear the offgoing clutch brings the turbine back too.
+            let beyond = (now.y * self.direction - c.release_slip_rad_s).max(0.0);
+            let caught_n_m = c.flare_per_s * self.mass_kg_m2[0][0] * beyond;
+            let offgoing_pa = if beyond > 0.0 { self.offgoing.pressure_for(caught_n_m, now.y) } else { 0.0 };
+            [offgoing_pa, self.oncoming.pressure_for(u, now.z)]
         } else {
             [self.offgoing.pressure_for(u, now.y), self.waiting_pa(c, now)]
         }
@@ -383,7 +406,15 @@ impl ActiveShift {
     }
 
     /// Share of the engine torque that suits the stage.
-    pub(super) fn engine_share(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
+    pub(super) fn engine_share(&self) -> f64 {
+        self.engine_share
+    }
+
+    pub(super) fn choose_engine_share(&mut self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) {
+        self.engine_share = self.suitable_engine_share(c, turbine_n_m, measured);
+    }
+
+    fn suitable_engine_share(&self, c: &CarCalibration, turbine_n_m: f64, measured: &CarMeasured) -> f64 {
         if !self.is_slipping || self.is_from_neutral {
             return 1.0;
         }

@@ -1,0 +1,143 @@
+//! The columns of an estimate of a car with any gearbox.
+
+use config::Car;
+use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate};
+use study::any_shift::logged::element_column;
+use trace::{Cell, ColumnKind};
+
+use crate::failure::Failure;
+
+/// What a row of the estimate is made from.
+#[derive(Clone, Copy)]
+pub(super) struct Row<'a> {
+    pub(super) car: &'a Car,
+    pub(super) places: &'a [(usize, &'a str)],
+    pub(super) gears: [usize; 2],
+    pub(super) estimate: ShiftEstimate<f64>,
+}
+
+impl<'a> Row<'a> {
+    fn gear(&self, which: usize) -> Cell<'a> {
+        Cell::Word(self.car.gearbox.gears.get(self.gears[which]).map_or("", |gear| gear.name.as_str()))
+    }
+
+    fn element(&self, which: usize) -> Cell<'a> {
+        let place = self.estimate.clutches.map(|clutches| clutches[which].element);
+        let named = self.places.iter().find(|(known, _)| Some(*known) == place);
+        Cell::Word(named.map_or("", |(_, name)| *name))
+    }
+
+    /// Pressure, torque, their ranges, and both by the valve model, in the order of [`CLUTCH`].
+    fn clutch(&self, which: usize, what: usize) -> f64 {
+        let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
+        let end = |range: Option<[f64; 2]>, end: usize| range.map_or(f64::NAN, |range| range[end]);
+        match what {
+            0 => clutch.pressure_pa,
+            1 => end(clutch.pressure_range_pa, 0),
+            2 => end(clutch.pressure_range_pa, 1),
+            3 => clutch.torque_n_m,
+            4 => end(clutch.torque_range_n_m, 0),
+            5 => end(clutch.torque_range_n_m, 1),
+            6 => clutch.valve_pa,
+            _ => clutch.open_loop_n_m,
+        }
+    }
+
+    /// The same without the sign of a zero.
+    fn clutch_cell(&self, which: usize, what: usize) -> Cell<'a> {
+        Cell::Number(self.clutch(which, what) + 0.0)
+    }
+}
+
+/// The columns of a clutch, after `offgoing_` or `oncoming_`.
+const CLUTCH: [&str; 8] = [
+    "pressure_estimate_pa",
+    "pressure_least_pa",
+    "pressure_greatest_pa",
+    "torque_estimate_n_m",
+    "torque_least_n_m",
+    "torque_greatest_n_m",
+    "valve_model_pressure_pa",
+    "valve_model_torque_n_m",
+];
+const ROLES: [&str; 2] = ["offgoing", "oncoming"];
+
+/// Where the cells of a column come from.
+#[derive(Clone, Copy)]
+pub(super) enum Value {
+    Of(for<'a> fn(&Row<'a>) -> Cell<'a>),
+    Clutch(usize, usize),
+    /// Pressure of an element by its valve model, by its place in the filter's tables.
+    Valve(usize),
+}
+
+impl Value {
+    pub(super) fn cell<'a>(self, row: &Row<'a>) -> Cell<'a> {
+        match self {
+            Self::Of(value) => value(row),
+            Self::Clutch(which, what) => row.clutch_cell(which, what),
+            Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
+        }
+    }
+}
+
+/// A column of the estimate.
+pub(super) struct Column {
+    pub(super) name: String,
+    pub(super) kind: ColumnKind,
+    pub(super) value: Value,
+}
+
+/// The columns of a car whose elements have these places in the filter's tables.
+pub(super) fn columns(places: &[(usize, &str)]) -> Vec<Column> {
+    let word = |name: &str, value: for<'a> fn(&Row<'a>) -> Cell<'a>| Column {
+        name: name.to_owned(),
+        kind: ColumnKind::Word,
+        value: Value::Of(value),
+    };
+    let number = |name: String, value: Value| Column { name, kind: ColumnKind::Number, value };
+    let mut columns = vec![
+        word(trace::signal::GEAR, |row| row.gear(0)),
+        word(trace::signal::TARGET_GEAR, |row| row.gear(1)),
+        word(trace::signal::PHASE, |row| Cell::Word(row.estimate.phase.map_or("", |phase| phase.name()))),
+        word(ROLES[0], |row| row.element(0)),
+        word(ROLES[1], |row| row.element(1)),
+    ];
+    for (which, role) in ROLES.iter().enumerate() {
+        let named = CLUTCH.iter().enumerate();
+        columns.extend(named.map(|(what, name)| number(format!("{role}_{name}"), Value::Clutch(which, what))));
+    }
+    columns.push(number("turbine_torque_estimate_n_m".to_owned(), Value::Of(|row| of(row.estimate.turbine_n_m))));
+    columns.push(number(trace::signal::SHAFT_ESTIMATE.to_owned(), Value::Of(|row| of(row.estimate.shaft_n_m))));
+    columns.extend(
+        places
+            .iter()
+            .map(|(place, name)| number(format!("{}_{}", element_column(name), CLUTCH[6]), Value::Valve(*place))),
+    );
+    columns.push(word(trace::signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
+    columns
+}
+
+fn of(value: Option<f64>) -> Cell<'static> {
+    Cell::Number(value.unwrap_or(f64::NAN))
+}
+
+/// The columns of these names in their order, or all.
+pub(super) fn chosen(mut all: Vec<Column>, names: &[String]) -> Result<Vec<Column>, Failure> {
+    if names.is_empty() {
+        return Ok(all);
+    }
+    let mut chosen = Vec::new();
+    for name in names.iter().map(|name| name.trim()).filter(|name| *name != trace::signal::TIME) {
+        let Some(at) = all.iter().position(|column| column.name == name) else {
+            let known: Vec<&str> = all.iter().map(|column| column.name.as_str()).collect();
+            return Err(Failure::Input(format!(
+                "--columns: there is no column `{}`, or it is there twice\nhint: the other columns are {}",
+                name.escape_debug(),
+                known.join(", ")
+            )));
+        };
+        chosen.push(all.remove(at));
+    }
+    Ok(chosen)
+}

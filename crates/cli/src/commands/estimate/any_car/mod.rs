@@ -1,0 +1,156 @@
+//! `wetclutch estimate` of a drive of a car with any gearbox.
+
+mod columns;
+mod passing;
+mod source;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use config::{Car, Sensors};
+use design::ShiftTables;
+use logs::ChannelMap;
+use report::drive_page::{DrivePage, findings, shift_cells, shift_rows};
+use study::any_shift::drive::ScoredDrive;
+use study::any_shift::logged::LoggedDrive;
+use trace::Cell;
+
+use self::columns::{Row, chosen, columns};
+use self::passing::Passing;
+use self::source::CarSource;
+use super::Messages;
+use super::observer::sensors;
+use super::outputs::{Output, beside, remove_old};
+use super::selection::Selection;
+use crate::args::{Estimate, ObserverChoice};
+use crate::commands::{channel_map, json_object, write_cells, write_text};
+use crate::failure::Failure;
+use crate::output;
+
+/// Rows of the table of shifts that a terminal shows.
+const SHOWN: usize = 40;
+
+/// Refuses options that have no effect with the filter for any shift.
+pub(super) fn check_options(options: &Estimate) -> Result<(), Failure> {
+    let refuse = |option: &str, hint: &str| {
+        let message = format!("{option} has no effect with the vehicle file of a car with a gearbox\nhint: {hint}");
+        Err(Failure::Input(message))
+    };
+    if options.observer != ObserverChoice::Best || options.method.is_some() {
+        let hint = "leave it out; the filter for any shift also writes the estimate of the valve model alone";
+        return refuse(if options.method.is_some() { "--method" } else { "--observer" }, hint);
+    }
+    Ok(())
+}
+
+/// What is common to all logs of a command.
+pub(super) struct CarSetup<'a> {
+    options: &'a Estimate,
+    car: Car,
+    tables: ShiftTables<f64>,
+    sensors: Option<Sensors>,
+    map: ChannelMap,
+    /// Set when a log that is followed is to end.
+    stop: Arc<AtomicBool>,
+}
+
+impl<'a> CarSetup<'a> {
+    pub(super) fn new(options: &'a Estimate) -> Result<Self, Failure> {
+        let car = Car::read(&options.vehicle)?;
+        let sensors = options.sensors.as_deref().map(sensors).transpose()?;
+        let (tables, map) = (LoggedDrive::tables(&car)?, channel_map(&options.mapping)?);
+        Ok(Self { options, car, tables, sensors, map, stop: super::stop(options)? })
+    }
+}
+
+/// Estimates a log, and says what was found and where it is.
+pub(super) fn estimate(
+    setup: &CarSetup<'_>,
+    path: &Path,
+    output: Option<&Path>,
+    say: &mut Messages,
+) -> Result<(), Failure> {
+    let CarSetup { options, car, tables, .. } = setup;
+    let mut opened = None;
+    let mut log = CarSource::open(setup, path, &mut opened)?;
+    let mut drive = LoggedDrive::new(car, tables, setup.sensors.as_ref());
+    // Places of the elements in the filter's tables, by name.
+    let elements = car.gearbox.elements.iter().enumerate();
+    let places: Vec<(usize, &str)> =
+        elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
+    let columns = chosen(columns(&places), &options.columns)?;
+    let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
+    let mut table = Output::named(output, named)?;
+    let mut passing = Passing::new(Selection::of(options));
+    while let Some(step) = log.next_step()? {
+        let estimate = drive.push(&step);
+        let gears = [step.input.gear.from, step.input.gear.to];
+        let row = Row { car, places: &places, gears, estimate };
+        passing.push(step.time_s, row, |time_s, row| {
+            table.cells(time_s, columns.iter().map(|column| column.value.cell(row)))
+        })?;
+        if options.follow {
+            table.flush()?;
+        }
+    }
+    log.finish(say)?;
+    check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
+    let mut drive = drive.finish();
+    passing.check()?;
+    drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
+    table.finish()?;
+    report(&drive, car, say);
+    let Some(output) = output else {
+        say.note("estimate: on standard output");
+        return Ok(());
+    };
+    say.note(&format!("estimate: {}", output.display()));
+    write_beside(&drive, car, path, output, say)
+}
+
+/// Refuses a log whose speeds are not those of the gearbox in most rows.
+fn check_ratios([all, unfit]: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
+    if 2 * unfit <= all {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\n         hint: check the units of both speeds, the gear, and whether this is the vehicle file of the car",
+        log.display(),
+        vehicle.display()
+    )))
+}
+
+/// The table of shifts and the page.
+fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path, say: &mut Messages) -> Result<(), Failure> {
+    let Some(places) = beside(output) else { return Ok(()) };
+    if drive.shifts.is_empty() {
+        return remove_old(&places, |note| say.note(note));
+    }
+    let [csv, json, page] = places;
+    let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
+    write_cells(&csv, &cells)?;
+    let objects: Vec<_> = cells.into_iter().map(json_object).collect();
+    write_text(&json, &(serde_json::to_string_pretty(&objects)? + "\n"))?;
+    let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
+    let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
+    write_text(&page, &html)?;
+    say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
+    say.note(&format!("report: {}", page.display()));
+    Ok(())
+}
+
+/// The shifts as a table, and what was found.
+fn report(drive: &ScoredDrive, car: &Car, say: &mut Messages) {
+    let (titles, rows) = shift_rows(drive, car);
+    let more = rows.len().saturating_sub(SHOWN);
+    let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
+    let table: Vec<Vec<String>> = std::iter::once(head).chain(rows.into_iter().take(SHOWN)).collect();
+    if table.len() > 1 {
+        output::lines(3, &table).iter().for_each(|line| say.note(line));
+    }
+    if more > 0 {
+        say.note(&format!("and {more} more shifts"));
+    }
+    findings(drive).iter().for_each(|sentence| say.note(sentence));
+}

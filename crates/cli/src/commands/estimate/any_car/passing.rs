@@ -1,0 +1,76 @@
+//! Which rows of an estimate are written: all, or those of the shifts that are wanted.
+
+use std::collections::VecDeque;
+
+use config::Car;
+
+use super::super::selection::{AFTER_S, BEFORE_S, Selection};
+use super::columns::Row;
+use crate::failure::Failure;
+
+/// The rows of a drive as they pass by.
+pub(super) struct Passing<'a> {
+    selection: Selection,
+    /// Rows that a shift which is wanted would begin with.
+    recent: VecDeque<(f64, Row<'a>)>,
+    gears: Option<[usize; 2]>,
+    is_wanted: bool,
+    /// Rows are written until this time, s.
+    until_s: f64,
+}
+
+impl<'a> Passing<'a> {
+    pub(super) fn new(selection: Selection) -> Self {
+        Self { selection, recent: VecDeque::new(), gears: None, is_wanted: false, until_s: f64::NEG_INFINITY }
+    }
+
+    /// Takes a row; `write` gets those that are to be written.
+    pub(super) fn push(
+        &mut self,
+        time_s: f64,
+        row: Row<'a>,
+        mut write: impl FnMut(f64, &Row<'a>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let gears = (row.gears[0] != row.gears[1]).then_some(row.gears);
+        if gears != self.gears {
+            if self.gears.is_some() && self.is_wanted {
+                self.until_s = time_s + AFTER_S;
+            }
+            self.gears = gears;
+            self.is_wanted = match gears {
+                Some(pair) => self.selection.begins(&names(row.car, pair)),
+                None => false,
+            };
+        }
+        if !self.selection.is_selective() {
+            return write(time_s, &row);
+        }
+        if self.is_wanted || time_s <= self.until_s {
+            for (time_s, row) in self.recent.drain(..) {
+                write(time_s, &row)?;
+            }
+            return write(time_s, &row);
+        }
+        self.recent.push_back((time_s, row));
+        while self.recent.front().is_some_and(|(first_s, _)| *first_s < time_s - BEFORE_S) {
+            self.recent.pop_front();
+        }
+        Ok(())
+    }
+
+    /// Whether a shift is wanted.
+    pub(super) fn wants(&self, number: usize, car: &Car, pair: [usize; 2]) -> bool {
+        self.selection.wants(number, &names(car, pair))
+    }
+
+    /// Refuses a selection that no shift is in.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        self.selection.check("`gear` and `target_gear` tell a shift")
+    }
+}
+
+/// A shift by the names of its gears.
+fn names(car: &Car, pair: [usize; 2]) -> String {
+    let name = |gear: usize| car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str());
+    format!("{}-{}", name(pair[0]), name(pair[1]))
+}

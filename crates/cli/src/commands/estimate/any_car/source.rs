@@ -1,0 +1,74 @@
+//! Where the steps of a drive come from: a table with the names of the program, or mapped channels.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+use logs::{Log, LogError};
+use study::any_shift::channels::{CarChannels, own_map};
+use study::any_shift::logged::{CarLog, LogStep};
+use trace::{CsvRows, Following};
+
+use super::super::Messages;
+use super::super::measured::report_readings;
+use super::CarSetup;
+use crate::failure::Failure;
+
+/// The steps of a log.
+pub(super) enum CarSource<'a> {
+    Rows(Box<CarLog<'a>>),
+    Channels(Box<CarChannels<'a>>),
+}
+
+impl<'a> CarSource<'a> {
+    /// Opens a log; `opened` holds it where it has channels.
+    pub(super) fn open(setup: &'a CarSetup<'_>, path: &Path, opened: &'a mut Option<Log>) -> Result<Self, Failure> {
+        let CarSetup { car, tables, map, options, .. } = setup;
+        let stop = options.follow.then(|| Arc::clone(&setup.stop));
+        let is_pipe = path == Path::new("-");
+        if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
+            let opening = |source| LogError::Io { path: path.to_owned(), source };
+            let input: Box<dyn Read> = match stop {
+                Some(stop) => Box::new(Following::open(path, stop).map_err(opening)?),
+                None if is_pipe => Box::new(io::stdin()),
+                None => Box::new(File::open(path).map_err(opening)?),
+            };
+            return Ok(Self::Rows(Box::new(CarLog::of(CsvRows::of(path, input)?, car, tables)?)));
+        }
+        let log = match stop {
+            Some(stop) => Log::follow(path, &map.open, stop)?,
+            None => Log::open(path, &map.open)?,
+        };
+        let own;
+        let map = if map.channels.is_empty() {
+            own = own_map(&log, car).ok_or_else(|| {
+                Failure::Input(format!(
+                    "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`\n\
+                     hint: `wetclutch inspect` with --suggest writes a first one, for --map",
+                    path.display()
+                ))
+            })?;
+            &own
+        } else {
+            map
+        };
+        let channels = CarChannels::of(opened.insert(log), map, car, tables)?;
+        Ok(Self::Channels(Box::new(channels)))
+    }
+
+    pub(super) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
+        Ok(match self {
+            Self::Rows(rows) => rows.next_step()?,
+            Self::Channels(channels) => channels.next_step()?,
+        })
+    }
+
+    /// Says what was met in the log, after its last step.
+    pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
+        match self {
+            Self::Rows(_) => Ok(()),
+            Self::Channels(channels) => report_readings(channels.readings(), say),
+        }
+    }
+}

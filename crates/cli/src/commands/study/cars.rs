@@ -1,0 +1,121 @@
+//! `wetclutch study` of a car with any gearbox.
+
+use std::path::Path;
+
+use config::{CarStudy, CarStudyRuns};
+use report::matrix_page::kind_rows;
+use study::StudyError;
+use study::any_shift::campaign::{CarCampaign, CarRow, CarSummary};
+use study::any_shift::matrix::Pooled;
+
+use super::part::{Part, Runs, lock, merged};
+use crate::args::{Merge, StudyOptions};
+use crate::commands::matrix::bench_sensors;
+use crate::commands::writable;
+use crate::failure::Failure;
+use crate::output;
+
+impl Runs for CarCampaign {
+    type Row = CarRow;
+
+    fn name(&self) -> &str {
+        &self.study.name
+    }
+
+    fn fingerprint(&self) -> String {
+        self.study.fingerprint()
+    }
+
+    fn count(&self) -> u64 {
+        self.study.runs
+    }
+
+    fn header(&self) -> Vec<String> {
+        Self::header(self)
+    }
+
+    fn make(&self, run: u64) -> Result<CarRow, StudyError> {
+        self.row(run)
+    }
+
+    fn line(&self, row: &CarRow) -> String {
+        row.line()
+    }
+
+    fn row_of_line(&self, run: u64, line: &str) -> Result<CarRow, String> {
+        Self::row_of_line(self, run, line)
+    }
+
+    fn at_once(&self) -> [u64; 2] {
+        [1, 1]
+    }
+}
+
+pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
+    if options.run.is_some() {
+        let message = "--run has no effect on a study of a car with a gearbox\nhint: `wetclutch demo --vehicle CAR --drive DRIVE --seed N` shows one car with every shift";
+        return Err(Failure::Input(message.to_owned()));
+    }
+    let _lock = lock(&options.output)?;
+    writable(&options.output, &["runs.csv", "runs.parquet"])?;
+    let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
+    let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
+    let mut summary = campaign.summary();
+    part.make(options, |row| campaign.push(&mut summary, row))?;
+    finish(&part, &summary)
+}
+
+pub(super) fn merge(options: &Merge) -> Result<(), Failure> {
+    let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
+    let mut summary = campaign.summary();
+    let (whole, _lock) = merged(&campaign, options, |row| campaign.push(&mut summary, row))?;
+    finish(&whole, &summary)
+}
+
+fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Failure> {
+    part.write_parquet()?;
+    let matrix = part.campaign.matrix(summary);
+    output::line(&format!("{} cars, {} shifts, {} cars failed\n", summary.runs, summary.shifts(), summary.failed))?;
+    if let Some(failure) = &summary.failure {
+        output::note(&format!("warning: the first car that failed: {failure}"));
+    }
+    output::line(
+        "RMS error of the clutch torque, relative to the open loop, and both errors in N m: filter / open loop. Of the clutch that\n\
+         controls the inertia phase; left out where the open loop errs by less than 2 N m\n",
+    )?;
+    let (titles, rows) = kind_rows(&matrix);
+    let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
+    output::table(2, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
+    let counts = Pooled::of(&matrix.rows, |_| true).counts;
+    output::line(&format!(
+        "\nabove the open loop by more than 1 N m: {} of {} phases\n\
+         outside their guaranteed ranges: {} of {} pressures and torques of both clutches",
+        counts.above,
+        counts.compared,
+        output::grouped(counts.outside),
+        output::grouped(counts.values),
+    ))?;
+    output::line(&format!("\ntable: {}", part.table().display()))?;
+    Ok(())
+}
+
+/// Prints what a study file of a car describes.
+pub(crate) fn describe(path: &Path) -> Result<(), Failure> {
+    let study = CarStudy::read(path)?;
+    let what = match &study.what {
+        CarStudyRuns::Drive(drive) => format!("the drive \"{}\", {:.0} s", drive.name, drive.duration_s()),
+        CarStudyRuns::Shifts(pairs) => format!("{} shifts, with power and without", pairs.len()),
+    };
+    let campaign = CarCampaign::new(study, &bench_sensors()?)?;
+    let (study, errors) = (&campaign.study, campaign.errors());
+    output::line(&format!(
+        "study {} \"{}\": {} cars, each {what}; friction within {} %, gain of the valves {} %, capacity of the converter {} %",
+        study.name,
+        study.title,
+        study.runs,
+        100.0 * errors.friction,
+        100.0 * errors.valve_gain,
+        100.0 * errors.converter,
+    ))?;
+    crate::commands::simulate_drive::describe_car(&study.car)
+}

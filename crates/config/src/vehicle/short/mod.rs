@@ -1,0 +1,157 @@
+//! Short vehicle files: a few numbers of a car, and defaults for everything else.
+//!
+//! A file with `gear_train.ratios` is short. Its defaults are those of `defaults.toml`, scaled to its numbers, and any key of a
+//! vehicle file may stand in it in place of a default.
+
+mod complete;
+mod facts;
+mod first_file;
+mod train;
+mod uncertainty;
+
+use toml::de::DeValue;
+
+use super::budget;
+use crate::source::{Layers, toml_number};
+use crate::{ConfigError, Source, Vehicle};
+pub use complete::DefaultTaken;
+pub(super) use facts::refuse_facts;
+pub use facts::{Facts, ValveKind};
+pub use first_file::{complete_file, short_file};
+pub use uncertainty::Uncertainty;
+
+const DEFAULTS: &str = include_str!("defaults.toml");
+
+/// A short file with the defaults under it.
+pub(super) struct Short {
+    /// The defaults for its numbers, as a file.
+    pub(super) defaults: Source,
+}
+
+impl Short {
+    /// The defaults of a file; none if it is not short.
+    ///
+    /// # Errors
+    /// A number that they need is missing or cannot be right.
+    pub(super) fn of(source: &Source) -> Result<Option<Self>, ConfigError> {
+        if !has_ratios(source)? {
+            return Ok(None);
+        }
+        complete::check_lists(source)?;
+        let facts = Facts::of_file(source)?;
+        let path = format!("defaults of {}", source.path.display()).into();
+        Ok(Some(Self { defaults: Source { path, text: text_of(&facts)? } }))
+    }
+
+    /// The file over its defaults.
+    pub(super) fn layers<'a>(&'a self, source: &'a Source) -> Layers<'a> {
+        Layers { source: &self.defaults, over: Some(source) }
+    }
+
+    /// The whole file, with the values of the short one in their places, and the defaults that it took.
+    pub(super) fn complete(&self, source: &Source) -> Result<(Source, Vec<DefaultTaken>), ConfigError> {
+        let (text, taken) = complete::complete(&self.defaults, source)?;
+        let path = format!("{}, completed with defaults", source.path.display()).into();
+        Ok((Source { path, text }, taken))
+    }
+}
+
+/// The keys that a file which is not short leaves out, with the values that they have.
+pub(super) fn left_out(source: &Source) -> Result<Vec<DefaultTaken>, ConfigError> {
+    let table = source.table()?;
+    let budget = complete::find(table.get_ref(), &["design", "error_bounds"]);
+    let given = |key: &str| match budget {
+        Some(DeValue::Table(budget)) => budget.contains_key(key),
+        _ => false,
+    };
+    let taken = |(key, value): (&str, &[f64])| DefaultTaken {
+        key: format!("design.error_bounds.{key}"),
+        value: numbers(value),
+        numbers: value.to_vec(),
+    };
+    Ok(budget::OPTIONAL.into_iter().filter(|(key, _)| !given(key)).map(taken).collect())
+}
+
+fn has_ratios(source: &Source) -> Result<bool, ConfigError> {
+    Ok(complete::find(source.table()?.get_ref(), &["gear_train", "ratios"]).is_some())
+}
+
+/// One number, or several as an array.
+fn numbers(values: &[f64]) -> String {
+    match values {
+        [value] => toml_number(*value),
+        values => format!("[{}]", values.iter().copied().map(toml_number).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// The car whose values are scaled: that of the two-speed vehicle file.
+const ENGINE_TORQUE_N_M: f64 = 190.0;
+const MASS_KG: f64 = 1500.0;
+const WHEEL_RADIUS_M: f64 = 0.3;
+const WHEEL_INERTIA_KG_M2: f64 = 2.4;
+const TYRE_FORCE_N: f64 = 13_200.0;
+const STIFFNESS_N_M_RAD: f64 = 13_000.0;
+const DAMPING_N_M_S_RAD: f64 = 20.0;
+const SHAFT_TORQUE_N_M: f64 = 800.0;
+const TURBINE_ERROR_N_M: f64 = 20.0;
+const ENGINE_INERTIA_KG_M2: f64 = 0.17;
+const LOWER_GEAR: f64 = 2.5 * 3.0;
+/// Its mass error over the mass, and its rolling resistance over the weight.
+const MASS_SHARE: f64 = 0.15;
+const ROLLING_SHARE: f64 = 0.02;
+/// Piston area per share of the turbine torque that the clutch carries, m^2, offgoing and oncoming clutch.
+const AREAS_M2: [f64; 2] = [0.012 / 1.5, 0.01 / 0.6];
+/// Pressure at which its plates touch, Pa.
+const KISS_PA: f64 = 60e3;
+
+/// The defaults as the text of a vehicle file.
+fn text_of(facts: &Facts) -> Result<String, ConfigError> {
+    let given = Vehicle::two_speed_at()?;
+    let torque = facts.engine_torque_n_m / ENGINE_TORQUE_N_M;
+    let lower_gear = torque * facts.ratio_before * facts.final_ratio / LOWER_GEAR;
+    let mass = facts.mass_kg / MASS_KG;
+    let radius = facts.wheel_radius_m / WHEEL_RADIUS_M;
+    let scaled = |values: Vec<f64>| numbers(&values.into_iter().map(|value| torque * value).collect::<Vec<_>>());
+    let map = &given.engine.torque_n_m;
+    let row = |speed: &f64| scaled(map.columns().iter().map(|throttle| map.at(*speed, *throttle)).collect());
+    let rows = map.rows().iter().map(|speed| format!("  {},\n", row(speed))).collect::<String>();
+    let elements =
+        train::elements([facts.ratio_before, facts.ratio_after]).map_err(|wrong| facts.wrong_ratios(wrong))?;
+    let area = |i: usize| torque * AREAS_M2[i] * elements[i].torque_share;
+    let weight_n = facts.mass_kg * drivetrain::road::GRAVITY_M_S2;
+    let mut fields = vec![
+        ("before", toml_number(facts.ratio_before)),
+        ("after", toml_number(facts.ratio_after)),
+        ("engine_inertia", toml_number(torque * ENGINE_INERTIA_KG_M2)),
+        ("engine_torque", toml_number(facts.engine_torque_n_m)),
+        ("engine_map", format!("[\n{rows}]")),
+        ("capacity", scaled(given.converter.capacity_n_m_s2.values().to_vec())),
+        ("train", elements.iter().map(|element| element.text.as_str()).collect()),
+        ("sides_a", elements[0].sides.clone()),
+        ("sides_b", elements[1].sides.clone()),
+        ("area_a", toml_number(area(0))),
+        ("area_b", toml_number(area(1))),
+        ("spring_a", toml_number(KISS_PA * area(0))),
+        ("spring_b", toml_number(KISS_PA * area(1))),
+        ("final_ratio", toml_number(facts.final_ratio)),
+        ("stiffness", toml_number(lower_gear * STIFFNESS_N_M_RAD)),
+        ("damping", toml_number(lower_gear * DAMPING_N_M_S_RAD)),
+        ("wheel_inertia", toml_number(mass * radius * radius * WHEEL_INERTIA_KG_M2)),
+        ("max_force", toml_number(mass * TYRE_FORCE_N)),
+        ("mass", toml_number(facts.mass_kg)),
+        ("radius", toml_number(facts.wheel_radius_m)),
+        ("rolling", toml_number(ROLLING_SHARE * weight_n * facts.wheel_radius_m)),
+        ("turbine_torque", toml_number(torque * TURBINE_ERROR_N_M)),
+        ("mass_error", toml_number(MASS_SHARE * facts.mass_kg)),
+        ("shaft_torque", toml_number(lower_gear * SHAFT_TORQUE_N_M)),
+    ];
+    let of_valve = facts.valve.fields();
+    let is_of_valve = |key: &str| of_valve.iter().any(|(name, _)| *name == key);
+    fields.extend(
+        budget::OPTIONAL.iter().filter(|(key, _)| !is_of_valve(key)).map(|(key, value)| (*key, numbers(value))),
+    );
+    fields.extend(of_valve.iter().map(|(key, value)| (*key, (*value).to_owned())));
+    // The name goes in last, so that braces in it stay what they are.
+    fields.push(("name", crate::toml_string(&facts.name)));
+    Ok(fields.into_iter().fold(DEFAULTS.to_owned(), |text, (key, value)| text.replace(&format!("{{{key}}}"), &value)))
+}

@@ -1,0 +1,106 @@
+//! Speeds that stand still while they cannot.
+//!
+//! A speed is frozen that stands still, to the last digit and away from zero, for [`FROZEN_S`] and [`FROZEN_SAMPLES`] samples and
+//! three times as many samples as ever before, while a speed that it cannot part from changes by more than a tyre slips,
+//! [`FROZEN_CHANGE`], and by more than [`FROZEN_QUANTA`] of its own quanta: it is not used until it changes. Its quantum is the
+//! smallest change that was seen of it; before it has changed, [`FROZEN_FROM_START_S`] and [`FROZEN_CHANGE_FROM_START`] count.
+//! Output, wheels and car cannot part from each other, nor the turbine from them, nor the engine from a turbine that is nearly as fast
+//! or faster: below that the idle control may hold the engine while the car comes to rest.
+
+use crate::Role;
+
+/// A speed is frozen when it stood still for so long, s.
+pub const FROZEN_S: f64 = 0.5;
+/// When it has not changed since the log began, s: how coarse it is, is not known then.
+pub const FROZEN_FROM_START_S: f64 = 5.0;
+/// And for so many samples.
+pub const FROZEN_SAMPLES: u32 = 10;
+/// While a speed that it cannot part from changed by this share of its value: more than the slip of a tyre changes in ordinary
+/// driving.
+pub const FROZEN_CHANGE: f64 = 0.02;
+/// The same when it has not changed since the log began.
+pub const FROZEN_CHANGE_FROM_START: f64 = 0.1;
+/// And by so many of its own quanta: a value may move by nearly one unseen, and a filter or a hysteresis may hide as much again.
+pub const FROZEN_QUANTA: f64 = 3.0;
+/// A turbine above this share of the engine's speed takes the engine along when it changes.
+pub const COUPLED: f64 = 0.95;
+
+/// Roles that are speeds: the first five.
+pub const SPEEDS: usize = 5;
+
+/// The newest value of each speed that is not frozen, rad/s, or m/s of the car.
+pub type Speeds = [Option<f64>; SPEEDS];
+
+/// Watches a speed.
+#[derive(Debug, Clone, Copy)]
+pub struct FrozenSpeed {
+    role: Role,
+    still: Option<Still>,
+    /// Samples of the longest time so far in which the speed stood still and was not frozen: coarse signals do so often.
+    longest_still: u32,
+    /// The smallest change so far.
+    quantum: f64,
+}
+
+/// A speed that stands still.
+#[derive(Debug, Clone, Copy)]
+struct Still {
+    value: f64,
+    since_s: f64,
+    samples: u32,
+    /// The other speeds when it began.
+    others: Speeds,
+    frozen: bool,
+}
+
+impl FrozenSpeed {
+    /// Watches the speed of this role.
+    pub fn new(role: Role) -> Self {
+        Self { role, still: None, longest_still: 0, quantum: f64::INFINITY }
+    }
+
+    /// Whether the speed is frozen, with its next value and the newest values of the others.
+    pub fn is_frozen(&mut self, value: f64, time_s: f64, speeds: &Speeds) -> bool {
+        let Some(still) = self.still.as_mut().filter(|still| still.value == value) else {
+            if let Some(before) = self.still {
+                self.quantum = self.quantum.min((value - before.value).abs());
+                if !before.frozen {
+                    self.longest_still = self.longest_still.max(before.samples);
+                }
+            }
+            self.still = Some(Still { value, since_s: time_s, samples: 1, others: *speeds, frozen: false });
+            return false;
+        };
+        still.samples += 1;
+        let (limit_s, share) = match self.longest_still {
+            0 => (FROZEN_FROM_START_S, FROZEN_CHANGE_FROM_START),
+            _ => (FROZEN_S, FROZEN_CHANGE),
+        };
+        let long = still.samples >= FROZEN_SAMPLES.max(3 * self.longest_still) && time_s - still.since_s >= limit_s;
+        if !still.frozen && value != 0.0 && long {
+            let quanta = if self.quantum.is_finite() { FROZEN_QUANTA * self.quantum / value.abs() } else { 0.0 };
+            let limit = share.max(quanta);
+            still.frozen = partners(self.role).iter().any(|partner| {
+                match (speeds[*partner as usize], still.others[*partner as usize]) {
+                    (Some(now), Some(then)) => {
+                        let takes_along = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
+                        takes_along && (now - then).abs() > limit * then.abs().max(now.abs())
+                    }
+                    _ => false,
+                }
+            });
+        }
+        still.frozen
+    }
+}
+
+/// The speeds that one cannot part from.
+fn partners(role: Role) -> &'static [Role] {
+    match role {
+        Role::EngineSpeed => &[Role::TurbineSpeed],
+        Role::TurbineSpeed => &[Role::OutputSpeed, Role::WheelSpeed, Role::VehicleSpeed],
+        Role::OutputSpeed => &[Role::WheelSpeed, Role::VehicleSpeed],
+        Role::WheelSpeed => &[Role::OutputSpeed, Role::VehicleSpeed],
+        _ => &[Role::OutputSpeed, Role::WheelSpeed],
+    }
+}

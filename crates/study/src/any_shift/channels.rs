@@ -1,0 +1,244 @@
+//! A log of a drive of a car with any gearbox, of any format, by a channel map: each channel with a clock of its own.
+//!
+//! Turbine and output speed, gear, target gear and the command of every element's valve are needed, with a converter the engine speed
+//! too, without one the engine torque. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
+
+use config::Car;
+use design::ShiftTables;
+use drivetrain::CommandKind;
+use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
+use observer::Reading as Measured;
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+
+use super::logged::{LogStep, NO_GEAR, element_column, element_commands};
+
+/// The newest reading of each entry of a map since the step before.
+#[derive(Debug, Clone)]
+pub struct Newest(Vec<Option<Reading>>);
+
+/// A step of a log: its time, the time since the one before, and the readings by the entries of the map.
+#[derive(Debug, Clone)]
+pub struct ChannelStep {
+    time_s: f64,
+    dt_s: f64,
+    readings: Vec<Option<Reading>>,
+}
+
+impl Places for Newest {
+    type Step = ChannelStep;
+
+    fn emptied(&self) -> Self {
+        Self(vec![None; self.0.len()])
+    }
+
+    fn place(&mut self, entry: usize, _role: Role) -> Option<&mut Option<Reading>> {
+        self.0.get_mut(entry)
+    }
+
+    fn close(&self, time_s: f64, dt_s: f64) -> ChannelStep {
+        ChannelStep { time_s, dt_s, readings: self.0.clone() }
+    }
+}
+
+/// A log by its channel map, step by step.
+pub struct CarChannels<'a> {
+    car: &'a Car,
+    steps: Steps<'a, Newest>,
+    /// Role of each entry, and the place in the filter's tables where it is the command of an element.
+    entries: Vec<(Role, Option<usize>)>,
+    gears: [usize; 2],
+    lock_up_applied: bool,
+    pedal: f64,
+    vehicle_m_s: Option<f64>,
+    truth: [f64; 2],
+}
+
+impl<'a> CarChannels<'a> {
+    /// Finds the channels.
+    ///
+    /// # Errors
+    /// The map lacks one that is needed, has one of no element, or does not fit the log.
+    pub fn of(log: &'a mut Log, map: &ChannelMap, car: &'a Car, tables: &ShiftTables<f64>) -> Result<Self, LogError> {
+        let entries = map.channels.iter().map(|entry| entry_of(entry, car, tables)).collect::<Result<Vec<_>, _>>()?;
+        require(map, car, tables)?;
+        let readings = Readings::new(log, map)?;
+        let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
+        let (gears, truth) = ([NO_GEAR; 2], [f64::NAN; 2]);
+        Ok(Self { car, steps, entries, gears, lock_up_applied: false, pedal: f64::NAN, vehicle_m_s: None, truth })
+    }
+
+    /// The readings, with their summary and notes.
+    pub fn readings(&self) -> &Readings<'a> {
+        self.steps.readings()
+    }
+
+    /// The next step; `None` at the end.
+    ///
+    /// # Errors
+    /// The log cannot be read, or a gear is none of the gearbox.
+    pub fn next_step(&mut self) -> Result<Option<LogStep>, LogError> {
+        let Some(step) = self.steps.next() else { return Ok(None) };
+        let ChannelStep { time_s, dt_s, readings } = step?;
+        let mut commands = [None; MAX_ELEMENTS];
+        let mut of_role = [None; 5];
+        let mut changed_gear = [None; 2];
+        for ((role, place), reading) in self.entries.iter().zip(&readings) {
+            let Some(reading) = reading else { continue };
+            let measured = Measured { value: reading.value, age_s: (time_s - reading.time_s).max(0.0) };
+            match role {
+                Role::EngineSpeed => of_role[0] = Some(measured),
+                Role::TurbineSpeed => of_role[1] = Some(measured),
+                Role::OutputSpeed => of_role[2] = Some(measured),
+                Role::WheelSpeed => of_role[3] = Some(measured),
+                Role::EngineTorque => of_role[4] = Some(measured),
+                Role::Gear => changed_gear[0] = Some(measured.value),
+                Role::TargetGear => changed_gear[1] = Some(measured.value),
+                Role::LockUpApplied => self.lock_up_applied = measured.value > 0.5,
+                Role::Throttle => self.pedal = measured.value,
+                Role::VehicleSpeed => self.vehicle_m_s = Some(measured.value),
+                Role::OncomingPressure => self.truth[0] = measured.value,
+                Role::OncomingTorque => self.truth[1] = measured.value,
+                _ => {
+                    if let Some(place) = place {
+                        commands[*place] = Some(measured);
+                    }
+                }
+            }
+        }
+        for (gear, number) in self.gears.iter_mut().zip(changed_gear) {
+            if let Some(number) = number {
+                *gear = gear_of(self.car, number)?;
+            }
+        }
+        let [from, to] = self.gears;
+        let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m] = of_role;
+        let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
+        let input = ShiftInput {
+            dt_s,
+            engine_rad_s,
+            turbine_rad_s,
+            output_rad_s,
+            wheel_rad_s,
+            // As with the rows of a table: beside the converter's maps the engine torque makes the inertia phase worse.
+            engine_n_m: engine_n_m.filter(|_| self.car.converter.is_none() || self.lock_up_applied),
+            lock_up_applied: self.lock_up_applied,
+            commands,
+            gear: GearCommand { from, to },
+        };
+        let oncoming = [self.truth[0], self.truth[1], f64::NAN];
+        Ok(Some(LogStep {
+            time_s,
+            input,
+            pedals: [self.pedal, f64::NAN],
+            vehicle_m_s: self.vehicle_m_s.unwrap_or(by_wheels),
+            truth: [[f64::NAN; 3], oncoming],
+        }))
+    }
+}
+
+/// Role of an entry, and the place in the filter's tables of the element that it is the command of.
+fn entry_of(entry: &Mapped, car: &Car, tables: &ShiftTables<f64>) -> Result<(Role, Option<usize>), LogError> {
+    let Some(element) = &entry.element else { return Ok((entry.role, None)) };
+    let column = format!("element_{element}");
+    let at = car.gearbox.elements.iter().position(|known| element_column(&known.name) == column);
+    let clutch = at.and_then(|at| car.clutches.get(at)?.as_ref());
+    let Some((at, clutch)) = at.zip(clutch) else {
+        let names = element_commands(car).into_iter().map(|(_, name)| key_of(&name)).collect::<Vec<_>>().join(", ");
+        return Err(LogError::map(format!(
+            "the channel map has {}, which is no clutch or brake of this gearbox\nhint: the commands are {names}",
+            entry.key()
+        )));
+    };
+    let wanted = match clutch.valve.command_kind() {
+        CommandKind::Current => Role::ElementCurrent,
+        CommandKind::DutyCycle => Role::ElementDuty,
+    };
+    if entry.role != wanted {
+        let hint = match wanted {
+            Role::ElementDuty => format!("element_{element}_duty, in %"),
+            _ => format!("element_{element}_current, in A"),
+        };
+        return Err(LogError::map(format!(
+            "the channel map has {}, and the command of this valve is another\nhint: it is {hint}",
+            entry.key()
+        )));
+    }
+    Ok((entry.role, tables.place(at)))
+}
+
+/// The name in a map of the command whose column in a table is called so.
+fn key_of(column: &str) -> String {
+    column.rsplit_once('_').map_or(column, |(key, _unit)| key).to_owned()
+}
+
+/// Refuses a map that lacks a channel that is needed.
+fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(), LogError> {
+    let mut needed = vec![Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear];
+    needed.push(if car.converter.is_some() { Role::EngineSpeed } else { Role::EngineTorque });
+    let commands = element_commands(car).into_iter().filter(|(at, _)| tables.place(*at).is_some());
+    let keys: Vec<String> =
+        needed.iter().map(|role| role.name().to_owned()).chain(commands.map(|(_, name)| key_of(&name))).collect();
+    let missing: Vec<&str> =
+        keys.iter().filter(|key| map.channels.iter().all(|entry| entry.key() != **key)).map(String::as_str).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(LogError::map(format!(
+        "the channel map has no {}\nhint: an estimate of this car needs {}; add `[channel.{}]` or --channel {2}=NAME",
+        missing.join(", "),
+        keys.join(", "),
+        missing[0]
+    )))
+}
+
+/// The place of a gear with this number.
+fn gear_of(car: &Car, number: f64) -> Result<usize, LogError> {
+    let forward = car.gearbox.forward_gears();
+    let whole = number.round();
+    let found = match whole {
+        _ if (number - whole).abs() > 0.01 => None,
+        0.0 => Some(NO_GEAR),
+        _ if whole < 0.0 => car.gearbox.gears.iter().position(|gear| gear.ratio < 0.0),
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1")]
+        _ => forward.get(whole as usize - 1).copied(),
+    };
+    found.ok_or_else(|| {
+        LogError::map(format!(
+            "the log has the gear {number}, which the gearbox does not have\nhint: gears are numbers from 1 to {}, 0 for none, and negative for reverse; use `scale` and `offset` of the channel map",
+            forward.len()
+        ))
+    })
+}
+
+/// The map of a log whose channels have the names of the program, as it writes them itself; `None` if some are missing.
+pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
+    use trace::signal;
+    let named = [
+        (Role::EngineSpeed, signal::ENGINE_SPEED),
+        (Role::TurbineSpeed, signal::TURBINE_SPEED),
+        (Role::OutputSpeed, signal::OUTPUT_SPEED),
+        (Role::WheelSpeed, signal::WHEEL_SPEED),
+        (Role::EngineTorque, signal::REPORTED_ENGINE_TORQUE),
+        (Role::LockUpApplied, signal::LOCK_UP_APPLIED),
+        (Role::Gear, signal::GEAR),
+        (Role::TargetGear, signal::TARGET_GEAR),
+        (Role::Throttle, signal::THROTTLE),
+        (Role::VehicleSpeed, signal::VEHICLE_SPEED),
+        (Role::OncomingPressure, signal::ONCOMING_PRESSURE),
+        (Role::OncomingTorque, signal::ONCOMING_TORQUE),
+    ];
+    let is_there = |name: &str| log.channels().iter().any(|channel| channel.name == name);
+    let of = |role: Role, element: Option<String>, name: &str| {
+        let unit = Some(role.unit().to_owned()).filter(|unit| !unit.is_empty());
+        Mapped { unit, element, ..Mapped::new(role, name) }
+    };
+    let mut map = ChannelMap::default();
+    map.channels.extend(named.into_iter().filter(|(_, name)| is_there(name)).map(|(role, name)| of(role, None, name)));
+    for (_, name) in element_commands(car) {
+        let (role, element) = Role::of_element(&key_of(&name)).map(|(role, element)| (role, element.to_owned()))?;
+        if is_there(&name) {
+            map.channels.push(of(role, Some(element), &name));
+        }
+    }
+    [Role::TurbineSpeed, Role::Gear].into_iter().all(|role| map.has(role)).then_some(map)
+}

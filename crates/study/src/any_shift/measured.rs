@@ -1,0 +1,221 @@
+//! A simulated drive as its car measures it: speeds through toothed wheels, currents through their sensor.
+//!
+//! Readings are made in blocks of [`BLOCK_S`], so that the memory does not grow with the drive. What the sensors count by the shift
+//! (`burst_s`, `frozen_s`, `outliers`) is counted by the block here: a drive has many shifts.
+
+use std::collections::VecDeque;
+use std::convert::Infallible;
+
+use config::{Car, Sensors};
+use design::ShiftTables;
+use drivetrain::CommandKind;
+use observer::Reading;
+use observer::any_shift::ShiftInput;
+use plant::car::CarSample;
+use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
+
+use super::logged::element_commands;
+use super::recording::input;
+use crate::campaign::plan::mixed;
+
+/// Longest time between two records from which teeth are counted, s.
+const RECORD_S: f64 = super::RECORD_S;
+/// Length of a block, s.
+const BLOCK_S: f64 = 60.0;
+/// Records before a block that its first readings need, s: sample time, delay, offset and the time of a standstill, 0.2 s each at most.
+const BEFORE_S: f64 = 1.0;
+/// Elements of a gearbox, with room for more.
+const ELEMENTS: usize = 16;
+/// Names of the speeds, which keep their random numbers apart.
+const SPEEDS: [&str; 4] = ["engine", "turbine", "output", "wheel"];
+
+/// A row of a drive: the truth, and what is read of it. Without a reading a value is not a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredRow {
+    /// The truth.
+    pub sample: CarSample,
+    /// Engine, turbine, output and wheel speed, rad/s, each with its age, s.
+    pub speeds: [[f64; 2]; 4],
+    /// Command of the valve of each element, A or %, with its age, s.
+    pub commands: [[f64; 2]; ELEMENTS],
+}
+
+impl MeasuredRow {
+    /// Of a car that measures exactly.
+    pub fn exact(sample: &CarSample) -> Self {
+        let commands = sample.commands.map(|command| [command, 0.0]);
+        Self { sample: *sample, speeds: speeds_of(sample).map(|speed| [speed, 0.0]), commands }
+    }
+}
+
+impl MeasuredRow {
+    /// What the filter is shown of the row.
+    pub fn input(&self, car: &Car, tables: &ShiftTables<f64>) -> ShiftInput<f64> {
+        let reading = |[value, age_s]: [f64; 2]| (!value.is_nan()).then_some(Reading { value, age_s });
+        let command = |element: usize| reading(self.commands[element]);
+        input(car, tables, &self.sample, self.speeds.map(reading), command)
+    }
+}
+
+fn speeds_of(sample: &CarSample) -> [f64; 4] {
+    let torques = &sample.torques;
+    [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s, sample.wheel_rad_s]
+}
+
+/// A channel with the values of its records.
+struct Recorded {
+    name: String,
+    values: Vec<f64>,
+}
+
+/// The sensors of a car on its way through a drive.
+pub struct SensedDrive<'s> {
+    sensors: &'s Sensors,
+    /// Records in a row, and place of the first row among the records.
+    every: usize,
+    first: usize,
+    row_s: f64,
+    /// Records since the start of the drive.
+    records: usize,
+    block: u64,
+    time_s: Vec<f64>,
+    speeds: [Recorded; 4],
+    /// Elements whose valve has a current that is read.
+    currents: Vec<(usize, Recorded)>,
+    /// Rows whose readings are not yet made.
+    waiting: VecDeque<CarSample>,
+    /// Times of the rows in the records, those of earlier blocks too.
+    rows_s: Vec<f64>,
+}
+
+impl<'s> SensedDrive<'s> {
+    /// For a row every `row_s` seconds.
+    pub fn new(car: &Car, sensors: &'s Sensors, row_s: f64) -> Self {
+        let every = (row_s / RECORD_S - 1e-9).ceil().max(1.0);
+        let record_s = row_s / every;
+        let recorded = |name: &str| Recorded { name: name.to_owned(), values: Vec::new() };
+        let is_current = |element: usize| {
+            let clutch = car.clutches.get(element).and_then(Option::as_ref);
+            clutch.is_some_and(|clutch| clutch.valve.command_kind() == CommandKind::Current)
+        };
+        let commands = element_commands(car).into_iter().filter(|_| sensors.current.is_some());
+        let currents = commands.filter(|(at, _)| is_current(*at)).map(|(at, name)| (at, recorded(&name)));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small and not negative")]
+        let (every, first) = (every as usize, (sensors.row_offset_s / record_s).round() as usize);
+        Self {
+            sensors,
+            every,
+            first,
+            row_s,
+            records: 0,
+            block: 0,
+            time_s: Vec::new(),
+            speeds: SPEEDS.map(recorded),
+            currents: currents.collect(),
+            waiting: VecDeque::new(),
+            rows_s: Vec::new(),
+        }
+    }
+
+    /// Time between two samples that [`Self::push`] takes, s.
+    pub fn record_s(&self) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "small")]
+        let every = self.every as f64;
+        self.row_s / every
+    }
+
+    /// Takes the next sample; `take` gets the rows that are ready.
+    ///
+    /// # Errors
+    /// Those of `take`.
+    pub fn push<E>(&mut self, sample: &CarSample, take: impl FnMut(&MeasuredRow) -> Result<(), E>) -> Result<(), E> {
+        self.time_s.push(sample.time_s);
+        for (channel, speed) in self.speeds.iter_mut().zip(speeds_of(sample)) {
+            channel.values.push(speed);
+        }
+        for (element, channel) in &mut self.currents {
+            channel.values.push(sample.commands[*element]);
+        }
+        let at = self.records;
+        self.records += 1;
+        if at >= self.first && (at - self.first).is_multiple_of(self.every) {
+            self.waiting.push_back(*sample);
+            self.rows_s.push(sample.time_s);
+        }
+        let begun_s = self.waiting.front().map_or(f64::INFINITY, |row| row.time_s);
+        if sample.time_s - begun_s < BLOCK_S { Ok(()) } else { self.finish(take) }
+    }
+
+    /// Gives the rows that wait, those of the last block of a drive.
+    ///
+    /// # Errors
+    /// Those of `take`.
+    pub fn finish<E>(&mut self, mut take: impl FnMut(&MeasuredRow) -> Result<(), E>) -> Result<(), E> {
+        let (Some(begin), Some(end)) = (self.waiting.front(), self.waiting.back()) else { return Ok(()) };
+        let shift_s = [begin.time_s, end.time_s];
+        let seed = mixed(self.sensors.seed, self.block);
+        let offset_s = self.sensors.row_offset_s;
+        let rows = Rows { at_s: &self.rows_s, offset_s, shift_s, seed };
+        let sensors = [&self.sensors.engine, &self.sensors.turbine, &self.sensors.output, &self.sensors.wheel];
+        let outliers = dealt(self.sensors.outliers, sensors.len(), seed);
+        let speeds: [Readings; 4] = std::array::from_fn(|at| {
+            let mut sensor = *sensors[at];
+            sensor.errors.outliers += outliers[at];
+            let Recorded { name, values } = &self.speeds[at];
+            read_speed(&sensor, Channel { name, time_s: &self.time_s, values }, rows)
+        });
+        let currents: Vec<(usize, Readings)> = (self.currents.iter())
+            .filter_map(|(element, of)| {
+                let Recorded { name, values } = of;
+                let truth = Channel { name, time_s: &self.time_s, values };
+                Some((*element, read_current(self.sensors.current.as_ref()?, truth, rows)))
+            })
+            .collect();
+        let before = self.rows_s.len() - self.waiting.len();
+        for (at, sample) in self.waiting.iter().enumerate() {
+            let of = |readings: &Readings| [readings.values[before + at], readings.age_s[before + at]];
+            let mut row = MeasuredRow { speeds: speeds.each_ref().map(of), ..MeasuredRow::exact(sample) };
+            for (element, readings) in &currents {
+                row.commands[*element] = of(readings);
+            }
+            take(&row)?;
+        }
+        self.begin_block(shift_s[1]);
+        Ok(())
+    }
+
+    /// As [`Self::push`], where nothing can go wrong.
+    pub fn each(&mut self, sample: &CarSample, mut take: impl FnMut(&MeasuredRow)) {
+        let Ok(()) = self.push::<Infallible>(sample, |row| {
+            take(row);
+            Ok(())
+        });
+    }
+
+    /// As [`Self::finish`], where nothing can go wrong.
+    pub fn last(&mut self, mut take: impl FnMut(&MeasuredRow)) {
+        let Ok(()) = self.finish::<Infallible>(|row| {
+            take(row);
+            Ok(())
+        });
+    }
+
+    /// Keeps the records that the next block needs.
+    fn begin_block(&mut self, end_s: f64) {
+        self.block += 1;
+        self.waiting.clear();
+        let records = self.time_s.partition_point(|&time_s| time_s < end_s - BEFORE_S);
+        self.time_s.drain(..records);
+        let channels = self.speeds.iter_mut().chain(self.currents.iter_mut().map(|(_, channel)| channel));
+        channels.for_each(|channel| drop(channel.values.drain(..records)));
+        // Readings need all times of the rows from here on.
+        let rows = self.rows_s.partition_point(|&time_s| time_s < end_s - BEFORE_S);
+        self.rows_s.drain(..rows);
+    }
+}
+
+/// Whether the readings of a channel may be older than their rows.
+pub fn has_ages(sample_time_s: f64, offset_s: f64, row_s: f64) -> bool {
+    let is_multiple = |a: f64, b: f64| ((a / b).round() - a / b).abs() < 1e-6;
+    offset_s != 0.0 || !(is_multiple(sample_time_s, row_s) || is_multiple(row_s, sample_time_s))
+}

@@ -1,0 +1,232 @@
+//! Comma-separated files, read row by row.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use crate::{TraceError, signal, units};
+
+/// Longest row that is read, bytes: a million columns fit in. A file without an end of line does not fill the memory.
+pub(super) const LONGEST_ROW: usize = 32 << 20;
+/// Bytes that are read at once.
+pub(super) const READ_AT_ONCE: usize = 64 << 10;
+
+/// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
+/// them and rise. An empty cell, or `nan`, is a reading that did not come, and becomes NaN. A column without a name is passed over.
+pub struct CsvRows {
+    path: PathBuf,
+    reader: csv::Reader<RowByRow>,
+    /// Name in SI, and the factor that brings the cells there.
+    pub(super) columns: Vec<(String, f64)>,
+    pub(super) time_at: usize,
+    row: csv::ByteRecord,
+    time_s: Option<f64>,
+}
+
+impl CsvRows {
+    /// Opens a file and reads the names of its columns.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no time, or two columns of the same signal.
+    pub fn open(path: &Path) -> Result<Self, TraceError> {
+        let file = File::open(path).map_err(|source| TraceError::Io { path: path.to_owned(), source })?;
+        Self::of(path, Box::new(file))
+    }
+
+    /// The same from anywhere; `path` is for messages.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .buffer_capacity(READ_AT_ONCE)
+            .from_reader(RowByRow { input, left: LONGEST_ROW });
+        let row = csv::ByteRecord::new();
+        let mut rows = Self { path: path.to_owned(), reader, columns: Vec::new(), time_at: 0, row, time_s: None };
+        if !rows.read_row()? {
+            return Err(TraceError::Table { path: rows.path, message: "the file is empty".to_owned() });
+        }
+        let names: Vec<String> = rows.row.iter().map(|name| String::from_utf8_lossy(name).trim().to_owned()).collect();
+        rows.columns = names.iter().map(|name| units::to_si(name)).collect();
+        rows.refuse_twins(&names)?;
+        rows.time_at = rows.require(signal::TIME)?;
+        Ok(rows)
+    }
+
+    fn refuse_twins(&self, names: &[String]) -> Result<(), TraceError> {
+        let mut places: HashMap<&str, usize> = HashMap::with_capacity(names.len());
+        for (i, (name, _)) in self.columns.iter().enumerate().filter(|(_, (name, _))| !name.is_empty()) {
+            match places.entry(name) {
+                Entry::Vacant(free) => drop(free.insert(i)),
+                Entry::Occupied(earlier) => {
+                    let (j, shown) = (*earlier.get(), |i: usize| TraceError::shown(&names[i]));
+                    return Err(TraceError::Table {
+                        path: self.path.clone(),
+                        message: format!(
+                            "columns {} `{}` and {} `{}` are the same signal\nhint: remove one of them",
+                            j + 1,
+                            shown(j),
+                            i + 1,
+                            shown(i)
+                        ),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on to the next row; false where there is none.
+    ///
+    /// # Errors
+    /// The file cannot be read, a row has another length, a time does not come after the one before, or there are no
+    /// rows at all.
+    pub fn advance(&mut self) -> Result<bool, TraceError> {
+        let before = self.time_s;
+        if !self.advance_in_any_order()? {
+            return Ok(false);
+        }
+        let time_s = self.time_s();
+        match before.filter(|before| time_s <= *before) {
+            None => Ok(true),
+            Some(before) => Err(self.wrong(format!("the time {time_s} s is not after the time before it, {before} s"))),
+        }
+    }
+
+    /// The same of a table whose times may stand still or go back.
+    ///
+    /// # Errors
+    /// See [`Self::advance`].
+    pub fn advance_in_any_order(&mut self) -> Result<bool, TraceError> {
+        if !self.read_row()? {
+            return match self.time_s {
+                Some(_) => Ok(false),
+                None => Err(TraceError::Table { path: self.path.clone(), message: "there are no rows".to_owned() }),
+            };
+        }
+        if self.row.len() != self.columns.len() {
+            let (cells, names) = (self.row.len(), self.columns.len());
+            return Err(self.wrong(format!("the row has {cells} cells, but the first line names {names} columns")));
+        }
+        let time_s = self.number(self.time_at)?;
+        if !time_s.is_finite() {
+            let text = self.text(self.time_at);
+            let message =
+                if text.is_empty() { "the time is missing".to_owned() } else { format!("the time is {text}") };
+            return Err(self.wrong(message));
+        }
+        self.time_s = Some(time_s);
+        Ok(true)
+    }
+
+    /// Time of the row, s; NaN before the first.
+    pub fn time_s(&self) -> f64 {
+        self.time_s.unwrap_or(f64::NAN)
+    }
+
+    /// Place of a column, if there is one of this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|(column, _)| column == name)
+    }
+
+    /// Place of a column.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn require(&self, name: &str) -> Result<usize, TraceError> {
+        self.find(name).ok_or_else(|| TraceError::MissingColumn {
+            path: self.path.clone(),
+            wanted: name.to_owned(),
+            present: self.columns.iter().map(|(name, _)| name.clone()).collect(),
+        })
+    }
+
+    /// What the cells of a column are multiplied by: 1 where the name has its unit in SI.
+    pub fn factor(&self, column: usize) -> f64 {
+        self.columns[column].1
+    }
+
+    /// The number in a column of this row, in SI; NaN where the cell is empty.
+    ///
+    /// # Errors
+    /// The cell holds something else.
+    pub fn number(&self, column: usize) -> Result<f64, TraceError> {
+        let cell = self.row[column].trim_ascii();
+        if cell.is_empty() {
+            return Ok(f64::NAN);
+        }
+        let (name, factor) = &self.columns[column];
+        let number = std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok());
+        number.map(|number| number * factor).ok_or_else(|| {
+            let (name, text) = (TraceError::shown(name), TraceError::shown(&self.text(column)));
+            self.wrong(format!(
+                "column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"
+            ))
+        })
+    }
+
+    /// The text in a column of this row.
+    pub fn text(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.row[column].trim_ascii())
+    }
+
+    fn read_row(&mut self) -> Result<bool, TraceError> {
+        let line = self.reader.position().line();
+        self.reader.get_mut().left = LONGEST_ROW;
+        let read = self.reader.read_byte_record(&mut self.row);
+        read.map_err(into_io).map_err(|source| match self.reader.get_ref().left {
+            0 => TraceError::Row {
+                path: self.path.clone(),
+                line,
+                message: format!(
+                    "the row that begins here is longer than {} MiB\nhint: the file is not comma-separated, or a quotation \
+                     mark is not closed",
+                    LONGEST_ROW >> 20
+                ),
+            },
+            _ => TraceError::Io { path: self.path.clone(), source },
+        })
+    }
+
+    /// The table cannot be used.
+    pub fn refused(&self, message: String) -> TraceError {
+        TraceError::Table { path: self.path.clone(), message }
+    }
+
+    /// An error in this row.
+    pub fn wrong(&self, message: String) -> TraceError {
+        let line = self.row.position().map_or(0, csv::Position::line);
+        TraceError::Row { path: self.path.clone(), line, message }
+    }
+}
+
+/// An input of which no row may be longer than what is left.
+struct RowByRow {
+    input: Box<dyn Read>,
+    left: usize,
+}
+
+impl Read for RowByRow {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let most = buffer.len().min(self.left);
+        let read = self.input.read(&mut buffer[..most])?;
+        self.left -= read;
+        Ok(read)
+    }
+}
+
+/// The error of the file below, with its kind: a broken pipe must stay one.
+fn into_io(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}

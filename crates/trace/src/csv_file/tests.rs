@@ -1,0 +1,199 @@
+use std::path::PathBuf;
+
+use super::rows::{LONGEST_ROW, READ_AT_ONCE};
+use super::writer::push_number;
+use super::*;
+use crate::signal;
+
+fn file(name: &str, text: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("wetclutch-csv-{}-{name}.csv", std::process::id()));
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn error(name: &str, text: &str) -> String {
+    let path = file(name, text);
+    let message = read_csv(&path).unwrap_err().to_string();
+    std::fs::remove_file(&path).unwrap();
+    message.replace(path.to_str().unwrap(), "FILE")
+}
+
+#[test]
+fn numbers_survive_a_round_trip_to_the_last_bit() {
+    let mut trace = Trace::with_columns(&["a_pa", "b_rad_s"]);
+    trace.push(0.1, &[1.0 / 3.0, f64::NAN]);
+    trace.push(0.2, &[-1e-300, 6.02e23]);
+    trace.add_words("phase", vec!["torque_phase".into(), "inertia_phase".into()]);
+    let path = file("round", "");
+    write_csv(&path, &trace).unwrap();
+    let back = read_csv(&path).unwrap();
+    assert_eq!(back.get("a_pa").unwrap(), trace.get("a_pa").unwrap());
+    assert!(back.get("b_rad_s").unwrap()[0].is_nan());
+    assert_eq!(back.columns[2], trace.columns[2]);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn numbers_are_as_short_as_those_of_display_and_read_back_the_same() {
+    let written = |number: f64| {
+        let mut row = Vec::new();
+        push_number(&mut row, number);
+        String::from_utf8(row).unwrap()
+    };
+    let some = [0.0, -0.0, 1.0, -1.5, 1e-5, 1.2e-5, 9e15, 1e16, 1.5e300, -5e-324, f64::INFINITY, f64::MIN_POSITIVE];
+    // All sizes, by a generator that needs no crate.
+    let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
+    let random = std::iter::repeat_with(|| {
+        bits ^= bits << 13;
+        bits ^= bits >> 7;
+        bits ^= bits << 17;
+        [f64::from_bits(bits), f64::from_bits(bits >> 12 | 0x3ff0_0000_0000_0000) * 1000.0]
+    });
+    for number in some.into_iter().chain(random.take(100_000).flatten()).filter(|number| !number.is_nan()) {
+        let text = written(number);
+        // Where two shortest numbers are equally near, the last digit may be the other one.
+        assert_eq!(text.len(), number.to_string().len(), "{text} {number}");
+        assert_eq!(text.parse::<f64>().unwrap().to_bits(), number.to_bits(), "{text} {number}");
+    }
+    assert_eq!(written(f64::NAN), "");
+    let plain = [
+        (1e-7, "0.0000001"),
+        (-1.25e-7, "-0.000000125"),
+        (1.2e-5, "0.000012"),
+        (1e16, "10000000000000000"),
+        (-1.234_567_890_123_456_7e17, "-123456789012345680"),
+        (5e22, "50000000000000000000000"),
+        (f64::NEG_INFINITY, "-inf"),
+    ];
+    for (number, text) in plain {
+        assert_eq!(written(number), text);
+    }
+}
+
+#[test]
+fn words_with_signs_of_the_format_are_quoted_and_a_row_has_a_cell_for_each_name() {
+    let mut writer = CsvWriter::new(Vec::new(), ["a, b", "c"]).unwrap();
+    writer.row(0.5, [Cell::Word("say \"x\"\n"), Cell::Whole(7)]).unwrap();
+    assert!(writer.row(1.0, [Cell::Number(1.0)]).is_err());
+    writer.row(2.0, [Cell::Number(f64::NAN), Cell::Word("")]).unwrap();
+    let text = String::from_utf8(writer.finish().unwrap()).unwrap();
+    assert_eq!(text, "time_s,\"a, b\",c\n0.5,\"say \"\"x\"\"\n\",7\n2,,\n");
+}
+
+#[test]
+fn other_units_are_converted_to_si() {
+    let path = file("units", "time_ms, Turbine_Speed_rpm\n0, 300\n10, 600\n");
+    let trace = read_csv(&path).unwrap();
+    assert_eq!(trace.time_s, [0.0, 0.01]);
+    assert!((trace.get("turbine_speed_rad_s").unwrap()[1] - 62.831_853).abs() < 1e-6);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn an_empty_cell_and_nan_are_readings_that_did_not_come() {
+    let text = "time_ms,wheel_speed_rpm,wheel_speed_age_ms\n0,60,0\n10,,\n20, NaN ,nan\n30,-nan,\n40,120,7\n";
+    let path = file("holes", text);
+    let (whole, mut rows) = (read_csv(&path).unwrap(), CsvRows::open(&path).unwrap());
+    for name in [signal::WHEEL_SPEED, signal::age_of(signal::WHEEL_SPEED).unwrap()] {
+        let came: Vec<bool> = whole.get(name).unwrap().iter().map(|value| !value.is_nan()).collect();
+        assert_eq!(came, [true, false, false, false, true], "{name}");
+    }
+    assert!((whole.get("wheel_speed_age_s").unwrap()[4] - 0.007).abs() < 1e-12);
+    let column = rows.require(signal::WHEEL_SPEED).unwrap();
+    for &expected in whole.get(signal::WHEEL_SPEED).unwrap() {
+        assert!(rows.advance().unwrap());
+        let number = rows.number(column).unwrap();
+        assert!(number == expected || number.is_nan() && expected.is_nan());
+    }
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_broken_file_says_where_it_is_broken() {
+    assert_eq!(
+        error("back", "time_s,a\n0,1\n0.2,1\n0.1,1\n"),
+        "FILE:4: the time 0.1 s is not after the time before it, 0.2 s"
+    );
+    assert_eq!(error("blank", "time_s,a\n0,1\n,1\n"), "FILE:3: the time is missing");
+    assert_eq!(error("none", "time_s,a\n"), "FILE: there are no rows");
+    assert_eq!(error("untimed", "t,a\n0,1\n"), "FILE: there is no column `time_s`\nhint: the columns are t, a");
+    assert_eq!(
+        error("ragged", "time_s,a\n0,1\n1\n"),
+        "FILE:3: the row has 1 cells, but the first line names 2 columns"
+    );
+    assert_eq!(error("comma", "time_s,a\n0,1,\n"), "FILE:2: the row has 3 cells, but the first line names 2 columns");
+    assert_eq!(error("empty", ""), "FILE: the file is empty");
+    assert_eq!(error("endless", "time_s,a\n0,1\n1e400,1\n"), "FILE:3: the time is 1e400");
+    assert_eq!(error("nan", "time_s,a\nNaN,1\n"), "FILE:2: the time is NaN");
+    assert_eq!(
+        error("time", "time_s,a\n0,1\nnoon,1\n"),
+        "FILE:3: column `time_s` contains `noon`, which is not a number\nhint: leave a lost sample empty"
+    );
+}
+
+#[test]
+fn one_signal_in_two_columns_is_refused_by_their_places() {
+    assert_eq!(
+        error("twins", "time_s,turbine_speed_rpm,a,turbine_speed_rad_s\n0,1,1,1\n"),
+        "FILE: columns 2 `turbine_speed_rpm` and 4 `turbine_speed_rad_s` are the same signal\nhint: remove one of them"
+    );
+}
+
+#[test]
+fn a_million_columns_are_read_and_the_hint_names_a_few() {
+    let names: Vec<String> = (0..1_000_000).map(|i| format!("c{i}")).collect();
+    let message = error("wide", &format!("{}\n0\n", names.join(",")));
+    assert!(message.contains("there is no column `time_s`") && message.len() < 1000, "{message}");
+    assert!(message.contains("c19 and 999980 more"), "{message}");
+}
+
+#[test]
+fn what_spreadsheets_write_is_read() {
+    let path = file("spreadsheet", "\u{feff}\"time_s\",a,,\r\n\"0\", 1 ,,\r\n\r\n0.5,\"2\",x,\r\n");
+    let trace = read_csv(&path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    assert_eq!((trace.time_s.as_slice(), trace.columns.len()), (&[0.0, 0.5][..], 1));
+    assert_eq!(trace.get("a").unwrap(), [1.0, 2.0]);
+}
+
+#[test]
+fn a_row_without_an_end_does_not_fill_the_memory() {
+    // An open quotation mark takes in every line that follows. What the reader holds of the row before is not
+    // counted.
+    let text = format!("time_s\n0\n\"{}", "x\n".repeat((LONGEST_ROW + READ_AT_ONCE) / 2));
+    assert!(error("quote", &text).starts_with("FILE:3: the row that begins here is longer than 32 MiB\nhint: "));
+}
+
+#[test]
+fn what_is_no_text_is_named_without_harm_to_the_terminal() {
+    let path = file("binary", "");
+    std::fs::write(&path, [0x1b, b'[', b'2', b'J', 0xff, 0x00, b',', 0xfe, b'\n', 1, b',', 2]).unwrap();
+    let message = read_csv(&path).unwrap_err().to_string();
+    std::fs::remove_file(path).unwrap();
+    assert!(message.contains("there is no column `time_s`"), "{message}");
+    assert!(message.chars().all(|c| c == '\n' || !c.is_control()), "{message:?}");
+}
+
+#[test]
+fn a_folder_is_no_file() {
+    assert!(matches!(read_csv(&std::env::temp_dir()), Err(TraceError::Io { .. })));
+}
+
+#[test]
+fn a_word_among_numbers_is_named_with_its_row() {
+    let path = file("word", "time_s,turbine_speed_rad_s\n0,1\n1,\n2,n/a\n");
+    let message = read_csv(&path).unwrap().require("turbine_speed_rad_s").unwrap_err().to_string();
+    assert!(
+        message.contains("column `turbine_speed_rad_s` contains `n/a` (row 3), which is not a number"),
+        "{message}"
+    );
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_missing_signal_names_the_one_that_looks_near() {
+    let path = file("near", "time_s,turbine_speed\n0,1\n");
+    let message = read_csv(&path).unwrap().require("turbine_speed_rad_s").unwrap_err().to_string();
+    assert!(message.contains("`turbine_speed` has a similar name"), "{message}");
+    std::fs::remove_file(path).unwrap();
+}

@@ -1,0 +1,4 @@
+//! Measured logs, from Vector's text.
+#![no_main]
+
+fuzz_targets::program!(Measured);

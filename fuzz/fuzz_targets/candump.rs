@@ -1,0 +1,4 @@
+//! Measured logs, from candump's text.
+#![no_main]
+
+fuzz_targets::program!(Measured);

@@ -1,0 +1,4 @@
+//! Measured logs, from tables as text.
+#![no_main]
+
+fuzz_targets::program!(Measured);

@@ -1,0 +1,4 @@
+//! Experiment files.
+#![no_main]
+
+fuzz_targets::program!(Experiment);

@@ -1,0 +1,4 @@
+//! Channel maps.
+#![no_main]
+
+fuzz_targets::program!(Map);

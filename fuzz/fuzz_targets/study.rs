@@ -1,0 +1,4 @@
+//! Study files.
+#![no_main]
+
+fuzz_targets::program!(Study);

@@ -1,0 +1,4 @@
+//! Tables of a study.
+#![no_main]
+
+fuzz_targets::program!(Table);

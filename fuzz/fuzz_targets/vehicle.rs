@@ -1,0 +1,4 @@
+//! Vehicle files of both kinds of car.
+#![no_main]
+
+fuzz_targets::program!(Vehicle);
