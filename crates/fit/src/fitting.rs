@@ -127,6 +127,7 @@ pub fn fit(
     at.shared.truncate(known);
     if !freed.is_empty() {
         precision.with_moved(&freeing::moved(&priors, &before, &at.shared));
+        freeing::forget_low_slips(&priors, &mut precision);
     }
     let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
     Ok(Fit {
