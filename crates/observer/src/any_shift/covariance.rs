@@ -132,10 +132,11 @@ impl<T: Real> Gaussian<T> {
             let output = joined(row[TURBINE], row[OUTPUT]);
             (row[TURBINE], row[OUTPUT]) = (ratio * output, output);
         }
-        for k in 0..N {
-            let output = joined(p[TURBINE][k], p[OUTPUT][k]);
-            (p[TURBINE][k], p[OUTPUT][k]) = (ratio * output, output);
+        let mut output = p[OUTPUT];
+        for (output, turbine) in output.iter_mut().zip(&p[TURBINE]) {
+            *output = joined(*turbine, *output);
         }
+        (p[TURBINE], p[OUTPUT]) = (output.map(|x| ratio * x), output);
     }
 
     /// Variance of a combination of the states.

@@ -21,7 +21,7 @@ pub(super) struct Newest<T> {
     /// Values and ages of those before, newer one first.
     before: [Option<(T, T)>; 2],
     /// Whether the last reading was refused: an outlier is single, a jump persists.
-    refused: bool,
+    pub(super) refused: bool,
 }
 
 impl<T: Real> Newest<T> {

@@ -153,9 +153,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     }
 
     /// Speeds of turbine and output at the time of the older reading, and on the same lines now; `None` where one of them has
-    /// not been read for long.
+    /// not been read for long, or its last reading was refused: a clutch that grips hard looks so, and the lines do not show it.
     pub(super) fn then_and_now(&self, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[[T; 2]; 2]> {
-        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
+        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S) && !newest.refused);
         let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
         Some([self.measured(newest, None), [turbine.at(T::zero()), output.at(T::zero())]])
     }
