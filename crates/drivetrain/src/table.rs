@@ -63,6 +63,7 @@ struct Axis<T, const N: usize> {
     points: [T; N],
     len: usize,
     last: T,
+    last_segment: usize,
     first_segment: [u8; BINS],
     bins_per_unit: T,
 }
@@ -101,7 +102,14 @@ impl<T: Real, const N: usize> Axis<T, N> {
         let (first, last) = (points[0], points[len - 1]);
         points[len..].fill(T::infinity());
         let span = last - first;
-        let mut axis = Self { points, len, last, first_segment: [0; BINS], bins_per_unit: T::of(BINS as f64) / span };
+        let mut axis = Self {
+            points,
+            len,
+            last,
+            last_segment: len - 2,
+            first_segment: [0; BINS],
+            bins_per_unit: T::of(BINS as f64) / span,
+        };
         for (bin, segment) in axis.first_segment.iter_mut().enumerate() {
             // A value that is rounded into this bin may be that much below its edge.
             let edge = first + span * T::of(bin as f64 / BINS as f64 - BIN_ROUNDING);
@@ -111,7 +119,7 @@ impl<T: Real, const N: usize> Axis<T, N> {
         axis
     }
 
-    /// Index of the segment that holds `x`, a value within the axis; for its end that of the last breakpoint.
+    /// Index of the segment that holds `x`, a value within the axis.
     #[inline]
     fn segment(&self, x: T) -> usize {
         let bin = ((x - self.points[0]) * self.bins_per_unit).whole();
@@ -119,7 +127,7 @@ impl<T: Real, const N: usize> Axis<T, N> {
         while self.points.get(segment + 1).is_some_and(|next| *next <= x) {
             segment += 1;
         }
-        segment.min(N - 1)
+        segment.min(self.last_segment).min(N - 2)
     }
 
     #[inline]
@@ -331,7 +339,7 @@ impl<T: Real> Table2<T> {
     #[inline]
     pub fn place(&self, column: T) -> ColumnPlace<T> {
         let column = self.columns.clamp(column);
-        let j = self.columns.segment(column).min(MAX_COLUMNS - 2);
+        let j = self.columns.segment(column);
         let share = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
         ColumnPlace { segment: j, share }
     }
@@ -340,7 +348,7 @@ impl<T: Real> Table2<T> {
     #[inline]
     pub fn at_place(&self, row: T, column: &ColumnPlace<T>) -> T {
         let row = self.rows.clamp(row);
-        let (i, j, c) = (self.rows.segment(row).min(MAX_POINTS - 2), column.segment.min(MAX_COLUMNS - 2), column.share);
+        let (i, j, c) = (self.rows.segment(row), column.segment.min(MAX_COLUMNS - 2), column.share);
         let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
         let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
         across(i) + r * (across(i + 1) - across(i))
