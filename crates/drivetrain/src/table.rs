@@ -340,8 +340,7 @@ impl<T: Real> Table2<T> {
     #[inline]
     pub fn at_place(&self, row: T, column: &ColumnPlace<T>) -> T {
         let row = self.rows.clamp(row);
-        let (i, j, c) =
-            (self.rows.segment(row).min(MAX_POINTS - 2), column.segment.min(MAX_COLUMNS - 2), column.share);
+        let (i, j, c) = (self.rows.segment(row).min(MAX_POINTS - 2), column.segment.min(MAX_COLUMNS - 2), column.share);
         let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
         let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
         across(i) + r * (across(i + 1) - across(i))
