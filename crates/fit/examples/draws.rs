@@ -92,7 +92,7 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     };
     let errors = (fit.priors.iter().enumerate())
         .map(|(i, prior)| {
-            let error = fit.unknowns[i] - car.true_value(prior.parameter);
+            let error = fit.unknowns[i] - car.true_value(prior.parameter, &fit.freed);
             (prior.name.clone(), error / fit.precision.stated[(i, i)].sqrt())
         })
         .collect();

@@ -100,6 +100,11 @@ impl Car {
     /// The car whose parameters have these unknowns.
     pub(crate) fn with(&self, shafts: &[Shaft], priors: &[Prior], unknowns: &[f64]) -> Self {
         let mut car = self.clone();
+        // A freed friction has its points before any of its numbers counts: each is then the change at its point.
+        if priors.iter().any(|prior| matches!(prior.parameter, Parameter::Shape(Map::Friction, _))) {
+            car.clutch.friction = car.knots.friction(&car.clutch.friction, 0, 0.0);
+            car.clutch.friction = car.knots.friction(&car.clutch.friction, 1, 0.0);
+        }
         for (prior, x) in priors.iter().zip(unknowns) {
             car.set(prior.parameter, prior.parameter.value(*x), shafts);
         }

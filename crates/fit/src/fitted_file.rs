@@ -138,7 +138,9 @@ impl Fit {
         };
         // What was known before is a range around the given value; the fitted one lies elsewhere in it. The 95 % interval stays.
         let factors = |parameters: &[Parameter], given: [f64; 2]| {
-            let (half, value) = (half(parameters), self.value(parameters[0]).unwrap_or(1.0));
+            // No wider than the whole of what was known before, however much the shapes leave open together.
+            let known = (given[1] / given[0]).ln();
+            let (half, value) = (half(parameters).min(known), self.value(parameters[0]).unwrap_or(1.0));
             let [least, greatest] = given.map(|end| end / value);
             let stated = half * SIDES / BUDGET_SIDES;
             [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]

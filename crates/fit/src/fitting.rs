@@ -126,7 +126,7 @@ pub fn fit(
     release_gain(&mut priors, untold_gain_sd);
     at.shared.truncate(known);
     if !freed.is_empty() {
-        precision.with_moved(&freeing::moved(&priors, &before, &at.shared));
+        precision.with_moved(&freeing::moved(&priors, &before, &at.shared), &priors);
         freeing::forget_low_slips(&priors, &mut precision);
     }
     let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));

@@ -35,10 +35,16 @@ impl Precision {
 
     /// Widens what is known by how far the unknowns moved as the maps were given a freer shape. A shape that is freer still is taken to move
     /// them by half of that, the next by a quarter and so on: no further than as much again, which is two standard deviations \[chosen\].
-    pub(crate) fn with_moved(&mut self, moved: &DVector<f64>) {
+    pub(crate) fn with_moved(&mut self, moved: &DVector<f64>, priors: &[Prior]) {
         let outer = 0.25 * moved * moved.transpose();
         self.auto += &outer / (FACTOR * FACTOR);
         self.stated += outer;
+        // No fit knows less than was known before.
+        for (i, prior) in priors.iter().enumerate() {
+            let scale = (prior.sd / self.stated[(i, i)].sqrt()).min(1.0);
+            self.stated.row_mut(i).scale_mut(scale);
+            self.stated.column_mut(i).scale_mut(scale);
+        }
     }
 
     /// Gives an unknown at least this standard deviation.

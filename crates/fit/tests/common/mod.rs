@@ -49,6 +49,8 @@ pub(crate) struct TestCar {
     pub(crate) sensors: Sensors,
     /// The unknowns of a perfect fit.
     pub(crate) truth: Vec<(Parameter, f64)>,
+    /// Those of the friction where its shape is freed: changes at points of its own, and not at those of the file.
+    freed_friction: Vec<(Parameter, f64)>,
     torque_signal_scale: f64,
     pressure_scale: f64,
     draw: Draw,
@@ -145,7 +147,10 @@ impl TestCar {
         // The plant holds the throttle for 10 ms: a line between the readings is late by half of it.
         truth.push((Parameter::EngineTorqueDelay, -0.5));
         truth.push((Parameter::PressureScale, pressure_scale.ln()));
-        let mut drawn = Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, draw };
+        truth.push((Parameter::FrictionAtRest, rest));
+        truth.push((Parameter::FrictionSlope, slope));
+        let mut drawn =
+            Self { freed_friction: Vec::new(), file, car, sensors, truth, torque_signal_scale, pressure_scale, draw };
         drawn.tell_maps();
         drawn
     }
@@ -203,13 +208,14 @@ impl TestCar {
         let (slips, pressures, commands) = self.points();
         let (car, file) = (&self.car.oncoming, &self.file.oncoming);
         let friction = slips.map(|slip| car.clutch.friction.at(slip) / file.clutch.friction.at(slip));
-        let mut told = vec![
+        self.freed_friction = vec![
             (P::Friction, friction[2].ln()),
             (P::FrictionAtRest, friction[0] / friction[2] - 1.0),
             (P::FrictionSlope, friction[4] / friction[2] - 1.0),
             (P::Shape(Map::Friction, 0), friction[1] / (0.3 * friction[2] + 0.7 * friction[0]) - 1.0),
             (P::Shape(Map::Friction, 1), friction[3] / (0.5 * friction[2] + 0.5 * friction[4]) - 1.0),
         ];
+        let mut told = Vec::new();
         if let (Some(car), Some(file)) = (car.valve.maps(), file.valve.maps()) {
             let lag = pressures.map(|p| car.time_constant_s.at(p) / file.time_constant_s.at(p));
             let gain = commands.map(|a| car.gain_pa_a.at(a) / file.gain_pa_a.at(a));
@@ -223,9 +229,10 @@ impl TestCar {
         self.truth.extend(told);
     }
 
-    /// The unknown of a perfect fit.
-    pub(crate) fn true_value(&self, parameter: Parameter) -> f64 {
-        self.truth.iter().find(|(other, _)| *other == parameter).unwrap().1
+    /// The unknown of a perfect fit with these maps freed.
+    pub(crate) fn true_value(&self, parameter: Parameter, freed: &[Map]) -> f64 {
+        let friction = if freed.contains(&Map::Friction) { self.freed_friction.as_slice() } else { &[] };
+        friction.iter().chain(&self.truth).find(|(other, _)| *other == parameter).unwrap().1
     }
 
     /// What the log says of the sensors.
