@@ -127,7 +127,6 @@ pub fn fit(
     at.shared.truncate(known);
     if !freed.is_empty() {
         precision.with_moved(&freeing::moved(&priors, &before, &at.shared), &priors);
-        freeing::forget_low_slips(&priors, &mut precision);
     }
     let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
     Ok(Fit {

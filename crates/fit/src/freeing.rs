@@ -8,17 +8,16 @@
 use config::Vehicle;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
+use crate::FitError;
 use crate::car::Car;
 use crate::fitting::scaled_by_priors;
 use crate::hotelling::excess;
-use crate::intervals::Precision;
 use crate::intervals::floor;
 use crate::parameters::{self, Prior, Shaft};
 use crate::shape::Map;
 use crate::shift_model::{Linearised, ShiftModel};
 use crate::solver::{NO_INFLATION, Problem, Solved, Unknowns};
 use crate::weights::Weights;
-use crate::{FitError, Parameter};
 
 /// Probability with which a map is freed where all are right \[chosen: a map that is freed in vain costs some time, one that is not freed
 /// makes the values of others wrong\].
@@ -36,16 +35,6 @@ pub(crate) fn moved(priors: &[Prior], before: &[f64], after: &[f64]) -> DVector<
     bound.resize(priors.len(), 0.0);
     let [bound, free] = [bound, after.to_vec()].map(|unknowns| DVector::from_vec(scaled_by_priors(priors, unknowns)));
     free - bound
-}
-
-/// Takes back what is said of a freed friction below 100 rad/s. A shift passes the slips from 30 rad/s on in a few readings, so what it
-/// says of them comes from the straight lines between the points: of cars whose friction is a root of the slip, the intervals did not hold.
-pub(crate) fn forget_low_slips(priors: &[Prior], precision: &mut Precision) {
-    let is_free = priors.iter().any(|prior| prior.parameter == Parameter::Shape(Map::Friction, 0));
-    let low = [Parameter::FrictionAtRest, Parameter::Shape(Map::Friction, 0)];
-    for (i, prior) in priors.iter().enumerate().filter(|(_, prior)| is_free && low.contains(&prior.parameter)) {
-        precision.forget(i, prior.sd);
-    }
 }
 
 /// A minimum with the maps that the residuals ask to be of another shape.

@@ -47,15 +47,6 @@ impl Precision {
         }
     }
 
-    /// Gives an unknown at least this standard deviation.
-    pub(crate) fn forget(&mut self, unknown: usize, sd: f64) {
-        let mut only = DVector::zeros(self.stated.nrows());
-        only[unknown] = 1.0;
-        for covariance in [&mut self.auto, &mut self.stated] {
-            forget(covariance, &only, sd * sd);
-        }
-    }
-
     /// Standard deviation of a combination of unknowns as it is stated.
     pub(crate) fn combination_sd(&self, along: &DVector<f64>) -> f64 {
         /// Least one: what the model leaves out does not shrink with more shifts.
