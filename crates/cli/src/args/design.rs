@@ -1,0 +1,112 @@
+//! Options of `design`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use config::{GainMethod, SAMPLE_TIMES_S};
+use design::Quantity;
+
+use super::within;
+
+#[derive(Debug, Args)]
+pub(crate) struct Design {
+    /// Vehicle file
+    pub(crate) vehicle: PathBuf,
+    /// File with values that replace those of the vehicle file, such as the output of `error-bound`
+    #[arg(long, value_name = "BOUNDS.toml")]
+    pub(crate) bounds: Option<PathBuf>,
+    /// Observer to design for
+    #[arg(long, value_enum, default_value_t = DesignChoice::Rigid)]
+    pub(crate) observer: DesignChoice,
+    /// Design method of the gains
+    #[arg(long, value_enum, default_value_t = MethodChoice::Iss)]
+    pub(crate) method: MethodChoice,
+    /// Quantity of the error bound in the discrete-time methods [default: clutch-torque]
+    #[arg(long, value_enum, value_name = "QUANTITY")]
+    pub(crate) bound_on: Option<QuantityChoice>,
+    /// Phase to design for
+    #[arg(long, value_enum, default_value_t = PhaseChoice::Both)]
+    pub(crate) phase: PhaseChoice,
+    /// kappa1 in 1/s; if it is neither here nor in the file, it is increased step by step
+    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(0.01..=1e4))]
+    pub(crate) kappa1: Option<f64>,
+    /// kappa2 in 1/s: decay rate of the error; the settling time is 4/kappa2
+    #[arg(long, value_name = "PER_S", allow_negative_numbers = true, value_parser = within(0.4..=800.0))]
+    pub(crate) kappa2: Option<f64>,
+    /// Bound on the model error |w|: in rad/s^2 for the rigid observer, normalised for the compliant one
+    #[arg(long, value_name = "BOUND", allow_negative_numbers = true, value_parser = within(0.0..=1e6))]
+    pub(crate) error_bound: Option<f64>,
+    /// Largest acceptable offset of the estimate in Pa
+    #[arg(long, value_name = "PA", allow_negative_numbers = true, value_parser = within(1e3..=10e6))]
+    pub(crate) offset_max: Option<f64>,
+    /// Sample time in s, for the discrete-time methods [default: 0.01]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = within(SAMPLE_TIMES_S))]
+    pub(crate) sample_time: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DesignChoice {
+    /// Reduced-order, rigid driveline, by the chapter's five steps
+    Rigid,
+    /// Reduced-order with elastic drive shafts
+    Compliant,
+    /// Full-order sliding mode: gains from the sliding condition, without a certificate
+    Sliding,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodChoice {
+    /// The chapter's method, in continuous time: the smallest gain with the required decay
+    Iss,
+    /// The same for a sample time, with every error of the budget in the bound; this method and the following ones use the
+    /// open loop where no gain reduces the bound
+    IssDiscrete,
+    /// The gain with the smallest error bound for a sample time, with every error of the budget
+    PeakToPeak,
+    /// The same, with a gain that depends on the friction coefficient
+    Scheduled,
+    /// The gain with the narrowest range that is computed together with the estimate
+    Interval,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QuantityChoice {
+    /// The clutch torque, on which the speeds depend directly
+    ClutchTorque,
+    /// The pressure, which follows from the speeds only with the friction coefficient
+    Pressure,
+}
+
+impl From<QuantityChoice> for Quantity {
+    fn from(choice: QuantityChoice) -> Self {
+        match choice {
+            QuantityChoice::ClutchTorque => Self::ClutchTorque,
+            QuantityChoice::Pressure => Self::Pressure,
+        }
+    }
+}
+
+impl From<MethodChoice> for GainMethod {
+    fn from(choice: MethodChoice) -> Self {
+        match choice {
+            MethodChoice::Iss => Self::Iss,
+            MethodChoice::IssDiscrete => Self::IssDiscrete,
+            MethodChoice::PeakToPeak => Self::PeakToPeak,
+            MethodChoice::Scheduled => Self::Scheduled,
+            MethodChoice::Interval => Self::Interval,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PhaseChoice {
+    /// Torque phase and inertia phase
+    Both,
+    /// Load moves from the offgoing to the oncoming clutch
+    Torque,
+    /// Both clutches slip
+    Inertia,
+}

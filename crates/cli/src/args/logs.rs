@@ -1,0 +1,224 @@
+//! Options of the commands that read measured logs, and of those that make a vehicle file.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use config::vehicle::short::ValveKind;
+use trace::TableFormat;
+
+use super::{MethodChoice, ObserverChoice, Threads, within};
+
+/// Which channels of a log are which signals.
+#[derive(Debug, Args)]
+pub(crate) struct Mapping {
+    /// Messages and signals of a CAN log; replaces `dbc` of the map
+    #[arg(long, value_name = "FILE.dbc")]
+    pub(crate) dbc: Option<PathBuf>,
+    /// Channel map
+    #[arg(long, value_name = "MAP.toml")]
+    pub(crate) map: Option<PathBuf>,
+    /// Channel of a signal, such as `engine_speed="N_Eng [rpm]"`; replaces that of the map. May be given several times
+    #[arg(long, value_name = "ROLE=NAME")]
+    pub(crate) channel: Vec<String>,
+}
+
+impl Mapping {
+    /// The files that it names.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.dbc.iter().chain(&self.map)
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Inspect {
+    /// Log
+    pub(crate) log: PathBuf,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// Print a first channel map from names and units
+    #[arg(long, conflicts_with_all = ["shifts", "map", "channel"])]
+    pub(crate) suggest: bool,
+    /// List the shifts; needs --map or --channel
+    #[arg(long)]
+    pub(crate) shifts: bool,
+    /// With --shifts: a page of the drive, with its shifts, the converter, engine torque and the torque at the turbine
+    #[arg(short, long, value_name = "PAGE.html", requires = "shifts")]
+    pub(crate) output: Option<PathBuf>,
+    /// Ratios of the forward gears, 1st first; they replace those of the map
+    #[arg(long, value_name = "R1,R2,...", value_delimiter = ',', requires = "shifts")]
+    pub(crate) ratios: Vec<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Estimate {
+    /// Logs; `-` is standard input. Several are estimated at a time, each into a file of its own
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// Vehicle file
+    #[arg(long)]
+    pub(crate) vehicle: PathBuf,
+    /// Observer
+    #[arg(long, value_enum, default_value_t = ObserverChoice::Best)]
+    pub(crate) observer: ObserverChoice,
+    /// Design method of the gains, for `--observer` rigid and compliant [default: iss]
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<MethodChoice>,
+    /// File whose table `sensors` describes the sensors of the log, such as an experiment file. The Kalman filters use
+    /// their noise and lag; without the file they assume the noise of the error budget and no lag
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// File for the estimate, by its ending CSV, .parquet or .mf4, or an existing folder; of several logs the folder for their files. Default:
+    /// standard output, as CSV
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: Option<PathBuf>,
+    /// Columns of the estimate, in this order; time_s is always the first
+    #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
+    pub(crate) columns: Vec<String>,
+    /// Only the Nth shift of the log: its estimates, quality and figure
+    #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) shift: Option<u32>,
+    /// Only shifts between these gears, such as 1-2,2-3
+    #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
+    pub(crate) shifts: Vec<GearPair>,
+    /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
+    #[arg(long)]
+    pub(crate) follow: bool,
+    /// Format of files in a folder [default: csv]; the ending of a file after -o says its format
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FormatChoice>,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatChoice {
+    /// Comma-separated text
+    Csv,
+    /// Parquet
+    Parquet,
+    /// ASAM MDF 4.10
+    Mf4,
+}
+
+impl From<FormatChoice> for TableFormat {
+    fn from(choice: FormatChoice) -> Self {
+        match choice {
+            FormatChoice::Csv => Self::Csv,
+            FormatChoice::Parquet => Self::Parquet,
+            FormatChoice::Mf4 => Self::Mdf,
+        }
+    }
+}
+
+impl FormatChoice {
+    /// The ending of its files.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mf4 => "mf4",
+        }
+    }
+}
+
+/// The gears of a shift.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct GearPair {
+    /// The gear before, from 1.
+    pub(crate) from: u32,
+    /// The gear after.
+    pub(crate) to: u32,
+}
+
+impl FromStr for GearPair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let gears = text.trim().split_once('-').and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+        match gears {
+            Some((from, to)) if from != to && from > 0 && to > 0 => Ok(Self { from, to }),
+            _ => Err("expected two gears from 1, such as 1-2".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for GearPair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{}", self.from, self.to)
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Init {
+    /// Name of the car
+    #[arg(long, default_value = "my car")]
+    pub(crate) name: String,
+    /// Mass with driver, kg
+    #[arg(long, value_name = "KG", value_parser = within(200.0..=60e3))]
+    pub(crate) mass_kg: f64,
+    /// Rolling radius of the driven wheels, m
+    #[arg(long, value_name = "M", value_parser = within(0.1..=1.0))]
+    pub(crate) wheel_radius_m: f64,
+    /// Ratios of the gears before and after the shift, such as 4.17,2.34
+    #[arg(long, required = true, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, value_parser = within(0.6..=20.0))]
+    pub(crate) ratios: Vec<f64>,
+    /// Ratio from gearbox output to wheels
+    #[arg(long, value_name = "RATIO", value_parser = within(0.5..=10.0))]
+    pub(crate) final_ratio: f64,
+    /// Greatest engine torque, N m
+    #[arg(long, value_name = "N_M", value_parser = within(20.0..=2000.0))]
+    pub(crate) engine_torque_n_m: f64,
+    /// Kind of the clutches' valves
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) valve: ValveChoice,
+    /// The pistons of the clutches have a stroke: the fill takes time
+    #[arg(long)]
+    pub(crate) stroke: bool,
+    /// Write every key, with where its value is from, in place of a short file
+    #[arg(long)]
+    pub(crate) complete: bool,
+    /// The vehicle file
+    #[arg(short, long, value_name = "CAR.toml")]
+    pub(crate) output: PathBuf,
+}
+
+/// Kind of a clutch's valve.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub(crate) enum ValveChoice {
+    /// The pressure follows a current
+    #[default]
+    Proportional,
+    /// The pressure follows a duty cycle
+    PulseWidth,
+}
+
+impl From<ValveChoice> for ValveKind {
+    fn from(choice: ValveChoice) -> Self {
+        match choice {
+            ValveChoice::Proportional => Self::Proportional,
+            ValveChoice::PulseWidth => Self::PulseWidth,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fit {
+    /// Logs of drives with upshifts
+    #[arg(required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) mapping: Mapping,
+    /// Vehicle file to start from; its error budget says how far off its values may be
+    #[arg(long)]
+    pub(crate) vehicle: PathBuf,
+    /// File whose table `sensors` describes the teeth of the speed sensors, such as an experiment file
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
+    /// The fitted vehicle file
+    #[arg(short, long, value_name = "FITTED.toml")]
+    pub(crate) output: PathBuf,
+}

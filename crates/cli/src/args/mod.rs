@@ -1,0 +1,302 @@
+//! The command line.
+
+mod design;
+mod logs;
+mod studies;
+
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
+pub(crate) use logs::{Estimate, Fit, FormatChoice, GearPair, Init, Inspect, Mapping};
+pub(crate) use studies::{
+    Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
+    WorstCaseOptions,
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  wetclutch demo                                     simulation, design, estimation and report for the built-in car
+  wetclutch demo --vehicle vehicles/eight_speed.toml  a drive through all gears of any car, every shift with its estimate
+  wetclutch reproduce                                the source chapter's experiments, statement by statement
+  wetclutch bench                                    all observers on many drives, ranked
+  wetclutch bench --vehicle vehicles/eight_speed.toml   every shift of a gearbox, in every kind
+  wetclutch study experiments/settings.toml -o out   two thousand shifts: errors and sensitivities
+  wetclutch simulate experiments/e1.toml -o out      a drive as CSV
+  wetclutch design vehicles/two_speed_at.toml        gains with their certificate
+  wetclutch inspect drive.mf4                        channels, units, rates and gaps of a log
+  wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
+  wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml   a vehicle file that fits the car
+
+All files use SI units, which are part of keys and column names. Column names of measured files may also
+end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
+Exit codes: 0 done, 1 the work failed (infeasible, diverged), 2 wrong usage or input.";
+
+/// A virtual pressure sensor for the wet clutches of automatic transmissions.
+///
+/// Estimates the hydraulic pressure in an engaging clutch from the speeds and the valve command that
+/// a car already has, with a bound on the error.
+#[derive(Debug, Parser)]
+#[command(version, about, after_help = EXAMPLES, arg_required_else_help = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Simulate a shift, design the observer, estimate the pressure, write the report
+    ///
+    /// Simulates a launch from rest and a power-on 1st to 2nd upshift of the built-in two-speed automatic,
+    /// designs the observer's gains for it, runs the observer and the open loop on the same samples, prints
+    /// their errors, and writes:
+    ///
+    ///   report.html    the report; opens from disk, needs no network
+    ///   shift.svg, drive.svg    its figures
+    ///   trace.csv      every simulated signal, true values included
+    ///   measured.csv   only the signals that a car measures
+    ///   estimate.csv   the output of `estimate measured.csv`
+    ///
+    /// With the vehicle file of a car with a gearbox: drives through all of its gears, up under power, down coasting, up
+    /// without power, down under power, or through a drive file. The car differs from the vehicle file. The filter for any
+    /// shift sees it through toothed wheels and estimates pressure and torque of both clutches. Prints every shift with its
+    /// quality and the errors of filter and open loop, and writes:
+    ///
+    ///   report.html    the drive, the shifts, each shift drawn
+    ///   shifts.csv     the shifts as numbers
+    ///   drive.csv, drive_measured.csv    the signals, as `simulate` writes them
+    ///
+    ///   wetclutch demo --vehicle vehicles/eight_speed.toml -o out
+    ///   wetclutch demo --vehicle vehicles/ten_speed.toml --drive drives/city.toml -o out
+    #[command(verbatim_doc_comment)]
+    Demo(Demo),
+    /// Simulate an experiment and write its signals as CSV
+    ///
+    /// Simulates an experiment and writes two files: NAME.csv with every signal, true values included, and
+    /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
+    /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
+    /// the drive is simulated without them, or with the scenario given by --scenario. With a [sensors] table NAME_measured.csv
+    /// has what the sensors read.
+    ///
+    /// A drive file (with segments) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
+    /// listed shifts, and a vehicle file with a gearbox. The columns of the offgoing and oncoming clutch are empty between
+    /// shifts.
+    ///
+    ///   wetclutch simulate drives/city.toml -o out
+    ///   wetclutch simulate drives/city.toml --vehicle vehicles/ten_speed.toml -o out
+    #[command(verbatim_doc_comment)]
+    Simulate(Simulate),
+    /// Design observer gains and print them with their certificate
+    ///
+    /// Designs the gains of an observer by the five-step procedure: the decay rate follows from the settling
+    /// time; the gain is the smallest one with this decay rate at every vertex of the polytope; kappa1 is
+    /// increased until the bound on the remaining error is small enough. Requirements come from the vehicle
+    /// file; options replace them. If no gain meets a requirement, the best certified gain is printed, with
+    /// its error bound and the settling time that would meet the requirement; the exit code is then 1.
+    ///
+    /// To use bounds on the model errors that were found by simulation:
+    ///   wetclutch error-bound experiments/error_bound.toml -o bounds.toml
+    ///   wetclutch design vehicles/two_speed_at.toml --bounds bounds.toml
+    #[command(verbatim_doc_comment)]
+    Design(Design),
+    /// List what is in a log, suggest a channel map, find the shifts
+    ///
+    /// Reads a log of any format: CSV (any delimiter, decimal comma, units in names or in a row), Parquet, ASAM MDF 4,
+    /// CAN logs (candump, ASC, BLF) with a DBC. `-` is standard input. Lists channels, units, groups, samples, rates, spans,
+    /// values, gaps, and samples that cannot be used.
+    ///
+    ///   wetclutch inspect drive.mf4
+    ///   wetclutch inspect drive.blf --dbc bus.dbc --suggest > map.toml
+    ///   wetclutch inspect drive.blf --map map.toml --shifts -o drive.html
+    #[command(verbatim_doc_comment)]
+    Inspect(Inspect),
+    /// Estimate pressure and torque from a file of measured signals
+    ///
+    /// Runs an observer over a file of measured signals. The file needs the columns
+    ///
+    ///   time_s, engine_speed_rad_s, turbine_speed_rad_s,
+    ///   oncoming_current_a, or oncoming_duty_percent for pulse-width-modulated valves,
+    ///   oncoming_slip_rad_s or output_speed_rad_s,
+    ///   and for some observers wheel_speed_rad_s
+    ///
+    /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell or `nan` is a reading that did
+    /// not come. If the file also contains the true pressure (a simulated drive), the error is reported.
+    ///
+    /// A log with other names, or of another format (Parquet, MDF 4, CAN with a DBC), needs a channel map, see `inspect
+    /// --suggest`; every reading then comes with its own time.
+    ///
+    /// Every shift of the log is found by the gears that the speeds show, and by gear signals where a channel map has
+    /// them. For the shifts of the vehicle file the summary gives pressure, torque and friction work with their range, the
+    /// lowest shaft torque, and the error where pressure or torque was measured. With -o OUT.csv there are also
+    ///
+    ///   OUT_report.html   the drive and each shift as figures; opens from disk
+    ///   OUT_shifts.csv, OUT_shifts.json   the shifts as numbers
+    ///
+    /// if there is a shift. --shift and --shifts choose shifts; the estimate then has only their rows.
+    ///
+    /// With the vehicle file of a car with a gearbox, both clutches of every shift are estimated from a log with the
+    /// columns that `simulate` writes for a drive, or by a channel map with the commands of all elements:
+    ///
+    ///   wetclutch estimate city_measured.csv --vehicle vehicles/eight_speed.toml -o out.csv
+    ///
+    /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
+    /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
+    /// appears when it contains all rows; it may be the log itself. A log of which a signal is unusable in most samples,
+    /// or in another unit by all appearances, is an error.
+    #[command(verbatim_doc_comment)]
+    Estimate(Estimate),
+    /// Fit a vehicle file to logs of measured shifts
+    ///
+    /// Finds the power-on upshifts of the vehicle's gears in the logs and fits converter, clutch, valve, inertias, shafts, tyres,
+    /// mass and delays to them. Prints each value with its interval, what these logs cannot tell, and which measurement would. Writes
+    /// the vehicle file with the fitted values; comments and all other keys stay, and the error budget follows from the fit.
+    ///
+    /// Needs engine, turbine and output speed and the command of the oncoming clutch's valve. Used where the log has them:
+    /// wheel speed, command of the offgoing clutch's valve, engine torque, pressure of the oncoming clutch. Columns with
+    /// the names of `estimate` need no channel map. The last fifth of the shifts is held out to check the result.
+    ///
+    ///   wetclutch fit drive1.mf4 drive2.mf4 --map map.toml --vehicle car.toml -o fitted.toml
+    #[command(verbatim_doc_comment)]
+    Fit(Fit),
+    /// Write a first vehicle file for a car from a few numbers
+    ///
+    /// Writes a short vehicle file for one upshift. What is not in it is a default, scaled to the car where it depends on its size.
+    /// What an estimate uses and somebody may know stands in it as comments. `check` lists the defaults, and says which of them matter
+    /// most for the estimate; `fit` finds the values from logs. With --complete, the file has every key, and each says where its value is from.
+    ///
+    ///   wetclutch init --mass-kg 1650 --wheel-radius-m 0.32 --ratios 4.17,2.34 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
+    #[command(verbatim_doc_comment)]
+    Init(Init),
+    /// Run the source chapter's experiments and compare the results with its statements
+    ///
+    /// Runs experiments E1 to E4 of the source chapter on the built-in car, and again in the settings that the
+    /// chapter leaves open (experiments/plausible.toml). Writes
+    ///
+    ///   reproduction.html   statements, figures, scores; opens from disk
+    ///   reproduction.md     statements and scores as Markdown
+    ///   reproduction.json   statements as numbers
+    ///   e1.svg ... e4.svg, map_*.svg    the figures
+    #[command(verbatim_doc_comment)]
+    Reproduce(Reproduce),
+    /// Run all observers over many scenarios and rank them against the open loop
+    ///
+    /// Runs every observer of an experiment file on every scenario of the file. All observers get the same drives; the
+    /// built-in bench runs them at 100 Hz with real sensors. Prints the RMS error of each observer in each phase, and its
+    /// ratio to the RMS error of the open loop; with -o, also writes them as a page. experiments/field.toml is a bench of
+    /// errors of the readings: scale, delays, outliers, lost readings, channels with clocks of their own.
+    ///
+    /// With the vehicle file of a car with a gearbox: every shift between neighbouring gears, up and down, with power and
+    /// without, each in --draws cars, estimated by the filter for any shift and by the open loop. Prints the RMS errors of the
+    /// clutch torques (N m) by phase and their ratio, by shift and by kind; with -o, also writes bench.html and bench.csv.
+    ///
+    ///   wetclutch bench --vehicle vehicles/eight_speed.toml --draws 10 -o out
+    #[command(verbatim_doc_comment)]
+    Bench(Bench),
+    /// Run thousands of shifts with varied parameters
+    ///
+    /// Runs a study file: an experiment in which any numbers of car, drive, controller, valves and sensors vary; or a drive, or
+    /// shifts, of many cars with a gearbox, which differ in friction, valves and converter (no page and figures). Writes
+    ///
+    ///   runs.csv, runs.parquet    one row for each run: factors, seed, status, shift quality, scores
+    ///   study.html                distributions, sensitivity of the error, worst runs; opens from disk
+    ///   figures/                  its figures
+    ///
+    /// In runs.csv `inf` means that an estimate was not finite. The same study gives the same bytes on any number of
+    /// threads, in one run or resumed, whole or in shards. One process at a time writes to a folder (wetclutch.lock).
+    #[command(verbatim_doc_comment)]
+    Study(StudyOptions),
+    /// Merge the shards of a study
+    ///
+    /// Merges the results of `study --shard 1/N` to `study --shard N/N`. The result has the same bytes as the study
+    /// in one run.
+    #[command(verbatim_doc_comment)]
+    Merge(Merge),
+    /// Find bounds on the errors of the observers' models by simulation
+    ///
+    /// Runs a study and computes, at every instant of its shifts, the difference between the accelerations of the
+    /// simulated car and those of the rigid and the compliant model. The result is |w| and H, which the gain design
+    /// needs, and the part of each cause.
+    #[command(verbatim_doc_comment)]
+    ErrorBound(ErrorBoundOptions),
+    /// Search a study's factors for the run with the largest error of an observer
+    ///
+    /// Makes the runs of a study, then continues from the worst of them with the simplex method of Nelder and Mead.
+    #[command(verbatim_doc_comment)]
+    WorstCase(WorstCaseOptions),
+    /// Show the effect of the pressure, and of each error, on the speeds
+    ///
+    /// Reads the error bounds of a vehicle file. For each phase it prints the equivalent pressure error of each of them,
+    /// and whether an observer can distinguish the error from a pressure.
+    #[command(verbatim_doc_comment)]
+    Sensitivity(SensitivityOptions),
+    /// Check a vehicle, gearbox, experiment or study file
+    ///
+    /// Checks a vehicle, gearbox, experiment or study file, and the files that it names, and prints a summary. Also checks a
+    /// bounds file for `design --bounds` and a sensors file for `estimate --sensors`. Warns of given gains that are
+    /// unstable at a vertex.
+    ///
+    /// Of a vehicle file it lists what the file leaves to defaults, and which of them matter most: the RMS change of the estimated
+    /// pressure and clutch torque in the torque and inertia phase of a simulated upshift, where each default is off by as much as the
+    /// error budget or a stated share allows. --all shows every one.
+    ///
+    /// Of a gearbox file it prints the gears with ratios and holding torques, the capacity of the elements, and the
+    /// shifts with their elements. With -o it draws them:
+    ///
+    ///   train.svg      shafts, planetary sets, gear pairs and elements
+    ///   gear_NAME.svg  the same in a gear: engaged elements, shaft speeds, levers of the sets
+    #[command(verbatim_doc_comment)]
+    Check(Check),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Demo {
+    /// Vehicle file with a gearbox: a drive through all of its gears
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Drive file in place of the drive through all gears
+    #[arg(long, value_name = "FILE", requires = "vehicle")]
+    pub(crate) drive: Option<PathBuf>,
+    /// Seed of the driven car, whose friction, valve gains and converter differ from those of the vehicle file, and of the noise
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
+    pub(crate) seed: u64,
+    /// Folder for the report
+    #[arg(short, long, value_name = "DIR", default_value = "wetclutch-demo")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Simulate {
+    /// Experiment file, or drive file
+    pub(crate) experiment: PathBuf,
+    /// Vehicle file with a gearbox, for a drive file; it replaces the one that the drive file names
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle: Option<PathBuf>,
+    /// Scenario of the experiment to simulate; the files are then called NAME_SCENARIO
+    #[arg(long, value_name = "NAME")]
+    pub(crate) scenario: Option<String>,
+    /// Folder for the signals
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Check {
+    /// Vehicle, experiment, study, bounds or sensors file
+    pub(crate) file: PathBuf,
+    /// Folder for the diagrams of a gearbox file
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Show every default of a vehicle file
+    #[arg(long)]
+    pub(crate) all: bool,
+}
+
+/// A number in this range, as a vehicle file has it.
+fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if range.contains(&value) => Ok(value),
+        _ => Err(format!("expected a number from {} to {}", range.start(), range.end())),
+    }
+}
