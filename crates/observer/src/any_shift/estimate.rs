@@ -5,8 +5,8 @@ use drivetrain::Real;
 use super::elements::{ElementState, PressureError};
 use super::powertrain::{ClutchTorque, dot};
 use super::{
-    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, OUTPUT, PRESSURE, SHARE, SLOW_SHARE,
-    SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE, SHARE,
+    SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -34,9 +34,10 @@ pub struct ClutchEstimate<T> {
     pub hidden: bool,
     /// Lowest and highest pressure, Pa, for errors within the budget.
     pub pressure_range_pa: Option<[T; 2]>,
-    /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if turbine and output
-    /// speed were read within 50 ms and their slip errs by less than 7 deviations of its reading and 0.6 rad/s, and twice
-    /// the change since the readings; else either direction is possible.
+    /// Lowest and highest torque, N m, for errors within the budget. Its direction is that of the slip, if that is larger than its
+    /// error; else, and where a speed has not been read twice within 50 ms or its last reading was refused, either direction is
+    /// possible. The slip errs by 7 deviations and 0.6 rad/s, by twice its change since the older reading, by the spread of
+    /// the readings' ages times the rate of each speed, and by an acceleration that changes by up to 10,000 rad/s^3.
     pub torque_range_n_m: Option<[T; 2]>,
 }
 
@@ -117,21 +118,22 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.phase = Some(running.phase.phase);
                 estimate.shaft_n_m = Some(x[SPRING] + damper);
                 estimate.turbine_n_m = Some(turbine_n_m);
-                let speeds = self.then_and_now(&state.newest);
-                estimate.flare_rad_s = match (&running.shift, speeds) {
-                    (Some(shift), Some([then, _])) => self.flare(shift, then),
+                estimate.flare_rad_s = match &running.shift {
+                    Some(shift) if self.are_read(&state.newest) => {
+                        self.flare(shift, self.measured(&state.newest, None))
+                    }
                     _ => T::zero(),
                 };
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
-                        self.in_range(estimate, &state.elements, &shift.clutches[c.min(1)], speeds)
+                        self.in_range(estimate, &state.elements, &shift.clutches[c.min(1)], &state.newest)
                     })
                 });
             }
             None => {
                 health = health.max(Health::SpeedsRejected);
-                let (then, speeds) = (self.measured(&state.newest, None), self.then_and_now(&state.newest));
+                let then = self.measured(&state.newest, None);
                 estimate.clutches =
                     self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
                         |shift| {
@@ -140,7 +142,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                                 let clutch = &shift.clutches[c];
                                 let lasting = [learnt[c], learnt[c + 2]];
                                 let estimate = self.by_valve(&state.elements, clutch, then, lasting);
-                                self.in_range(estimate, &state.elements, clutch, speeds)
+                                self.in_range(estimate, &state.elements, clutch, &state.newest)
                             })
                         },
                     );
@@ -249,19 +251,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         mut estimate: ClutchEstimate<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         clutch: &ShiftClutch<T>,
-        speeds: Option<[[T; 2]; 2]>,
+        newest: &[Option<Newest<T>>; SPEEDS],
     ) -> ClutchEstimate<T> {
-        let known = speeds.map(|[then, now]| {
-            // Since the readings were taken the slip has gone on, and may have ended.
-            let (then, now) = (self.slip(clutch.ratio, then), self.slip(clutch.ratio, now));
-            let threshold = now.threshold();
-            let error = (clutch.alpha * (threshold + threshold)).abs()
-                + (clutch.alpha * (now.value - then.value)).abs() * T::of(2.0);
-            [clutch.alpha * now.value, error]
+        let (alpha, slip) = (clutch.alpha, self.bounded_slip(clutch.ratio, newest));
+        let ranges = self.element(elements, clutch.element).and_then(|(memory, element)| {
+            memory.ranges(element, slip.map(|[slip, error]| [alpha * slip, alpha.abs() * error]))
         });
-        let ranges = self
-            .element(elements, clutch.element)
-            .and_then(|(memory, element)| memory.ranges(element, known.filter(|[slip, _]| slip.is_finite())));
         if let Some((pressure, torque)) = ranges {
             let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
             estimate.pressure_pa = nearest(pressure, estimate.pressure_pa);

@@ -18,16 +18,30 @@ const DEVIATIONS: f64 = 5.0;
 pub(super) struct Newest<T> {
     pub(super) value: T,
     pub(super) age_s: T,
+    /// By how much it may be older or newer, s.
+    late_s: T,
     /// Values and ages of those before, newer one first.
     before: [Option<(T, T)>; 2],
+    /// By how much the reading before may be older or newer, s.
+    before_late_s: T,
     /// Whether the last reading was refused: an outlier is single, a jump persists.
     pub(super) refused: bool,
 }
 
+/// A speed now, from the line through the two newest readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SpeedNow<T> {
+    pub(super) value: T,
+    /// Its standard deviation by those of the readings.
+    pub(super) deviation: T,
+    /// By how much it errs at most beside them: the speed bends, and the readings are of other times.
+    pub(super) drift: T,
+}
+
 impl<T: Real> Newest<T> {
-    /// Takes a reading that is `age_s` old, with this standard deviation. Whether it was taken: one that lies off the line
+    /// Takes a reading that is `age_s` old up to `late_s`, with this standard deviation. Whether it was taken: one that lies off the line
     /// through the two before by more than a powertrain can do is refused once.
-    pub(super) fn take(newest: &mut Option<Self>, value: T, age_s: T, deviation: T) -> bool {
+    pub(super) fn take(newest: &mut Option<Self>, value: T, [age_s, late_s]: [T; 2], deviation: T) -> bool {
         if let Some(newest) = newest
             && newest.is_off(value, age_s, deviation)
             && !newest.refused
@@ -38,7 +52,8 @@ impl<T: Real> Newest<T> {
         let before = newest
             .filter(|newest| newest.age_s > age_s)
             .map_or([None; 2], |newest| [Some((newest.value, newest.age_s)), newest.before[0]]);
-        *newest = Some(Self { value, age_s, before, refused: false });
+        let before_late_s = newest.map_or(T::zero(), |newest| newest.late_s);
+        *newest = Some(Self { value, age_s, late_s, before, before_late_s, refused: false });
         true
     }
 
@@ -79,6 +94,27 @@ impl<T: Real> Newest<T> {
         }
         late.0
     }
+
+    /// The speed now; `None` without a line, where the newest reading may be older than `longest_s`, where a toothed wheel may turn
+    /// at less than half of it, or after a refused one: a clutch that grips hard looks so, and the line does not show it.
+    ///
+    /// An acceleration that changes by at most `j` leads away from a line through two readings that are `a` and `b` old by at
+    /// most `j a b / 2`. An age that errs by `e` changes the value of its reading by the rate times `e`.
+    pub(super) fn now(&self, deviation: T, longest_s: T) -> Option<SpeedNow<T>> {
+        let (early, early_s) = self.before[0].filter(|_| !self.refused)?;
+        let (age_s, span_s) = (self.age_s + self.late_s, early_s - self.age_s);
+        if !(age_s <= longest_s && span_s <= T::of(LONGEST_S)) {
+            return None;
+        }
+        let (one, half) = (T::one(), T::of(0.5));
+        let (rate, reach) = ((self.value - early) / span_s, self.age_s / span_s);
+        let bent = half * T::of(JERK_RAD_S3) * age_s * (early_s + self.before_late_s);
+        let late = rate.abs() * ((one + reach) * self.late_s + reach * self.before_late_s);
+        let (value, drift) = (self.value + rate * self.age_s, bent + late);
+        // The spread of the ages is that of a wheel that turns at half its reading or faster.
+        let turns = value.abs() - drift >= half * self.value.abs() || self.late_s <= T::zero();
+        turns.then(|| SpeedNow { value, deviation: deviation * (one + reach).hypot(reach), drift })
+    }
 }
 
 #[cfg(test)]
@@ -88,9 +124,9 @@ mod tests {
     #[test]
     fn a_speed_lies_on_the_line_through_two_readings() {
         let mut newest = None;
-        assert!(Newest::take(&mut newest, 100.0, 0.004, 0.1));
+        assert!(Newest::take(&mut newest, 100.0, [0.004, 0.0], 0.1));
         newest.iter_mut().for_each(|newest| newest.pass(0.01));
-        assert!(Newest::take(&mut newest, 102.0, 0.004, 0.1));
+        assert!(Newest::take(&mut newest, 102.0, [0.004, 0.0], 0.1));
         let newest = newest.unwrap();
         assert!((newest.at(0.004) - 102.0_f64).abs() < 1e-9);
         assert!((newest.at(0.009) - 101.0).abs() < 1e-9);
@@ -101,9 +137,9 @@ mod tests {
     #[test]
     fn after_a_pause_the_newest_reading_stands() {
         let mut newest = None;
-        assert!(Newest::take(&mut newest, 100.0, 0.0, 0.1));
+        assert!(Newest::take(&mut newest, 100.0, [0.0, 0.0], 0.1));
         newest.iter_mut().for_each(|newest| newest.pass(0.2));
-        assert!(Newest::take(&mut newest, 200.0, 0.0, 0.1));
+        assert!(Newest::take(&mut newest, 200.0, [0.0, 0.0], 0.1));
         assert_eq!(newest.map(|newest| newest.at(0.01)), Some(200.0_f64));
     }
 
@@ -112,7 +148,7 @@ mod tests {
         let mut newest = None;
         let mut read = |value: f64| {
             newest.iter_mut().for_each(|newest: &mut Newest<f64>| newest.pass(0.01));
-            Newest::take(&mut newest, value, 0.0, 0.1)
+            Newest::take(&mut newest, value, [0.0, 0.0], 0.1)
         };
         for value in [100.0, 101.0, 102.0] {
             assert!(read(value));
@@ -126,7 +162,53 @@ mod tests {
         let mut newest = None;
         for value in [300.0, 297.0, 294.0, 292.5, 292.6, 292.8] {
             newest.iter_mut().for_each(|newest: &mut Newest<f64>| newest.pass(0.01));
-            assert!(Newest::take(&mut newest, value, 0.0, 0.1), "{value}");
+            assert!(Newest::take(&mut newest, value, [0.0, 0.0], 0.1), "{value}");
+        }
+    }
+
+    /// Takes a reading without noise after 10 ms, that is as old as it says.
+    fn read(newest: &mut Option<Newest<f64>>, value: f64) -> bool {
+        newest.iter_mut().for_each(|newest| newest.pass(0.01));
+        Newest::take(newest, value, [0.005, 0.0], 0.1)
+    }
+
+    #[test]
+    fn a_speed_that_bends_is_within_its_drift_of_the_line() {
+        // 300 rad/s^2 that grow by the bound of the rate.
+        let speed = |t: f64| 200.0 - 300.0 * t - 0.5 * JERK_RAD_S3 * t * t;
+        let mut newest = None;
+        for i in 0..10 {
+            let t = 0.01 * f64::from(i);
+            assert!(read(&mut newest, speed(t - 0.005)));
+            let now = newest.and_then(|newest| newest.now(0.1, 0.05));
+            let Some(now) = now else { continue };
+            let error = (speed(t) - now.value).abs();
+            assert!(error > 0.3 && error <= now.drift + 1e-9, "{t}: {error} {now:?}");
+        }
+        assert!(newest.is_some_and(|newest| newest.now(0.1, 0.05).is_some()));
+    }
+
+    #[test]
+    fn without_a_line_there_is_no_speed_now() {
+        let now = |newest: Option<Newest<f64>>| newest.and_then(|newest| newest.now(0.1, 0.05));
+        let mut newest = None;
+        assert!(read(&mut newest, 100.0) && now(newest).is_none());
+        assert!(read(&mut newest, 101.0) && now(newest).is_some());
+        assert!(!read(&mut newest, 150.0) && now(newest).is_none());
+        assert!(read(&mut newest, 103.0) && now(newest).is_some());
+        newest.iter_mut().for_each(|newest| newest.pass(0.06));
+        assert!(now(newest).is_none(), "too old");
+        assert!(read(&mut newest, 104.0) && now(newest).is_none(), "after a pause");
+        let mut stops = None;
+        for (value, late_s) in [(24.0, 0.002), (20.0, 0.002), (16.0, 0.002), (12.0, 0.002)] {
+            stops.iter_mut().for_each(|newest: &mut Newest<f64>| newest.pass(0.01));
+            assert!(Newest::take(&mut stops, value, [0.02, late_s], 0.1));
+        }
+        assert!(now(stops).is_none(), "it may stand");
+        let mut still = None;
+        for _ in 0..3 {
+            still.iter_mut().for_each(|newest: &mut Newest<f64>| newest.pass(0.01));
+            assert!(Newest::take(&mut still, 0.0, [0.02, f64::INFINITY], 0.1) && now(still).is_none());
         }
     }
 }

@@ -108,8 +108,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Age of the middle of a reading, s.
     pub(super) fn age(&self, sensor: &SpeedReading<T>, reading: &Reading<T>) -> T {
-        let size = reading.value.abs().max(self.uncertainty.output_least_rad_s);
-        reading.age_s + sensor.delay_s + sensor.lag_rad / size
+        self.age_and_late(sensor, reading)[0]
+    }
+
+    fn age_and_late(&self, sensor: &SpeedReading<T>, reading: &Reading<T>) -> [T; 2] {
+        let [lag_s, late_s] = sensor.lag_and_late(reading.value.abs(), self.uncertainty.output_least_rad_s);
+        [reading.age_s + sensor.delay_s + lag_s, late_s]
     }
 
     /// Keeps the newest readings of turbine, output and wheel.
@@ -135,7 +139,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
             let taken = self.limits.speed_valid(reading.value)
                 && aged
-                && Newest::take(newest, reading.value, self.age(sensor, &reading), sensor.deviation_rad_s);
+                && Newest::take(newest, reading.value, self.age_and_late(sensor, &reading), sensor.deviation_rad_s);
             *health = if taken { ChannelHealth::Good } else { ChannelHealth::Refused };
         }
     }
@@ -152,12 +156,21 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         })
     }
 
-    /// Speeds of turbine and output at the time of the older reading, and on the same lines now; `None` where one of them has
-    /// not been read for long, or its last reading was refused: a clutch that grips hard looks so, and the lines do not show it.
-    pub(super) fn then_and_now(&self, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[[T; 2]; 2]> {
-        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S) && !newest.refused);
-        let (turbine, output) = (fresh(TURBINE)?, fresh(OUTPUT)?);
-        Some([self.measured(newest, None), [turbine.at(T::zero()), output.at(T::zero())]])
+    /// Whether turbine and output have been read of late.
+    pub(super) fn are_read(&self, newest: &[Option<Newest<T>>; SPEEDS]) -> bool {
+        [TURBINE, OUTPUT].iter().all(|&k| newest[k].is_some_and(|newest| newest.age_s <= T::of(FIRST_S)))
+    }
+
+    /// Slip now at the turbine, and its error: `None` where the readings bound none. It errs by 7 deviations and 0.6 rad/s, by
+    /// twice its change since the older reading, and by what readings of both speeds do not show ([`Newest::now`]).
+    pub(super) fn bounded_slip(&self, ratio: T, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[T; 2]> {
+        let now = |k: usize| newest[k].and_then(|newest| newest.now(self.readings[k].deviation_rad_s, T::of(FIRST_S)));
+        let (turbine, output) = (now(TURBINE)?, now(OUTPUT)?);
+        let deviation = turbine.deviation.hypot(ratio * output.deviation);
+        let slip = Slip { value: turbine.value - ratio * output.value, deviation };
+        let changed = (slip.value - self.slip(ratio, self.measured(newest, None)).value).abs();
+        let error = T::of(2.0) * (slip.threshold() + changed) + turbine.drift + ratio.abs() * output.drift;
+        (slip.value.is_finite() && error.is_finite()).then_some([slip.value, error])
     }
 
     /// The torque at the gearbox input now, if it is known.
@@ -182,5 +195,61 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {
         let deviation = self.readings[TURBINE].deviation_rad_s.hypot(ratio * self.readings[OUTPUT].deviation_rad_s);
         Slip { value: turbine - ratio * output, deviation }
+    }
+}
+
+impl<T: Real> SpeedReading<T> {
+    /// How old the middle of a reading of this speed is by the lag, for speeds from the least one on, and by how much it may be
+    /// older or newer, s. The last tooth has passed up to a pitch ago, and the lag has half a pitch in it; a wheel that now turns
+    /// at half the reading takes two pitches' time for that one. Below the least speed all teeth have taken longer.
+    fn lag_and_late(&self, speed_rad_s: T, least_rad_s: T) -> [T; 2] {
+        let zero = T::zero();
+        let spent = |angle_rad: T, speed: T| if angle_rad > zero { angle_rad / speed } else { zero };
+        let lag_s = spent(self.lag_rad, speed_rad_s.max(least_rad_s));
+        let longer_s = spent(self.lag_rad, speed_rad_s) - lag_s;
+        [lag_s, longer_s + spent(T::of(1.5) * self.pitch_rad, speed_rad_s)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PITCH: f64 = core::f64::consts::TAU / 60.0;
+    const WHEEL: SpeedReading<f64> =
+        SpeedReading { deviation_rad_s: 0.1, lag_rad: 0.5 * 11.0 * PITCH, pitch_rad: PITCH, delay_s: 0.0 };
+
+    #[test]
+    fn a_toothed_wheel_that_slows_down_is_within_the_drift_of_its_readings() {
+        // Over ten pitches, read every 10 ms, from 86 to 6 rad/s.
+        let (start, slower) = (90.0_f64, 40.0_f64);
+        let speed = |t: f64| start - slower * t;
+        let turned = |t: f64| start * t - 0.5 * slower * t * t;
+        let passed_s = |tooth: f64| (start - (start * start - 2.0 * slower * tooth * PITCH).sqrt()) / slower;
+        let (mut newest, mut slow, mut known) = (None, 0, 0);
+        for i in 10..210 {
+            let t = 0.01 * f64::from(i);
+            newest.iter_mut().for_each(|newest: &mut Newest<f64>| newest.pass(0.01));
+            let last = (turned(t) / PITCH).floor();
+            let value = 10.0 * PITCH / (passed_s(last) - passed_s(last - 10.0));
+            let [lag_s, late_s] = WHEEL.lag_and_late(value, 15.0);
+            slow += u32::from(value < 12.0);
+            let middle_s = t - (start - value) / slower;
+            assert!((middle_s - lag_s).abs() <= late_s, "{t}: {middle_s} {lag_s} {late_s}");
+            assert!(Newest::take(&mut newest, value, [lag_s, late_s], 0.1));
+            let Some(now) = newest.and_then(|newest| newest.now(0.0, f64::INFINITY)) else { continue };
+            assert!((now.value - speed(t)).abs() <= now.drift, "{t}: {value} {now:?} {}", speed(t));
+            known += 1;
+        }
+        assert!(slow > 5 && known > 100, "{slow} {known}");
+    }
+
+    #[test]
+    fn a_reading_of_the_moment_is_never_late_and_a_wheel_that_stands_for_ever() {
+        let moment = SpeedReading { lag_rad: 0.0, pitch_rad: 0.0, ..WHEEL };
+        assert_eq!(moment.lag_and_late(0.0, 15.0), [0.0; 2]);
+        assert_eq!(WHEEL.lag_and_late(0.0, 15.0), [WHEEL.lag_rad / 15.0, f64::INFINITY]);
+        let [lag_s, late_s] = WHEEL.lag_and_late(10.0, 15.0);
+        assert!((lag_s + late_s - (WHEEL.lag_rad + 1.5 * PITCH) / 10.0).abs() < 1e-12);
     }
 }
