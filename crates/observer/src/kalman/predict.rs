@@ -104,7 +104,7 @@ impl<T: Real> KalmanFilter<T> {
             direction: direction(model.shift.oncoming_slip(turbine, output)),
             turned_s: zero,
             flares_s: zero,
-            gates: [Gate::new(GATE); 3],
+            gates: [Gate::new(GATE).ended_by_agreement(); 3],
             silent_s: [zero; 3],
             squared_innovations: [None; 3],
         })
