@@ -77,7 +77,7 @@ pub(crate) enum Command {
     /// Simulates an experiment and writes two files: NAME.csv with every signal, true values included, and
     /// NAME_measured.csv with only the signals that a car measures. The same experiment gives the same bytes. Rows are
     /// written during the simulation; the size is printed first if it is more than 1 GB. If the experiment has scenarios,
-    /// the drive is simulated without them, or with the scenario given by --scenario. With a [sensors] table NAME_measured.csv
+    /// the drive is simulated without them, or with the scenario given by --scenario. With a table of sensors NAME_measured.csv
     /// has what the sensors read.
     ///
     /// A drive file (with segments) is driven with all its shifts: throttle, brake and grade over time, a shift schedule or
