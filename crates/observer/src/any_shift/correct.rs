@@ -30,7 +30,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             health[k] = self.correct(running, k, &reading, &rates);
         }
-        running.rates = rates.at(&running.x.mean);
+        running.rates = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &running.x));
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
             running.before = None;
         }
@@ -59,7 +59,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let sensor = &self.readings[k];
         let age_s = self.age(sensor, reading);
         let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.uncertainty.output_least_rad_s);
-        let rate = rates.at(&running.x.mean)[k];
+        let rate = rates.of(k, &running.x);
         // The speed at the time of the reading: `w - age w'`.
         let mut row = rates.rows[k].map(|x| -age_s * x);
         row[k] = row[k] + T::one();

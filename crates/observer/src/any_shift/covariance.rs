@@ -43,21 +43,23 @@ impl<T: Real> Gaussian<T> {
         Self { mean, covariance, active: N }
     }
 
-    /// Carries the first states on by their rows, and lets the others fade by their factors.
-    pub(super) fn pass(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE], stay: &[T; N]) {
-        if self.active <= IN_GEAR {
-            self.pass_first::<IN_GEAR>(rows, rest, stay);
-        } else {
-            self.pass_first::<N>(rows, rest, stay);
-        }
+    /// Whether only the states of a gear are active. Loops over a number of states that the compiler knows are unrolled; so
+    /// what is done most often is done by functions for the first `M` states.
+    fn in_gear(&self) -> bool {
+        self.active <= IN_GEAR
     }
 
-    /// The same for the first `M` states. With `M` known to the compiler the loops are unrolled.
-    fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE], stay: &[T; N]) {
-        let before = self.mean;
-        for (k, x) in self.mean.iter_mut().enumerate().take(M) {
-            *x = if k < CORE { dot(&rows[k], &before) + rest[k] } else { stay[k] * *x };
+    /// Carries the first states on by their rows; the others stay as they are.
+    pub(super) fn pass(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
+        if self.in_gear() { self.pass_first::<IN_GEAR>(rows, rest) } else { self.pass_first::<N>(rows, rest) }
+    }
+
+    fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
+        let mut mean = *rest;
+        for (mean, row) in mean.iter_mut().zip(rows) {
+            *mean = *mean + dot_first::<T, M>(row, &self.mean);
         }
+        self.mean[..CORE].copy_from_slice(&mean);
         let p = &mut self.covariance;
         let mut carried = [[T::zero(); M]; CORE];
         for (carried, row) in carried.iter_mut().zip(rows) {
@@ -67,21 +69,28 @@ impl<T: Real> Gaussian<T> {
                 }
             }
         }
-        for (row, own) in p.iter_mut().zip(stay).take(M).skip(CORE) {
-            for (p, other) in row.iter_mut().zip(stay).take(M).skip(CORE) {
-                *p = *own * *other * *p;
-            }
-        }
-        for i in 0..CORE {
-            for j in i..M {
-                let value = if j < CORE {
-                    carried[i].iter().zip(&rows[j]).fold(T::zero(), |sum, (p, weight)| sum + *p * *weight)
-                } else {
-                    stay[j] * carried[i][j]
-                };
+        for (i, carried) in carried.iter().enumerate() {
+            for (j, row) in rows.iter().enumerate().skip(i) {
+                let value = carried.iter().zip(row).fold(T::zero(), |sum, (p, weight)| sum + *p * *weight);
                 p[i][j] = value;
                 p[j][i] = value;
             }
+            for (j, value) in carried.iter().enumerate().skip(CORE) {
+                p[i][j] = *value;
+                p[j][i] = *value;
+            }
+        }
+    }
+
+    /// Lets a state fade by a factor.
+    pub(super) fn fade(&mut self, state: usize, factor: T) {
+        let (state, active) = (state.min(N - 1), self.active);
+        self.mean[state] = factor * self.mean[state];
+        for row in self.covariance.iter_mut().take(active) {
+            row[state] = factor * row[state];
+        }
+        for p in self.covariance[state].iter_mut().take(active) {
+            *p = factor * *p;
         }
     }
 
@@ -141,15 +150,16 @@ impl<T: Real> Gaussian<T> {
 
     /// Variance of a combination of the states.
     pub(super) fn variance(&self, row: &[T; N]) -> T {
-        dot(&self.with(row), row).max(T::zero())
+        let with = if self.in_gear() { self.with_first::<IN_GEAR>(row) } else { self.with_first::<N>(row) };
+        dot(&with, row).at_least(T::zero())
     }
 
-    /// Covariance of the states with a combination of them. Most combinations are of few states.
-    fn with(&self, row: &[T; N]) -> [T; N] {
+    /// Covariance of the first states with a combination of them. Some combinations are of few states.
+    fn with_first<const M: usize>(&self, row: &[T; N]) -> [T; N] {
         let mut with = [T::zero(); N];
-        for (per, p) in row.iter().zip(&self.covariance).take(self.active) {
+        for (per, p) in row.iter().zip(&self.covariance).take(M) {
             if *per != T::zero() {
-                for (with, p) in with.iter_mut().zip(p) {
+                for (with, p) in with.iter_mut().zip(p).take(M) {
                     *with = *with + *per * *p;
                 }
             }
@@ -159,9 +169,13 @@ impl<T: Real> Gaussian<T> {
 
     /// What a measurement says beside the states.
     pub(super) fn look(&self, measured: &Measured<T>) -> Look<T> {
-        let with = self.with(&measured.row);
-        let variance = dot(&with, &measured.row).max(T::zero()) + measured.noise;
-        Look { innovation: measured.value - dot(&measured.row, &self.mean), variance, with }
+        if self.in_gear() { self.look_first::<IN_GEAR>(measured) } else { self.look_first::<N>(measured) }
+    }
+
+    fn look_first<const M: usize>(&self, measured: &Measured<T>) -> Look<T> {
+        let with = self.with_first::<M>(&measured.row);
+        let variance = dot_first::<T, M>(&with, &measured.row).at_least(T::zero()) + measured.noise;
+        Look { innovation: measured.value - dot_first::<T, M>(&measured.row, &self.mean), variance, with }
     }
 
     /// Corrects by a measurement: `x + S e/V`, `P - S S'/V`. The product is made of two equal factors, so that `P` stays
@@ -170,23 +184,38 @@ impl<T: Real> Gaussian<T> {
         if look.variance <= T::zero() {
             return;
         }
+        if self.in_gear() { self.correct_first::<IN_GEAR>(look) } else { self.correct_first::<N>(look) }
+    }
+
+    fn correct_first<const M: usize>(&mut self, look: &Look<T>) {
         let per = look.variance.sqrt().recip();
         let factor = look.with.map(|with| per * with);
-        for (i, (row, own)) in self.covariance.iter_mut().zip(&factor).enumerate().take(self.active) {
-            for (p, other) in row.iter_mut().zip(&factor) {
+        for (i, (row, own)) in self.covariance.iter_mut().zip(&factor).enumerate().take(M) {
+            for (p, other) in row.iter_mut().zip(&factor).take(M) {
                 *p = *p - *own * *other;
             }
-            row[i] = row[i].max(T::zero());
+            row[i] = row[i].at_least(T::zero());
         }
         let innovation = per * look.innovation;
-        for (x, factor) in self.mean.iter_mut().zip(&factor).take(self.active) {
+        for (x, factor) in self.mean.iter_mut().zip(&factor).take(M) {
             *x = *x + *factor * innovation;
         }
     }
 
+    /// The value of a row over the states, of which those that are not active are zero.
+    pub(super) fn value(&self, row: &[T; N]) -> T {
+        if self.in_gear() { dot_first::<T, IN_GEAR>(row, &self.mean) } else { dot(row, &self.mean) }
+    }
+
     /// Whether all are numbers, and no variance is negative.
     pub(super) fn is_sound(&self) -> bool {
-        let variances = self.covariance.iter().enumerate().all(|(k, row)| row[k] >= T::zero() && row[k].is_finite());
-        variances && self.mean.iter().all(|x| x.is_finite())
+        let states = self.covariance.iter().zip(&self.mean).enumerate().take(self.active);
+        states.fold(true, |sound, (k, (row, x))| sound & (row[k] >= T::zero()) & row[k].is_finite() & x.is_finite())
     }
+}
+
+/// The sum of the products of the first of two rows.
+#[inline]
+fn dot_first<T: Real, const M: usize>(a: &[T; N], b: &[T; N]) -> T {
+    a.iter().zip(b).take(M).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
 }

@@ -4,10 +4,14 @@ use drivetrain::Real;
 
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
-use super::{PIECE_S, ShiftUncertainty, square};
+use super::{PIECE_S, ShiftUncertainty, pieces, square};
 use crate::bound::pressure_and_torque;
 use crate::kalman::valve_model::Commands;
 use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
+
+/// Distance from the pressure that the command ends at from which on the valve model rests there, Pa \[chosen\]: errors of a
+/// pressure are thousands of this.
+const RESTS_PA: f64 = 1.0;
 
 /// What is known of the errors of an element's pressure and kiss point, in their deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +46,19 @@ fn pressed<T: Real>(mean_pa: T, variance: T) -> (T, T) {
     }
 }
 
+/// The newest command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct NewestCommand<T> {
+    command: T,
+    /// The pressure that it ends at, Pa.
+    settled_pa: T,
+    age_s: T,
+    /// Since when all commands have been this one, s.
+    alike_s: T,
+    /// For how long the valve has rested where this command ends, s; none while it moves. Meanwhile `commands` stands still.
+    rests_s: Option<T>,
+}
+
 /// Memory of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ElementState<T> {
@@ -51,6 +68,7 @@ pub(super) struct ElementState<T> {
     rate_pa_s: T,
     /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
     per_lag_pa: T,
+    newest: Option<NewestCommand<T>>,
     range: Option<PressureRange<T>>,
 }
 
@@ -61,6 +79,7 @@ impl<T: Real> ElementState<T> {
             valve_pa: T::zero(),
             rate_pa_s: T::zero(),
             per_lag_pa: T::zero(),
+            newest: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
         }
     }
@@ -75,37 +94,83 @@ impl<T: Real> ElementState<T> {
         dt_s: T,
     ) -> ChannelHealth {
         if dt_s > T::zero() {
-            let before_pa = self.valve_pa;
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, super::MOST_PIECES);
-            let piece_s = dt_s / T::of(pieces as f64);
-            for _ in 0..pieces {
-                self.commands.pass(piece_s);
-                let settled_pa = element.valve.target_pa(&self.commands, piece_s);
-                let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
-                let before_pa = self.valve_pa;
-                self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
-                self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
-            }
-            self.rate_pa_s = (self.valve_pa - before_pa) / dt_s;
+            self.pass(element, limits, dt_s);
         }
         let usable = command.filter(|reading| limits.usable_command(reading));
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
             range.step(budget, dt_s, usable, limits.command_max);
         }
         match (command, usable) {
-            (None, _) if !self.commands.is_fresh(T::of(LOST_S)) => ChannelHealth::Lost,
+            (None, _) if self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
             (Some(_), Some(reading)) => {
-                let settled_pa = element.valve.valve.settled_pressure(reading.value);
-                if self.commands.newest_pa().is_none() {
-                    // The first command is taken to have stood for long.
-                    self.valve_pa = limits.possible_pressure(settled_pa);
-                }
-                self.commands.send(reading.age_s, settled_pa, element.valve.needed_s(T::of(PIECE_S)));
+                self.take(element, limits, &reading);
                 ChannelHealth::Good
             }
         }
+    }
+
+    /// Carries the valve on, unless it rests.
+    #[inline]
+    fn pass(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+        if let Some(newest) = &mut self.newest {
+            (newest.age_s, newest.alike_s) = (newest.age_s + dt_s, newest.alike_s + dt_s);
+            if let Some(rests_s) = &mut newest.rests_s {
+                *rests_s = *rests_s + dt_s;
+                return;
+            }
+        }
+        self.move_valve(element, limits, dt_s);
+        if let Some(newest) = &mut self.newest {
+            let end_pa = limits.possible_pressure(newest.settled_pa);
+            let near = (self.valve_pa - end_pa).abs().at_least(self.per_lag_pa.abs()) <= T::of(RESTS_PA);
+            if near && newest.alike_s - dt_s >= element.valve.delay_s {
+                (self.valve_pa, self.rate_pa_s, self.per_lag_pa) = (end_pa, T::zero(), T::zero());
+                newest.rests_s = Some(T::zero());
+            }
+        }
+    }
+
+    fn move_valve(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+        let start_pa = self.valve_pa;
+        let (pieces, piece_s) = pieces(dt_s);
+        for _ in 0..pieces {
+            self.commands.pass(piece_s);
+            let settled_pa = element.valve.target_pa(&self.commands, piece_s);
+            let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
+            let before_pa = self.valve_pa;
+            self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
+            self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
+        }
+        self.rate_pa_s = (self.valve_pa - start_pa) / dt_s;
+    }
+
+    /// Takes a usable command.
+    #[inline]
+    fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
+        let needed_s = element.valve.needed_s(T::of(PIECE_S));
+        if let Some(newest) = &mut self.newest {
+            // Commands arrive in their order.
+            newest.age_s = newest.age_s.at_most(reading.age_s);
+            if newest.command == reading.value {
+                if newest.rests_s.is_none() {
+                    self.commands.send(newest.age_s, newest.settled_pa, needed_s);
+                }
+                return;
+            }
+            if let Some(rests_s) = newest.rests_s {
+                self.commands.pass(rests_s);
+            }
+        }
+        let settled_pa = element.valve.valve.settled_pressure(reading.value);
+        if self.newest.is_none() {
+            // The first command is taken to have stood for long.
+            self.valve_pa = limits.possible_pressure(settled_pa);
+        }
+        let age_s = self.newest.map_or(reading.age_s, |newest| newest.age_s);
+        self.commands.send(age_s, settled_pa, needed_s);
+        self.newest = Some(NewestCommand { command: reading.value, settled_pa, age_s, alike_s: age_s, rests_s: None });
     }
 
     /// Forgets the range and the rate: time was lost, and with it commands.
@@ -119,8 +184,8 @@ impl<T: Real> ElementState<T> {
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
     pub(super) fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
-        let moving = (u.valve_lag_share * self.per_lag_pa).hypot(u.valve_delay_s * self.rate_pa_s);
-        moving.hypot(u.pressure_pa)
+        let moving = square(u.valve_lag_share * self.per_lag_pa) + square(u.valve_delay_s * self.rate_pa_s);
+        (moving + square(u.pressure_pa)).sqrt()
     }
 
     /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
@@ -165,7 +230,7 @@ impl<T: Real> ElementState<T> {
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_force = shift.alpha.abs() * friction * clutch.lever();
         let capacity = per_force * clutch.clamp_force(self.valve_pa);
-        let wrong_pa = self.deviation_pa(u).hypot(u.kiss_deviation_pa(clutch));
+        let wrong_pa = (square(self.deviation_pa(u)) + square(u.kiss_deviation_pa(clutch))).sqrt();
         let wrong = per_force * clutch.piston_area_m2 * wrong_pa;
         [capacity * (one + u.torque_share), capacity * (one + three * u.torque_share) + three * wrong]
     }

@@ -81,6 +81,9 @@ impl<T: Real> Newest<T> {
 
     /// The speed a time ago, on the lines through the readings; before the oldest that reading.
     pub(super) fn at(&self, age_s: T) -> T {
+        if age_s == self.age_s {
+            return self.value;
+        }
         let mut late = (self.value, self.age_s);
         for early in self.before.into_iter().flatten() {
             let span_s = early.1 - late.1;
@@ -113,7 +116,11 @@ impl<T: Real> Newest<T> {
         let (value, drift) = (self.value + rate * self.age_s, bent + late);
         // The spread of the ages is that of a wheel that turns at half its reading or faster.
         let turns = value.abs() - drift >= half * self.value.abs() || self.late_s <= T::zero();
-        turns.then(|| SpeedNow { value, deviation: deviation * (one + reach).hypot(reach), drift })
+        turns.then(|| SpeedNow {
+            value,
+            deviation: deviation * ((one + reach) * (one + reach) + reach * reach).sqrt(),
+            drift,
+        })
     }
 }
 

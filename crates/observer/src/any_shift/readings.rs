@@ -2,8 +2,8 @@
 
 use super::{
     AnyShiftFilter, AnyShiftState, ChannelHealth, Channels, Engine, FIRST_S, GearCommand, InputSide, LOST_S,
-    MAX_ELEMENTS, MOST_PIECES, Newest, OUTPUT, PIECE_S, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading,
-    TURBINE, Verdict, turbine,
+    MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, pieces,
+    square, turbine,
 };
 use drivetrain::Real;
 
@@ -77,9 +77,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (sensor, noise) = &self.engine;
         let lost = T::of(LOST_S);
         if let Some(engine) = &mut state.engine {
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+            let (pieces, piece_s) = pieces(dt_s);
             for _ in 0..pieces {
-                engine.predict(noise, dt_s / T::of(pieces as f64));
+                engine.predict(noise, piece_s);
             }
             if engine.silent_s > lost {
                 state.engine = None;
@@ -146,7 +146,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.
     pub(super) fn measured(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
-        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
+        let fresh = |k: usize| newest[k].as_ref().filter(|newest| newest.age_s <= T::of(FIRST_S));
         let older_s = |k: usize| fresh(k).map_or(T::zero(), |newest| newest.age_s);
         let age_s = older_s(TURBINE).max(older_s(OUTPUT));
         [TURBINE, OUTPUT].map(|k| match (fresh(k), running) {
@@ -166,7 +166,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn bounded_slip(&self, ratio: T, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[T; 2]> {
         let now = |k: usize| newest[k].and_then(|newest| newest.now(self.readings[k].deviation_rad_s, T::of(FIRST_S)));
         let (turbine, output) = (now(TURBINE)?, now(OUTPUT)?);
-        let deviation = turbine.deviation.hypot(ratio * output.deviation);
+        let deviation = (square(turbine.deviation) + square(ratio * output.deviation)).sqrt();
         let slip = Slip { value: turbine.value - ratio * output.value, deviation };
         let changed = (slip.value - self.slip(ratio, self.measured(newest, None)).value).abs();
         let error = T::of(2.0) * (slip.threshold() + changed) + turbine.drift + ratio.abs() * output.drift;
@@ -193,7 +193,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     }
 
     pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {
-        let deviation = self.readings[TURBINE].deviation_rad_s.hypot(ratio * self.readings[OUTPUT].deviation_rad_s);
+        let [turbine_deviation, output_deviation] = [TURBINE, OUTPUT].map(|k| self.readings[k].deviation_rad_s);
+        let deviation = (square(turbine_deviation) + square(ratio * output_deviation)).sqrt();
         Slip { value: turbine - ratio * output, deviation }
     }
 }
