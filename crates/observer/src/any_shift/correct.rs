@@ -65,9 +65,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         row[k] = row[k] + T::one();
         let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
         let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
-        let measured = Measured { row, value: reading.value + age_s * rates.rest[k], noise };
+        let innovation = reading.value - (running.x.mean[k] - age_s * rate);
+        let measured = Measured { row, innovation, noise };
         let mut look = running.x.look(&measured);
-        let (innovation, variance) = (look.innovation, look.variance);
+        let variance = look.variance;
         if k != WHEEL {
             let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
             running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);

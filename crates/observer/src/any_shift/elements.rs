@@ -241,3 +241,70 @@ impl<T: Real> ElementState<T> {
         Some(pressure_and_torque(&element.clutch, budget, range, slip_rad_s))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ValveModel;
+    use drivetrain::{Clutch, ClutchValve, Table1, ValveMaps};
+
+    const LIMITS: InputLimits<f64> =
+        InputLimits { speed_max_rad_s: 1e3, command_max: 1.2, pressure_max_pa: 1.1e6, shaft_torque_max_n_m: 1e4 };
+
+    fn element() -> FrictionElement<f64> {
+        let maps = ValveMaps {
+            time_constant_s: Table1::new(&[0.0, 1e5, 1e6], &[0.1, 0.06, 0.03]).unwrap(),
+            gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[0.7e6, 1.0e6, 1.2e6]).unwrap(),
+            delay_s: Table1::constant(0.015),
+        };
+        FrictionElement {
+            clutch: Clutch {
+                mean_radius_m: 0.13,
+                friction_faces: 3.0,
+                piston_area_m2: 0.01,
+                return_spring_n: 600.0,
+                friction: Table1::constant(0.13),
+                static_friction: 0.14,
+            },
+            valve: ValveModel { valve: ClutchValve::Proportional(maps), delay_s: 0.015 },
+            budget: None,
+        }
+    }
+
+    /// With late and missing readings, and commands above what the supply gives.
+    #[test]
+    fn a_valve_that_rests_goes_on_as_one_that_never_does() {
+        let element = element();
+        let mut rests = ElementState::new(&element, &LIMITS);
+        let (mut moves, mut rested) = (rests, 0);
+        for k in 0..6000_usize {
+            // Every new command is late, after two that were lost or out of order.
+            let (held, at) = (k / 495, k % 11);
+            let value = [0.3, 0.0, 1.0, 0.31, 0.9][held % 5];
+            let age_s = if at == 0 { 0.025 } else { 0.0 };
+            let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
+            let health = [&mut rests, &mut moves]
+                .map(|valve: &mut ElementState<f64>| valve.step(&element, &LIMITS, command, 0.01));
+            assert_eq!(health[0], health[1]);
+            // So it never begins to rest.
+            moves.newest.iter_mut().for_each(|newest| newest.alike_s = 0.0);
+            rested += usize::from(rests.rate_pa_s == 0.0);
+            assert!((rests.valve_pa - moves.valve_pa).abs() <= RESTS_PA, "{k}: {} {}", rests.valve_pa, moves.valve_pa);
+            assert!((rests.per_lag_pa - moves.per_lag_pa).abs() <= RESTS_PA, "{k}");
+            assert!((rests.rate_pa_s - moves.rate_pa_s).abs() <= 100.0 * RESTS_PA, "{k}");
+        }
+        assert!(rested > 3000 && moves.newest.is_some_and(|newest| newest.rests_s.is_none()), "{rested}");
+    }
+
+    #[test]
+    fn a_command_that_is_lost_while_the_valve_rests_is_said_to_be() {
+        let element = element();
+        let mut state = ElementState::new(&element, &LIMITS);
+        (0..500).for_each(|_| {
+            state.step(&element, &LIMITS, Some(Reading::now(0.3)), 0.01);
+        });
+        assert!(state.newest.is_some_and(|newest| newest.rests_s.is_some()));
+        let health: [ChannelHealth; 200] = core::array::from_fn(|_| state.step(&element, &LIMITS, None, 0.01));
+        assert_eq!((health[0], health[199]), (ChannelHealth::Absent, ChannelHealth::Lost));
+    }
+}

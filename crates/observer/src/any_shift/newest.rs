@@ -63,12 +63,15 @@ impl<T: Real> Newest<T> {
         if line_s > T::of(LONGEST_S) || step_s <= T::zero() {
             return false;
         }
+        let distance = (value - self.at(age_s)).abs() - T::of(JERK_RAD_S3) * step_s * step_s.at_least(line_s);
+        if distance <= T::zero() {
+            return false;
+        }
         let reach = step_s / line_s;
         // Of the line's end, whose ends err by one deviation each, and of the reading.
         let one = T::one();
         let noise = deviation * ((one + reach) * (one + reach) + reach * reach + one).sqrt();
-        let most = T::of(DEVIATIONS) * noise + T::of(JERK_RAD_S3) * step_s * step_s.max(line_s);
-        (value - self.at(age_s)).abs() > most
+        distance > T::of(DEVIATIONS) * noise
     }
 
     /// Lets time pass.

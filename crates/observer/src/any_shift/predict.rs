@@ -86,10 +86,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     pub(super) fn predict(&self, running: &mut Running<T>, torques: &Torques<T>, torque_noise: T, dt_s: T) {
         let (u, response) = (&self.uncertainty, self.response(running));
-        let known = running.motion.take().filter(|motion| motion.of == (response, dt_s));
-        let motion =
-            known.unwrap_or_else(|| Motion::new(response, &self.driveline, self.wheels_kg_m2, dt_s, u.fading_s()));
-        let motion = running.motion.insert(motion);
+        running.motion.take_if(|motion| motion.of != (response, dt_s));
+        let new = || Motion::new(response, &self.driveline, self.wheels_kg_m2, dt_s, u.fading_s());
+        let motion = running.motion.get_or_insert_with(new);
         let (rows, rest) = motion.rows(torques);
         let (by_torque, [share, pressure]) = (motion.per_turbine_torque(), motion.stay);
         let in_shift = running.shift.is_some();

@@ -31,15 +31,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// The health of all commands together: a refused one first, then a lost one of an element that shifts, which is what the
     /// estimate rests on.
     pub(super) fn of_commands(&self, each: &[ChannelHealth; MAX_ELEMENTS], gear: GearCommand) -> ChannelHealth {
-        let shifts = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
-        let lost = shifts.is_some_and(|shift| {
-            shift.clutches.iter().any(|clutch| each.get(clutch.element) == Some(&ChannelHealth::Lost))
-        });
-        if each.contains(&ChannelHealth::Refused) {
+        let is = |health: ChannelHealth| each.contains(&health);
+        let lost = || {
+            let shift = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
+            let elements = shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
+            elements.into_iter().flatten().any(|element| each.get(element) == Some(&ChannelHealth::Lost))
+        };
+        if is(ChannelHealth::Refused) {
             ChannelHealth::Refused
-        } else if lost {
+        } else if is(ChannelHealth::Lost) && lost() {
             ChannelHealth::Lost
-        } else if each.contains(&ChannelHealth::Good) {
+        } else if is(ChannelHealth::Good) {
             ChannelHealth::Good
         } else {
             ChannelHealth::Absent
@@ -147,13 +149,15 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.
     pub(super) fn measured(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
         let fresh = |k: usize| newest[k].as_ref().filter(|newest| newest.age_s <= T::of(FIRST_S));
-        let older_s = |k: usize| fresh(k).map_or(T::zero(), |newest| newest.age_s);
-        let age_s = older_s(TURBINE).max(older_s(OUTPUT));
-        [TURBINE, OUTPUT].map(|k| match (fresh(k), running) {
-            (Some(newest), _) => newest.at(age_s),
+        let (turbine, output) = (fresh(TURBINE), fresh(OUTPUT));
+        let age_s = |newest: Option<&Newest<T>>| newest.map_or(T::zero(), |newest| newest.age_s);
+        let older_s = age_s(turbine).at_least(age_s(output));
+        let speed = |newest: Option<&Newest<T>>, k: usize| match (newest, running) {
+            (Some(newest), _) => newest.at(older_s),
             (None, Some(running)) => running.x.mean[k],
             (None, None) => T::zero(),
-        })
+        };
+        [speed(turbine, TURBINE), speed(output, OUTPUT)]
     }
 
     /// Whether turbine and output have been read of late.
