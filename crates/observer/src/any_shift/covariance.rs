@@ -70,15 +70,15 @@ impl<T: Real> Gaussian<T> {
                 }
             }
         }
-        for (i, carried) in carried.iter().enumerate() {
-            for (j, row) in rows.iter().enumerate().skip(i) {
-                let value = carried.iter().zip(row).fold(T::zero(), |sum, (p, weight)| sum + *p * *weight);
+        for i in 0..CORE {
+            for j in i..M {
+                let value = if j < CORE {
+                    carried[i].iter().zip(&rows[j]).fold(T::zero(), |sum, (p, weight)| sum + *p * *weight)
+                } else {
+                    carried[i][j]
+                };
                 p[i][j] = value;
                 p[j][i] = value;
-            }
-            for (j, value) in carried.iter().enumerate().skip(CORE) {
-                p[i][j] = *value;
-                p[j][i] = *value;
             }
         }
     }
@@ -197,7 +197,9 @@ impl<T: Real> Gaussian<T> {
             for (p, other) in row.iter_mut().zip(&factor) {
                 *p = *p - *own * *other;
             }
-            row[i] = row[i].at_least(T::zero());
+            if let Some(variance) = row.get_mut(i) {
+                *variance = variance.at_least(T::zero());
+            }
         }
         let innovation = per * look.innovation;
         for (x, factor) in self.mean.iter_mut().zip(&factor) {

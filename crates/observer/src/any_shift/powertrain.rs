@@ -203,6 +203,7 @@ impl<T: Real> Rates<T> {
     /// One of the rates at the mean of the states, rad/s^2.
     #[inline]
     pub(super) fn of(&self, k: usize, x: &Gaussian<T>) -> T {
+        let k = k.min(SPEEDS - 1);
         x.value(&self.rows[k]) + self.rest[k]
     }
 }
