@@ -2,8 +2,7 @@
 //!
 //! `cargo bench -p study --bench instructions` counts them with Valgrind's callgrind and fails where one has grown by more than 5 %.
 //! Counts repeat on one toolchain; where the compiler, the C library or Valgrind is another than that of the file, the program
-//! says so and compares nothing. After a change that is meant, or with a new toolchain, `-- --write` renews the file. `-- --time` prints
-//! the time of each, the fastest of fifty runs.
+//! says so and compares nothing. After a change that is meant, or with a new toolchain, `-- --write` renews the file.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "a benchmark")]
 
@@ -16,7 +15,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, ExitCode};
-use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
@@ -44,10 +42,6 @@ fn main() -> ExitCode {
         counted(&mut *(path.unwrap().prepare)());
         return ExitCode::SUCCESS;
     }
-    if has("--time") {
-        PATHS.iter().for_each(time);
-        return ExitCode::SUCCESS;
-    }
     match check(has("--write")) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
@@ -62,20 +56,6 @@ fn main() -> ExitCode {
 #[inline(never)]
 fn counted(job: &mut dyn FnMut()) {
     job();
-}
-
-/// Runs of a path of which the fastest counts.
-const RUNS: usize = 50;
-
-/// Prints the time that a path takes for one of its units.
-fn time(path: &HotPath) {
-    let mut job = (path.prepare)();
-    let fastest = (0..RUNS).fold(Duration::MAX, |fastest, _| {
-        let start = Instant::now();
-        counted(&mut *job);
-        fastest.min(start.elapsed())
-    });
-    println!("{:>12.3} us  {}", 1e6 * fastest.as_secs_f64() / path.units as f64, path.name);
 }
 
 fn check(write: bool) -> Result<bool, String> {

@@ -322,7 +322,8 @@ fn a_torque_that_the_speeds_do_not_show_is_said_to_be_hidden() {
 fn single_precision_estimates_the_same() {
     let mut largest = 0.0_f64;
     let mut square = [0.0, 0.0];
-    let (mut steps, mut time_s) = (0.0, 0.0);
+    // A machine that does other things too is left alone in some of the shifts.
+    let mut fastest_s = f64::INFINITY;
     for car in cars() {
         let tables = ShiftTables::of_car(&car, &ERRORS).unwrap();
         let single_tables = tables.cast::<f32>();
@@ -336,8 +337,7 @@ fn single_precision_estimates_the_same() {
             let inputs = inputs(&car, &tables, &samples, &sensors, 1);
             let begun = std::time::Instant::now();
             let estimates: Vec<_> = inputs.iter().map(|(_, input)| filter.step(&mut state, input)).collect();
-            time_s += begun.elapsed().as_secs_f64();
-            steps += inputs.len() as f64;
+            fastest_s = fastest_s.min(begun.elapsed().as_secs_f64() / inputs.len() as f64);
             for ((_, input), estimate) in inputs.iter().zip(estimates) {
                 let rounded = single.step(&mut single_state, &cast(input));
                 if let (Some(clutches), Some(others)) = (estimate.clutches, rounded.clutches) {
@@ -352,7 +352,7 @@ fn single_precision_estimates_the_same() {
         }
     }
     let rms = (square[0] / square[1]).sqrt();
-    println!("{:.2} us for a step with ranges", 1e6 * time_s / steps);
+    println!("{:.2} us for a step with ranges, in the fastest shift", 1e6 * fastest_s);
     println!("single from double precision: RMS {rms:.3} N m, largest {largest:.2} N m");
     assert!(rms < 0.5, "{rms} {largest}");
 }
