@@ -322,8 +322,7 @@ fn a_torque_that_the_speeds_do_not_show_is_said_to_be_hidden() {
 fn single_precision_estimates_the_same() {
     let mut largest = 0.0_f64;
     let mut square = [0.0, 0.0];
-    // A machine that does other things too is left alone in some of the shifts.
-    let mut fastest_s = f64::INFINITY;
+    let (mut steps, mut time_s) = (0.0, 0.0);
     for car in cars() {
         let tables = ShiftTables::of_car(&car, &ERRORS).unwrap();
         let single_tables = tables.cast::<f32>();
@@ -333,11 +332,17 @@ fn single_precision_estimates_the_same() {
         for (from, to, throttle) in shifts(&car).into_iter().step_by(3) {
             let shift = CarShift::usual(&car, from, to, throttle);
             let samples = simulated(&car, &draw(&car, seed_of(&shift)), &shift).unwrap();
-            let (mut state, mut single_state) = (filter.start(), single.start());
+            let mut single_state = single.start();
             let inputs = inputs(&car, &tables, &samples, &sensors, 1);
-            let begun = std::time::Instant::now();
-            let estimates: Vec<_> = inputs.iter().map(|(_, input)| filter.step(&mut state, input)).collect();
-            fastest_s = fastest_s.min(begun.elapsed().as_secs_f64() / inputs.len() as f64);
+            let mut estimates = Vec::with_capacity(inputs.len());
+            // A machine that does other things too is left alone in one of ten times.
+            time_s += (0..10).fold(f64::INFINITY, |fastest_s, _| {
+                let (mut state, begun) = (filter.start(), std::time::Instant::now());
+                estimates.clear();
+                estimates.extend(inputs.iter().map(|(_, input)| filter.step(&mut state, input)));
+                fastest_s.min(begun.elapsed().as_secs_f64())
+            });
+            steps += inputs.len() as f64;
             for ((_, input), estimate) in inputs.iter().zip(estimates) {
                 let rounded = single.step(&mut single_state, &cast(input));
                 if let (Some(clutches), Some(others)) = (estimate.clutches, rounded.clutches) {
@@ -352,7 +357,7 @@ fn single_precision_estimates_the_same() {
         }
     }
     let rms = (square[0] / square[1]).sqrt();
-    println!("{:.2} us for a step with ranges, in the fastest shift", 1e6 * fastest_s);
+    println!("{:.2} us for a step with ranges, each shift the fastest of ten times", 1e6 * time_s / steps);
     println!("single from double precision: RMS {rms:.3} N m, largest {largest:.2} N m");
     assert!(rms < 0.5, "{rms} {largest}");
 }
