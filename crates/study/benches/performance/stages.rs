@@ -42,7 +42,7 @@ pub(crate) fn of_a_run(page: &mut String, campaign: &Campaign) -> Figure {
         }
     }
     // The shift was simulated with its launch, and the last is the whole run: differences of the fastest times.
-    best[2] -= best[1];
+    best[2] = (best[2] - best[1]).max(0.0);
     let others: f64 = best[..6].iter().sum();
     best[6] = (best[6] - others).max(0.0);
     let whole: f64 = best.iter().sum();
