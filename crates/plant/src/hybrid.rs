@@ -193,9 +193,10 @@ impl HybridIntegrator {
             let accepted =
                 size.accepted(until_s - self.time_s, |h| self.trial::<N, ROWS>(powertrain, &acting, &rates, h));
             self.step_size = size;
-            let (step_s, trial) = accepted.ok_or(PlantError::Diverged { time_s: self.time_s })?;
-            let Some(theta) = self.first_event(powertrain, inputs, &trial) else {
-                self.take(&trial, self.time_s + step_s, inputs, record);
+            // Looked at where it is: a trial is large, and a copy costs as much as a stage.
+            let Some((step_s, trial)) = &accepted else { return Err(PlantError::Diverged { time_s: self.time_s }) };
+            let Some(theta) = self.first_event(powertrain, inputs, trial) else {
+                self.take(trial, self.time_s + step_s, inputs, record);
                 rates = Rates { slope: trial.end_slope, applied: trial.end_applied };
                 changes = 0;
                 continue;

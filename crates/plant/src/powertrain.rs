@@ -5,7 +5,7 @@ use drivetrain::clutch::drag_torque;
 use drivetrain::{Clutch, ColumnPlace, Driveline, Engagement, ShiftCoefficients, ShiftTorques};
 
 use crate::rosenbrock::StiffRow;
-use crate::state::{CYLINDERS, STATES, State, WHEEL};
+use crate::state::{AT_THE_WHEEL, CYLINDERS, STATES, State, VALVE_TO_CYLINDER, WHEEL};
 use crate::{Contact, Direction, Mode};
 
 /// What acts on the plant from outside, constant over a segment of the integration.
@@ -219,16 +219,16 @@ impl Powertrain {
     pub(crate) fn stiff_rows<const N: usize, const ROWS: usize>(&self, x: &State, tyre_n: f64) -> [StiffRow<N>; ROWS] {
         let v = &self.vehicle;
         std::array::from_fn(|row| match row {
-            0 => StiffRow { state: WHEEL, gradient: self.wheel_gradient(x, tyre_n).to_vector() },
+            0 => StiffRow::of_states(WHEEL, AT_THE_WHEEL, self.wheel_gradient(x, tyre_n).to_vector()),
             1 => {
                 let (own, valve) = v.offgoing.volume_rate_slopes(x.offgoing_m3, x.offgoing_valve_pa);
                 let gradient = State { offgoing_m3: own, offgoing_valve_pa: valve, ..State::ZERO };
-                StiffRow { state: CYLINDERS[0], gradient: gradient.to_vector() }
+                StiffRow::of_states(CYLINDERS[0], VALVE_TO_CYLINDER[0].clone(), gradient.to_vector())
             }
             _ => {
                 let (own, valve) = v.oncoming.volume_rate_slopes(x.oncoming_m3, x.oncoming_valve_pa);
                 let gradient = State { oncoming_m3: own, oncoming_valve_pa: valve, ..State::ZERO };
-                StiffRow { state: CYLINDERS[1], gradient: gradient.to_vector() }
+                StiffRow::of_states(CYLINDERS[1], VALVE_TO_CYLINDER[1].clone(), gradient.to_vector())
             }
         })
     }
@@ -236,7 +236,7 @@ impl Powertrain {
     /// The wheel's equation by wheel, vehicle, output and twist: the row that the tyre makes stiff. `tyre_n`
     /// is the tyre's force at this state.
     pub fn stiff_row(&self, x: &State, tyre_n: f64) -> StiffRow<STATES> {
-        StiffRow { state: WHEEL, gradient: self.wheel_gradient(x, tyre_n).to_array() }
+        StiffRow::of_states(WHEEL, AT_THE_WHEEL, self.wheel_gradient(x, tyre_n).to_array())
     }
 
     #[inline]

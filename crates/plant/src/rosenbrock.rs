@@ -37,30 +37,51 @@ const ERROR_WEIGHTS: [f64; 4] = [
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StiffRow<const N: usize> {
     /// Which state's equation it is.
-    pub state: usize,
+    state: usize,
     /// Derivative of that state's rate by every state.
-    pub gradient: [f64; N],
+    gradient: [f64; N],
+    /// The first state that the row depends on, and the one after the last.
+    first: usize,
+    end: usize,
 }
 
 impl<const N: usize> StiffRow<N> {
+    /// The row of this state's equation: derivative of its rate by every state.
+    #[inline]
+    pub fn new(state: usize, gradient: [f64; N]) -> Self {
+        let first = gradient.iter().position(|g| *g != 0.0).unwrap_or(N);
+        let last = gradient.iter().rposition(|g| *g != 0.0).unwrap_or(N);
+        Self::of_states(state, first..last.saturating_add(1).min(N), gradient)
+    }
+
+    /// The same, where only the derivatives by these states may differ from zero.
+    #[inline]
+    pub fn of_states(state: usize, states: Range<usize>, gradient: [f64; N]) -> Self {
+        Self { state, gradient, first: states.start.min(N), end: states.end.min(N) }
+    }
+
     /// Treats everything explicitly.
     pub fn none() -> Self {
-        Self { state: 0, gradient: [0.0; N] }
+        Self::of_states(0, 0..0, [0.0; N])
     }
 
-    /// From the first to the last state that the row depends on.
+    /// What the states before its own one add to the row times a vector.
     #[inline]
-    fn support(&self) -> Range<usize> {
-        let first = self.gradient.iter().position(|g| *g != 0.0).unwrap_or(N);
-        let last = self.gradient.iter().rposition(|g| *g != 0.0).unwrap_or(N);
-        first..last.saturating_add(1).min(N)
+    fn before(&self, x: &[f64; N]) -> f64 {
+        self.add(self.first.min(self.state)..self.state, 0.0, x)
     }
 
-    /// The row times a vector, summed over its support: each sum waits for the one before.
+    /// The sum with what the states after its own one add to the row times a vector.
     #[inline]
-    fn times(&self, support: &Range<usize>, x: &[f64; N]) -> f64 {
-        let Range { start, end } = *support;
-        self.gradient[start..end].iter().zip(&x[start..end]).map(|(g, x)| g * x).sum()
+    fn after(&self, sum: f64, x: &[f64; N]) -> f64 {
+        self.add(self.state + 1..self.end.max(self.state + 1), sum, x)
+    }
+
+    /// The sum with what these states add: each sum waits for the one before, so there should be few.
+    #[inline]
+    fn add(&self, states: Range<usize>, sum: f64, x: &[f64; N]) -> f64 {
+        let terms = self.gradient[states.clone()].iter().zip(&x[states]);
+        terms.fold(sum, |sum, (g, x)| sum + g * x)
     }
 }
 
@@ -161,24 +182,13 @@ pub fn step<const N: usize, const ROWS: usize, E>(
     h: f64,
     tolerance: &Tolerance<N>,
 ) -> Trial<N, E> {
-    let pivots = rows.map(|row| 1.0 / (1.0 - h * GAMMA * row.gradient[row.state]));
-    let supports = rows.each_ref().map(StiffRow::support);
-    let mut k = [[0.0; N]; 4];
+    let solve = Solve { rows, pivots: rows.map(|row| 1.0 / (1.0 - h * GAMMA * row.gradient[row.state])), h };
     let mut rows_times_k = [[0.0; 4]; ROWS];
-    for stage in 0..4 {
-        let rate = if stage == 0 { *slope } else { f(&combine(x, &ALPHA[stage][..stage], &k)) };
-        let mut next = rate.map(|rate| h * rate);
-        // Of (1 - h gamma J) k = next only the stiff rows are not solved already.
-        for (((row, support), pivot), row_times_k) in rows.iter().zip(&supports).zip(&pivots).zip(&mut rows_times_k) {
-            let r = row.state;
-            let earlier: f64 = GAMMAS[stage].iter().zip(&*row_times_k).map(|(gamma, row_k)| gamma * row_k).sum();
-            let known = next[r] + h * earlier;
-            next[r] = 0.0;
-            next[r] = pivot * (known + h * GAMMA * row.times(support, &next));
-            row_times_k[stage] = row.times(support, &next);
-        }
-        k[stage] = next;
-    }
+    let k1 = solve.stage::<0>(slope, &mut rows_times_k);
+    let k2 = solve.stage::<1>(&f(&combine(x, &ALPHA[1], &[&k1])), &mut rows_times_k);
+    let k3 = solve.stage::<2>(&f(&combine(x, &ALPHA[2], &[&k1, &k2])), &mut rows_times_k);
+    let k4 = solve.stage::<3>(&f(&combine(x, &ALPHA[3], &[&k1, &k2, &k3])), &mut rows_times_k);
+    let k = [&k1, &k2, &k3, &k4];
     let end = combine(x, &WEIGHTS, &k);
     let error = combine(&[0.0; N], &ERROR_WEIGHTS, &k);
     let scaled = |i: usize| {
@@ -192,12 +202,40 @@ pub fn step<const N: usize, const ROWS: usize, E>(
     Trial { end, end_slope, end_applied, error, start: *x, start_slope: *slope, length_s: h }
 }
 
+/// The implicit part of the stages of a step.
+struct Solve<'a, const N: usize, const ROWS: usize> {
+    rows: &'a [StiffRow<N>; ROWS],
+    pivots: [f64; ROWS],
+    h: f64,
+}
+
+impl<const N: usize, const ROWS: usize> Solve<'_, N, ROWS> {
+    /// `k` of a stage whose right-hand side is `rate`; `rows_times_k` is known of the stages before. Always inlined: which
+    /// coefficients are zero, and where the rows lie, is known to the compiler.
+    #[inline(always)]
+    fn stage<const STAGE: usize>(&self, rate: &[f64; N], rows_times_k: &mut [[f64; 4]; ROWS]) -> [f64; N] {
+        let h = self.h;
+        let mut k = rate.map(|rate| h * rate);
+        // Of (1 - h gamma J) k = known only the stiff rows are not solved already.
+        for ((row, pivot), row_times_k) in self.rows.iter().zip(self.pivots).zip(rows_times_k) {
+            let earlier: f64 =
+                GAMMAS[STAGE].iter().zip(&*row_times_k).take(STAGE).map(|(gamma, row_k)| gamma * row_k).sum();
+            let known = k[row.state] + h * earlier;
+            let before = row.before(&k);
+            let own = pivot * (known + h * GAMMA * row.after(before, &k));
+            row_times_k[STAGE] = row.after(before + row.gradient[row.state] * own, &k);
+            k[row.state] = own;
+        }
+        k
+    }
+}
+
 /// `x + sum of weight[j] k[j]`.
-#[inline]
-fn combine<const N: usize>(x: &[f64; N], weights: &[f64], k: &[[f64; N]; 4]) -> [f64; N] {
+#[inline(always)]
+fn combine<const N: usize>(x: &[f64; N], weights: &[f64], k: &[&[f64; N]]) -> [f64; N] {
     let mut sum = *x;
-    for (weight, k) in weights.iter().zip(k) {
-        for (sum, k) in sum.iter_mut().zip(k) {
+    for (weight, k) in weights.iter().zip(k).filter(|(weight, _)| **weight != 0.0) {
+        for (sum, k) in sum.iter_mut().zip(*k) {
             *sum += weight * k;
         }
     }
@@ -233,8 +271,8 @@ mod tests {
 
     #[test]
     fn halving_the_step_shows_order_3_with_any_stiff_row() {
-        let right = StiffRow { state: 1, gradient: [-1.0, 0.0] };
-        let wrong = StiffRow { state: 0, gradient: [-2.0, 0.7] };
+        let right = StiffRow::new(1, [-1.0, 0.0]);
+        let wrong = StiffRow::new(0, [-2.0, 0.7]);
         for row in [StiffRow::none(), right, wrong] {
             let (coarse, fine) = (errors(80, row), errors(160, row));
             let order = |a: f64, b: f64| (a / b).log2();
@@ -250,15 +288,16 @@ mod tests {
         for (gradient, (support, expected)) in
             supports.into_iter().zip([(1..4, -980.0), (0..5, 30_001.0), (4..5, 4e4), (5..5, 0.0)])
         {
-            let row = StiffRow { state: 1, gradient };
-            assert_eq!((row.support(), row.times(&row.support(), &x)), (support, expected));
+            let row = StiffRow::new(1, gradient);
+            let whole = row.after(row.before(&x) + gradient[1] * x[1], &x);
+            assert_eq!((row.first..row.end, whole), (support, expected));
         }
     }
 
     #[test]
     fn a_stiff_row_is_stable_at_steps_far_beyond_its_time_constant() {
         let f = |x: &[f64; 2]| [-1e5 * (x[0] - x[1]), -x[1]];
-        let row = StiffRow { state: 0, gradient: [-1e5, 1e5] };
+        let row = StiffRow::new(0, [-1e5, 1e5]);
         let mut x = [3.0, 1.0];
         for _ in 0..100 {
             x = step(&f, &alone(f), &x, &f(&x), &[row], 0.02, &TOLERANCE).end;

@@ -156,14 +156,9 @@ fn taken(rows: Rows<'_>, sample_time_s: Option<f64>, offset_s: f64, mut read: im
 
 /// Speed by the teeth that passed until `now`, rad/s.
 fn tooth_speed(sensor: &SpeedSensor, teeth: &mut Teeth<'_>, now: f64, pitch: f64) -> f64 {
-    let passed = teeth.passed(now);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 1 to 100")]
-    let periods = sensor.periods as usize;
-    if passed <= periods {
-        return 0.0;
-    }
-    let (last, first) = (teeth.time_s(passed - 1), teeth.time_s(passed - 1 - periods));
-    if now - last > STANDSTILL_S { 0.0 } else { sensor.periods * pitch / (last - first) }
+    let Some(last) = teeth.last(now).filter(|last| now - last.time_s <= STANDSTILL_S) else { return 0.0 };
+    let first_s = teeth.time_s(last.number - sensor.periods);
+    first_s.map_or(0.0, |first_s| sensor.periods * pitch / (last.time_s - first_s))
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The continuous state of the plant.
 
+use std::ops::Range;
+
 /// Number of states of a car whose pistons have no stroke.
 pub const STATES: usize = 8;
 /// Number of states of a car whose pistons have one: the oil in both cylinders is added.
@@ -8,6 +10,10 @@ pub const STATES_WITH_STROKE: usize = 10;
 pub const WHEEL: usize = 4;
 /// Positions of the oil in the cylinders in the vector.
 pub const CYLINDERS: [usize; 2] = [8, 9];
+/// Positions of output speed, twist, wheel speed and vehicle speed in the vector: what the wheel's equation depends on.
+pub(crate) const AT_THE_WHEEL: Range<usize> = 2..6;
+/// Positions from the pressure of each valve to the oil in its cylinder.
+pub(crate) const VALVE_TO_CYLINDER: [Range<usize>; 2] = [6..9, 7..10];
 
 /// The continuous state. Pressures are gauge; twist is gearbox side minus wheel side.
 #[derive(Debug, Clone, Copy, PartialEq)]

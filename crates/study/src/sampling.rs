@@ -3,9 +3,7 @@
 use config::{ReadingErrors, Sensors, SpeedSensor, Vehicle};
 use observer::Phase;
 use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
-use trace::{Column, Trace, Values, signal};
-
-use crate::drive::true_phases;
+use trace::{Column, Trace, Values, Word, signal};
 
 /// The samples of a trace that lie at multiples of a period.
 pub fn sampled(trace: &Trace, period_s: f64) -> Trace {
@@ -97,10 +95,14 @@ fn replace(measured: &mut Trace, name: &str, values: Vec<f64>) {
 
 /// Begin and end of the shift in a recorded drive, s; those of the whole drive where it has none.
 fn shift_s(whole: &Trace) -> [f64; 2] {
-    let phases = true_phases(whole).unwrap_or_default();
-    let shifting = |&at: &usize| matches!(phases[at], Phase::TorquePhase | Phase::InertiaPhase);
-    let first = (0..phases.len()).find(shifting).or((!whole.is_empty()).then_some(0));
-    let last = (0..phases.len()).rev().find(shifting).or(whole.len().checked_sub(1));
+    let column = whole.columns.iter().find(|column| column.name == signal::TRUE_PHASE);
+    let words = column.map_or(&[][..], |column| match &column.values {
+        Values::Words(words) => words,
+        Values::Numbers(_) => &[],
+    });
+    let shifting = |word: &Word| [Phase::TorquePhase, Phase::InertiaPhase].iter().any(|phase| phase.name() == *word);
+    let first = words.iter().position(shifting).or((!whole.is_empty()).then_some(0));
+    let last = words.iter().rposition(shifting).or(whole.len().checked_sub(1));
     [first, last].map(|at| at.map_or(0.0, |at| whole.time_s[at]))
 }
 

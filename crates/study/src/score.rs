@@ -284,6 +284,12 @@ impl ShiftRating {
         }
     }
 
+    /// From when on the acceleration of a shift may count that is requested at this time, s.
+    pub fn felt_from_s(request_s: f64) -> f64 {
+        // The load transfer begins after the request; times are sums of periods and differ in their last bits.
+        request_s - FELT_BEFORE_S - 1e-6
+    }
+
     /// Whether the oncoming clutch has locked; from then on its torque counts no more.
     pub fn is_locked(&self) -> bool {
         self.lock_up_s.is_some()

@@ -395,9 +395,10 @@ impl CarModel {
                 && let Some(row) = rows.get_mut(1 + slot)
             {
                 let (own, valve) = clutch.volume_rate_slopes(x.volumes_m3[*slot], x.valves_pa[*slot]);
-                row.state = VOLUME + slot;
-                row.gradient[VOLUME + slot] = own;
-                row.gradient[PRESSURE + slot] = valve;
+                let mut gradient = [0.0; N];
+                gradient[VOLUME + slot] = own;
+                gradient[PRESSURE + slot] = valve;
+                *row = StiffRow::new(VOLUME + slot, gradient);
             }
         }
         rows
@@ -421,7 +422,7 @@ impl CarModel {
         for (entry, output) in gradient[MOTION..PRESSURE].iter_mut().zip(&self.train.ends[1]) {
             *entry = by_output * output;
         }
-        StiffRow { state: WHEEL, gradient }
+        StiffRow::new(WHEEL, gradient)
     }
 
     /// Kinetic energy of engine and gearbox, J.

@@ -11,7 +11,7 @@ pub(crate) struct Bar {
 /// Colours of the parts.
 const COLOURS: [&str; 2] = ["#0b6e99", "#c8a15a"];
 /// Sizes, in pixels.
-const LABELS: f64 = 300.0;
+const LABELS: f64 = 330.0;
 const WIDTH: f64 = 420.0;
 const STEP: f64 = 24.0;
 const TOP: f64 = 46.0;
@@ -34,15 +34,7 @@ pub(crate) fn svg(title: &str, parts: &[&str], bars: &[Bar]) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"Helvetica, Arial, sans-serif\" \
          font-size=\"13\" fill=\"#222222\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
     );
-    for (at, part) in parts.iter().enumerate() {
-        let x = LABELS + 150.0 * at as f64;
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{x}\" y=\"14\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{}\" y=\"26\">{part}</text>",
-            COLOURS[at % COLOURS.len()],
-            x + 20.0
-        );
-    }
+    legend(&mut svg, parts);
     let mut mark = 0.0;
     while mark <= most * (1.0 + 1e-9) {
         let x = LABELS + WIDTH * mark / most;
@@ -75,11 +67,31 @@ pub(crate) fn svg(title: &str, parts: &[&str], bars: &[Bar]) -> String {
             x += length;
         }
         let whole: f64 = bar.parts.iter().sum();
-        let _ = writeln!(svg, "<text x=\"{:.1}\" y=\"{}\">{}</text>", x + 6.0, y + 16.5, short(whole));
+        // White around it covers the lines of the axis.
+        let _ = writeln!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{}\" stroke=\"#ffffff\" stroke-width=\"4\" paint-order=\"stroke\">{}</text>",
+            x + 6.0,
+            y + 16.5,
+            short(whole)
+        );
     }
     let middle = LABELS + 0.5 * WIDTH;
     let _ = writeln!(svg, "<text x=\"{middle}\" y=\"{}\" text-anchor=\"middle\">{title}</text>", bottom + 40.0);
     svg + "</svg>\n"
+}
+
+/// The names of the parts with their colours.
+fn legend(svg: &mut String, parts: &[&str]) {
+    for (at, part) in parts.iter().enumerate() {
+        let x = LABELS + 150.0 * at as f64;
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{x}\" y=\"14\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{}\" y=\"26\">{part}</text>",
+            COLOURS[at % COLOURS.len()],
+            x + 20.0
+        );
+    }
 }
 
 /// A number with three digits, as far as it has decimals.

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p study --bench performance` prints the page; `cargo bench -p study --bench performance -- --write` writes it with
 //! its figures. That takes about five minutes. Times are the fastest of many runs. CVODE is a rival where `cc` has SUNDIALS, SciPy
-//! where `python3` has it. `-- --rivals` only checks that both are there and have the same equations.
+//! where `python3` has it. `-- --rivals` only checks that both are there and have the same equations, and fails where one is not.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark")]
 
@@ -18,7 +18,7 @@ mod simulation;
 mod stages;
 mod studies;
 
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use shared::root;
@@ -26,14 +26,14 @@ use shared::root;
 /// A figure of the page: its name in `docs/figures`, and the SVG.
 type Figure = (&'static str, String);
 
-fn main() {
+fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().collect();
     // Tests ask only whether it starts.
     if arguments.iter().any(|argument| argument == "--test") {
-        return;
+        return ExitCode::SUCCESS;
     }
     if arguments.iter().any(|argument| argument == "--rivals") {
-        return rivals::check();
+        return if rivals::check() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     }
     let (page, figures) = page();
     if arguments.iter().any(|argument| argument == "--write") {
@@ -43,6 +43,7 @@ fn main() {
         }
     }
     println!("{page}");
+    ExitCode::SUCCESS
 }
 
 /// The page with its figures.

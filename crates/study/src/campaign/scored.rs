@@ -38,9 +38,10 @@ pub fn scored_shift(
     let mut recording = Recording::of(names(car), spare);
     let mut rating = ShiftRating::new(&nominal.shift);
     let mut scored = 0;
+    let felt_from_s = ShiftRating::felt_from_s(experiment.shift.request_s);
     over_shift(car, nominal, experiment, before_s, |moment| {
         let phase = phase(moment.stage, moment.mode);
-        let sample = shift_sample(moment, phase, rating.is_locked());
+        let sample = shift_sample(moment, phase, moment.time_s >= felt_from_s, rating.is_locked());
         rating.push(&sample);
         recording.push(moment.time_s, phase, values(moment, &sample));
         if PHASES.contains(&phase) {
@@ -52,8 +53,9 @@ pub fn scored_shift(
     Ok(ScoredShift { trace, quality: rating.finish() })
 }
 
-/// What the shift is rated by; no torque of a clutch that is `locked` after its shift.
-fn shift_sample(moment: &Moment<'_>, phase: Phase, locked: bool) -> ShiftSample {
+/// What the shift is rated by: no acceleration where the shift is not `felt`, and no torque of a clutch that is `locked` after
+/// its shift.
+fn shift_sample(moment: &Moment<'_>, phase: Phase, felt: bool, locked: bool) -> ShiftSample {
     ShiftSample {
         time_s: moment.time_s,
         phase,
@@ -62,7 +64,7 @@ fn shift_sample(moment: &Moment<'_>, phase: Phase, locked: bool) -> ShiftSample 
         oncoming_slip_rad_s: moment.oncoming_slip_rad_s(),
         oncoming_n_m: if locked && phase == Phase::AfterShift { f64::NAN } else { moment.oncoming_n_m() },
         shaft_n_m: moment.shaft_n_m(),
-        vehicle_m_s2: moment.vehicle_m_s2(),
+        vehicle_m_s2: if felt { moment.vehicle_m_s2() } else { f64::NAN },
     }
 }
 

@@ -142,14 +142,19 @@ fn methods<'a>(powertrain: &'a Powertrain, mode: Mode) -> Vec<Method<'a>> {
 /// Error that a method may have at most to be compared in the table.
 const EQUAL_ERROR: f64 = 1e-4;
 
-/// Says which rivals that are other programs are there. Where one has other equations, this ends with an error.
-pub(crate) fn check() {
+/// Says which rivals that are other programs are there, and whether all are. Where one has other equations, this ends with an
+/// error.
+pub(crate) fn check() -> bool {
     let powertrain = Powertrain::new(vehicle());
     let mode = HybridIntegrator::new(&powertrain, 0.0, START, &INPUTS).unwrap().mode();
     let outside = Outside::new(&powertrain, mode, &problems());
-    let said = |there: bool| if there { "has our equations" } else { "is not there" };
-    println!("CVODE {}", said(outside.cvode().is_some()));
-    println!("SciPy's LSODA {}", said(outside.lsoda().is_some()));
+    let there = [outside.cvode().is_some(), outside.lsoda().is_some()];
+    let needs = ["`cc` with SUNDIALS (Debian: `libsundials-dev`)", "`python3` with `scipy`"];
+    for ((rival, needs), there) in ["CVODE", "SciPy's LSODA"].iter().zip(needs).zip(there) {
+        let said = if there { "has our equations".to_owned() } else { format!("is not there: it needs {needs}") };
+        println!("{rival} {said}");
+    }
+    there.iter().all(|there| *there)
 }
 
 /// The integrator beside its rivals: a table for the page, and the diagram.
