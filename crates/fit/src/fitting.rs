@@ -22,7 +22,7 @@ const FIRST_SHIFTS: usize = 5;
 
 /// On these; on all shifts, with all shapes free; and with those bound that the shifts do not ask for.
 const FIRST: Iterations = Iterations { scaled: 3, most: 5, end: End::COARSE };
-const FREE: Iterations = Iterations { scaled: 4, most: 14, end: End::COARSE };
+const FREE: Iterations = Iterations { scaled: 3, most: 14, end: End::COARSE };
 const BOUND: Iterations = Iterations { scaled: 1, most: 14, end: End::OF_FIT };
 
 /// A fitted vehicle.
@@ -112,7 +112,7 @@ pub fn fit(
         let held = if available.pressure { Vec::new() } else { hold(&mut priors) };
         (priors, held)
     };
-    let (free, held) = with_shapes(file.knots.maps());
+    let (free, all_held) = with_shapes(file.knots.maps());
     let problem = Problem { file: &file, shafts: &shafts, priors: &free };
     let first = fit_some(&problem, &shifts, progress)?;
     // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
@@ -122,15 +122,15 @@ pub fn fit(
     let at = Unknowns { shared: first.at.shared, own: models.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
     let solved = problem.solve(&models, at, first.weights, FREE, &mut say)?;
-    let freed = freed(&problem, &models, &solved, &held)?;
+    let freed = freed(&problem, &models, &solved, &all_held)?;
     let (mut priors, held) = with_shapes(&freed);
     let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
     let at = Unknowns { shared: taken_over(&free, &solved.at.shared, &priors), ..solved.at };
     let solved = problem.solve(&models, at, solved.weights, BOUND, &mut say)?;
-    let (mut precision, misfits) = found(vehicle, &problem, &models, &solved, &held)?;
+    let (mut precision, misfits) = found(vehicle, &problem, &models, &solved, &all_held)?;
     release(&mut priors, &held);
     misfits.iter().for_each(|misfit| precision.with_move(&misfit.moves, &priors));
-    let Solved { at, weights, is_converged } = solved;
+    let Solved { at, weights, is_converged, .. } = solved;
     let limited: Vec<usize> = (0..priors.len()).filter(|i| priors[*i].is_at_limit(at.shared[*i])).collect();
     if !limited.is_empty() {
         // The model is not that of the car, and nothing is known better than before.
@@ -157,8 +157,8 @@ pub fn fit(
 
 /// The maps whose shape stays free after a fit with all shapes free.
 fn freed(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved, held: &[Held]) -> Result<Vec<Map>, FitError> {
-    let lines = problem.linearised(models, &solved.at);
-    let normal = problem.normal(models, &lines, &solved.at, &solved.weights, 0.0)?;
+    // Near a minimum the derivatives of the last step are those of its end.
+    let normal = problem.normal(models, &solved.lines, &solved.at, &solved.weights, 0.0)?;
     // What is held of a shape is no reason to free it.
     let of_maps: Vec<Held> = held.iter().copied().filter(|held| !held.parameter.is_shape()).collect();
     let precision = intervals::precision(problem.priors, &normal, &of_maps).ok_or_else(singular)?;

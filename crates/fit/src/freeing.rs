@@ -37,11 +37,15 @@ pub(crate) fn differing(priors: &[Prior], unknowns: &[f64], stated: &DMatrix<f64
     }
     let (mut at, mut covariance) = (DVector::from_column_slice(unknowns), stated.clone());
     loop {
-        // Twice the logarithm of the ratio of probabilities: density of no change before over that after.
+        // Twice the logarithm of the ratio of probabilities: density of no change before over that after, which is Student's: a covariance
+        // that rests on the scatter of few shifts is uncertain itself.
+        let freedom = shifts as f64 - 1.0;
         let evidence = |(_, [i, j]): &(Map, [usize; 2])| {
             let (x, of) = chosen(&at, &covariance, [*i, *j]);
+            let Some(inverse) = of.try_inverse() else { return 0.0 };
             let before = (priors[*i].sd * priors[*j].sd).powi(2);
-            of.try_inverse().map_or(0.0, |inverse| x.dot(&(inverse * x)) - (before / of.determinant()).ln())
+            let size = x.dot(&(inverse * x));
+            (freedom + 2.0) * (size / freedom).ln_1p() - (before / of.determinant()).ln()
         };
         let least = free.iter().enumerate().min_by(|one, other| evidence(one.1).total_cmp(&evidence(other.1)));
         let Some((place, bound)) = least.filter(|(_, map)| evidence(map) <= 0.0) else { break };

@@ -284,37 +284,32 @@ mod tests {
     use super::*;
     use crate::ReadingAges;
 
-    /// With a torque that changes its sign where the slip does, the speeds are rough functions of the friction, and a fit gets stuck.
+    /// A torque that changes its sign with the slip would hold the slip near zero, step by step to and fro: such a motion is a rough function of
+    /// the parameters, and a fit gets stuck in it.
     #[test]
-    fn a_slip_that_would_turn_around_leaves_the_motion_smooth() {
-        let file = Car::of_file(&Vehicle::two_speed_at().unwrap(), ReadingAges::default());
-        let part = Part { begin_s: 0.0, first: 0, steps: 100 };
+    fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
+        let car = Car::of_file(&Vehicle::two_speed_at().unwrap(), ReadingAges::default());
+        let part = Part { begin_s: 0.0, first: 0, steps: 10 };
         let points = 2 * part.steps + 1;
         let inputs = Inputs {
             engine_rad_s: vec![200.0; points],
-            oncoming_pa: vec![0.35e6; points],
+            oncoming_pa: vec![0.7e6; points],
             offgoing_pa: Vec::new(),
             engine_n_m: Vec::new(),
         };
         let of = Circumstances { directions: [1.0, -1.0], ..Circumstances::default() };
         let output_rad_s = 60.0;
-        // A slip of 20 rad/s, which the torque takes away in the middle of the time.
         let start = State {
-            turbine_rad_s: file.shift.ratio_oncoming() * output_rad_s + 20.0,
+            turbine_rad_s: car.shift.ratio_oncoming() * output_rad_s + 20.0,
             output_rad_s,
-            vehicle_m_s: output_rad_s / file.driveline.final_ratio * file.road.wheel_radius_m,
+            vehicle_m_s: output_rad_s / car.driveline.final_ratio * car.road.wheel_radius_m,
             ..State::default()
         };
-        let end = |friction: f64| {
-            let mut car = file.clone();
-            car.clutch.friction = car.clutch.friction.scaled(friction);
-            let motion = Motion::run(&car, SegmentKind::Slipping, &of, &inputs, part, start);
-            motion.turbine.last().unwrap().0
-        };
-        let direction = drivetrain::clutch::direction(file.shift.oncoming_slip(start.turbine_rad_s, output_rad_s));
-        assert_eq!(direction, 1.0);
-        let slope = |h: f64| (end(1.0 + h) - end(1.0)) / h;
-        let (small, large) = (slope(1e-4), slope(1e-2));
-        assert!((small / large - 1.0).abs() < 0.05, "{small} {large}");
+        let motion = Motion::run(&car, SegmentKind::Slipping, &of, &inputs, part, start);
+        let slips: Vec<f64> = (motion.turbine.iter().zip(&motion.output))
+            .map(|(turbine, output)| car.shift.oncoming_slip(turbine.0, output.0))
+            .collect();
+        assert!(slips[0] > 0.0 && *slips.last().unwrap() < 0.0, "{slips:?}");
+        assert!(slips.windows(2).all(|pair| pair[1] < pair[0]), "{slips:?}");
     }
 }

@@ -67,6 +67,8 @@ pub(crate) struct Solved {
     pub(crate) weights: Weights,
     /// The last step was small; otherwise the iterations were used up.
     pub(crate) is_converged: bool,
+    /// Where the last step began.
+    pub(crate) lines: Vec<Linearised>,
 }
 
 /// Normal equations of the parameters with the shifts' own unknowns eliminated.
@@ -177,13 +179,14 @@ impl Problem<'_> {
         let mut is_converged = false;
         let mut damping = 1e-3;
         let mut residuals = self.residuals(shifts, &at);
+        let mut lines = Vec::new();
         for iteration in 0..iterations.most {
             progress(iteration);
             // The first residuals are those of the file, whose scale says nothing of the readings.
             if (1..=iterations.scaled).contains(&iteration) {
                 weights = weights.following(shifts, &residuals);
             }
-            let lines = self.linearised(shifts, &at);
+            lines = self.linearised(shifts, &at);
             let cost = self.cost(shifts, &at, &residuals, &weights);
             if !cost.is_finite() {
                 return Err(not_finite("the shifts"));
@@ -208,7 +211,7 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok(Solved { at, weights, is_converged })
+        Ok(Solved { at, weights, is_converged, lines })
     }
 
     /// The unknowns after a step, and its largest size in standard deviations after the fit.
