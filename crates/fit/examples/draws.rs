@@ -1,7 +1,7 @@
 //! Cars whose parameters are all off, fitted to 20 shifts behind sensors: prints the statistics of many of them.
 //!
 //! `FIT_CARS=200 cargo run --release -p fit --example draws`; `FIT_CASE=lossy` takes those of a case of `car_of`. The seeds of the
-//! cars are their numbers, from `FIT_FIRST` (0) on; `FIT_LOGS=torque` or `speeds` takes one kind of logs only.
+//! cars are their numbers, from `FIT_FIRST` (0) on; `FIT_SHIFTS=4` fits so many, `FIT_REPORT=1` prints each car's values; `FIT_LOGS=torque` or `speeds` takes one kind of logs only.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
 #[path = "../tests/common/mod.rs"]
@@ -13,9 +13,9 @@ use config::{Source, Vehicle};
 use common::{Logs, TestCar, TestShift};
 use fit::Map;
 
-/// Shifts that are fitted, and shifts that are held out.
-const SHIFTS: u64 = 20;
+/// Shifts that are held out: for the errors of the torque, and others with which the fit is checked as `wetclutch fit` does.
 const HELD_OUT: u64 = 8;
+const CHECKED: u64 = 4;
 
 /// What came of one car.
 struct Outcome {
@@ -28,9 +28,11 @@ struct Outcome {
     errors: Vec<(String, f64)>,
     cpu_s: f64,
     iterations: u32,
+    /// Why the given file would be kept.
+    reason_against: Option<String>,
 }
 
-/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`, `hysteresis`, `other converter`; all others are cars of the
+/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`, `hysteresis`, `other converter`, `right file`; all others are cars of the
 /// two-speed file.
 fn car_of(case: &str, seed: u64) -> TestCar {
     let mut car = match case {
@@ -49,6 +51,8 @@ fn car_of(case: &str, seed: u64) -> TestCar {
             TestCar::of(Vehicle::from_source(file).unwrap(), seed)
         }
         "other shape" => TestCar::drawn(seed).with_other_maps(),
+        "other converter" => TestCar::drawn(seed).with_other_converter(),
+        "right file" => TestCar::drawn(seed).with_the_right_file(),
         "hysteresis" => TestCar::drawn(seed).with_hysteresis(),
         _ => TestCar::drawn(seed),
     };
@@ -59,14 +63,6 @@ fn car_of(case: &str, seed: u64) -> TestCar {
             sensor.errors.missing_share = 0.03;
             sensor.errors.outliers = 1.0;
         }
-    }
-    if case == "other converter" {
-        // A capacity that is 15 % less around a speed ratio of 0.8: a shape that the fit cannot give.
-        let capacity = &mut car.car.converter.capacity_n_m_s2;
-        let values = capacity.axis().iter().zip(capacity.values());
-        let dented: Vec<f64> =
-            values.map(|(v, c)| c * (1.0 - 0.15 * (1.0 - (v - 0.8).abs() / 0.15).max(0.0))).collect();
-        *capacity = drivetrain::Table1::new(capacity.axis(), &dented).unwrap();
     }
     car
 }
@@ -80,7 +76,8 @@ fn cpu_s() -> f64 {
 fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let mut car = car_of(case, seed);
     let ages = if case == "sensors unknown" { fit::ReadingAges::default() } else { car.ages() };
-    let records: Vec<_> = (0..SHIFTS).map(|number| car.shift(number, logs).record).collect();
+    let shifts = std::env::var("FIT_SHIFTS").map_or(20, |text| text.parse().unwrap());
+    let records: Vec<_> = (0..shifts).map(|number| car.shift(number, logs).record).collect();
     let begin_s = cpu_s();
     let mut iterations = 0;
     let fit = fit::fit(&car.file, &records, ages, &mut |_| iterations += 1).unwrap();
@@ -90,31 +87,48 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let mean = |vehicle, at: usize| {
         (held_out.iter().map(|shift: &TestShift| shift.errors(vehicle)[at]).sum::<f64>() / HELD_OUT as f64).sqrt()
     };
+    let checked: Vec<_> = (200..200 + CHECKED).map(|number| car.shift(number, logs).record).collect();
+    let checked = fit.validate(&car.file, &fitted, &checked, ages).unwrap();
+    let reason_against = fit.reason_against(checked.as_ref());
     let errors = (fit.priors.iter().enumerate())
         .map(|(i, prior)| {
-            let error = fit.unknowns[i] - car.true_value(prior.parameter, &fit.freed);
+            let error = fit.unknowns[i] - car.true_value(prior.parameter);
             (prior.name.clone(), error / fit.precision.stated[(i, i)].sqrt())
         })
         .collect();
     let torque_n_m = [mean(&car.file, 0), mean(&fitted, 0)];
     let pressure_pa = [mean(&car.file, 1), mean(&fitted, 1)];
-    Outcome { fit, torque_n_m, pressure_pa, errors, cpu_s, iterations }
+    Outcome { fit, torque_n_m, pressure_pa, errors, cpu_s, iterations, reason_against }
 }
 
 fn print_car(seed: u64, o: &Outcome) {
     let worst = o.errors.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
     let freed: Vec<&str> = o.fit.freed.iter().map(|map| map.name()).collect();
     println!(
-        "car {seed}: torque N m {:.2} -> {:.2}, pressure kPa {:.2} -> {:.2}, {} iterations, CPU {:.2} s, worst {} {:+.1}, freed {freed:?}",
+        "car {seed}: torque N m {:.2} -> {:.2}, pressure kPa {:.2} -> {:.2}, change {:.2} open {:.2}, {} iterations, CPU {:.2} s, worst {} {:+.1}, freed {freed:?}, misfits {:?}, kept {:?}",
         o.torque_n_m[0],
         o.torque_n_m[1],
         1e-3 * o.pressure_pa[0],
         1e-3 * o.pressure_pa[1],
+        o.fit.torque_change.rms_n_m,
+        2.0 * o.fit.torque_change.open_n_m,
         o.iterations,
         o.cpu_s,
         worst.0,
-        worst.1
+        worst.1,
+        o.fit.misfits,
+        o.reason_against
     );
+    if std::env::var("FIT_REPORT").is_ok() {
+        for (i, (name, error)) in o.errors.iter().enumerate() {
+            let sd = o.fit.precision.stated[(i, i)].sqrt();
+            println!(
+                "  {name:34} {:+.4} sd {sd:.4} of {:.4}, off by {error:+.1}",
+                o.fit.unknowns[i], o.fit.priors[i].sd
+            );
+        }
+        println!("  channels {:?}", o.fit.channels);
+    }
 }
 
 /// Of each parameter how many truths lie in the stated 95 %, the mean and the spread of the errors in stated standard deviations.
@@ -168,8 +182,12 @@ fn print_all(outcomes: &[Outcome]) {
     );
     let count = |is: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| is(o)).count();
     println!(
-        "of {cars}: below the file {}, with a warning of a misfit {}, not converged {}, freed: {:?}",
+        "of {cars}: below the file {}, change within what is open {}, kept {}, worse and not kept {}, with a warning of a misfit {}, \
+         not converged {}, freed: {:?}",
         count(&|o| o.torque_n_m[1] < o.torque_n_m[0]),
+        count(&|o| o.fit.torque_change.rms_n_m <= 2.0 * o.fit.torque_change.open_n_m),
+        count(&|o| o.reason_against.is_some()),
+        count(&|o| o.reason_against.is_none() && o.torque_n_m[1] >= o.torque_n_m[0]),
         count(&|o| o.fit.statements().iter().any(|line| line.contains("warning: the"))),
         count(&|o| !o.fit.is_converged),
         Map::ALL.map(|map| (map.name(), count(&|o| o.fit.freed.contains(&map)))),

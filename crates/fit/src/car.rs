@@ -71,7 +71,10 @@ impl Car {
     pub(crate) fn of_file(vehicle: &Vehicle, ages: ReadingAges) -> Self {
         Self {
             converter: vehicle.converter,
-            clutch: vehicle.oncoming.clutch,
+            clutch: Clutch {
+                friction: Knots::with_points(&vehicle.oncoming.clutch.friction),
+                ..vehicle.oncoming.clutch
+            },
             offgoing: vehicle.offgoing.clutch,
             valve: vehicle.oncoming.valve,
             offgoing_valve: vehicle.offgoing.valve,
@@ -100,11 +103,6 @@ impl Car {
     /// The car whose parameters have these unknowns.
     pub(crate) fn with(&self, shafts: &[Shaft], priors: &[Prior], unknowns: &[f64]) -> Self {
         let mut car = self.clone();
-        // A freed friction has its points before any of its numbers counts: each is then the change at its point.
-        if priors.iter().any(|prior| matches!(prior.parameter, Parameter::Shape(Map::Friction, _))) {
-            car.clutch.friction = car.knots.friction(&car.clutch.friction, 0, 0.0);
-            car.clutch.friction = car.knots.friction(&car.clutch.friction, 1, 0.0);
-        }
         for (prior, x) in priors.iter().zip(unknowns) {
             car.set(prior.parameter, prior.parameter.value(*x), shafts);
         }
@@ -157,8 +155,11 @@ impl Car {
             Parameter::EngineTorqueDelay => self.engine_torque_delay_s = value,
             Parameter::PressureScale => self.pressure_scale = value,
             Parameter::Hysteresis => self.hysteresis_pa = value,
-            Parameter::Shape(Map::Friction, i) => {
-                self.clutch.friction = self.knots.friction(&self.clutch.friction, i, value);
+            Parameter::Shape(map @ Map::Friction, i) => {
+                self.clutch.friction = self.knots.changed(&self.clutch.friction, map, i, value);
+            }
+            Parameter::Shape(map @ Map::Capacity, i) => {
+                self.converter.capacity_n_m_s2 = self.knots.changed(&self.converter.capacity_n_m_s2, map, i, value);
             }
             Parameter::Shape(map, i) => self.valve = self.knots.valve(self.valve, map, i, value),
         }

@@ -42,13 +42,27 @@ impl Fit {
         })
     }
 
+    /// The given vehicle file, with the reason why its values are kept in a line at its head.
+    ///
+    /// # Errors
+    /// None that the given file does not have itself.
+    pub fn kept_file(&self, vehicle: &Vehicle, reason: &str) -> Result<Vehicle, FitError> {
+        let reason = reason.replace(char::is_control, " ");
+        let text = format!("{FITTED}all values are those of the given file. {reason}\n{}", vehicle.source.text);
+        let source = Source { path: vehicle.source.path.clone(), text };
+        Vehicle::from_source(source).map_err(|error| FitError::Work(error.to_string()))
+    }
+
     fn write(&self, text: &mut VehicleText, fitted: &Car, clutch: &str, parameter: Parameter) -> Result<(), FitError> {
         let Some(value) = self.value(parameter) else { return Ok(()) };
         let words = self.comment(parameter);
         let comment = Some(words.as_str());
         let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
         match parameter {
-            Parameter::Capacity => text.map(&keys(&["converter", "capacity_n_m_s2"]), |c| value * c, comment),
+            Parameter::Capacity => {
+                let capacity = &fitted.converter.capacity_n_m_s2;
+                text.set(&keys(&["converter", "capacity_n_m_s2"]), capacity.values(), comment)
+            }
             Parameter::TorqueRatio => {
                 text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
             }
@@ -150,11 +164,16 @@ impl Fit {
             if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
         };
         let given = &vehicle.error_bounds;
-        // The shape of the converter's maps is not fitted.
+        // The finer shape of the converter's maps is not fitted.
         let capacity = self.value(Parameter::Capacity).unwrap_or(1.0);
         let known = given.turbine_torque_share + (capacity - 1.0).abs();
-        let share = half(&[Parameter::Capacity, Parameter::TorqueRatio])
-            .clamp(CONVERTER_SHARE_MIN, known.max(CONVERTER_SHARE_MIN));
+        let converter = [
+            Parameter::Capacity,
+            Parameter::TorqueRatio,
+            Parameter::Shape(Map::Capacity, 0),
+            Parameter::Shape(Map::Capacity, 1),
+        ];
+        let share = half(&converter).clamp(CONVERTER_SHARE_MIN, known.max(CONVERTER_SHARE_MIN));
         set(budget("turbine_torque_share"), &[share])?;
         set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
         use Parameter as P;

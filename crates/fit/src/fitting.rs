@@ -4,13 +4,14 @@ use config::Vehicle;
 use nalgebra::DVector;
 
 use crate::car::Car;
-use crate::freeing::Freed;
+use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
 use crate::parameters::{self, Available, Prior};
 use crate::record::OutputClock;
 use crate::shape::Map;
 use crate::shift_model::ShiftModel;
-use crate::solver::{Problem, Solved, Unknowns};
+use crate::solver::{End, Iterations, Problem, Solved, Unknowns};
+use crate::torque_change::TorqueChange;
 use crate::weights::Weights;
 use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord, freeing};
 
@@ -19,9 +20,10 @@ pub const SHIFTS_MAX: usize = 30;
 /// So many shifts are fitted first; the others start from their result.
 const FIRST_SHIFTS: usize = 5;
 
-/// Iterations with new scales, and all of them, on these, and then on all shifts until near a minimum.
-const FIRST_ITERATIONS: (u32, u32) = (3, 5);
-const NEAR_ITERATIONS: (u32, u32) = (4, 5);
+/// On these; on all shifts, with all shapes free; and with those bound that the shifts do not ask for.
+const FIRST: Iterations = Iterations { scaled: 3, most: 5, end: End::COARSE };
+const FREE: Iterations = Iterations { scaled: 3, most: 14, end: End::COARSE };
+const BOUND: Iterations = Iterations { scaled: 1, most: 14, end: End::OF_FIT };
 
 /// A fitted vehicle.
 #[derive(Debug, Clone)]
@@ -44,8 +46,13 @@ pub struct Fit {
     pub is_converged: bool,
     /// Names of the parameters that ended where nothing beyond is held possible.
     pub at_limit: Vec<String>,
-    /// Maps that were given another shape than that of the file, because the residuals ask for it.
+    /// Maps that were given another shape than that of the file, because the shifts ask for it.
     pub freed: Vec<Map>,
+    /// Maps whose shape the shifts ask to be finer than the fit can give it, so much that it would move a value out of its interval: a misfit that
+    /// stays.
+    pub misfits: Vec<Map>,
+    /// What the fit changes of the torque of the oncoming clutch in these shifts.
+    pub torque_change: TorqueChange,
     pub(crate) weights: Weights,
 }
 
@@ -95,57 +102,118 @@ pub fn fit(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Fit, FitError> {
     check_vehicle(vehicle)?;
-    let (shifts, mut left_out) = sound(shifts);
-    if shifts.is_empty() {
-        let reasons = left_out.iter().map(|reason| format!("\n{reason}")).collect::<String>();
-        return Err(FitError::input(format!("there is no shift to fit{reasons}")));
-    }
+    let (shifts, mut left_out) = sound(shifts)?;
     let available = available(&shifts);
     let shafts = parameters::shafts(vehicle)?;
-    let mut priors = parameters::priors(vehicle, &shafts, available);
-    let untold_gain_sd = if available.pressure { None } else { hold_gain(&mut priors) };
     let file = Car::of_file(vehicle, ages);
-    let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
+    let bound = parameters::priors(vehicle, &shafts, available);
+    let with_shapes = |freed: &[Map]| {
+        let mut priors = parameters::with_shapes(vehicle, &file.knots, &bound, freed);
+        let held = if available.pressure { Vec::new() } else { hold(&mut priors) };
+        (priors, held)
+    };
+    let (free, all_held) = with_shapes(file.knots.maps());
+    let problem = Problem { file: &file, shafts: &shafts, priors: &free };
     let first = fit_some(&problem, &shifts, progress)?;
     // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
-    let clock = OutputClock { delay_s: file.with(&shafts, &priors, &first.at.shared).output_delay_s, ages };
+    let clock = OutputClock { delay_s: file.with(&shafts, &free, &first.at.shared).output_delay_s, ages };
     let (models, unusable) = usable(vehicle, &file, &shifts, clock)?;
     left_out.extend(unusable);
     let at = Unknowns { shared: first.at.shared, own: models.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
-    let near = problem.solve(&models, at, first.weights, NEAR_ITERATIONS, &mut say)?;
-    let before = near.at.shared.clone();
-    let Freed { priors: all, solved, lines, freed } =
-        freeing::with_freed_maps(vehicle, &file, &shafts, priors, &models, near, &mut say)?;
-    let Solved { mut at, weights, is_converged } = solved;
-    let problem = Problem { file: &file, shafts: &shafts, priors: &all };
-    let known = all.len() - 2 * (file.knots.maps().len() - freed.len());
-    // What is not freed is not known either: the intervals contain what it may be.
-    let mut precision = intervals::precision(&problem, &models, &lines, &at, &weights, untold_gain_sd)?.of_first(known);
-    let mut priors = all[..known].to_vec();
-    release_gain(&mut priors, untold_gain_sd);
-    at.shared.truncate(known);
-    if !freed.is_empty() {
-        precision.with_moved(&freeing::moved(&priors, &before, &at.shared), &priors);
+    let solved = problem.solve(&models, at, first.weights, FREE, &mut say)?;
+    let freed = freed(&problem, &models, &solved, &all_held)?;
+    let (mut priors, held) = with_shapes(&freed);
+    let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
+    let at = Unknowns { shared: taken_over(&free, &solved.at.shared, &priors), ..solved.at };
+    let solved = problem.solve(&models, at, solved.weights, BOUND, &mut say)?;
+    let (mut precision, misfits) = found(vehicle, &problem, &models, &solved, &all_held)?;
+    release(&mut priors, &held);
+    misfits.iter().for_each(|misfit| precision.with_move(&misfit.moves, &priors));
+    let Solved { at, weights, is_converged, .. } = solved;
+    let limited: Vec<usize> = (0..priors.len()).filter(|i| priors[*i].is_at_limit(at.shared[*i])).collect();
+    if !limited.is_empty() {
+        // The model is not that of the car, and nothing is known better than before.
+        precision.forget_all(&priors);
     }
-    let at_limit = priors.iter().zip(&at.shared).filter(|(prior, x)| prior.is_at_limit(**x));
+    let unknowns = scaled_by_priors(&priors, at.shared);
+    let torque_change = TorqueChange::of(&file, &shafts, &models, &priors, &unknowns, &precision);
     Ok(Fit {
-        at_limit: at_limit.map(|(prior, _)| prior.name.clone()).collect(),
-        unknowns: scaled_by_priors(&priors, at.shared),
+        at_limit: limited.into_iter().map(|i| priors[i].name.clone()).collect(),
         channels: channels(&models, &weights),
+        unknowns,
         precision,
         available,
         shifts: models.len(),
         unusable: left_out,
         is_converged,
         freed,
+        misfits: grave(&misfits),
+        torque_change,
         weights,
         priors,
     })
 }
 
+/// The maps whose shape stays free after a fit with all shapes free.
+fn freed(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved, held: &[Held]) -> Result<Vec<Map>, FitError> {
+    // Near a minimum the derivatives of the last step are those of its end.
+    let normal = problem.normal(models, &solved.lines, &solved.at, &solved.weights, 0.0)?;
+    // What is held of a shape is no reason to free it.
+    let of_maps: Vec<Held> = held.iter().copied().filter(|held| !held.parameter.is_shape()).collect();
+    let precision = intervals::precision(problem.priors, &normal, &of_maps).ok_or_else(singular)?;
+    Ok(freeing::differing(problem.priors, &solved.at.shared, &precision.stated, models.len()))
+}
+
+/// What is known of the unknowns at a minimum, and which shapes that are not fitted the shifts ask for. What is not fitted of the shapes is not known
+/// either: the intervals contain what it may be.
+fn found(
+    vehicle: &Vehicle,
+    problem: &Problem<'_>,
+    models: &[ShiftModel],
+    solved: &Solved,
+    held: &[Held],
+) -> Result<(Precision, Vec<Misfit>), FitError> {
+    let knots = &problem.file.knots;
+    let known = problem.priors.len();
+    let is_free = |map: Map| problem.priors.iter().any(|prior| prior.parameter == map.parameters()[0]);
+    let bound = knots.maps().iter().filter(|map| !is_free(**map)).map(|map| (*map, [0, 1]));
+    let finer = knots.maps().iter().flat_map(|map| map.finer().iter().map(move |pair| (*map, *pair)));
+    let pairs: Vec<(Map, [usize; 2])> = bound.chain(finer).collect();
+    let shapes = pairs.iter().flat_map(|(map, pair)| parameters::shape_priors(vehicle, knots, *map, pair));
+    let all: Vec<Prior> = problem.priors.iter().cloned().chain(shapes).collect();
+    let mut at = solved.at.clone();
+    at.shared.resize(all.len(), 0.0);
+    let problem = Problem { priors: &all, ..*problem };
+    let lines = problem.linearised(models, &at);
+    let normal = problem.normal(models, &lines, &at, &solved.weights, 0.0)?;
+    let precision = intervals::precision(&all, &normal, held).ok_or_else(singular)?.of_first(known);
+    let maps: Vec<Map> = pairs.into_iter().map(|(map, _)| map).collect();
+    let misfits = freeing::misfits(&all, &precision.stated, known, &maps, &normal, &at.shared).ok_or_else(singular)?;
+    Ok((precision, misfits))
+}
+
+/// The maps with a misfit that is worth a warning.
+fn grave(misfits: &[Misfit]) -> Vec<Map> {
+    let is_grave = |map: &Map| misfits.iter().any(|misfit| misfit.map == *map && misfit.is_grave);
+    Map::ALL.into_iter().filter(is_grave).collect()
+}
+
+fn singular() -> FitError {
+    FitError::Work("the information of the shifts is not finite".to_owned())
+}
+
+/// Unknowns of some parameters by those of others.
+fn taken_over(from: &[Prior], unknowns: &[f64], to: &[Prior]) -> Vec<f64> {
+    let of = |prior: &Prior| from.iter().position(|other| other.parameter == prior.parameter).map(|i| unknowns[i]);
+    to.iter().map(|prior| of(prior).unwrap_or(prior.mean)).collect()
+}
+
 /// The shifts without those that have readings which are no numbers, and without copies: a shift tells what it has to tell once.
-fn sound(shifts: &[ShiftRecord]) -> (Vec<ShiftRecord>, Vec<String>) {
+///
+/// # Errors
+/// None is left.
+fn sound(shifts: &[ShiftRecord]) -> Result<(Vec<ShiftRecord>, Vec<String>), FitError> {
     let (mut sound, mut left_out): (Vec<ShiftRecord>, Vec<String>) = (Vec::new(), Vec::new());
     for record in shifts {
         let first = sound.iter().find(|other| other.engine == record.engine && other.turbine == record.turbine);
@@ -157,7 +225,11 @@ fn sound(shifts: &[ShiftRecord]) -> (Vec<ShiftRecord>, Vec<String>) {
             sound.push(record.clone());
         }
     }
-    (sound, left_out)
+    if sound.is_empty() {
+        let reasons = left_out.iter().map(|reason| format!("\n{reason}")).collect::<String>();
+        return Err(FitError::input(format!("there is no shift to fit{reasons}")));
+    }
+    Ok((sound, left_out))
 }
 
 /// A fit of a few of the shifts, from the vehicle file.
@@ -171,7 +243,7 @@ fn fit_some(
     let shared: Vec<f64> = problem.priors.iter().map(|prior| prior.mean).collect();
     let start = Unknowns { shared, own: few.iter().map(ShiftModel::start).collect() };
     let mut say = |iteration| progress(Progress { shifts: few.len(), iteration });
-    problem.solve(&few, start, Weights::START, FIRST_ITERATIONS, &mut say)
+    problem.solve(&few, start, Weights::START, FIRST, &mut say)
 }
 
 /// The shifts that can be used now that the clock of the output speed is known, and why the others cannot.
@@ -201,21 +273,31 @@ fn channels(models: &[ShiftModel], weights: &Weights) -> Vec<(Channel, f64, f64)
     channels.map(|c| (c, weights.scale[c as usize], weights.gain[c as usize])).collect()
 }
 
-/// Without a pressure the gain of the valve cannot be told: what speeds seem to say of it rests on the shape of the lag over pressure. It
-/// stays near that of the file, and the intervals get back what was known of it, which is returned.
-fn hold_gain(priors: &mut [Prior]) -> Option<f64> {
-    /// Share of its standard deviation in which it is held; none would make it a constant, with which nothing is correlated.
-    const HELD_SHARE: f64 = 0.1;
-    let gain = priors.iter_mut().find(|prior| prior.parameter == Parameter::Gain)?;
-    let sd = gain.sd;
-    gain.sd *= HELD_SHARE;
-    Some(sd)
+/// A parameter that is held near the value of the file, with the standard deviation of what is known of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) parameter: Parameter,
+    pub(crate) sd: f64,
 }
 
-/// Gives the gain back what was known of it.
-fn release_gain(priors: &mut [Prior], sd: Option<f64>) {
-    for prior in priors.iter_mut().filter(|prior| prior.parameter == Parameter::Gain) {
-        prior.sd = sd.unwrap_or(prior.sd);
+/// Without a pressure the gain of the valve cannot be told, nor, apart from the spring, its gain at the kiss point: what speeds seem to say of
+/// them rests on the shape of the lag over pressure. They stay near those of the file, and the intervals get back what was known of them.
+fn hold(priors: &mut [Prior]) -> Vec<Held> {
+    /// Share of its standard deviation in which it is held; none would make it a constant, with which nothing is correlated.
+    const HELD_SHARE: f64 = 0.1;
+    let untold = [Parameter::Gain, Parameter::Shape(Map::Gain, 0)];
+    let hold = |prior: &mut Prior| {
+        let held = Held { parameter: prior.parameter, sd: prior.sd };
+        prior.sd *= HELD_SHARE;
+        held
+    };
+    priors.iter_mut().filter(|prior| untold.contains(&prior.parameter)).map(hold).collect()
+}
+
+/// Gives them back what was known of them.
+fn release(priors: &mut [Prior], held: &[Held]) {
+    for held in held {
+        priors.iter_mut().filter(|prior| prior.parameter == held.parameter).for_each(|prior| prior.sd = held.sd);
     }
 }
 

@@ -5,23 +5,26 @@
 //! ```
 //!
 //! `m` is the mean of the `n` pairs and `S` their covariance. Where normal pairs have no mean, `F(2, n - 2)` exceeds
-//! `((n - 2)/2) (level^(-2/(n - 2)) - 1)` with probability `level`: of two and `n - 2` degrees of freedom it has a closed form.
+//! `((n - 2)/2) (level^(-2/(n - 2)) - 1)` with probability `level`: of two and `n - 2` degrees of freedom it has a closed form. So T2
+//! exceeds `(n - 1) (level^(-2/(n - 2)) - 1)`.
 
 use nalgebra::{Matrix2, Vector2};
 
-/// Hotelling's F of pairs whose mean should be zero over its limit at this level; zero where they are too few to tell.
+/// Fewer pairs tell nothing.
+const FEWEST: usize = 4;
+
+/// Hotelling's T2 of pairs whose mean should be zero over its limit at this level; zero where they are too few to tell.
 pub(crate) fn excess(pairs: &[Vector2<f64>], level: f64) -> f64 {
-    const FEWEST: usize = 4;
     if pairs.len() < FEWEST {
         return 0.0;
     }
     let count = pairs.len() as f64;
+    let limit = (count - 1.0) * (level.powf(-2.0 / (count - 2.0)) - 1.0);
     let mean = pairs.iter().sum::<Vector2<f64>>() / count;
     let scatter =
         pairs.iter().map(|pair| (pair - mean) * (pair - mean).transpose()).sum::<Matrix2<f64>>() / (count - 1.0);
     let Some(inverse) = scatter.try_inverse() else { return 0.0 };
-    let f = (count - 2.0) / (2.0 * (count - 1.0)) * count * mean.dot(&(inverse * mean));
-    let excess = f / (0.5 * (count - 2.0) * (level.powf(-2.0 / (count - 2.0)) - 1.0));
+    let excess = count * mean.dot(&(inverse * mean)) / limit;
     if excess.is_finite() { excess } else { 0.0 }
 }
 

@@ -1,28 +1,24 @@
 //! How sure the parameters of a fit are.
 //!
-//! The plain standard errors hold for independent errors of a perfect model. Stated is the larger of two that ask for less:
-//! "auto", the information divided by the correlation of the residuals in sequence, and "cluster", the spread of the shifts' own
-//! gradients. What the model leaves out (tyres with inertia, noise of the command) is in neither: a factor and a floor
-//! stand for it.
+//! Stated is the larger of two variances: "auto", where the information is divided by the correlation of the residuals in sequence,
+//! and "cluster", the spread of the shifts' own gradients. What the model leaves out (tyres with inertia, noise of the command) is in
+//! neither: a factor and a floor stand for it.
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::Parameter;
+use crate::fitting::Held;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, Prior};
 use crate::shape::Map;
-use crate::shift_model::{Linearised, ShiftModel};
-use crate::solver::{NO_INFLATION, Problem, Unknowns};
-use crate::weights::{Weights, correlation_factor};
-use crate::{Channel, FitError, Parameter};
-
-/// Factor on the larger of both standard deviations, from fits of cars whose parameters are known.
-const FACTOR: f64 = 1.4;
+use crate::solver::Normal;
+use crate::weights::FACTOR;
 
 /// What is known of the parameters after a fit.
 #[derive(Debug, Clone)]
 pub struct Precision {
     /// Covariance of the unknowns as it is stated.
     pub stated: DMatrix<f64>,
-    /// Covariance with the correlation of the residuals, without factor and floor.
+    /// The larger of the two without the floor is at least this one, with the correlation of the residuals.
     pub auto: DMatrix<f64>,
 }
 
@@ -33,11 +29,10 @@ impl Precision {
         Self { stated: first(&self.stated), auto: first(&self.auto) }
     }
 
-    /// Widens what is known by how far the unknowns moved as the maps were given a freer shape. A shape that is freer still is taken to move
-    /// them by half of that, the next by a quarter and so on: no further than as much again, which is two standard deviations \[chosen\].
-    pub(crate) fn with_moved(&mut self, moved: &DVector<f64>, priors: &[Prior]) {
-        let outer = 0.25 * moved * moved.transpose();
-        self.auto += &outer / (FACTOR * FACTOR);
+    /// Widens what is known by a move of the unknowns that the shifts ask for and the fit does not make, as one standard deviation.
+    pub(crate) fn with_move(&mut self, moved: &DVector<f64>, priors: &[Prior]) {
+        let outer = moved * moved.transpose();
+        self.auto += &outer;
         self.stated += outer;
         // No fit knows less than was known before.
         for (i, prior) in priors.iter().enumerate() {
@@ -47,11 +42,18 @@ impl Precision {
         }
     }
 
+    /// Makes it what was known before.
+    pub(crate) fn forget_all(&mut self, priors: &[Prior]) {
+        let variances = DVector::from_iterator(priors.len(), priors.iter().map(|prior| prior.sd * prior.sd));
+        self.stated = DMatrix::from_diagonal(&variances);
+        self.auto = self.stated.clone();
+    }
+
     /// Standard deviation of a combination of unknowns as it is stated.
     pub(crate) fn combination_sd(&self, along: &DVector<f64>) -> f64 {
         /// Least one: what the model leaves out does not shrink with more shifts.
         const FLOOR: f64 = 0.005;
-        (FACTOR * along.dot(&(&self.auto * along)).max(0.0).sqrt()).hypot(FLOOR)
+        along.dot(&(&self.auto * along)).max(0.0).sqrt().hypot(FLOOR)
     }
 }
 
@@ -68,65 +70,42 @@ pub(crate) fn floor(parameter: Parameter) -> f64 {
     }
 }
 
-/// The precision at the minimum.
-pub(crate) fn precision(
-    problem: &Problem<'_>,
-    shifts: &[ShiftModel],
-    lines: &[Linearised],
-    at: &Unknowns,
-    weights: &Weights,
-    untold_gain_sd: Option<f64>,
-) -> Result<Precision, FitError> {
-    let plain = problem.normal(shifts, lines, at, weights, &NO_INFLATION, 0.0)?;
-    let inflation = inflation(shifts, lines.iter().map(|line| &line.residuals), weights);
-    let auto = problem.normal(shifts, lines, at, weights, &inflation, 0.0)?;
-    let count = problem.priors.len();
-    let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, problem.priors.iter().map(|p| p.sd.powi(-2))));
-    let inverse = |matrix: DMatrix<f64>| {
-        let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
-        Ok::<_, FitError>(matrix.cholesky().ok_or_else(singular)?.inverse())
-    };
-    let plain_covariance = inverse(&plain.information + &prior)?;
-    let auto_covariance = inverse(&auto.information + &prior)?;
-    let cluster = cluster(&plain_covariance, &plain.scores, &prior);
-    let mut stated = auto_covariance.clone();
+/// The precision at a minimum with these normal equations.
+pub(crate) fn precision(priors: &[Prior], normal: &Normal, held: &[Held]) -> Option<Precision> {
+    let count = priors.len();
+    let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, priors.iter().map(|p| p.sd.powi(-2))));
+    let mut auto = (&normal.information + &prior).cholesky()?.inverse();
+    let cluster = cluster(&auto, &normal.scores, &prior);
+    let mut stated = auto.clone();
     // Each parameter takes the larger variance; the correlations are those of "auto".
-    let scale: Vec<f64> = (0..count)
-        .map(|j| {
-            let auto = auto_covariance[(j, j)];
-            let found = FACTOR * auto.max(cluster[(j, j)]).sqrt();
-            let prior = &problem.priors[j];
-            // No fit knows less than was known before.
-            found.hypot(floor(prior.parameter)).min(prior.sd) / auto.sqrt()
-        })
-        .collect();
-    for i in 0..count {
-        for j in 0..count {
-            stated[(i, j)] *= scale[i] * scale[j];
-        }
+    for (i, prior) in priors.iter().enumerate() {
+        let found = auto[(i, i)].max(cluster[(i, i)]).sqrt().hypot(floor(prior.parameter));
+        // No fit knows less than was known before.
+        let scale = found.min(prior.sd) / auto[(i, i)].sqrt();
+        stated.row_mut(i).scale_mut(scale);
+        stated.column_mut(i).scale_mut(scale);
     }
-    let mut auto = auto_covariance;
     for covariance in [&mut auto, &mut stated] {
-        for (weights, variance) in untold(problem.priors, untold_gain_sd) {
+        for (weights, variance) in untold(priors, held) {
             forget(covariance, &weights, variance);
         }
     }
-    Ok(Precision { stated, auto })
+    Some(Precision { stated, auto })
 }
 
 /// Combinations of the unknowns of which data may say nothing, with the variance that the priors leave them.
 ///
 /// The factor of all torques: what speeds seem to say of it comes from rolling resistance, drag and the inertia of
-/// the wheels, which the file takes as exact. The gain of the valve, where no pressure is measured: what speeds seem to say
-/// of it comes from the shape of its lag over pressure.
-fn untold(priors: &[Prior], untold_gain_sd: Option<f64>) -> Vec<(DVector<f64>, f64)> {
+/// the wheels, which the file takes as exact. And what is held near the file.
+fn untold(priors: &[Prior], held: &[Held]) -> Vec<(DVector<f64>, f64)> {
     let (scale, precision) = torque_scale(priors);
     let mut combinations = vec![(scale, precision.recip())];
-    let gain = priors.iter().position(|prior| prior.parameter == Parameter::Gain);
-    if let Some((gain, sd)) = gain.zip(untold_gain_sd) {
-        let mut only = DVector::zeros(priors.len());
-        only[gain] = 1.0;
-        combinations.push((only, sd * sd));
+    for held in held {
+        if let Some(place) = priors.iter().position(|prior| prior.parameter == held.parameter) {
+            let mut only = DVector::zeros(priors.len());
+            only[place] = 1.0;
+            combinations.push((only, held.sd * held.sd));
+        }
     }
     combinations
 }
@@ -156,33 +135,9 @@ fn cluster(covariance: &DMatrix<f64>, scores: &[DVector<f64>], prior: &DMatrix<f
     }
     let mut middle = prior.clone();
     for score in scores {
-        middle += score * score.transpose() * (count / (count - 1.0));
+        middle += score * score.transpose() * (FACTOR * FACTOR * count / (count - 1.0));
     }
     covariance * middle * covariance
-}
-
-/// Correlation factor of each channel, at least 1.
-fn inflation<'a>(
-    shifts: &[ShiftModel],
-    residuals: impl Iterator<Item = &'a DVector<f64>>,
-    weights: &Weights,
-) -> [f64; Channel::ALL.len()] {
-    let errors: Vec<DVector<f64>> = (shifts.iter().zip(residuals))
-        .map(|(shift, rows)| {
-            let mut errors = rows.clone();
-            weights.errors(&shift.blocks, errors.as_mut_slice());
-            errors
-        })
-        .collect();
-    Channel::ALL.map(|channel| {
-        let blocks: Vec<&[f64]> = (shifts.iter().zip(&errors))
-            .flat_map(|(shift, errors)| {
-                let of_channel = shift.blocks.iter().filter(|block| block.channel == channel);
-                of_channel.map(|block| &errors.as_slice()[block.rows.clone()])
-            })
-            .collect();
-        if blocks.is_empty() { 1.0 } else { correlation_factor(&blocks).max(1.0) }
-    })
 }
 
 #[cfg(test)]

@@ -31,6 +31,8 @@ pub(crate) struct Circumstances {
     pub(crate) load_n: f64,
     /// Engine torque over its signal, less 1.
     pub(crate) engine_torque_share: f64,
+    /// Signs of the slips of the oncoming and the offgoing clutch, which they keep while the clutch slips.
+    pub(crate) directions: [f64; 2],
 }
 
 /// State of the powertrain.
@@ -164,6 +166,7 @@ struct Field<'a> {
     moved_kg: f64,
     load_n: f64,
     engine_torque_factor: f64,
+    directions: [f64; 2],
 }
 
 impl<'a> Field<'a> {
@@ -178,6 +181,7 @@ impl<'a> Field<'a> {
             moved_kg: mass_kg + car.driveline.wheel_inertia_kg_m2 / (radius * radius),
             load_n: of.load_n + car.road.grade_force() * (1.0 + of.mass_share),
             engine_torque_factor: car.engine_torque_scale.recip() * (1.0 + of.engine_torque_share),
+            directions: of.directions,
         }
     }
 
@@ -214,15 +218,19 @@ impl<'a> Field<'a> {
         (rates, wheel_rad_s)
     }
 
+    /// A slip that would turn around keeps its direction and has the friction at rest: in a segment in which the clutch slips, a torque that
+    /// changed its sign would have no derivative.
     fn oncoming(&self, state: &State, at: usize) -> f64 {
-        let slip = self.car.shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s);
-        self.car.oncoming_torque(self.inputs.oncoming_pa[at], slip)
+        let direction = self.directions[0];
+        let slip = direction * self.car.shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s);
+        direction * self.car.clutch.torque_capacity(self.inputs.oncoming_pa[at], slip.max(0.0))
     }
 
     fn offgoing(&self, state: &State, at: usize) -> f64 {
         let Some(pressure_pa) = self.inputs.offgoing_pa.get(at) else { return 0.0 };
-        let slip = self.car.shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s);
-        drivetrain::clutch::direction(slip) * self.car.offgoing.torque_capacity(*pressure_pa, slip)
+        let direction = self.directions[1];
+        let slip = direction * self.car.shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s);
+        direction * self.car.offgoing.torque_capacity(*pressure_pa, slip.max(0.0))
     }
 
     /// Shafts, wheels and car at a state.
@@ -267,4 +275,41 @@ struct Wheels {
 fn inverse_tanh(x: f64) -> f64 {
     let xx = x * x;
     if xx < 0.06 { x * (1.0 + xx * (1.0 / 3.0 + xx * (0.2 + xx / 7.0))) } else { x.clamp(-0.999, 0.999).atanh() }
+}
+
+#[cfg(test)]
+mod tests {
+    use config::Vehicle;
+
+    use super::*;
+    use crate::ReadingAges;
+
+    /// A torque that changes its sign with the slip would hold the slip near zero, step by step to and fro: such a motion is a rough function of
+    /// the parameters, and a fit gets stuck in it.
+    #[test]
+    fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
+        let car = Car::of_file(&Vehicle::two_speed_at().unwrap(), ReadingAges::default());
+        let part = Part { begin_s: 0.0, first: 0, steps: 10 };
+        let points = 2 * part.steps + 1;
+        let inputs = Inputs {
+            engine_rad_s: vec![200.0; points],
+            oncoming_pa: vec![0.7e6; points],
+            offgoing_pa: Vec::new(),
+            engine_n_m: Vec::new(),
+        };
+        let of = Circumstances { directions: [1.0, -1.0], ..Circumstances::default() };
+        let output_rad_s = 60.0;
+        let start = State {
+            turbine_rad_s: car.shift.ratio_oncoming() * output_rad_s + 20.0,
+            output_rad_s,
+            vehicle_m_s: output_rad_s / car.driveline.final_ratio * car.road.wheel_radius_m,
+            ..State::default()
+        };
+        let motion = Motion::run(&car, SegmentKind::Slipping, &of, &inputs, part, start);
+        let slips: Vec<f64> = (motion.turbine.iter().zip(&motion.output))
+            .map(|(turbine, output)| car.shift.oncoming_slip(turbine.0, output.0))
+            .collect();
+        assert!(slips[0] > 0.0 && *slips.last().unwrap() < 0.0, "{slips:?}");
+        assert!(slips.windows(2).all(|pair| pair[1] < pair[0]), "{slips:?}");
+    }
 }

@@ -66,7 +66,7 @@ pub enum Parameter {
     PressureScale,
     /// Half-width of the hysteresis of the oncoming clutch's valve, Pa.
     Hysteresis,
-    /// Relative change of a freed map at one of two points of its own.
+    /// Relative change of a map at a point of its own: the first two where the map is freed.
     Shape(Map, usize),
 }
 
@@ -258,23 +258,37 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         .collect()
 }
 
-/// The two numbers of a freed shape, with the range of the map in the error budget as what is known of them: any map within it is
-/// possible. A friction point between two others is half as free as they are against each other, as in a random walk.
-pub(crate) fn shape_priors(vehicle: &Vehicle, knots: &Knots, map: Map) -> [Prior; 2] {
-    let sd = match map {
-        Map::Friction => 0.5 * between(vehicle.error_bounds.friction_factor),
-        Map::Lag => between(vehicle.error_bounds.valve_lag_factor),
-        Map::Gain => between(vehicle.error_bounds.valve_gain_factor),
+/// Numbers of the shape of a map. The map is taken as a random walk: its change along the map has the range of the map in the error budget,
+/// and a point between others is as free as they leave it.
+pub(crate) fn shape_priors(vehicle: &Vehicle, knots: &Knots, map: Map, numbers: &[usize]) -> Vec<Prior> {
+    let budget = &vehicle.error_bounds;
+    let whole = match map {
+        Map::Friction => between(budget.friction_factor),
+        Map::Lag => between(budget.valve_lag_factor),
+        Map::Gain => between(budget.valve_gain_factor),
+        Map::Capacity => uniform(budget.turbine_torque_share),
     };
-    [0, 1].map(|i| Prior { parameter: Parameter::Shape(map, i), name: knots.name(map, i), mean: 0.0, sd })
+    let prior = |i: &usize| Prior {
+        parameter: Parameter::Shape(map, *i),
+        name: knots.name(map, *i),
+        mean: 0.0,
+        sd: (whole * knots.sd_share(map, *i)).max(1e-4),
+    };
+    numbers.iter().map(prior).collect()
 }
 
-/// What is known of the friction's change at rest and above the middle once its shape is free: the whole range of the error budget.
-pub(crate) fn free_friction(vehicle: &Vehicle, priors: &mut [Prior]) {
-    let sd = between(vehicle.error_bounds.friction_factor);
-    for prior in priors {
-        if matches!(prior.parameter, Parameter::FrictionAtRest | Parameter::FrictionSlope) {
-            prior.sd = prior.sd.max(sd);
+/// The parameters of a fit that frees the shapes of these maps. Of a freed friction the changes at rest and above the middle
+/// have the whole range of the error budget.
+pub(crate) fn with_shapes(vehicle: &Vehicle, knots: &Knots, bound: &[Prior], freed: &[Map]) -> Vec<Prior> {
+    let mut priors = bound.to_vec();
+    if freed.contains(&Map::Friction) {
+        let sd = between(vehicle.error_bounds.friction_factor);
+        for prior in &mut priors {
+            if matches!(prior.parameter, Parameter::FrictionAtRest | Parameter::FrictionSlope) {
+                prior.sd = prior.sd.max(sd);
+            }
         }
     }
+    priors.extend(freed.iter().flat_map(|map| shape_priors(vehicle, knots, *map, &[0, 1])));
+    priors
 }

@@ -72,7 +72,7 @@ impl Fit {
         if !self.freed.is_empty() {
             let names: Vec<&str> = self.freed.iter().map(|map| map.name()).collect();
             lines.push(format!(
-                "freed, because the shifts ask for another shape than the file's: {} (Hotelling's T2 over the shifts, level {LEVEL})",
+                "freed, because the shifts ask for another shape than the file's: {} (level {LEVEL})",
                 names.join(", ")
             ));
         }
@@ -82,6 +82,7 @@ impl Fit {
                 "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned(),
             );
         }
+        lines.push(self.torque_said());
         if !self.is_converged {
             lines.push(
                 "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
@@ -122,6 +123,20 @@ impl Fit {
         })
     }
 
+    /// How much the clutch torque changes, and whether the logs show that this is better.
+    fn torque_said(&self) -> String {
+        let change = &self.torque_change;
+        let open = SIDES * change.open_n_m;
+        let mut text = format!(
+            "clutch torque in these shifts at the same commands: changed by {:.1} N m RMS, of which +- {open:.1} N m is open",
+            change.rms_n_m
+        );
+        if change.rms_n_m <= open {
+            text += ". These logs are too few, or tell too little, to show that the fitted file is better than the given one";
+        }
+        text
+    }
+
     fn misfits(&self) -> Vec<String> {
         let wrong = |(channel, _, gain): &(Channel, f64, f64)| *channel == Channel::Turbine && *gain > MISFIT_GAIN;
         let warn = |_: &(Channel, f64, f64)| {
@@ -136,7 +151,16 @@ impl Fit {
                 self.at_limit.join(", ")
             )
         });
-        self.channels.iter().filter(|channel| wrong(channel)).map(warn).chain(limited).collect()
+        let finer = (!self.misfits.is_empty()).then(|| {
+            let names: Vec<&str> = self.misfits.iter().map(|map| map.name()).collect();
+            format!(
+                "warning: the shifts do not follow the fitted model: they ask for another shape of {} than the fit gives it (Hotelling's T2 \
+                 over the shifts, level {LEVEL}), or for what no map of the vehicle file has. The intervals contain how far that moves the \
+                 values",
+                names.join(", ")
+            )
+        });
+        self.channels.iter().filter(|channel| wrong(channel)).map(warn).chain(finer).chain(limited).collect()
     }
 
     /// Delays and scale of channels, which belong into a channel map.

@@ -1,11 +1,13 @@
-//! Maps of the oncoming clutch whose shape a fit can free, and where it changes them.
+//! Maps whose shape a fit can free, and where it changes them.
+
+use std::ops::Div;
 
 use config::Vehicle;
 use drivetrain::{ClutchValve, Table1};
 
 use crate::Parameter;
 
-/// A map of the oncoming clutch whose shape a fit frees where the residuals ask for it.
+/// A map whose shape a fit frees where the shifts ask for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Map {
     /// Friction over slip.
@@ -14,11 +16,13 @@ pub enum Map {
     Lag,
     /// Gain of the valve over its command.
     Gain,
+    /// Capacity of the converter over its speed ratio.
+    Capacity,
 }
 
 impl Map {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Friction, Self::Lag, Self::Gain];
+    pub const ALL: [Self; 4] = [Self::Friction, Self::Lag, Self::Gain, Self::Capacity];
 
     /// A name for the report.
     pub fn name(self) -> &'static str {
@@ -26,6 +30,7 @@ impl Map {
             Self::Friction => "friction over slip",
             Self::Lag => "valve lag over pressure",
             Self::Gain => "valve gain over command",
+            Self::Capacity => "converter capacity over speed ratio",
         }
     }
 
@@ -33,13 +38,72 @@ impl Map {
     pub fn parameters(self) -> [Parameter; 2] {
         [Parameter::Shape(self, 0), Parameter::Shape(self, 1)]
     }
+
+    /// Pairs of numbers of a finer shape than a fit gives it.
+    pub(crate) fn finer(self) -> &'static [[usize; 2]] {
+        match self {
+            Self::Capacity => &[[2, 3]],
+            _ => &[[2, 3], [4, 5]],
+        }
+    }
 }
 
-/// Slips at which a freed friction has a point of its own besides 0, 100 and 300 rad/s, rad/s; each change falls linearly
-/// to none at the points beside it.
-const FRICTION_POINTS_RAD_S: [[f64; 3]; 2] = [[0.0, 30.0, 100.0], [100.0, 200.0, 300.0]];
+/// A relative change of a map: whole at a point, and falling linearly to none at the points beside it. Without a point on one side the whole
+/// change lasts to the end of the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bend {
+    from: f64,
+    peak: f64,
+    to: f64,
+    /// Distance over which the map changes by what is known of it before, see [`Self::sd_share`].
+    span: f64,
+}
 
-/// Where the freed shapes of the valve's maps change: below the first and beyond the last point the whole change, none at the middle.
+impl Bend {
+    const fn between([from, peak, to]: [f64; 3], span: f64) -> Self {
+        Self { from, peak, to, span }
+    }
+
+    fn at(self, x: f64) -> f64 {
+        let (end, other) = if x < self.peak { (self.from, x - self.from) } else { (self.to, self.to - x) };
+        if end.is_finite() { (other / (end - self.peak).abs()).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// Standard deviation of a random walk at this point when its values at the points beside it are known, over that of its change along
+    /// the span.
+    fn sd_share(self) -> f64 {
+        ((self.peak - self.from).recip() + (self.to - self.peak).recip()).recip().max(0.0).div(self.span).sqrt()
+    }
+}
+
+/// Slips between which the friction changes, rad/s: those of the freed shape, and those of a finer one.
+const FRICTION: [Bend; 6] = [
+    Bend::between([0.0, 30.0, 100.0], 100.0),
+    Bend::between([100.0, 200.0, 300.0], 200.0),
+    Bend::between([0.0, 10.0, 30.0], 100.0),
+    Bend::between([30.0, 60.0, 100.0], 100.0),
+    Bend::between([100.0, 150.0, 200.0], 200.0),
+    Bend::between([200.0, 250.0, 300.0], 200.0),
+];
+
+/// Speed ratios that power-on upshifts pass: as they end, in the middle, and as they begin \[chosen\].
+const SPEED_RATIOS: [f64; 3] = [0.5, 0.75, 0.95];
+
+/// Of a map that a factor scales at its middle point: the changes at the other two and beyond, those between the points, and those beyond.
+fn bend_around([low, middle, high]: [f64; 3], number: usize) -> Bend {
+    let (below, above) = (middle - low, high - middle);
+    let between = |from: f64, to: f64| [from, 0.5 * (from + to), to];
+    match number {
+        0 => Bend::between([f64::NEG_INFINITY, low, middle], below),
+        1 => Bend::between([middle, high, f64::INFINITY], above),
+        2 => Bend::between(between(low, middle), below),
+        3 => Bend::between(between(middle, high), above),
+        4 => Bend::between([f64::NEG_INFINITY, 0.0, low], below),
+        _ => Bend::between([high, high + above, f64::INFINITY], above),
+    }
+}
+
+/// Where the shapes of the maps change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Knots {
     pressure_pa: [f64; 3],
@@ -59,48 +123,60 @@ impl Knots {
 
     /// The maps that can be freed: a valve that is driven by its duty cycle has no lag and gain maps.
     pub(crate) fn maps(&self) -> &'static [Map] {
-        if self.command.is_some() { &Map::ALL } else { &Map::ALL[..1] }
+        if self.command.is_some() { &Map::ALL } else { &[Map::Friction, Map::Capacity] }
+    }
+
+    fn bend(&self, map: Map, number: usize) -> Bend {
+        match map {
+            Map::Friction => FRICTION[number.min(FRICTION.len() - 1)],
+            Map::Lag => bend_around(self.pressure_pa, number),
+            Map::Gain => bend_around(self.command.unwrap_or(self.pressure_pa), number),
+            Map::Capacity => bend_around(SPEED_RATIOS, number),
+        }
     }
 
     /// A name for tables.
     pub(crate) fn name(&self, map: Map, number: usize) -> String {
-        let end = 2 * number;
+        let at = self.bend(map, number).peak;
         match map {
-            Map::Friction => format!("friction at {} rad/s", FRICTION_POINTS_RAD_S[number][1]),
-            Map::Lag => format!("valve lag at {:.0} kPa", 1e-3 * self.pressure_pa[end]),
-            Map::Gain => format!("valve gain at {:.2} A", self.command.map_or(0.0, |command| command[end])),
+            Map::Friction => format!("friction at {at} rad/s"),
+            Map::Lag => format!("valve lag at {:.0} kPa", 1e-3 * at),
+            Map::Gain => format!("valve gain at {at:.2} A"),
+            Map::Capacity => format!("converter capacity at {at}"),
         }
     }
 
-    /// The friction with a relative change of its shape.
-    pub(crate) fn friction(&self, table: &Table1<f64>, number: usize, change: f64) -> Table1<f64> {
-        let [from, middle, to] = FRICTION_POINTS_RAD_S[number];
-        let hat = |slip: f64| ((slip - from) / (middle - from)).min((to - slip) / (to - middle)).max(0.0);
-        mapped(&refined(table, &FRICTION_POINTS_RAD_S.concat()), |slip, mu| mu * (1.0 + change * hat(slip)))
+    /// Standard deviation of a number of a shape over that of the change along the map, which is a random walk.
+    pub(crate) fn sd_share(&self, map: Map, number: usize) -> f64 {
+        self.bend(map, number).sd_share()
+    }
+
+    /// A map with a relative change of its shape, at points of its own where the file's axis has none.
+    pub(crate) fn changed(&self, table: &Table1<f64>, map: Map, number: usize, change: f64) -> Table1<f64> {
+        let bend = self.bend(map, number);
+        let points = [bend.from, bend.peak, bend.to];
+        // The converter's maps share an axis.
+        let table = if map == Map::Capacity { *table } else { refined(table, &points) };
+        mapped(&table, |x, value| value * (1.0 + change * bend.at(x)))
+    }
+
+    /// The friction with the points at which its numbers count, so that each is the change at its point.
+    pub(crate) fn with_points(friction: &Table1<f64>) -> Table1<f64> {
+        refined(friction, &FRICTION[..2].iter().flat_map(|bend| [bend.from, bend.peak, bend.to]).collect::<Vec<_>>())
     }
 
     /// The valve with a relative change of the shape of its lag or gain.
     pub(crate) fn valve(&self, valve: ClutchValve<f64>, map: Map, number: usize, change: f64) -> ClutchValve<f64> {
-        let points = if map == Map::Lag { self.pressure_pa } else { self.command.unwrap_or(self.pressure_pa) };
-        let changed = |table: &Table1<f64>| {
-            mapped(&refined(table, &points), |x, value| value * (1.0 + change * end_share(points, number, x)))
-        };
         let mut valve = valve;
         if let ClutchValve::Proportional(maps) | ClutchValve::NormallyHigh { maps, .. } = &mut valve {
             match map {
-                Map::Lag => maps.time_constant_s = changed(&maps.time_constant_s),
-                Map::Gain => maps.gain_pa_a = changed(&maps.gain_pa_a),
-                Map::Friction => {}
+                Map::Lag => maps.time_constant_s = self.changed(&maps.time_constant_s, map, number, change),
+                Map::Gain => maps.gain_pa_a = self.changed(&maps.gain_pa_a, map, number, change),
+                Map::Friction | Map::Capacity => {}
             }
         }
         valve
     }
-}
-
-/// How much of the change at its lower (0) or upper (1) end a map has here.
-fn end_share([low, middle, high]: [f64; 3], number: usize, x: f64) -> f64 {
-    let share = if number == 0 { (middle - x) / (middle - low) } else { (x - middle) / (high - middle) };
-    share.clamp(0.0, 1.0)
 }
 
 /// The same map with more points; as it is where a table has no room for them.
@@ -109,7 +185,7 @@ fn refined(table: &Table1<f64>, points: &[f64]) -> Table1<f64> {
     const SAME: f64 = 1e-3;
     let mut axis = table.axis().to_vec();
     let near = SAME * (axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0));
-    for point in points {
+    for point in points.iter().filter(|point| point.is_finite()) {
         if axis.iter().all(|other| (other - point).abs() > near) {
             axis.push(*point);
         }
@@ -135,7 +211,7 @@ mod tests {
         let vehicle = Vehicle::two_speed_at().unwrap();
         let knots = Knots::of(&vehicle);
         let clutch = &vehicle.oncoming.clutch;
-        let friction = knots.friction(&clutch.friction, 0, 0.0);
+        let friction = knots.changed(&clutch.friction, Map::Friction, 0, 0.0);
         assert!(
             (0..500).all(|slip| (friction.at(f64::from(slip)) - clutch.friction.at(f64::from(slip))).abs() < 1e-15)
         );
@@ -155,10 +231,13 @@ mod tests {
         let vehicle = Vehicle::two_speed_at().unwrap();
         let knots = Knots::of(&vehicle);
         let before = vehicle.oncoming.clutch.friction;
-        let after = knots.friction(&before, 1, -0.1);
+        let after = knots.changed(&before, Map::Friction, 1, -0.1);
         for (slip, factor) in [(0.0, 1.0), (100.0, 1.0), (200.0, 0.9), (300.0, 1.0), (400.0, 1.0)] {
             assert!((after.at(slip) / before.at(slip) - factor).abs() < 1e-12, "{slip}");
         }
+        // A random walk that is known 100 rad/s below and above, of the change along 200 rad/s.
+        assert!((knots.sd_share(Map::Friction, 1) - 0.5).abs() < 1e-12);
+        assert!((knots.sd_share(Map::Lag, 1) - 1.0).abs() < 1e-12);
         let [low, middle, high] = knots.pressure_pa;
         let lag = |valve: ClutchValve<f64>, p: f64| valve.lag(p, 0.0);
         let valve = knots.valve(vehicle.oncoming.valve, Map::Lag, 1, 0.2);

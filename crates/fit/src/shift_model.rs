@@ -88,6 +88,7 @@ pub(crate) struct ShiftModel {
     pub(crate) own: Vec<OwnUnknown>,
     has_engine_torque: bool,
     offgoing_pa: Vec<f64>,
+    directions: [f64; 2],
 }
 
 /// Residuals and their derivatives by the parameters and by the shift's own unknowns.
@@ -134,6 +135,7 @@ impl ShiftModel {
             own: Vec::new(),
             has_engine_torque,
             offgoing_pa,
+            directions: directions(&record, car),
             record,
         };
         model.lay_out_rows(&segments);
@@ -220,6 +222,18 @@ impl ShiftModel {
         pressures(&car.valve, car.hysteresis_pa, car.command_delay_s, &self.record.oncoming, self.half_steps)
     }
 
+    /// Torque of the oncoming clutch at the readings of the turbine speed before it locks, N m, of a car and the measured slip.
+    pub(crate) fn oncoming_torque(&self, car: &Car) -> Vec<f64> {
+        let pressures = self.oncoming(car);
+        let before_lock = self.record.segments.iter().filter(|segment| segment.kind != SegmentKind::Locked);
+        let readings = before_lock.flat_map(|segment| self.record.turbine.between(segment.span_s));
+        let torque = |(time_s, turbine_rad_s): (f64, f64)| {
+            let slip = car.shift.oncoming_slip(turbine_rad_s, self.record.output.at(time_s));
+            car.oncoming_torque(self.on_grid(&pressures, time_s), slip)
+        };
+        readings.map(torque).collect()
+    }
+
     fn engine(&self, car: &Car) -> Vec<f64> {
         let late = |speed: f64| car.engine_delay_s + age_s(car.ages.engine_rad, speed);
         (0..self.half_steps.points)
@@ -303,7 +317,12 @@ impl ShiftModel {
 
     /// What the own unknowns say of a segment.
     fn circumstances(&self, segment: usize, kind: SegmentKind, car: &Car, own: &[f64]) -> (Circumstances, State) {
-        let mut of = Circumstances { mass_share: own[0], load_n: LOAD_UNIT_N * own[1], engine_torque_share: 0.0 };
+        let mut of = Circumstances {
+            mass_share: own[0],
+            load_n: LOAD_UNIT_N * own[1],
+            engine_torque_share: 0.0,
+            directions: self.directions,
+        };
         if self.has_engine_torque {
             of.engine_torque_share = own[2];
         }
@@ -356,7 +375,13 @@ impl ShiftModel {
             let rows = if prior.parameter.leaves_motion() {
                 self.compared(&other, &inputs, &motions)
             } else {
-                self.residuals(&other, changed.as_ref().unwrap_or(&inputs), own)
+                let inputs = changed.as_ref().unwrap_or(&inputs);
+                let segments = motions.iter().zip(&self.record.segments).enumerate();
+                let moved = |(i, (motion, segment)): (usize, (&Motion, &Segment))| {
+                    let is_moved = acts_in(prior.parameter, segment.kind);
+                    if is_moved { self.motion(i, &other, inputs, own) } else { motion.clone() }
+                };
+                self.compared(&other, inputs, &segments.map(moved).collect::<Vec<_>>())
             };
             by_parameter.set_column(j, &((rows - &residuals) / DIFFERENCE));
         }
@@ -379,6 +404,28 @@ impl ShiftModel {
             by_own.set_column(j, &((rows - residuals) / DIFFERENCE));
         }
         by_own
+    }
+}
+
+/// Signs of the slips of the oncoming and the offgoing clutch while both slip.
+fn directions(record: &ShiftRecord, car: &Car) -> [f64; 2] {
+    let slipping = record.segments.iter().filter(|segment| segment.kind == SegmentKind::Slipping);
+    let readings = slipping.flat_map(|segment| record.turbine.between(segment.span_s));
+    let sums = readings.fold([0.0, 0.0], |[oncoming, offgoing], (time_s, turbine)| {
+        let output = record.output.at(time_s);
+        [oncoming + car.shift.oncoming_slip(turbine, output), offgoing + car.shift.offgoing_slip(turbine, output)]
+    });
+    sums.map(drivetrain::clutch::direction)
+}
+
+/// Whether the motion in a segment depends on a parameter: a clutch that sticks or is open has no say.
+fn acts_in(parameter: P, kind: SegmentKind) -> bool {
+    match parameter {
+        P::Friction | P::FrictionAtRest | P::FrictionSlope | P::Spring => kind != SegmentKind::Locked,
+        P::Gain | P::Lag | P::CommandDelay | P::Hysteresis => kind != SegmentKind::Locked,
+        P::Shape(map, _) => map == Map::Capacity || kind != SegmentKind::Locked,
+        P::OffgoingFriction => kind == SegmentKind::Slipping,
+        _ => true,
     }
 }
 

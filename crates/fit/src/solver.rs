@@ -6,15 +6,43 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::FitError;
 use crate::car::Car;
 use crate::parameters::{Prior, Shaft};
-use crate::shift_model::{Linearised, ShiftModel};
+use crate::shift_model::{Block, Linearised, ShiftModel};
 use crate::weights::{HUBER, Weights};
-use crate::{Channel, FitError};
 
-/// A step that changes no unknown by more than this share of its plain standard deviation, of which the stated one is 1.4 times or
-/// more, ends the fit.
-const CONVERGED: f64 = 0.1;
+/// The steps of a stage of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Iterations {
+    /// With new scales and gains.
+    pub(crate) scaled: u32,
+    /// All of them.
+    pub(crate) most: u32,
+    pub(crate) end: End,
+}
+
+/// What ends a stage of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct End {
+    /// A step that changes no unknown by more than so many of its standard deviations.
+    pub(crate) small: f64,
+    /// A step of up to so many of them,
+    pub(crate) passable: f64,
+    /// which lowers the cost by less than this. At kinks of the model, such as the kiss point, steps go to and fro around a minimum.
+    pub(crate) decrease: f64,
+}
+
+impl End {
+    /// That of a fit. From a minimum to a standard deviation of `d` away the cost grows by `d^2/2`.
+    pub(crate) const OF_FIT: Self = Self { small: 0.2, passable: 0.5, decrease: 0.1 };
+    /// Where something else follows.
+    pub(crate) const COARSE: Self = Self { small: 0.5, passable: f64::INFINITY, decrease: 0.5 };
+
+    fn is_reached(self, size: f64, decrease: f64) -> bool {
+        size <= self.small || (size <= self.passable && decrease <= self.decrease)
+    }
+}
 /// Dampings tried in one iteration.
 const TRIES: u32 = 8;
 
@@ -39,6 +67,8 @@ pub(crate) struct Solved {
     pub(crate) weights: Weights,
     /// The last step was small; otherwise the iterations were used up.
     pub(crate) is_converged: bool,
+    /// Where the last step began.
+    pub(crate) lines: Vec<Linearised>,
 }
 
 /// Normal equations of the parameters with the shifts' own unknowns eliminated.
@@ -72,7 +102,11 @@ impl Problem<'_> {
             weights.errors(&shift.blocks, errors.as_mut_slice());
             let huber = |e: f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
             let own: f64 = shift.own.iter().zip(own).map(|(u, x)| ((x - u.mean) / u.sd).powi(2)).sum();
-            own + errors.iter().map(|e| huber(*e)).sum::<f64>()
+            let of_block = |block: &Block| {
+                let sum: f64 = errors.as_slice()[block.rows.clone()].iter().map(|e| huber(*e)).sum();
+                sum / weights.inflation[block.channel as usize]
+            };
+            own + shift.blocks.iter().map(of_block).sum::<f64>()
         });
         0.5 * (prior + data.sum::<f64>())
     }
@@ -84,14 +118,13 @@ impl Problem<'_> {
         shifts.iter().zip(&at.own).map(linearised).collect()
     }
 
-    /// The normal equations; the information of each channel is divided by its inflation.
+    /// The normal equations.
     pub(crate) fn normal(
         &self,
         shifts: &[ShiftModel],
         lines: &[Linearised],
         at: &Unknowns,
         weights: &Weights,
-        inflation: &[f64; Channel::ALL.len()],
         damping: f64,
     ) -> Result<Normal, FitError> {
         let count = self.priors.len();
@@ -109,7 +142,7 @@ impl Problem<'_> {
             for block in &shift.blocks {
                 for row in block.rows.clone() {
                     let robust = (HUBER / errors[row].abs()).min(1.0);
-                    let root = (robust / inflation[block.channel as usize]).sqrt();
+                    let root = (robust / weights.inflation[block.channel as usize]).sqrt();
                     errors[row] *= root;
                     all.row_mut(row).iter_mut().for_each(|cell| *cell *= root);
                 }
@@ -134,49 +167,51 @@ impl Problem<'_> {
         Ok(normal)
     }
 
-    /// Goes on from unknowns until a step is small. The scales follow the residuals in the first `scaled` iterations.
+    /// Goes on from unknowns until a step is small.
     pub(crate) fn solve(
         &self,
         shifts: &[ShiftModel],
         mut at: Unknowns,
         mut weights: Weights,
-        (scaled, most): (u32, u32),
+        iterations: Iterations,
         progress: &mut dyn FnMut(u32),
     ) -> Result<Solved, FitError> {
         let mut is_converged = false;
         let mut damping = 1e-3;
         let mut residuals = self.residuals(shifts, &at);
-        for iteration in 0..most {
+        let mut lines = Vec::new();
+        for iteration in 0..iterations.most {
             progress(iteration);
             // The first residuals are those of the file, whose scale says nothing of the readings.
-            if (1..=scaled).contains(&iteration) {
+            if (1..=iterations.scaled).contains(&iteration) {
                 weights = weights.following(shifts, &residuals);
             }
-            let lines = self.linearised(shifts, &at);
+            lines = self.linearised(shifts, &at);
             let cost = self.cost(shifts, &at, &residuals, &weights);
             if !cost.is_finite() {
                 return Err(not_finite("the shifts"));
             }
-            let mut largest = f64::INFINITY;
+            let (mut largest, mut decrease) = (f64::INFINITY, f64::INFINITY);
             for _ in 0..TRIES {
-                let normal = self.normal(shifts, &lines, &at, &weights, &NO_INFLATION, damping)?;
+                let normal = self.normal(shifts, &lines, &at, &weights, damping)?;
                 let (next, size) = self.step(&at, &normal, damping)?;
                 let next_residuals = self.residuals(shifts, &next);
-                if self.cost(shifts, &next, &next_residuals, &weights) <= cost {
-                    (at, residuals, largest) = (next, next_residuals, size);
+                let next_cost = self.cost(shifts, &next, &next_residuals, &weights);
+                if next_cost <= cost {
+                    (at, residuals, largest, decrease) = (next, next_residuals, size, cost - next_cost);
                     damping = (damping / 10.0).max(1e-8);
                     break;
                 }
                 damping = (damping * 8.0).max(1e-6);
                 // Where no damping helps, nothing smaller can be found.
-                largest = size.min(CONVERGED);
+                largest = size.min(iterations.end.small);
             }
-            if largest <= CONVERGED && iteration > scaled {
+            if iterations.end.is_reached(largest, decrease) && iteration > iterations.scaled {
                 is_converged = true;
                 break;
             }
         }
-        Ok(Solved { at, weights, is_converged })
+        Ok(Solved { at, weights, is_converged, lines })
     }
 
     /// The unknowns after a step, and its largest size in standard deviations after the fit.
@@ -236,9 +271,6 @@ impl Problem<'_> {
         }
     }
 }
-
-/// No channel counts less than its scale says.
-pub(crate) const NO_INFLATION: [f64; Channel::ALL.len()] = [1.0; Channel::ALL.len()];
 
 fn not_finite(what: &str) -> FitError {
     FitError::Work(format!(

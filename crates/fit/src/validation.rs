@@ -5,7 +5,7 @@ use config::Vehicle;
 use crate::car::Car;
 use crate::parameters::{self, HYSTERESIS_UNIT_PA, Prior};
 use crate::shift_model::ShiftModel;
-use crate::solver::{Problem, Unknowns};
+use crate::solver::{End, Iterations, Problem, Unknowns};
 use crate::{Channel, Fit, FitError, Parameter, ReadingAges, ShiftRecord, open_loop};
 
 /// Errors over shifts that were held out.
@@ -21,6 +21,24 @@ pub struct HeldOut {
 }
 
 impl Fit {
+    /// Why the fitted file is not to be used in place of the given one, if so.
+    pub fn reason_against(&self, checked: Option<&HeldOut>) -> Option<String> {
+        if !self.at_limit.is_empty() {
+            return Some(format!("at the end of what is held possible: {}", self.at_limit.join(", ")));
+        }
+        let checked = checked?;
+        let [given, fitted] = checked.turbine_rad_s;
+        // An error that is not a number counts against the fit.
+        let is_better = fitted < given;
+        (!is_better).then(|| {
+            format!(
+                "on {} shifts that were held out the turbine speed has a one-step error of {given:.3} rad/s with the given file and \
+                 {fitted:.3} with the fitted one",
+                checked.shifts
+            )
+        })
+    }
+
     /// Compares both vehicles on shifts that were not fitted; none if there are none.
     ///
     /// # Errors
@@ -76,7 +94,8 @@ impl Fit {
             shared: priors.iter().map(|prior| prior.mean).collect(),
             own: models.iter().map(ShiftModel::start).collect(),
         };
-        let at = problem.solve(&models, start, self.weights, (0, 6), &mut |_| {})?.at;
+        const STARTS: Iterations = Iterations { scaled: 0, most: 6, end: End::OF_FIT };
+        let at = problem.solve(&models, start, self.weights, STARTS, &mut |_| {})?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {
             self.weights.errors(&model.blocks, rows.as_mut_slice());

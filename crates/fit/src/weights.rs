@@ -23,11 +23,21 @@ pub(crate) struct Weights {
     pub(crate) gain: [f64; CHANNELS],
     /// Standard deviation of a one-step error, in the unit of the channel.
     pub(crate) scale: [f64; CHANNELS],
+    /// Factor by which the information of its readings is less than that of independent ones of a perfect model. The same one counts in
+    /// the fit and in the intervals: otherwise what is known before would count too little in the fit.
+    pub(crate) inflation: [f64; CHANNELS],
 }
+
+/// Factor on standard deviations for what the model leaves out, from fits of cars whose parameters are known.
+pub(crate) const FACTOR: f64 = 1.4;
 
 impl Weights {
     /// Where a fit starts: what is usual for each channel.
-    pub(crate) const START: Self = Self { gain: [0.3, 0.03, 0.03, 0.3, 0.3], scale: [0.5, 0.3, 0.1, 1.0, 3e3] };
+    pub(crate) const START: Self = Self {
+        gain: [0.3, 0.03, 0.03, 0.3, 0.3],
+        scale: [0.5, 0.3, 0.1, 1.0, 3e3],
+        inflation: [FACTOR * FACTOR; CHANNELS],
+    };
 
     /// One-step errors of the residuals, or of a column of their derivatives, in scales.
     pub(crate) fn errors(&self, blocks: &[Block], column: &mut [f64]) {
@@ -54,6 +64,7 @@ impl Weights {
             {
                 weights.gain[channel as usize] = gain;
                 weights.scale[channel as usize] = scale;
+                weights.inflation[channel as usize] = FACTOR * FACTOR * correlation(&blocks, gain, scale);
             }
         }
         weights
@@ -89,8 +100,21 @@ fn spread(blocks: &[&[f64]], gain: f64) -> (f64, f64) {
     (errors.iter().map(|error| error.min(3.0 * HUBER * scale).powi(2)).sum(), scale)
 }
 
+/// Correlation factor of the one-step errors, at least 1.
+fn correlation(blocks: &[&[f64]], gain: f64, scale: f64) -> f64 {
+    let errors: Vec<Vec<f64>> = (blocks.iter())
+        .map(|block| {
+            let mut errors = block.to_vec();
+            one_step(&mut errors, gain);
+            errors.iter_mut().for_each(|error| *error /= scale);
+            errors
+        })
+        .collect();
+    correlation_factor(&errors.iter().map(Vec::as_slice).collect::<Vec<_>>()).max(1.0)
+}
+
 /// Factor by which the variance of a mean of errors that are alike in sequence exceeds that of independent ones.
-pub(crate) fn correlation_factor(blocks: &[&[f64]]) -> f64 {
+fn correlation_factor(blocks: &[&[f64]]) -> f64 {
     const LAGS: usize = 30;
     let limited = |error: f64| error.clamp(-HUBER, HUBER);
     let variance: f64 = blocks.iter().copied().flatten().map(|error| limited(*error).powi(2)).sum();

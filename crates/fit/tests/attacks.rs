@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Logs, TestCar};
-use fit::{Fit, FitError, Map, Parameter, Series, ShiftRecord, Verdict};
+use fit::{Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
     (0..count).map(|number| car.shift(number, logs).record).collect()
@@ -36,17 +36,42 @@ fn a_shift_that_is_given_again_and_again_counts_once() {
 
 #[test]
 fn a_file_that_is_the_car_is_not_made_worse() {
-    let mut car = TestCar::drawn(3);
-    // The file takes the place of the car: nothing is off but the readings.
-    car.car = car.file.clone();
+    let mut car = TestCar::drawn(3).with_the_right_file();
     let shifts = shifts(&mut car, 4, Logs::SpeedsAndCurrent);
     let fit = fitted(&car, &shifts).unwrap();
     let [given, after] = errors(&mut car, &fit);
     // No more than the stated interval of the torque at a command, at the level of 100 N m.
     let [_, sd] = fit.combination_sd(&[(Parameter::Friction, 1.0), (Parameter::Gain, 1.0)]);
     assert!(after < given + 2.0 * sd * 100.0, "{given} {after} {sd}");
-    assert!(fit.statements().iter().any(|line| line.contains("do not ask for another file")), "{:#?}", fit.report());
+    let said = fit.statements();
+    assert!(said.iter().any(|line| line.contains("do not ask for another file")), "{:#?}", fit.report());
+    assert!(said.iter().any(|line| line.contains("too few, or tell too little, to show")), "{said:#?}");
     assert!(fit.at_limit.is_empty() && fit.freed.is_empty(), "{:?} {:?}", fit.at_limit, fit.freed);
+}
+
+#[test]
+fn a_file_that_is_worse_on_held_out_shifts_is_not_offered() {
+    let mut car = TestCar::drawn(2);
+    let shifts = shifts(&mut car, 2, Logs::SpeedsAndCurrent);
+    let fit = fitted(&car, &shifts).unwrap();
+    assert_eq!(fit.reason_against(None), None);
+    let checked = |turbine_rad_s| HeldOut { shifts: 3, turbine_rad_s, pressure_pa: None };
+    assert_eq!(fit.reason_against(Some(&checked([0.2, 0.1]))), None);
+    assert!(fit.reason_against(Some(&checked([0.2, f64::NAN]))).is_some());
+    let reason = fit.reason_against(Some(&checked([0.1, 0.2]))).unwrap();
+    let kept = fit.kept_file(&car.file, &format!("{reason}\n[driveline]")).unwrap();
+    let (head, rest) = kept.source.text.split_once('\n').unwrap();
+    assert!(head.starts_with("# fit: all values are those of the given file") && head.contains("0.200"), "{head}");
+    assert_eq!(rest, car.file.source.text);
+}
+
+#[test]
+fn a_misfit_that_stays_is_a_warning() {
+    let mut car = TestCar::drawn(2).with_other_converter();
+    let shifts = shifts(&mut car, 8, Logs::SpeedsAndCurrent);
+    let fit = fitted(&car, &shifts).unwrap();
+    let said = fit.statements();
+    assert!(said.iter().any(|line| line.starts_with("warning: the ")), "{said:#?}");
 }
 
 #[test]
@@ -84,6 +109,7 @@ fn the_log_of_another_car_is_named_as_such() {
         Ok(fit) => {
             let said = fit.statements();
             assert!(said.iter().any(|line| line.starts_with("warning: ")), "{said:#?}");
+            assert!(fit.at_limit.is_empty() || fit.reason_against(None).is_some());
         }
         Err(error) => assert!(error.to_string().contains("hint"), "{error}"),
     }
@@ -162,10 +188,9 @@ fn a_map_of_another_shape_is_freed_and_the_file_has_its_points() {
     let vehicle = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let [before, after] = [&car.file, &vehicle].map(|file| {
         let maps = file.oncoming.valve.maps().unwrap();
-        let friction = file.oncoming.clutch.friction;
-        [friction.axis().len(), maps.time_constant_s.axis().len(), maps.gain_pa_a.axis().len()]
+        [maps.time_constant_s.axis().len(), maps.gain_pa_a.axis().len()]
     });
-    for (i, map) in Map::ALL.into_iter().enumerate() {
+    for (i, map) in [Map::Lag, Map::Gain].into_iter().enumerate() {
         assert_eq!(after[i] > before[i], fit.freed.contains(&map), "{map:?}: {before:?} {after:?}");
     }
     let [given, after] = errors(&mut car, &fit);

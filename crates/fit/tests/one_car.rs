@@ -21,8 +21,7 @@ fn fitted(seed: u64, logs: Logs, count: u64) -> (TestCar, Fit, f64) {
 /// How many of the parameters lie within their stated 95 %.
 fn inside(car: &TestCar, fit: &Fit) -> (usize, usize) {
     let held = fit.priors.iter().enumerate().filter(|(i, prior)| {
-        (fit.unknowns[*i] - car.true_value(prior.parameter, &fit.freed)).abs()
-            <= 1.96 * fit.precision.stated[(*i, *i)].sqrt()
+        (fit.unknowns[*i] - car.true_value(prior.parameter)).abs() <= 1.96 * fit.precision.stated[(*i, *i)].sqrt()
     });
     (held.count(), fit.priors.len())
 }

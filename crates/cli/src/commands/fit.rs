@@ -52,8 +52,13 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     let fitted = found.vehicle_file(&vehicle, &names.join(", "))?;
     let checked = found.validate(&vehicle, &fitted, &held_out, ages)?;
     bar.finish_and_clear();
+    let against = found.reason_against(checked.as_ref());
+    let written = match &against {
+        None => fitted,
+        Some(reason) => found.kept_file(&vehicle, reason)?,
+    };
     // Nobody has to read the report to its end.
-    write_text(&options.output, &fitted.source.text)?;
+    write_text(&options.output, &written.source.text)?;
     table(&found.report())?;
     for (channel, scale, gain) in &found.channels {
         let (scale, unit) = if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
@@ -64,6 +69,13 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     }
     output::line(&said_of(checked.as_ref()))?;
     let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
+    if let Some(reason) = against {
+        output::note(&format!(
+            "warning: the fitted values are not written: {reason}. {} has the values of the given file; do not use others before the reason is known",
+            options.output.display()
+        ));
+        return Ok(());
+    }
     output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
     Ok(())
 }
@@ -146,9 +158,6 @@ fn said_of(checked: Option<&HeldOut>) -> String {
     );
     if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| 1e-3 * error)) {
         text += &format!("; pressure of the valve maps against the measured one {given:.2} kPa, {fitted:.2} kPa");
-    }
-    if fitted > given {
-        text += "\nwarning: the fitted file is worse on them: do not use it before the reason is known";
     }
     text
 }

@@ -49,8 +49,6 @@ pub(crate) struct TestCar {
     pub(crate) sensors: Sensors,
     /// The unknowns of a perfect fit.
     pub(crate) truth: Vec<(Parameter, f64)>,
-    /// Those of the friction where its shape is freed: changes at points of its own, and not at those of the file.
-    freed_friction: Vec<(Parameter, f64)>,
     torque_signal_scale: f64,
     pressure_scale: f64,
     draw: Draw,
@@ -68,6 +66,12 @@ pub(crate) struct TestShift {
 fn mapped(table: &Table1<f64>, value: impl Fn(f64, f64) -> f64) -> Table1<f64> {
     let values: Vec<f64> = table.axis().iter().zip(table.values()).map(|(x, y)| value(*x, *y)).collect();
     Table1::new(table.axis(), &values).unwrap()
+}
+
+/// A factor on a map and the changes of its shape, from the factors at three points.
+fn around(whole: Parameter, map: Map, [low, middle, high]: [f64; 3]) -> [(Parameter, f64); 3] {
+    let shape = |number: usize, end: f64| (Parameter::Shape(map, number), end / middle - 1.0);
+    [(whole, middle.ln()), shape(0, low), shape(1, high)]
 }
 
 impl TestCar {
@@ -147,10 +151,7 @@ impl TestCar {
         // The plant holds the throttle for 10 ms: a line between the readings is late by half of it.
         truth.push((Parameter::EngineTorqueDelay, -0.5));
         truth.push((Parameter::PressureScale, pressure_scale.ln()));
-        truth.push((Parameter::FrictionAtRest, rest));
-        truth.push((Parameter::FrictionSlope, slope));
-        let mut drawn =
-            Self { freed_friction: Vec::new(), file, car, sensors, truth, torque_signal_scale, pressure_scale, draw };
+        let mut drawn = Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, draw };
         drawn.tell_maps();
         drawn
     }
@@ -186,6 +187,24 @@ impl TestCar {
         self
     }
 
+    /// A converter with a capacity that is 15 % less around a speed ratio of 0.8.
+    pub(crate) fn with_other_converter(mut self) -> Self {
+        let capacity = &mut self.car.converter.capacity_n_m_s2;
+        *capacity = mapped(capacity, |v, c| c * (1.0 - 0.15 * (1.0 - (v - 0.8).abs() / 0.15).max(0.0)));
+        self.tell_maps();
+        self
+    }
+
+    /// The file takes the place of the car: nothing is off but the signals.
+    pub(crate) fn with_the_right_file(mut self) -> Self {
+        self.car = self.file.clone();
+        for (parameter, value) in &mut self.truth {
+            let is_of_car = !parameter.is_of_signals();
+            *value = if is_of_car { 0.0 } else { *value };
+        }
+        self
+    }
+
     /// Gives the valve of the oncoming clutch a hysteresis that the file does not have, of up to 10 kPa to each side.
     pub(crate) fn with_hysteresis(mut self) -> Self {
         self.car.oncoming.hysteresis_pa = self.draw.between(0.0, 10e3);
@@ -202,37 +221,35 @@ impl TestCar {
         ([0.0, 30.0, 100.0, 200.0, 300.0], pressures, commands)
     }
 
-    /// The true values of what a fit finds of the maps of the oncoming clutch.
-    fn tell_maps(&mut self) {
+    /// The true values of what a fit finds of the maps: at their points.
+    pub(crate) fn tell_maps(&mut self) {
         use Parameter as P;
         let (slips, pressures, commands) = self.points();
         let (car, file) = (&self.car.oncoming, &self.file.oncoming);
         let friction = slips.map(|slip| car.clutch.friction.at(slip) / file.clutch.friction.at(slip));
-        self.freed_friction = vec![
+        let mut told = vec![
             (P::Friction, friction[2].ln()),
             (P::FrictionAtRest, friction[0] / friction[2] - 1.0),
             (P::FrictionSlope, friction[4] / friction[2] - 1.0),
             (P::Shape(Map::Friction, 0), friction[1] / (0.3 * friction[2] + 0.7 * friction[0]) - 1.0),
             (P::Shape(Map::Friction, 1), friction[3] / (0.5 * friction[2] + 0.5 * friction[4]) - 1.0),
         ];
-        let mut told = Vec::new();
+        let capacity = [0.5, 0.75, 0.95]
+            .map(|ratio| self.car.converter.capacity_n_m_s2.at(ratio) / self.file.converter.capacity_n_m_s2.at(ratio));
+        told.extend(around(P::Capacity, Map::Capacity, capacity));
         if let (Some(car), Some(file)) = (car.valve.maps(), file.valve.maps()) {
             let lag = pressures.map(|p| car.time_constant_s.at(p) / file.time_constant_s.at(p));
             let gain = commands.map(|a| car.gain_pa_a.at(a) / file.gain_pa_a.at(a));
-            for (whole, map, [low, middle, high]) in [(P::Lag, Map::Lag, lag), (P::Gain, Map::Gain, gain)] {
-                told.push((whole, middle.ln()));
-                told.push((P::Shape(map, 0), low / middle - 1.0));
-                told.push((P::Shape(map, 1), high / middle - 1.0));
-            }
+            told.extend(around(P::Lag, Map::Lag, lag));
+            told.extend(around(P::Gain, Map::Gain, gain));
         }
         self.truth.retain(|(parameter, _)| told.iter().all(|(other, _)| other != parameter));
         self.truth.extend(told);
     }
 
-    /// The unknown of a perfect fit with these maps freed.
-    pub(crate) fn true_value(&self, parameter: Parameter, freed: &[Map]) -> f64 {
-        let friction = if freed.contains(&Map::Friction) { self.freed_friction.as_slice() } else { &[] };
-        friction.iter().chain(&self.truth).find(|(other, _)| *other == parameter).unwrap().1
+    /// The unknown of a perfect fit.
+    pub(crate) fn true_value(&self, parameter: Parameter) -> f64 {
+        self.truth.iter().find(|(other, _)| *other == parameter).unwrap().1
     }
 
     /// What the log says of the sensors.
