@@ -268,7 +268,7 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
     let is_command = is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT));
     if unit.quantity != Quantity::Current
         || !is_command
-        || is_about(&["line", "tcc", "lockup", "battery", "off", "offgoing"])
+        || is_about(&["line", "tcc", "lockup", "battery", "off", "offgoing", "oncoming"])
     {
         return None;
     }
@@ -430,6 +430,7 @@ mod tests {
                 ("element_b_duty_percent", "%", "element_b_duty"),
                 ("element_35r_current_ma", "mA", "element_35r_current"),
                 ("lock_up_applied", "", "lock_up_applied"),
+                ("oncoming_current_a", "A", "oncoming_current"),
             ],
             &[
                 ("I_ClA", "mA", "element_a_current"),
