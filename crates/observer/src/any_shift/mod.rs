@@ -36,6 +36,7 @@ mod powertrain;
 mod predict;
 mod readings;
 mod running;
+mod shown;
 mod tables;
 mod turbine;
 
