@@ -25,8 +25,8 @@ fn names(gearbox: &Gearbox) -> Vec<&str> {
     gearbox.elements.iter().filter(|element| element.pack.is_some()).map(|element| element.name.as_str()).collect()
 }
 
-/// The text of a file of what was learnt of a car with this gearbox. The same numbers are read again from it, and are believed
-/// with even odds until shifts of the car have shown them: it may be another car, or the log may have been a bad one.
+/// The text of a file of what was learnt of a car with this gearbox. The same numbers are read again from it, but
+/// for the odds, which are those of a drive.
 pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     let row = |values: &[f64]| values.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(", ");
     let elements: Vec<String> = names(gearbox).into_iter().map(toml_string).collect();
@@ -74,9 +74,7 @@ pub fn read_learnt(gearbox: &Gearbox, source: &Source) -> Result<Learnt<f64>, Co
     size("mean", raw.mean.span().start, mean.len(), LEARNT)?;
     size("covariance", raw.covariance.span().start, covariance.len(), LEARNT)?;
     let (shifts, refused) = (raw.shifts, raw.refused);
-    // Whether this car is the one of the file its shifts will show: even odds.
-    let mut learnt =
-        Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0 };
+    let mut learnt = Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0 };
     learnt.mean.copy_from_slice(mean);
     for (i, row) in covariance.iter().enumerate() {
         size("covariance", raw.covariance.span().start, row.len(), i + 1)?;
@@ -107,7 +105,8 @@ mod tests {
 
     /// Something that was learnt: unequal numbers everywhere.
     fn learnt() -> Learnt<f64> {
-        let mut learnt = Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts: 31, refused: 2, odds: 0.0 };
+        let mut learnt =
+            Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts: 31, refused: 2, odds: 0.0 };
         for i in 0..LEARNT {
             learnt.mean[i] = 1.0 / (i as f64 + 3.0) - 0.1;
             for j in 0..LEARNT {

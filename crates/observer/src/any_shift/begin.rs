@@ -2,9 +2,9 @@
 
 use super::running::TURBINE_ACTS;
 use super::{
-    AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N,
-    OUTPUT, PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput,
-    ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+    AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N, OUTPUT,
+    PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput, ShiftPhase,
+    TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
 

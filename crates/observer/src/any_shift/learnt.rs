@@ -24,7 +24,8 @@
 //! **Another car, or a bad log.** What is learnt is one of two hypotheses; the other is that the car is any of the budget.
 //! Each shift is held against both, and the logarithm of their odds is summed. Before a shift the filter is given the mean
 //! and the covariance of both together, weighted by these odds. Where they speak for the budget by a hundred to one, what
-//! was learnt before is forgotten. What is read from a file begins with even odds.
+//! was learnt before is forgotten. What comes from another drive begins with even odds. Some of what a bad log leaves is in
+//! directions that no shift shows, turbine torque against stiffness: so it also begins with the covariance of both together.
 //!
 //! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
 //! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.
@@ -65,7 +66,7 @@ const EDGE_OF_TWO: f64 = 2.449;
 const COMMON: f64 = 0.33;
 /// Logarithm of the odds of what is learnt against the budget \[chosen\]: at most, and with the other sign what is forgotten;
 /// at most by one shift, which may be a bad one itself. A hundred to one, and ten to one: a car that is the one learnt loses what
-/// is learnt once in ten thousand shifts at most (Wald), another car is found in two shifts after a file is read.
+/// is learnt once in ten thousand shifts at most (Wald); another car is found in two shifts of a new drive.
 const ODDS_MOST: f64 = 4.6;
 const ODDS_OF_SHIFT: f64 = 2.3;
 /// Variance above which a covariance was not made here, in that of the budget.
@@ -89,7 +90,7 @@ pub struct Learnt<T> {
     pub shifts: u32,
     /// Shifts in a row that were refused.
     pub refused: u8,
-    /// Logarithm of the odds that it is of this car, against any car of the budget. Zero in what is read from a file.
+    /// Logarithm of the odds that it is of this car, against any car of the budget.
     pub odds: T,
 }
 
@@ -128,12 +129,7 @@ pub(super) struct Known<T> {
 
 impl<T: Real> Acting<T> {
     /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input.
-    pub(super) fn new(
-        [off, on]: [usize; 2],
-        pair: Option<usize>,
-        slow_part: T,
-        by_stiffness: [T; ACTING],
-    ) -> Self {
+    pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T, by_stiffness: [T; ACTING]) -> Self {
         let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
         let kiss = |at: usize| element(at).map(|at| KISS_AT + at);
         let inertia = pair.filter(|&pair| pair < MAX_PAIRS).map(|pair| INERTIA_AT + pair);
@@ -227,6 +223,19 @@ impl<T: Real> Learnt<T> {
         known
     }
 
+    /// What a new drive begins with. What was learnt may be of another car, or of a bad log: it is the mean and covariance of it
+    /// and of the budget together, with even odds, and each shift of the drive is held against both anew.
+    pub(super) fn doubted(&self, correlations: &Correlations<T>) -> Self {
+        let (half, budget) = (T::of(0.5), Self::nothing(correlations));
+        let mut doubted = Self { mean: self.mean.map(|mean| half * mean), odds: T::zero(), ..*self };
+        for (i, row) in doubted.covariance.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = half * (*value + budget.covariance[i][j] + half * self.mean[i] * self.mean[j]);
+            }
+        }
+        doubted
+    }
+
     /// Takes what a shift has shown: the acting quantities as they were before it, and after it. Whether it was taken.
     pub(super) fn take(
         &mut self,
@@ -238,7 +247,9 @@ impl<T: Real> Learnt<T> {
         let Some(shown) = Shown::between(before, after) else { return false };
         let nothing = Self::nothing(correlations);
         let by_budget = Innovation::of(&nothing, acting, &shown);
-        let (Some(mut by_car), Some(by_budget)) = (Innovation::of(self, acting, &shown), by_budget) else { return false };
+        let (Some(mut by_car), Some(by_budget)) = (Innovation::of(self, acting, &shown), by_budget) else {
+            return false;
+        };
         // What no car of the budget shows speaks for none.
         if !(by_budget.distance <= T::of(GATE)) {
             return false;
@@ -404,166 +415,4 @@ fn is_positive<T: Real>(mut of: [[T; LEARNT]; LEARNT]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CORRELATIONS: Correlations<f64> = [-0.3; MAX_ELEMENTS];
-    const PART: f64 = 0.75;
-    const STIFFNESS: [f64; ACTING] = [0.9, 0.9, 0.0, 0.0, 1.0, 2.3];
-
-    fn shift() -> Acting<f64> {
-        Acting::new([1, 4], Some(2), PART, STIFFNESS)
-    }
-
-    /// What a filter knows after a measurement of `h a` with a variance of the noise.
-    fn after(before: &Known<f64>, h: &[f64; ACTING], value: f64, noise: f64) -> Known<f64> {
-        let with = before.covariance.map(|row| dot(&row, h));
-        let variance = dot(&with, h) + noise;
-        let innovation = value - dot(h, &before.mean);
-        let mut after = *before;
-        for a in 0..ACTING {
-            after.mean[a] += with[a] / variance * innovation;
-            for b in 0..ACTING {
-                after.covariance[a][b] -= with[a] * with[b] / variance;
-            }
-        }
-        after
-    }
-
-    /// Numbers from -1 to 1 (linear congruential).
-    fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    /// The regression is the Kalman filter of all quantities with the part that does not last as noise.
-    #[test]
-    fn what_a_shift_shows_reaches_all_quantities_as_in_one_filter() {
-        let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
-        // Other shifts have tied the quantities to each other.
-        let mut seed = 1;
-        for pair in 0..6 {
-            let acting = Acting::new([pair, pair + 1], Some(pair), PART, STIFFNESS);
-            let h = core::array::from_fn(|_| random(&mut seed));
-            let before = learnt.known(&acting, &CORRELATIONS);
-            assert!(learnt.take(&acting, &before, &after(&before, &h, 0.5, 0.1), &CORRELATIONS));
-        }
-        let (before, h) = (learnt.known(&acting, &CORRELATIONS), [0.9, -0.2, 0.4, 0.1, -0.7, 0.8]);
-        let mut taken = learnt;
-        assert!(taken.take(&acting, &before, &after(&before, &h, 0.8, 0.2), &CORRELATIONS));
-        let mut row = [0.0; LEARNT];
-        let mut noise = 0.2;
-        for a in 0..ACTING {
-            let (per_unit, more) = acting.per_unit(a);
-            row[acting.places[a].unwrap()] += per_unit * h[a];
-            row[STIFFNESS_AT] += STIFFNESS[a] * h[a];
-            noise += more * h[a] * h[a];
-        }
-        let with = learnt.covariance.map(|line| dot(&line, &row));
-        let variance = dot(&with, &row) + noise;
-        let innovation = 0.8 - dot(&row, &learnt.mean);
-        for i in 0..LEARNT {
-            assert!((taken.mean[i] - learnt.mean[i] - with[i] / variance * innovation).abs() < 1e-9, "{i}");
-            for j in 0..LEARNT {
-                let drift = if i == j && learnt.covariance[i][i] < 1.0 { PER_SHIFT } else { 0.0 };
-                let expected = learnt.covariance[i][j] - with[i] * with[j] / variance + drift;
-                assert!((taken.covariance[i][j] - expected).abs() < 1e-9, "{i} {j}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_shift_that_shows_nothing_teaches_nothing() {
-        let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
-        let (mut learnt, mut known) = (nothing, nothing.known(&acting, &CORRELATIONS));
-        // The part that does not last has walked, and nothing was seen of it.
-        known.covariance[0][0] += 0.3;
-        assert!(learnt.take(&acting, &known, &known, &CORRELATIONS));
-        let change = learnt.covariance.iter().flatten().zip(nothing.covariance.iter().flatten());
-        assert!(change.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < PER_SHIFT + 1e-12);
-        assert_eq!(learnt.mean, nothing.mean);
-    }
-
-    #[test]
-    fn what_cannot_be_is_refused_and_often_refused_is_another_car() {
-        let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
-        let h = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let before = learnt.known(&acting, &CORRELATIONS);
-        assert!(learnt.take(&acting, &before, &after(&before, &h, 1.0, 0.01), &CORRELATIONS));
-        learnt.count(true, &CORRELATIONS);
-        let known = learnt;
-        for value in [9.0, -9.0, f64::NAN, f64::INFINITY] {
-            let before = learnt.known(&acting, &CORRELATIONS);
-            assert!(!learnt.take(&acting, &before, &after(&before, &h, value, 0.01), &CORRELATIONS), "{value}");
-            let mut odd = before;
-            odd.covariance[2][3] = f64::NAN;
-            assert!(!learnt.take(&acting, &before, &odd, &CORRELATIONS));
-        }
-        assert_eq!(learnt, known);
-        for refused in 1..=REFUSED_MOST {
-            learnt.count(false, &CORRELATIONS);
-            assert_eq!(learnt.shifts, u32::from(refused < REFUSED_MOST));
-        }
-        assert_eq!(learnt, Learnt::nothing(&CORRELATIONS));
-    }
-
-    /// Whatever the shifts show, in single precision too.
-    #[test]
-    fn ten_thousand_shifts_leave_a_covariance_and_means_within_the_bounds() {
-        let correlations = CORRELATIONS.map(|correlation| correlation as f32);
-        let (mut learnt, mut seed, mut taken) = (Learnt::nothing(&correlations), 5, 0);
-        for k in 0..10_000 {
-            let at = k % 7;
-            let acting = Acting::new([at, at + 1], Some(at), PART as f32, STIFFNESS.map(|x| x as f32));
-            let known = learnt.known(&acting, &correlations);
-            let double =
-                Known { mean: known.mean.map(f64::from), covariance: known.covariance.map(|row| row.map(f64::from)) };
-            let h = core::array::from_fn(|_| random(&mut seed));
-            let shown = after(&double, &h, 3.0 * random(&mut seed), 1e-4);
-            let shown = Known {
-                mean: shown.mean.map(|x| x as f32),
-                covariance: shown.covariance.map(|row| row.map(|x| x as f32)),
-            };
-            taken += u32::from(learnt.take(&acting, &known, &shown, &correlations));
-            learnt.pass(20.0, &correlations);
-            assert!(learnt.is_sound(), "{k}");
-        }
-        assert!(taken > 2000, "{taken}");
-    }
-
-    #[test]
-    fn time_makes_it_unknown_again() {
-        let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
-        let (mut learnt, before) = (nothing, nothing.known(&acting, &CORRELATIONS));
-        assert!(learnt.take(&acting, &before, &after(&before, &[0.5; ACTING], 1.0, 0.01), &CORRELATIONS));
-        let (friction, inertia) = (learnt.mean[1], learnt.mean[INERTIA_AT + 2]);
-        assert!(friction > 0.05 && inertia > 0.05);
-        // A night: the oil is cold again, and the inertia is that of the day before.
-        learnt.pass(12.0 * 3600.0, &CORRELATIONS);
-        assert!(learnt.mean[1] < 0.01 * friction && learnt.mean[INERTIA_AT + 2] > 0.98 * inertia);
-        assert!((learnt.covariance[1][1] - 1.0).abs() < 0.01);
-    }
-
-    #[test]
-    fn what_is_read_must_be_what_a_filter_can_have_learnt() {
-        let nothing = Learnt::nothing(&CORRELATIONS);
-        assert_eq!(nothing.checked(), Some(nothing));
-        let wrong = |change: fn(&mut Learnt<f64>)| {
-            let mut learnt = nothing;
-            change(&mut learnt);
-            learnt.checked()
-        };
-        assert_eq!(wrong(|learnt| learnt.mean[3] = f64::NAN), None);
-        assert_eq!(wrong(|learnt| learnt.mean[3] = 2.6), None);
-        assert_eq!(wrong(|learnt| learnt.covariance[3][3] = -1.0), None);
-        assert_eq!(wrong(|learnt| learnt.covariance[3][3] = 1e9), None);
-        assert_eq!(wrong(|learnt| learnt.covariance[3][4] = 0.1), None);
-        assert_eq!(
-            wrong(|learnt| {
-                learnt.covariance[3][4] = 1.1;
-                learnt.covariance[4][3] = 1.1;
-            }),
-            None
-        );
-    }
-}
+mod tests;

@@ -128,12 +128,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// torques alike, and of none of the kiss points.
     fn by_stiffness(&self) -> [T; ACTING] {
         let u = &self.uncertainty;
-        let source = if self.turbine.converter.is_some() {
-            self.turbine.converter_share
-        } else {
-            self.turbine.engine_share
-        };
-        let in_shares = [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, u.slow_share(source)];
+        let source =
+            if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
+        let in_shares =
+            [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, u.slow_share(source)];
         in_shares.map(|share| if share > T::zero() { u.stiffness_share / share } else { T::zero() })
     }
 
@@ -170,8 +168,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn end_shift(&self, running: &mut Running<T>, gear: usize, learnt: &mut Learnt<T>) {
         if let Some((before, shift)) = running.before.take().zip(running.shift) {
             let correlations = self.correlations();
-            let taken = running.x.is_sound()
-                && learnt.take(&self.acting(&shift), &before, &running.lasting(), &correlations);
+            let taken =
+                running.x.is_sound() && learnt.take(&self.acting(&shift), &before, &running.lasting(), &correlations);
             learnt.count(taken, &correlations);
         }
         self.take_turbine(running, learnt);
