@@ -110,7 +110,7 @@ impl<T: Real> Gaussian<T> {
         let state = state.min(N - 1);
         let with = self.covariance[state];
         let own = with[state];
-        if !(own > T::epsilon()) {
+        if own <= T::epsilon() {
             return self.renew(state, mean, variance);
         }
         let by_mean = (mean - self.mean[state]) / own;

@@ -69,6 +69,10 @@ const COMMON: f64 = 0.33;
 /// is learnt once in ten thousand shifts at most (Wald); another car is found in two shifts of a new drive.
 const ODDS_MOST: f64 = 4.6;
 const ODDS_OF_SHIFT: f64 = 2.3;
+/// The same of the inertia of two pairs of gears \[chosen\]: half of the variance is that of the turbine, of the oil in it and of
+/// the input shaft, which are in all of them. Without it an inertia that is wrong in all pairs alike would be taken for an error
+/// of the stiffness, of which there is one.
+const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the temperature of the
@@ -251,7 +255,7 @@ impl<T: Real> Learnt<T> {
             return false;
         };
         // What no car of the budget shows speaks for none.
-        if !(by_budget.distance <= T::of(GATE)) {
+        if !by_budget.is_possible() {
             return false;
         }
         let (most, of_shift) = (T::of(ODDS_MOST), T::of(ODDS_OF_SHIFT));
@@ -260,7 +264,7 @@ impl<T: Real> Learnt<T> {
         if self.odds < -most {
             (*self, by_car) = (nothing, by_budget);
         }
-        if !(by_car.distance <= T::of(GATE)) {
+        if !by_car.is_possible() {
             return false;
         }
         self.correct(&by_car);
@@ -351,6 +355,7 @@ fn unlearnt<T: Real>(correlations: &Correlations<T>, i: usize, j: usize) -> T {
     match i.abs_diff(j) {
         0 => T::one(),
         _ if i.max(j) < KISS_AT => T::of(COMMON),
+        _ if i.min(j) >= INERTIA_AT && i.max(j) < TURBINE_AT => T::of(COMMON_INERTIA),
         KISS_AT if i.max(j) < INERTIA_AT => correlations.get(i.min(j)).copied().unwrap_or(T::zero()),
         _ => T::zero(),
     }
@@ -368,6 +373,11 @@ struct Innovation<T> {
 }
 
 impl<T: Real> Innovation<T> {
+    /// Whether it is near enough to what was known to be of the same car.
+    fn is_possible(&self) -> bool {
+        self.distance <= T::of(GATE)
+    }
+
     fn of(learnt: &Learnt<T>, acting: &Acting<T>, shown: &Shown<T>) -> Option<Self> {
         let seen = learnt.covariance.map(|row| acting.seen(&row));
         // `(H, s) P (H, s)' + D`, by its rows: `seen` is `P (H, s)'`.

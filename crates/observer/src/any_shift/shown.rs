@@ -122,9 +122,8 @@ fn directions<T: Real>(mut of: Matrix<T>) -> ([T; ACTING], Matrix<T>) {
                     (row[p], row[q]) = turn(row[p], row[q]);
                 }
                 for rows in [&mut of, &mut rows] {
-                    for k in 0..ACTING {
-                        (rows[p][k], rows[q][k]) = turn(rows[p][k], rows[q][k]);
-                    }
+                    let both: [(T, T); ACTING] = core::array::from_fn(|k| turn(rows[p][k], rows[q][k]));
+                    (rows[p], rows[q]) = (both.map(|both| both.0), both.map(|both| both.1));
                 }
             }
         }

@@ -267,7 +267,7 @@ fn a_bad_log_is_harmless_after_a_few_good_shifts() {
         assert!(learnt.checked().is_some(), "{name}");
         // What no shift has shown yet to be wrong is believed in part. Later shifts sort it out.
         assert!(found[0] < 1.2 * unlearnt[0], "{name}: {found:?} {unlearnt:?}");
-        assert!(found[2..].iter().zip(&unlearnt[2..]).all(|(a, b)| *a < 1.05 * b), "{name}: {found:?} {unlearnt:?}");
+        assert!(found[2..].iter().zip(&unlearnt[2..]).all(|(a, b)| *a < 1.1 * b), "{name}: {found:?} {unlearnt:?}");
     }
 }
 

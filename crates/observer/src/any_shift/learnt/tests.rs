@@ -225,9 +225,9 @@ fn the_scale_of_all_torques_is_never_known_better_than_the_stiffness() {
         let before = learnt.known(&acting, &CORRELATIONS);
         // As shafts show that are softer by one deviation.
         let mut known = before;
-        for a in 0..ACTING {
+        for (a, value) in STIFFNESS.into_iter().enumerate() {
             let h = core::array::from_fn(|b| if a == b { 1.0 } else { 0.0 });
-            known = after(&known, &h, STIFFNESS[a], 0.1);
+            known = after(&known, &h, value, 0.1);
         }
         assert!(learnt.take(&acting, &before, &known, &CORRELATIONS));
     }
