@@ -171,7 +171,9 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
             println!("{name}: {:.2} of the known car's, unlearnt {unlearnt:.2}: {}", found / best, before.show());
             println!("  after {SHIFTS} shifts {}", learnt.show());
             // Asked for is 1.2, which not every car meets (docs/any_shift.md). Far from the valve model they all are.
-            assert!(found < 0.6 * learnt.all()[1], "{name}, converter {converter}: {found} {}", learnt.all()[1]);
+            // A converter that is off beside all clutches is a scale of all torques, which only the stiffness of the shafts shows.
+            let most = if converter == 1.0 { 0.6 } else { 0.7 };
+            assert!(found < most * learnt.all()[1], "{name}, converter {converter}: {found} {}", learnt.all()[1]);
             sums[0].add(&before);
             sums[1].add(&learnt);
         }
