@@ -25,7 +25,8 @@ fn names(gearbox: &Gearbox) -> Vec<&str> {
     gearbox.elements.iter().filter(|element| element.pack.is_some()).map(|element| element.name.as_str()).collect()
 }
 
-/// The text of a file of what was learnt of a car with this gearbox. The same numbers are read again from it.
+/// The text of a file of what was learnt of a car with this gearbox. The same numbers are read again from it, but
+/// for the odds, which are those of a drive.
 pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     let row = |values: &[f64]| values.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(", ");
     let elements: Vec<String> = names(gearbox).into_iter().map(toml_string).collect();
@@ -34,7 +35,8 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     let triangle = triangle.map(|(k, values)| format!("  [{}],\n", row(&values[..=k])));
     format!(
         "# What the filter for any shift has learnt of a car. Each number is in units of the deviation that the quantity has\n\
-         # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input.\n\
+         # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input, stiffness\n\
+         # of the drive shafts.\n\
          gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\nmean = [{}]\ncovariance = [\n{}]\n",
         toml_string(&gearbox.name),
         elements.join(", "),
@@ -71,8 +73,8 @@ pub fn read_learnt(gearbox: &Gearbox, source: &Source) -> Result<Learnt<f64>, Co
     let (mean, covariance) = (raw.mean.get_ref(), raw.covariance.get_ref());
     size("mean", raw.mean.span().start, mean.len(), LEARNT)?;
     size("covariance", raw.covariance.span().start, covariance.len(), LEARNT)?;
-    let mut learnt =
-        Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts: raw.shifts, refused: raw.refused };
+    let (shifts, refused) = (raw.shifts, raw.refused);
+    let mut learnt = Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0 };
     learnt.mean.copy_from_slice(mean);
     for (i, row) in covariance.iter().enumerate() {
         size("covariance", raw.covariance.span().start, row.len(), i + 1)?;
@@ -103,7 +105,8 @@ mod tests {
 
     /// Something that was learnt: unequal numbers everywhere.
     fn learnt() -> Learnt<f64> {
-        let mut learnt = Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts: 31, refused: 2 };
+        let mut learnt =
+            Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts: 31, refused: 2, odds: 0.0 };
         for i in 0..LEARNT {
             learnt.mean[i] = 1.0 / (i as f64 + 3.0) - 0.1;
             for j in 0..LEARNT {
@@ -127,8 +130,8 @@ mod tests {
         let refused =
             |text: &str| read_learnt(&gearbox, &Source::built_in("learnt.toml", text)).unwrap_err().to_string();
         let other = refused(&text.replace("\"E\"", "\"F\""));
-        assert!(other.starts_with("learnt.toml:3: `gearbox`: was learnt of the gearbox"), "{other}");
-        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains("has 34 numbers, expected 33"));
+        assert!(other.starts_with("learnt.toml:4: `gearbox`: was learnt of the gearbox"), "{other}");
+        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains("has 35 numbers, expected 34"));
         assert!(refused(&text.replace("7e-1", "-7e-1")).contains("no covariance"));
         assert!(refused(&text.replace("7e-1", "nan")).contains("no covariance"));
         // Cut anywhere in the middle.

@@ -49,12 +49,12 @@ impl RecordedShift {
         filter: &AnyShiftFilter<'_, f64>,
         learnt: &Learnt<f64>,
     ) -> Vec<ShiftScoreRow> {
-        score_from(tables, filter, &mut filter.start_with(learnt), &self.samples, &self.inputs)
+        score_from(tables, filter, &mut filter.go_on_with(learnt), &self.samples, &self.inputs)
     }
 
     /// What a filter has learnt after it, if it had learnt this before.
     pub fn learnt(&self, filter: &AnyShiftFilter<'_, f64>, before: &Learnt<f64>) -> Learnt<f64> {
-        let mut state = filter.start_with(before);
+        let mut state = filter.go_on_with(before);
         for (_, input) in &self.inputs {
             filter.step(&mut state, input);
         }

@@ -2,9 +2,9 @@
 
 use super::running::TURBINE_ACTS;
 use super::{
-    Acting, AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N,
-    OUTPUT, PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput,
-    ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+    AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N, OUTPUT,
+    PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput, ShiftPhase,
+    TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
 
@@ -95,7 +95,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         deviations[RATE] = u.rate_rad_s;
         deviations[SHARE] = u.turbine_share;
         let mut x = Gaussian::of(mean, deviations);
-        let known = state.learnt.known(&Acting::turbine());
+        let known = self.known(&state.learnt, &self.acting_in_gear());
         x.renew(SLOW_SHARE, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
         // Turbine and output are tied.
         let output_variance = square(deviations[OUTPUT]);

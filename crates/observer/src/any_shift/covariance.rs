@@ -115,6 +115,24 @@ impl<T: Real> Gaussian<T> {
         self.covariance[state][state] = variance;
     }
 
+    /// Gives a state another mean and variance. What it says of the others stays, and they follow.
+    pub(super) fn replace(&mut self, state: usize, mean: T, variance: T) {
+        let state = state.min(N - 1);
+        let with = self.covariance[state];
+        let own = with[state];
+        if own <= T::epsilon() {
+            return self.renew(state, mean, variance);
+        }
+        let by_mean = (mean - self.mean[state]) / own;
+        let by_variance = (variance - own) / (own * own);
+        for ((row, x), own) in self.covariance.iter_mut().zip(&mut self.mean).zip(&with) {
+            *x = *x + *own * by_mean;
+            for (p, other) in row.iter_mut().zip(&with) {
+                *p = *p + by_variance * *own * *other;
+            }
+        }
+    }
+
     /// Exchanges two states.
     pub(super) fn swap(&mut self, a: usize, b: usize) {
         let (a, b) = (a.min(N - 1), b.min(N - 1));

@@ -2,35 +2,49 @@
 //!
 //! | quantity | of each | meaning |
 //! |---|---|---|
-//! | `s` | element | factor of its torque: friction times the valve's gain |
+//! | `f` | element | factor of its torque: friction times the valve's gain |
 //! | `k` | element | its kiss point |
 //! | `m` | pair of gears | turbine-side inertia `M11` |
 //! | `c` | car | torque at the gearbox input: the converter's capacity |
 //!
+//! | `e` | car | stiffness of the drive shafts: it is in what is seen, and the filter has no state of it |
+//!
 //! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the six of
-//! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift, and ends with `a+`, the
-//! states of the filter. All others follow by regression:
+//! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`Shown`])
+//! are up to six measurements of these, with noise of variance one, and one Kalman filter of all quantities takes them:
 //!
 //! ```text
-//! K = P H' (H P H' + D)^-1         theta+ = theta + K (a+ - a)         P+ = P - K (P_a - P_a+) K'
+//! y = R (a + s e) + noise          S = R ((H, s) P (H, s)' + D) R' + 1
 //! ```
 //!
-//! Friction and gain are not told apart here: what the speeds show of both is `s` and `k`. A gain moves both, a
-//! friction only `s`, and [`LearntElement`] has what follows of each from what the budget says of them.
+//! **Stiffness.** The scale of all torques that the speeds show is that of the twist of the drive shafts. A shaft that is
+//! softer by a share shows turbine torque, torque factors and inertia larger by that share, in each shift alike: the
+//! direction `s`. Without `e` the shifts together would find the turbine torque with a certainty that they do not have.
+//!
+//! **Another car, or a bad log.** What is learnt is one of two hypotheses; the other is that the car is any of the budget.
+//! Each shift is held against both, and the logarithm of their odds is summed. Before a shift the filter is given the mean
+//! and the covariance of both together, weighted by these odds. Where they speak for the budget by a hundred to one, what
+//! was learnt before is forgotten. What comes from another drive begins with even odds. Some of what a bad log leaves is in
+//! directions that no shift shows, turbine torque against stiffness: so it also begins with the covariance of both together.
+//!
+//! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
+//! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.
 
 use drivetrain::Real;
 
 use super::powertrain::dot;
+use super::shown::{Matrix, Shown, around, cholesky, lower_inverse};
 use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
-/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input.
+/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness.
 const KISS_AT: usize = MAX_ELEMENTS;
 const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
 const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
+const STIFFNESS_AT: usize = TURBINE_AT + 1;
 /// How many quantities are learnt.
-pub const LEARNT: usize = TURBINE_AT + 1;
+pub const LEARNT: usize = STIFFNESS_AT + 1;
 /// How many of them act in a shift.
 pub(super) const ACTING: usize = 6;
 
@@ -50,6 +64,15 @@ const EDGE_OF_TWO: f64 = 2.449;
 /// which all of them share, and friction is two thirds of that of the factor. Without it a friction that is wrong in all
 /// elements alike would be taken for an error of the converter, of which there is one.
 const COMMON: f64 = 0.33;
+/// Logarithm of the odds of what is learnt against the budget \[chosen\]: at most, and with the other sign what is forgotten;
+/// at most by one shift, which may be a bad one itself. A hundred to one, and ten to one: a car that is the one learnt loses what
+/// is learnt once in ten thousand shifts at most (Wald); another car is found in two shifts of a new drive.
+const ODDS_MOST: f64 = 4.6;
+const ODDS_OF_SHIFT: f64 = 2.3;
+/// The same of the inertia of two pairs of gears \[chosen\]: half of the variance is that of the turbine, of the oil in it and of
+/// the input shaft, which are in all of them. Without it an inertia that is wrong in all pairs alike would be taken for an error
+/// of the stiffness, of which there is one.
+const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the temperature of the
@@ -63,7 +86,7 @@ const INERTIA_S: f64 = 3.6e6;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt<T> {
     /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
-    /// by pair of gears, torque at the gearbox input.
+    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts.
     pub mean: [T; LEARNT],
     /// Their covariance, in the same units.
     pub covariance: [[T; LEARNT]; LEARNT],
@@ -71,6 +94,8 @@ pub struct Learnt<T> {
     pub shifts: u32,
     /// Shifts in a row that were refused.
     pub refused: u8,
+    /// Logarithm of the odds that it is of this car, against any car of the budget.
+    pub odds: T,
 }
 
 /// What is learnt of an element: error and its standard deviation.
@@ -95,6 +120,8 @@ pub(super) struct Acting<T> {
     places: [Option<usize>; ACTING],
     /// Part of the variance of torque factors and kiss points that lasts.
     slow_part: T,
+    /// How an error of the stiffness shows in each, per deviation of it.
+    by_stiffness: [T; ACTING],
 }
 
 /// Means and covariance of the acting quantities, as the filter has them.
@@ -106,16 +133,18 @@ pub(super) struct Known<T> {
 
 impl<T: Real> Acting<T> {
     /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input.
-    pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T) -> Self {
+    pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T, by_stiffness: [T; ACTING]) -> Self {
         let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
         let kiss = |at: usize| element(at).map(|at| KISS_AT + at);
         let inertia = pair.filter(|&pair| pair < MAX_PAIRS).map(|pair| INERTIA_AT + pair);
-        Self { places: [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)], slow_part }
+        let places = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
+        Self { places, slow_part, by_stiffness }
     }
 
     /// Only the torque at the gearbox input, as in a gear.
-    pub(super) fn turbine() -> Self {
-        Self { places: [None, None, None, None, None, Some(TURBINE_AT)], slow_part: T::one() }
+    pub(super) fn turbine(by_stiffness: [T; ACTING]) -> Self {
+        let places = [None, None, None, None, None, Some(TURBINE_AT)];
+        Self { places, slow_part: T::one(), by_stiffness }
     }
 
     /// Place of a quantity among all.
@@ -123,10 +152,12 @@ impl<T: Real> Acting<T> {
         self.places.get(a).copied().flatten().filter(|&place| place < LEARNT)
     }
 
-    /// A row of the acting quantities, `H P`, from the rows of all.
-    fn row(&self, a: usize, of: impl Fn(usize) -> [T; LEARNT]) -> [T; LEARNT] {
-        let per_unit = self.per_unit(a).0;
-        self.place(a).map_or([T::zero(); LEARNT], |place| of(place).map(|x| per_unit * x))
+    /// Each of the acting quantities as it shows, `(H, s) x`, from all of them.
+    fn seen(&self, all: &[T; LEARNT]) -> [T; ACTING] {
+        core::array::from_fn(|a| {
+            let own = self.place(a).map_or(T::zero(), |place| self.per_unit(a).0 * all[place]);
+            own + self.by_stiffness[a] * all[STIFFNESS_AT]
+        })
     }
 
     /// How a quantity acts per unit, `H`, and the variance beside it, `D`.
@@ -148,7 +179,7 @@ impl<T: Real> Learnt<T> {
                 *value = unlearnt(correlations, k, j);
             }
         }
-        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0 }
+        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0, odds: T::of(ODDS_MOST) }
     }
 
     /// Mean and covariance of torque factor and kiss point of an element.
@@ -164,8 +195,8 @@ impl<T: Real> Learnt<T> {
         (pair < MAX_PAIRS).then_some([self.mean[place], self.covariance[place][place].sqrt()])
     }
 
-    /// What the acting quantities are before a shift.
-    pub(super) fn known(&self, acting: &Acting<T>) -> Known<T> {
+    /// What the acting quantities are before a shift, by what is learnt alone.
+    fn of_car(&self, acting: &Acting<T>) -> Known<T> {
         let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
         for (a, place) in acting.places.iter().enumerate() {
             let (per_unit, more) = acting.per_unit(a);
@@ -181,85 +212,82 @@ impl<T: Real> Learnt<T> {
         known
     }
 
-    /// Takes what a shift has shown: the acting quantities as they were before it, and after it. Whether it was taken.
-    pub(super) fn take(&mut self, acting: &Acting<T>, before: &Known<T>, after: &Known<T>) -> bool {
-        let Some(inverse) = inverse(&before.covariance) else { return false };
-        let mut moved = [T::zero(); ACTING];
-        for (moved, (after, before)) in moved.iter_mut().zip(after.mean.iter().zip(&before.mean)) {
-            *moved = *after - *before;
+    /// What the acting quantities are before a shift: mean and covariance of what is learnt and of the budget together.
+    pub(super) fn known(&self, acting: &Acting<T>, correlations: &Correlations<T>) -> Known<T> {
+        let (mut known, budget) = (self.of_car(acting), Self::nothing(correlations).of_car(acting));
+        let car = (T::one() + (-self.odds).exp()).recip();
+        let rest = T::one() - car;
+        let mean = known.mean;
+        for (a, row) in known.covariance.iter_mut().enumerate() {
+            for (b, value) in row.iter_mut().enumerate() {
+                *value = car * *value + rest * (budget.covariance[a][b] + car * mean[a] * mean[b]);
+            }
         }
-        let weighted = inverse.map(|row| dot(&row, &moved));
-        let distance = dot(&weighted, &moved);
-        let numbers = after.covariance.iter().flatten().all(|x| x.is_finite());
-        if !(numbers && distance <= T::of(GATE)) {
+        known.mean = mean.map(|mean| car * mean);
+        known
+    }
+
+    /// What a new drive begins with. What was learnt may be of another car, or of a bad log: it is the mean and covariance of it
+    /// and of the budget together, with even odds, and each shift of the drive is held against both anew.
+    pub(super) fn doubted(&self, correlations: &Correlations<T>) -> Self {
+        let (half, budget) = (T::of(0.5), Self::nothing(correlations));
+        let mut doubted = Self { mean: self.mean.map(|mean| half * mean), odds: T::zero(), ..*self };
+        for (i, row) in doubted.covariance.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = half * (*value + budget.covariance[i][j] + half * self.mean[i] * self.mean[j]);
+            }
+        }
+        doubted
+    }
+
+    /// Takes what a shift has shown: the acting quantities as they were before it, and after it. Whether it was taken.
+    pub(super) fn take(
+        &mut self,
+        acting: &Acting<T>,
+        before: &Known<T>,
+        after: &Known<T>,
+        correlations: &Correlations<T>,
+    ) -> bool {
+        let Some(shown) = Shown::between(before, after) else { return false };
+        let nothing = Self::nothing(correlations);
+        let by_budget = Innovation::of(&nothing, acting, &shown);
+        let (Some(mut by_car), Some(by_budget)) = (Innovation::of(self, acting, &shown), by_budget) else {
+            return false;
+        };
+        // What no car of the budget shows speaks for none.
+        if !by_budget.is_possible() {
             return false;
         }
-        // A shift that says more than is likely counts for less.
-        let weight = (T::of(LIKELY) / distance.max(T::of(LIKELY))).sqrt();
-        let gain = self.regression(acting, &inverse);
-        for (k, (mean, gain)) in self.mean.iter_mut().zip(&gain).enumerate() {
-            let edge = T::of(edge(k));
-            *mean = (*mean + weight * dot(gain, &moved)).max(-edge).min(edge);
+        let (most, of_shift) = (T::of(ODDS_MOST), T::of(ODDS_OF_SHIFT));
+        self.odds = self.odds + (by_car.likelihood - by_budget.likelihood).max(-of_shift).min(of_shift);
+        self.odds = self.odds.min(most);
+        if self.odds < -most {
+            (*self, by_car) = (nothing, by_budget);
         }
-        let mut left = before.covariance;
-        for (left, after) in left.iter_mut().flatten().zip(after.covariance.iter().flatten()) {
-            *left = *left + weight * (*after - *left);
+        if !by_car.is_possible() {
+            return false;
         }
-        self.correct(acting, &gain, before, &left);
+        self.correct(&by_car);
         true
     }
 
-    /// The covariance when that of the acting quantities has become `left`: `(I - K H) P (I - K H)' + K (P_a - H P H' + left) K'`.
-    /// In this form rounding does not add up.
-    fn correct(
-        &mut self,
-        acting: &Acting<T>,
-        gain: &[[T; ACTING]; LEARNT],
-        before: &Known<T>,
-        left: &[[T; ACTING]; ACTING],
-    ) {
-        let mut noise = *left;
-        for (a, noise) in noise.iter_mut().enumerate() {
-            let per_unit = acting.per_unit(a).0;
-            let own = acting.place(a).map_or(T::zero(), |place| self.covariance[place][place]);
-            noise[a] = noise[a] + (before.covariance[a][a] - per_unit * per_unit * own).max(T::zero());
+    /// Corrects all quantities: `theta + W e`, `P - w W W'`. The product is made of two equal factors, so that `P` stays
+    /// symmetric to the last digit. A shift that says more than is likely counts for less, by `w`.
+    fn correct(&mut self, by: &Innovation<T>) {
+        let weight = (T::of(LIKELY) / by.distance.max(T::of(LIKELY))).sqrt();
+        let with: [[T; ACTING]; LEARNT] = core::array::from_fn(|k| by.with[k].map(|x| x * weight.sqrt()));
+        for (k, mean) in self.mean.iter_mut().enumerate() {
+            let edge = T::of(edge(k));
+            *mean = (*mean + weight * dot(&by.with[k], &by.innovation)).max(-edge).min(edge);
         }
-        // P - K (H P), then the same from the other side.
-        let rows = core::array::from_fn::<_, ACTING, _>(|a| acting.row(a, |place| self.covariance[place]));
-        for (p, gain) in self.covariance.iter_mut().zip(gain) {
-            for (gain, row) in gain.iter().zip(&rows) {
-                for (p, x) in p.iter_mut().zip(row) {
-                    *p = *p - *gain * *x;
-                }
+        for (i, row) in self.covariance.iter_mut().enumerate() {
+            for (p, other) in row.iter_mut().zip(&with) {
+                *p = *p - dot(&with[i], other);
+            }
+            if row[i] < T::one() {
+                row[i] = row[i] + T::of(PER_SHIFT);
             }
         }
-        for (p, own) in self.covariance.iter_mut().zip(gain) {
-            let with: [T; ACTING] =
-                core::array::from_fn(|a| acting.place(a).map_or(T::zero(), |place| acting.per_unit(a).0 * p[place]));
-            let of_noise = noise.map(|row| dot(&row, own));
-            let both: [T; ACTING] = core::array::from_fn(|a| of_noise[a] - with[a]);
-            for (p, gain) in p.iter_mut().zip(gain) {
-                *p = *p + dot(&both, gain);
-            }
-        }
-        for i in 0..LEARNT {
-            for j in 0..i {
-                let mean = T::of(0.5) * (self.covariance[i][j] + self.covariance[j][i]);
-                (self.covariance[i][j], self.covariance[j][i]) = (mean, mean);
-            }
-            if self.covariance[i][i] < T::one() {
-                self.covariance[i][i] = self.covariance[i][i] + T::of(PER_SHIFT);
-            }
-        }
-    }
-
-    /// All quantities by the acting ones: `K = P H' P_a^-1`.
-    fn regression(&self, acting: &Acting<T>, inverse: &[[T; ACTING]; ACTING]) -> [[T; ACTING]; LEARNT] {
-        let with = core::array::from_fn::<_, ACTING, _>(|a| acting.row(a, |place| self.covariance[place]));
-        core::array::from_fn(|k| {
-            let with = with.map(|row| row[k]);
-            inverse.map(|row| dot(&row, &with))
-        })
     }
 
     /// Counts a shift that was taken, or refused; after many refused ones in a row all is forgotten.
@@ -278,7 +306,8 @@ impl<T: Real> Learnt<T> {
     pub(super) fn pass(&mut self, dt_s: T, correlations: &Correlations<T>) {
         let one = T::one();
         let [oil, inertia] = [WITH_OIL_S, INERTIA_S].map(|s| (-dt_s / T::of(s)).exp());
-        let stay = |k: usize| if (INERTIA_AT..TURBINE_AT).contains(&k) { inertia } else { oil };
+        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || k == STIFFNESS_AT;
+        let stay = |k: usize| if lasts(k) { inertia } else { oil };
         for i in 0..LEARNT {
             self.mean[i] = stay(i) * self.mean[i];
             for j in 0..LEARNT {
@@ -294,7 +323,7 @@ impl<T: Real> Learnt<T> {
         let means = self.mean.iter().enumerate().all(|(k, &mean)| within(mean, edge(k)));
         let symmetric = (0..LEARNT).all(|i| (0..i).all(|j| self.covariance[i][j] == self.covariance[j][i]));
         let variances = (0..LEARNT).all(|i| within(self.covariance[i][i], VARIANCE_MOST));
-        means && symmetric && variances && is_positive(self.covariance)
+        means && symmetric && variances && within(self.odds, ODDS_MOST) && is_positive(self.covariance)
     }
 
     /// What was read from a file, or `None` if it cannot be what a filter has learnt: not numbers, outside the bounds, or no
@@ -311,6 +340,7 @@ impl<T: Real> Learnt<T> {
             covariance: self.covariance.map(|row| row.map(to)),
             shifts: self.shifts,
             refused: self.refused,
+            odds: to(self.odds),
         }
     }
 }
@@ -325,38 +355,56 @@ fn unlearnt<T: Real>(correlations: &Correlations<T>, i: usize, j: usize) -> T {
     match i.abs_diff(j) {
         0 => T::one(),
         _ if i.max(j) < KISS_AT => T::of(COMMON),
+        _ if i.min(j) >= INERTIA_AT && i.max(j) < TURBINE_AT => T::of(COMMON_INERTIA),
         KISS_AT if i.max(j) < INERTIA_AT => correlations.get(i.min(j)).copied().unwrap_or(T::zero()),
         _ => T::zero(),
     }
 }
 
-/// The inverse of a covariance, or `None` if it has none.
-fn inverse<T: Real>(of: &[[T; ACTING]; ACTING]) -> Option<[[T; ACTING]; ACTING]> {
-    let mut left = *of;
-    let mut right = [[T::zero(); ACTING]; ACTING];
-    for (k, row) in right.iter_mut().enumerate() {
-        row[k] = T::one();
+/// What a shift has shown beside what was known, in independent directions of variance one.
+struct Innovation<T> {
+    innovation: [T; ACTING],
+    /// Covariance of all quantities with each of them.
+    with: [[T; ACTING]; LEARNT],
+    /// Squared distance from what was known.
+    distance: T,
+    /// Logarithm of the likelihood, but for what does not depend on what was known.
+    likelihood: T,
+}
+
+impl<T: Real> Innovation<T> {
+    /// Whether it is near enough to what was known to be of the same car.
+    fn is_possible(&self) -> bool {
+        self.distance <= T::of(GATE)
     }
-    // Gauss and Jordan; a covariance needs no exchange of rows.
-    for k in 0..ACTING {
-        let pivot = left[k][k];
-        if !(pivot > T::epsilon() && pivot.is_finite()) {
-            return None;
+
+    fn of(learnt: &Learnt<T>, acting: &Acting<T>, shown: &Shown<T>) -> Option<Self> {
+        let seen = learnt.covariance.map(|row| acting.seen(&row));
+        // `(H, s) P (H, s)' + D`, by its rows: `seen` is `P (H, s)'`.
+        let mut covariance: Matrix<T> = core::array::from_fn(|b| {
+            let column: [T; LEARNT] = core::array::from_fn(|k| seen[k][b]);
+            acting.seen(&column)
+        });
+        for (a, row) in covariance.iter_mut().enumerate() {
+            row[a] = row[a] + acting.per_unit(a).1;
         }
-        for j in 0..ACTING {
-            left[k][j] = left[k][j] / pivot;
-            right[k][j] = right[k][j] / pivot;
+        let mut noisy = around(&shown.rows, &covariance);
+        for (k, row) in noisy.iter_mut().enumerate() {
+            row[k] = row[k] + T::one();
         }
-        let (left_row, right_row) = (left[k], right[k]);
-        for i in (0..ACTING).filter(|&i| i != k) {
-            let factor = left[i][k];
-            for j in 0..ACTING {
-                left[i][j] = left[i][j] - factor * left_row[j];
-                right[i][j] = right[i][j] - factor * right_row[j];
-            }
-        }
+        let lower = cholesky(&noisy)?;
+        let inverse = lower_inverse(&lower);
+        let expected = acting.seen(&learnt.mean);
+        let beside: [T; ACTING] = core::array::from_fn(|i| shown.values[i] - dot(&shown.rows[i], &expected));
+        let innovation = inverse.map(|row| dot(&row, &beside));
+        let with = seen.map(|row| {
+            let by_value = shown.rows.map(|of| dot(&of, &row));
+            inverse.map(|row| dot(&row, &by_value))
+        });
+        let distance = dot(&innovation, &innovation);
+        let spread = (0..ACTING).fold(T::zero(), |sum, k| sum + lower[k][k].ln());
+        Some(Self { innovation, with, distance, likelihood: -T::of(0.5) * distance - spread })
     }
-    Some(right)
 }
 
 /// Whether a symmetric matrix is that of a covariance: all pivots are positive.
@@ -377,164 +425,4 @@ fn is_positive<T: Real>(mut of: [[T; LEARNT]; LEARNT]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CORRELATIONS: Correlations<f64> = [-0.3; MAX_ELEMENTS];
-    const PART: f64 = 0.75;
-
-    fn shift() -> Acting<f64> {
-        Acting::new([1, 4], Some(2), PART)
-    }
-
-    /// What a filter knows after a measurement of `h a` with a variance of the noise.
-    fn after(before: &Known<f64>, h: &[f64; ACTING], value: f64, noise: f64) -> Known<f64> {
-        let with = before.covariance.map(|row| dot(&row, h));
-        let variance = dot(&with, h) + noise;
-        let innovation = value - dot(h, &before.mean);
-        let mut after = *before;
-        for a in 0..ACTING {
-            after.mean[a] += with[a] / variance * innovation;
-            for b in 0..ACTING {
-                after.covariance[a][b] -= with[a] * with[b] / variance;
-            }
-        }
-        after
-    }
-
-    /// Numbers from -1 to 1 (linear congruential).
-    fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    /// The regression is the Kalman filter of all quantities with the part that does not last as noise.
-    #[test]
-    fn what_a_shift_shows_reaches_all_quantities_as_in_one_filter() {
-        let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
-        // Other shifts have tied the quantities to each other.
-        let mut seed = 1;
-        for pair in 0..6 {
-            let acting = Acting::new([pair, pair + 1], Some(pair), PART);
-            let h = core::array::from_fn(|_| random(&mut seed));
-            let before = learnt.known(&acting);
-            assert!(learnt.take(&acting, &before, &after(&before, &h, 0.5, 0.1)));
-        }
-        let (before, h) = (learnt.known(&acting), [0.9, -0.2, 0.4, 0.1, -0.7, 0.8]);
-        let mut taken = learnt;
-        assert!(taken.take(&acting, &before, &after(&before, &h, 0.8, 0.2)));
-        let mut row = [0.0; LEARNT];
-        let mut noise = 0.2;
-        for a in 0..ACTING {
-            let (per_unit, more) = acting.per_unit(a);
-            row[acting.places[a].unwrap()] += per_unit * h[a];
-            noise += more * h[a] * h[a];
-        }
-        let with = learnt.covariance.map(|line| dot(&line, &row));
-        let variance = dot(&with, &row) + noise;
-        let innovation = 0.8 - dot(&row, &learnt.mean);
-        for i in 0..LEARNT {
-            assert!((taken.mean[i] - learnt.mean[i] - with[i] / variance * innovation).abs() < 1e-9, "{i}");
-            for j in 0..LEARNT {
-                let drift = if i == j && learnt.covariance[i][i] < 1.0 { PER_SHIFT } else { 0.0 };
-                let expected = learnt.covariance[i][j] - with[i] * with[j] / variance + drift;
-                assert!((taken.covariance[i][j] - expected).abs() < 1e-9, "{i} {j}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_shift_that_shows_nothing_teaches_nothing() {
-        let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
-        let (mut learnt, mut known) = (nothing, nothing.known(&acting));
-        // The part that does not last has walked, and nothing was seen of it.
-        known.covariance[0][0] += 0.3;
-        assert!(learnt.take(&acting, &known, &known));
-        let change = learnt.covariance.iter().flatten().zip(nothing.covariance.iter().flatten());
-        assert!(change.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < PER_SHIFT + 1e-12);
-        assert_eq!(learnt.mean, nothing.mean);
-    }
-
-    #[test]
-    fn what_cannot_be_is_refused_and_often_refused_is_another_car() {
-        let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
-        let h = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let before = learnt.known(&acting);
-        assert!(learnt.take(&acting, &before, &after(&before, &h, 1.0, 0.01)));
-        learnt.count(true, &CORRELATIONS);
-        let known = learnt;
-        for value in [9.0, -9.0, f64::NAN, f64::INFINITY] {
-            let before = learnt.known(&acting);
-            assert!(!learnt.take(&acting, &before, &after(&before, &h, value, 0.01)), "{value}");
-            let mut odd = before;
-            odd.covariance[2][3] = f64::NAN;
-            assert!(!learnt.take(&acting, &before, &odd));
-        }
-        assert_eq!(learnt, known);
-        for refused in 1..=REFUSED_MOST {
-            learnt.count(false, &CORRELATIONS);
-            assert_eq!(learnt.shifts, u32::from(refused < REFUSED_MOST));
-        }
-        assert_eq!(learnt, Learnt::nothing(&CORRELATIONS));
-    }
-
-    /// Whatever the shifts show, in single precision too.
-    #[test]
-    fn ten_thousand_shifts_leave_a_covariance_and_means_within_the_bounds() {
-        let correlations = CORRELATIONS.map(|correlation| correlation as f32);
-        let (mut learnt, mut seed, mut taken) = (Learnt::nothing(&correlations), 5, 0);
-        for k in 0..10_000 {
-            let at = k % 7;
-            let acting = Acting::new([at, at + 1], Some(at), PART as f32);
-            let known = learnt.known(&acting);
-            let double =
-                Known { mean: known.mean.map(f64::from), covariance: known.covariance.map(|row| row.map(f64::from)) };
-            let h = core::array::from_fn(|_| random(&mut seed));
-            let shown = after(&double, &h, 3.0 * random(&mut seed), 1e-4);
-            let shown = Known {
-                mean: shown.mean.map(|x| x as f32),
-                covariance: shown.covariance.map(|row| row.map(|x| x as f32)),
-            };
-            taken += u32::from(learnt.take(&acting, &known, &shown));
-            learnt.pass(20.0, &correlations);
-            assert!(learnt.is_sound(), "{k}");
-        }
-        assert!(taken > 2000, "{taken}");
-    }
-
-    #[test]
-    fn time_makes_it_unknown_again() {
-        let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
-        let (mut learnt, before) = (nothing, nothing.known(&acting));
-        assert!(learnt.take(&acting, &before, &after(&before, &[0.5; ACTING], 1.0, 0.01)));
-        let (friction, inertia) = (learnt.mean[1], learnt.mean[INERTIA_AT + 2]);
-        assert!(friction > 0.05 && inertia > 0.05);
-        // A night: the oil is cold again, and the inertia is that of the day before.
-        learnt.pass(12.0 * 3600.0, &CORRELATIONS);
-        assert!(learnt.mean[1] < 0.01 * friction && learnt.mean[INERTIA_AT + 2] > 0.98 * inertia);
-        assert!((learnt.covariance[1][1] - 1.0).abs() < 0.01);
-    }
-
-    #[test]
-    fn what_is_read_must_be_what_a_filter_can_have_learnt() {
-        let nothing = Learnt::nothing(&CORRELATIONS);
-        assert_eq!(nothing.checked(), Some(nothing));
-        let wrong = |change: fn(&mut Learnt<f64>)| {
-            let mut learnt = nothing;
-            change(&mut learnt);
-            learnt.checked()
-        };
-        assert_eq!(wrong(|learnt| learnt.mean[3] = f64::NAN), None);
-        assert_eq!(wrong(|learnt| learnt.mean[3] = 2.6), None);
-        assert_eq!(wrong(|learnt| learnt.covariance[3][3] = -1.0), None);
-        assert_eq!(wrong(|learnt| learnt.covariance[3][3] = 1e9), None);
-        assert_eq!(wrong(|learnt| learnt.covariance[3][4] = 0.1), None);
-        assert_eq!(
-            wrong(|learnt| {
-                learnt.covariance[3][4] = 1.1;
-                learnt.covariance[4][3] = 1.1;
-            }),
-            None
-        );
-    }
-}
+mod tests;

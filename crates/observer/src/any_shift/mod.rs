@@ -22,7 +22,7 @@
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
 //! `c`, `f`, `k` and `m` last longer than a shift. What a shift has shown of them is kept in [`Learnt`], which can be saved
-//! and given to another filter of the same car ([`AnyShiftFilter::start_with`]).
+//! and given to another filter of the same car ([`AnyShiftFilter::start_with`]), which believes it as far as its shifts show it.
 
 mod begin;
 mod correct;
@@ -36,6 +36,7 @@ mod powertrain;
 mod predict;
 mod readings;
 mod running;
+mod shown;
 mod tables;
 mod turbine;
 
@@ -301,11 +302,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Its memory before the first step, with nothing learnt.
     pub fn start(&self) -> AnyShiftState<T> {
-        self.start_with(&Learnt::nothing(&self.correlations()))
+        self.go_on_with(&Learnt::nothing(&self.correlations()))
     }
 
-    /// Its memory before the first step, with what was learnt before.
+    /// Its memory before the first step of a new drive, with what was learnt in another one. That may have been another car, or a
+    /// bad log: it is believed with even odds, until shifts of this drive have shown it.
     pub fn start_with(&self, learnt: &Learnt<T>) -> AnyShiftState<T> {
+        self.go_on_with(&learnt.doubted(&self.correlations()))
+    }
+
+    /// Its memory before the next step of the same drive, with what was learnt in it.
+    pub fn go_on_with(&self, learnt: &Learnt<T>) -> AnyShiftState<T> {
         let mut elements = [None; MAX_ELEMENTS];
         for (state, element) in elements.iter_mut().zip(self.tables.elements) {
             *state = Some(ElementState::new(element, &self.limits));

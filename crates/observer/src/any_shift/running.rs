@@ -3,7 +3,7 @@
 use super::{
     ACTING, Acting, AnyShiftFilter, Correlations, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS, Known, LASTING,
     Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SLOW_SHARE, ShiftPhase, ShiftRow,
-    ShiftUncertainty, Slip, square,
+    ShiftUncertainty, Slip,
 };
 use drivetrain::Real;
 
@@ -11,9 +11,6 @@ use drivetrain::Real;
 pub(super) const TURBINE_ACTS: usize = ACTING - 1;
 /// That of the inertia.
 const INERTIA_ACTS: usize = 4;
-/// Share of the variance by which the filter's turbine torque may differ from what is learnt of it and still be the same: by
-/// rounding, and by what each shift adds.
-const SAME: f64 = 0.1;
 
 impl<T: Real> ShiftUncertainty<T> {
     /// Deviation of the part of the turbine torque's error that lasts, from that of the whole, as shares.
@@ -118,12 +115,34 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// What is learnt and acts in a shift.
     pub(super) fn acting(&self, shift: &ShiftRow<T>) -> Acting<T> {
         let elements = shift.clutches.map(|clutch| clutch.element);
-        Acting::new(elements, self.tables.pair(shift.from, shift.to), self.uncertainty.slow_part)
+        let pair = self.tables.pair(shift.from, shift.to);
+        Acting::new(elements, pair, self.uncertainty.slow_part, self.by_stiffness())
+    }
+
+    /// The same in a gear.
+    pub(super) fn acting_in_gear(&self) -> Acting<T> {
+        Acting::turbine(self.by_stiffness())
+    }
+
+    /// How an error of the stiffness of the drive shafts shows in the lasting states, per deviation of it: as one of all
+    /// torques alike, and of none of the kiss points.
+    fn by_stiffness(&self) -> [T; ACTING] {
+        let u = &self.uncertainty;
+        let source =
+            if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
+        let in_shares =
+            [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, u.slow_share(source)];
+        in_shares.map(|share| if share > T::zero() { u.stiffness_share / share } else { T::zero() })
+    }
+
+    /// What is known before a shift, or in a gear.
+    pub(super) fn known(&self, learnt: &Learnt<T>, acting: &Acting<T>) -> Known<T> {
+        learnt.known(acting, &self.correlations())
     }
 
     /// Puts what is learnt into the states of a shift.
     pub(super) fn enter_shift(&self, running: &mut Running<T>, shift: ShiftRow<T>, learnt: &Learnt<T>) {
-        let known = learnt.known(&self.acting(&shift));
+        let known = self.known(learnt, &self.acting(&shift));
         let x = &mut running.x;
         x.active = N;
         let turbine = x.covariance[SLOW_SHARE][SLOW_SHARE];
@@ -148,8 +167,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// The gear holds, and the shift is learnt from.
     pub(super) fn end_shift(&self, running: &mut Running<T>, gear: usize, learnt: &mut Learnt<T>) {
         if let Some((before, shift)) = running.before.take().zip(running.shift) {
-            let taken = running.x.is_sound() && learnt.take(&self.acting(&shift), &before, &running.lasting());
-            learnt.count(taken, &self.correlations());
+            let correlations = self.correlations();
+            let taken =
+                running.x.is_sound() && learnt.take(&self.acting(&shift), &before, &running.lasting(), &correlations);
+            learnt.count(taken, &correlations);
         }
         self.take_turbine(running, learnt);
         running.renew_shift();
@@ -157,19 +178,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         running.phase = PhaseMemory::new(ShiftPhase::InGear);
     }
 
-    /// Makes the lasting part of the turbine torque's error what is learnt of it. Where that is what the filter has, the rest
-    /// of what it knows stays tied to it.
+    /// Makes the lasting part of the turbine torque's error what is learnt of it.
     fn take_turbine(&self, running: &mut Running<T>, learnt: &Learnt<T>) {
-        let known = learnt.known(&Acting::turbine());
-        let (mean, variance) = (known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
-        let x = &mut running.x;
-        let more = variance - x.covariance[SLOW_SHARE][SLOW_SHARE];
-        let same = square(x.mean[SLOW_SHARE] - mean).max(more.abs()) <= T::of(SAME) * variance;
-        if !same {
-            x.renew(SLOW_SHARE, mean, variance);
-        } else if more > T::zero() {
-            x.add(SLOW_SHARE, SLOW_SHARE, more);
-        }
+        let known = self.known(learnt, &self.acting_in_gear());
+        running.x.replace(SLOW_SHARE, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
     }
 
     /// Another shift. From a gear it begins with what is learnt; an element that takes part in both this shift and the one
@@ -187,7 +199,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if from_gear {
             self.learn_turbine(running, learnt);
             self.enter_shift(running, shift, learnt);
-            running.before = (running.misfit <= T::of(MISFIT)).then(|| learnt.known(&self.acting(&shift)));
+            running.before = (running.misfit <= T::of(MISFIT)).then(|| self.known(learnt, &self.acting(&shift)));
         } else {
             self.change_shift(running, shift, learnt);
             running.before = None;
@@ -203,12 +215,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Learns what the time in a gear has shown of the turbine torque.
     fn learn_turbine(&self, running: &mut Running<T>, learnt: &mut Learnt<T>) {
-        let acting = Acting::turbine();
-        let before = learnt.known(&acting);
+        let acting = self.acting_in_gear();
+        let before = self.known(learnt, &acting);
         let mut after = before;
         after.mean[TURBINE_ACTS] = running.x.mean[SLOW_SHARE];
         after.covariance[TURBINE_ACTS][TURBINE_ACTS] = running.x.covariance[SLOW_SHARE][SLOW_SHARE];
-        learnt.take(&acting, &before, &after);
+        learnt.take(&acting, &before, &after, &self.correlations());
         self.take_turbine(running, learnt);
     }
 
@@ -223,7 +235,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             core::mem::swap(off, on);
         }
-        let known = learnt.known(&self.acting(&shift));
+        let known = self.known(learnt, &self.acting(&shift));
         for (c, clutch) in shift.clutches.iter().enumerate() {
             let c = c.min(1);
             if before.is_some_and(|before| before[c] == clutch.element) {

@@ -126,6 +126,23 @@ fn single_outliers_cost_little() {
     assert!(usual.iter().zip(&wrong).all(|(usual, wrong)| wrong - usual < 0.3), "{usual:?} {wrong:?}");
 }
 
+/// The errors while both slip of the clutch that controls at that time, which is the other one after the turbine torque has
+/// changed its sign; by kind.
+fn of_the_controlling(mut rows_of: impl FnMut(&Car, &CarShift) -> Vec<ShiftScoreRow>) -> [SquaredErrors; 4] {
+    let car = &cars()[0];
+    let mut sums = [SquaredErrors::default(); 4];
+    for (from, to, throttle) in shifts(car) {
+        let [off, on] = [from, to].map(|gear| car.gearbox.gears[gear].ratio);
+        let kind = ShiftKind::of(throttle - 0.01, off, on).unwrap();
+        let at = ShiftKind::ALL.iter().position(|&other| other == kind).unwrap();
+        for row in rows_of(car, &CarShift::usual(car, from, to, throttle)) {
+            let controls = usize::from(row.turbine_n_m[0] * (off - on) > 0.0);
+            sums[at].add(&SquaredErrors::of(&[row], TruePhase::Inertia, controls));
+        }
+    }
+    sums
+}
+
 #[test]
 fn a_throttle_that_moves_in_the_shift_swaps_the_roles_of_the_clutches() {
     let usual = as_usual();
@@ -136,6 +153,21 @@ fn a_throttle_that_moves_in_the_shift_swaps_the_roles_of_the_clutches() {
             let samples = moved_throttle(car, &draw(car, seed_of(shift)), shift, after_s, throttle);
             rows(car, &samples, 1, |_| {})
         });
+    }
+    for after_s in [None, Some(0.3), Some(0.45), Some(0.6)] {
+        let sums = of_the_controlling(|car, shift| {
+            let (truth, moved) = (draw(car, seed_of(shift)), if shift.throttle > 0.0 { 0.0 } else { 0.2 });
+            let samples = match after_s {
+                None => simulated(car, &truth, shift).unwrap(),
+                Some(after_s) => moved_throttle(car, &truth, shift, after_s, moved),
+            };
+            rows(car, &samples, 1, |_| {})
+        });
+        let shown = sums.map(|sum| {
+            let [estimate, open_loop] = sum.rms_n_m();
+            format!("{:.2} ({estimate:.1} / {open_loop:.1} N m)", estimate / open_loop)
+        });
+        println!("moved {after_s:?}, the clutch that controls at the time: {}", shown.join(", "));
     }
     println!("usual {usual:.2?}, throttle moved 0.3, 0.45, 0.6 s after the request {all:.2?}");
     assert!(all.iter().flatten().all(|&ratio| ratio < 1.0), "{all:?}");

@@ -20,14 +20,18 @@ struct Drive {
 impl Drive {
     fn new(draw: impl Fn(&Car) -> ShiftDraw, seed: u64) -> Self {
         let car = cars().remove(0);
-        let truth = draw(&car).car(&car);
-        let tables = tables_with_inertia(&car, 1.0).unwrap();
+        Self::of(&car, &draw(&car).car(&car), seed)
+    }
+
+    /// All shifts of the car `car` that truly is `truth`.
+    fn of(car: &Car, truth: &Car, seed: u64) -> Self {
+        let tables = tables_with_inertia(car, 1.0).unwrap();
         let record = |(k, (from, to, throttle))| {
-            let shift = CarShift::usual(&car, from, to, throttle);
-            RecordedShift::new(&car, &truth, &tables, shift, &sensors(), 100 * seed + k as u64).unwrap()
+            let shift = CarShift::usual(car, from, to, throttle);
+            RecordedShift::new(car, truth, &tables, shift, &sensors(), 100 * seed + k as u64).unwrap()
         };
-        let shifts = shifts(&car).into_iter().enumerate().map(record).collect();
-        Self { car, shifts }
+        let shifts = shifts(car).into_iter().enumerate().map(record).collect();
+        Self { car: car.clone(), shifts }
     }
 
     /// What is learnt in so many of its shifts in a random order, and the errors with it.
@@ -167,7 +171,9 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
             println!("{name}: {:.2} of the known car's, unlearnt {unlearnt:.2}: {}", found / best, before.show());
             println!("  after {SHIFTS} shifts {}", learnt.show());
             // Asked for is 1.2, which not every car meets (docs/any_shift.md). Far from the valve model they all are.
-            assert!(found < 0.6 * learnt.all()[1], "{name}, converter {converter}: {found} {}", learnt.all()[1]);
+            // A converter that is off beside all clutches is a scale of all torques, which only the stiffness of the shafts shows.
+            let most = if converter == 1.0 { 0.6 } else { 0.7 };
+            assert!(found < most * learnt.all()[1], "{name}, converter {converter}: {found} {}", learnt.all()[1]);
             sums[0].add(&before);
             sums[1].add(&learnt);
         }
@@ -202,9 +208,10 @@ fn cars_of_the_budget_are_learnt() {
     }
 }
 
-/// A log that is wrong teaches little, and never beyond the bounds.
+/// A log that is wrong teaches little, and never beyond the bounds. In the good drive after it the error is soon that of a filter
+/// that has learnt nothing.
 #[test]
-fn a_bad_log_leaves_what_is_learnt_within_its_bounds() {
+fn a_bad_log_is_harmless_after_a_few_good_shifts() {
     type Damage = fn(&mut ShiftInput<f64>, &mut Random);
     let damages: [(&str, Damage); 8] = [
         ("outliers of 5 rad/s in 2 % of the readings", |input, random| {
@@ -243,23 +250,58 @@ fn a_bad_log_leaves_what_is_learnt_within_its_bounds() {
         }),
     ];
     let drive = Drive::new(uniform(1.05, 0.97, 1.02), 3);
-    let [unlearnt, open_loop] = drive.after(0, 1.0, 1).1.all();
+    let tables = tables_with_inertia(&drive.car, 1.0).unwrap();
+    let filter = filter(&drive.car, &tables, &sensors());
+    let nothing = *filter.start().learnt();
+    let unlearnt = in_drive(&drive, &nothing);
+    println!("unlearnt, after {GOOD:?} good shifts: {unlearnt:.2?} N m");
     for (name, damage) in damages {
         let mut bad = Drive { car: drive.car.clone(), shifts: drive.shifts.clone() };
         let mut random = Random(4);
         bad.shifts.iter_mut().flat_map(RecordedShift::inputs_mut).for_each(|input| damage(input, &mut random));
         let learnt = bad.after(SHIFTS, 1.0, 7).0;
-        let sound = drive.with(&learnt, 1.0).all()[0];
-        let again = drive.with(&drive.learn(learnt, SHIFTS, 1.0, 8), 1.0).all()[0];
+        let kept = drive.with(&learnt, 1.0).all()[0];
+        let found = in_drive(&drive, filter.start_with(&learnt).learnt());
         println!(
-            "{name}: {} shifts learnt; good shifts then {sound:.2} N m, after {SHIFTS} good ones {again:.2}, unlearnt {unlearnt:.2}, valve models {open_loop:.2}",
+            "{name}: {} shifts learnt; then {found:.2?}; with what was learnt in it kept {kept:.2}",
             learnt.shifts
         );
         assert!(learnt.checked().is_some(), "{name}");
-        assert!(again < 1.02 * sound, "{name}: {again} {sound}");
-        // Commands that are a fifth high are a car with other clutches, until good shifts say otherwise: it errs by at most a
-        // fifth more than the valve models of the car as it is known.
-        assert!(sound < 1.2 * open_loop, "{name}: {sound} {open_loop}");
+        // What no shift has shown yet to be wrong is believed in part. Later shifts sort it out.
+        assert!(found[0] < 1.2 * unlearnt[0], "{name}: {found:?} {unlearnt:?}");
+        assert!(found[2..].iter().zip(&unlearnt[2..]).all(|(a, b)| *a < 1.1 * b), "{name}: {found:?} {unlearnt:?}");
+    }
+}
+
+/// Good shifts after which the errors are scored.
+const GOOD: [usize; 5] = [0, 1, 3, 10, SHIFTS];
+
+/// The errors after so many shifts of a drive that begins with this, over some orders of the shifts, N m.
+fn in_drive(drive: &Drive, begins_with: &Learnt<f64>) -> [f64; GOOD.len()] {
+    GOOD.map(|count| {
+        let mut sum = Errors::default();
+        let orders = if count == 0 { 1 } else { 2 * draws() };
+        for order in 0..orders {
+            sum.add(&drive.with(&drive.learn(*begins_with, count, 1.0, 100 + order), 1.0));
+        }
+        sum.all()[0]
+    })
+}
+
+/// Shafts whose stiffness is off by all that the budget has: it is the same in each shift, and no reason to learn another
+/// converter from them.
+#[test]
+fn wrong_stiffness_is_not_learnt_as_another_converter() {
+    for stiffness in [0.8, 1.2] {
+        let car = cars().remove(0);
+        let mut truth = car.clone();
+        truth.driveline.shaft_stiffness_n_m_rad *= stiffness;
+        let drive = Drive::of(&car, &truth, 1);
+        let [before, learnt, long] = [0, SHIFTS, 5 * SHIFTS].map(|count| after(&drive, count, 1.0).all()[0]);
+        println!(
+            "stiffness times {stiffness}: unlearnt {before:.2}, learnt {learnt:.2}, after five times as many {long:.2}"
+        );
+        assert!(learnt < 1.15 * before && long < 1.15 * before, "{stiffness}: {before} {learnt} {long}");
     }
 }
 

@@ -1,0 +1,237 @@
+//! Tests of what is learnt from shift to shift.
+
+use super::*;
+
+const CORRELATIONS: Correlations<f64> = [-0.3; MAX_ELEMENTS];
+const PART: f64 = 0.75;
+const STIFFNESS: [f64; ACTING] = [0.9, 0.9, 0.0, 0.0, 1.0, 2.3];
+
+fn shift() -> Acting<f64> {
+    Acting::new([1, 4], Some(2), PART, STIFFNESS)
+}
+
+/// What a filter knows after a measurement of `h a` with a variance of the noise.
+fn after(before: &Known<f64>, h: &[f64; ACTING], value: f64, noise: f64) -> Known<f64> {
+    let with = before.covariance.map(|row| dot(&row, h));
+    let variance = dot(&with, h) + noise;
+    let innovation = value - dot(h, &before.mean);
+    let mut after = *before;
+    for a in 0..ACTING {
+        after.mean[a] += with[a] / variance * innovation;
+        for b in 0..ACTING {
+            after.covariance[a][b] -= with[a] * with[b] / variance;
+        }
+    }
+    after
+}
+
+/// Numbers from -1 to 1 (linear congruential).
+fn random(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+/// The regression is the Kalman filter of all quantities with the part that does not last as noise.
+#[test]
+fn what_a_shift_shows_reaches_all_quantities_as_in_one_filter() {
+    let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
+    // Other shifts have tied the quantities to each other.
+    let mut seed = 1;
+    for pair in 0..6 {
+        let acting = Acting::new([pair, pair + 1], Some(pair), PART, STIFFNESS);
+        let h = core::array::from_fn(|_| random(&mut seed));
+        let before = learnt.known(&acting, &CORRELATIONS);
+        assert!(learnt.take(&acting, &before, &after(&before, &h, 0.5, 0.1), &CORRELATIONS));
+    }
+    let (before, h) = (learnt.known(&acting, &CORRELATIONS), [0.9, -0.2, 0.4, 0.1, -0.7, 0.8]);
+    let mut taken = learnt;
+    assert!(taken.take(&acting, &before, &after(&before, &h, 0.8, 0.2), &CORRELATIONS));
+    let mut row = [0.0; LEARNT];
+    let mut noise = 0.2;
+    for a in 0..ACTING {
+        let (per_unit, more) = acting.per_unit(a);
+        row[acting.places[a].unwrap()] += per_unit * h[a];
+        row[STIFFNESS_AT] += STIFFNESS[a] * h[a];
+        noise += more * h[a] * h[a];
+    }
+    let with = learnt.covariance.map(|line| dot(&line, &row));
+    let variance = dot(&with, &row) + noise;
+    let innovation = 0.8 - dot(&row, &learnt.mean);
+    for i in 0..LEARNT {
+        assert!((taken.mean[i] - learnt.mean[i] - with[i] / variance * innovation).abs() < 1e-9, "{i}");
+        for j in 0..LEARNT {
+            let drift = if i == j && learnt.covariance[i][i] < 1.0 { PER_SHIFT } else { 0.0 };
+            let expected = learnt.covariance[i][j] - with[i] * with[j] / variance + drift;
+            assert!((taken.covariance[i][j] - expected).abs() < 1e-9, "{i} {j}");
+        }
+    }
+}
+
+#[test]
+fn a_shift_that_shows_nothing_teaches_nothing() {
+    let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
+    let (mut learnt, mut known) = (nothing, nothing.known(&acting, &CORRELATIONS));
+    // The part that does not last has walked, and nothing was seen of it.
+    known.covariance[0][0] += 0.3;
+    assert!(learnt.take(&acting, &known, &known, &CORRELATIONS));
+    let change = learnt.covariance.iter().flatten().zip(nothing.covariance.iter().flatten());
+    assert!(change.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < PER_SHIFT + 1e-12);
+    assert_eq!(learnt.mean, nothing.mean);
+}
+
+#[test]
+fn what_cannot_be_is_refused_and_often_refused_is_another_car() {
+    let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
+    let h = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let before = learnt.known(&acting, &CORRELATIONS);
+    assert!(learnt.take(&acting, &before, &after(&before, &h, 1.0, 0.01), &CORRELATIONS));
+    learnt.count(true, &CORRELATIONS);
+    let known = learnt;
+    for value in [9.0, -9.0, f64::NAN, f64::INFINITY] {
+        let before = learnt.known(&acting, &CORRELATIONS);
+        assert!(!learnt.take(&acting, &before, &after(&before, &h, value, 0.01), &CORRELATIONS), "{value}");
+        let mut odd = before;
+        odd.covariance[2][3] = f64::NAN;
+        assert!(!learnt.take(&acting, &before, &odd, &CORRELATIONS));
+    }
+    assert_eq!(learnt, known);
+    for refused in 1..=REFUSED_MOST {
+        learnt.count(false, &CORRELATIONS);
+        assert_eq!(learnt.shifts, u32::from(refused < REFUSED_MOST));
+    }
+    assert_eq!(learnt, Learnt::nothing(&CORRELATIONS));
+}
+
+/// Whatever the shifts show, in single precision too.
+#[test]
+fn ten_thousand_shifts_leave_a_covariance_and_means_within_the_bounds() {
+    let correlations = CORRELATIONS.map(|correlation| correlation as f32);
+    let (mut learnt, mut seed, mut taken) = (Learnt::nothing(&correlations), 5, 0);
+    for k in 0..10_000 {
+        let at = k % 7;
+        let acting = Acting::new([at, at + 1], Some(at), PART as f32, STIFFNESS.map(|x| x as f32));
+        let known = learnt.known(&acting, &correlations);
+        let double =
+            Known { mean: known.mean.map(f64::from), covariance: known.covariance.map(|row| row.map(f64::from)) };
+        let h = core::array::from_fn(|_| random(&mut seed));
+        let shown = after(&double, &h, 3.0 * random(&mut seed), 1e-4);
+        let shown =
+            Known { mean: shown.mean.map(|x| x as f32), covariance: shown.covariance.map(|row| row.map(|x| x as f32)) };
+        taken += u32::from(learnt.take(&acting, &known, &shown, &correlations));
+        learnt.pass(20.0, &correlations);
+        assert!(learnt.is_sound(), "{k}");
+    }
+    assert!(taken > 2000, "{taken}");
+}
+
+#[test]
+fn time_makes_it_unknown_again() {
+    let (acting, nothing) = (shift(), Learnt::nothing(&CORRELATIONS));
+    let (mut learnt, before) = (nothing, nothing.known(&acting, &CORRELATIONS));
+    assert!(learnt.take(&acting, &before, &after(&before, &[0.5; ACTING], 1.0, 0.01), &CORRELATIONS));
+    let (friction, inertia) = (learnt.mean[1], learnt.mean[INERTIA_AT + 2]);
+    assert!(friction > 0.05 && inertia > 0.05);
+    // A night: the oil is cold again, and the inertia is that of the day before.
+    learnt.pass(12.0 * 3600.0, &CORRELATIONS);
+    assert!(learnt.mean[1] < 0.01 * friction && learnt.mean[INERTIA_AT + 2] > 0.98 * inertia);
+    assert!((learnt.covariance[1][1] - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn what_is_read_must_be_what_a_filter_can_have_learnt() {
+    let nothing = Learnt::nothing(&CORRELATIONS);
+    assert_eq!(nothing.checked(), Some(nothing));
+    let wrong = |change: fn(&mut Learnt<f64>)| {
+        let mut learnt = nothing;
+        change(&mut learnt);
+        learnt.checked()
+    };
+    assert_eq!(wrong(|learnt| learnt.mean[3] = f64::NAN), None);
+    assert_eq!(wrong(|learnt| learnt.mean[3] = 2.6), None);
+    assert_eq!(wrong(|learnt| learnt.covariance[3][3] = -1.0), None);
+    assert_eq!(wrong(|learnt| learnt.covariance[3][3] = 1e9), None);
+    assert_eq!(wrong(|learnt| learnt.covariance[3][4] = 0.1), None);
+    assert_eq!(
+        wrong(|learnt| {
+            learnt.covariance[3][4] = 1.1;
+            learnt.covariance[4][3] = 1.1;
+        }),
+        None
+    );
+}
+
+/// Shifts of one car, of which each shows all quantities that act in it, with a little noise.
+fn shown_by(car: impl Fn(usize) -> f64, learnt: &mut Learnt<f64>, shifts: usize, seed: &mut u64) {
+    for k in 0..shifts {
+        let at = k % 4;
+        let acting = Acting::new([at, at + 1], Some(at), PART, STIFFNESS);
+        let before = learnt.known(&acting, &CORRELATIONS);
+        let mut known = before;
+        for a in 0..ACTING {
+            let h = core::array::from_fn(|b| if a == b { 1.0 } else { 0.0 });
+            let truth = acting.places[a].map_or(0.0, |place| acting.per_unit(a).0 * car(place));
+            known = after(&known, &h, truth + 0.1 * random(seed), 0.1);
+        }
+        let taken = learnt.take(&acting, &before, &known, &CORRELATIONS);
+        learnt.count(taken, &CORRELATIONS);
+    }
+}
+
+#[test]
+fn another_car_is_found_within_a_few_shifts_and_the_same_car_is_kept() {
+    let mut seed = 3;
+    let car = |place: usize| if place < INERTIA_AT { 1.2 } else { 0.0 };
+    let mut learnt = Learnt::nothing(&CORRELATIONS);
+    shown_by(car, &mut learnt, 40, &mut seed);
+    // Less than the truth: a part is taken for one of converter and inertia, which show the same.
+    assert!(learnt.mean[1] > 0.7 && learnt.odds > 4.0, "{} {}", learnt.mean[1], learnt.odds);
+    // The same car in another drive.
+    let mut same = learnt.doubted(&CORRELATIONS);
+    assert!((same.mean[1] - 0.5 * learnt.mean[1]).abs() < 1e-12 && same.covariance[1][1] > 0.5);
+    shown_by(car, &mut same, 8, &mut seed);
+    assert!(same.mean[1] > 0.7 && same.odds > 4.0, "{} {}", same.mean[1], same.odds);
+    // Another car, in the same drive and in another one.
+    let other = |place: usize| -car(place);
+    for (mut learnt, shifts) in [(learnt, 8), (learnt.doubted(&CORRELATIONS), 4)] {
+        shown_by(other, &mut learnt, shifts, &mut seed);
+        assert!(learnt.mean[1] < -0.5 && learnt.is_sound(), "{} {}", learnt.mean[1], learnt.odds);
+    }
+}
+
+#[test]
+fn what_the_odds_are_against_is_given_less_weight() {
+    let (acting, mut seed) = (shift(), 3);
+    let mut learnt = Learnt::nothing(&CORRELATIONS);
+    shown_by(|place| if place < KISS_AT { 1.2 } else { 0.0 }, &mut learnt, 40, &mut seed);
+    let known = |odds: f64| {
+        let mut learnt = learnt;
+        learnt.odds = odds;
+        learnt.known(&acting, &CORRELATIONS)
+    };
+    let (sure, even, against) = (known(4.6), known(0.0), known(-4.6));
+    assert!((even.mean[0] - 0.5 * learnt.of_car(&acting).mean[0]).abs() < 1e-12);
+    assert!(sure.mean[0] > 0.98 * learnt.of_car(&acting).mean[0] && against.mean[0] < 0.02 * sure.mean[0]);
+    assert!(sure.covariance[0][0] < even.covariance[0][0] && even.covariance[0][0] > 0.5);
+    let budget = Learnt::nothing(&CORRELATIONS).of_car(&acting);
+    assert!((against.covariance[0][0] - budget.covariance[0][0]).abs() < 0.02);
+}
+
+/// Shafts that are softer show all torques larger, in each shift alike: shifts do not tell that from the converter.
+#[test]
+fn the_scale_of_all_torques_is_never_known_better_than_the_stiffness() {
+    let mut learnt = Learnt::nothing(&CORRELATIONS);
+    for at in (0..400).map(|k| k % 5) {
+        let acting = Acting::new([at, at + 1], Some(at), PART, STIFFNESS);
+        let before = learnt.known(&acting, &CORRELATIONS);
+        // As shafts show that are softer by one deviation.
+        let mut known = before;
+        for (a, value) in STIFFNESS.into_iter().enumerate() {
+            let h = core::array::from_fn(|b| if a == b { 1.0 } else { 0.0 });
+            known = after(&known, &h, value, 0.1);
+        }
+        assert!(learnt.take(&acting, &before, &known, &CORRELATIONS));
+    }
+    let (turbine, stiffness) = (learnt.mean[TURBINE_AT], learnt.mean[STIFFNESS_AT]);
+    assert!(turbine < 0.7 && stiffness > 0.6, "{turbine} {stiffness}");
+    assert!(learnt.covariance[TURBINE_AT][TURBINE_AT] > 0.3, "{}", learnt.covariance[TURBINE_AT][TURBINE_AT]);
+}
