@@ -15,8 +15,8 @@ const CARRIED_S: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Speed<T> {
     last: Option<Reading<T>>,
-    /// How fast it changed between the last two readings, rad/s^2.
-    rate: T,
+    /// How much it changed from the reading before, and in which time: rad/s and s.
+    change: [T; 2],
 }
 
 /// Memory of an [`Alignment`].
@@ -44,7 +44,7 @@ pub struct Alignment<T> {
 impl<T: Real> AlignmentState<T> {
     /// Nothing has come yet.
     pub fn new() -> Self {
-        let none = Speed { last: None, rate: T::zero() };
+        let none = Speed { last: None, change: [T::zero(); 2] };
         Self { engine: none, turbine: none, output: none, wheel: none, command: None }
     }
 }
@@ -56,6 +56,13 @@ impl<T: Real> Default for AlignmentState<T> {
 }
 
 impl<T: Real> Speed<T> {
+    /// How fast it changed between the last two readings, rad/s^2; none if they are far apart.
+    #[inline]
+    fn rate(&self) -> T {
+        let [change, time_s] = self.change;
+        if time_s > T::zero() && time_s <= T::of(CARRIED_S) { change / time_s } else { T::zero() }
+    }
+
     /// Takes what came of it, `dt_s` after the step before. Returns its value now, NaN if there is none.
     #[inline]
     fn take(&mut self, dt_s: T, reading: Option<Reading<T>>, limits: &InputLimits<T>) -> (T, ChannelHealth) {
@@ -68,18 +75,14 @@ impl<T: Real> Speed<T> {
             let usable = limits.speed_valid(reading.value) && reading.age_s >= T::zero() && newer;
             health = if usable { ChannelHealth::Good } else { ChannelHealth::Refused };
             if usable {
-                self.rate = match last {
-                    Some(last) if last.age_s > reading.age_s && last.age_s - reading.age_s <= T::of(CARRIED_S) => {
-                        (reading.value - last.value) / (last.age_s - reading.age_s)
-                    }
-                    _ => T::zero(),
-                };
+                self.change =
+                    last.map_or([T::zero(); 2], |last| [reading.value - last.value, last.age_s - reading.age_s]);
                 self.last = Some(reading);
             }
         }
         match self.last {
             Some(last) if last.age_s <= T::zero() => (last.value, health),
-            Some(last) if last.age_s <= T::of(CARRIED_S) => (last.value + last.age_s * self.rate, health),
+            Some(last) if last.age_s <= T::of(CARRIED_S) => (last.value + last.age_s * self.rate(), health),
             // A refused reading says more than that there is none.
             _ if health == ChannelHealth::Refused => (T::nan(), health),
             _ => (T::nan(), ChannelHealth::Lost),

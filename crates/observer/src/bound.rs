@@ -150,9 +150,11 @@ impl<T: Real> RangeEstimator<T> {
         let (limits, zero) = (&self.tracker.limits, T::zero());
         let alignment = Alignment { shift: self.tracker.shift, limits: *limits };
         let (sample, channels) = alignment.step(&mut state.alignment, input);
-        let dt_s = self.tracker.begin(&mut state.tracker, &sample).map(|interval| interval.dt_s);
+        let interval = self.tracker.begin(&mut state.tracker, &sample);
+        let usable = interval.map_or_else(|| limits.speeds_valid(&sample), |interval| interval.speeds_valid());
+        let dt_s = interval.map(|interval| interval.dt_s);
         let command = input.command.filter(|reading| limits.usable_command(reading));
-        let phase = limits.speeds_valid(&sample).then(|| match dt_s {
+        let phase = usable.then(|| match dt_s {
             Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, &sample).0,
             None => state.tracker.supervisor.phase,
         });
@@ -187,6 +189,10 @@ pub(crate) fn pressure_and_torque<T: Real>(
 ) -> ([T; 2], [T; 2]) {
     let zero = T::zero();
     let [lower_pa, upper_pa] = pressure.pressure_pa(budget);
+    let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
+    if highest_force <= zero {
+        return ([lower_pa, upper_pa], [zero; 2]);
+    }
     let [least, most] = budget.friction_factor;
     // The sign of a slip that may be zero is not known, nor whether the clutch holds.
     let slip = slip_rad_s.filter(|[slip, error]| slip.abs() > *error);
@@ -197,7 +203,6 @@ pub(crate) fn pressure_and_torque<T: Real>(
             (lowest.at_most(clutch.static_friction), highest.at_least(clutch.static_friction))
         }
     };
-    let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
     let at_most = most * highest * clutch.lever() * highest_force;
     let at_least = least * lowest * clutch.lever() * lowest_force;
     let torque = match slip {

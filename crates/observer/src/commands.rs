@@ -36,12 +36,18 @@ impl<T: Real> Commands<T> {
     }
 
     /// Takes a new command between these limits, of a sample `age_s` ago, sent up to `early_s` before it. Commands that
-    /// were sent more than `delay_max_s` before now are forgotten, but for the newest of them.
+    /// were sent more than `delay_max_s` before now are forgotten, but for the newest of them. One that is like the newest
+    /// is that one going on.
     #[inline]
     pub(crate) fn send(&mut self, age_s: T, early_s: T, [lowest, highest]: [T; 2], delay_max_s: T) {
         // What is older than the longest delay has been replaced by what came after it.
         let oldest = self.sent.iter().take(self.count).position(|sent| sent.age_s >= delay_max_s);
         let kept = oldest.map_or(self.count, |at| at + 1).min(REMEMBERED);
+        let newest = &self.sent[0];
+        if newest.lowest == lowest && newest.highest == highest && lowest == highest {
+            self.count = kept;
+            return;
+        }
         let full = kept == REMEMBERED;
         if full {
             // No room: the two oldest become one that may have been either.
@@ -58,10 +64,10 @@ impl<T: Real> Commands<T> {
         self.count = kept + 1;
     }
 
-    /// Whether every one of them is this command.
+    /// Whether every one of them is this command: then there is one, since neighbours are not alike.
     #[inline]
     pub(crate) fn are_all(&self, command: T) -> bool {
-        self.sent.iter().take(self.count).all(|sent| sent.lowest == command && sent.highest == command)
+        self.count == 1 && self.sent[0].lowest == command && self.sent[0].highest == command
     }
 
     /// Carries all of them on by `dt_s`.
