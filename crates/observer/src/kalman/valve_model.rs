@@ -79,6 +79,10 @@ impl<T: Real> Commands<T> {
     /// command. The first one is taken to have stood before.
     #[inline]
     fn mean_pa(&self, delay_s: T, dt_s: T) -> Option<T> {
+        // One has stood all the time.
+        if self.count == 1 {
+            return self.newest_pa();
+        }
         // At a time `x` ago the newest command was in effect that is older than `x` and the delay.
         let (newest, oldest) = (delay_s, delay_s + dt_s);
         let first = self.sent.iter().take(self.count).find(|sent| sent.age_s >= newest);
