@@ -34,11 +34,20 @@ pub struct AlignmentState<T> {
 ///
 /// Readings of the moment pass unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alignment<T> {
+pub struct Alignment<'a, T> {
     /// Kinematics of the shift.
-    pub shift: ReducedShift<T>,
+    pub shift: &'a ReducedShift<T>,
     /// What counts as a measurement.
-    pub limits: InputLimits<T>,
+    pub limits: &'a InputLimits<T>,
+}
+
+/// All signals at the time of a step, and what became of each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aligned<T> {
+    /// The signals; NaN where there is none.
+    pub sample: Sample<T>,
+    /// What became of each channel.
+    pub channels: Channels<ChannelHealth>,
 }
 
 impl<T: Real> AlignmentState<T> {
@@ -90,14 +99,14 @@ impl<T: Real> Speed<T> {
     }
 }
 
-impl<T: Real> Alignment<T> {
-    /// All signals at the time of a step, and what became of each channel.
+impl<T: Real> Alignment<'_, T> {
+    /// All signals at the time of a step.
     #[inline]
-    pub fn step(&self, state: &mut AlignmentState<T>, input: &Input<T>) -> (Sample<T>, Channels<ChannelHealth>) {
+    pub fn step(&self, state: &mut AlignmentState<T>, input: &Input<T>) -> Aligned<T> {
         let zero = T::zero();
         let possible = input.dt_s >= zero && input.dt_s.is_finite();
         let dt_s = if possible { input.dt_s } else { T::infinity() };
-        let limits = &self.limits;
+        let limits = self.limits;
         let (engine_rad_s, engine) = state.engine.take(dt_s, input.engine_rad_s, limits);
         let (turbine_rad_s, turbine) = state.turbine.take(dt_s, input.turbine_rad_s, limits);
         let (output_rad_s, output) = state.output.take(dt_s, input.output_rad_s, limits);
@@ -125,7 +134,7 @@ impl<T: Real> Alignment<T> {
         let unused = ChannelHealth::Unused;
         let channels =
             Channels { engine, turbine, output, wheel, command, offgoing_command: unused, engine_torque: unused };
-        (sample, channels)
+        Aligned { sample, channels }
     }
 }
 
@@ -136,27 +145,22 @@ pub struct AlignedState<T, S> {
     observer: S,
 }
 
-impl<T: Real> Alignment<T> {
-    /// A step of an observer that needs all signals at one time.
-    #[inline]
-    fn step_observer<O: SampleEstimator<T>>(
-        observer: &O,
-        state: &mut AlignedState<T, O::SampleState>,
-        input: &Input<T>,
-    ) -> Estimate<T> {
-        let tracker = observer.tracker();
-        let alignment = Self { shift: tracker.shift, limits: tracker.limits };
-        let (sample, channels) = alignment.step(&mut state.alignment, input);
-        let mut estimate = observer.step_sample(&mut state.observer, &sample);
-        estimate.channels = channels;
-        if !O::READS_WHEEL {
-            estimate.channels.wheel = ChannelHealth::Unused;
-        }
-        if estimate.channels.each().contains(&ChannelHealth::Refused) {
-            estimate.health = estimate.health.max(Health::ReadingRefused);
-        }
-        estimate
+/// A step of an observer that needs all signals at one time.
+#[inline]
+fn step_observer<T: Real, O: SampleEstimator<T>>(
+    observer: &O,
+    state: &mut O::SampleState,
+    aligned: &Aligned<T>,
+) -> Estimate<T> {
+    let mut estimate = observer.step_sample(state, &aligned.sample);
+    estimate.channels = aligned.channels;
+    if !O::READS_WHEEL {
+        estimate.channels.wheel = ChannelHealth::Unused;
     }
+    if estimate.channels.each().contains(&ChannelHealth::Refused) {
+        estimate.health = estimate.health.max(Health::ReadingRefused);
+    }
+    estimate
 }
 
 macro_rules! estimators {
@@ -170,7 +174,15 @@ macro_rules! estimators {
 
             #[inline]
             fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T> {
-                Alignment::step_observer(self, state, input)
+                let tracker = self.tracker();
+                let alignment = Alignment { shift: &tracker.shift, limits: &tracker.limits };
+                let aligned = alignment.step(&mut state.alignment, input);
+                step_observer(self, &mut state.observer, &aligned)
+            }
+
+            #[inline]
+            fn step_aligned(&self, state: &mut Self::State, _input: &Input<T>, aligned: &Aligned<T>) -> Estimate<T> {
+                step_observer(self, &mut state.observer, aligned)
             }
         }
     )*};

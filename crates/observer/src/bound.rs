@@ -10,7 +10,7 @@ use drivetrain::{Clutch, ClutchValve, Real};
 
 use crate::fill_range::FillBudget;
 use crate::{
-    Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Reading,
+    Aligned, Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Reading,
     Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
 };
 
@@ -92,7 +92,7 @@ pub struct Bounded<T, O> {
 }
 
 /// What the ranges take of a step.
-struct Seen<T> {
+struct Seen<'a, T> {
     /// Time since the step before, s; none if it is unusable.
     dt_s: Option<T>,
     /// The command, if a usable one was read.
@@ -100,7 +100,7 @@ struct Seen<T> {
     /// The phase, if the speeds are usable.
     phase: Option<Phase>,
     /// The signals at the time of the step.
-    sample: Sample<T>,
+    sample: &'a Sample<T>,
     /// Slip of the oncoming clutch, and its largest error, rad/s.
     slip_rad_s: Option<[T; 2]>,
     /// Whether turbine, output and wheel speed were read in this step.
@@ -122,8 +122,21 @@ impl<T: Real> RangeEstimator<T> {
     /// Takes what came since the step before and returns the ranges for now. Never panics; allocates nothing.
     #[inline]
     pub fn step(&self, state: &mut RangeState<T>, input: &Input<T>) -> Bounds<T> {
+        let aligned = self.align(state, input);
+        self.step_aligned(state, input, &aligned)
+    }
+
+    /// The signals at the time of the step, the first part of [`Self::step`].
+    #[inline]
+    fn align(&self, state: &mut RangeState<T>, input: &Input<T>) -> Aligned<T> {
+        Alignment { shift: &self.tracker.shift, limits: &self.tracker.limits }.step(&mut state.alignment, input)
+    }
+
+    /// The second part.
+    #[inline]
+    fn step_aligned(&self, state: &mut RangeState<T>, input: &Input<T>, aligned: &Aligned<T>) -> Bounds<T> {
         let limits = &self.tracker.limits;
-        let seen = self.seen(state, input);
+        let seen = self.seen(state, input, aligned);
         match seen.dt_s {
             Some(dt_s) => state.pressure.step(&self.budget, dt_s, seen.command, limits.command_max),
             None => state.pressure.forget(&self.budget, limits.command_max),
@@ -132,7 +145,7 @@ impl<T: Real> RangeEstimator<T> {
             pressure_and_torque(&self.clutch, &self.budget, &state.pressure, seen.slip_rad_s);
         let shaft_torque_n_m = match seen.phase {
             Some(phase) if seen.dt_s.is_some() && seen.read => {
-                let range = self.shaft.step(&mut state.shaft, phase, &seen.sample, clutch_torque_n_m);
+                let range = self.shaft.step(&mut state.shaft, phase, seen.sample, clutch_torque_n_m);
                 let limit = limits.shaft_torque_max_n_m;
                 range.map(|range| range.map(|torque| torque.at_least(-limit).at_most(limit)))
             }
@@ -146,16 +159,15 @@ impl<T: Real> RangeEstimator<T> {
 
     /// Checks the input and follows the phase.
     #[inline]
-    fn seen(&self, state: &mut RangeState<T>, input: &Input<T>) -> Seen<T> {
+    fn seen<'a>(&self, state: &mut RangeState<T>, input: &Input<T>, aligned: &'a Aligned<T>) -> Seen<'a, T> {
         let (limits, zero) = (&self.tracker.limits, T::zero());
-        let alignment = Alignment { shift: self.tracker.shift, limits: *limits };
-        let (sample, channels) = alignment.step(&mut state.alignment, input);
-        let interval = self.tracker.begin(&mut state.tracker, &sample);
-        let usable = interval.map_or_else(|| limits.speeds_valid(&sample), |interval| interval.speeds_valid());
+        let Aligned { sample, channels } = aligned;
+        let interval = self.tracker.begin(&mut state.tracker, sample);
+        let usable = interval.map_or_else(|| limits.speeds_valid(sample), |interval| interval.speeds_valid());
         let dt_s = interval.map(|interval| interval.dt_s);
         let command = input.command.filter(|reading| limits.usable_command(reading));
         let phase = usable.then(|| match dt_s {
-            Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, &sample).0,
+            Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, sample).0,
             None => state.tracker.supervisor.phase,
         });
         let fresh = channels.turbine == ChannelHealth::Good && channels.output == ChannelHealth::Good;
@@ -240,8 +252,9 @@ impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {
 
     #[inline]
     fn step(&self, (state, range): &mut Self::State, input: &Input<T>) -> Estimate<T> {
-        let estimate = self.observer.step(state, input);
-        self.range.step(range, input).clip(estimate)
+        let aligned = self.range.align(range, input);
+        let estimate = self.observer.step_aligned(state, input, &aligned);
+        self.range.step_aligned(range, input, &aligned).clip(estimate)
     }
 }
 
