@@ -63,8 +63,10 @@ pub struct RangeEstimator<T> {
     pub budget: Budget<T>,
     /// The oncoming clutch.
     pub clutch: Clutch<T>,
-    /// The drive shafts' part.
-    pub shaft: ShaftRange<T>,
+    /// Greatest age of a reading, s.
+    pub age_s: T,
+    /// The drive shafts' part; with none there is no range of their torque.
+    pub shaft: Option<ShaftRange<T>>,
     /// Checks of the input, and the phase.
     pub tracker: Tracker<T>,
 }
@@ -108,6 +110,12 @@ struct Seen<'a, T> {
 }
 
 impl<T: Real> RangeEstimator<T> {
+    /// The guaranteed ranges alone, without the expected one of the shaft torque.
+    #[must_use]
+    pub fn guaranteed(self) -> Self {
+        Self { shaft: None, ..self }
+    }
+
     /// Its memory before the first sample: everything is possible.
     pub fn start(&self) -> RangeState<T> {
         RangeState {
@@ -143,13 +151,14 @@ impl<T: Real> RangeEstimator<T> {
         }
         let (pressure_pa, clutch_torque_n_m) =
             pressure_and_torque(&self.clutch, &self.budget, &state.pressure, seen.slip_rad_s);
-        let shaft_torque_n_m = match seen.phase {
-            Some(phase) if seen.dt_s.is_some() && seen.read => {
-                let range = self.shaft.step(&mut state.shaft, phase, seen.sample, clutch_torque_n_m);
+        let shaft_torque_n_m = match (&self.shaft, seen.phase) {
+            (None, _) => None,
+            (Some(shaft), Some(phase)) if seen.dt_s.is_some() && seen.read => {
+                let range = shaft.step(&mut state.shaft, phase, seen.sample, clutch_torque_n_m);
                 let limit = limits.shaft_torque_max_n_m;
                 range.map(|range| range.map(|torque| torque.at_least(-limit).at_most(limit)))
             }
-            _ => {
+            (Some(_), _) => {
                 state.shaft = ShaftMemory::new();
                 None
             }
@@ -173,7 +182,7 @@ impl<T: Real> RangeEstimator<T> {
         let fresh = channels.turbine == ChannelHealth::Good && channels.output == ChannelHealth::Good;
         state.unread_s = if fresh { zero } else { state.unread_s + dt_s.unwrap_or_else(T::infinity) };
         // A slip carried on by its rate may be wrong by what it changes at most, twice: once that it does, once that it did.
-        let carried = T::one() + (state.unread_s + state.unread_s) / self.shaft.age_s();
+        let carried = T::one() + (state.unread_s + state.unread_s) / self.age_s;
         let error = self.budget.slip_rad_s * if fresh { T::one() } else { carried };
         let slip_rad_s = phase.map(|_| [sample.slip_rad_s, error]);
         let read = fresh && channels.wheel == ChannelHealth::Good;
@@ -185,7 +194,8 @@ impl<T: Real> RangeEstimator<T> {
         RangeEstimator {
             budget: self.budget.cast(),
             clutch: self.clutch.cast(),
-            shaft: self.shaft.cast(),
+            age_s: U::of(self.age_s.to_f64_exact()),
+            shaft: self.shaft.as_ref().map(ShaftRange::cast),
             tracker: self.tracker.cast(),
         }
     }

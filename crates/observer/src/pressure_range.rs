@@ -103,7 +103,9 @@ impl<T: Real> PressureRange<T> {
         if let Some((reading, interval_s)) = new.filter(|(_, interval_s)| *interval_s >= zero) {
             self.take(budget, interval_s, reading.value, command_max);
             self.now = self.at_reading;
-            self.carry_on(budget, zero, reading.age_s, command_max);
+            if reading.age_s > zero {
+                self.carry_on(budget, zero, reading.age_s, command_max);
+            }
             (self.since_reading_s, self.stepped) = (Some(reading.age_s), false);
         } else {
             let start_s = before_s.unwrap_or(zero);
@@ -123,7 +125,7 @@ impl<T: Real> PressureRange<T> {
         let (zero, delay_max_s) = (T::zero(), budget.delay_s[1]);
         let lost = interval_s > T::of(LOST) * self.period_s;
         if lost && self.stepped || interval_s > T::of(GAP) * self.period_s {
-            self.commands.send(zero, zero, [zero, command_max], delay_max_s);
+            self.commands.send(zero, zero, [zero, command_max]);
         }
         if interval_s > zero {
             self.period_s = interval_s.at_most(self.period_s * T::of(SLOWER));
@@ -132,19 +134,19 @@ impl<T: Real> PressureRange<T> {
         if self.still.is_some_and(|(still, longest_s)| !lost && still == command && interval_s <= longest_s) {
             return;
         }
-        let (before, alike) = (self.at_reading, !lost && self.commands.are_all(command));
+        let before = (!lost && self.commands.are_all(command)).then_some(self.at_reading);
         let early_s = if lost { interval_s } else { budget.command_age_s.at_most(interval_s) };
         if early_s > zero {
-            self.commands.send(-interval_s, early_s, [command; 2], delay_max_s);
+            self.commands.send(-interval_s, early_s, [command; 2]);
         }
         let commands = &self.commands;
         self.at_reading
             .carry(budget, zero, interval_s, |start_s, end_s| commands.in_effect(budget.delay_s, start_s, end_s));
-        self.commands.age(interval_s);
+        self.commands.age(interval_s, delay_max_s);
         if early_s <= zero {
-            self.commands.send(zero, zero, [command; 2], delay_max_s);
+            self.commands.send(zero, zero, [command; 2]);
         }
-        self.still = (alike && before == self.at_reading).then_some((command, interval_s));
+        self.still = (before == Some(self.at_reading)).then_some((command, interval_s));
     }
 
     /// Carries the limits for now from `start_s` to `end_s` after the newest reading. Its command holds until the next one

@@ -183,11 +183,6 @@ impl<T: Real> ShaftRange<T> {
         Self { shift, any_offgoing, any_oncoming, converter, driveline, errors }
     }
 
-    /// Age that a reading may have by the budget, s.
-    pub(crate) fn age_s(&self) -> T {
-        self.errors.age_s
-    }
-
     /// The same range in another precision.
     pub fn cast<U: Real>(&self) -> ShaftRange<U> {
         ShaftRange::new(self.shift.cast(), self.converter.cast(), self.driveline.cast(), self.errors.cast())
