@@ -437,6 +437,25 @@ mod tests {
     }
 
     #[test]
+    fn the_range_from_an_argument_to_another_on_either_side_holds_all_values_between() {
+        let axis = [-1.0_f64, 0.0, 0.3, 0.35, 2.0, 2.1, 5.0];
+        let table = Table1::new(&axis, &[0.0, 3.0, -2.0, 4.0, 1.0, -5.0, 6.0]).unwrap();
+        let ends = [-2.0, -1.0, -0.4, 0.0, 0.1, 0.3, 0.32, 0.35, 1.7, 2.05, 2.1, 4.0, 5.0, 9.0];
+        for from in ends {
+            for to in ends {
+                let (low, high) = table.range_from(&table.place(from), to);
+                let (least, most) = (from.min(to), from.max(to));
+                let between = axis.into_iter().filter(|x| (least..=most).contains(x)).chain([from, to]);
+                let values = between.map(|x| table.at(x));
+                let expected =
+                    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)]);
+                assert!((low - expected[0]).abs() < 1e-12 && (high - expected[1]).abs() < 1e-12, "{from} {to}");
+                assert_eq!(table.range_within(least, most), table.range_from(&table.place(least), most));
+            }
+        }
+    }
+
+    #[test]
     fn inverse_undoes_a_rising_table() {
         let table = Table1::new(&[0.0, 0.2, 1.0], &[0.0, 0.1, 0.9]).unwrap();
         for x in [0.0_f64, 0.13, 0.2, 0.77, 1.0] {

@@ -10,8 +10,8 @@ use drivetrain::{Clutch, ClutchValve, Real};
 
 use crate::fill_range::FillBudget;
 use crate::{
-    Aligned, Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Reading,
-    Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
+    Aligned, Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange,
+    Reading, Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
 };
 
 /// Largest errors under which the ranges of pressure and clutch torque hold.

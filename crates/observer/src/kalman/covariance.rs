@@ -123,8 +123,8 @@ impl<T: Real> Covariance<T> {
             for l in k..SPEEDS {
                 p[N + k][N + l] = p[k][l];
             }
-            for m in N + SPEEDS..ALL {
-                p[N + k][m] = p[k][m];
+            for m in SPEEDS..CLONES {
+                p[N + k][N + m] = p[k][N + m];
             }
             for i in 0..N {
                 p[i][N + k] = p[i.min(k)][i.max(k)];

@@ -152,6 +152,28 @@ mod tests {
     }
 
     #[test]
+    fn a_command_that_is_read_again_goes_on() {
+        let mut commands = Commands::<f64>::new();
+        for _ in 0..50 {
+            commands.pass(0.01);
+            commands.send(0.0, 2.0, 0.025);
+        }
+        assert!(commands.is_fresh(0.001) && commands.mean_pa(0.015, 0.01) == Some(2.0));
+        commands.pass(0.3);
+        assert!(!commands.is_fresh(0.25));
+        commands.send(0.0, 4.0, 0.025);
+        commands.pass(0.01);
+        commands.send(0.0, 2.0, 0.025);
+        commands.pass(0.01);
+        // The one between came 20 ms ago and stood for 10 ms: it is in effect for the last 5 ms.
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+        commands.pass(0.01);
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+        commands.pass(0.01);
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
     fn more_commands_than_are_remembered_do_no_harm() {
         let mut commands = Commands::<f32>::new();
         for i in 0..100_u8 {
