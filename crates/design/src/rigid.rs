@@ -115,7 +115,13 @@ pub fn range(vehicle: &Vehicle) -> RangeEstimator<f64> {
         offgoing_drain_s: errors.offgoing_drain_s,
     };
     let shaft = ShaftRange::new(vehicle.shift, vehicle.converter, vehicle.driveline, shaft);
-    RangeEstimator { budget, clutch: vehicle.oncoming.clutch, shaft, tracker: tracker(vehicle) }
+    RangeEstimator {
+        budget,
+        clutch: vehicle.oncoming.clutch,
+        age_s: errors.sampling_delay_s,
+        shaft: Some(shaft),
+        tracker: tracker(vehicle),
+    }
 }
 
 /// The observer with these ranges around its estimates.

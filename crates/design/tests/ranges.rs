@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 use config::{Source, Vehicle};
-use design::{bounded, inversion, kalman_filter, range};
+use design::{bounded, design_rigid, inversion, kalman_filter, range, rigid_observer};
 use observer::{Bounds, ChannelHealth, Channels, Estimate, Estimator, Health, Input, Phase, Reading};
 
 const STROKE: &str = include_str!("../../../vehicles/two_speed_stroke.toml");
@@ -39,6 +39,60 @@ fn ranges(vehicle: &Vehicle, parts: &[(f64, f64)]) -> Vec<Bounds<f64>> {
         (0..samples).map(|_| estimator.step(&mut state, &input)).last().unwrap()
     };
     parts.iter().map(part).collect()
+}
+
+/// Rolling with changing commands, and with readings that are late, lost or impossible.
+fn with_faults(vehicle: &Vehicle, k: u32) -> Input<f64> {
+    let mut input = rolling(vehicle, 0.3 * f64::from(k % 100) / 100.0);
+    let age_s = 0.001 * f64::from(k % 7);
+    input.output_rad_s = input.output_rad_s.filter(|_| k % 5 != 3).map(|reading| Reading { age_s, ..reading });
+    match k {
+        120..=125 => input.turbine_rad_s = None,
+        140 => input.dt_s = f64::NAN,
+        160 => input.dt_s = 0.3,
+        180 => input.engine_rad_s = Some(Reading::now(1e9)),
+        200..=240 => input.wheel_rad_s = None,
+        _ => (),
+    }
+    input
+}
+
+/// Whether both say the same; fields without a value are not equal to themselves.
+fn same(a: &Estimate<f64>, b: &Estimate<f64>) -> bool {
+    format!("{a:?}") == format!("{b:?}")
+}
+
+#[test]
+fn an_observer_with_its_ranges_is_that_observer_and_those_ranges() {
+    fn check<O: Estimator<f64>>(vehicle: &Vehicle, observer: &O) {
+        let (ranges, both) = (range(vehicle), bounded(vehicle, observer));
+        let (mut own, mut alone, mut together) = (observer.start(), ranges.start(), both.start());
+        for k in 0..300 {
+            let input = with_faults(vehicle, k);
+            let apart = ranges.step(&mut alone, &input).clip(observer.step(&mut own, &input));
+            let found = both.step(&mut together, &input);
+            assert!(same(&found, &apart), "{k}: {found:?} {apart:?}");
+        }
+    }
+    let vehicle = with_stroke();
+    check(&vehicle, &rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains()));
+    check(&vehicle, &inversion(&vehicle));
+    check(&vehicle, &kalman_filter(&vehicle, None));
+}
+
+#[test]
+fn the_guaranteed_ranges_are_the_same_without_the_expected_one() {
+    let vehicle = with_stroke();
+    let (all, guaranteed) = (range(&vehicle), range(&vehicle).guaranteed());
+    let (mut with, mut without) = (all.start(), guaranteed.start());
+    let mut expected = 0;
+    for k in 0..300 {
+        let input = with_faults(&vehicle, k);
+        let (with, without) = (all.step(&mut with, &input), guaranteed.step(&mut without, &input));
+        expected += usize::from(with.shaft_torque_n_m.is_some());
+        assert_eq!(without, Bounds { shaft_torque_n_m: None, ..with }, "{k}");
+    }
+    assert!(expected > 100, "{expected}");
 }
 
 fn width([low, high]: [f64; 2]) -> f64 {

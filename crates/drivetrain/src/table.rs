@@ -119,15 +119,23 @@ impl<T: Real, const N: usize> Axis<T, N> {
         axis
     }
 
-    /// Index of the segment that holds `x`, a value within the axis.
+    /// The segment that `x` is in, and the nearest value on the axis.
     #[inline]
-    fn segment(&self, x: T) -> usize {
-        let bin = ((x - self.points[0]) * self.bins_per_unit).whole();
-        let mut segment = usize::from(self.first_segment[bin.min(BINS - 1)]);
-        while self.points.get(segment + 1).is_some_and(|next| *next <= x) {
+    fn locate(&self, x: T) -> (usize, T) {
+        let (first, last) = (self.points[0], self.last);
+        if x <= first {
+            return (0, first);
+        }
+        if x >= last {
+            return (self.last_segment.min(N - 2), last);
+        }
+        // NaN stays NaN.
+        let bin = ((x - first) * self.bins_per_unit).whole();
+        let mut segment = usize::from(self.first_segment[bin.min(BINS - 1)]).min(N - 2);
+        while segment < N - 2 && self.points[segment + 1] <= x {
             segment += 1;
         }
-        segment.min(self.last_segment).min(N - 2)
+        (segment, x)
     }
 
     #[inline]
@@ -203,10 +211,9 @@ impl<T: Real> Table1<T> {
     /// The value at `x` and its derivative, which is zero outside the breakpoints.
     #[inline]
     pub fn at_with_slope(&self, x: T) -> (T, T) {
-        let within = self.axis.clamp(x);
-        let i = self.axis.segment(within);
+        let (i, within) = self.axis.locate(x);
         let slope = if within == x { self.slopes[i] } else { T::zero() };
-        (self.values[i] + self.slopes[i] * (within - self.axis.points[i]), slope)
+        (self.on(i, within), slope)
     }
 
     /// The argument at which a table of rising values reaches `value`; the end arguments outside.
@@ -244,30 +251,41 @@ impl<T: Real> Table1<T> {
         self.values.get(..self.axis.len).unwrap_or_default()
     }
 
+    /// Where an argument is, for [`Self::range_from`].
+    #[inline]
+    pub fn place(&self, x: T) -> Place<T> {
+        let (segment, x) = self.axis.locate(x);
+        Place { segment, value: self.on(segment, x) }
+    }
+
+    /// The value at an argument on the axis that is in this segment.
+    #[inline]
+    fn on(&self, segment: usize, x: T) -> T {
+        self.values[segment] + self.slopes[segment] * (x - self.axis.points[segment])
+    }
+
     /// Smallest and largest value between two arguments, the first not above the second.
     #[inline]
     pub fn range_within(&self, from: T, to: T) -> (T, T) {
-        self.range_between(self.place(from), self.place(to))
+        self.range_from(&self.place(from), to)
     }
 
-    /// Where an argument is, for [`Self::range_between`].
+    /// Smallest and largest value between an argument and another on either side of it, which mostly is near.
     #[inline]
-    pub fn place(&self, x: T) -> Place<T> {
-        let x = self.axis.clamp(x);
-        let segment = self.axis.segment(x);
-        Place { segment, value: self.values[segment] + self.slopes[segment] * (x - self.axis.points[segment]) }
-    }
-
-    /// Smallest and largest value between two arguments, the first not above the second.
-    #[inline]
-    pub fn range_between(&self, from: Place<T>, to: Place<T>) -> (T, T) {
-        let (mut low, mut high) = (from.value.at_most(to.value), from.value.at_least(to.value));
-        let mut at = from.segment + 1;
-        while let Some(&y) = self.values.get(at).filter(|_| at <= to.segment) {
-            (low, high) = (low.at_most(y), high.at_least(y));
-            at += 1;
+    pub fn range_from(&self, from: &Place<T>, to: T) -> (T, T) {
+        let (points, to) = (&self.axis.points, self.axis.clamp(to));
+        let (mut low, mut high) = (from.value, from.value);
+        let mut segment = from.segment.min(MAX_POINTS - 2);
+        while segment < self.axis.last_segment.min(MAX_POINTS - 2) && points[segment + 1] <= to {
+            segment += 1;
+            (low, high) = (low.at_most(self.values[segment]), high.at_least(self.values[segment]));
         }
-        (low, high)
+        while segment > 0 && points[segment] > to {
+            (low, high) = (low.at_most(self.values[segment]), high.at_least(self.values[segment]));
+            segment -= 1;
+        }
+        let end = self.on(segment, to);
+        (low.at_most(end), high.at_least(end))
     }
 
     /// Smallest and largest value.
@@ -338,8 +356,7 @@ impl<T: Real> Table2<T> {
     /// Where a value of the column lies, for [`Self::at_place`].
     #[inline]
     pub fn place(&self, column: T) -> ColumnPlace<T> {
-        let column = self.columns.clamp(column);
-        let j = self.columns.segment(column);
+        let (j, column) = self.columns.locate(column);
         let share = (column - self.columns.points[j]) / (self.columns.points[j + 1] - self.columns.points[j]);
         ColumnPlace { segment: j, share }
     }
@@ -347,8 +364,8 @@ impl<T: Real> Table2<T> {
     /// As [`Self::at`], for many rows at one value of the column.
     #[inline]
     pub fn at_place(&self, row: T, column: &ColumnPlace<T>) -> T {
-        let row = self.rows.clamp(row);
-        let (i, j, c) = (self.rows.segment(row), column.segment.min(MAX_COLUMNS - 2), column.share);
+        let (i, row) = self.rows.locate(row);
+        let (j, c) = (column.segment.min(MAX_COLUMNS - 2), column.share);
         let r = (row - self.rows.points[i]) / (self.rows.points[i + 1] - self.rows.points[i]);
         let across = |k: usize| self.values[k][j] + c * (self.values[k][j + 1] - self.values[k][j]);
         across(i) + r * (across(i + 1) - across(i))
@@ -415,6 +432,25 @@ mod tests {
                 let x = ends[0] + share * (ends[1] - ends[0]);
                 let expected = values[segment] + share * (values[segment + 1] - values[segment]);
                 assert!((table.at(x) - expected).abs() < 1e-6, "at {x}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_range_from_an_argument_to_another_on_either_side_holds_all_values_between() {
+        let axis = [-1.0_f64, 0.0, 0.3, 0.35, 2.0, 2.1, 5.0];
+        let table = Table1::new(&axis, &[0.0, 3.0, -2.0, 4.0, 1.0, -5.0, 6.0]).unwrap();
+        let ends = [-2.0, -1.0, -0.4, 0.0, 0.1, 0.3, 0.32, 0.35, 1.7, 2.05, 2.1, 4.0, 5.0, 9.0];
+        for from in ends {
+            for to in ends {
+                let (low, high) = table.range_from(&table.place(from), to);
+                let (least, most) = (from.min(to), from.max(to));
+                let between = axis.into_iter().filter(|x| (least..=most).contains(x)).chain([from, to]);
+                let values = between.map(|x| table.at(x));
+                let expected =
+                    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| [low.min(y), high.max(y)]);
+                assert!((low - expected[0]).abs() < 1e-12 && (high - expected[1]).abs() < 1e-12, "{from} {to}");
+                assert_eq!(table.range_within(least, most), table.range_from(&table.place(least), most));
             }
         }
     }

@@ -15,8 +15,8 @@ const CARRIED_S: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Speed<T> {
     last: Option<Reading<T>>,
-    /// How fast it changed between the last two readings, rad/s^2.
-    rate: T,
+    /// How much it changed from the reading before, and in which time: rad/s and s.
+    change: [T; 2],
 }
 
 /// Memory of an [`Alignment`].
@@ -34,17 +34,26 @@ pub struct AlignmentState<T> {
 ///
 /// Readings of the moment pass unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alignment<T> {
+pub struct Alignment<'a, T> {
     /// Kinematics of the shift.
-    pub shift: ReducedShift<T>,
+    pub shift: &'a ReducedShift<T>,
     /// What counts as a measurement.
-    pub limits: InputLimits<T>,
+    pub limits: &'a InputLimits<T>,
+}
+
+/// All signals at the time of a step, and what became of each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aligned<T> {
+    /// The signals; NaN where there is none.
+    pub sample: Sample<T>,
+    /// What became of each channel.
+    pub channels: Channels<ChannelHealth>,
 }
 
 impl<T: Real> AlignmentState<T> {
     /// Nothing has come yet.
     pub fn new() -> Self {
-        let none = Speed { last: None, rate: T::zero() };
+        let none = Speed { last: None, change: [T::zero(); 2] };
         Self { engine: none, turbine: none, output: none, wheel: none, command: None }
     }
 }
@@ -56,6 +65,13 @@ impl<T: Real> Default for AlignmentState<T> {
 }
 
 impl<T: Real> Speed<T> {
+    /// How fast it changed between the last two readings, rad/s^2; none if they are far apart.
+    #[inline]
+    fn rate(&self) -> T {
+        let [change, time_s] = self.change;
+        if time_s > T::zero() && time_s <= T::of(CARRIED_S) { change / time_s } else { T::zero() }
+    }
+
     /// Takes what came of it, `dt_s` after the step before. Returns its value now, NaN if there is none.
     #[inline]
     fn take(&mut self, dt_s: T, reading: Option<Reading<T>>, limits: &InputLimits<T>) -> (T, ChannelHealth) {
@@ -68,18 +84,14 @@ impl<T: Real> Speed<T> {
             let usable = limits.speed_valid(reading.value) && reading.age_s >= T::zero() && newer;
             health = if usable { ChannelHealth::Good } else { ChannelHealth::Refused };
             if usable {
-                self.rate = match last {
-                    Some(last) if last.age_s > reading.age_s && last.age_s - reading.age_s <= T::of(CARRIED_S) => {
-                        (reading.value - last.value) / (last.age_s - reading.age_s)
-                    }
-                    _ => T::zero(),
-                };
+                self.change =
+                    last.map_or([T::zero(); 2], |last| [reading.value - last.value, last.age_s - reading.age_s]);
                 self.last = Some(reading);
             }
         }
         match self.last {
             Some(last) if last.age_s <= T::zero() => (last.value, health),
-            Some(last) if last.age_s <= T::of(CARRIED_S) => (last.value + last.age_s * self.rate, health),
+            Some(last) if last.age_s <= T::of(CARRIED_S) => (last.value + last.age_s * self.rate(), health),
             // A refused reading says more than that there is none.
             _ if health == ChannelHealth::Refused => (T::nan(), health),
             _ => (T::nan(), ChannelHealth::Lost),
@@ -87,14 +99,14 @@ impl<T: Real> Speed<T> {
     }
 }
 
-impl<T: Real> Alignment<T> {
-    /// All signals at the time of a step, and what became of each channel.
+impl<T: Real> Alignment<'_, T> {
+    /// All signals at the time of a step.
     #[inline]
-    pub fn step(&self, state: &mut AlignmentState<T>, input: &Input<T>) -> (Sample<T>, Channels<ChannelHealth>) {
+    pub fn step(&self, state: &mut AlignmentState<T>, input: &Input<T>) -> Aligned<T> {
         let zero = T::zero();
         let possible = input.dt_s >= zero && input.dt_s.is_finite();
         let dt_s = if possible { input.dt_s } else { T::infinity() };
-        let limits = &self.limits;
+        let limits = self.limits;
         let (engine_rad_s, engine) = state.engine.take(dt_s, input.engine_rad_s, limits);
         let (turbine_rad_s, turbine) = state.turbine.take(dt_s, input.turbine_rad_s, limits);
         let (output_rad_s, output) = state.output.take(dt_s, input.output_rad_s, limits);
@@ -122,7 +134,7 @@ impl<T: Real> Alignment<T> {
         let unused = ChannelHealth::Unused;
         let channels =
             Channels { engine, turbine, output, wheel, command, offgoing_command: unused, engine_torque: unused };
-        (sample, channels)
+        Aligned { sample, channels }
     }
 }
 
@@ -133,27 +145,22 @@ pub struct AlignedState<T, S> {
     observer: S,
 }
 
-impl<T: Real> Alignment<T> {
-    /// A step of an observer that needs all signals at one time.
-    #[inline]
-    fn step_observer<O: SampleEstimator<T>>(
-        observer: &O,
-        state: &mut AlignedState<T, O::SampleState>,
-        input: &Input<T>,
-    ) -> Estimate<T> {
-        let tracker = observer.tracker();
-        let alignment = Self { shift: tracker.shift, limits: tracker.limits };
-        let (sample, channels) = alignment.step(&mut state.alignment, input);
-        let mut estimate = observer.step_sample(&mut state.observer, &sample);
-        estimate.channels = channels;
-        if !O::READS_WHEEL {
-            estimate.channels.wheel = ChannelHealth::Unused;
-        }
-        if estimate.channels.each().contains(&ChannelHealth::Refused) {
-            estimate.health = estimate.health.max(Health::ReadingRefused);
-        }
-        estimate
+/// A step of an observer that needs all signals at one time.
+#[inline]
+fn step_observer<T: Real, O: SampleEstimator<T>>(
+    observer: &O,
+    state: &mut O::SampleState,
+    aligned: &Aligned<T>,
+) -> Estimate<T> {
+    let mut estimate = observer.step_sample(state, &aligned.sample);
+    estimate.channels = aligned.channels;
+    if !O::READS_WHEEL {
+        estimate.channels.wheel = ChannelHealth::Unused;
     }
+    if estimate.channels.each().contains(&ChannelHealth::Refused) {
+        estimate.health = estimate.health.max(Health::ReadingRefused);
+    }
+    estimate
 }
 
 macro_rules! estimators {
@@ -167,7 +174,15 @@ macro_rules! estimators {
 
             #[inline]
             fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T> {
-                Alignment::step_observer(self, state, input)
+                let tracker = self.tracker();
+                let alignment = Alignment { shift: &tracker.shift, limits: &tracker.limits };
+                let aligned = alignment.step(&mut state.alignment, input);
+                step_observer(self, &mut state.observer, &aligned)
+            }
+
+            #[inline]
+            fn step_aligned(&self, state: &mut Self::State, _input: &Input<T>, aligned: &Aligned<T>) -> Estimate<T> {
+                step_observer(self, &mut state.observer, aligned)
             }
         }
     )*};

@@ -10,8 +10,8 @@ use drivetrain::{Clutch, ClutchValve, Real};
 
 use crate::fill_range::FillBudget;
 use crate::{
-    Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange, Reading,
-    Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
+    Aligned, Alignment, AlignmentState, ChannelHealth, Estimate, Estimator, Health, Input, Phase, PressureRange,
+    Reading, Sample, ShaftMemory, ShaftRange, Tracker, TrackerState,
 };
 
 /// Largest errors under which the ranges of pressure and clutch torque hold.
@@ -63,8 +63,10 @@ pub struct RangeEstimator<T> {
     pub budget: Budget<T>,
     /// The oncoming clutch.
     pub clutch: Clutch<T>,
-    /// The drive shafts' part.
-    pub shaft: ShaftRange<T>,
+    /// Greatest age of a reading, s.
+    pub age_s: T,
+    /// The drive shafts' part; with none there is no range of their torque.
+    pub shaft: Option<ShaftRange<T>>,
     /// Checks of the input, and the phase.
     pub tracker: Tracker<T>,
 }
@@ -92,7 +94,7 @@ pub struct Bounded<T, O> {
 }
 
 /// What the ranges take of a step.
-struct Seen<T> {
+struct Seen<'a, T> {
     /// Time since the step before, s; none if it is unusable.
     dt_s: Option<T>,
     /// The command, if a usable one was read.
@@ -100,7 +102,7 @@ struct Seen<T> {
     /// The phase, if the speeds are usable.
     phase: Option<Phase>,
     /// The signals at the time of the step.
-    sample: Sample<T>,
+    sample: &'a Sample<T>,
     /// Slip of the oncoming clutch, and its largest error, rad/s.
     slip_rad_s: Option<[T; 2]>,
     /// Whether turbine, output and wheel speed were read in this step.
@@ -108,6 +110,12 @@ struct Seen<T> {
 }
 
 impl<T: Real> RangeEstimator<T> {
+    /// The guaranteed ranges alone, without the expected one of the shaft torque.
+    #[must_use]
+    pub fn guaranteed(self) -> Self {
+        Self { shaft: None, ..self }
+    }
+
     /// Its memory before the first sample: everything is possible.
     pub fn start(&self) -> RangeState<T> {
         RangeState {
@@ -122,21 +130,35 @@ impl<T: Real> RangeEstimator<T> {
     /// Takes what came since the step before and returns the ranges for now. Never panics; allocates nothing.
     #[inline]
     pub fn step(&self, state: &mut RangeState<T>, input: &Input<T>) -> Bounds<T> {
+        let aligned = self.align(state, input);
+        self.step_aligned(state, input, &aligned)
+    }
+
+    /// The signals at the time of the step, the first part of [`Self::step`].
+    #[inline]
+    fn align(&self, state: &mut RangeState<T>, input: &Input<T>) -> Aligned<T> {
+        Alignment { shift: &self.tracker.shift, limits: &self.tracker.limits }.step(&mut state.alignment, input)
+    }
+
+    /// The second part.
+    #[inline]
+    fn step_aligned(&self, state: &mut RangeState<T>, input: &Input<T>, aligned: &Aligned<T>) -> Bounds<T> {
         let limits = &self.tracker.limits;
-        let seen = self.seen(state, input);
+        let seen = self.seen(state, input, aligned);
         match seen.dt_s {
             Some(dt_s) => state.pressure.step(&self.budget, dt_s, seen.command, limits.command_max),
             None => state.pressure.forget(&self.budget, limits.command_max),
         }
         let (pressure_pa, clutch_torque_n_m) =
             pressure_and_torque(&self.clutch, &self.budget, &state.pressure, seen.slip_rad_s);
-        let shaft_torque_n_m = match seen.phase {
-            Some(phase) if seen.dt_s.is_some() && seen.read => {
-                let range = self.shaft.step(&mut state.shaft, phase, &seen.sample, clutch_torque_n_m);
+        let shaft_torque_n_m = match (&self.shaft, seen.phase) {
+            (None, _) => None,
+            (Some(shaft), Some(phase)) if seen.dt_s.is_some() && seen.read => {
+                let range = shaft.step(&mut state.shaft, phase, seen.sample, clutch_torque_n_m);
                 let limit = limits.shaft_torque_max_n_m;
                 range.map(|range| range.map(|torque| torque.at_least(-limit).at_most(limit)))
             }
-            _ => {
+            (Some(_), _) => {
                 state.shaft = ShaftMemory::new();
                 None
             }
@@ -146,20 +168,21 @@ impl<T: Real> RangeEstimator<T> {
 
     /// Checks the input and follows the phase.
     #[inline]
-    fn seen(&self, state: &mut RangeState<T>, input: &Input<T>) -> Seen<T> {
+    fn seen<'a>(&self, state: &mut RangeState<T>, input: &Input<T>, aligned: &'a Aligned<T>) -> Seen<'a, T> {
         let (limits, zero) = (&self.tracker.limits, T::zero());
-        let alignment = Alignment { shift: self.tracker.shift, limits: *limits };
-        let (sample, channels) = alignment.step(&mut state.alignment, input);
-        let dt_s = self.tracker.begin(&mut state.tracker, &sample).map(|interval| interval.dt_s);
+        let Aligned { sample, channels } = aligned;
+        let interval = self.tracker.begin(&mut state.tracker, sample);
+        let usable = interval.map_or_else(|| limits.speeds_valid(sample), |interval| interval.speeds_valid());
+        let dt_s = interval.map(|interval| interval.dt_s);
         let command = input.command.filter(|reading| limits.usable_command(reading));
-        let phase = limits.speeds_valid(&sample).then(|| match dt_s {
-            Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, &sample).0,
+        let phase = usable.then(|| match dt_s {
+            Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, sample).0,
             None => state.tracker.supervisor.phase,
         });
         let fresh = channels.turbine == ChannelHealth::Good && channels.output == ChannelHealth::Good;
         state.unread_s = if fresh { zero } else { state.unread_s + dt_s.unwrap_or_else(T::infinity) };
         // A slip carried on by its rate may be wrong by what it changes at most, twice: once that it does, once that it did.
-        let carried = T::one() + (state.unread_s + state.unread_s) / self.shaft.age_s();
+        let carried = T::one() + (state.unread_s + state.unread_s) / self.age_s;
         let error = self.budget.slip_rad_s * if fresh { T::one() } else { carried };
         let slip_rad_s = phase.map(|_| [sample.slip_rad_s, error]);
         let read = fresh && channels.wheel == ChannelHealth::Good;
@@ -171,7 +194,8 @@ impl<T: Real> RangeEstimator<T> {
         RangeEstimator {
             budget: self.budget.cast(),
             clutch: self.clutch.cast(),
-            shaft: self.shaft.cast(),
+            age_s: U::of(self.age_s.to_f64_exact()),
+            shaft: self.shaft.as_ref().map(ShaftRange::cast),
             tracker: self.tracker.cast(),
         }
     }
@@ -187,6 +211,10 @@ pub(crate) fn pressure_and_torque<T: Real>(
 ) -> ([T; 2], [T; 2]) {
     let zero = T::zero();
     let [lower_pa, upper_pa] = pressure.pressure_pa(budget);
+    let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
+    if highest_force <= zero {
+        return ([lower_pa, upper_pa], [zero; 2]);
+    }
     let [least, most] = budget.friction_factor;
     // The sign of a slip that may be zero is not known, nor whether the clutch holds.
     let slip = slip_rad_s.filter(|[slip, error]| slip.abs() > *error);
@@ -197,7 +225,6 @@ pub(crate) fn pressure_and_torque<T: Real>(
             (lowest.at_most(clutch.static_friction), highest.at_least(clutch.static_friction))
         }
     };
-    let [lowest_force, highest_force] = clamp_force(clutch, budget, pressure, [lower_pa, upper_pa]);
     let at_most = most * highest * clutch.lever() * highest_force;
     let at_least = least * lowest * clutch.lever() * lowest_force;
     let torque = match slip {
@@ -235,8 +262,9 @@ impl<T: Real, O: Estimator<T>> Estimator<T> for Bounded<T, O> {
 
     #[inline]
     fn step(&self, (state, range): &mut Self::State, input: &Input<T>) -> Estimate<T> {
-        let estimate = self.observer.step(state, input);
-        self.range.step(range, input).clip(estimate)
+        let aligned = self.range.align(range, input);
+        let estimate = self.observer.step_aligned(state, input, &aligned);
+        self.range.step_aligned(range, input, &aligned).clip(estimate)
     }
 }
 

@@ -35,13 +35,15 @@ impl<T: Real> Commands<T> {
         Self { sent: [any; REMEMBERED], count: 1 }
     }
 
-    /// Takes a new command between these limits, of a sample `age_s` ago, sent up to `early_s` before it. Commands that
-    /// were sent more than `delay_max_s` before now are forgotten, but for the newest of them.
+    /// Takes a new command between these limits, of a sample `age_s` ago, sent up to `early_s` before it. One that is like
+    /// the newest is that one going on.
     #[inline]
-    pub(crate) fn send(&mut self, age_s: T, early_s: T, [lowest, highest]: [T; 2], delay_max_s: T) {
-        // What is older than the longest delay has been replaced by what came after it.
-        let oldest = self.sent.iter().take(self.count).position(|sent| sent.age_s >= delay_max_s);
-        let kept = oldest.map_or(self.count, |at| at + 1).min(REMEMBERED);
+    pub(crate) fn send(&mut self, age_s: T, early_s: T, [lowest, highest]: [T; 2]) {
+        let newest = &self.sent[0];
+        if newest.lowest == lowest && newest.highest == highest && lowest == highest {
+            return;
+        }
+        let kept = self.count.min(REMEMBERED);
         let full = kept == REMEMBERED;
         if full {
             // No room: the two oldest become one that may have been either.
@@ -58,17 +60,22 @@ impl<T: Real> Commands<T> {
         self.count = kept + 1;
     }
 
-    /// Whether every one of them is this command.
+    /// Whether every one of them is this command: then there is one, since neighbours are not alike.
     #[inline]
     pub(crate) fn are_all(&self, command: T) -> bool {
-        self.sent.iter().take(self.count).all(|sent| sent.lowest == command && sent.highest == command)
+        self.count == 1 && self.sent[0].lowest == command && self.sent[0].highest == command
     }
 
-    /// Carries all of them on by `dt_s`.
+    /// Carries all of them on by `dt_s`. Those that were sent more than `delay_max_s` before now are forgotten, but for the
+    /// newest of them: they have been replaced by what came after them.
     #[inline]
-    pub(crate) fn age(&mut self, dt_s: T) {
-        for sent in self.sent.iter_mut().take(self.count) {
+    pub(crate) fn age(&mut self, dt_s: T, delay_max_s: T) {
+        for (at, sent) in self.sent.iter_mut().take(self.count).enumerate() {
             sent.age_s = sent.age_s + dt_s;
+            if sent.age_s >= delay_max_s {
+                self.count = at + 1;
+                break;
+            }
         }
     }
 
@@ -99,22 +106,42 @@ mod tests {
     #[test]
     fn a_command_acts_from_the_least_delay_until_the_greatest_after_the_next() {
         let mut commands = Commands::unknown(0.0);
-        commands.send(0.0, 0.0, [1.0, 1.0], DELAY_S[1]);
+        commands.send(0.0, 0.0, [1.0, 1.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.004), [0.0, 0.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.006), [0.0, 1.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.021, 0.03), [1.0, 1.0]);
-        commands.age(0.01);
-        commands.send(0.0, 0.0, [3.0, 3.0], DELAY_S[1]);
+        commands.age(0.01, DELAY_S[1]);
+        commands.send(0.0, 0.0, [3.0, 3.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.01), [0.0, 3.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.011, 0.019), [1.0, 3.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.021, 0.022), [3.0, 3.0]);
     }
 
     #[test]
+    fn a_command_that_is_read_again_goes_on() {
+        let mut commands = Commands::unknown(0.0);
+        for _ in 0..4 {
+            commands.send(0.0, 0.0, [1.0, 1.0]);
+            commands.age(0.01, DELAY_S[1]);
+        }
+        // Sent 40 ms ago for the first time: nothing else is in effect.
+        assert!(commands.are_all(1.0) && !commands.are_all(2.0));
+        assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.01), [1.0, 1.0]);
+        commands.send(0.0, 0.0, [2.0, 2.0]);
+        assert!(!commands.are_all(1.0) && !commands.are_all(2.0));
+        assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.006), [1.0, 2.0]);
+        commands.age(0.01, DELAY_S[1]);
+        // The old one again: the one between is still on its way.
+        commands.send(0.0, 0.0, [1.0, 1.0]);
+        assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.006), [1.0, 2.0]);
+        assert!(!commands.are_all(1.0));
+    }
+
+    #[test]
     fn a_command_of_the_coming_sample_acts_as_early_as_it_may_have_been_sent() {
         // Sent somewhere in the 10 ms before its sample, which lies 10 ms ahead.
         let mut commands = Commands::unknown(0.0);
-        commands.send(-0.01, 0.01, [1.0, 1.0], DELAY_S[1]);
+        commands.send(-0.01, 0.01, [1.0, 1.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.0, 0.004), [0.0, 0.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.004, 0.008), [0.0, 1.0]);
         assert_eq!(commands.in_effect(DELAY_S, 0.031, 0.032), [1.0, 1.0]);

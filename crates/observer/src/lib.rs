@@ -30,7 +30,7 @@ pub mod supervisor;
 pub mod tracker;
 pub mod unscented;
 
-pub use alignment::{AlignedState, Alignment, AlignmentState};
+pub use alignment::{Aligned, AlignedState, Alignment, AlignmentState};
 pub use any_shift::{AnyShiftFilter, AnyShiftState, GearboxTables, ShiftEstimate, ShiftInput};
 pub use bound::{Bounded, Bounds, Budget, RangeEstimator, RangeState};
 pub use compliant::{CompliantGains, CompliantObserver, CompliantState};

@@ -55,6 +55,9 @@ pub struct PressureRange<T> {
 /// What is known of the valve and the cylinder at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Limits<T> {
+    /// The lowest and the highest command that were in effect, and the least and greatest pressure that they end at, Pa.
+    commands: [T; 2],
+    ends_pa: [T; 2],
     /// Lowest and highest settled pressure behind the hysteresis, Pa.
     asked_pa: [T; 2],
     /// Lowest and highest pressure at the valve's outlet, Pa.
@@ -100,7 +103,9 @@ impl<T: Real> PressureRange<T> {
         if let Some((reading, interval_s)) = new.filter(|(_, interval_s)| *interval_s >= zero) {
             self.take(budget, interval_s, reading.value, command_max);
             self.now = self.at_reading;
-            self.carry_on(budget, zero, reading.age_s, command_max);
+            if reading.age_s > zero {
+                self.carry_on(budget, zero, reading.age_s, command_max);
+            }
             (self.since_reading_s, self.stepped) = (Some(reading.age_s), false);
         } else {
             let start_s = before_s.unwrap_or(zero);
@@ -120,7 +125,7 @@ impl<T: Real> PressureRange<T> {
         let (zero, delay_max_s) = (T::zero(), budget.delay_s[1]);
         let lost = interval_s > T::of(LOST) * self.period_s;
         if lost && self.stepped || interval_s > T::of(GAP) * self.period_s {
-            self.commands.send(zero, zero, [zero, command_max], delay_max_s);
+            self.commands.send(zero, zero, [zero, command_max]);
         }
         if interval_s > zero {
             self.period_s = interval_s.at_most(self.period_s * T::of(SLOWER));
@@ -129,19 +134,19 @@ impl<T: Real> PressureRange<T> {
         if self.still.is_some_and(|(still, longest_s)| !lost && still == command && interval_s <= longest_s) {
             return;
         }
-        let (before, alike) = (self.at_reading, !lost && self.commands.are_all(command));
+        let before = (!lost && self.commands.are_all(command)).then_some(self.at_reading);
         let early_s = if lost { interval_s } else { budget.command_age_s.at_most(interval_s) };
         if early_s > zero {
-            self.commands.send(-interval_s, early_s, [command; 2], delay_max_s);
+            self.commands.send(-interval_s, early_s, [command; 2]);
         }
         let commands = &self.commands;
         self.at_reading
             .carry(budget, zero, interval_s, |start_s, end_s| commands.in_effect(budget.delay_s, start_s, end_s));
-        self.commands.age(interval_s);
+        self.commands.age(interval_s, delay_max_s);
         if early_s <= zero {
-            self.commands.send(zero, zero, [command; 2], delay_max_s);
+            self.commands.send(zero, zero, [command; 2]);
         }
-        self.still = (alike && before == self.at_reading).then_some((command, interval_s));
+        self.still = (before == Some(self.at_reading)).then_some((command, interval_s));
     }
 
     /// Carries the limits for now from `start_s` to `end_s` after the newest reading. Its command holds until the next one
@@ -162,6 +167,9 @@ impl<T: Real> Limits<T> {
     fn unknown(pressure_max_pa: T) -> Self {
         let zero = T::zero();
         Self {
+            // No command is that large: the pressures are found with the first one.
+            commands: [T::infinity(); 2],
+            ends_pa: [zero, T::infinity()],
             asked_pa: [zero, T::infinity()],
             outlet_pa: [zero, pressure_max_pa],
             piston: PistonRange::unknown(pressure_max_pa),
@@ -173,12 +181,18 @@ impl<T: Real> Limits<T> {
     fn carry(&mut self, budget: &Budget<T>, start_s: T, end_s: T, in_effect: impl Fn(T, T) -> [T; 2]) {
         let dt_s = end_s - start_s;
         if dt_s > T::zero() {
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
-            let length_s = dt_s / T::of(pieces as f64);
+            let (mut pieces, mut length_s) = (1, dt_s);
+            if dt_s > T::of(PIECE_S) {
+                pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+                length_s = dt_s / T::of(pieces as f64);
+            }
             let mut at_s = start_s;
             for _ in 0..pieces {
                 let commands = in_effect(at_s, at_s + length_s);
-                self.asked_pa = budget.asked(self.asked_pa, commands);
+                if commands != self.commands {
+                    (self.commands, self.ends_pa) = (commands, budget.ends(commands));
+                }
+                self.asked_pa = budget.asked(self.asked_pa, self.ends_pa);
                 self.advance_piece(budget, length_s);
                 at_s = at_s + length_s;
             }
@@ -208,18 +222,23 @@ impl<T: Real> Limits<T> {
 }
 
 impl<T: Real> Budget<T> {
-    /// Lowest and highest settled pressure behind the hysteresis, Pa, from those before and the commands in effect.
+    /// Least and greatest pressure that the commands in effect end at, Pa.
+    #[inline]
+    fn ends(&self, [lowest, highest]: [T; 2]) -> [T; 2] {
+        let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
+        let (weakest, strongest) = ((lowest - self.command).at_least(T::zero()), highest + self.command);
+        let (weakest, strongest) = if self.valve.falls() { (strongest, weakest) } else { (weakest, strongest) };
+        [settled(weakest, self.gain_factor[0]), settled(strongest, self.gain_factor[1])]
+    }
+
+    /// Lowest and highest settled pressure behind the hysteresis, Pa, from those before and the pressures that the commands
+    /// in effect end at.
     ///
     /// The hysteresis is a play operator of half-width 0 to `r`: the settled pressure stays where it is until the
     /// command has moved by more than the half-width from it. It does not fall with command and start, and the largest
     /// value over all half-widths is `max(u, min(w, u + r))`: after a rise `u`, after a fall at most `u + r`.
     #[inline]
-    fn asked(&self, [low, high]: [T; 2], [lowest, highest]: [T; 2]) -> [T; 2] {
-        let settled = |command: T, gain: T| gain * self.valve.settled_pressure(command);
-        let (weakest, strongest) = ((lowest - self.command).at_least(T::zero()), highest + self.command);
-        let (weakest, strongest) = if self.valve.falls() { (strongest, weakest) } else { (weakest, strongest) };
-        let bottom = settled(weakest, self.gain_factor[0]);
-        let top = settled(strongest, self.gain_factor[1]);
+    fn asked(&self, [low, high]: [T; 2], [bottom, top]: [T; 2]) -> [T; 2] {
         [
             bottom.at_most(low.at_least(bottom - self.hysteresis_pa)),
             top.at_least(high.at_most(top + self.hysteresis_pa)),

@@ -143,7 +143,8 @@ struct Span<T> {
 /// Memory of the range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShaftMemory<T> {
-    last: Option<Sample<T>>,
+    /// Turbine and output speed of the last sample, rad/s.
+    last: Option<[T; 2]>,
     /// The newest samples, and those before; together they reach back far enough.
     recent: Option<Span<T>>,
     before: Option<Span<T>>,
@@ -182,11 +183,6 @@ impl<T: Real> ShaftRange<T> {
         Self { shift, any_offgoing, any_oncoming, converter, driveline, errors }
     }
 
-    /// Age that a reading may have by the budget, s.
-    pub(crate) fn age_s(&self) -> T {
-        self.errors.age_s
-    }
-
     /// The same range in another precision.
     pub fn cast<U: Real>(&self) -> ShaftRange<U> {
         ShaftRange::new(self.shift.cast(), self.converter.cast(), self.driveline.cast(), self.errors.cast())
@@ -201,16 +197,17 @@ impl<T: Real> ShaftRange<T> {
         clutch: [T; 2],
     ) -> Option<[T; 2]> {
         let (zero, errors, line) = (T::zero(), &self.errors, &self.driveline);
+        let speeds = [sample.turbine_rad_s, self.shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s)];
         let now = Span {
             engine: [sample.engine_rad_s; 2],
-            turbine: [sample.turbine_rad_s; 2],
+            turbine: [speeds[0]; 2],
             clutch,
-            output: [self.output(sample); 2],
+            output: [speeds[1]; 2],
             wheel: [sample.wheel_rad_s; 2],
             length_s: zero,
         };
-        let Some(last) = memory.last.replace(*sample).filter(|_| sample.dt_s > zero) else {
-            *memory = ShaftMemory { last: Some(*sample), recent: Some(now), ..ShaftMemory::new() };
+        let Some(last) = memory.last.replace(speeds).filter(|_| sample.dt_s > zero) else {
+            *memory = ShaftMemory { last: Some(speeds), recent: Some(now), ..ShaftMemory::new() };
             return None;
         };
         let dt = sample.dt_s;
@@ -237,7 +234,8 @@ impl<T: Real> ShaftRange<T> {
             Phase::InertiaPhase | Phase::AfterShift => memory.released_s + dt,
             Phase::BeforeShift | Phase::TorquePhase => zero,
         };
-        let seen = self.seen(&last, sample, &span);
+        let changes = [speeds[0] - last[0], speeds[1] - last[1]];
+        let seen = self.seen(changes, dt, &span);
         let mut mean = scaled(self.any_offgoing.output(&seen, span.clutch), ratio);
         // A clutch that has let go carries next to nothing, as soon as it has drained and all that is looked back on lies
         // after that.
@@ -261,21 +259,17 @@ impl<T: Real> ShaftRange<T> {
         Some([spring[0] + damping[0], spring[1] + damping[1]])
     }
 
-    /// What the readings leave open between two of them.
-    fn seen(&self, last: &Sample<T>, sample: &Sample<T>, span: &Span<T>) -> Seen<T> {
+    /// What the readings leave open between two of them, between which turbine and output speed changed by these.
+    fn seen(&self, [turbine, output]: [T; 2], dt_s: T, span: &Span<T>) -> Seen<T> {
         let errors = &self.errors;
-        let rate = |change: T, error: T| [(change - error) / sample.dt_s, (change + error) / sample.dt_s];
+        let rate = |change: T, error: T| [(change - error) / dt_s, (change + error) / dt_s];
         let [least, most] = self.converter.turbine_range(span.engine, span.turbine);
         let share = errors.turbine_torque_share;
         Seen {
-            turbine_rad_s2: rate(sample.turbine_rad_s - last.turbine_rad_s, errors.turbine_rad_s),
-            output_rad_s2: rate(self.output(sample) - self.output(last), errors.output_rad_s),
+            turbine_rad_s2: rate(turbine, errors.turbine_rad_s),
+            output_rad_s2: rate(output, errors.output_rad_s),
             turbine_n_m: [least - share * least.abs(), most + share * most.abs()],
         }
-    }
-
-    fn output(&self, sample: &Sample<T>) -> T {
-        self.shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s)
     }
 }
 
@@ -313,7 +307,7 @@ fn widened<T: Real>([low, high]: [T; 2], share: T, error: T) -> [T; 2] {
 /// A range times a factor of either sign.
 fn scaled<T: Real>([low, high]: [T; 2], factor: T) -> [T; 2] {
     let (a, b) = (low * factor, high * factor);
-    [a.at_most(b), a.at_least(b)]
+    if factor >= T::zero() { [a, b] } else { [b, a] }
 }
 
 #[cfg(test)]

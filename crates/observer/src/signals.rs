@@ -2,7 +2,7 @@
 
 use drivetrain::{Real, ReducedShift};
 
-use crate::{Bounds, Phase, Tracker};
+use crate::{Aligned, Bounds, Phase, Tracker};
 
 /// What a sensor or a controller told last, and how old it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -319,6 +319,13 @@ pub trait Estimator<T> {
 
     /// Takes what came since the step before and returns the estimate for now. Never panics; allocates nothing.
     fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T>;
+
+    /// The same where another part has brought the signals to the time of the step by an [`crate::Alignment`] of this
+    /// powertrain: an observer that needs them so does not do it again. In a run either all steps are of this kind or none.
+    #[inline]
+    fn step_aligned(&self, state: &mut Self::State, input: &Input<T>, _aligned: &Aligned<T>) -> Estimate<T> {
+        self.step(state, input)
+    }
 }
 
 impl<T, O: Estimator<T>> Estimator<T> for &O {
@@ -331,6 +338,11 @@ impl<T, O: Estimator<T>> Estimator<T> for &O {
     #[inline]
     fn step(&self, state: &mut Self::State, input: &Input<T>) -> Estimate<T> {
         (**self).step(state, input)
+    }
+
+    #[inline]
+    fn step_aligned(&self, state: &mut Self::State, input: &Input<T>, aligned: &Aligned<T>) -> Estimate<T> {
+        (**self).step_aligned(state, input, aligned)
     }
 }
 

@@ -83,7 +83,7 @@ fn ticks(job: impl FnOnce()) -> u32 {
     before.wrapping_sub(SYST::get_current()) & 0x00ff_ffff
 }
 
-/// The observer alone, the range alone, and both.
+/// The observer alone, the ranges alone, and both; then the guaranteed ranges alone, and the observer with them.
 fn run_all<O>(bytes: &[u8]) -> Result<(), postcard::Error>
 where
     O: Estimator<f32> + for<'a> serde::Deserialize<'a>,
@@ -96,7 +96,12 @@ where
     let mut state = range.start();
     run("range", readings, |input| step_range(range, &mut state, input).pressure_pa[1])?;
     let mut state = bounded.start();
-    run("both", readings, |input| step(&bounded, &mut state, input).pressure_pa)
+    run("both", readings, |input| step(&bounded, &mut state, input).pressure_pa)?;
+    let bounded = Bounded { range: bounded.range.guaranteed(), ..bounded };
+    let mut state = bounded.range.start();
+    run("guaranteed", readings, |input| step_range(&bounded.range, &mut state, input).pressure_pa[1])?;
+    let mut state = bounded.start();
+    run("with-guaranteed", readings, |input| step(&bounded, &mut state, input).pressure_pa)
 }
 
 /// A step, as a function of its own: what is counted includes its call.

@@ -57,14 +57,13 @@ impl<T: Real> ValveMaps<T> {
     /// meet times `lag_factor[0]`, or at the nearest, with the longest times `lag_factor[1]`.
     #[inline]
     pub fn moved(&self, pressure_pa: T, settled_pa: T, dt_s: T, lag_factor: [T; 2], furthest: bool) -> T {
-        if furthest && (settled_pa - pressure_pa).abs() <= T::of(ARRIVED_PA) {
+        let arrived = furthest && (settled_pa - pressure_pa).abs() <= T::of(ARRIVED_PA);
+        if arrived || pressure_pa == settled_pa {
             return settled_pa;
         }
         let here = self.time_constant_s.place(pressure_pa);
         let lags = |to: T| {
-            let there = self.time_constant_s.place(to);
-            let (from, to) = if to < pressure_pa { (there, here) } else { (here, there) };
-            let (shortest, longest) = self.time_constant_s.range_between(from, to);
+            let (shortest, longest) = self.time_constant_s.range_from(&here, to);
             [shortest * lag_factor[0], longest * lag_factor[1]]
         };
         // It cannot get further than at its first speed, which tells what lags it meets.

@@ -21,8 +21,8 @@ pub(super) struct Covariance<T> {
 
 /// A scalar measurement: the covariance of all with it, and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Measured<T> {
-    pub(super) with: [T; ALL],
+pub(super) struct Measured<'a, T> {
+    pub(super) with: &'a [T; ALL],
     pub(super) variance: T,
 }
 
@@ -74,6 +74,17 @@ impl<T: Real> Covariance<T> {
         core::array::from_fn(|i| a * self.entry::<A>(i) + b * self.entry::<B>(i))
     }
 
+    /// The sum of multiples of four rows.
+    #[inline(always)]
+    pub(super) fn sum_of_four<const A: usize, const B: usize, const C: usize, const D: usize>(
+        &self,
+        [a, b, c, d]: [T; 4],
+    ) -> [T; ALL] {
+        core::array::from_fn(|i| {
+            a * self.entry::<A>(i) + b * self.entry::<B>(i) + c * self.entry::<C>(i) + d * self.entry::<D>(i)
+        })
+    }
+
     /// An entry of a row that is known when this is compiled.
     #[inline(always)]
     fn entry<const ROW: usize>(&self, i: usize) -> T {
@@ -99,7 +110,9 @@ impl<T: Real> Covariance<T> {
     pub(super) fn remember(&mut self) {
         let p = &mut self.upper;
         for row in p.iter_mut().take(N) {
-            row.copy_within(N..ALL - SPEEDS, N + SPEEDS);
+            for m in (N + SPEEDS..ALL).rev() {
+                row[m] = row[m - SPEEDS];
+            }
         }
         for m in (N + SPEEDS..ALL).rev() {
             for l in (m..ALL).rev() {
@@ -107,9 +120,12 @@ impl<T: Real> Covariance<T> {
             }
         }
         for k in 0..SPEEDS {
-            let now = p[k];
-            p[N + k][N + k..N + SPEEDS].copy_from_slice(&now[k..SPEEDS]);
-            p[N + k][N + SPEEDS..].copy_from_slice(&now[N + SPEEDS..]);
+            for l in k..SPEEDS {
+                p[N + k][N + l] = p[k][l];
+            }
+            for m in SPEEDS..CLONES {
+                p[N + k][N + m] = p[k][N + m];
+            }
             for i in 0..N {
                 p[i][N + k] = p[i.min(k)][i.max(k)];
             }
@@ -184,13 +200,13 @@ impl<T: Real> Covariance<T> {
     /// Of the best gain each of the considered states gets a share; with none its uncertainty is accounted for and stays.
     ///
     /// With `K = a S/V`, each entry of `S` with its own share `a`, the form is `P - (S S' - R R')/V` with `R = (1 - a) S`.
-    #[inline]
-    pub(super) fn correct(&mut self, measured: &Measured<T>, shares: &[T; CONSIDERED]) -> [T; ALL] {
+    #[inline(always)]
+    pub(super) fn correct(&mut self, measured: &Measured<'_, T>, shares: &[T; CONSIDERED]) -> [T; ALL] {
         let per_variance = measured.variance.recip();
         let mut gain = measured.with.map(|with| with * per_variance);
         // What of the considered states' best gain is not taken.
         let left: [T; CONSIDERED] = core::array::from_fn(|a| T::one() - shares[a]);
-        subtract_product(&mut self.upper, &gain, &measured.with, &left);
+        subtract_product(&mut self.upper, &gain, measured.with, &left);
         for (gain, share) in gain[SHARE..].iter_mut().zip(shares) {
             *gain = *share * *gain;
         }

@@ -96,8 +96,7 @@ impl<T: Real> KalmanFilter<T> {
         if !(variance.is_finite() && innovation.is_finite()) {
             return;
         }
-        let gain = running.covariance.correct(&Measured { with, variance }, &[one; CONSIDERED]);
-        running.shift_by(&gain, innovation);
+        running.correct(&Measured { with: &with, variance }, innovation, &[one; CONSIDERED]);
     }
 }
 

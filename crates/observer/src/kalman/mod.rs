@@ -45,7 +45,7 @@ use crate::{
     ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Phase,
     Supervisor, SupervisorState,
 };
-use covariance::Covariance;
+use covariance::{CONSIDERED, Covariance, Measured};
 use engine::Engine;
 use engine_torque::LastTorque;
 use gate::Gate;
@@ -489,10 +489,11 @@ fn holds_offgoing<T: Real>(
 }
 
 impl<T: Real> Running<T> {
-    /// Moves states and remembered speeds by a gain each times an innovation.
-    #[inline]
-    fn shift_by(&mut self, gain: &[T; covariance::ALL], innovation: T) {
-        for (x, gain) in self.mean.iter_mut().zip(gain) {
+    /// Corrects the covariance for a measurement, and states and remembered speeds by their gains times its innovation; of
+    /// the considered states' best gains these shares.
+    fn correct(&mut self, measured: &Measured<'_, T>, innovation: T, shares: &[T; CONSIDERED]) {
+        let gain = self.covariance.correct(measured, shares);
+        for (x, gain) in self.mean.iter_mut().zip(&gain) {
             *x = *x + *gain * innovation;
         }
         self.past.correct(&gain[N..], innovation);

@@ -112,8 +112,7 @@ impl<T: Real> KalmanFilter<T> {
         running.covariance.add_row::<OFFGOING>(&mut with, T::one());
         let variance = with[OFFGOING].at_least(T::zero()) + deviation * deviation;
         let beyond = if torque > T::zero() { most - torque } else { -most - torque };
-        let gain = running.covariance.correct(&Measured { with, variance }, &[T::one(); CONSIDERED]);
-        running.shift_by(&gain, beyond);
+        running.correct(&Measured { with: &with, variance }, beyond, &[T::one(); CONSIDERED]);
     }
 }
 

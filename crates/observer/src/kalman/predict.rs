@@ -180,8 +180,8 @@ impl<T: Real> KalmanFilter<T> {
         let valve = self.valve.step(settled_pa, x[PRESSURE], dt_s);
         let per_start = valve.psi / dt_s;
         let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s / dt_s;
-        let sigma_pa = running.covariance.at(PRESSURE, PRESSURE).at_least(zero).sqrt();
-        let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), sigma_pa);
+        let variance = running.covariance.at(PRESSURE, PRESSURE).at_least(zero);
+        let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), variance);
         let (turbine_n_m, slope_n_m_s) =
             rigid.converter.turbine_with_slope(engine.speed_before(left_s + half * dt_s), x[TURBINE]);
         Step {
@@ -190,7 +190,8 @@ impl<T: Real> KalmanFilter<T> {
             // A torque that rises with the turbine speed is taken as it is at the start: implicit it might have no solution.
             turbine: [turbine_n_m, slope_n_m_s.at_most(zero)],
             held: !released,
-            per_pressure: if locked {
+            // One that does not touch carries nothing.
+            per_pressure: if locked || above_pa <= zero {
                 zero
             } else {
                 running.direction * clutch.torque_per_force(slip) * clutch.piston_area_m2
@@ -267,13 +268,15 @@ fn lasting<T: Real>(dt_s: T, time_s: T) -> T {
     time_s / (time_s + dt_s)
 }
 
-/// Mean of `max(x, 0)` and its derivative, of a normal distribution about `x`.
+/// Mean of `max(x, 0)` and its derivative, of a normal distribution about `x` with this variance.
 #[inline]
-pub(super) fn above<T: Real>(x: T, deviation: T) -> (T, T) {
-    let z = x / deviation.at_least(T::min_positive_value());
-    if z.abs() >= T::of(6.0) || z.is_nan() {
+pub(super) fn above<T: Real>(x: T, variance: T) -> (T, T) {
+    let near = x * x <= T::of(36.0) * variance;
+    if !near {
         return if x > T::zero() { (x, T::one()) } else { (T::zero(), T::zero()) };
     }
+    let deviation = variance.sqrt();
+    let z = x / deviation.at_least(T::min_positive_value());
     let density = (T::of(-0.5) * z * z).exp() * T::of(0.398_942_280_401_432_7);
     // Abramowitz and Stegun, Handbook of Mathematical Functions (1964), 26.2.17: error below 7.5e-8.
     let t = (T::one() + T::of(0.231_641_9) * z.abs()).recip();
@@ -290,7 +293,7 @@ mod tests {
     #[test]
     fn the_mean_above_zero_is_that_of_the_distribution() {
         // At zero: deviation/sqrt(2 pi), and half of the samples.
-        let (mean, share) = above(0.0_f64, 2.0);
+        let (mean, share) = above(0.0_f64, 4.0);
         assert!((mean - 2.0 * 0.398_942_28).abs() < 1e-6 && (share - 0.5).abs() < 1e-6);
         // One deviation above: 1.0833, 84.13 %.
         let (mean, share) = above(1.0_f64, 1.0);

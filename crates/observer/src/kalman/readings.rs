@@ -2,7 +2,7 @@
 
 use drivetrain::Real;
 
-use super::covariance::{CONSIDERED, Measured, speed_at};
+use super::covariance::{ALL, CONSIDERED, Measured, speed_at};
 use super::gate::Verdict;
 use super::past::{PASTS, Place, SPEEDS};
 use super::{DELAY, FRICTION, GAIN, KalmanFilter, N, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
@@ -61,22 +61,29 @@ impl<T: Real> KalmanFilter<T> {
         let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
         let place = Place { shares: line.place.shares.map(|share| scale * share), ..line.place };
-        let mut measured = with_reading(running, k, &place, by, noise);
-        let verdict = running.gates[k].judge(innovation, measured.variance);
-        match verdict {
+        let with = with_reading(running, k, &place, by);
+        let variance = variance_of(&with, k, &place, by, noise);
+        match running.gates[k].judge(innovation, variance) {
             Verdict::Refused => {
                 running.silent_s[k] = since_s;
                 return ChannelHealth::Refused;
             }
             Verdict::Jumped => {
                 running.covariance.add(k, innovation * innovation);
-                measured = with_reading_again(running, k, &place, by, noise);
+                let with = with_reading_again(running, k, &place, by);
+                let variance = variance_of(&with, k, &place, by, noise);
+                self.take(running, k, &Measured { with: &with, variance }, innovation, since_s);
             }
-            Verdict::Taken => {}
+            Verdict::Taken => self.take(running, k, &Measured { with: &with, variance }, innovation, since_s),
         }
-        running.squared_innovations[k] = Some(innovation * innovation / measured.variance);
-        self.apply(running, &measured, innovation, since_s);
         ChannelHealth::Good
+    }
+
+    /// Corrects for a reading of the speed `k`.
+    #[inline]
+    fn take(&self, running: &mut Running<T>, k: usize, measured: &Measured<'_, T>, innovation: T, since_s: T) {
+        running.squared_innovations[k] = Some(innovation * innovation / measured.variance);
+        self.apply(running, measured, innovation, since_s);
     }
 
     #[inline]
@@ -122,12 +129,12 @@ impl<T: Real> KalmanFilter<T> {
         let deviation = self.readings[TURBINE].deviation_rad_s;
         let variance = (with[TURBINE] - ratio * with[OUTPUT]).at_least(T::zero()) + deviation * deviation;
         let innovation = ratio * running.mean[OUTPUT] - running.mean[TURBINE];
-        self.apply(running, &Measured { with, variance }, innovation, dt_s);
+        self.apply(running, &Measured { with: &with, variance }, innovation, dt_s);
     }
 
     /// Corrects mean and covariance for a measurement, that comes `since_s` after the last of its kind.
     #[inline]
-    fn apply(&self, running: &mut Running<T>, measured: &Measured<T>, innovation: T, since_s: T) {
+    fn apply(&self, running: &mut Running<T>, measured: &Measured<'_, T>, innovation: T, since_s: T) {
         let u = &self.uncertainty;
         let mut shares = [T::one(); CONSIDERED];
         // Before both clutches slip an error of the turbine torque cancels in the clutch torque, and a cylinder that fills late
@@ -145,11 +152,10 @@ impl<T: Real> KalmanFilter<T> {
                 shares[state - SHARE] = (since_s / T::of(SLOWLY_S)).at_most(T::one());
             }
         }
-        let gain = running.covariance.correct(measured, &shares);
+        running.correct(measured, innovation, &shares);
         for (state, least) in least {
             running.covariance.hold_above(state, least * least);
         }
-        running.shift_by(&gain, innovation);
         let [least, most] = u.wheel_delay_s;
         let x = &mut running.mean;
         x[DELAY] = x[DELAY].at_least(least).at_most(most);
@@ -165,31 +171,38 @@ fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2])
     (p.at(late, late) - T::of(2.0) * p.at(late, early) + p.at(early, early)).at_least(T::zero())
 }
 
-/// The measurement that a reading of the speed `k` at a place in time is, with this noise: it also depends on scale, wheel
-/// delay and skew as `by` says.
+/// The covariance of all with a reading of the speed `k` at a place in time, which also depends on scale, wheel delay and
+/// skew as `by` says.
 #[inline(always)]
-fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
+fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3]) -> [T; ALL] {
     const { assert!(PASTS == 2, "a reading is between now and the newer of the past, or between both") };
-    let (p, shares, recent) = (&running.covariance, place.shares, place.between[0] == 0);
+    let (p, recent) = (&running.covariance, place.between[0] == 0);
+    let [late, early] = place.shares;
+    let wheel = [late, early, by[0], by[1]];
     let mut with = match (k, recent) {
-        (TURBINE, true) => p.sum_of::<TURBINE, { N + TURBINE }>(shares),
-        (TURBINE, false) => p.sum_of::<{ N + TURBINE }, { N + SPEEDS + TURBINE }>(shares),
-        (OUTPUT, true) => p.sum_of::<OUTPUT, { N + OUTPUT }>(shares),
-        (OUTPUT, false) => p.sum_of::<{ N + OUTPUT }, { N + SPEEDS + OUTPUT }>(shares),
-        (_, true) => p.sum_of::<WHEEL, { N + WHEEL }>(shares),
-        (_, false) => p.sum_of::<{ N + WHEEL }, { N + SPEEDS + WHEEL }>(shares),
+        (TURBINE, true) => p.sum_of::<TURBINE, { N + TURBINE }>(place.shares),
+        (TURBINE, false) => p.sum_of::<{ N + TURBINE }, { N + SPEEDS + TURBINE }>(place.shares),
+        (OUTPUT, true) => p.sum_of::<OUTPUT, { N + OUTPUT }>(place.shares),
+        (OUTPUT, false) => p.sum_of::<{ N + OUTPUT }, { N + SPEEDS + OUTPUT }>(place.shares),
+        (_, true) => p.sum_of_four::<WHEEL, { N + WHEEL }, SCALE, DELAY>(wheel),
+        (_, false) => p.sum_of_four::<{ N + WHEEL }, { N + SPEEDS + WHEEL }, SCALE, DELAY>(wheel),
     };
-    p.add_row::<SCALE>(&mut with, by[0]);
-    p.add_row::<DELAY>(&mut with, by[1]);
     p.add_row::<SKEW>(&mut with, by[2]);
-    let [late, early] = place.between.map(|point| with[speed_at(k, point)]);
-    let total = shares[0] * late + shares[1] * early + by[0] * with[SCALE] + by[1] * with[DELAY] + by[2] * with[SKEW];
-    Measured { with, variance: noise + total.at_least(T::zero()) }
+    with
 }
 
 /// The same after the speed has jumped, which is rare.
 #[cold]
 #[inline(never)]
-fn with_reading_again<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3], noise: T) -> Measured<T> {
-    with_reading(running, k, place, by, noise)
+fn with_reading_again<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3]) -> [T; ALL] {
+    with_reading(running, k, place, by)
+}
+
+/// The variance of that reading.
+#[inline]
+fn variance_of<T: Real>(with: &[T; ALL], k: usize, place: &Place<T>, by: [T; 3], noise: T) -> T {
+    let [late, early] = place.between.map(|point| with[speed_at(k, point)]);
+    let by_speed = place.shares[0] * late + place.shares[1] * early;
+    let total = by_speed + by[0] * with[SCALE] + by[1] * with[DELAY] + by[2] * with[SKEW];
+    noise + total.at_least(T::zero())
 }

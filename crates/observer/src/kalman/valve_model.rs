@@ -27,12 +27,14 @@ struct Sent<T> {
 pub(crate) struct Commands<T> {
     sent: [Sent<T>; REMEMBERED],
     count: usize,
+    /// Age of the newest reading, s: one that is like the newest command is that one going on.
+    read_s: T,
 }
 
 impl<T: Real> Commands<T> {
     /// None yet.
     pub(crate) fn new() -> Self {
-        Self { sent: [Sent { age_s: T::zero(), settled_pa: T::zero() }; REMEMBERED], count: 0 }
+        Self { sent: [Sent { age_s: T::zero(), settled_pa: T::zero() }; REMEMBERED], count: 0, read_s: T::zero() }
     }
 
     /// Pressure that the newest command ends at, Pa, if there was one.
@@ -42,12 +44,13 @@ impl<T: Real> Commands<T> {
 
     /// Whether a command came in the last `lost_s`.
     pub(crate) fn is_fresh(&self, lost_s: T) -> bool {
-        self.sent.iter().take(self.count.min(1)).any(|newest| newest.age_s <= lost_s)
+        self.count > 0 && self.read_s <= lost_s
     }
 
     /// Lets time pass.
     #[inline]
     pub(crate) fn pass(&mut self, dt_s: T) {
+        self.read_s = self.read_s + dt_s;
         for sent in self.sent.iter_mut().take(self.count) {
             sent.age_s = sent.age_s + dt_s;
         }
@@ -57,9 +60,14 @@ impl<T: Real> Commands<T> {
     #[inline]
     pub(crate) fn send(&mut self, age_s: T, settled_pa: T, needed_s: T) {
         // Commands arrive in their order; the oldest one gives way.
-        let age_s = self.sent.iter().take(self.count.min(1)).fold(age_s, |age, newest| age.at_most(newest.age_s));
+        let age_s = if self.count > 0 { age_s.at_most(self.read_s) } else { age_s };
+        self.read_s = age_s;
         let oldest = self.sent.iter().take(self.count).position(|sent| sent.age_s >= needed_s);
         let kept = oldest.map_or(self.count, |at| at + 1).min(REMEMBERED - 1);
+        if self.newest_pa() == Some(settled_pa) {
+            self.count = kept;
+            return;
+        }
         let mut moved = Sent { age_s, settled_pa };
         for sent in self.sent.iter_mut().take(kept + 1) {
             core::mem::swap(sent, &mut moved);
@@ -71,6 +79,10 @@ impl<T: Real> Commands<T> {
     /// command. The first one is taken to have stood before.
     #[inline]
     fn mean_pa(&self, delay_s: T, dt_s: T) -> Option<T> {
+        // One has stood all the time.
+        if self.count == 1 {
+            return self.newest_pa();
+        }
         // At a time `x` ago the newest command was in effect that is older than `x` and the delay.
         let (newest, oldest) = (delay_s, delay_s + dt_s);
         let first = self.sent.iter().take(self.count).find(|sent| sent.age_s >= newest);
@@ -137,6 +149,28 @@ mod tests {
         assert!((commands.mean_pa(0.015, 0.01).unwrap() - 2.0).abs() < 1e-12);
         commands.pass(0.01);
         assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_command_that_is_read_again_goes_on() {
+        let mut commands = Commands::<f64>::new();
+        for _ in 0..50 {
+            commands.pass(0.01);
+            commands.send(0.0, 2.0, 0.025);
+        }
+        assert!(commands.is_fresh(0.001) && commands.mean_pa(0.015, 0.01) == Some(2.0));
+        commands.pass(0.3);
+        assert!(!commands.is_fresh(0.25));
+        commands.send(0.0, 4.0, 0.025);
+        commands.pass(0.01);
+        commands.send(0.0, 2.0, 0.025);
+        commands.pass(0.01);
+        // The one between came 20 ms ago and stood for 10 ms: it is in effect for the last 5 ms.
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+        commands.pass(0.01);
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 3.0).abs() < 1e-12);
+        commands.pass(0.01);
+        assert!((commands.mean_pa(0.015, 0.01).unwrap() - 2.0).abs() < 1e-12);
     }
 
     #[test]

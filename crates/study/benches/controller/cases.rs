@@ -134,7 +134,7 @@ impl Case {
             Some([line.get(1)?.parse().ok()?, line.get(2)?.parse().ok()?])
         };
         let (mut parts, mut difference_pa) = (Vec::new(), 0.0_f32);
-        for part in ["observer", "range", "both"] {
+        for part in ["observer", "range", "both", "guaranteed", "with-guaranteed"] {
             let steps: Vec<[u32; 2]> = (lines.iter().filter(|line| line[0] == part))
                 .map(|line| Some([line.get(1)?.parse().ok()?, line.get(2)?.parse().ok()?]))
                 .collect::<Option<_>>()?;
