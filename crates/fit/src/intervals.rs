@@ -15,7 +15,7 @@ use crate::weights::{Weights, correlation_factor};
 use crate::{Channel, FitError, Parameter};
 
 /// Factor on the larger of both standard deviations, from fits of cars whose parameters are known.
-const FACTOR: f64 = 1.4;
+pub(crate) const FACTOR: f64 = 1.4;
 
 /// What is known of the parameters after a fit.
 #[derive(Debug, Clone)]

@@ -48,16 +48,20 @@ impl Weights {
                     of_channel.map(|block| &rows.as_slice()[block.rows.clone()])
                 })
                 .collect();
-            let best = GAINS.into_iter().map(|gain| (gain, spread(&blocks, gain)));
-            if let Some((gain, (_, scale))) = best.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
-                && scale > 0.0
-            {
+            if let Some((gain, scale)) = gain_and_scale(&blocks) {
                 weights.gain[channel as usize] = gain;
                 weights.scale[channel as usize] = scale;
             }
         }
         weights
     }
+}
+
+/// The gain with which residuals have the least one-step errors, and the scale of these; none without residuals.
+pub(crate) fn gain_and_scale(blocks: &[&[f64]]) -> Option<(f64, f64)> {
+    let found = GAINS.into_iter().map(|gain| (gain, spread(blocks, gain)));
+    let (gain, (_, scale)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
+    (scale > 0.0).then_some((gain, scale))
 }
 
 /// Turns residuals into one-step errors. The first is the residual itself.
