@@ -55,7 +55,8 @@ fn main() {
         all.push(rows.collect());
     }
     let (mut inside, mut count) = (0, 0);
-    for at in 0..all[0].len() {
+    let fewest = all.iter().map(Vec::len).min().unwrap();
+    for at in 0..fewest {
         let of: Vec<_> = all.iter().map(|rows| &rows[at]).collect();
         let held = of.iter().filter(|row| row.2.abs() <= 1.96 * row.3).count();
         inside += held;

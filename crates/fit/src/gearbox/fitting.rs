@@ -54,7 +54,7 @@ pub fn fit(
     shifts: &[ShiftLog],
     progress: &mut dyn FnMut(Progress),
 ) -> Result<GearboxFit, FitError> {
-    let quantities = Quantities::of(car, tables);
+    let quantities = Quantities::of(car, tables, shifts);
     let models: Vec<ShiftModel> =
         shifts.iter().filter_map(|log| ShiftModel::new(car, tables, &quantities, log)).collect();
     if models.is_empty() {

@@ -4,12 +4,15 @@ use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use nalgebra::DMatrix;
 
-use super::shift_log::named_pair;
+use super::shift_log::{ShiftLog, named_pair};
 
 /// Unit of the unknown of a delay, s.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
 /// Unit of the unknown of a kiss point, Pa.
 pub(crate) const KISS_UNIT_PA: f64 = 1e4;
+/// Unit of the unknown of the drag, N m, and its standard deviation before \[chosen: that of one or two open elements\].
+pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
+const DRAG_N_M: f64 = 1.5;
 /// Part of the variance that friction elements, or inertias, have in common \[chosen\]: oil, temperature, the shaft at the input.
 const COMMON: f64 = 1.0 / 3.0;
 /// Bound of the torque ratio above 1, as a share \[chosen\].
@@ -24,6 +27,8 @@ pub enum Quantity {
     TorqueRatio,
     /// Delay of all commands against the turbine speed, beside that of the file.
     Delay,
+    /// Drag of the open elements at the turbine, in the mean over all shifts.
+    Drag,
     /// Torque of an element: friction times valve gain.
     Torque(usize),
     /// Kiss point of an element.
@@ -43,7 +48,7 @@ pub struct Quantities {
     pub all: Vec<Quantity>,
     /// Names of the friction elements, by their places in the tables.
     pub elements: Vec<String>,
-    /// Pairs of neighbouring gears with a shift from one clutch to another, the lower one first.
+    /// Pairs of gears with a shift from one clutch to another, the lower one first.
     pub pairs: Vec<[usize; 2]>,
     /// Names of these pairs.
     pub pair_names: Vec<String>,
@@ -53,21 +58,30 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// Those of a car with these tables.
-    pub fn of(car: &Car, tables: &ShiftTables<f64>) -> Self {
+    /// Those of a car with these tables, with the pairs of neighbouring gears and of these shifts.
+    pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Self {
         let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
         let (known, rows) = (&filter.uncertainty, tables.tables());
         let forward = car.gearbox.forward_gears();
         let is_known = |pair: &[usize; 2]| {
             rows.shift(pair[0], pair[1]).is_some() || rows.shift(pair[1], pair[0]).is_some()
         };
-        let pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).filter(is_known).collect();
+        let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        // The lower gear first.
+        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);
+        let lower_first = |[a, b]: [usize; 2]| if ratio(a) > ratio(b) { [a, b] } else { [b, a] };
+        for pair in shifts.iter().map(|log| lower_first(log.gears)) {
+            if !pairs.contains(&pair) {
+                pairs.push(pair);
+            }
+        }
+        pairs.retain(is_known);
         let mut all = vec![Quantity::Input];
         let has_converter = car.converter.is_some();
         if has_converter {
             all.push(Quantity::TorqueRatio);
         }
-        all.push(Quantity::Delay);
+        all.extend([Quantity::Delay, Quantity::Drag]);
         let elements = rows.elements.len();
         all.extend((0..elements).flat_map(|at| [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at)]));
         all.extend((0..pairs.len()).map(Quantity::Inertia));
@@ -76,6 +90,7 @@ impl Quantities {
             Quantity::Input => filter.turbine.engine_share,
             Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
             Quantity::Delay => known.valve_delay_s / DELAY_UNIT_S,
+            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
             Quantity::Torque(_) => known.torque_share,
             Quantity::Kiss(at) => {
                 known.kiss_point_pa.hypot(known.valve_gain * rows.elements[*at].clutch.kiss_pressure()) / KISS_UNIT_PA
@@ -120,6 +135,7 @@ impl Quantities {
             Quantity::Input => "reported engine torque".to_owned(),
             Quantity::TorqueRatio => "converter torque ratio above 1".to_owned(),
             Quantity::Delay => "delay of the valves".to_owned(),
+            Quantity::Drag => "drag of open elements".to_owned(),
             Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
             Quantity::Kiss(at) => format!("{}: kiss point", element(at)),
             Quantity::Lag(at) => format!("{}: valve lag", element(at)),
@@ -151,6 +167,7 @@ impl Quantity {
     pub(crate) fn floor(self) -> f64 {
         match self {
             Self::Delay => 0.3e-3 / DELAY_UNIT_S,
+            Self::Drag => 0.2 / DRAG_UNIT_N_M,
             Self::Kiss(_) => 500.0 / KISS_UNIT_PA,
             Self::Lag(_) => 0.02,
             Self::Inertia(_) => 0.015,

@@ -184,11 +184,9 @@ impl<'a> Recorder<'a> {
         if ended_s - open.begun_s > LONGEST_S {
             return Err("it takes longer than any shift");
         }
-        let forward = self.car.gearbox.forward_gears();
-        let place = |gear: usize| forward.iter().position(|other| *other == gear);
-        let [Some(one), Some(other)] = [place(from), place(to)] else { return Err("it is not between forward gears") };
-        if one.abs_diff(other) != 1 {
-            return Err("its gears are not neighbours");
+        let is_forward = |gear: usize| self.car.gearbox.gears.get(gear).is_some_and(|gear| gear.ratio > 0.0);
+        if !(is_forward(from) && is_forward(to)) {
+            return Err("it is not between forward gears");
         }
         let rows = self.tables.tables();
         let row = rows.shift(from, to).ok_or("it is not from one clutch to another")?;

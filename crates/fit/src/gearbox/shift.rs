@@ -6,7 +6,7 @@ use drivetrain::{ClutchValve, ShiftKind};
 use nalgebra::{DMatrix, DVector};
 use observer::any_shift::ShiftRow;
 
-use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
+use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift_log::ShiftLog;
 use crate::Series;
 use crate::pressure::{Grid, pressures};
@@ -17,9 +17,9 @@ const STEP_S: f64 = 0.002;
 pub(crate) const OWN: usize = 2;
 /// Deviation of the first, rad/s: nothing is known of it.
 const START_SD_RAD_S: f64 = 50.0;
-/// Deviation of the second: drag of the other elements, N m \[chosen\], and a share of the torque at the input by the shape of the
+/// Deviation of the second: drag of the open elements from shift to shift, N m \[chosen\], and a share of the torque at the input by the shape of the
 /// converter's maps \[chosen, as in the filter\].
-const DRAG_SD_N_M: f64 = 1.5;
+const DRAG_SD_N_M: f64 = 1.0;
 const INPUT_SD_SHARE: f64 = 0.03;
 /// Steps for the derivatives by the logarithm of a lag and by a delay in its unit.
 const LAG_STEP: f64 = 0.02;
@@ -49,7 +49,8 @@ pub(crate) struct ShiftModel {
     above_one_n_m: Vec<f64>,
     /// `M11`, kg m^2.
     inertia_kg_m2: f64,
-    /// What `M12` and the output speed have done to the momentum until each reading, N m s.
+    /// By how much the output speed has slowed the turbine down until each reading by `M12/M11` of the file, rad/s. With another `M11`
+    /// that ratio stays: with `M12` as it is, a greater common factor of all torques would be a smaller noise of this reading.
     by_output: Vec<f64>,
     pub(crate) time_s: Vec<f64>,
     pub(crate) reading: Vec<f64>,
@@ -80,7 +81,7 @@ impl ShiftModel {
         let [Some(offgoing), Some(oncoming)] = clutches else { return None };
         let (time_s, reading): (Vec<f64>, Vec<f64>) = log.turbine.between(log.slip_s).unzip();
         let start = log.output.at(begin_s);
-        let by_output = time_s.iter().map(|time_s| row.mass_kg_m2[0][1] * (log.output.at(*time_s) - start)).collect();
+        let by_output = time_s.iter().map(|time_s| row.mass_kg_m2[0][1] / row.mass_kg_m2[0][0] * (log.output.at(*time_s) - start)).collect();
         let mean = input_n_m.iter().sum::<f64>() / points as f64;
         Some(Self {
             kind: log.kind(car, mean),
@@ -122,6 +123,10 @@ impl ShiftModel {
         put(Quantity::Input, &momentum);
         let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
         put(Quantity::TorqueRatio, &self.integral(&above));
+        let drag: Vec<f64> = self.integral(&vec![-DRAG_UNIT_N_M; input.len()]);
+        put(Quantity::Drag, &drag);
+        let braked = momentum.iter().zip(&drag).map(|(sum, drag)| sum + of(Quantity::Drag) * drag);
+        momentum = braked.collect();
         for clutch in &self.clutches {
             let (torque, kiss) = (Quantity::Torque(clutch.place), Quantity::Kiss(clutch.place));
             let lag = Quantity::Lag(clutch.place);
@@ -141,10 +146,10 @@ impl ShiftModel {
             put(Quantity::Delay, &scaled(&|i| (later[i] - pressure[i]) / DELAY_STEP));
             momentum.iter_mut().zip(of_clutch).for_each(|(sum, more)| *sum += more);
         }
-        momentum.iter_mut().zip(&self.by_output).for_each(|(sum, output)| *sum -= output);
         let less: Vec<f64> = momentum.iter().map(|momentum| -momentum).collect();
         put(Quantity::Inertia(self.pair), &less);
-        let residuals = self.reading.iter().zip(&momentum).map(|(reading, momentum)| reading - momentum / inertia);
+        let speeds = momentum.iter().zip(&self.by_output).map(|(momentum, output)| momentum / inertia - output);
+        let residuals = self.reading.iter().zip(speeds).map(|(reading, speed)| reading - speed);
         let by_own = DMatrix::from_fn(rows, OWN, |row, own| match own {
             0 => 1.0,
             _ => (self.time_s[row] - self.grid.begin_s) / inertia,
@@ -230,7 +235,7 @@ pub struct OpenLoop {
 
 /// What the valves and the friction of a vehicle file say of a shift while both clutches slip, at each reading of the turbine speed.
 pub fn open_loop(car: &Car, tables: &ShiftTables<f64>, log: &ShiftLog) -> Vec<OpenLoop> {
-    let quantities = Quantities::of(car, tables);
+    let quantities = Quantities::of(car, tables, std::slice::from_ref(log));
     let rows = tables.tables();
     let row = rows.shift(log.gears[0], log.gears[1]);
     let (Some(model), Some(row)) = (ShiftModel::new(car, tables, &quantities, log), row) else { return Vec::new() };

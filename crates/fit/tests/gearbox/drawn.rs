@@ -70,8 +70,9 @@ impl Drawn {
         // The simulated gear train has its own inertia; that of the file is what is wrong.
         let mut file = file;
         let forward = file.gearbox.forward_gears();
+        let pairs = [1, 2].into_iter().flat_map(|apart| forward.windows(apart + 1));
         let inertia: Vec<([usize; 2], f64)> =
-            forward.windows(2).map(|pair| ([pair[0], pair[1]], 1.0 + within(INERTIA))).collect();
+            pairs.map(|gears| ([gears[0], gears[gears.len() - 1]], 1.0 + within(INERTIA))).collect();
         for shift in &mut file.gearbox.shifts {
             let of_pair = inertia.iter().find(|(pair, _)| {
                 [[pair[0], pair[1]], [pair[1], pair[0]]].contains(&[shift.from, shift.to])
@@ -92,7 +93,7 @@ impl Drawn {
         let element = |place: usize| (0..self.file.clutches.len()).find(|at| tables.place(*at) == Some(place)).unwrap();
         match quantity {
             Quantity::Input if self.file.converter.is_some() => self.draw.converter.ln(),
-            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay | Quantity::Lag(_) => 0.0,
+            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay | Quantity::Drag | Quantity::Lag(_) => 0.0,
             Quantity::Torque(place) => {
                 let at = element(place);
                 (self.draw.friction[at] * self.draw.valve_gain[at]).ln()
