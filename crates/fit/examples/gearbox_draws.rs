@@ -48,7 +48,9 @@ fn main() {
             println!("  by pair {:?}", fit.by_pair);
         }
         let quantities = &fit.quantities;
-        let rows = quantities.all.iter().enumerate().map(|(place, quantity)| {
+        // The simulated drag is another in each shift.
+        let known = quantities.all.iter().enumerate().filter(|(_, quantity)| **quantity != Quantity::Drag);
+        let rows = known.map(|(place, quantity)| {
             let error = fit.unknowns[place] - drawn.true_unknown(&tables, quantities, *quantity);
             (*quantity, quantities.name(*quantity), error, fit.stated[(place, place)].sqrt(), quantities.sd_before(place))
         });

@@ -38,6 +38,8 @@ pub struct GearboxFit {
     pub elements_seen: Vec<bool>,
     /// One-step scale of the turbine speed, rad/s, and its gain `g`.
     pub scale_and_gain: [f64; 2],
+    /// RMS over the shifts of the error of the torque at the turbine that each of them asks for, in what is held likely.
+    pub torque_misfit: f64,
     /// Whether the last step was small; otherwise the iterations were used up.
     pub is_converged: bool,
     /// Names of the quantities that ended where nothing beyond is held possible.
@@ -63,7 +65,7 @@ pub fn fit(
     let problem = Problem::new(&quantities)?;
     let solved =
         problem.solve(&models, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
-    let stated = stated(&problem, &solved)?;
+    let stated = stated(&problem, &models, &solved)?;
     let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
     let mut elements_seen = vec![false; quantities.elements.len()];
     for model in &models {
@@ -71,7 +73,9 @@ pub fn fit(
         by_pair[model.pair][kind.unwrap_or(0)] += 1;
         model.elements().iter().for_each(|at| elements_seen[*at] = true);
     }
+    let squares = solved.shifts.iter().map(|shift| shift.torque_error.powi(2)).sum::<f64>();
     Ok(GearboxFit {
+        torque_misfit: (squares / solved.shifts.len() as f64).sqrt(),
         at_limit: problem.at_limit(&solved.at),
         unknowns: solved.at,
         stated,

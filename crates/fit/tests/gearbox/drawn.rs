@@ -6,6 +6,7 @@ use config::{Car, Drive, Sensors};
 use design::{ShiftErrors, ShiftTables};
 use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
 use fit::{ReadingAges, Series};
+use observer::any_shift::ShiftInput;
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::ShiftDraw;
 use study::any_shift::matrix::Random;
@@ -70,7 +71,7 @@ impl Drawn {
         // The simulated gear train has its own inertia; that of the file is what is wrong.
         let mut file = file;
         let forward = file.gearbox.forward_gears();
-        let pairs = [1, 2].into_iter().flat_map(|apart| forward.windows(apart + 1));
+        let pairs = [1, 2, 3].into_iter().flat_map(|apart| forward.windows(apart + 1));
         let inertia: Vec<([usize; 2], f64)> =
             pairs.map(|gears| ([gears[0], gears[gears.len() - 1]], 1.0 + within(INERTIA))).collect();
         for shift in &mut file.gearbox.shifts {
@@ -113,19 +114,30 @@ impl Drawn {
     /// The shifts of a drive, and the truth.
     pub(crate) fn driven(&self, drive: &Drive) -> (Recorded, Truth) {
         let tables = self.tables();
-        let sensors = Sensors { seed: self.seed, ..sensors() };
-        let mut recorder = Recorder::new(&self.file, &tables, ReadingAges::of(&sensors));
+        let mut recorder = Recorder::new(&self.file, &tables, ReadingAges::of(&sensors()));
         let mut truth = Truth::default();
+        self.each_row(drive, |sample| truth.push(sample), |time_s, input| recorder.push(time_s, input));
+        (recorder.finish(), truth)
+    }
+
+    /// Simulates a drive: `sampled` gets the truth, `read` what is read of it.
+    pub(crate) fn each_row(
+        &self,
+        drive: &Drive,
+        mut sampled: impl FnMut(&CarSample),
+        mut read: impl FnMut(f64, &ShiftInput<f64>),
+    ) {
+        let tables = self.tables();
+        let sensors = Sensors { seed: self.seed, ..sensors() };
         let model = CarModel::new(self.truth.clone()).unwrap();
         let mut sensed = SensedDrive::new(&self.file, &sensors, ROW_S);
         let drive = Drive { sample_time_s: sensed.record_s(), ..drive.clone() };
         simulate_car_drive(&model, &self.file, CarCalibration::STANDARD, &drive, |sample| {
-            truth.push(sample);
-            sensed.each(sample, |row| recorder.push(row.sample.time_s, &row.input(&self.file, &tables)));
+            sampled(sample);
+            sensed.each(sample, |row| read(row.sample.time_s, &row.input(&self.file, &tables)));
         })
         .unwrap();
-        sensed.last(|row| recorder.push(row.sample.time_s, &row.input(&self.file, &tables)));
-        (recorder.finish(), truth)
+        sensed.last(|row| read(row.sample.time_s, &row.input(&self.file, &tables)));
     }
 }
 
