@@ -51,6 +51,8 @@ def main(path, out, seed="1"):
         ("TCU", 0.010, 0.0013, [
             ("I_E", "mA", 1e3 * current(drive, "E"), 1.0, np.uint16),
             ("I_C", "mA", 1e3 * current(drive, "C"), 1.0, np.uint16),
+            *[(f"I_Valve_{element}", "mA", 1e3 * numbers(drive[f"element_{element.lower()}_current_a"]), 1.0, np.uint16)
+              for element in "ABCDE"],
             ("N_Eng", "1/min", rpm("engine_speed_rad_s"), 0.25, np.uint16)]),
         ("Brakes", 0.020, 0.0071, [
             ("N_Whl", "1/min", rpm("wheel_speed_rad_s"), 0.125, np.int16),

@@ -38,9 +38,17 @@ fn main() {
         let checked = fit.validate((&drawn.file, &tables), (&file, &drawn::tables(&file)), &held_out).unwrap();
         println!(
             "car {seed}: {number} shifts, {} skipped, torque N m {:.2} -> {:.2} ({:.2}), turbine rad/s {:.2} -> {:.2} (better {}/{}), scale {:.3} g {:.2}, {iterations} iterations {seconds:.2} s, converged {}",
-            recorded.skipped.len(), error[0], error[1], error[1] / error[0],
-            checked.turbine_rad_s[0], checked.turbine_rad_s[1], checked.better, checked.shifts,
-            fit.scale_and_gain[0], fit.scale_and_gain[1], fit.is_converged
+            recorded.skipped.len(),
+            error[0],
+            error[1],
+            error[1] / error[0],
+            checked.turbine_rad_s[0],
+            checked.turbine_rad_s[1],
+            checked.better,
+            checked.shifts,
+            fit.scale_and_gain[0],
+            fit.scale_and_gain[1],
+            fit.is_converged
         );
         torques.push(error);
         if seed == first {
@@ -52,7 +60,13 @@ fn main() {
         let known = quantities.all.iter().enumerate().filter(|(_, quantity)| **quantity != Quantity::Drag);
         let rows = known.map(|(place, quantity)| {
             let error = fit.unknowns[place] - drawn.true_unknown(&tables, quantities, *quantity);
-            (*quantity, quantities.name(*quantity), error, fit.stated[(place, place)].sqrt(), quantities.sd_before(place))
+            (
+                *quantity,
+                quantities.name(*quantity),
+                error,
+                fit.stated[(place, place)].sqrt(),
+                quantities.sd_before(place),
+            )
         });
         all.push(rows.collect());
     }
@@ -63,20 +77,30 @@ fn main() {
         let held = of.iter().filter(|row| row.2.abs() <= 1.96 * row.3).count();
         inside += held;
         count += of.len();
-        let rms = |of: &dyn Fn(usize) -> f64| ((0..all.len()).map(|i| of(i).powi(2)).sum::<f64>() / all.len() as f64).sqrt();
+        let rms =
+            |of: &dyn Fn(usize) -> f64| ((0..all.len()).map(|i| of(i).powi(2)).sum::<f64>() / all.len() as f64).sqrt();
         println!(
             "{:32} held {:.2} bias {:+.4} rms error {:.4} stated {:.4} before {:.4}",
-            of[0].1, held as f64 / of.len() as f64,
+            of[0].1,
+            held as f64 / of.len() as f64,
             of.iter().map(|row| row.2).sum::<f64>() / of.len() as f64,
-            rms(&|i| all[i][at].2), rms(&|i| all[i][at].3), of[0].4
+            rms(&|i| all[i][at].2),
+            rms(&|i| all[i][at].3),
+            of[0].4
         );
     }
-    let rms = |which: usize| (torques.iter().map(|error| error[which].powi(2)).sum::<f64>() / torques.len() as f64).sqrt();
+    let rms =
+        |which: usize| (torques.iter().map(|error| error[which].powi(2)).sum::<f64>() / torques.len() as f64).sqrt();
     let better = torques.iter().filter(|[given, fitted]| fitted < given).count();
     let mut ratios: Vec<f64> = torques.iter().map(|[given, fitted]| fitted / given).collect();
     ratios.sort_by(f64::total_cmp);
     println!(
         "all held {:.3}; torque N m {:.2} -> {:.2} ({:.3}), median ratio {:.2}, better in {better} of {}",
-        inside as f64 / count as f64, rms(0), rms(1), rms(1) / rms(0), ratios[ratios.len() / 2], torques.len()
+        inside as f64 / count as f64,
+        rms(0),
+        rms(1),
+        rms(1) / rms(0),
+        ratios[ratios.len() / 2],
+        torques.len()
     );
 }

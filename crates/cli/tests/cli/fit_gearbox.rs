@@ -8,7 +8,8 @@ const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_spe
 
 /// The factor of a quantity in the table of a fit.
 fn factor(table: &str, name: &str) -> f64 {
-    let line = table.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}: {table}"));
+    let line =
+        table.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}: {table}"));
     let rest = line.split_once(" x ").map(|(_, rest)| rest.trim_start_matches("valve gain").trim()).unwrap();
     let number = rest.trim_start_matches("x ").split_whitespace().next().unwrap();
     number.parse().unwrap_or_else(|_| panic!("{line}"))
@@ -18,10 +19,12 @@ fn factor(table: &str, name: &str) -> f64 {
 fn town() -> (Folder, String) {
     let folder = Folder::new("fit-gearbox");
     let text = std::fs::read_to_string(CAR).unwrap().replace("../gearboxes", &format!("{ROOT}gearboxes"));
-    let friction = "friction = { slip_rad_s = [0, 10, 50, 150, 450], coefficient = [0.138, 0.14145, 0.14904, 0.1587, 0.16698] }";
+    let friction =
+        "friction = { slip_rad_s = [0, 10, 50, 150, 450], coefficient = [0.138, 0.14145, 0.14904, 0.1587, 0.16698] }";
     let car = folder.write("true.toml", format!("{text}\n[clutch.E]\n{friction}\nstatic_friction = 0.149\n"));
     let drive = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
-    let drive = folder.write("city.toml", drive.replace("repetitions = 20", "repetitions = 1").replace("vehicle = ", "# "));
+    let drive =
+        folder.write("city.toml", drive.replace("repetitions = 20", "repetitions = 1").replace("vehicle = ", "# "));
     said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("")]));
     let log = folder.path("city_measured.csv");
     (folder, log)
@@ -36,12 +39,20 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     // The ratio of two frictions does not contain the common factor of all torques.
     let ratio = factor(&table, "E: friction") / factor(&table, "C: friction");
     assert!((ratio - 1.15).abs() < 0.08, "{ratio}: {table}");
-    for words in ["converter capacity", "M11 of 1-2", "torque scale: not told by these logs", "shifts held out: ", "better one in "] {
+    for words in [
+        "converter capacity",
+        "M11 of 1-2",
+        "torque scale: not told by these logs",
+        "shifts held out: ",
+        "better one in ",
+    ] {
         assert!(table.contains(words), "{words}: {table}");
     }
     assert!(notes.contains("shifts: ") && notes.contains(&fitted), "{notes}");
     let text = folder.read("fitted.toml");
-    for words in ["# fit: values below", "[clutch.E]", "[turbine_inertia_kg_m2]", "inertia_kg_m2 = 0.17 # crank and pump wheel"] {
+    for words in
+        ["# fit: values below", "[clutch.E]", "[turbine_inertia_kg_m2]", "inertia_kg_m2 = 0.17 # crank and pump wheel"]
+    {
         assert!(text.contains(words), "{words}: {text}");
     }
     said(&wetclutch(&["check", &fitted]));
@@ -56,16 +67,23 @@ fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
     let (folder, log) = town();
     let text = std::fs::read_to_string(&log).unwrap();
     let lines = |count: usize| text.lines().take(count).map(|line| format!("{line}\n")).collect::<String>();
-    let ratios = folder.write("ratios.toml", format!("name = \"r\"\ngearbox = \"{ROOT}gearboxes/8_speed_hyundai.toml\"\n"));
+    let by_ratios = "name = \"ratios\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 3.0 }, { name = \"2\", ratio = 2.0 }]\n";
+    folder.write("box.toml", by_ratios);
+    let ratios = folder.write("ratios.toml", "name = \"r\"\ngearbox = \"box.toml\"\n");
     let fitted = folder.path("fitted.toml");
     let vehicle = |name: &str| format!("{ROOT}vehicles/{name}.toml");
     for (case, text, vehicle, expected) in [
         ("no shift", lines(600), CAR.to_owned(), "have no shift between two gears that can be fitted"),
         ("no command", text.replace("element_c_current_a", "x"), CAR.to_owned(), "element_c_current"),
         ("no turbine", text.replace("turbine_speed_rad_s", "x"), CAR.to_owned(), "turbine_speed"),
-        ("another car", text.replace("element_f", "x"), vehicle("eight_speed_stroke"), "has a stroke"),
-        ("wrong ratios", scaled(&text, "turbine_speed_rad_s", 1.5), CAR.to_owned(), "is not the output speed times the ratio"),
-        ("ratios alone", text.clone(), ratios, "gearbox"),
+        ("a stroke", text.clone(), vehicle("eight_speed_stroke"), "has a stroke"),
+        (
+            "wrong ratios",
+            scaled(&text, "turbine_speed_rad_s", 1.5),
+            CAR.to_owned(),
+            "is not the output speed times the ratio",
+        ),
+        ("ratios alone", text.clone(), ratios, "has no stick diagram"),
     ] {
         let log = folder.write("log.csv", &text);
         let said = refused(&wetclutch(&["fit", &log, "--vehicle", &vehicle, "-o", &fitted]));

@@ -7,16 +7,17 @@ use drivetrain::{ClutchValve, Table1};
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use crate::FitError;
 use crate::fitted_file::SIDES;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
-use crate::{FitError, Verdict};
 
 /// A clutch that sticks holds at least so much more than it carries as it begins to slip, as a factor.
 const STATIC_OVER_SLIDING: f64 = 1.0001;
 
 impl GearboxFit {
-    /// The vehicle file with the fitted values, as it is to stand at `path`. What the logs do not tell stays as it is; every value that
-    /// changes has a comment with its interval. `logs` are named at the head of the file.
+    /// The vehicle file with the fitted values, as it is to stand at `path`. Elements and pairs of gears without a fitted shift stay as they
+    /// are. What is not told singly changes too: its ratio to the others may be told. Every value that changes has a comment with its
+    /// interval. `logs` are named at the head of the file.
     ///
     /// # Errors
     /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
@@ -32,7 +33,7 @@ impl GearboxFit {
         for (at, pair) in self.quantities.pairs.iter().enumerate() {
             let shift = car.gearbox.shift(pair[0], pair[1]).or_else(|| car.gearbox.shift(pair[1], pair[0]));
             let Some(reduced) = shift.and_then(|shift| shift.reduced.as_ref()) else { continue };
-            if self.by_pair[at].iter().sum::<usize>() > 0 && self.verdict(Quantity::Inertia(at)) != Verdict::NotTold {
+            if self.is_seen(Quantity::Inertia(at)) {
                 let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
                 let all_kg_m2 = reduced.mass_kg_m2[0][0] + on_input_kg_m2;
                 let value = all_kg_m2 * self.unknown(Quantity::Inertia(at)).exp() - on_input_kg_m2;
@@ -59,13 +60,8 @@ impl GearboxFit {
         let capacity = converter.capacity_n_m_s2.scaled(self.unknown(Quantity::Input).exp());
         let ratio = self.unknown(Quantity::TorqueRatio).exp();
         let ratios: Vec<f64> = converter.torque_ratio.values().iter().map(|t| 1.0 + ratio * (t - 1.0)).collect();
-        if self.verdict(Quantity::Input) != Verdict::NotTold {
-            text.put(&["converter"], "capacity_n_m_s2", &list(capacity.values()), &self.comment(Quantity::Input))?;
-        }
-        if self.verdict(Quantity::TorqueRatio) != Verdict::NotTold {
-            text.put(&["converter"], "torque_ratio", &list(&ratios), &self.comment(Quantity::TorqueRatio))?;
-        }
-        Ok(())
+        text.put(&["converter"], "capacity_n_m_s2", &list(capacity.values()), &self.comment(Quantity::Input))?;
+        text.put(&["converter"], "torque_ratio", &list(&ratios), &self.comment(Quantity::TorqueRatio))
     }
 
     fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {
@@ -73,24 +69,16 @@ impl GearboxFit {
         let name = car.gearbox.elements[element].name.as_str();
         let table = ["clutch", name];
         let factor = self.unknown(Quantity::Torque(place)).exp();
-        if self.verdict(Quantity::Torque(place)) != Verdict::NotTold {
-            let friction = known.clutch.friction.scaled(factor);
-            let comment = self.comment(Quantity::Torque(place));
-            text.put_map(&table, "friction", ["slip_rad_s", "coefficient"], &friction, &comment)?;
-            let held = (factor * known.clutch.static_friction).max(STATIC_OVER_SLIDING * friction.at(0.0));
-            let comment = "keeps its ratio to the fitted friction, and is not below it";
-            text.put(&table, "static_friction", &number(held), comment)?;
-        }
-        if self.verdict(Quantity::Kiss(place)) != Verdict::NotTold {
-            let kiss_pa = known.clutch.kiss_pressure() + KISS_UNIT_PA * self.unknown(Quantity::Kiss(place));
-            let spring_n = (kiss_pa * known.clutch.piston_area_m2).max(0.0);
-            text.put(&table, "return_spring_n", &number(spring_n), &self.comment(Quantity::Kiss(place)))?;
-        }
-        let told = |quantity: Quantity| self.verdict(quantity) != Verdict::NotTold;
-        if told(Quantity::Lag(place)) || told(Quantity::Delay) {
-            self.write_valve(text, name, known, place)?;
-        }
-        Ok(())
+        let friction = known.clutch.friction.scaled(factor);
+        let comment = self.comment(Quantity::Torque(place));
+        text.put_map(&table, "friction", ["slip_rad_s", "coefficient"], &friction, &comment)?;
+        let held = (factor * known.clutch.static_friction).max(STATIC_OVER_SLIDING * friction.at(0.0));
+        let comment = "keeps its ratio to the fitted friction, and is not below it";
+        text.put(&table, "static_friction", &number(held), comment)?;
+        let kiss_pa = known.clutch.kiss_pressure() + KISS_UNIT_PA * self.unknown(Quantity::Kiss(place));
+        let spring_n = (kiss_pa * known.clutch.piston_area_m2).max(0.0);
+        text.put(&table, "return_spring_n", &number(spring_n), &self.comment(Quantity::Kiss(place)))?;
+        self.write_valve(text, name, known, place)
     }
 
     /// The valve of an element as a table of its own.
@@ -101,9 +89,8 @@ impl GearboxFit {
         known: &config::ShiftClutch,
         place: usize,
     ) -> Result<(), FitError> {
-        let told = |quantity: Quantity| if self.verdict(quantity) == Verdict::NotTold { 0.0 } else { self.unknown(quantity) };
-        let valve = known.valve.changed(told(Quantity::Lag(place)).exp(), 1.0, None);
-        let late_s = DELAY_UNIT_S * told(Quantity::Delay);
+        let valve = known.valve.changed(self.unknown(Quantity::Lag(place)).exp(), 1.0, None);
+        let late_s = DELAY_UNIT_S * self.unknown(Quantity::Delay);
         let later = |delay: &Table1<f64>| {
             let values: Vec<f64> = delay.values().iter().map(|delay_s| (delay_s + late_s).max(0.0)).collect();
             Table1::new(delay.axis(), &values).unwrap_or(*delay)

@@ -63,8 +63,7 @@ pub fn fit(
         return Err(FitError::input("there is no shift to fit"));
     }
     let problem = Problem::new(&quantities)?;
-    let solved =
-        problem.solve(&models, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
+    let solved = problem.solve(&models, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
     let stated = stated(&problem, &models, &solved)?;
     let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
     let mut elements_seen = vec![false; quantities.elements.len()];
@@ -103,6 +102,18 @@ impl GearboxFit {
     pub fn verdict(&self, quantity: Quantity) -> Verdict {
         let Some(place) = self.quantities.place(quantity) else { return Verdict::NotTold };
         Verdict::of(self.sd(quantity), self.quantities.sd_before(place))
+    }
+
+    /// Standard deviation of the unknown of a quantity that has the common factor of all torques, beside that factor.
+    pub fn sd_beside_scale(&self, quantity: Quantity) -> f64 {
+        let powers = DVector::from_vec(self.quantities.powers_of_torque());
+        let Some(cholesky) = self.quantities.before.clone().cholesky() else { return f64::INFINITY };
+        let weights = cholesky.solve(&powers);
+        let mut along = -&weights / powers.dot(&weights);
+        if let Some(place) = self.quantities.place(quantity) {
+            along[place] += 1.0;
+        }
+        along.dot(&(&self.stated * &along)).max(0.0).sqrt()
     }
 
     /// Standard deviation of the logarithm of the factor that all torques have in common, which the speeds do not tell: by what was known

@@ -63,9 +63,8 @@ impl Quantities {
         let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
         let (known, rows) = (&filter.uncertainty, tables.tables());
         let forward = car.gearbox.forward_gears();
-        let is_known = |pair: &[usize; 2]| {
-            rows.shift(pair[0], pair[1]).is_some() || rows.shift(pair[1], pair[0]).is_some()
-        };
+        let is_known =
+            |pair: &[usize; 2]| rows.shift(pair[0], pair[1]).is_some() || rows.shift(pair[1], pair[0]).is_some();
         let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
         // The lower gear first.
         let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);

@@ -31,6 +31,23 @@ pub struct Recorded {
     pub in_gear: [u64; 2],
 }
 
+impl Recorded {
+    /// Adds the shifts of another log. A shift tells what it has to tell once: copies are left out.
+    pub fn add(&mut self, more: Self) {
+        self.skipped.extend(more.skipped);
+        for shift in more.shifts {
+            let same = |other: &&ShiftLog| other.turbine.value == shift.turbine.value && other.engine == shift.engine;
+            match self.shifts.iter().find(same) {
+                Some(first) => self.skipped.push(format!("{}: the same readings as {}", shift.name, first.name)),
+                None => self.shifts.push(shift),
+            }
+        }
+        for (sum, count) in self.in_gear.iter_mut().zip(more.in_gear) {
+            *sum += count;
+        }
+    }
+}
+
 /// A shift that is under way, or has just ended.
 #[derive(Debug, Clone, Copy)]
 struct Open {

@@ -16,14 +16,19 @@ impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
     pub fn report(&self) -> Vec<ReportRow> {
         let all = self.quantities.all.iter().enumerate();
-        all.filter(|(_, quantity)| self.is_seen(**quantity)).map(|(place, quantity)| self.row(place, *quantity)).collect()
+        all.filter(|(_, quantity)| self.is_seen(**quantity))
+            .map(|(place, quantity)| self.row(place, *quantity))
+            .collect()
     }
 
     fn row(&self, place: usize, quantity: Quantity) -> ReportRow {
         let (x, sd) = (self.unknowns[place], self.sd(quantity));
         let half = SIDES * sd;
         let plain = |unit: f64, name: &str| {
-            (format!("{:+.1} {name}", unit * x), format!("{:+.1} to {:+.1} {name}", unit * (x - half), unit * (x + half)))
+            (
+                format!("{:+.1} {name}", unit * x),
+                format!("{:+.1} to {:+.1} {name}", unit * (x - half), unit * (x + half)),
+            )
         };
         let (value, interval) = match quantity {
             Quantity::Delay => plain(1e3 * DELAY_UNIT_S, "ms"),
@@ -48,11 +53,18 @@ impl GearboxFit {
     pub fn statements(&self) -> Vec<String> {
         let scale = 100.0 * SIDES * self.torque_scale_sd();
         let input = if self.quantities.has_converter { "converter" } else { "reported engine torque" };
+        let beside = |at: usize| {
+            let half = 100.0 * SIDES * self.sd_beside_scale(Quantity::Torque(at));
+            format!("{} {half:.1} %", self.quantities.elements[at])
+        };
+        let seen: Vec<String> =
+            (0..self.elements_seen.len()).filter(|at| self.elements_seen[*at]).map(beside).collect();
         let mut lines = vec![
             format!(
                 "torque scale: not told by these logs, +- {scale:.1} %. Speeds fix the ratios of all torques and inertias and not their common \
                  factor; it comes from what was known before of {input}, friction and inertias together, and is in every interval"
             ),
+            format!("beside that factor, friction x valve gain is known within +- {}", seen.join(", ")),
             "friction and valve gain of an element are not told apart: their product stands in the file as friction, and the kiss point is that of \
              the valve's maps. A measured pressure of an element would tell them"
                 .to_owned(),
@@ -67,7 +79,8 @@ impl GearboxFit {
 
     /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni.
     fn given_is_possible(&self) -> bool {
-        let mut all = self.quantities.all.iter().zip(&self.unknowns).filter(|(quantity, _)| **quantity != Quantity::Drag);
+        let mut all =
+            self.quantities.all.iter().zip(&self.unknowns).filter(|(quantity, _)| **quantity != Quantity::Drag);
         all.all(|(quantity, x)| x.abs() <= SIDES_OF_ALL * self.sd(*quantity))
     }
 
@@ -113,12 +126,16 @@ impl GearboxFit {
             lines.push(format!("no fitted shift has {}: they stay as they are", without.join(", ")));
         }
         let names = |is: &dyn Fn(usize) -> bool| {
-            let named = quantities.pair_names.iter().enumerate().filter(|(at, _)| is(*at)).map(|(_, name)| name.as_str());
+            let named =
+                quantities.pair_names.iter().enumerate().filter(|(at, _)| is(*at)).map(|(_, name)| name.as_str());
             named.collect::<Vec<_>>()
         };
         let missing = names(&|at| self.by_pair[at].iter().sum::<usize>() == 0);
         if !missing.is_empty() {
-            lines.push(format!("to know more: drive shifts between gears {}, of which none is fitted", missing.join(", ")));
+            lines.push(format!(
+                "to know more: drive shifts between gears {}, of which none is fitted",
+                missing.join(", ")
+            ));
         }
         let some = |at: usize, kinds: [ShiftKind; 2]| {
             let of_kind = |kind: &ShiftKind| ShiftKind::ALL.iter().position(|other| other == kind);
@@ -140,14 +157,15 @@ impl GearboxFit {
             ));
         }
         let of_element = |quantity: fn(usize) -> Quantity| {
-            let open = (0..quantities.elements.len()).filter(|at| {
-                self.elements_seen[*at] && self.verdict(quantity(*at)) == Verdict::NotTold
-            });
+            let open = (0..quantities.elements.len())
+                .filter(|at| self.elements_seen[*at] && self.verdict(quantity(*at)) == Verdict::NotTold);
             open.map(|at| quantities.elements[at].as_str()).collect::<Vec<_>>().join(", ")
         };
         let kiss = of_element(Quantity::Kiss);
         if !kiss.is_empty() {
-            lines.push(format!("to know more: for the kiss point of {kiss}, shifts at light throttle and coasting in which it slips"));
+            lines.push(format!(
+                "to know more: for the kiss point of {kiss}, shifts at light throttle and coasting in which it slips"
+            ));
         }
         let torque = of_element(Quantity::Torque);
         if !torque.is_empty() {

@@ -81,7 +81,10 @@ impl ShiftModel {
         let [Some(offgoing), Some(oncoming)] = clutches else { return None };
         let (time_s, reading): (Vec<f64>, Vec<f64>) = log.turbine.between(log.slip_s).unzip();
         let start = log.output.at(begin_s);
-        let by_output = time_s.iter().map(|time_s| row.mass_kg_m2[0][1] / row.mass_kg_m2[0][0] * (log.output.at(*time_s) - start)).collect();
+        let by_output = time_s
+            .iter()
+            .map(|time_s| row.mass_kg_m2[0][1] / row.mass_kg_m2[0][0] * (log.output.at(*time_s) - start))
+            .collect();
         let mean = input_n_m.iter().sum::<f64>() / points as f64;
         Some(Self {
             kind: log.kind(car, mean),

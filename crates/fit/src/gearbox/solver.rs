@@ -96,7 +96,14 @@ pub(crate) fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights)
     let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
     let cost = 0.5 * (errors.iter().map(loss).sum::<f64>() + precision[(1, 1)] * own[1] * own[1]);
     let residuals = (&lines.residuals - &lines.by_own * own).as_slice().to_vec();
-    Profiled { residuals, score: all.tr_mul(&errors), errors, information, torque_error: own[1] / shift.own_sd[1], cost }
+    Profiled {
+        residuals,
+        score: all.tr_mul(&errors),
+        errors,
+        information,
+        torque_error: own[1] / shift.own_sd[1],
+        cost,
+    }
 }
 
 /// What does not change during a fit.

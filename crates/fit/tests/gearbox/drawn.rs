@@ -75,9 +75,9 @@ impl Drawn {
         let inertia: Vec<([usize; 2], f64)> =
             pairs.map(|gears| ([gears[0], gears[gears.len() - 1]], 1.0 + within(INERTIA))).collect();
         for shift in &mut file.gearbox.shifts {
-            let of_pair = inertia.iter().find(|(pair, _)| {
-                [[pair[0], pair[1]], [pair[1], pair[0]]].contains(&[shift.from, shift.to])
-            });
+            let of_pair = inertia
+                .iter()
+                .find(|(pair, _)| [[pair[0], pair[1]], [pair[1], pair[0]]].contains(&[shift.from, shift.to]));
             if let (Some((_, factor)), Some(reduced)) = (of_pair, &mut shift.reduced) {
                 reduced.mass_kg_m2[0][0] /= factor;
             }

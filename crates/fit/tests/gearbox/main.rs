@@ -34,7 +34,8 @@ fn fit_of_rows(drawn: &Drawn, rows: &[(f64, ShiftInput<f64>)]) -> (GearboxFit, u
 /// Share of the true values that lie in their stated intervals.
 fn held(drawn: &Drawn, fit: &GearboxFit) -> f64 {
     let tables = drawn.tables();
-    let known: Vec<Quantity> = fit.quantities.all.iter().copied().filter(|quantity| *quantity != Quantity::Drag).collect();
+    let known: Vec<Quantity> =
+        fit.quantities.all.iter().copied().filter(|quantity| *quantity != Quantity::Drag).collect();
     let inside = known.iter().filter(|quantity| {
         let truth = drawn.true_unknown(&tables, &fit.quantities, **quantity);
         (fit.unknown(**quantity) - truth).abs() <= 1.96 * fit.sd(**quantity)
@@ -60,7 +61,10 @@ fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_hel
         let share = held(&drawn, &fit);
         assert!(share > 0.85, "{vehicle}: {share}");
         let checked = fit.validate((&drawn.file, &drawn.tables()), (&file, &tables(&file)), &held_out).unwrap();
-        assert!(checked.turbine_rad_s[1] < checked.turbine_rad_s[0] && 2 * checked.better > checked.shifts, "{checked:?}");
+        assert!(
+            checked.turbine_rad_s[1] < checked.turbine_rad_s[0] && 2 * checked.better > checked.shifts,
+            "{checked:?}"
+        );
         assert!(fit.is_converged && fit.at_limit.is_empty() && fit.torque_misfit < 2.0, "{}", fit.torque_misfit);
     }
 }
@@ -131,8 +135,16 @@ fn one_shift_tells_little_and_says_so() {
     let (recorded, _) = drawn.driven(&city(1));
     let fit = fitted(&drawn, &recorded.shifts[..1]);
     let before = |place: usize| fit.quantities.sd_before(place);
-    let told = fit.quantities.all.iter().enumerate().filter(|(_, quantity)| fit.verdict(**quantity) == Verdict::Measured);
+    // It passes through some pressures, which may tell a kiss point or a lag, and no torque for itself.
+    let is_torque =
+        |quantity: &Quantity| matches!(quantity, Quantity::Input | Quantity::Torque(_) | Quantity::Inertia(_));
+    let told = fit
+        .quantities
+        .all
+        .iter()
+        .filter(|quantity| is_torque(quantity) && fit.verdict(**quantity) == Verdict::Measured);
     assert_eq!(told.count(), 0);
+    assert!(held(&drawn, &fit) > 0.9, "{}", held(&drawn, &fit));
     for (place, quantity) in fit.quantities.all.iter().enumerate() {
         assert!(fit.sd(*quantity) <= 1.000_001 * before(place), "{quantity:?}");
     }
@@ -141,6 +153,10 @@ fn one_shift_tells_little_and_says_so() {
         assert!(said.contains(words), "{words}: {said}");
     }
     assert!(fit.report().iter().all(|row| !row.name.starts_with("B:")), "{:?}", fit.report());
+    let mut twice = recorded.clone();
+    twice.add(recorded.clone());
+    assert_eq!(twice.shifts, recorded.shifts);
+    assert_eq!(twice.skipped.len(), 2 * recorded.skipped.len() + recorded.shifts.len());
     let none = fit::gearbox::fit(&drawn.file, &drawn.tables(), &[], &mut |_| ()).unwrap_err().to_string();
     assert!(none.contains("no shift"), "{none}");
 }

@@ -89,10 +89,9 @@ fn record(
     for log in &options.logs {
         bar.set_message(format!("reading {}", log.display()));
         bar.tick();
-        let mut one = record_one(log, &map, Recorder::new(car, tables, ages), (car, tables), bar)?;
+        let one = record_one(log, &map, Recorder::new(car, tables, ages), (car, tables), bar)?;
         check_ratios(one.in_gear, &options.vehicle, log)?;
-        all.shifts.append(&mut one.shifts);
-        all.skipped.append(&mut one.skipped);
+        all.add(one);
     }
     Ok(all)
 }
