@@ -73,7 +73,7 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     let elements: String = ('A'..='E')
         .map(|name| {
             let key = name.to_ascii_lowercase();
-            format!("[channel.element_{key}_current]\nname = \"I_Valve_{name}\"\n")
+            format!("[channel.element_{key}_current]\nname = \"I_{name}\"\n")
         })
         .collect();
     let of_elements = folder.write("elements.toml", format!("{suggested}\n{elements}"));

@@ -6,13 +6,11 @@ use crate::support::{Folder, ROOT, printed, refused, said, stderr, wetclutch};
 
 const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
 
-/// The factor of a quantity in the table of a fit.
-fn factor(table: &str, name: &str) -> f64 {
-    let line =
-        table.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{name}: {table}"));
-    let rest = line.split_once(" x ").map(|(_, rest)| rest.trim_start_matches("valve gain").trim()).unwrap();
-    let number = rest.trim_start_matches("x ").split_whitespace().next().unwrap();
-    number.parse().unwrap_or_else(|_| panic!("{line}"))
+/// The factor of a quantity in the table of a fit, and its interval.
+fn factor(table: &str, name: &str) -> [f64; 3] {
+    let line = table.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {table}"));
+    let numbers = line[name.len()..].split_whitespace().filter_map(|word| word.parse().ok()).take(3);
+    numbers.collect::<Vec<f64>>().try_into().unwrap_or_else(|_| panic!("{line}"))
 }
 
 /// A folder with three minutes of town by a car whose clutch E has 15 % more friction, and whose converter 8 % less capacity.
@@ -36,9 +34,14 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let fitted = folder.path("fitted.toml");
     let output = wetclutch(&["fit", &log, "--vehicle", CAR, "-o", &fitted]);
     let (table, notes) = (printed(&output), stderr(&output));
-    // The ratio of two frictions does not contain the common factor of all torques.
-    let ratio = factor(&table, "E: friction") / factor(&table, "C: friction");
-    assert!((ratio - 1.15).abs() < 0.08, "{ratio}: {table}");
+    let [clutch_e, clutch_c] = ["E", "C"].map(|name| factor(&table, &format!("{name}: friction x valve gain")));
+    for ([_, least, most], truth) in [(clutch_e, 1.15), (clutch_c, 1.0)] {
+        assert!(least < truth && truth < most, "{truth}: {table}");
+    }
+    // The ratio of two frictions does not contain the common factor of all torques; in the given file it is 15 % low.
+    let ratio = clutch_e[0] / clutch_c[0];
+    assert!((ratio / 1.15 - 1.0).abs() < 0.12, "{ratio}: {table}");
+    assert!(!table.contains("they do not ask for another file"), "{table}");
     for words in [
         "converter capacity",
         "M11 of 1-2",
@@ -59,7 +62,8 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     said(&wetclutch(&["estimate", &log, "--vehicle", &fitted, "-o", &folder.path("estimate.csv")]));
     // A fitted file can be fitted again.
     let again = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &folder.path("again.toml")]);
-    assert!((factor(&printed(&again), "E: friction") - 1.0).abs() < 0.05, "{}", printed(&again));
+    let [again_e, ..] = factor(&printed(&again), "E: friction x valve gain");
+    assert!((again_e - 1.0).abs() < 0.06, "{}", printed(&again));
 }
 
 #[test]

@@ -104,12 +104,21 @@ impl GearboxFit {
         Verdict::of(self.sd(quantity), self.quantities.sd_before(place))
     }
 
+    /// The weights with which the quantities make the logarithm of the factor that all torques have in common.
+    fn torque_scale_weights(&self) -> DVector<f64> {
+        let powers = DVector::from_vec(self.quantities.powers_of_torque());
+        let solved = self.quantities.before.clone().cholesky().map(|cholesky| cholesky.solve(&powers));
+        solved.map_or_else(|| powers.clone(), |weights| &weights / powers.dot(&weights))
+    }
+
+    /// The logarithm of the factor that all torques have in common.
+    pub(crate) fn torque_scale(&self) -> f64 {
+        self.torque_scale_weights().iter().zip(&self.unknowns).map(|(weight, x)| weight * x).sum()
+    }
+
     /// Standard deviation of the unknown of a quantity that has the common factor of all torques, beside that factor.
     pub fn sd_beside_scale(&self, quantity: Quantity) -> f64 {
-        let powers = DVector::from_vec(self.quantities.powers_of_torque());
-        let Some(cholesky) = self.quantities.before.clone().cholesky() else { return f64::INFINITY };
-        let weights = cholesky.solve(&powers);
-        let mut along = -&weights / powers.dot(&weights);
+        let mut along = -self.torque_scale_weights();
         if let Some(place) = self.quantities.place(quantity) {
             along[place] += 1.0;
         }

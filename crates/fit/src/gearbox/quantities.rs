@@ -152,15 +152,17 @@ impl Quantities {
     /// Power of each quantity in the factor that all torques have in common: with all of them multiplied by one number the speeds
     /// stay the same.
     pub(crate) fn powers_of_torque(&self) -> Vec<f64> {
-        let power = |quantity: &Quantity| match quantity {
-            Quantity::Input | Quantity::Torque(_) | Quantity::Inertia(_) => 1.0,
-            _ => 0.0,
-        };
+        let power = |quantity: &Quantity| f64::from(u8::from(quantity.has_torque_scale()));
         self.all.iter().map(power).collect()
     }
 }
 
 impl Quantity {
+    /// Whether it is multiplied when all torques are multiplied by one number.
+    pub(crate) fn has_torque_scale(self) -> bool {
+        matches!(self, Self::Input | Self::Torque(_) | Self::Inertia(_))
+    }
+
     /// Least standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not
     /// shrink with more shifts.
     pub(crate) fn floor(self) -> f64 {

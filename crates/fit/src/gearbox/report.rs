@@ -77,11 +77,16 @@ impl GearboxFit {
         lines
     }
 
-    /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni.
+    /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni; those with the common factor of all
+    /// torques also beside it.
     fn given_is_possible(&self) -> bool {
-        let mut all =
-            self.quantities.all.iter().zip(&self.unknowns).filter(|(quantity, _)| **quantity != Quantity::Drag);
-        all.all(|(quantity, x)| x.abs() <= SIDES_OF_ALL * self.sd(*quantity))
+        let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
+        let mut car = seen().filter(|quantity| *quantity != Quantity::Drag);
+        let mut torques = seen().filter(|quantity| quantity.has_torque_scale());
+        let scale = self.torque_scale();
+        car.all(|quantity| self.unknown(quantity).abs() <= SIDES_OF_ALL * self.sd(quantity))
+            && torques
+                .all(|quantity| (self.unknown(quantity) - scale).abs() <= SIDES_OF_ALL * self.sd_beside_scale(quantity))
     }
 
     fn warnings(&self) -> Vec<String> {

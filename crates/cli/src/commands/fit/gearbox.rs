@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use logs::ChannelMap;
 use study::any_shift::logged::LoggedDrive;
 
-use super::{LEAST_FOR_HELD_OUT, WORSE, nothing_held_out, progress, reasons, table};
+use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, WORSE, nothing_held_out, progress, reasons, table};
 use crate::args::Fit;
 use crate::commands::estimate::Messages;
 use crate::commands::estimate::any_car::check_ratios;
@@ -20,7 +20,7 @@ use crate::commands::{channel_map, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
 
-/// Every so many shifts one is held out.
+/// Every so many shifts one is held out; of few more often.
 const HELD_OUT_EVERY: usize = 5;
 /// More shifts are thinned evenly.
 const SHIFTS_MAX: usize = 400;
@@ -118,10 +118,11 @@ fn record_one(
     Ok(recorder.finish())
 }
 
-/// Shifts to fit, and shifts that are held out: every fifth. Of more than a fit can use, some are left out evenly.
+/// Shifts to fit, and shifts that are held out: every fifth, and at least [`HELD_OUT_MIN`]. Of more than a fit can use, some are left out evenly.
 fn divided(shifts: Vec<ShiftLog>) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
     let count = shifts.len();
-    let is_held_out = |at: usize| count >= LEAST_FOR_HELD_OUT && at % HELD_OUT_EVERY == HELD_OUT_EVERY - 1;
+    let every = HELD_OUT_EVERY.min(count / HELD_OUT_MIN);
+    let is_held_out = |at: usize| count >= LEAST_FOR_HELD_OUT && at % every == every - 1;
     let some = SHIFTS_MAX.min(count);
     let chosen = (0..some).map(|i| shifts[i * count / some.max(1)].clone()).enumerate();
     let (held_out, fitted): (Vec<_>, Vec<_>) = chosen.partition(|(at, _)| is_held_out(*at));
