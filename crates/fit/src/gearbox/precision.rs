@@ -4,7 +4,6 @@
 //! A group is all shifts between the same gears of one kind: what the model leaves out, such as the drag of the elements that are open
 //! there, is alike in them.
 
-use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::shift::ShiftModel;
@@ -37,12 +36,12 @@ pub(crate) fn stated(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solv
 
 /// The sandwich over groups of shifts: how much they disagree.
 fn cluster(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved, plain: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut groups: Vec<((usize, Option<ShiftKind>), DVector<f64>)> = Vec::new();
+    let mut groups: Vec<(&ShiftModel, DVector<f64>)> = Vec::new();
     for (model, shift) in models.iter().zip(&solved.shifts) {
-        let group = (model.pair, model.kind);
-        match groups.iter_mut().find(|(other, _)| *other == group) {
+        let is_same = |other: &ShiftModel| (other.pair, other.kind) == (model.pair, model.kind);
+        match groups.iter_mut().find(|(other, _)| is_same(other)) {
             Some((_, sum)) => *sum += &shift.score,
-            None => groups.push((group, shift.score.clone())),
+            None => groups.push((model, shift.score.clone())),
         }
     }
     if groups.len() < 2 {

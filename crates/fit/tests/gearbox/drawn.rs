@@ -145,6 +145,15 @@ pub(crate) fn tables(car: &Car) -> ShiftTables<f64> {
     ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap()
 }
 
+/// Shifts to fit, and every fifth to check.
+pub(crate) fn every_fifth(shifts: Vec<ShiftLog>) -> [Vec<ShiftLog>; 2] {
+    let mut divided = [Vec::new(), Vec::new()];
+    for (at, shift) in shifts.into_iter().enumerate() {
+        divided[usize::from(at % 5 == 4)].push(shift);
+    }
+    divided
+}
+
 /// True torques of the clutches of the shifts.
 #[derive(Default)]
 pub(crate) struct Truth {

@@ -1,11 +1,12 @@
 //! Fits of cars with a whole gearbox to drives behind sensors.
+#![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod drawn;
 
 use std::path::Path;
 
 use config::{Car, Source};
-use drawn::{Drawn, car, city, tables};
+use drawn::{Drawn, car, city, every_fifth, tables};
 use fit::gearbox::{GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
@@ -49,10 +50,7 @@ fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_hel
     for (vehicle, seed) in [("eight_speed.toml", 1), ("dual_clutch.toml", 2)] {
         let drawn = Drawn::of(car(vehicle), seed);
         let (recorded, truth) = drawn.driven(&city(2));
-        let (held_out, fitted_shifts): (Vec<_>, Vec<_>) =
-            recorded.shifts.into_iter().enumerate().partition(|(at, _)| at % 5 == 4);
-        let logs = |shifts: Vec<(usize, ShiftLog)>| shifts.into_iter().map(|(_, log)| log).collect::<Vec<_>>();
-        let (held_out, fitted_shifts) = (logs(held_out), logs(fitted_shifts));
+        let [fitted_shifts, held_out] = every_fifth(recorded.shifts);
         assert!(fitted_shifts.len() >= 20, "{vehicle}: {}", fitted_shifts.len());
         let fit = fitted(&drawn, &fitted_shifts);
         let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
@@ -106,7 +104,7 @@ fn outliers_and_lost_readings_leave_the_values_within_their_intervals() {
     let drawn = Drawn::of(car("eight_speed.toml"), 4);
     let mut rows = rows(&drawn, 1);
     let (clean, skipped) = fit_of_rows(&drawn, &rows);
-    let is = |row: usize, every: usize| row.wrapping_mul(2_654_435_761) % every == 0;
+    let is = |row: usize, every: usize| row.wrapping_mul(2_654_435_761).is_multiple_of(every);
     for (at, (_, input)) in rows.iter_mut().enumerate() {
         if is(at, 50) {
             let wrong = |reading: Reading<f64>| Reading { value: reading.value + 5.0, ..reading };
