@@ -38,7 +38,7 @@ pub struct ShiftLog {
     pub engine_torque: Series,
     /// Commands of the offgoing and of the oncoming element, A or %.
     pub commands: [Series; 2],
-    /// When both clutches slip, s; found by [`Self::find_slip`].
+    /// When both clutches slip, s; found from the readings.
     pub slip_s: [f64; 2],
     /// Whether the lock-up clutch of the converter was applied.
     pub lock_up: bool,
