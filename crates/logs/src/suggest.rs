@@ -77,19 +77,19 @@ const TABLE: &[Words] = &[
     Words {
         role: Role::OncomingCurrent,
         all: &[CURRENT, CLUTCH],
-        none: &["offgoing", "line", "tcc", "lockup", "battery"],
+        none: &["offgoing", "off", "line", "tcc", "lockup", "battery"],
         exact: &[],
     },
-    Words { role: Role::OffgoingCurrent, all: &[CURRENT, &["offgoing"]], none: &[], exact: &[] },
+    Words { role: Role::OffgoingCurrent, all: &[CURRENT, &["offgoing", "off"]], none: &[], exact: &[] },
     Words {
         role: Role::OncomingDuty,
         all: &[&["duty", "tastverhaeltnis", "pwm"], CLUTCH],
-        none: &["offgoing", "line", "tcc", "lockup"],
+        none: &["offgoing", "off", "line", "tcc", "lockup"],
         exact: &[],
     },
     Words {
         role: Role::OffgoingDuty,
-        all: &[&["duty", "tastverhaeltnis", "pwm"], &["offgoing"]],
+        all: &[&["duty", "tastverhaeltnis", "pwm"], &["offgoing", "off"]],
         none: &[],
         exact: &[],
     },
@@ -140,7 +140,7 @@ const TABLE: &[Words] = &[
     },
     Words {
         role: Role::Throttle,
-        all: &[&["throttle", "drossel*", "dk", "tps", "accelerator", "fahrpedal", "pedal", "wped"]],
+        all: &[&["throttle", "drossel*", "dk", "tps", "accelerator", "fahrpedal", "pedal", "wped", "app", "apps"]],
         none: &["target", "soll", "brake", "kick"],
         exact: &["wped", "wdk", "tps"],
     },
@@ -167,6 +167,15 @@ const TABLE: &[Words] = &[
         all: &[&["selector", "lever", "prnd", "waehlhebel", "sel"]],
         none: &["speed"],
         exact: &[],
+    },
+    Words {
+        role: Role::LockUpApplied,
+        all: &[
+            &["tcc", "lockup", "lock", "wk", "wandlerkupplung*"],
+            &["applied", "active", "aktiv", "state", "status", "locked", "closed", "zu", "geschlossen"],
+        ],
+        none: &["door", "diff", "slip", "pressure", "current"],
+        exact: &["lockup", "tcc", "wk_zu"],
     },
     Words {
         role: Role::OilTemperature,
@@ -237,6 +246,57 @@ fn fit(entry: &Words, channel: &Channel) -> Option<u32> {
     Some(unit_fits + if exact { 3 } else { 0 } + if words.len() <= 3 { 1 } else { 0 })
 }
 
+/// From so many commands of elements on they are those of a whole gearbox.
+const WHOLE_GEARBOX: usize = 3;
+
+/// The element whose valve has this command, and the role; none if the channel is no such command.
+fn element(channel: &Channel) -> Option<(Role, String)> {
+    const ELEMENT: &[&str] = &["element", "brake", "bremse", "elem"];
+    const UNITS: [&str; 2] = ["a", "ma"];
+    let name = channel.name.to_lowercase();
+    let own = name.strip_prefix("element_").and_then(|rest| {
+        let current = ["_current_a", "_current_ma"].into_iter().find_map(|ending| rest.strip_suffix(ending));
+        let duty = || rest.strip_suffix("_duty_percent");
+        current.map(|name| (Role::ElementCurrent, name)).or_else(|| Some((Role::ElementDuty, duty()?)))
+    });
+    if let Some((role, name)) = own {
+        return Some((role, name.to_owned()));
+    }
+    let words = words(&channel.name);
+    let is_about = |list: &[&str]| met(list, &words);
+    let unit = Unit::parse(&channel.unit).filter(|unit| unit.quantity == Quantity::Current)?;
+    let is_command = is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT));
+    if unit.quantity != Quantity::Current
+        || !is_command
+        || is_about(&["line", "tcc", "lockup", "battery", "off", "offgoing"])
+    {
+        return None;
+    }
+    let is_name = |word: &&String| {
+        let word = std::slice::from_ref(*word);
+        ![CURRENT, CLUTCH, ELEMENT, TARGET, ACTUAL].iter().any(|list| met(list, word))
+    };
+    let mut named: Vec<&str> = words.iter().filter(is_name).map(String::as_str).collect();
+    if named.len() > 1 && named.last().is_some_and(|word| UNITS.contains(word)) {
+        named.pop();
+    }
+    let name = named.concat();
+    (1..=3).contains(&name.len()).then_some((Role::ElementCurrent, name))
+}
+
+/// The commands of the elements of a whole gearbox: their keys in a map, and their channels. None if there are but a few, or two
+/// with one key.
+fn elements(channels: &[Channel]) -> Vec<(String, usize)> {
+    let key = |(at, channel)| {
+        let (role, name) = element(channel)?;
+        let what = if role == Role::ElementDuty { "duty" } else { "current" };
+        Some((format!("element_{name}_{what}"), at))
+    };
+    let found: Vec<(String, usize)> = channels.iter().enumerate().filter_map(key).collect();
+    let keys: std::collections::BTreeSet<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
+    if keys.len() == found.len() && found.len() >= WHOLE_GEARBOX { found } else { Vec::new() }
+}
+
 /// A channel map for a log, as the text of a TOML file. Channels in doubt stand beside it as comments.
 pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     let mut text = String::from("# A first channel map, from names and units alone: check every line.\n");
@@ -245,6 +305,8 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     }
     let mut missing = Vec::new();
     let mut taken = vec![false; channels.len()];
+    let elements = elements(channels);
+    elements.iter().for_each(|(_, at)| taken[*at] = true);
     for entry in TABLE {
         let mut found: Vec<(u32, usize)> = channels
             .iter()
@@ -254,39 +316,55 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
             .collect();
         found.sort_by_key(|(fit, i)| (std::cmp::Reverse(*fit), *i));
         let Some(&(_, best)) = found.first() else {
-            missing.push(entry.role.name());
+            if elements.is_empty() || !entry.role.is_command() {
+                missing.push(entry.role.name());
+            }
             continue;
         };
         taken[best] = true;
-        let channel = &channels[best];
-        let _ = writeln!(text, "\n[channel.{}]\nname = {}", entry.role.name(), quoted(&channel.name));
-        if channels.iter().filter(|other| other.name == channel.name).count() > 1 {
-            let _ = writeln!(text, "group = {}", quoted(&channel.group));
-        }
-        let known = Unit::parse(&channel.unit);
-        match known {
-            Some(Unit { quantity: Quantity::Share, .. }) if entry.role.quantity() == Some(Quantity::Torque) => {
-                let _ = writeln!(
-                    text,
-                    "unit = \"N m\"\nscale = 1.0 # the log has {}: check, N m for each",
-                    error::shown(&channel.unit)
-                );
-            }
-            Some(_) if !channel.unit.trim().is_empty() => {
-                let _ = writeln!(text, "# unit of the log: {}", error::shown(&channel.unit));
-            }
-            _ if entry.role.quantity().is_some() => {
-                let _ = writeln!(text, "unit = {} # the log does not say it: check", quoted(entry.role.unit()));
-            }
-            _ => {}
-        }
+        text += &table_of(entry.role.name(), entry.role, best, channels);
         let others: Vec<String> = found.iter().skip(1).take(4).map(|(_, i)| error::shown(&channels[*i].name)).collect();
         if !others.is_empty() {
             let _ = writeln!(text, "# also fits: {}", others.join(", "));
         }
     }
+    if !elements.is_empty() {
+        text.push_str(
+            "\n# Commands of the elements of a whole gearbox: check that these are the names of the gearbox file.\n",
+        );
+    }
+    for (key, at) in &elements {
+        let role = if key.ends_with("duty") { Role::ElementDuty } else { Role::ElementCurrent };
+        text += &table_of(key, role, *at, channels);
+    }
     if !missing.is_empty() {
         let _ = writeln!(text, "\n# No channel was found for: {}", missing.join(", "));
+    }
+    text
+}
+
+/// The table of a channel in a map.
+fn table_of(key: &str, role: Role, at: usize, channels: &[Channel]) -> String {
+    let channel = &channels[at];
+    let mut text = format!("\n[channel.{key}]\nname = {}\n", quoted(&channel.name));
+    if channels.iter().filter(|other| other.name == channel.name).count() > 1 {
+        let _ = writeln!(text, "group = {}", quoted(&channel.group));
+    }
+    match Unit::parse(&channel.unit) {
+        Some(Unit { quantity: Quantity::Share, .. }) if role.quantity() == Some(Quantity::Torque) => {
+            let _ = writeln!(
+                text,
+                "unit = \"N m\"\nscale = 1.0 # the log has {}: check, N m for each",
+                error::shown(&channel.unit)
+            );
+        }
+        Some(_) if !channel.unit.trim().is_empty() => {
+            let _ = writeln!(text, "# unit of the log: {}", error::shown(&channel.unit));
+        }
+        _ if role.quantity().is_some() => {
+            let _ = writeln!(text, "unit = {} # the log does not say it: check", quoted(role.unit()));
+        }
+        _ => {}
     }
     text
 }
@@ -314,7 +392,7 @@ mod tests {
 
     #[test]
     fn usual_names_in_two_languages_are_found() {
-        let logs: [&[(&str, &str, &str)]; 4] = [
+        let logs: [&[(&str, &str, &str)]; 7] = [
             &[
                 ("N_Eng", "rpm", "engine_speed"),
                 ("N_Turb", "rpm", "turbine_speed"),
@@ -346,13 +424,27 @@ mod tests {
                 ("offgoing_current_a", "A", "offgoing_current"),
                 ("throttle", "", "throttle"),
             ],
+            &[("I_ClA", "mA", "oncoming_current"), ("I_ClA_off", "mA", "offgoing_current"), ("APP", "%", "throttle")],
+            &[
+                ("element_a_current_a", "A", "element_a_current"),
+                ("element_b_duty_percent", "%", "element_b_duty"),
+                ("element_35r_current_ma", "mA", "element_35r_current"),
+                ("lock_up_applied", "", "lock_up_applied"),
+            ],
+            &[
+                ("I_ClA", "mA", "element_a_current"),
+                ("Solenoid_B1_Current_A", "A", "element_b1_current"),
+                ("Kupplung_E_Strom_Ist", "mA", "element_e_current"),
+                ("TCC_State", "", "lock_up_applied"),
+                ("TCC_Sol_Current", "mA", ""),
+            ],
         ];
         for log in logs {
             let found = suggested(&log.iter().map(|(name, unit, _)| channel(name, unit)).collect::<Vec<_>>());
-            for (name, _, role) in log {
+            for (name, _, role) in log.iter().filter(|(.., role)| !role.is_empty()) {
                 assert!(found.contains(&((*role).to_owned(), (*name).to_owned())), "{name}: {found:?}");
             }
-            assert_eq!(found.len(), log.len(), "{found:?}");
+            assert_eq!(found.len(), log.iter().filter(|(.., role)| !role.is_empty()).count(), "{found:?}");
         }
     }
 

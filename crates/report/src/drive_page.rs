@@ -143,6 +143,9 @@ fn draw_rows(draw: &ShiftDraw, car: &Car) -> Vec<Value> {
 /// What happened, in sentences.
 pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     let shifts = &drive.shifts;
+    if shifts.is_empty() {
+        return vec!["The drive has no shift.".to_owned()];
+    }
     let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
     let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
     let clutches = || shifts.iter().flat_map(|shift| &shift.rows).flat_map(|row| &row.clutches);
