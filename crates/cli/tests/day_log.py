@@ -10,9 +10,8 @@ import numpy as np
 from asammdf import MDF, Signal
 from asammdf.blocks import v4_blocks, v4_constants
 
-# Engaged elements of gears 1 to 8 (gearboxes/8hp.toml) of which the currents are logged.
-ENGAGED = {"E": {2, 3, 4, 6, 8}, "C": {1, 3, 5, 6, 7}}
-HOLDING_A = 1.05
+# The friction elements of gearboxes/8hp.toml.
+ELEMENTS = "ABCDE"
 RPM = 30 / np.pi
 
 
@@ -28,16 +27,6 @@ def numbers(cells):
     return np.array([float(cell) if cell else np.nan for cell in cells])
 
 
-def current(drive, element):
-    """Current of an element: that of the shift controller in its shifts, else full or none as its gear wants it."""
-    gear = numbers(drive["gear"])
-    value = np.where(np.isin(gear, list(ENGAGED[element])), HOLDING_A, 0.0)
-    for role in ("offgoing", "oncoming"):
-        mine = np.array([name == element for name in drive[role]])
-        value = np.where(mine, numbers(drive[role + "_current_a"]), value)
-    return value
-
-
 def main(path, out, seed="1"):
     random = np.random.default_rng(int(seed))
     drive = read(path)
@@ -49,8 +38,8 @@ def main(path, out, seed="1"):
             ("N_Turb", "1/min", rpm("turbine_speed_rad_s"), 0.25, np.int16),
             ("N_Out", "1/min", rpm("output_speed_rad_s"), 0.25, np.int16)]),
         ("TCU", 0.010, 0.0013, [
-            ("I_E", "mA", 1e3 * current(drive, "E"), 1.0, np.uint16),
-            ("I_C", "mA", 1e3 * current(drive, "C"), 1.0, np.uint16),
+            *[(f"I_{element}", "mA", 1e3 * numbers(drive[f"element_{element.lower()}_current_a"]), 1.0, np.uint16)
+              for element in ELEMENTS],
             ("N_Eng", "1/min", rpm("engine_speed_rad_s"), 0.25, np.uint16)]),
         ("Brakes", 0.020, 0.0071, [
             ("N_Whl", "1/min", rpm("wheel_speed_rad_s"), 0.125, np.int16),

@@ -12,6 +12,7 @@ pub mod error;
 mod fitted_file;
 pub mod fitting;
 mod freeing;
+pub mod gearbox;
 mod hotelling;
 pub mod intervals;
 mod motion;

@@ -83,6 +83,18 @@ impl VehicleText {
         } else {
             values.first().map_or_else(String::new, |value| number(*value))
         };
+        self.replace(span, key_at, text, comment);
+        Ok(())
+    }
+
+    /// Puts any value, as it is written in TOML, in place of another.
+    pub(crate) fn set_text(&mut self, path: &[Step], value: &str, comment: &str) -> Result<(), FitError> {
+        let (span, key_at) = self.place(path)?;
+        self.replace(span, key_at, value.to_owned(), Some(comment));
+        Ok(())
+    }
+
+    fn replace(&mut self, span: std::ops::Range<usize>, key_at: usize, text: String, comment: Option<&str>) {
         if let Some(comment) = comment {
             let before = &self.text[span.clone()];
             let was = if before.starts_with('[') { String::new() } else { format!("; before: {before}") };
@@ -94,7 +106,24 @@ impl VehicleText {
             self.edits.push((at, format!("{FITTED}{comment}{was}\n")));
         }
         self.edits.push((span, text));
-        Ok(())
+    }
+
+    /// Adds lines to a table of the file, above its first key that begins a line; false if there is no such table.
+    pub(crate) fn add_to_table(&mut self, table: &[Step], lines: &str) -> Result<bool, FitError> {
+        let root = DeTable::parse(&self.text).map_err(|error| FitError::input(error.to_string()))?;
+        let mut found = root.get_ref();
+        for step in table {
+            let Step::Key(key) = step else { return Ok(false) };
+            let value = found.iter().find(|(name, _)| name.get_ref().as_ref() == key.as_str());
+            let Some(DeValue::Table(inner)) = value.map(|(_, value)| value.get_ref()) else { return Ok(false) };
+            found = inner;
+        }
+        let line_of = |at: usize| self.text[..at].rfind('\n').map_or(0, |end| end + 1);
+        let begins_line = |at: &usize| self.text[line_of(*at)..*at].trim().is_empty();
+        let Some(at) = found.keys().map(|key| key.span().start).filter(begins_line).min() else { return Ok(false) };
+        let at = line_of(at);
+        self.edits.push((at..at, lines.to_owned()));
+        Ok(true)
     }
 
     /// Adds a number to the table of another value, on the line above it.

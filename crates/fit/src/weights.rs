@@ -58,10 +58,7 @@ impl Weights {
                     of_channel.map(|block| &rows.as_slice()[block.rows.clone()])
                 })
                 .collect();
-            let best = GAINS.into_iter().map(|gain| (gain, spread(&blocks, gain)));
-            if let Some((gain, (_, scale))) = best.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
-                && scale > 0.0
-            {
+            if let Some((gain, scale)) = gain_and_scale(&blocks) {
                 weights.gain[channel as usize] = gain;
                 weights.scale[channel as usize] = scale;
                 weights.inflation[channel as usize] = FACTOR * FACTOR * correlation(&blocks, gain, scale);
@@ -69,6 +66,13 @@ impl Weights {
         }
         weights
     }
+}
+
+/// The gain with which residuals have the least one-step errors, and the scale of these; none without residuals.
+pub(crate) fn gain_and_scale(blocks: &[&[f64]]) -> Option<(f64, f64)> {
+    let found = GAINS.into_iter().map(|gain| (gain, spread(blocks, gain)));
+    let (gain, (_, scale)) = found.min_by(|one, other| one.1.0.total_cmp(&other.1.0))?;
+    (scale > 0.0).then_some((gain, scale))
 }
 
 /// Turns residuals into one-step errors. The first is the residual itself.
@@ -114,7 +118,7 @@ fn correlation(blocks: &[&[f64]], gain: f64, scale: f64) -> f64 {
 }
 
 /// Factor by which the variance of a mean of errors that are alike in sequence exceeds that of independent ones.
-fn correlation_factor(blocks: &[&[f64]]) -> f64 {
+pub(crate) fn correlation_factor(blocks: &[&[f64]]) -> f64 {
     const LAGS: usize = 30;
     let limited = |error: f64| error.clamp(-HUBER, HUBER);
     let variance: f64 = blocks.iter().copied().flatten().map(|error| limited(*error).powi(2)).sum();

@@ -207,7 +207,7 @@ impl From<ValveChoice> for ValveKind {
 
 #[derive(Debug, Args)]
 pub(crate) struct Fit {
-    /// Logs of drives with upshifts
+    /// Logs of drives with shifts
     #[arg(required = true)]
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]

@@ -70,6 +70,14 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     let gearbox = "ratios = [4.6957, 3.1304, 2.1039, 1.6667, 1.2845, 1.0, 0.8392, 0.6667]\noutput_rad_per_m = 10.0\n";
     let valves = "[channel.oncoming_current]\nname = \"I_E\"\n[channel.offgoing_current]\nname = \"I_C\"\n";
     let map = folder.write("map.toml", format!("{suggested}\n[gearbox]\n{gearbox}{valves}"));
+    let elements: String = ('A'..='E')
+        .map(|name| {
+            let key = name.to_ascii_lowercase();
+            format!("[channel.element_{key}_current]\nname = \"I_{name}\"\n")
+        })
+        .collect();
+    let of_elements = folder.write("elements.toml", format!("{suggested}\n{elements}"));
+    let eight_speed = format!("{ROOT}vehicles/eight_speed.toml");
     let car = folder.path("car.toml");
     let numbers = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"];
     said(&wetclutch(&[&["init", "--ratios", "4.6957,3.1304", "-o", &car], &numbers[..]].concat()));
@@ -88,7 +96,15 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
         let fit = wetclutch(&["fit", &log, "--map", &map, "--vehicle", &car, "-o", &fitted]);
         let fit = said(&fit).map(|text| text.replace(&log, "LOG"));
         let estimate = said(&wetclutch(&["estimate", &log, "--map", &map, "--vehicle", &car, "-o", &out]));
-        let files = ["out.csv", "out_shifts.csv", "out_shifts.json", "fitted.toml"];
+        // The car with its whole gearbox.
+        let (whole, whole_fitted) = (folder.path("whole.csv"), folder.path("whole.toml"));
+        let whole_fit =
+            wetclutch(&["fit", &log, "--map", &of_elements, "--vehicle", &eight_speed, "-o", &whole_fitted]);
+        let whole_fit = said(&whole_fit).map(|text| text.replace(&log, "LOG"));
+        let vehicle = ["--vehicle", &whole_fitted];
+        let estimated = wetclutch(&[&["estimate", &log, "--map", &of_elements, "-o", &whole], &vehicle[..]].concat());
+        let estimate = (estimate, whole_fit, said(&estimated));
+        let files = ["out.csv", "out_shifts.csv", "out_shifts.json", "fitted.toml", "whole.csv", "whole.toml"];
         let files = files.map(|name| folder.read(name).replace(&log, "LOG"));
         (channels, shifts, fit, estimate, files)
     };
@@ -96,6 +112,13 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     assert_eq!(mdf.0, csv.0);
     assert_eq!(mdf.1, csv.1);
     assert_eq!((&mdf.2, &mdf.3), (&csv.2, &csv.3));
+    let (estimate, whole_fit, whole_estimate) = &mdf.3;
+    // The simulated car is that of the file, and the fit does not take it for another.
+    assert!(
+        whole_fit[0].contains("shifts held out: ") && !whole_fit[0].contains("the shifts ask for"),
+        "{whole_fit:?}"
+    );
+    assert!(whole_estimate[1].contains("whole_shifts.csv"), "{whole_estimate:?}");
     for (one, other) in mdf.4.iter().zip(&csv.4) {
         assert!(one == other, "the files differ");
     }
@@ -106,9 +129,9 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     // Of the shifts of the simulated drive, all but those at walking speed are found by their ratio; no sample is called frozen.
     let found = mdf.1[0].lines().filter(|line| line.contains(" to ") && line.contains("power-")).count();
     assert!(found >= 15 * repetitions as usize, "{}", mdf.1[0]);
-    assert!(!mdf.3[1].contains("frozen"), "{}", mdf.3[1]);
+    assert!(!estimate[1].contains("frozen"), "{}", estimate[1]);
     // In other gears there is no estimate, and what an observer meets there does not spoil the next shift: all of them are alike.
-    assert!(mdf.3[1].contains("samples are in gears that the vehicle file does not describe"), "{}", mdf.3[1]);
+    assert!(estimate[1].contains("samples are in gears that the vehicle file does not describe"), "{}", estimate[1]);
     let shifts: Vec<Vec<String>> = mdf.4[1].lines().map(|line| line.split(',').map(str::to_owned).collect()).collect();
     let column = |name: &str| shifts[0].iter().position(|title| title == name).unwrap();
     let (of_vehicle, work) = (column("of_vehicle"), column("friction_work_j"));

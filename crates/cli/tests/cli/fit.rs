@@ -111,20 +111,6 @@ fn what_a_log_lacks_is_said_and_no_file_is_written() {
 }
 
 #[test]
-fn a_car_with_a_whole_gearbox_is_told_what_can_be_found_for_it() {
-    let folder = Folder::new("gearbox");
-    let log = folder.write("log.csv", one_shift(1));
-    let car = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
-    let output = wetclutch(&["fit", &log, "--vehicle", car, "-o", &folder.path("fitted.toml")]);
-    assert_eq!(output.status.code(), Some(2));
-    let said = stderr(&output);
-    for words in ["a vehicle with a whole gearbox", "wetclutch init --ratios FROM,TO", "--shifts -o PAGE.html"] {
-        assert!(said.contains(words), "{said}");
-    }
-    assert!(!std::path::Path::new(&folder.path("fitted.toml")).exists());
-}
-
-#[test]
 fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is() {
     let folder = Folder::new("one");
     // Every fifth engine speed and every seventh wheel speed are lost, and there is no command of the offgoing clutch.

@@ -10,6 +10,7 @@ mod day_of_logs;
 mod drives;
 mod equations;
 mod fit;
+mod fit_gearbox;
 #[cfg(unix)]
 mod log_to_fit;
 mod logs;

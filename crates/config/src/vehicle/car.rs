@@ -115,13 +115,14 @@ impl Car {
         let given: toml::Table = source.parse()?;
         let raw: RawCar = Layers { source: &defaults, over: Some(&source) }.parse()?;
         let check = Check { layers: Layers { source: &defaults, over: Some(&source) } };
-        let gearbox = GearboxFile::from_source(gearbox)?.gearbox;
+        let mut gearbox = GearboxFile::from_source(gearbox)?.gearbox;
         let at = raw.gearbox.span().start;
         if gearbox.train.is_none() {
             let message = format!("\"{}\" has no stick diagram", raw.gearbox.get_ref());
             let hint = "a simulated car needs a gearbox file with level = \"stick-diagram\"".to_owned();
             return Err(check.meaning("gearbox", at, message, Some(hint)));
         }
+        turbine_inertias(&check, &raw, &mut gearbox)?;
         let line_pressure_pa =
             check.number("hydraulics.line_pressure_pa", &raw.hydraulics.line_pressure_pa, 1e5..=10e6)?;
         let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
@@ -192,6 +193,8 @@ struct RawCar {
     lock_up: Option<RawLockUp>,
     #[serde(default)]
     clutch: BTreeMap<Spanned<String>, RawElementClutch>,
+    #[serde(default)]
+    turbine_inertia_kg_m2: BTreeMap<Spanned<String>, Number>,
     driveline: RawDriveline,
     tyre: RawTyre,
     vehicle: RawRoad,
@@ -247,6 +250,7 @@ struct RawElementClutch {
     friction: Option<RawFriction>,
     static_friction: Option<Number>,
     drag_n_m: Option<Number>,
+    return_spring_n: Option<Number>,
     valve: Option<Spanned<RawClutchValve>>,
     fill: Option<RawFill>,
 }
@@ -278,6 +282,34 @@ fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) 
         ramp_s: number("ramp_s", &raw.ramp_s, 0.05..=10.0)?,
         slip_rad_s: raw.slip_rad_s.as_ref().map_or(Ok(0.0), |slip| number("slip_rad_s", slip, 0.0..=30.0))?,
     })
+}
+
+/// Puts inertias of the file in place of those of the gear train, for both shifts between two neighbouring gears.
+fn turbine_inertias(check: &Check<'_>, raw: &RawCar, gearbox: &mut Gearbox) -> Result<(), ConfigError> {
+    for (name, value) in &raw.turbine_inertia_kg_m2 {
+        let key = format!("turbine_inertia_kg_m2.{}", name.get_ref());
+        let inertia_kg_m2 = check.number(&key, value, 1e-4..=10.0)?;
+        let pair = name.get_ref().split_once('-').and_then(|(low, high)| gearbox.gear(low).zip(gearbox.gear(high)));
+        let is_of_pair =
+            |from: usize, to: usize| pair.is_some_and(|(a, b)| a != b && [[a, b], [b, a]].contains(&[from, to]));
+        let shifts = gearbox.shifts.iter_mut().filter(|shift| is_of_pair(shift.from, shift.to));
+        let mut reduced: Vec<_> = shifts.filter_map(|shift| shift.reduced.as_mut()).collect();
+        if reduced.is_empty() {
+            let message = "names no shift of the gearbox from one clutch to another".to_owned();
+            let hint = "two gears with a line between them, as \"1-2\"".to_owned();
+            return Err(check.meaning(&key, name.span().start, message, Some(hint)));
+        }
+        for shift in &mut reduced {
+            let [[_, mixed], [_, output]] = shift.mass_kg_m2;
+            if inertia_kg_m2 * output <= mixed * mixed {
+                let message = format!("is {inertia_kg_m2} kg m2, with which speeds could change without energy");
+                let hint = format!("more than {:.4} kg m2", mixed * mixed / output);
+                return Err(check.meaning(&key, value.span().start, message, Some(hint)));
+            }
+            shift.mass_kg_m2[0][0] = inertia_kg_m2;
+        }
+    }
+    Ok(())
 }
 
 /// The friction elements: plates of the gearbox file, friction over slip, drag and valve of the vehicle file.
@@ -327,6 +359,9 @@ fn clutches(
             static_friction: static_factor * pack.static_friction,
             ..pack
         };
+        if let Some(value) = own.and_then(|own| own.return_spring_n.as_ref()) {
+            clutch.return_spring_n = check.number(key("return_spring_n"), value, 0.0..=10e3)?;
+        }
         if let Some(friction) = own.and_then(|own| own.friction.as_ref()) {
             clutch.friction = own_friction(check, &key("friction"), friction)?;
             clutch.static_friction = clutch.static_friction.max(clutch.friction.at(0.0));

@@ -1,6 +1,6 @@
 //! `wetclutch estimate`: one log, or several at a time.
 
-mod any_car;
+pub(super) mod any_car;
 mod findings;
 mod job;
 mod measured;
@@ -37,11 +37,16 @@ struct Setup<'a> {
 }
 
 /// Messages of one log: shown as they come, or together when it is done.
-struct Messages {
+pub(super) struct Messages {
     held: Option<Vec<String>>,
 }
 
 impl Messages {
+    /// That are shown as they come.
+    pub(super) fn at_once() -> Self {
+        Self { held: None }
+    }
+
     fn note(&mut self, message: &str) {
         match &mut self.held {
             None => output::note(message),
@@ -84,7 +89,7 @@ fn each_log<S: Sync>(
         not_an_input(Some(&beside), inputs(options).chain([log]))?;
     }
     output.as_deref().map(outputs::only_own_beside).transpose()?;
-    estimate(&prepare()?, log, output.as_deref(), &mut Messages { held: None })
+    estimate(&prepare()?, log, output.as_deref(), &mut Messages::at_once())
 }
 
 /// The ending of files in a folder.

@@ -3,7 +3,7 @@
 mod checks;
 mod columns;
 mod passing;
-mod source;
+pub(in crate::commands) mod source;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use trace::Cell;
 
 use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
-use self::source::CarSource;
+use self::source::{CarReading, CarSource};
 use super::Messages;
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
@@ -74,7 +74,8 @@ pub(super) fn estimate(
 ) -> Result<(), Failure> {
     let CarSetup { options, car, tables, .. } = setup;
     let mut opened = None;
-    let mut log = CarSource::open(setup, path, &mut opened)?;
+    let stop = options.follow.then_some(&setup.stop);
+    let mut log = CarSource::open(CarReading { car, tables, map: &setup.map, stop }, path, &mut opened)?;
     let mut drive = LoggedDrive::new(car, tables, setup.sensors.as_ref());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
@@ -114,7 +115,7 @@ pub(super) fn estimate(
 }
 
 /// Refuses a log whose speeds are not those of the gearbox in most rows.
-fn check_ratios([all, unfit]: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
+pub(in crate::commands) fn check_ratios([all, unfit]: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
     if 2 * unfit <= all {
         return Ok(());
     }

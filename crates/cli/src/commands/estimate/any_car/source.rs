@@ -4,28 +4,44 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use logs::{Log, LogError};
+use config::Car;
+use design::ShiftTables;
+use logs::{ChannelMap, Log, LogError};
 use study::any_shift::channels::{CarChannels, own_map};
 use study::any_shift::logged::{CarLog, LogStep};
 use trace::{CsvRows, Following};
 
 use super::super::Messages;
 use super::super::measured::report_readings;
-use super::CarSetup;
 use crate::failure::Failure;
 
+/// How a log of a car is read.
+#[derive(Clone, Copy)]
+pub(in crate::commands) struct CarReading<'a> {
+    pub(in crate::commands) car: &'a Car,
+    pub(in crate::commands) tables: &'a ShiftTables<f64>,
+    pub(in crate::commands) map: &'a ChannelMap,
+    /// Set when a log that is followed is to end; none for one that is not followed.
+    pub(in crate::commands) stop: Option<&'a Arc<AtomicBool>>,
+}
+
 /// The steps of a log.
-pub(super) enum CarSource<'a> {
+pub(in crate::commands) enum CarSource<'a> {
     Rows(Box<CarLog<'a>>),
     Channels(Box<CarChannels<'a>>),
 }
 
 impl<'a> CarSource<'a> {
     /// Opens a log; `opened` holds it where it has channels.
-    pub(super) fn open(setup: &'a CarSetup<'_>, path: &Path, opened: &'a mut Option<Log>) -> Result<Self, Failure> {
-        let CarSetup { car, tables, map, options, .. } = setup;
-        let stop = options.follow.then(|| Arc::clone(&setup.stop));
+    pub(in crate::commands) fn open(
+        reading: CarReading<'a>,
+        path: &Path,
+        opened: &'a mut Option<Log>,
+    ) -> Result<Self, Failure> {
+        let CarReading { car, tables, map, stop } = reading;
+        let stop = stop.map(Arc::clone);
         let is_pipe = path == Path::new("-");
         if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
             let opening = |source| LogError::Io { path: path.to_owned(), source };
@@ -57,7 +73,7 @@ impl<'a> CarSource<'a> {
         Ok(Self::Channels(Box::new(channels)))
     }
 
-    pub(super) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
+    pub(in crate::commands) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
         Ok(match self {
             Self::Rows(rows) => rows.next_step()?,
             Self::Channels(channels) => channels.next_step()?,
@@ -65,7 +81,7 @@ impl<'a> CarSource<'a> {
     }
 
     /// Says what was met in the log, after its last step.
-    pub(super) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
+    pub(in crate::commands) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
         match self {
             Self::Rows(_) => Ok(()),
             Self::Channels(channels) => report_readings(channels.readings(), say),

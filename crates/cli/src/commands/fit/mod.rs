@@ -1,5 +1,9 @@
 //! `wetclutch fit`.
 
+mod gearbox;
+
+use std::path::Path;
+
 use config::{Kind, Source, Vehicle};
 use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -21,9 +25,10 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
     let inputs = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]).chain(options.mapping.files());
     not_an_input(Some(&options.output), inputs)?;
+    only_a_vehicle_file(&options.output)?;
     let source = Source::read(&options.vehicle)?;
     if source.kind()? == Kind::Car {
-        return Err(whole_gearbox(options).into());
+        return gearbox::fit(options);
     }
     let vehicle = Vehicle::from_source(source)?;
     fit::check_vehicle(&vehicle)?;
@@ -80,6 +85,21 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses an output that is there and no vehicle file: it may be a measurement.
+fn only_a_vehicle_file(output: &Path) -> Result<(), Failure> {
+    let is_vehicle = || {
+        Source::read(output)
+            .and_then(|source| source.kind())
+            .is_ok_and(|kind| matches!(kind, Kind::Vehicle | Kind::Car))
+    };
+    if output.is_file() && !is_vehicle() {
+        let message =
+            format!("{}: exists and is no vehicle file\nhint: choose another name after -o", output.display());
+        return Err(Failure::Input(message));
+    }
+    Ok(())
+}
+
 /// The shifts of all logs.
 fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collected, Failure> {
     let map = channel_map(&options.mapping)?;
@@ -102,18 +122,6 @@ fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>)
         if count < LEAST_FOR_HELD_OUT { Vec::new() } else { shifts.split_off(count - HELD_OUT_MIN.max(count / 5)) };
     let some = SHIFTS_MAX.min(shifts.len());
     ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
-}
-
-/// What can be found for a car with a whole gearbox.
-fn whole_gearbox(options: &Fit) -> FitError {
-    let log = options.logs.first().map(|log| shell_quoted(log)).unwrap_or_default();
-    FitError::Input(format!(
-        "{}: is a vehicle with a whole gearbox; a fit finds the values of a file with one shift\n\
-         hint: for one shift of this car, `wetclutch init --ratios FROM,TO` with the ratios of both gears makes such a file, and a fit to the same \
-         logs finds friction, spring and valve of its oncoming clutch and the inertia M11 of the shift; they go into this file by hand. For the \
-         converter and the torque of each shift, `wetclutch inspect {log} --map MAP.toml --shifts -o PAGE.html` with an engine torque signal",
-        options.vehicle.display()
-    ))
 }
 
 fn no_shift(vehicle: &Vehicle, options: &Fit) -> Failure {
@@ -146,11 +154,7 @@ fn table(rows: &[ReportRow]) -> Result<(), Failure> {
 
 /// The result on held-out shifts, in words.
 fn said_of(checked: Option<&HeldOut>) -> String {
-    let Some(checked) = checked else {
-        return format!(
-            "no shift is held out: fewer than {LEAST_FOR_HELD_OUT} can be used, so nothing checks this fit"
-        );
-    };
+    let Some(checked) = checked else { return nothing_held_out() };
     let [given, fitted] = checked.turbine_rad_s;
     let mut text = format!(
         "{} shifts held out: one-step error of the turbine speed {given:.3} rad/s with the given file, {fitted:.3} with the fitted one",
@@ -160,6 +164,10 @@ fn said_of(checked: Option<&HeldOut>) -> String {
         text += &format!("; pressure of the valve maps against the measured one {given:.2} kPa, {fitted:.2} kPa");
     }
     text
+}
+
+fn nothing_held_out() -> String {
+    format!("no shift is held out: fewer than {LEAST_FOR_HELD_OUT} can be used, so nothing checks this fit")
 }
 
 /// A line on standard error that says what is being done; nothing if standard error is not a terminal.

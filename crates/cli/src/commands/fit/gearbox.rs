@@ -1,0 +1,156 @@
+//! `wetclutch fit` of a car with a whole gearbox.
+
+use std::path::Path;
+
+use config::Car;
+use design::ShiftTables;
+use fit::gearbox::{HeldOut, Recorded, Recorder, ShiftLog};
+use fit::{FitError, ReadingAges};
+use indicatif::ProgressBar;
+use logs::ChannelMap;
+use study::any_shift::logged::LoggedDrive;
+
+use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, progress, reasons, table};
+use crate::args::Fit;
+use crate::commands::estimate::Messages;
+use crate::commands::estimate::any_car::check_ratios;
+use crate::commands::estimate::any_car::source::{CarReading, CarSource};
+use crate::commands::estimate::sensors;
+use crate::commands::{channel_map, shell_quoted, write_text};
+use crate::failure::Failure;
+use crate::output;
+
+/// Every so many shifts one is held out; of few more often.
+const HELD_OUT_EVERY: usize = 5;
+/// More shifts are thinned evenly.
+const SHIFTS_MAX: usize = 400;
+/// Steps between two signs of life.
+const STEPS: u64 = 20_000;
+
+pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
+    let car = Car::read(&options.vehicle)?;
+    if let Some(name) = with_stroke(&car) {
+        return Err(FitError::Input(format!(
+            "{}: the piston of element {name} has a stroke, which the fit does not model\n\
+             hint: leave the `fill` tables out for the fit; a fill that has ended before the speeds change does little",
+            options.vehicle.display()
+        ))
+        .into());
+    }
+    let tables = LoggedDrive::tables(&car)?;
+    let ages = options.sensors.as_deref().map(sensors).transpose()?.map(|sensors| ReadingAges::of(&sensors));
+    let bar = progress();
+    let recorded = record(options, &car, &tables, ages.unwrap_or_default(), &bar)?;
+    bar.suspend(|| reasons("not used", &recorded.skipped));
+    let (fitted_shifts, held_out) = divided(recorded.shifts);
+    if fitted_shifts.is_empty() {
+        bar.finish_and_clear();
+        return Err(no_shift(options));
+    }
+    let found = fit::gearbox::fit(&car, &tables, &fitted_shifts, &mut |progress| {
+        bar.set_message(format!("{} shifts, iteration {}", progress.shifts, progress.iteration + 1));
+        bar.tick();
+    })?;
+    let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
+    let fitted = found.vehicle_file(&car, &options.output, &names.join(", "))?;
+    let checked = found.validate((&car, &tables), (&fitted, &LoggedDrive::tables(&fitted)?), &held_out);
+    bar.finish_and_clear();
+    // Nobody has to read the report to its end.
+    write_text(&options.output, &fitted.source.text)?;
+    table(&found.report())?;
+    let [scale, gain] = found.scale_and_gain;
+    output::line(&format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}"))?;
+    for statement in found.statements() {
+        output::line(&statement)?;
+    }
+    output::line(&checked.as_ref().map_or_else(nothing_held_out, said_of))?;
+    let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
+    output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
+    Ok(())
+}
+
+/// The first element whose piston has a stroke.
+fn with_stroke(car: &Car) -> Option<&str> {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches);
+    let mut with = elements.filter(|(_, clutch)| clutch.as_ref().is_some_and(|clutch| clutch.has_stroke));
+    with.next().map(|(element, _)| element.name.as_str())
+}
+
+/// The shifts of all logs.
+fn record(
+    options: &Fit,
+    car: &Car,
+    tables: &ShiftTables<f64>,
+    ages: ReadingAges,
+    bar: &ProgressBar,
+) -> Result<Recorded, Failure> {
+    let map = channel_map(&options.mapping)?;
+    let mut all = Recorded::default();
+    for log in &options.logs {
+        bar.set_message(format!("reading {}", log.display()));
+        bar.tick();
+        let one = record_one(log, &map, Recorder::new(car, tables, ages), (car, tables), bar)?;
+        check_ratios(one.in_gear, &options.vehicle, log)?;
+        all.add(one);
+    }
+    Ok(all)
+}
+
+fn record_one(
+    log: &Path,
+    map: &ChannelMap,
+    mut recorder: Recorder<'_>,
+    (car, tables): (&Car, &ShiftTables<f64>),
+    bar: &ProgressBar,
+) -> Result<Recorded, Failure> {
+    let mut opened = None;
+    let mut steps = CarSource::open(CarReading { car, tables, map, stop: None }, log, &mut opened)?;
+    let mut count = 0_u64;
+    while let Some(step) = steps.next_step()? {
+        recorder.push(step.time_s, &step.input);
+        count += 1;
+        if count.is_multiple_of(STEPS) {
+            bar.set_message(format!("reading {}, {:.0} s", log.display(), step.time_s));
+            bar.tick();
+        }
+    }
+    bar.suspend(|| steps.finish(&mut Messages::at_once()))?;
+    Ok(recorder.finish())
+}
+
+/// Shifts to fit, and shifts that are held out: every fifth, and at least [`HELD_OUT_MIN`]. Of more than a fit can use, some are left out evenly.
+fn divided(shifts: Vec<ShiftLog>) -> (Vec<ShiftLog>, Vec<ShiftLog>) {
+    let count = shifts.len();
+    let every = HELD_OUT_EVERY.min(count / HELD_OUT_MIN);
+    let is_held_out = |at: usize| count >= LEAST_FOR_HELD_OUT && at % every == every - 1;
+    let some = SHIFTS_MAX.min(count);
+    let chosen = (0..some).map(|i| shifts[i * count / some.max(1)].clone()).enumerate();
+    let (held_out, fitted): (Vec<_>, Vec<_>) = chosen.partition(|(at, _)| is_held_out(*at));
+    let logs = |shifts: Vec<(usize, ShiftLog)>| shifts.into_iter().map(|(_, log)| log).collect();
+    (logs(fitted), logs(held_out))
+}
+
+fn no_shift(options: &Fit) -> Failure {
+    let log = options.logs.first().map(|log| shell_quoted(log)).unwrap_or_default();
+    FitError::Input(format!(
+        "the logs have no shift between two gears that can be fitted\n\
+         hint: `wetclutch inspect {log} --shifts` with the same map and the ratios of {} lists the shifts that it finds; a fit needs \
+         `gear` and `target_gear`, which differ during a shift",
+        options.vehicle.display()
+    ))
+    .into()
+}
+
+/// The result on held-out shifts, in words.
+fn said_of(checked: &HeldOut) -> String {
+    let [given, fitted] = checked.turbine_rad_s;
+    let mut text = format!(
+        "{} shifts held out: turbine speed while both clutches slip, by the torques of the given file off by {given:.2} rad/s, of the fitted one \
+         by {fitted:.2} rad/s; the fitted file is the better one in {}",
+        checked.shifts, checked.better
+    );
+    if fitted > given {
+        text += "\nwarning: the fitted file is worse on them: do not use it before the reason is known";
+    }
+    text
+}

@@ -1,0 +1,111 @@
+//! `wetclutch fit` of a car with a whole gearbox.
+
+use std::path::Path;
+
+use crate::support::{Folder, ROOT, printed, refused, said, stderr, wetclutch};
+
+const CAR: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml");
+
+/// The factor of a quantity in the table of a fit, and its interval.
+fn factor(table: &str, name: &str) -> [f64; 3] {
+    let line = table.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {table}"));
+    let numbers = line[name.len()..].split_whitespace().filter_map(|word| word.parse().ok()).take(3);
+    numbers.collect::<Vec<f64>>().try_into().unwrap_or_else(|_| panic!("{line}"))
+}
+
+/// A folder with three minutes of town by a car whose clutch E has 15 % more friction, and whose converter 8 % less capacity.
+fn town() -> (Folder, String) {
+    let folder = Folder::new("fit-gearbox");
+    let text = std::fs::read_to_string(CAR).unwrap().replace("../gearboxes", &format!("{ROOT}gearboxes"));
+    let friction =
+        "friction = { slip_rad_s = [0, 10, 50, 150, 450], coefficient = [0.138, 0.14145, 0.14904, 0.1587, 0.16698] }";
+    let car = folder.write("true.toml", format!("{text}\n[clutch.E]\n{friction}\nstatic_friction = 0.149\n"));
+    let drive = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
+    let drive =
+        folder.write("city.toml", drive.replace("repetitions = 20", "repetitions = 1").replace("vehicle = ", "# "));
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("")]));
+    let log = folder.path("city_measured.csv");
+    (folder, log)
+}
+
+#[test]
+fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
+    let (folder, log) = town();
+    let fitted = folder.path("fitted.toml");
+    let output = wetclutch(&["fit", &log, "--vehicle", CAR, "-o", &fitted]);
+    let (table, notes) = (printed(&output), stderr(&output));
+    let [clutch_e, clutch_c] = ["E", "C"].map(|name| factor(&table, &format!("{name}: friction x valve gain")));
+    for ([_, least, most], truth) in [(clutch_e, 1.15), (clutch_c, 1.0)] {
+        assert!(least < truth && truth < most, "{truth}: {table}");
+    }
+    // The ratio of two frictions does not contain the common factor of all torques; in the given file it is 15 % low.
+    let ratio = clutch_e[0] / clutch_c[0];
+    assert!((ratio / 1.15 - 1.0).abs() < 0.12, "{ratio}: {table}");
+    assert!(!table.contains("they do not ask for another file"), "{table}");
+    for words in [
+        "converter capacity",
+        "M11 of 1-2",
+        "torque scale: not told by these logs",
+        "shifts held out: ",
+        "better one in ",
+    ] {
+        assert!(table.contains(words), "{words}: {table}");
+    }
+    assert!(notes.contains("shifts: ") && notes.contains(&fitted), "{notes}");
+    let text = folder.read("fitted.toml");
+    for words in
+        ["# fit: values below", "[clutch.E]", "[turbine_inertia_kg_m2]", "inertia_kg_m2 = 0.17 # crank and pump wheel"]
+    {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    said(&wetclutch(&["check", &fitted]));
+    said(&wetclutch(&["estimate", &log, "--vehicle", &fitted, "-o", &folder.path("estimate.csv")]));
+    // A fitted file can be fitted again.
+    let again = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &folder.path("again.toml")]);
+    let [again_e, ..] = factor(&printed(&again), "E: friction x valve gain");
+    assert!((again_e - 1.0).abs() < 0.06, "{}", printed(&again));
+}
+
+#[test]
+fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
+    let (folder, log) = town();
+    let text = std::fs::read_to_string(&log).unwrap();
+    let lines = |count: usize| text.lines().take(count).map(|line| format!("{line}\n")).collect::<String>();
+    let by_ratios = "name = \"ratios\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 3.0 }, { name = \"2\", ratio = 2.0 }]\n";
+    folder.write("box.toml", by_ratios);
+    let ratios = folder.write("ratios.toml", "name = \"r\"\ngearbox = \"box.toml\"\n");
+    let fitted = folder.path("fitted.toml");
+    let vehicle = |name: &str| format!("{ROOT}vehicles/{name}.toml");
+    for (case, text, vehicle, expected) in [
+        ("no shift", lines(600), CAR.to_owned(), "have no shift between two gears that can be fitted"),
+        ("no command", text.replace("element_c_current_a", "x"), CAR.to_owned(), "element_c_current"),
+        ("no turbine", text.replace("turbine_speed_rad_s", "x"), CAR.to_owned(), "turbine_speed"),
+        ("a stroke", text.clone(), vehicle("eight_speed_stroke"), "has a stroke"),
+        (
+            "wrong ratios",
+            scaled(&text, "turbine_speed_rad_s", 1.5),
+            CAR.to_owned(),
+            "is not the output speed times the ratio",
+        ),
+        ("ratios alone", text.clone(), ratios, "has no stick diagram"),
+    ] {
+        let log = folder.write("log.csv", &text);
+        let said = refused(&wetclutch(&["fit", &log, "--vehicle", &vehicle, "-o", &fitted]));
+        assert!(said.contains(expected), "{case}: {said}");
+        assert!(!Path::new(&fitted).exists(), "{case}");
+    }
+}
+
+/// A table with one column multiplied.
+fn scaled(text: &str, column: &str, factor: f64) -> String {
+    let names = text.lines().next().unwrap();
+    let at = names.split(',').position(|name| name == column).unwrap();
+    let row = |line: &str| {
+        let cells = line.split(',').enumerate().map(|(i, cell)| match cell.parse::<f64>() {
+            Ok(value) if i == at => (factor * value).to_string(),
+            _ => cell.to_owned(),
+        });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    };
+    format!("{names}\n{}", text.lines().skip(1).map(row).collect::<String>())
+}

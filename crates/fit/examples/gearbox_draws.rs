@@ -1,0 +1,122 @@
+//! Cars with a whole gearbox whose parameters are off, fitted to a drive in town behind sensors: prints the statistics of many of them.
+//!
+//! `FIT_CARS=20 cargo run --release -p fit --example gearbox_draws`; `FIT_FIRST` is the first seed, `FIT_DRIVES` how often the drive of
+//! three minutes is driven (5), `FIT_VEHICLE` the vehicle file (`eight_speed.toml`).
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
+
+#[path = "../tests/gearbox/drawn.rs"]
+mod drawn;
+
+use config::Drive;
+use drawn::{Drawn, every_fifth};
+use fit::gearbox::Quantity;
+
+/// Of a quantity the error of the fit, and the standard deviations stated and before, in its unknown.
+struct Told {
+    name: String,
+    error: f64,
+    stated: f64,
+    before: f64,
+}
+
+/// What came of one car.
+struct Outcome {
+    /// RMS error of the torques by the valve models on held-out shifts, N m: given file, fitted file.
+    torque_n_m: [f64; 2],
+    told: Vec<Told>,
+}
+
+fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().unwrap())
+}
+
+fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
+    let tables = drawn.tables();
+    let (recorded, truth) = drawn.driven(drive);
+    let number = recorded.shifts.len();
+    let [fitted, held_out] = every_fifth(recorded.shifts);
+    let begin = std::time::Instant::now();
+    let mut iterations = 0;
+    let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &mut |_| iterations += 1).unwrap();
+    let seconds = begin.elapsed().as_secs_f64();
+    let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a simulation").unwrap();
+    let torque_n_m = [&drawn.file, &file].map(|car| truth.squared_error(car, &held_out).sqrt());
+    let checked = fit.validate((&drawn.file, &tables), (&file, &drawn::tables(&file)), &held_out).unwrap();
+    println!(
+        "car {}: {number} shifts, {} skipped, torque N m {:.2} -> {:.2} ({:.2}), turbine rad/s {:.2} -> {:.2} (better {}/{}), g {:.2}, misfit {:.2}, \
+         {iterations} iterations, {seconds:.1} s, converged {}",
+        drawn.seed,
+        recorded.skipped.len(),
+        torque_n_m[0],
+        torque_n_m[1],
+        torque_n_m[1] / torque_n_m[0],
+        checked.turbine_rad_s[0],
+        checked.turbine_rad_s[1],
+        checked.better,
+        checked.shifts,
+        fit.scale_and_gain[1],
+        fit.torque_misfit,
+        fit.is_converged
+    );
+    let quantities = &fit.quantities;
+    // The simulated drag is another in each shift.
+    let known = quantities.all.iter().enumerate().filter(|(_, quantity)| **quantity != Quantity::Drag);
+    let told = known.map(|(place, quantity)| Told {
+        name: quantities.name(*quantity),
+        error: fit.unknowns[place] - drawn.true_unknown(&tables, quantities, *quantity),
+        stated: fit.sd(*quantity),
+        before: quantities.sd_before(place),
+    });
+    Outcome { torque_n_m, told: told.collect() }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count
+}
+
+/// Of each quantity how many truths lie in the stated 95 %, bias and spread of the errors.
+fn print_quantities(outcomes: &[Outcome]) {
+    let is_inside = |told: &&Told| told.error.abs() <= 1.96 * told.stated;
+    let all = || outcomes.iter().flat_map(|outcome| &outcome.told);
+    let mut names: Vec<&str> = Vec::new();
+    for told in all() {
+        if !names.contains(&told.name.as_str()) {
+            names.push(&told.name);
+        }
+    }
+    for name in names {
+        let of = || all().filter(|told| told.name == name);
+        println!(
+            "{name:32} cars {} held {:.2} bias {:+.4} rms error {:.4} stated {:.4} before {:.4}",
+            of().count(),
+            of().filter(is_inside).count() as f64 / of().count() as f64,
+            mean(of().map(|told| told.error)),
+            mean(of().map(|told| told.error.powi(2))).sqrt(),
+            mean(of().map(|told| told.stated.powi(2))).sqrt(),
+            mean(of().map(|told| told.before))
+        );
+    }
+    println!("all held {:.3}", all().filter(is_inside).count() as f64 / all().count() as f64);
+}
+
+fn main() {
+    let vehicle = std::env::var("FIT_VEHICLE").unwrap_or("eight_speed.toml".to_owned());
+    let (first, cars) = (number("FIT_FIRST", 0), number("FIT_CARS", 3));
+    let drive = drawn::city(number("FIT_DRIVES", 5).try_into().unwrap());
+    let outcomes: Vec<Outcome> =
+        (first..first + cars).map(|seed| outcome(&Drawn::of(drawn::car(&vehicle), seed), &drive)).collect();
+    print_quantities(&outcomes);
+    let rms = [0, 1].map(|which| mean(outcomes.iter().map(|outcome| outcome.torque_n_m[which].powi(2))).sqrt());
+    let mut ratios: Vec<f64> = outcomes.iter().map(|outcome| outcome.torque_n_m[1] / outcome.torque_n_m[0]).collect();
+    ratios.sort_by(f64::total_cmp);
+    println!(
+        "torque N m {:.2} -> {:.2} ({:.3}), median ratio {:.2}, better in {} of {}",
+        rms[0],
+        rms[1],
+        rms[1] / rms[0],
+        ratios[ratios.len() / 2],
+        ratios.iter().filter(|ratio| **ratio < 1.0).count(),
+        ratios.len()
+    );
+}

@@ -1,0 +1,259 @@
+//! The vehicle file of a fit: the text of the given one with other values.
+
+use std::path::{Component, Path, PathBuf};
+
+use config::{Car, Source, toml_string};
+use drivetrain::{ClutchValve, Table1};
+
+use super::fitting::GearboxFit;
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use crate::FitError;
+use crate::fitted_file::SIDES;
+use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
+
+/// A clutch that sticks holds at least so much more than it carries as it begins to slip, as a factor.
+const STATIC_OVER_SLIDING: f64 = 1.0001;
+
+impl GearboxFit {
+    /// The vehicle file with the fitted values, as it is to stand at `path`. Elements and pairs of gears without a fitted shift stay as they
+    /// are. What is not told singly changes too: its ratio to the others may be told. Every value that changes has a comment with its
+    /// interval. `logs` are named at the head of the file.
+    ///
+    /// # Errors
+    /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
+    pub fn vehicle_file(&self, car: &Car, path: &Path, logs: &str) -> Result<Car, FitError> {
+        let mut text = Written::new(&car.source.text)?;
+        self.write_converter(&mut text, car)?;
+        for (place, name) in self.quantities.elements.iter().enumerate() {
+            let element = car.gearbox.elements.iter().position(|element| element.name == *name);
+            if let Some(element) = element.filter(|_| self.elements_seen[place]) {
+                self.write_element(&mut text, car, element, place)?;
+            }
+        }
+        for (at, pair) in self.quantities.pairs.iter().enumerate() {
+            let shift = car.gearbox.shift(pair[0], pair[1]).or_else(|| car.gearbox.shift(pair[1], pair[0]));
+            let Some(reduced) = shift.and_then(|shift| shift.reduced.as_ref()) else { continue };
+            if self.is_seen(Quantity::Inertia(at)) {
+                let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
+                let all_kg_m2 = reduced.mass_kg_m2[0][0] + on_input_kg_m2;
+                let value = all_kg_m2 * self.unknown(Quantity::Inertia(at)).exp() - on_input_kg_m2;
+                let comment = self.comment(Quantity::Inertia(at));
+                text.put(&["turbine_inertia_kg_m2"], &self.quantities.pair_names[at], &number(value), &comment)?;
+            }
+        }
+        let gearbox = gearbox_path(car)?;
+        text.set_gearbox(car, path, &gearbox)?;
+        let logs = logs.replace(char::is_control, " ");
+        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
+        let source = Source { path: path.to_owned(), text: head + &text.finish() };
+        let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
+        Car::from_sources(source, gearbox).map_err(|error| {
+            FitError::Work(format!(
+                "the fitted values are not those of a possible car: {error}\n\
+                 hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
+            ))
+        })
+    }
+
+    fn write_converter(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+        let Some(converter) = &car.converter else { return Ok(()) };
+        let capacity = converter.capacity_n_m_s2.scaled(self.unknown(Quantity::Input).exp());
+        let ratio = self.unknown(Quantity::TorqueRatio).exp();
+        let ratios: Vec<f64> = converter.torque_ratio.values().iter().map(|t| 1.0 + ratio * (t - 1.0)).collect();
+        text.put(&["converter"], "capacity_n_m_s2", &list(capacity.values()), &self.comment(Quantity::Input))?;
+        text.put(&["converter"], "torque_ratio", &list(&ratios), &self.comment(Quantity::TorqueRatio))
+    }
+
+    fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {
+        let Some(Some(known)) = car.clutches.get(element) else { return Ok(()) };
+        let name = car.gearbox.elements[element].name.as_str();
+        let table = ["clutch", name];
+        let factor = self.unknown(Quantity::Torque(place)).exp();
+        let friction = known.clutch.friction.scaled(factor);
+        let comment = self.comment(Quantity::Torque(place));
+        text.put_map(&table, "friction", ["slip_rad_s", "coefficient"], &friction, &comment)?;
+        let held = (factor * known.clutch.static_friction).max(STATIC_OVER_SLIDING * friction.at(0.0));
+        let comment = "keeps its ratio to the fitted friction, and is not below it";
+        text.put(&table, "static_friction", &number(held), comment)?;
+        let kiss_pa = known.clutch.kiss_pressure() + KISS_UNIT_PA * self.unknown(Quantity::Kiss(place));
+        let spring_n = (kiss_pa * known.clutch.piston_area_m2).max(0.0);
+        text.put(&table, "return_spring_n", &number(spring_n), &self.comment(Quantity::Kiss(place)))?;
+        self.write_valve(text, name, known, place)
+    }
+
+    /// The valve of an element as a table of its own.
+    fn write_valve(
+        &self,
+        text: &mut Written,
+        name: &str,
+        known: &config::ShiftClutch,
+        place: usize,
+    ) -> Result<(), FitError> {
+        let valve = known.valve.changed(self.unknown(Quantity::Lag(place)).exp(), 1.0, None);
+        let late_s = DELAY_UNIT_S * self.unknown(Quantity::Delay);
+        let later = |delay: &Table1<f64>| {
+            let values: Vec<f64> = delay.values().iter().map(|delay_s| (delay_s + late_s).max(0.0)).collect();
+            Table1::new(delay.axis(), &values).unwrap_or(*delay)
+        };
+        let (lag, delay) = (self.comment(Quantity::Lag(place)), self.comment(Quantity::Delay));
+        let table = ["clutch", name, "valve"];
+        // A valve of its own has nothing of the common one.
+        let same = "as in the given file";
+        match &valve {
+            ClutchValve::Proportional(maps) | ClutchValve::NormallyHigh { maps, .. } => {
+                text.put_map(&table, "lag", ["pressure_pa", "time_constant_s"], &maps.time_constant_s, &lag)?;
+                text.put_map(&table, "gain", ["current_a", "gain_pa_a"], &maps.gain_pa_a, same)?;
+                text.put_map(&table, "delay", ["current_a", "delay_s"], &later(&maps.delay_s), &delay)?;
+                if let ClutchValve::NormallyHigh { zero_pressure_a, .. } = &valve {
+                    text.put(&table, "zero_pressure_a", &number(*zero_pressure_a), same)?;
+                }
+            }
+            ClutchValve::PulseWidth { law, delay_s } => {
+                text.put(&table, "kind", "\"pulse-width\"", same)?;
+                text.put(&table, "flow_sqrt_pa_s", &number(law.flow_sqrt_pa_s), &lag)?;
+                text.put(&table, "line_pressure_pa", &number(law.line_pressure_pa), same)?;
+                text.put_map(&table, "delay", ["duty_percent", "delay_s"], &later(delay_s), &delay)?;
+            }
+        }
+        if known.hysteresis_pa > 0.0 {
+            text.put(&table, "hysteresis_pa", &number(known.hysteresis_pa), same)?;
+        }
+        Ok(())
+    }
+
+    /// What a fitted value says of itself.
+    pub(crate) fn comment(&self, quantity: Quantity) -> String {
+        let (value, half) = (self.unknown(quantity), SIDES * self.sd(quantity));
+        let told = self.verdict(quantity).name();
+        match quantity {
+            Quantity::Delay => {
+                let ms = 1e3 * DELAY_UNIT_S;
+                format!("delays {:+.1} ms, 95 % within {:.1} ms, {told}", ms * value, ms * half)
+            }
+            Quantity::Kiss(_) => {
+                let kpa = 1e-3 * KISS_UNIT_PA;
+                format!(
+                    "kiss point {:+.1} kPa, 95 % within {:.1} kPa, {told}; of pressures that are as in the valve's maps",
+                    kpa * value,
+                    kpa * half
+                )
+            }
+            _ => {
+                let more = match quantity {
+                    Quantity::Torque(_) => "; friction and valve gain show as one, and stand here as friction",
+                    _ => "",
+                };
+                let [least, most] = [(value - half).exp(), (value + half).exp()];
+                format!("x {:.3}, 95 % {least:.3} to {most:.3}, {told}{more}", value.exp())
+            }
+        }
+    }
+}
+
+/// The text of a vehicle file on its way to another: values that it has are replaced, others are added.
+struct Written {
+    text: VehicleText,
+    /// Tables that the file does not have, with their lines.
+    added: Vec<(String, Vec<String>)>,
+}
+
+impl Written {
+    fn new(text: &str) -> Result<Self, FitError> {
+        Ok(Self { text: VehicleText::new(text)?, added: Vec::new() })
+    }
+
+    /// Puts a value in TOML into a table.
+    fn put(&mut self, table: &[&str], key: &str, value: &str, comment: &str) -> Result<(), FitError> {
+        let path = keys(&[table, &[key]].concat());
+        if self.text.has(&path) {
+            return self.text.set_text(&path, value, comment);
+        }
+        let lines = format!("{FITTED}{comment}; the file had none\n{} = {value}\n", bare_or_quoted(key));
+        if self.text.add_to_table(&keys(table), &lines)? {
+            return Ok(());
+        }
+        let name = table.iter().map(|key| bare_or_quoted(key)).collect::<Vec<_>>().join(".");
+        match self.added.iter_mut().find(|(other, _)| *other == name) {
+            Some((_, all)) => all.push(lines),
+            None => self.added.push((name, vec![lines])),
+        }
+        Ok(())
+    }
+
+    /// The same with a map of two lists.
+    fn put_map(
+        &mut self,
+        table: &[&str],
+        key: &str,
+        [axis, values]: [&str; 2],
+        map: &Table1<f64>,
+        comment: &str,
+    ) -> Result<(), FitError> {
+        let path = |last: &str| keys(&[table, &[key, last]].concat());
+        if self.text.has(&path(values)) && self.text.has(&path(axis)) {
+            self.text.set_text(&path(values), &list(map.values()), comment)?;
+            return Ok(());
+        }
+        let inline = format!("{{ {axis} = {}, {values} = {} }}", list(map.axis()), list(map.values()));
+        self.put(table, key, &inline, comment)
+    }
+
+    /// Keeps the gearbox file where it is when the vehicle file moves to another folder.
+    fn set_gearbox(&mut self, car: &Car, path: &Path, gearbox: &Path) -> Result<(), FitError> {
+        let folder = |path: &Path| match path.parent() {
+            Some(folder) if folder != Path::new("") => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let (from, to) = (whole(&folder(&car.source.path)), whole(&folder(path)));
+        if from == to || !gearbox.exists() {
+            return Ok(());
+        }
+        let moved = toml_string(&relative(&to, &whole(gearbox)).to_string_lossy().replace('\\', "/"));
+        self.text.set_text(&[Step::Key("gearbox".to_owned())], &moved, "a path from the folder of this file")
+    }
+
+    fn finish(self) -> String {
+        let mut text = self.text.finish();
+        for (name, lines) in self.added {
+            if !text.ends_with('\n') {
+                text.push('\n');
+            }
+            text += &format!("\n[{name}]\n{}", lines.concat());
+        }
+        text
+    }
+}
+
+/// A key as it stands in a file.
+fn bare_or_quoted(key: &str) -> String {
+    let is_bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
+    if is_bare { key.to_owned() } else { toml_string(key) }
+}
+
+fn list(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
+}
+
+/// The gearbox file of a vehicle file.
+fn gearbox_path(car: &Car) -> Result<PathBuf, FitError> {
+    let table: toml::Table =
+        car.source.text.parse().map_err(|error: toml::de::Error| FitError::input(error.to_string()))?;
+    let named = table.get("gearbox").and_then(toml::Value::as_str).unwrap_or_default();
+    Ok(car.source.path.parent().unwrap_or(Path::new("")).join(named))
+}
+
+fn no_gearbox(path: &Path) -> FitError {
+    FitError::input(format!("{}: the gearbox file of the vehicle file is not there", path.display()))
+}
+
+/// The way from a folder to a file, both from the root; the file itself where there is none.
+fn relative(folder: &Path, file: &Path) -> PathBuf {
+    let common = folder.components().zip(file.components()).take_while(|(one, other)| one == other).count();
+    // On another drive.
+    if !matches!(folder.components().nth(common.saturating_sub(1)), Some(Component::RootDir | Component::Normal(_))) {
+        return file.to_owned();
+    }
+    let up = folder.components().skip(common).map(|_| Component::ParentDir);
+    up.chain(file.components().skip(common)).collect()
+}

@@ -1,0 +1,135 @@
+//! The fit of a car to its shifts.
+
+use config::Car;
+use design::ShiftTables;
+use drivetrain::ShiftKind;
+use nalgebra::{DMatrix, DVector};
+
+use super::precision::stated;
+use super::quantities::{Quantities, Quantity};
+use super::shift::ShiftModel;
+use super::shift_log::ShiftLog;
+use super::solver::Problem;
+use crate::{FitError, Verdict};
+
+/// How far a fit is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Shifts that are fitted.
+    pub shifts: usize,
+    /// Iteration, from 0.
+    pub iteration: u32,
+}
+
+/// A fitted car.
+#[derive(Debug, Clone)]
+pub struct GearboxFit {
+    /// The quantities and what was known of them.
+    pub quantities: Quantities,
+    /// Their unknowns.
+    pub unknowns: Vec<f64>,
+    /// Covariance of the unknowns as it is stated.
+    pub stated: DMatrix<f64>,
+    /// How many shifts were fitted.
+    pub shifts: usize,
+    /// How many of each pair of gears, and by kind in the order of [`ShiftKind::ALL`].
+    pub by_pair: Vec<[usize; 4]>,
+    /// Elements that slipped in a fitted shift.
+    pub elements_seen: Vec<bool>,
+    /// One-step scale of the turbine speed, rad/s, and its gain `g`.
+    pub scale_and_gain: [f64; 2],
+    /// RMS over the shifts of the error of the torque at the turbine that each of them asks for, in what is held likely.
+    pub torque_misfit: f64,
+    /// Whether the last step was small; otherwise the iterations were used up.
+    pub is_converged: bool,
+    /// Names of the quantities that ended where nothing beyond is held possible.
+    pub at_limit: Vec<String>,
+}
+
+/// Fits the quantities of a car to its shifts.
+///
+/// # Errors
+/// There is no shift, the car cannot be fitted, or no minimum was found.
+pub fn fit(
+    car: &Car,
+    tables: &ShiftTables<f64>,
+    shifts: &[ShiftLog],
+    progress: &mut dyn FnMut(Progress),
+) -> Result<GearboxFit, FitError> {
+    let quantities = Quantities::of(car, tables, shifts);
+    let models: Vec<ShiftModel> =
+        shifts.iter().filter_map(|log| ShiftModel::new(car, tables, &quantities, log)).collect();
+    if models.is_empty() {
+        return Err(FitError::input("there is no shift to fit"));
+    }
+    let problem = Problem::new(&quantities)?;
+    let solved = problem.solve(&models, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
+    let stated = stated(&problem, &models, &solved)?;
+    let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
+    let mut elements_seen = vec![false; quantities.elements.len()];
+    for model in &models {
+        let kind = ShiftKind::ALL.iter().position(|kind| Some(*kind) == model.kind);
+        by_pair[model.pair][kind.unwrap_or(0)] += 1;
+        model.elements().iter().for_each(|at| elements_seen[*at] = true);
+    }
+    let squares = solved.shifts.iter().map(|shift| shift.torque_error.powi(2)).sum::<f64>();
+    Ok(GearboxFit {
+        torque_misfit: (squares / solved.shifts.len() as f64).sqrt(),
+        at_limit: problem.at_limit(&solved.at),
+        unknowns: solved.at,
+        stated,
+        shifts: models.len(),
+        by_pair,
+        elements_seen,
+        scale_and_gain: [solved.weights.scale, solved.weights.gain],
+        is_converged: solved.is_converged,
+        quantities,
+    })
+}
+
+impl GearboxFit {
+    /// The unknown of a quantity; zero, the file's value, for one that the car does not have.
+    pub fn unknown(&self, quantity: Quantity) -> f64 {
+        self.quantities.place(quantity).map_or(0.0, |place| self.unknowns[place])
+    }
+
+    /// Standard deviation of the unknown of a quantity as it is stated.
+    pub fn sd(&self, quantity: Quantity) -> f64 {
+        self.quantities.place(quantity).map_or(f64::INFINITY, |place| self.stated[(place, place)].sqrt())
+    }
+
+    /// What the logs tell of a quantity.
+    pub fn verdict(&self, quantity: Quantity) -> Verdict {
+        let Some(place) = self.quantities.place(quantity) else { return Verdict::NotTold };
+        Verdict::of(self.sd(quantity), self.quantities.sd_before(place))
+    }
+
+    /// The weights with which the quantities make the logarithm of the factor that all torques have in common.
+    fn torque_scale_weights(&self) -> DVector<f64> {
+        let powers = DVector::from_vec(self.quantities.powers_of_torque());
+        let solved = self.quantities.before.clone().cholesky().map(|cholesky| cholesky.solve(&powers));
+        solved.map_or_else(|| powers.clone(), |weights| &weights / powers.dot(&weights))
+    }
+
+    /// The logarithm of the factor that all torques have in common.
+    pub(crate) fn torque_scale(&self) -> f64 {
+        self.torque_scale_weights().iter().zip(&self.unknowns).map(|(weight, x)| weight * x).sum()
+    }
+
+    /// Standard deviation of the unknown of a quantity that has the common factor of all torques, beside that factor.
+    pub fn sd_beside_scale(&self, quantity: Quantity) -> f64 {
+        let mut along = -self.torque_scale_weights();
+        if let Some(place) = self.quantities.place(quantity) {
+            along[place] += 1.0;
+        }
+        along.dot(&(&self.stated * &along)).max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the logarithm of the factor that all torques have in common, which the speeds do not tell: by what was known
+    /// before of all of them together.
+    pub fn torque_scale_sd(&self) -> f64 {
+        let powers = DVector::from_vec(self.quantities.powers_of_torque());
+        let precision = self.quantities.before.clone().cholesky().map(|cholesky| powers.dot(&cholesky.solve(&powers)));
+        precision.map_or(f64::INFINITY, |precision| precision.sqrt().recip())
+    }
+}

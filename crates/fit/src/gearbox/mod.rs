@@ -1,0 +1,29 @@
+//! Parameters of a car with a whole gearbox from measured drives.
+//!
+//! While both clutches of a shift slip, the speed of the turbine shows the torques that act on it:
+//!
+//! ```text
+//! M11 w_t' + M12 w_o' = T_t - U_off - U_on        U_c = alpha_c mu(s_c) R N A (p_c - p_kiss)+
+//! ```
+//!
+//! `T_t` is the converter's by engine and turbine speed, or without a converter the reported engine torque, and `p_c` that of the
+//! valve's model. The output speed is measured and is no unknown. [`Recorder`] takes the steps of a log and keeps what belongs to
+//! its shifts; [`fit`] finds the parameters that all shifts have in common ([`Quantity`]).
+
+mod file;
+mod fitting;
+mod precision;
+mod quantities;
+mod recorder;
+mod report;
+mod shift;
+mod shift_log;
+mod solver;
+mod validation;
+
+pub use fitting::{GearboxFit, Progress, fit};
+pub use quantities::{Quantities, Quantity};
+pub use recorder::{Recorded, Recorder};
+pub use shift::{OpenLoop, open_loop};
+pub use shift_log::ShiftLog;
+pub use validation::HeldOut;

@@ -1,0 +1,178 @@
+//! The quantities of a fit, and what is known of them before.
+
+use config::Car;
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use nalgebra::DMatrix;
+
+use super::shift_log::{ShiftLog, named_pair};
+
+/// Unit of the unknown of a delay, s.
+pub(crate) const DELAY_UNIT_S: f64 = 0.01;
+/// Unit of the unknown of a kiss point, Pa.
+pub(crate) const KISS_UNIT_PA: f64 = 1e4;
+/// Unit of the unknown of the drag, N m, and its standard deviation before \[chosen: that of one or two open elements\].
+pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
+const DRAG_N_M: f64 = 1.5;
+/// Part of the variance that friction elements, or inertias, have in common \[chosen\]: oil, temperature, the shaft at the input.
+const COMMON: f64 = 1.0 / 3.0;
+/// Bound of the torque ratio above 1, as a share \[chosen\].
+const TORQUE_RATIO: f64 = 0.10;
+
+/// A quantity of a car.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Capacity of the converter; without a converter the reported engine torque.
+    Input,
+    /// Torque ratio of the converter above 1.
+    TorqueRatio,
+    /// Delay of all commands against the turbine speed, beside that of the file.
+    Delay,
+    /// Drag of the open elements at the turbine, in the mean over all shifts.
+    Drag,
+    /// Torque of an element: friction times valve gain.
+    Torque(usize),
+    /// Kiss point of an element.
+    Kiss(usize),
+    /// Lag of the valve of an element.
+    Lag(usize),
+    /// Turbine-side inertia of the shifts between two gears.
+    Inertia(usize),
+}
+
+/// The quantities of a car, in the order of the unknowns.
+///
+/// The unknown of a factor is its logarithm; that of a delay is in 10 ms, that of a kiss point in 10 kPa, both beside the file's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantities {
+    /// All of them.
+    pub all: Vec<Quantity>,
+    /// Names of the friction elements, by their places in the tables.
+    pub elements: Vec<String>,
+    /// Pairs of gears with a shift from one clutch to another, the lower one first.
+    pub pairs: Vec<[usize; 2]>,
+    /// Names of these pairs.
+    pub pair_names: Vec<String>,
+    /// Covariance of the unknowns before the fit.
+    pub before: DMatrix<f64>,
+    pub(crate) has_converter: bool,
+}
+
+impl Quantities {
+    /// Those of a car with these tables, with the pairs of neighbouring gears and of these shifts.
+    pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Self {
+        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
+        let (known, rows) = (&filter.uncertainty, tables.tables());
+        let forward = car.gearbox.forward_gears();
+        let is_known =
+            |pair: &[usize; 2]| rows.shift(pair[0], pair[1]).is_some() || rows.shift(pair[1], pair[0]).is_some();
+        let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        // The lower gear first.
+        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);
+        let lower_first = |[a, b]: [usize; 2]| if ratio(a) > ratio(b) { [a, b] } else { [b, a] };
+        for pair in shifts.iter().map(|log| lower_first(log.gears)) {
+            if !pairs.contains(&pair) {
+                pairs.push(pair);
+            }
+        }
+        pairs.retain(is_known);
+        let mut all = vec![Quantity::Input];
+        let has_converter = car.converter.is_some();
+        if has_converter {
+            all.push(Quantity::TorqueRatio);
+        }
+        all.extend([Quantity::Delay, Quantity::Drag]);
+        let elements = rows.elements.len();
+        all.extend((0..elements).flat_map(|at| [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at)]));
+        all.extend((0..pairs.len()).map(Quantity::Inertia));
+        let sd = |quantity: &Quantity| match quantity {
+            Quantity::Input if has_converter => filter.turbine.converter_share,
+            Quantity::Input => filter.turbine.engine_share,
+            Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
+            Quantity::Delay => known.valve_delay_s / DELAY_UNIT_S,
+            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
+            Quantity::Torque(_) => known.torque_share,
+            Quantity::Kiss(at) => {
+                known.kiss_point_pa.hypot(known.valve_gain * rows.elements[*at].clutch.kiss_pressure()) / KISS_UNIT_PA
+            }
+            Quantity::Lag(_) => known.valve_lag_share,
+            Quantity::Inertia(_) => known.inertia_share,
+        };
+        let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
+            let both = sd(&all[i]) * sd(&all[j]);
+            match (all[i], all[j]) {
+                _ if i == j => both,
+                (Quantity::Torque(_), Quantity::Torque(_)) | (Quantity::Inertia(_), Quantity::Inertia(_)) => {
+                    COMMON * both
+                }
+                _ => 0.0,
+            }
+        });
+        let names = car.gearbox.elements.iter().enumerate();
+        let mut named: Vec<(usize, String)> =
+            names.filter_map(|(at, element)| Some((tables.place(at)?, element.name.clone()))).collect();
+        named.sort_by_key(|(place, _)| *place);
+        let pair_names = pairs.iter().map(|pair| named_pair(car, *pair)).collect();
+        let elements = named.into_iter().map(|(_, name)| name).collect();
+        Self { all, elements, pairs, pair_names, before, has_converter }
+    }
+
+    /// Place of a quantity among the unknowns.
+    pub fn place(&self, quantity: Quantity) -> Option<usize> {
+        self.all.iter().position(|other| *other == quantity)
+    }
+
+    /// Place of the shifts between two gears among the pairs.
+    pub fn pair(&self, from: usize, to: usize) -> Option<usize> {
+        self.pairs.iter().position(|pair| [[from, to], [to, from]].contains(pair))
+    }
+
+    /// Words for a quantity.
+    pub fn name(&self, quantity: Quantity) -> String {
+        let element = |at: usize| self.elements.get(at).map_or("?", String::as_str);
+        match quantity {
+            Quantity::Input if self.has_converter => "converter capacity".to_owned(),
+            Quantity::Input => "reported engine torque".to_owned(),
+            Quantity::TorqueRatio => "converter torque ratio above 1".to_owned(),
+            Quantity::Delay => "delay of the valves".to_owned(),
+            Quantity::Drag => "drag of open elements".to_owned(),
+            Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
+            Quantity::Kiss(at) => format!("{}: kiss point", element(at)),
+            Quantity::Lag(at) => format!("{}: valve lag", element(at)),
+            Quantity::Inertia(at) => {
+                format!("M11 of {}", self.pair_names.get(at).map_or("?", String::as_str))
+            }
+        }
+    }
+
+    /// Standard deviation of an unknown before the fit.
+    pub fn sd_before(&self, at: usize) -> f64 {
+        self.before[(at, at)].sqrt()
+    }
+
+    /// Power of each quantity in the factor that all torques have in common: with all of them multiplied by one number the speeds
+    /// stay the same.
+    pub(crate) fn powers_of_torque(&self) -> Vec<f64> {
+        let power = |quantity: &Quantity| f64::from(u8::from(quantity.has_torque_scale()));
+        self.all.iter().map(power).collect()
+    }
+}
+
+impl Quantity {
+    /// Whether it is multiplied when all torques are multiplied by one number.
+    pub(crate) fn has_torque_scale(self) -> bool {
+        matches!(self, Self::Input | Self::Torque(_) | Self::Inertia(_))
+    }
+
+    /// Least standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not
+    /// shrink with more shifts.
+    pub(crate) fn floor(self) -> f64 {
+        match self {
+            Self::Delay => 0.3e-3 / DELAY_UNIT_S,
+            Self::Drag => 0.2 / DRAG_UNIT_N_M,
+            Self::Kiss(_) => 500.0 / KISS_UNIT_PA,
+            Self::Lag(_) => 0.02,
+            Self::Inertia(_) => 0.015,
+            _ => 0.005,
+        }
+    }
+}

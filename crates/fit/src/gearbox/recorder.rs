@@ -1,0 +1,234 @@
+//! From the steps of a log to its shifts.
+
+use config::Car;
+use design::ShiftTables;
+use observer::Reading;
+use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
+
+use super::shift_log::{ShiftLog, named_pair};
+use crate::{ReadingAges, Series};
+
+/// What is kept from before a shift, s: after this time a valve has forgotten where it was.
+const BEFORE_S: f64 = 2.0;
+/// What is kept from after it, s: a gear signal may change before the ratio does.
+const AFTER_S: f64 = 0.5;
+/// Longest shift, s.
+const LONGEST_S: f64 = 5.0;
+/// Readings of a channel above which old ones are dropped.
+const READINGS_KEPT: usize = 4000;
+/// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
+const RATIO_FROM_RAD_S: f64 = 20.0;
+const RATIO_SHARE: f64 = 0.1;
+
+/// The shifts of a log.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Recorded {
+    /// Shifts that can be fitted.
+    pub shifts: Vec<ShiftLog>,
+    /// Shifts that cannot, each with the reason.
+    pub skipped: Vec<String>,
+    /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
+    pub in_gear: [u64; 2],
+}
+
+impl Recorded {
+    /// Adds the shifts of another log. A shift tells what it has to tell once: copies are left out.
+    pub fn add(&mut self, more: Self) {
+        self.skipped.extend(more.skipped);
+        for shift in more.shifts {
+            let same = |other: &&ShiftLog| other.turbine.value == shift.turbine.value && other.engine == shift.engine;
+            match self.shifts.iter().find(same) {
+                Some(first) => self.skipped.push(format!("{}: the same readings as {}", shift.name, first.name)),
+                None => self.shifts.push(shift),
+            }
+        }
+        for (sum, count) in self.in_gear.iter_mut().zip(more.in_gear) {
+            *sum += count;
+        }
+    }
+}
+
+/// A shift that is under way, or has just ended.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    gears: [usize; 2],
+    begun_s: f64,
+    ended_s: Option<f64>,
+    lock_up: bool,
+}
+
+/// Takes the steps of a log one after the other.
+pub struct Recorder<'a> {
+    car: &'a Car,
+    tables: &'a ShiftTables<f64>,
+    ages: ReadingAges,
+    engine: Series,
+    turbine: Series,
+    output: Series,
+    engine_torque: Series,
+    commands: [Series; MAX_ELEMENTS],
+    open: Option<Open>,
+    last_output: f64,
+    found: Recorded,
+}
+
+impl<'a> Recorder<'a> {
+    /// For a car with these tables and readings of these ages.
+    pub fn new(car: &'a Car, tables: &'a ShiftTables<f64>, ages: ReadingAges) -> Self {
+        let none = Series::default;
+        Self {
+            car,
+            tables,
+            ages,
+            engine: none(),
+            turbine: none(),
+            output: none(),
+            engine_torque: none(),
+            commands: std::array::from_fn(|_| none()),
+            open: None,
+            last_output: f64::NAN,
+            found: Recorded::default(),
+        }
+    }
+
+    /// Takes a step.
+    pub fn push(&mut self, time_s: f64, input: &ShiftInput<f64>) {
+        if let Some(open) = self.open
+            && (open.ended_s.is_some_and(|ended_s| time_s > ended_s + AFTER_S) || time_s < open.begun_s)
+        {
+            self.close(open);
+        }
+        self.take(time_s, input);
+        let gears = [input.gear.from, input.gear.to];
+        let is_shift = gears[0] != gears[1];
+        match &mut self.open {
+            Some(open) if is_shift && open.gears == gears && open.ended_s.is_none() => {
+                open.lock_up |= input.lock_up_applied;
+            }
+            Some(open) if is_shift => {
+                let open = *open;
+                self.close(Open { ended_s: open.ended_s.or(Some(time_s)), ..open });
+                self.begin(time_s, gears, input.lock_up_applied);
+            }
+            Some(open) => open.ended_s = open.ended_s.or(Some(time_s)),
+            None if is_shift => self.begin(time_s, gears, input.lock_up_applied),
+            None => self.compare_ratio(gears[0], input),
+        }
+        self.forget(time_s);
+    }
+
+    /// The shifts.
+    pub fn finish(mut self) -> Recorded {
+        if let Some(open) = self.open {
+            self.close(open);
+        }
+        self.found
+    }
+
+    fn take(&mut self, time_s: f64, input: &ShiftInput<f64>) {
+        let ages = self.ages;
+        let wheels = [
+            (&mut self.engine, input.engine_rad_s, ages.engine_rad),
+            (&mut self.turbine, input.turbine_rad_s, ages.turbine_rad),
+            (&mut self.output, input.output_rad_s, ages.output_rad),
+        ];
+        for (series, reading, turned_rad) in wheels {
+            // What cannot be a reading is none.
+            let Some(Reading { value, age_s }) = reading.filter(|reading| reading.value.is_finite()) else { continue };
+            let turning_s = if value.abs() > 1.0 { turned_rad / value.abs() } else { 0.0 };
+            series.push(time_s - age_s - turning_s, value);
+        }
+        let others = std::iter::once((&mut self.engine_torque, input.engine_n_m));
+        for (series, reading) in others.chain(self.commands.iter_mut().zip(input.commands)) {
+            if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
+                series.push(time_s - reading.age_s, reading.value);
+            }
+        }
+    }
+
+    fn begin(&mut self, time_s: f64, gears: [usize; 2], lock_up: bool) {
+        self.open = Some(Open { gears, begun_s: time_s, ended_s: None, lock_up });
+    }
+
+    fn compare_ratio(&mut self, gear: usize, input: &ShiftInput<f64>) {
+        self.last_output = input.output_rad_s.map_or(self.last_output, |reading| reading.value);
+        let (Some(turbine), Some(gear)) = (input.turbine_rad_s, self.car.gearbox.gears.get(gear)) else { return };
+        if self.last_output > RATIO_FROM_RAD_S {
+            let by_output = gear.ratio * self.last_output;
+            self.found.in_gear[0] += 1;
+            self.found.in_gear[1] += u64::from((turbine.value - by_output).abs() > RATIO_SHARE * by_output.abs());
+        }
+    }
+
+    /// Drops readings that no shift needs.
+    fn forget(&mut self, time_s: f64) {
+        if self.open.is_some() || self.turbine.len().max(self.commands[0].len()) < READINGS_KEPT {
+            return;
+        }
+        let speeds = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
+        for series in speeds.into_iter().chain(&mut self.commands) {
+            *series = part(series, [time_s - BEFORE_S, f64::INFINITY]);
+        }
+    }
+
+    /// Ends a shift: keeps it, or says why not.
+    fn close(&mut self, open: Open) {
+        self.open = None;
+        let Open { gears, begun_s, lock_up, .. } = open;
+        let name = format!("{} at {begun_s:.2} s", named_pair(self.car, gears));
+        let mut log = match self.cut(open, &name) {
+            Ok(log) => log,
+            Err(reason) => return self.found.skipped.push(format!("{name}: {reason}")),
+        };
+        let rows = self.tables.tables();
+        let Some(row) = rows.shift(gears[0], gears[1]) else { return };
+        let found = log.find_slip(row).and_then(|()| match (&self.car.converter, lock_up) {
+            (Some(_), true) => Err("the lock-up clutch of the converter was applied"),
+            (Some(_), false) if log.engine.between(log.slip_s).count() < 2 => Err("the engine speed is missing"),
+            (None, _) if log.engine_torque.between(log.slip_s).count() < 2 => Err("the engine torque is missing"),
+            _ => Ok(()),
+        });
+        match found {
+            Ok(()) => self.found.shifts.push(log),
+            Err(reason) => self.found.skipped.push(format!("{name}: {reason}")),
+        }
+    }
+
+    /// The readings of a shift.
+    fn cut(&self, open: Open, name: &str) -> Result<ShiftLog, &'static str> {
+        let [from, to] = open.gears;
+        let ended_s = open.ended_s.ok_or("the log ends within it")?;
+        if ended_s - open.begun_s > LONGEST_S {
+            return Err("it takes longer than any shift");
+        }
+        let is_forward = |gear: usize| self.car.gearbox.gears.get(gear).is_some_and(|gear| gear.ratio > 0.0);
+        if !(is_forward(from) && is_forward(to)) {
+            return Err("it is not between forward gears");
+        }
+        let rows = self.tables.tables();
+        let row = rows.shift(from, to).ok_or("it is not from one clutch to another")?;
+        let span = [open.begun_s - 0.1, ended_s + AFTER_S];
+        let commands = row.clutches.map(|clutch| {
+            let all = self.commands.get(clutch.element);
+            all.map(|all| part(all, [open.begun_s - BEFORE_S, span[1]])).unwrap_or_default()
+        });
+        Ok(ShiftLog {
+            name: name.to_owned(),
+            gears: open.gears,
+            command_s: [open.begun_s, ended_s],
+            engine: part(&self.engine, span),
+            turbine: part(&self.turbine, span),
+            output: part(&self.output, span),
+            engine_torque: part(&self.engine_torque, span),
+            commands,
+            slip_s: [f64::NAN; 2],
+            lock_up: open.lock_up,
+        })
+    }
+}
+
+/// The readings from one time to another.
+fn part(series: &Series, span: [f64; 2]) -> Series {
+    let (time_s, value) = series.between(span).unzip();
+    Series { time_s, value }
+}

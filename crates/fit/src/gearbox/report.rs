@@ -1,0 +1,181 @@
+//! What a fit has found, in words.
+
+use drivetrain::ShiftKind;
+
+use super::fitting::GearboxFit;
+use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
+use crate::fitted_file::SIDES;
+use crate::{ReportRow, Verdict};
+
+/// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
+const MISFIT: f64 = 2.0;
+/// Standard deviations on either side that 99.9 % lie within: 5 % over some 30 quantities.
+const SIDES_OF_ALL: f64 = 3.3;
+
+impl GearboxFit {
+    /// The table: each quantity of which a fitted shift can tell something.
+    pub fn report(&self) -> Vec<ReportRow> {
+        let all = self.quantities.all.iter().enumerate();
+        all.filter(|(_, quantity)| self.is_seen(**quantity))
+            .map(|(place, quantity)| self.row(place, *quantity))
+            .collect()
+    }
+
+    fn row(&self, place: usize, quantity: Quantity) -> ReportRow {
+        let (x, sd) = (self.unknowns[place], self.sd(quantity));
+        let half = SIDES * sd;
+        let plain = |unit: f64, name: &str| {
+            (
+                format!("{:+.1} {name}", unit * x),
+                format!("{:+.1} to {:+.1} {name}", unit * (x - half), unit * (x + half)),
+            )
+        };
+        let (value, interval) = match quantity {
+            Quantity::Delay => plain(1e3 * DELAY_UNIT_S, "ms"),
+            Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
+            Quantity::Drag => plain(DRAG_UNIT_N_M, "N m"),
+            _ => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
+        };
+        let share = format!("{:.2}", sd / self.quantities.sd_before(place));
+        ReportRow { name: self.quantities.name(quantity), value, interval, share, verdict: self.verdict(quantity) }
+    }
+
+    /// Whether a fitted shift depends on a quantity.
+    pub(crate) fn is_seen(&self, quantity: Quantity) -> bool {
+        match quantity {
+            Quantity::Torque(at) | Quantity::Kiss(at) | Quantity::Lag(at) => self.elements_seen[at],
+            Quantity::Inertia(at) => self.by_pair[at].iter().any(|count| *count > 0),
+            _ => true,
+        }
+    }
+
+    /// What is to be said besides the table: torque scale, what is not told, misfit, and which drive would tell more.
+    pub fn statements(&self) -> Vec<String> {
+        let scale = 100.0 * SIDES * self.torque_scale_sd();
+        let input = if self.quantities.has_converter { "converter" } else { "reported engine torque" };
+        let beside = |at: usize| {
+            let half = 100.0 * SIDES * self.sd_beside_scale(Quantity::Torque(at));
+            format!("{} {half:.1} %", self.quantities.elements[at])
+        };
+        let seen: Vec<String> =
+            (0..self.elements_seen.len()).filter(|at| self.elements_seen[*at]).map(beside).collect();
+        let mut lines = vec![
+            format!(
+                "torque scale: not told by these logs, +- {scale:.1} %. Speeds fix the ratios of all torques and inertias and not their common \
+                 factor; it comes from what was known before of {input}, friction and inertias together, and is in every interval"
+            ),
+            format!("beside that factor, friction x valve gain is known within +- {}", seen.join(", ")),
+            "friction and valve gain of an element are not told apart: their product stands in the file as friction, and the kiss point is that of \
+             the valve's maps. A measured pressure of an element would tell them"
+                .to_owned(),
+        ];
+        lines.extend(self.given_is_possible().then(|| {
+            "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
+        }));
+        lines.extend(self.warnings());
+        lines.extend(self.proposals());
+        lines
+    }
+
+    /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni; those with the common factor of all
+    /// torques also beside it.
+    fn given_is_possible(&self) -> bool {
+        let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
+        let mut car = seen().filter(|quantity| *quantity != Quantity::Drag);
+        let mut torques = seen().filter(|quantity| quantity.has_torque_scale());
+        let scale = self.torque_scale();
+        car.all(|quantity| self.unknown(quantity).abs() <= SIDES_OF_ALL * self.sd(quantity))
+            && torques
+                .all(|quantity| (self.unknown(quantity) - scale).abs() <= SIDES_OF_ALL * self.sd_beside_scale(quantity))
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if self.torque_misfit > MISFIT {
+            lines.push(format!(
+                "warning: the shifts ask for torques that the model does not have: their errors are {:.1} times what drag and the converter's \
+                 maps explain. The vehicle file is not of this car, its maps have another shape, or a signal is not what the channel map says; \
+                 the intervals are too small",
+                self.torque_misfit
+            ));
+        }
+        if !self.at_limit.is_empty() {
+            lines.push(format!(
+                "warning: at the end of what is held possible: {}. The vehicle file is not of this car, or a signal is not what the channel map \
+                 says; do not use the fitted file before the reason is known",
+                self.at_limit.join(", ")
+            ));
+        }
+        if !self.is_converged {
+            lines.push(
+                "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
+            );
+        }
+        if self.shifts == 1 {
+            lines.push(
+                "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),
+            );
+        }
+        lines
+    }
+
+    /// Which drive would tell what these logs do not.
+    fn proposals(&self) -> Vec<String> {
+        let quantities = &self.quantities;
+        let mut lines = Vec::new();
+        let without: Vec<&str> = (quantities.elements.iter().zip(&self.elements_seen))
+            .filter(|(_, seen)| !**seen)
+            .map(|(name, _)| name.as_str())
+            .collect();
+        if !without.is_empty() {
+            lines.push(format!("no fitted shift has {}: they stay as they are", without.join(", ")));
+        }
+        let names = |is: &dyn Fn(usize) -> bool| {
+            let named =
+                quantities.pair_names.iter().enumerate().filter(|(at, _)| is(*at)).map(|(_, name)| name.as_str());
+            named.collect::<Vec<_>>()
+        };
+        let missing = names(&|at| self.by_pair[at].iter().sum::<usize>() == 0);
+        if !missing.is_empty() {
+            lines.push(format!(
+                "to know more: drive shifts between gears {}, of which none is fitted",
+                missing.join(", ")
+            ));
+        }
+        let some = |at: usize, kinds: [ShiftKind; 2]| {
+            let of_kind = |kind: &ShiftKind| ShiftKind::ALL.iter().position(|other| other == kind);
+            kinds.iter().filter_map(of_kind).any(|kind| self.by_pair[at][kind] > 0)
+        };
+        let is_open = |at: usize| self.verdict(Quantity::Inertia(at)) != Verdict::Measured;
+        let one_way = names(&|at| {
+            let (on, off) = (
+                some(at, [ShiftKind::PowerOnUp, ShiftKind::PowerOnDown]),
+                some(at, [ShiftKind::PowerOffUp, ShiftKind::CoastDown]),
+            );
+            on != off && is_open(at)
+        });
+        if !one_way.is_empty() {
+            lines.push(format!(
+                "to know more: for inertia and friction apart, shifts with the accelerator pressed and released between {}: so far there are only \
+                 those of one of both",
+                one_way.join(", ")
+            ));
+        }
+        let of_element = |quantity: fn(usize) -> Quantity| {
+            let open = (0..quantities.elements.len())
+                .filter(|at| self.elements_seen[*at] && self.verdict(quantity(*at)) == Verdict::NotTold);
+            open.map(|at| quantities.elements[at].as_str()).collect::<Vec<_>>().join(", ")
+        };
+        let kiss = of_element(Quantity::Kiss);
+        if !kiss.is_empty() {
+            lines.push(format!(
+                "to know more: for the kiss point of {kiss}, shifts at light throttle and coasting in which it slips"
+            ));
+        }
+        let torque = of_element(Quantity::Torque);
+        if !torque.is_empty() {
+            lines.push(format!("to know more: for the friction of {torque}, shifts at much throttle in which it drives the change of speed"));
+        }
+        lines
+    }
+}

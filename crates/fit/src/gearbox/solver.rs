@@ -1,0 +1,207 @@
+//! Gauss-Newton with Levenberg's damping over the shifts of a car.
+//!
+//! A shift's own unknowns act linearly: for given parameters they are found at once, and the parameters see what is left (variable
+//! projection). The weights are those of the one-shift fit.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
+
+use super::quantities::Quantities;
+use super::shift::{Linearised, OWN, ShiftModel};
+use crate::FitError;
+use crate::weights::{HUBER, gain_and_scale, one_step};
+
+/// A step that changes no unknown by more than this share of its plain standard deviation ends the fit.
+const CONVERGED: f64 = 0.1;
+/// Dampings tried in one iteration.
+const TRIES: u32 = 8;
+/// Iterations in which the scale follows the residuals, and all of them.
+const SCALED_ITERATIONS: u32 = 5;
+const ITERATIONS: u32 = 20;
+/// Turns in which the own unknowns of a shift are found with Huber's weights.
+const OWN_TURNS: u32 = 4;
+/// Deviations of what was known before beyond which nothing is held possible.
+const LIMIT: f64 = 4.0;
+
+/// Gain and scale of the one-step errors of the turbine speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Weights {
+    pub(crate) gain: f64,
+    pub(crate) scale: f64,
+}
+
+/// A shift at unknowns, with its own unknowns at their best.
+pub(crate) struct Profiled {
+    /// Residuals, rad/s.
+    pub(crate) residuals: Vec<f64>,
+    /// One-step errors in scales.
+    pub(crate) errors: DVector<f64>,
+    /// Half the gradient by the parameters, with the sign of a step.
+    pub(crate) score: DVector<f64>,
+    /// Information about the parameters, own unknowns eliminated.
+    pub(crate) information: DMatrix<f64>,
+    /// Error of the torque at the turbine, in its deviations.
+    pub(crate) torque_error: f64,
+    cost: f64,
+}
+
+/// Where a fit ended.
+pub(crate) struct Solved {
+    pub(crate) at: Vec<f64>,
+    pub(crate) weights: Weights,
+    pub(crate) is_converged: bool,
+    pub(crate) shifts: Vec<Profiled>,
+}
+
+/// A shift with its own unknowns at their best for these parameters.
+pub(crate) fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights) -> Profiled {
+    let in_scales = |column: &mut [f64]| {
+        one_step(column, weights.gain);
+        column.iter_mut().for_each(|error| *error /= weights.scale);
+    };
+    let mut by_own = lines.by_own.clone();
+    by_own.column_iter_mut().for_each(|mut column| in_scales(column.as_mut_slice()));
+    let mut of_parameters = lines.residuals.clone();
+    in_scales(of_parameters.as_mut_slice());
+    let precision = Matrix2::from_diagonal(&Vector2::from(shift.own_sd.map(|sd| sd.powi(-2))));
+    let mut own = Vector2::new(lines.residuals.get(0).copied().unwrap_or(0.0), 0.0);
+    let huber = |error: f64| (HUBER / error.abs()).min(1.0);
+    let own_step = |own: &Vector2<f64>| {
+        let errors = &of_parameters - &by_own * own;
+        let mut square = precision;
+        let mut gradient = Vector2::zeros();
+        for (row, error) in errors.iter().enumerate() {
+            let line = Vector2::new(by_own[(row, 0)], by_own[(row, 1)]);
+            square += huber(*error) * line * line.transpose();
+            gradient += huber(*error) * *error * line;
+        }
+        // The start of a shift has no mean before.
+        gradient[1] -= precision[(1, 1)] * own[1];
+        (square, gradient)
+    };
+    for _ in 0..OWN_TURNS {
+        let (square, gradient) = own_step(&own);
+        own += square.try_inverse().map_or(Vector2::zeros(), |inverse| inverse * gradient);
+    }
+    let errors = &of_parameters - &by_own * own;
+    let mut whitened = lines.by_parameter.clone();
+    whitened.column_iter_mut().for_each(|mut column| in_scales(column.as_mut_slice()));
+    let mut all = whitened.clone();
+    for (row, error) in errors.iter().enumerate() {
+        all.row_mut(row).scale_mut(huber(*error));
+    }
+    let (square, _) = own_step(&own);
+    let mixed = by_own.tr_mul(&all);
+    let inverse = square.try_inverse().unwrap_or_else(Matrix2::zeros);
+    let information = all.tr_mul(&whitened) - mixed.tr_mul(&(inverse * &mixed));
+    let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
+    let cost = 0.5 * (errors.iter().map(loss).sum::<f64>() + precision[(1, 1)] * own[1] * own[1]);
+    let residuals = (&lines.residuals - &lines.by_own * own).as_slice().to_vec();
+    Profiled {
+        residuals,
+        score: all.tr_mul(&errors),
+        errors,
+        information,
+        torque_error: own[1] / shift.own_sd[1],
+        cost,
+    }
+}
+
+/// What does not change during a fit.
+pub(crate) struct Problem<'a> {
+    pub(crate) quantities: &'a Quantities,
+    /// Inverse of the covariance before the fit.
+    pub(crate) precision: DMatrix<f64>,
+}
+
+impl<'a> Problem<'a> {
+    pub(crate) fn new(quantities: &'a Quantities) -> Result<Self, FitError> {
+        let cholesky = quantities.before.clone().cholesky().ok_or_else(not_finite)?;
+        Ok(Self { quantities, precision: cholesky.inverse() })
+    }
+
+    fn profiles(&self, shifts: &[ShiftModel], at: &[f64], weights: Weights) -> Vec<Profiled> {
+        shifts.iter().map(|shift| profiled(shift, &shift.linearised(self.quantities, at), weights)).collect()
+    }
+
+    fn cost(&self, shifts: &[Profiled], at: &[f64]) -> f64 {
+        let at = DVector::from_column_slice(at);
+        0.5 * at.dot(&(&self.precision * &at)) + shifts.iter().map(|shift| shift.cost).sum::<f64>()
+    }
+
+    /// Finds the parameters of shifts, from those of the file.
+    pub(crate) fn solve(&self, shifts: &[ShiftModel], progress: &mut dyn FnMut(u32)) -> Result<Solved, FitError> {
+        let mut weights = Weights { gain: 0.3, scale: 0.5 };
+        let mut at = vec![0.0; self.quantities.all.len()];
+        let (mut damping, mut is_converged) = (1e-3, false);
+        let mut profiles = self.profiles(shifts, &at, weights);
+        for iteration in 0..ITERATIONS {
+            progress(iteration);
+            if iteration <= SCALED_ITERATIONS {
+                weights = following(&profiles, weights);
+                profiles = self.profiles(shifts, &at, weights);
+            }
+            let cost = self.cost(&profiles, &at);
+            if !cost.is_finite() {
+                return Err(not_finite());
+            }
+            let mut largest = f64::INFINITY;
+            for _ in 0..TRIES {
+                let (next, size) = self.step(&profiles, &at, damping)?;
+                let next_profiles = self.profiles(shifts, &next, weights);
+                if self.cost(&next_profiles, &next) <= cost {
+                    (at, profiles, largest) = (next, next_profiles, size);
+                    damping = (damping / 10.0).max(1e-8);
+                    break;
+                }
+                damping *= 8.0;
+                largest = size.min(CONVERGED);
+            }
+            if largest <= CONVERGED && iteration > SCALED_ITERATIONS {
+                is_converged = true;
+                break;
+            }
+        }
+        Ok(Solved { at, weights, is_converged, shifts: profiles })
+    }
+
+    /// The unknowns after a step, and its largest size in standard deviations.
+    fn step(&self, shifts: &[Profiled], at: &[f64], damping: f64) -> Result<(Vec<f64>, f64), FitError> {
+        let here = DVector::from_column_slice(at);
+        let mut matrix = self.precision.clone();
+        let mut gradient = -(&self.precision * &here);
+        for shift in shifts {
+            matrix += &shift.information;
+            gradient += &shift.score;
+        }
+        for j in 0..at.len() {
+            matrix[(j, j)] *= 1.0 + damping;
+        }
+        let cholesky: Cholesky<f64, Dyn> = matrix.cholesky().ok_or_else(not_finite)?;
+        let (step, inverse) = (cholesky.solve(&gradient), cholesky.inverse());
+        let limit = |j: usize| LIMIT * self.quantities.sd_before(j);
+        let next: Vec<f64> = (0..at.len()).map(|j| (at[j] + step[j]).clamp(-limit(j), limit(j))).collect();
+        let size = |j: usize| (next[j] - at[j]).abs() / inverse[(j, j)].sqrt();
+        let largest = (0..at.len()).map(size).fold(0.0, f64::max);
+        Ok((next, largest))
+    }
+
+    /// Names of the unknowns that ended where nothing beyond is held possible.
+    pub(crate) fn at_limit(&self, at: &[f64]) -> Vec<String> {
+        let is_there = |(j, _): &(usize, &f64)| at[*j].abs() >= LIMIT * self.quantities.sd_before(*j);
+        at.iter().enumerate().filter(is_there).map(|(j, _)| self.quantities.name(self.quantities.all[j])).collect()
+    }
+}
+
+/// Gain and scale that the residuals ask for.
+fn following(shifts: &[Profiled], before: Weights) -> Weights {
+    let blocks: Vec<&[f64]> = shifts.iter().map(|shift| shift.residuals.as_slice()).collect();
+    gain_and_scale(&blocks).map_or(before, |(gain, scale)| Weights { gain, scale })
+}
+
+const _: () = assert!(OWN == 2, "the own unknowns are solved for as two");
+
+fn not_finite() -> FitError {
+    FitError::Work(
+        "the fit left the range in which the model of the shifts can be computed\nhint: check units and signs of the channels with `wetclutch inspect`".to_owned(),
+    )
+}

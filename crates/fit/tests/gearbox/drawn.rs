@@ -1,0 +1,181 @@
+//! A car with a whole gearbox that differs from its file, and a drive of it behind sensors.
+
+use std::path::Path;
+
+use config::{Car, Drive, Sensors};
+use design::{ShiftErrors, ShiftTables};
+use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
+use fit::{ReadingAges, Series};
+use observer::any_shift::ShiftInput;
+use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
+use study::any_shift::ShiftDraw;
+use study::any_shift::matrix::Random;
+use study::any_shift::measured::SensedDrive;
+
+/// Bounds of what is drawn: as shares, and of the kiss point in Pa.
+const FRICTION: f64 = 0.15;
+const GAIN: f64 = 0.08;
+const CONVERTER: f64 = 0.08;
+const INERTIA: f64 = 0.10;
+const KISS_PA: f64 = 10e3;
+/// Time between two rows, s.
+const ROW_S: f64 = 0.01;
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
+
+/// A car of the repository.
+pub(crate) fn car(name: &str) -> Car {
+    Car::read(&root().join("vehicles").join(name)).unwrap()
+}
+
+/// Sensors of the bench.
+pub(crate) fn sensors() -> Sensors {
+    Sensors::read(&root().join("experiments/bench.toml")).unwrap().unwrap()
+}
+
+/// The drive in town, so many times.
+pub(crate) fn city(repetitions: u32) -> Drive {
+    Drive { repetitions, ..Drive::read(&root().join("drives/city.toml")).unwrap() }
+}
+
+/// A car as its file has it, and as it is.
+pub(crate) struct Drawn {
+    pub(crate) file: Car,
+    pub(crate) truth: Car,
+    pub(crate) seed: u64,
+    draw: ShiftDraw,
+    kiss_pa: Vec<f64>,
+    /// What the file's inertias are multiplied with to be true, by pairs of gears.
+    inertia: Vec<([usize; 2], f64)>,
+}
+
+impl Drawn {
+    pub(crate) fn of(file: Car, seed: u64) -> Self {
+        let mut random = Random(seed);
+        let mut within = |bound: f64| bound * (2.0 * random.uniform() - 1.0);
+        let none = ShiftDraw::none(&file);
+        let draw = ShiftDraw {
+            friction: none.friction.iter().map(|_| 1.0 + within(FRICTION)).collect(),
+            valve_gain: none.valve_gain.iter().map(|_| 1.0 + within(GAIN)).collect(),
+            converter: 1.0 + within(CONVERTER),
+            ..none
+        };
+        let mut truth = draw.car(&file);
+        let kiss_pa: Vec<f64> = truth.clutches.iter().map(|_| within(KISS_PA)).collect();
+        for (clutch, kiss_pa) in truth.clutches.iter_mut().zip(&kiss_pa) {
+            let Some(clutch) = clutch else { continue };
+            clutch.clutch.return_spring_n += kiss_pa * clutch.clutch.piston_area_m2;
+        }
+        // The simulated gear train has its own inertia; that of the file is what is wrong.
+        let mut file = file;
+        let forward = file.gearbox.forward_gears();
+        let pairs = [1, 2, 3].into_iter().flat_map(|apart| forward.windows(apart + 1));
+        let inertia: Vec<([usize; 2], f64)> =
+            pairs.map(|gears| ([gears[0], gears[gears.len() - 1]], 1.0 + within(INERTIA))).collect();
+        for shift in &mut file.gearbox.shifts {
+            let of_pair = inertia
+                .iter()
+                .find(|(pair, _)| [[pair[0], pair[1]], [pair[1], pair[0]]].contains(&[shift.from, shift.to]));
+            if let (Some((_, factor)), Some(reduced)) = (of_pair, &mut shift.reduced) {
+                reduced.mass_kg_m2[0][0] /= factor;
+            }
+        }
+        Self { file, truth, seed, draw, kiss_pa, inertia }
+    }
+
+    pub(crate) fn tables(&self) -> ShiftTables<f64> {
+        tables(&self.file)
+    }
+
+    /// The unknown of a quantity with which the file would be that of the car.
+    pub(crate) fn true_unknown(&self, tables: &ShiftTables<f64>, quantities: &Quantities, quantity: Quantity) -> f64 {
+        let element = |place: usize| (0..self.file.clutches.len()).find(|at| tables.place(*at) == Some(place)).unwrap();
+        match quantity {
+            Quantity::Input if self.file.converter.is_some() => self.draw.converter.ln(),
+            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay | Quantity::Drag | Quantity::Lag(_) => 0.0,
+            Quantity::Torque(place) => {
+                let at = element(place);
+                (self.draw.friction[at] * self.draw.valve_gain[at]).ln()
+            }
+            Quantity::Kiss(place) => {
+                let at = element(place);
+                let file_pa = self.file.clutches[at].unwrap().clutch.kiss_pressure();
+                ((file_pa + self.kiss_pa[at]) / self.draw.valve_gain[at] - file_pa) / 1e4
+            }
+            Quantity::Inertia(pair) => {
+                let pair = quantities.pairs[pair];
+                self.inertia.iter().find(|(other, _)| *other == pair).unwrap().1.ln()
+            }
+        }
+    }
+
+    /// The shifts of a drive, and the truth.
+    pub(crate) fn driven(&self, drive: &Drive) -> (Recorded, Truth) {
+        let tables = self.tables();
+        let mut recorder = Recorder::new(&self.file, &tables, ReadingAges::of(&sensors()));
+        let mut truth = Truth::default();
+        self.each_row(drive, |sample| truth.push(sample), |time_s, input| recorder.push(time_s, input));
+        (recorder.finish(), truth)
+    }
+
+    /// Simulates a drive: `sampled` gets the truth, `read` what is read of it.
+    pub(crate) fn each_row(
+        &self,
+        drive: &Drive,
+        mut sampled: impl FnMut(&CarSample),
+        mut read: impl FnMut(f64, &ShiftInput<f64>),
+    ) {
+        let tables = self.tables();
+        let sensors = Sensors { seed: self.seed, ..sensors() };
+        let model = CarModel::new(self.truth.clone()).unwrap();
+        let mut sensed = SensedDrive::new(&self.file, &sensors, ROW_S);
+        let drive = Drive { sample_time_s: sensed.record_s(), ..drive.clone() };
+        simulate_car_drive(&model, &self.file, CarCalibration::STANDARD, &drive, |sample| {
+            sampled(sample);
+            sensed.each(sample, |row| read(row.sample.time_s, &row.input(&self.file, &tables)));
+        })
+        .unwrap();
+        sensed.last(|row| read(row.sample.time_s, &row.input(&self.file, &tables)));
+    }
+}
+
+pub(crate) fn tables(car: &Car) -> ShiftTables<f64> {
+    ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap()
+}
+
+/// Shifts to fit, and every fifth to check.
+pub(crate) fn every_fifth(shifts: Vec<ShiftLog>) -> [Vec<ShiftLog>; 2] {
+    let mut divided = [Vec::new(), Vec::new()];
+    for (at, shift) in shifts.into_iter().enumerate() {
+        divided[usize::from(at % 5 == 4)].push(shift);
+    }
+    divided
+}
+
+/// True torques of the clutches of the shifts.
+#[derive(Default)]
+pub(crate) struct Truth {
+    torque_n_m: [Series; 2],
+}
+
+impl Truth {
+    fn push(&mut self, sample: &CarSample) {
+        let Some(shift) = &sample.shift else { return };
+        for (series, clutch) in self.torque_n_m.iter_mut().zip([&shift.offgoing, &shift.oncoming]) {
+            series.push(sample.time_s, clutch.torque_n_m.abs());
+        }
+    }
+
+    /// Mean squared error of the torques of both clutches by the valve models of a file over shifts, N m squared.
+    pub(crate) fn squared_error(&self, car: &Car, shifts: &[ShiftLog]) -> f64 {
+        let tables = tables(car);
+        let points = shifts.iter().flat_map(|log| fit::gearbox::open_loop(car, &tables, log));
+        let errors = points.flat_map(|point| {
+            [0, 1].map(|which| (point.torque_n_m[which] - self.torque_n_m[which].at(point.time_s)).powi(2))
+        });
+        let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));
+        sum / count
+    }
+}

@@ -1,0 +1,232 @@
+//! Fits of cars with a whole gearbox to drives behind sensors.
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
+mod drawn;
+
+use std::path::Path;
+
+use config::{Car, Source};
+use drawn::{Drawn, car, city, every_fifth, tables};
+use fit::gearbox::{GearboxFit, Quantity, Recorder, ShiftLog, fit};
+use fit::{ReadingAges, Verdict};
+use observer::Reading;
+use observer::any_shift::ShiftInput;
+
+fn fitted(drawn: &Drawn, shifts: &[ShiftLog]) -> GearboxFit {
+    fit(&drawn.file, &drawn.tables(), shifts, &mut |_| ()).unwrap()
+}
+
+/// The rows of a drive of a drawn car as its file's filter is shown them.
+fn rows(drawn: &Drawn, drive: u32) -> Vec<(f64, ShiftInput<f64>)> {
+    let mut rows = Vec::new();
+    drawn.each_row(&city(drive), |_| (), |time_s, input| rows.push((time_s, *input)));
+    rows
+}
+
+/// The fit of rows, and how many shifts were left out.
+fn fit_of_rows(drawn: &Drawn, rows: &[(f64, ShiftInput<f64>)]) -> (GearboxFit, usize) {
+    let tables = drawn.tables();
+    let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::of(&drawn::sensors()));
+    rows.iter().for_each(|(time_s, input)| recorder.push(*time_s, input));
+    let recorded = recorder.finish();
+    (fitted(drawn, &recorded.shifts), recorded.skipped.len())
+}
+
+/// Share of the true values that lie in their stated intervals.
+fn held(drawn: &Drawn, fit: &GearboxFit) -> f64 {
+    let tables = drawn.tables();
+    let known: Vec<Quantity> =
+        fit.quantities.all.iter().copied().filter(|quantity| *quantity != Quantity::Drag).collect();
+    let inside = known.iter().filter(|quantity| {
+        let truth = drawn.true_unknown(&tables, &fit.quantities, **quantity);
+        (fit.unknown(**quantity) - truth).abs() <= 1.96 * fit.sd(**quantity)
+    });
+    inside.count() as f64 / known.len() as f64
+}
+
+#[test]
+fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_held_out() {
+    // The second has neither converter nor planetary gears.
+    for (vehicle, seed) in [("eight_speed.toml", 1), ("dual_clutch.toml", 2)] {
+        let drawn = Drawn::of(car(vehicle), seed);
+        let (recorded, truth) = drawn.driven(&city(2));
+        let [fitted_shifts, held_out] = every_fifth(recorded.shifts);
+        assert!(fitted_shifts.len() >= 20, "{vehicle}: {}", fitted_shifts.len());
+        let fit = fitted(&drawn, &fitted_shifts);
+        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+        let [given, found] = [&drawn.file, &file].map(|car| truth.squared_error(car, &held_out).sqrt());
+        assert!(found < 0.6 * given, "{vehicle}: {given} {found}");
+        let share = held(&drawn, &fit);
+        assert!(share > 0.85, "{vehicle}: {share}");
+        let checked = fit.validate((&drawn.file, &drawn.tables()), (&file, &tables(&file)), &held_out).unwrap();
+        assert!(
+            checked.turbine_rad_s[1] < checked.turbine_rad_s[0] && 2 * checked.better > checked.shifts,
+            "{checked:?}"
+        );
+        assert!(fit.is_converged && fit.at_limit.is_empty() && fit.torque_misfit < 2.0, "{}", fit.torque_misfit);
+    }
+}
+
+#[test]
+fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 3);
+    let (recorded, _) = drawn.driven(&city(1));
+    let fit = fitted(&drawn, &recorded.shifts);
+    let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+    let text = &file.source.text;
+    // Every line of the given file that has no fitted value stands in the new one.
+    let changed = ["capacity_n_m_s2", "torque_ratio", "4.3976e-3", "2.0482e-3", "2.00, 1.88", "]"];
+    let kept = drawn.file.source.text.lines().filter(|line| !changed.iter().any(|word| line.contains(word)));
+    kept.for_each(|line| assert!(text.lines().any(|other| other == line), "{line}"));
+    assert!(text.contains("[turbine_inertia_kg_m2]\n# fit: x "), "{text}");
+    let at = (0..drawn.file.clutches.len()).find(|at| drawn.file.gearbox.elements[*at].name == "E").unwrap();
+    let place = drawn.tables().place(at).unwrap();
+    let [before, after] = [&drawn.file, &file].map(|car| car.clutches[at].unwrap().clutch);
+    let factor = fit.unknown(Quantity::Torque(place)).exp();
+    assert!((after.friction.at(50.0) / before.friction.at(50.0) / factor - 1.0).abs() < 1e-3);
+    let kiss_pa = before.kiss_pressure() + 1e4 * fit.unknown(Quantity::Kiss(place));
+    assert!((after.kiss_pressure() - kiss_pa).abs() < 50.0);
+    // A fit to the same shifts from the fitted file has nothing to change beyond what the logs leave open.
+    let again = fit::gearbox::fit(&file, &tables(&file), &recorded.shifts, &mut |_| ()).unwrap();
+    let torque = Quantity::Torque(place);
+    assert!(again.unknown(torque).abs() < fit.sd(torque), "{} {}", again.unknown(torque), fit.sd(torque));
+    let twice = again.vehicle_file(&file, &file.source.path, "a drive").unwrap().source.text;
+    assert_eq!(twice.matches("[clutch.E]").count(), 1, "{twice}");
+    // In another folder the gearbox file is named anew.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fitted.toml");
+    let moved = fit.vehicle_file(&drawn.file, &folder, "a drive").unwrap();
+    std::fs::write(&folder, &moved.source.text).unwrap();
+    assert_eq!(Car::read(&folder).unwrap().clutches, moved.clutches);
+}
+
+#[test]
+fn outliers_and_lost_readings_leave_the_values_within_their_intervals() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 4);
+    let mut rows = rows(&drawn, 1);
+    let (clean, skipped) = fit_of_rows(&drawn, &rows);
+    let is = |row: usize, every: usize| row.wrapping_mul(2_654_435_761).is_multiple_of(every);
+    for (at, (_, input)) in rows.iter_mut().enumerate() {
+        if is(at, 50) {
+            let wrong = |reading: Reading<f64>| Reading { value: reading.value + 5.0, ..reading };
+            input.turbine_rad_s = input.turbine_rad_s.map(wrong);
+        }
+        if is(at + 7, 20) {
+            (input.turbine_rad_s, input.engine_rad_s) = (None, None);
+        }
+        if is(at + 3, 1000) {
+            input.output_rad_s = Some(Reading::now(f64::NAN));
+            input.commands[0] = Some(Reading::now(f64::INFINITY));
+        }
+    }
+    let (faulty, more_skipped) = fit_of_rows(&drawn, &rows);
+    assert!(faulty.is_converged && more_skipped <= skipped + 2, "{skipped} {more_skipped}");
+    for quantity in &clean.quantities.all {
+        let moved = faulty.unknown(*quantity) - clean.unknown(*quantity);
+        assert!(moved.abs() <= 2.0 * clean.sd(*quantity), "{quantity:?}: {moved} of {}", clean.sd(*quantity));
+    }
+    assert!(held(&drawn, &faulty) > 0.8, "{}", held(&drawn, &faulty));
+}
+
+#[test]
+fn one_shift_tells_little_and_says_so() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 5);
+    let (recorded, _) = drawn.driven(&city(1));
+    let fit = fitted(&drawn, &recorded.shifts[..1]);
+    let before = |place: usize| fit.quantities.sd_before(place);
+    // It passes through some pressures, which may tell a kiss point or a lag, and no torque for itself.
+    let is_torque =
+        |quantity: &Quantity| matches!(quantity, Quantity::Input | Quantity::Torque(_) | Quantity::Inertia(_));
+    let told = fit
+        .quantities
+        .all
+        .iter()
+        .filter(|quantity| is_torque(quantity) && fit.verdict(**quantity) == Verdict::Measured);
+    assert_eq!(told.count(), 0);
+    assert!(held(&drawn, &fit) > 0.9, "{}", held(&drawn, &fit));
+    for (place, quantity) in fit.quantities.all.iter().enumerate() {
+        assert!(fit.sd(*quantity) <= 1.000_001 * before(place), "{quantity:?}");
+    }
+    let said = fit.statements().join("\n");
+    for words in ["one shift only", "torque scale: not told", "no fitted shift has", "drive shifts between gears"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert!(fit.report().iter().all(|row| !row.name.starts_with("B:")), "{:?}", fit.report());
+    let mut twice = recorded.clone();
+    twice.add(recorded.clone());
+    assert_eq!(twice.shifts, recorded.shifts);
+    assert_eq!(twice.skipped.len(), 2 * recorded.skipped.len() + recorded.shifts.len());
+    let none = fit::gearbox::fit(&drawn.file, &drawn.tables(), &[], &mut |_| ()).unwrap_err().to_string();
+    assert!(none.contains("no shift"), "{none}");
+}
+
+#[test]
+fn a_log_of_another_car_does_not_fit_the_ratios() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 6);
+    let other = car("ten_speed.toml");
+    let other_tables = tables(&other);
+    let mut recorder = Recorder::new(&other, &other_tables, ReadingAges::default());
+    rows(&drawn, 1).iter().for_each(|(time_s, input)| recorder.push(*time_s, input));
+    let [all, unfit] = recorder.finish().in_gear;
+    assert!(2 * unfit > all && all > 1000, "{unfit} of {all}");
+}
+
+/// Input without sense is no panic, and no shift comes from it.
+#[test]
+fn what_no_car_does_is_left_out() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 7);
+    let good = rows(&drawn, 1);
+    let tables = drawn.tables();
+    let recorded = |change: &dyn Fn(usize, &mut f64, &mut ShiftInput<f64>)| {
+        let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::default());
+        for (at, (time_s, input)) in good.iter().enumerate().take(4000) {
+            let (mut time_s, mut input) = (*time_s, *input);
+            change(at, &mut time_s, &mut input);
+            recorder.push(time_s, &input);
+        }
+        recorder.finish()
+    };
+    let clean = recorded(&|_, _, _| ()).shifts.len();
+    assert!(clean >= 4, "{clean}");
+    // Without commands, turbine speeds, or time that goes on.
+    assert_eq!(recorded(&|_, _, input| input.commands = [None; 8]).shifts.len(), 0);
+    assert_eq!(recorded(&|_, _, input| input.turbine_rad_s = None).shifts.len(), 0);
+    assert_eq!(recorded(&|_, time_s, _| *time_s = 1.0).shifts.len(), 0);
+    // A gear of no gearbox, a shift that never ends, and two that change all the time.
+    assert_eq!(recorded(&|_, _, input| input.gear.to = usize::MAX).shifts.len(), 0);
+    assert_eq!(recorded(&|_, _, input| (input.gear.from, input.gear.to) = (1, 2)).shifts.len(), 0);
+    recorded(&|at, _, input| (input.gear.from, input.gear.to) = (1 + at % 3, 2));
+    // Speeds that are huge: the model must not be left with numbers that are none.
+    let huge = recorded(&|_, _, input| input.engine_rad_s = Some(Reading::now(1e300)));
+    if let Ok(fit) = fit::gearbox::fit(&drawn.file, &tables, &huge.shifts, &mut |_| ()) {
+        assert!(fit.unknowns.iter().all(|x| x.is_finite()));
+    }
+}
+
+#[test]
+fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
+    let given = car("eight_speed.toml");
+    let gearbox = || Source::read(&given.source.path.parent().unwrap().join("../gearboxes/8hp.toml")).unwrap();
+    let with = |more: &str| {
+        let source = Source { text: format!("{}\n{more}\n", given.source.text), ..given.source.clone() };
+        Car::from_sources(source, gearbox())
+    };
+    let other = with("[clutch.E]\nreturn_spring_n = 700\n[turbine_inertia_kg_m2]\n\"1-2\" = 0.09").unwrap();
+    let at = other.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
+    assert_eq!(other.clutches[at].unwrap().clutch.return_spring_n, 700.0);
+    let gear = |name: &str| other.gearbox.gear(name).unwrap();
+    for (from, to, is) in [("1", "2", true), ("2", "1", true), ("2", "3", false)] {
+        let m11 = |car: &Car| car.gearbox.shift(gear(from), gear(to)).unwrap().reduced.unwrap().mass_kg_m2[0][0];
+        assert_eq!((m11(&other) - 0.09).abs() < 1e-12, is);
+        assert_eq!(m11(&other) == m11(&given), !is);
+    }
+    for (text, words) in [
+        ("[turbine_inertia_kg_m2]\n\"1-9\" = 0.09", "names no shift"),
+        ("[turbine_inertia_kg_m2]\nfast = 0.09", "two gears with a line between them"),
+        ("[turbine_inertia_kg_m2]\n\"2-3\" = 0.01", "hint: more than"),
+        ("[turbine_inertia_kg_m2]\n\"1-2\" = -1", "1-2"),
+        ("[clutch.E]\nreturn_spring_n = -5", "clutch.E.return_spring_n"),
+    ] {
+        let error = with(text).unwrap_err().to_string();
+        assert!(error.contains(words), "{text}: {error}");
+    }
+}
