@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use super::rows::{LONGEST_ROW, READ_AT_ONCE};
+use super::records::READ_AT_ONCE;
 use super::writer::push_number;
 use super::*;
 use crate::signal;
