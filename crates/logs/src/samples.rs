@@ -434,6 +434,13 @@ impl<'a> Samples<'a> {
         Ok(())
     }
 
+    /// Lets a stream wait in place of the first one that waits; that one.
+    fn change_places(&mut self, next: Next) -> Option<usize> {
+        let mut first = self.heap.peek_mut()?;
+        let Reverse(Next(_, other)) = std::mem::replace(&mut *first, Reverse(next));
+        Some(other)
+    }
+
     /// Puts a sample where it waits for its time.
     fn put_back(&mut self, i: usize, sample: Sample) {
         self.streams[i].next = Some(sample);
@@ -449,9 +456,16 @@ impl Iterator for Samples<'_> {
             && self.streams[i].at < self.streams[i].batch.len()
         {
             let sample = self.stamped(i);
-            if Next(sample.time_s, i) <= until {
+            let next = Next(sample.time_s, i);
+            if next <= until {
                 self.given += 1;
                 return Some(Ok(sample));
+            }
+            if let Some(other) = self.change_places(next) {
+                self.streams[i].next = Some(sample);
+                self.front = Some((other, self.heap.peek().map_or(next, |Reverse(first)| *first)));
+                self.given += 1;
+                return self.streams[other].next.take().map(Ok);
             }
             self.put_back(i, sample);
         }

@@ -1,10 +1,10 @@
-"""Least times of asammdf for all channels of a file, and of zlib for its deflated blocks, in s: LOG.mf4 TRIES."""
+"""Least times of the processor of asammdf for all channels of a file, and of its decompression for the deflated blocks, in s: LOG.mf4 TRIES."""
 import struct
 import sys
 import time
-import zlib
 
 from asammdf import MDF
+from asammdf.blocks import utils
 
 
 def channels(path):
@@ -19,20 +19,22 @@ def channels(path):
 def fastest(job, tries):
     times = []
     for _ in range(tries):
-        began = time.perf_counter()
+        began = time.process_time()
         job()
-        times.append(time.perf_counter() - began)
+        times.append(time.process_time() - began)
     return min(times)
 
 
 def main(path, tries):
+    # What asammdf itself unpacks with: ISA-L where it is installed.
+    inflate = utils.zlib_decompress
     data = open(path, "rb").read()
     blocks = []
     for at in range(0, len(data) - 48, 8):
         if data[at : at + 4] == b"##DZ":
             (length,) = struct.unpack_from("<Q", data, at + 40)
             blocks.append(data[at + 48 : at + 48 + length])
-    print(fastest(lambda: channels(path), tries), fastest(lambda: [zlib.decompress(block) for block in blocks], tries))
+    print(fastest(lambda: channels(path), tries), fastest(lambda: [inflate(block) for block in blocks], tries))
 
 
 main(sys.argv[1], int(sys.argv[2]))

@@ -151,20 +151,20 @@ impl Records {
     /// Looks for the end of the record in the bytes that are there.
     fn scan(&mut self) -> Found {
         let text = &self.bytes[..self.filled];
+        let delimiter = self.delimiter;
         let mut from = self.scanned;
         self.row.line = self.next_line;
-        while from < text.len() {
-            let eight = text.get(from..from + 8).and_then(|eight| eight.try_into().ok()).unwrap_or_else(|| {
-                let mut eight = [b'0'; 8];
-                eight[..text.len() - from].copy_from_slice(&text[from..]);
-                eight
-            });
-            let mut signs = signs(u64::from_le_bytes(eight), self.delimiter);
+        for eight in text[from..].chunks(8) {
+            let mut signs = signs(padded(eight), delimiter);
             while signs != 0 {
                 let at = from + (signs.trailing_zeros() / 8) as usize;
                 signs &= signs - 1;
-                match text[at] {
-                    sign if sign == self.delimiter => self.row.ends.push(at),
+                let sign = text[at];
+                if sign == delimiter {
+                    self.row.ends.push(at);
+                    continue;
+                }
+                match sign {
                     b'\n' => {
                         let end = if at > self.start && text[at - 1] == b'\r' { at - 1 } else { at };
                         let start = std::mem::replace(&mut self.start, at + 1);
@@ -263,6 +263,16 @@ impl Records {
             }
         }
     }
+}
+
+/// Eight bytes as a number, or what there is of them before letters.
+#[inline]
+fn padded(bytes: &[u8]) -> u64 {
+    u64::from_le_bytes(bytes.try_into().unwrap_or_else(|_| {
+        let mut eight = [b'x'; 8];
+        eight[..bytes.len()].copy_from_slice(bytes);
+        eight
+    }))
 }
 
 /// Marks, by its highest bit, each byte that is below `-` or the delimiter. In a table of numbers these are the ends of cells.

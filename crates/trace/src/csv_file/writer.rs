@@ -67,19 +67,21 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// As [`Self::row`].
     pub fn cells<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let begin = self.rows.len();
+        let Self { rows, .. } = self;
+        let begin = rows.len();
         let mut count = 0;
-        for cell in cells {
+        // A chain of cells is faster from within.
+        cells.into_iter().for_each(|cell| {
             if count > 0 {
-                self.rows.push(b',');
+                rows.push(b',');
             }
             count += 1;
             match cell {
-                Cell::Word(word) => push_word(&mut self.rows, word),
-                Cell::Whole(number) => write!(self.rows, "{number}")?,
-                Cell::Number(number) => push_number(&mut self.rows, number),
+                Cell::Number(number) => push_number(rows, number),
+                Cell::Word(word) => push_word(rows, word),
+                Cell::Whole(number) => rows.extend_from_slice(number.to_string().as_bytes()),
             }
-        }
+        });
         if count != self.columns {
             self.rows.truncate(begin);
             return Err(io::Error::other(format!("a row of {count} cells for {} columns", self.columns)));

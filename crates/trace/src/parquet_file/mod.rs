@@ -83,15 +83,17 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// # Errors
     /// What the writer meets, or a cell that is not of the kind of its column.
     pub fn row<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let mut cells = cells.into_iter();
-        for column in &mut self.columns {
-            match (column, cells.next()) {
-                (Values::Whole(values), Some(Cell::Whole(value))) => values.push(value.cast_signed()),
-                (Values::Numbers(_, absent), Some(Cell::Number(value))) if value.is_nan() => absent.push(self.rows),
-                (Values::Numbers(values, _), Some(Cell::Number(value))) => values.push(value),
-                (Values::Words(words), Some(Cell::Word(word))) => words.push(word),
-                _ => return Err(io::Error::other("a cell is not of the kind of its column")),
-            }
+        let (mut columns, rows, mut is_of_kind) = (self.columns.iter_mut(), self.rows, true);
+        // A chain of cells is faster from within.
+        cells.into_iter().for_each(|cell| match (columns.next(), cell) {
+            (Some(Values::Numbers(_, absent)), Cell::Number(value)) if value.is_nan() => absent.push(rows),
+            (Some(Values::Numbers(values, _)), Cell::Number(value)) => values.push(value),
+            (Some(Values::Words(words)), Cell::Word(word)) => words.push(word),
+            (Some(Values::Whole(values)), Cell::Whole(value)) => values.push(value.cast_signed()),
+            _ => is_of_kind = false,
+        });
+        if !is_of_kind || columns.next().is_some() {
+            return Err(io::Error::other("a row has not one cell of its kind for each column"));
         }
         self.rows += 1;
         if self.rows == GROUP { self.write_group() } else { Ok(()) }
