@@ -176,7 +176,7 @@ impl ShiftTables<f64> {
                     command_age_s: 0.0,
                     line_pressure_pa: [pressure_max_pa; 2],
                     pressure_max_pa,
-                    fill: None,
+                    fill: clutch.standard_fill_budget(car.oil_temperature_degc),
                     friction_factor: around(errors.friction),
                     slip_rad_s: 0.0,
                 };

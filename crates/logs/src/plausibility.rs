@@ -94,6 +94,8 @@ impl Extremes {
 pub struct Finding {
     /// The signal.
     pub role: Role,
+    /// Its name in a channel map.
+    pub name: String,
     /// What is wrong, with what is likely.
     pub message: String,
     /// What is likely.
@@ -111,11 +113,20 @@ pub enum Likely {
     OtherChannel,
 }
 
+/// How much of a log some values are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// Its beginning: what is small may become large.
+    Beginning,
+    /// All of it.
+    All,
+}
+
 /// What cannot be right.
-pub fn findings(summary: &[RoleSummary]) -> Vec<Finding> {
+pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
     let turning =
         |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.size() > 1.0);
-    let mut findings: Vec<Finding> = summary.iter().filter_map(alone).collect();
+    let mut findings: Vec<Finding> = summary.iter().filter_map(|entry| alone(entry, seen)).collect();
     if !findings.is_empty() {
         return findings;
     }
@@ -131,15 +142,16 @@ pub fn findings(summary: &[RoleSummary]) -> Vec<Finding> {
     for (of, role, unit, least, most, likely) in pairs {
         let (Some(of), Some(entry)) = (turning(of), turning(role)) else { continue };
         let ratio = entry.extremes.size() / of.extremes.size();
-        if entry.unit_name == unit && (least..most).contains(&ratio) {
-            let reference = of.role.name();
+        let is_small = most < 1.0;
+        if entry.unit_name == unit && (least..most).contains(&ratio) && !(is_small && seen == Seen::Beginning) {
+            let reference = of.name.as_str();
             let why = format!("its greatest value is {ratio:.2} times that of {reference}; it looks like {likely}");
             findings.push(finding(entry, unit, &why, likely));
         }
         if of.extremes.is_forward() && entry.extremes.is_backward() {
-            let (name, reference) = (entry.role.name(), of.role.name());
+            let (name, reference) = (entry.name.clone(), &of.name);
             let message = format!("{name} is negative and {reference} positive: its sign is the other way round");
-            findings.push(Finding { role, message, likely: Likely::OtherSign });
+            findings.push(Finding { role, name, message, likely: Likely::OtherSign });
         }
     }
     findings
@@ -162,45 +174,33 @@ fn stands_still(entry: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding>
         turns && is_coupled && greatest - least > FROZEN_CHANGE_FROM_START * greatest
     };
     let other = summary.iter().find(changes)?;
-    let (role, name) = (entry.role, entry.role.name());
-    let message = format!("{name} is {value:.3} rad/s in all samples, and {} changes", other.role.name());
-    Some(Finding { role, message, likely: Likely::OtherChannel })
+    let (role, name) = (entry.role, entry.name.clone());
+    let message = format!("{name} is {value:.3} rad/s in all samples, and {} changes", other.name);
+    Some(Finding { role, name, message, likely: Likely::OtherChannel })
 }
 
 fn finding(entry: &RoleSummary, found: &str, why: &str, likely: &'static str) -> Finding {
     Finding {
         role: entry.role,
-        message: format!("{} cannot be in {found}: {why}", entry.role.name()),
+        name: entry.name.clone(),
+        message: format!("{} cannot be in {found}: {why}", entry.name),
         likely: Likely::Unit(likely),
     }
 }
 
 /// What cannot be right by the values of the signal alone.
-fn alone(entry: &RoleSummary) -> Option<Finding> {
+fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
     let middle = entry.extremes.middle()?;
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
     let say = |text: String, likely| Some(finding(entry, unit, &format!("{text}; it looks like {likely}"), likely));
     match entry.role.quantity()? {
-        // An offset of a command that is off is small.
-        Quantity::Current | Quantity::Share
-            if entry.role.is_command() && entry.extremes.greatest <= 0.0 && entry.extremes.least < -0.05 =>
-        {
-            let message = format!("{} is never positive: its sign is the other way round", entry.role.name());
-            Some(Finding { role: entry.role, message, likely: Likely::OtherSign })
+        Quantity::Current if unit == "A" && size > 10.0 => {
+            say(format!("its greatest value would be {size:.0} A"), "mA")
         }
         Quantity::Rotation
             if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) =>
         {
             say(format!("most values would be about {:.0} rpm", rpm(middle)), "rpm")
-        }
-        Quantity::Rotation if unit == "rpm" && entry.role == Role::EngineSpeed && size > 2.0 && middle < 42.0 => {
-            say(format!("most values would be about {:.0} rpm, below idle", rpm(middle)), "rad/s")
-        }
-        Quantity::Current if unit == "A" && size > 10.0 => {
-            say(format!("its greatest value would be {size:.0} A"), "mA")
-        }
-        Quantity::Current if unit == "mA" && size < 0.01 => {
-            say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
         }
         Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
             say(format!("its greatest value is {size:.1}"), "%")
@@ -208,14 +208,8 @@ fn alone(entry: &RoleSummary) -> Option<Finding> {
         Quantity::Share if unit == "1" && is_duty(entry.role) && size > 150.0 => {
             say(format!("its greatest value is {:.1}", size / 100.0), "%")
         }
-        Quantity::Share if unit == "%" && !is_duty(entry.role) && size <= 0.0101 && size > 0.0 => {
-            say(format!("its greatest value is {:.2} %", 100.0 * size), "a share from 0 to 1 (unit `1`)")
-        }
         Quantity::Pressure if size > 20e6 => {
             say(format!("its greatest value would be {:.0} MPa", mpa(size)), "a smaller unit (bar, kPa or Pa)")
-        }
-        Quantity::Pressure if size < 5e3 => {
-            say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
         }
         Quantity::Velocity if size > 120.0 => {
             say(format!("its greatest value would be {:.0} km/h", 3.6 * size), "a smaller unit (km/h)")
@@ -223,12 +217,33 @@ fn alone(entry: &RoleSummary) -> Option<Finding> {
         Quantity::Torque if size > 20e3 => {
             say(format!("its greatest value would be {size:.0} N m"), "a share or raw value; give `scale`")
         }
+        // What follows is too small, or never of the right sign, which only a whole log shows.
+        _ if seen == Seen::Beginning => None,
+        // An offset of a command that is off is small.
+        Quantity::Current | Quantity::Share
+            if entry.role.is_command() && entry.extremes.greatest <= 0.0 && entry.extremes.least < -0.05 =>
+        {
+            let message = format!("{} is never positive: its sign is the other way round", entry.name);
+            Some(Finding { role: entry.role, name: entry.name.clone(), message, likely: Likely::OtherSign })
+        }
+        Quantity::Rotation if unit == "rpm" && entry.role == Role::EngineSpeed && size > 2.0 && middle < 42.0 => {
+            say(format!("most values would be about {:.0} rpm, below idle", rpm(middle)), "rad/s")
+        }
+        Quantity::Current if unit == "mA" && size < 0.003 => {
+            say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
+        }
+        Quantity::Share if unit == "%" && !is_duty(entry.role) && size <= 0.0101 && size > 0.0 => {
+            say(format!("its greatest value is {:.2} %", 100.0 * size), "a share from 0 to 1 (unit `1`)")
+        }
+        Quantity::Pressure if size < 5e3 => {
+            say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
+        }
         _ => None,
     }
 }
 
 fn is_duty(role: Role) -> bool {
-    matches!(role, Role::OncomingDuty | Role::OffgoingDuty)
+    matches!(role, Role::OncomingDuty | Role::OffgoingDuty | Role::ElementDuty)
 }
 
 #[cfg(test)]
@@ -239,7 +254,29 @@ mod tests {
     fn summary(role: Role, unit_name: &str, values: &[f64]) -> RoleSummary {
         let mut extremes = Extremes::default();
         values.iter().for_each(|value| extremes.push(*value));
-        RoleSummary { role, counts: QualityCounts::default(), extremes, unit_name: unit_name.to_owned() }
+        RoleSummary {
+            role,
+            name: role.name().to_owned(),
+            counts: QualityCounts::default(),
+            extremes,
+            unit_name: unit_name.to_owned(),
+        }
+    }
+
+    #[test]
+    fn what_is_small_may_become_large() {
+        // An engine that is cranked, a valve without a command, a turbine that is held.
+        let begin = [
+            summary(Role::EngineSpeed, "rpm", &[11.3, 11.2]),
+            summary(Role::OncomingCurrent, "mA", &[0.0, 0.002]),
+            summary(Role::TurbineSpeed, "rpm", &[0.0, 1.2]),
+        ];
+        assert_eq!(findings(&begin, Seen::Beginning), Vec::new());
+        assert_eq!(findings(&begin, Seen::All).len(), 2);
+        let amperes = summary(Role::ElementCurrent, "A", &[0.0, 350.0]);
+        assert_eq!(findings(&[amperes], Seen::Beginning).len(), 1);
+        // 8 mA of noise.
+        assert_eq!(findings(&[summary(Role::OncomingCurrent, "mA", &[0.0, 0.008])], Seen::All), Vec::new());
     }
 
     #[test]
@@ -255,7 +292,7 @@ mod tests {
             (Role::OncomingPressure, "Pa", vec![0.2, 1.1], "a larger unit"),
         ];
         for (role, unit, values, likely) in cases {
-            let found = findings(&[summary(role, unit, &values)]);
+            let found = findings(&[summary(role, unit, &values)], Seen::All);
             assert!(found.len() == 1 && found[0].message.contains(&format!("looks like {likely}")), "{found:?}");
         }
     }
@@ -272,7 +309,7 @@ mod tests {
             summary(Role::TurbineSpeed, "rad/s", &speeds),
             summary(Role::OncomingCurrent, "A", &currents),
         ];
-        assert_eq!(findings(&right), []);
+        assert_eq!(findings(&right, Seen::All), []);
     }
 
     #[test]
@@ -290,7 +327,7 @@ mod tests {
             summary(Role::Throttle, "1", &[-0.2]),
         ];
         for entry in fine {
-            assert_eq!(findings(std::slice::from_ref(&entry)), Vec::new());
+            assert_eq!(findings(std::slice::from_ref(&entry), Seen::All), Vec::new());
         }
     }
 
@@ -302,7 +339,7 @@ mod tests {
                 let stands = [value; 200];
                 summary(role, "rad/s", if still == Some(role) { &stands } else { &values })
             });
-            findings(&speeds).into_iter().map(|found| (found.role, found.likely)).collect::<Vec<_>>()
+            findings(&speeds, Seen::All).into_iter().map(|found| (found.role, found.likely)).collect::<Vec<_>>()
         };
         assert_eq!(log(None, 0.0), Vec::new());
         for role in [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed] {
@@ -311,7 +348,7 @@ mod tests {
         // An engine that turns faster than the turbine can do so at one speed.
         assert_eq!(log(Some(Role::EngineSpeed), 400.0), Vec::new());
         let few = [(Role::TurbineSpeed, [180.0; 3]), (Role::OutputSpeed, [100.0, 200.0, 300.0])];
-        assert_eq!(findings(&few.map(|(role, values)| summary(role, "rad/s", &values))), Vec::new());
+        assert_eq!(findings(&few.map(|(role, values)| summary(role, "rad/s", &values)), Seen::All), Vec::new());
     }
 
     #[test]
@@ -326,6 +363,7 @@ mod tests {
             let value = |role, value| value * wrong.filter(|wrong| wrong.0 == role).map_or(1.0, |wrong| wrong.1);
             findings(
                 &speeds.map(|(role, most)| summary(role, unit, &[0.0, 0.2 * value(role, most), value(role, most)])),
+                Seen::All,
             )
         };
         let rpm = 30.0 / std::f64::consts::PI;

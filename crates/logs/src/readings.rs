@@ -9,7 +9,7 @@
 
 use crate::frozen::{FrozenSpeed, SPEEDS, Speeds};
 use crate::map::Resolved;
-use crate::plausibility::{Extremes, Likely};
+use crate::plausibility::{Extremes, Finding, Likely, Seen};
 use crate::samples::{Quality, QualityCounts};
 use crate::{ChannelMap, Combine, Log, LogError, Role, Samples, plausibility};
 
@@ -31,6 +31,8 @@ pub struct Reading {
 pub struct RoleSummary {
     /// The role.
     pub role: Role,
+    /// Its name in a channel map.
+    pub name: String,
     /// Samples of each quality.
     pub counts: QualityCounts,
     /// Extremes and middle of the good ones, in the unit of the role.
@@ -105,6 +107,7 @@ impl<'a> Readings<'a> {
     pub fn summary(&self) -> Vec<RoleSummary> {
         let summary = |channels: &Channels| RoleSummary {
             role: channels.resolved.entry.role,
+            name: channels.resolved.entry.key(),
             counts: channels.counts,
             extremes: channels.extremes,
             unit_name: channels.resolved.unit_name.clone(),
@@ -127,24 +130,25 @@ impl<'a> Readings<'a> {
         self.samples.resets()
     }
 
-    /// Checks units against what the values so far can be.
+    /// Checks units against what the first values can be.
     ///
     /// # Errors
     /// A unit is wrong by all appearances.
-    pub fn check_units(&self) -> Result<(), LogError> {
-        match plausibility::findings(&self.summary()).into_iter().next() {
-            Some(finding) => {
-                let (name, message) = (finding.role.name(), finding.message);
-                Err(LogError::map(match finding.likely {
-                    Likely::Unit(_) => {
-                        format!("{message}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`")
-                    }
-                    Likely::OtherChannel => format!(
-                        "{message}\nhint: check that `channel.{name}.name` is this signal and that its sensor works; `wetclutch inspect` shows least and greatest values"
-                    ),
-                    Likely::OtherSign => format!("{message}\nhint: set `channel.{name}.scale` to a negative number"),
-                }))
-            }
+    pub fn check_first_units(&self) -> Result<(), LogError> {
+        self.check_units(Seen::Beginning)
+    }
+
+    fn check_units(&self, seen: Seen) -> Result<(), LogError> {
+        match plausibility::findings(&self.summary(), seen).into_iter().next() {
+            Some(Finding { name, message, likely, .. }) => Err(LogError::map(match likely {
+                Likely::Unit(_) => {
+                    format!("{message}\nhint: set `channel.{name}.unit`, or use `--channel {name}=\"NAME [UNIT]\"`")
+                }
+                Likely::OtherChannel => format!(
+                    "{message}\nhint: check that `channel.{name}.name` is this signal and that its sensor works; `wetclutch inspect` shows least and greatest values"
+                ),
+                Likely::OtherSign => format!("{message}\nhint: set `channel.{name}.scale` to a negative number"),
+            })),
             None => Ok(()),
         }
     }
@@ -172,7 +176,7 @@ impl<'a> Readings<'a> {
                 )));
             }
         }
-        self.check_units()
+        self.check_units(Seen::All)
     }
 
     /// Gives the sample to a role; a reading if it is one.

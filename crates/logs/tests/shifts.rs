@@ -194,6 +194,34 @@ fn what_happens_in_a_hole_or_at_standstill_is_not_a_shift() {
     assert_eq!(gears(&drive.found(&SPEEDS)), [(1, 2)]);
 }
 
+/// The recording may pause as soon as a shift is over; what was seen of it is not forgotten.
+#[test]
+fn a_pause_of_the_recording_costs_nothing_of_the_shift_before_it() {
+    let drive = Drive { duration_s: 14.0, ..Drive::new(2, &[(6.0, 3)]) };
+    let roles = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::Gear, Role::TargetGear];
+    let gearbox = Gearbox { ratios: RATIOS.to_vec(), output_rad_per_m: Some(12.0), ..Gearbox::default() };
+    let readings = drive.readings(&roles);
+    let whole = found(&gearbox, &roles, &readings);
+    assert_eq!((gears(&whole), whole[0].load), (vec![(2, 3)], Load::PowerOn));
+    assert!(whole[0].quality.jerk_m_s3.is_some());
+    for pause_s in [2.0, 13.0, 16.0, 600.0] {
+        let mut paused = readings.clone();
+        for reading in paused.iter_mut().filter(|reading| reading.stamp_s > 7.6) {
+            reading.time_s += pause_s;
+            reading.stamp_s += pause_s;
+        }
+        assert_eq!(found(&gearbox, &roles, &paused), whole, "{pause_s} s");
+    }
+}
+
+#[test]
+fn readings_of_every_role_are_taken() {
+    let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
+    let readings: Vec<Reading> =
+        Role::all().map(|role| Reading { role, time_s: 1.0, stamp_s: 1.0, value: 1.0 }).collect();
+    assert_eq!(found(&gearbox, &SPEEDS, &readings), []);
+}
+
 #[test]
 fn an_engine_stands_for_a_turbine_that_is_not_measured() {
     let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };

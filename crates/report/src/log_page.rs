@@ -282,20 +282,16 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
     }
 }
 
+/// Points of a curve, in time.
+type Points = Vec<(f64, f64)>;
+
 /// A shift with some time around it.
 fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> Figure {
     let mut shift = shift.clone();
     shift.thin(points.max(1));
-    let samples = &shift.samples;
-    let of = |value: &dyn Fn(&LogSample) -> f64| -> Vec<(f64, f64)> {
-        samples.iter().map(|sample| (sample.time_s, value(sample))).collect()
-    };
-    // A channel that is slower than the steps has readings with gaps between them.
-    let measured = |value: &dyn Fn(&LogSample) -> Option<f64>| -> Vec<(f64, f64)> {
-        samples.iter().filter_map(|sample| Some((sample.time_s, value(sample)?))).collect()
-    };
+    let samples = Samples(&shift.samples);
     let readings = |i: usize| {
-        measured(&|sample: &LogSample| {
+        samples.measured(&|sample| {
             let input = &sample.input;
             let reading = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s][i]?;
             Some(rpm(reading.value))
@@ -307,66 +303,95 @@ fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> F
         points: readings(i),
     });
     let mut panels = vec![panel("speed (rpm)", 110.0, speeds.collect())];
-    let estimate = |points| Series { label: "estimate".to_owned(), stroke: ESTIMATE, points };
-    let truth = |points: Vec<(f64, f64)>| {
-        let measured = Series { label: "measured".to_owned(), stroke: Stroke::TRUTH, points };
-        (!measured.points.is_empty()).then_some(measured)
-    };
-    let band = |range: &dyn Fn(&LogSample) -> Option<[f64; 2]>| {
-        let end = |end: usize| of(&|sample| range(sample).map_or(f64::NAN, |range| range[end]));
-        Some(Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) })
-    };
     if let Some(estimated) = &shift.estimated {
         // After lock-up the pressure rises to that of the line, which no speed tells.
         let until_s = estimated.lock_up_s.unwrap_or(f64::INFINITY);
-        let most = |value: &dyn Fn(&LogSample) -> f64| {
-            let until = samples.iter().filter(|sample| sample.time_s <= until_s);
-            until.map(value).filter(|value| value.is_finite()).fold(0.0, f64::max)
-        };
-        let pressure_most = most(&|sample| {
-            let measured = sample.pressure_pa.map_or(0.0, |reading| reading.value);
-            mpa(sample.estimate.bounds.map_or(sample.estimate.pressure_pa, |b| b.pressure_pa[1]).max(measured))
-        });
-        let pressures = [
-            truth(measured(&|sample| Some(mpa(sample.pressure_pa?.value)))),
-            Some(estimate(of(&|sample| mpa(sample.estimate.pressure_pa)))),
-        ];
-        panels.push(Panel {
-            band: band(&|sample| Some(sample.estimate.bounds?.pressure_pa.map(mpa))),
-            axis: Axis::Within(0.0, 1.1 * pressure_most.max(0.01)),
-            ..panel("clutch pressure (MPa)", 150.0, pressures.into_iter().flatten().collect())
-        });
-        let torque_most = most(&|sample| {
-            let measured = sample.torque_n_m.map_or(0.0, |reading| reading.value);
-            let estimate = &sample.estimate;
-            estimate.bounds.map_or(estimate.clutch_torque_n_m, |b| b.clutch_torque_n_m[1]).max(measured)
-        });
-        let torques = [
-            truth(measured(&|sample| Some(sample.torque_n_m?.value))),
-            Some(estimate(of(&|sample| sample.estimate.clutch_torque_n_m))),
-        ];
-        panels.push(Panel {
-            band: band(&|sample| Some(sample.estimate.bounds?.clutch_torque_n_m)),
-            axis: Axis::Within(-0.1 * torque_most.max(1.0), 1.1 * torque_most.max(1.0)),
-            ..panel("clutch torque (N\u{a0}m)", 120.0, torques.into_iter().flatten().collect())
-        });
-        let shaft = measured(&|sample| sample.estimate.shaft_torque_n_m);
+        panels.extend([samples.pressure_panel(until_s), samples.torque_panel(until_s)]);
+        let shaft = samples.measured(&|sample| sample.estimate.shaft_torque_n_m);
         if !shaft.is_empty() {
             panels.push(panel("shaft torque (N\u{a0}m)", 100.0, vec![estimate(shaft)]));
         }
-        let title = match command {
-            CommandKind::Current => "current (A)",
-            CommandKind::DutyCycle => "duty cycle (%)",
-        };
-        let points = measured(&|sample| Some(sample.input.command?.value));
-        let command = Series { label: "oncoming valve".to_owned(), stroke: Stroke::SIGNAL, points };
-        panels.push(panel(title, 70.0, vec![command]));
+        panels.push(samples.command_panel(command));
         let is = |sample: &LogSample| Health::ALL.map(|health| health == sample.estimate.health);
-        let healths: Vec<_> = samples.iter().map(|sample| (sample.time_s, is(sample))).collect();
+        let healths: Vec<_> = samples.0.iter().map(|sample| (sample.time_s, is(sample))).collect();
         panels.extend(health_panel(&healths));
     }
     let [from_s, to_s] = shift.window_s;
     Figure { x_label: "time (s)", x_range: (from_s, to_s), spans: phases(&shift), panels }
+}
+
+fn estimate(points: Points) -> Series {
+    Series { label: "estimate".to_owned(), stroke: ESTIMATE, points }
+}
+
+/// The samples of a shift, as curves.
+struct Samples<'a>(&'a [LogSample]);
+
+impl Samples<'_> {
+    fn all(&self, value: &dyn Fn(&LogSample) -> f64) -> Points {
+        self.0.iter().map(|sample| (sample.time_s, value(sample))).collect()
+    }
+
+    /// A channel that is slower than the steps has readings with gaps between them.
+    fn measured(&self, value: &dyn Fn(&LogSample) -> Option<f64>) -> Points {
+        self.0.iter().filter_map(|sample| Some((sample.time_s, value(sample)?))).collect()
+    }
+
+    /// The estimate, with the measured values where there are any.
+    fn beside_measured(&self, measured: Points, value: &dyn Fn(&LogSample) -> f64) -> Vec<Series> {
+        let measured = Series { label: "measured".to_owned(), stroke: Stroke::TRUTH, points: measured };
+        let measured = (!measured.points.is_empty()).then_some(measured);
+        measured.into_iter().chain([estimate(self.all(value))]).collect()
+    }
+
+    fn band(&self, range: &dyn Fn(&LogSample) -> Option<[f64; 2]>) -> Option<Band> {
+        let end = |end: usize| self.all(&|sample| range(sample).map_or(f64::NAN, |range| range[end]));
+        Some(Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) })
+    }
+
+    /// The largest value up to a time; at least zero.
+    fn most(&self, until_s: f64, value: &dyn Fn(&LogSample) -> f64) -> f64 {
+        let until = self.0.iter().filter(|sample| sample.time_s <= until_s);
+        until.map(value).filter(|value| value.is_finite()).fold(0.0, f64::max)
+    }
+
+    fn pressure_panel(&self, until_s: f64) -> Panel {
+        let most = self.most(until_s, &|sample| {
+            let measured = sample.pressure_pa.map_or(0.0, |reading| reading.value);
+            mpa(sample.estimate.bounds.map_or(sample.estimate.pressure_pa, |b| b.pressure_pa[1]).max(measured))
+        });
+        let measured = self.measured(&|sample| Some(mpa(sample.pressure_pa?.value)));
+        let series = self.beside_measured(measured, &|sample| mpa(sample.estimate.pressure_pa));
+        Panel {
+            band: self.band(&|sample| Some(sample.estimate.bounds?.pressure_pa.map(mpa))),
+            axis: Axis::Within(0.0, 1.1 * most.max(0.01)),
+            ..panel("clutch pressure (MPa)", 150.0, series)
+        }
+    }
+
+    fn torque_panel(&self, until_s: f64) -> Panel {
+        let most = self.most(until_s, &|sample| {
+            let measured = sample.torque_n_m.map_or(0.0, |reading| reading.value);
+            let estimate = &sample.estimate;
+            estimate.bounds.map_or(estimate.clutch_torque_n_m, |b| b.clutch_torque_n_m[1]).max(measured)
+        });
+        let measured = self.measured(&|sample| Some(sample.torque_n_m?.value));
+        let series = self.beside_measured(measured, &|sample| sample.estimate.clutch_torque_n_m);
+        Panel {
+            band: self.band(&|sample| Some(sample.estimate.bounds?.clutch_torque_n_m)),
+            axis: Axis::Within(-0.1 * most.max(1.0), 1.1 * most.max(1.0)),
+            ..panel("clutch torque (N\u{a0}m)", 120.0, series)
+        }
+    }
+
+    fn command_panel(&self, command: CommandKind) -> Panel {
+        let title = match command {
+            CommandKind::Current => "current (A)",
+            CommandKind::DutyCycle => "duty cycle (%)",
+        };
+        let points = self.measured(&|sample| Some(sample.input.command?.value));
+        panel(title, 70.0, vec![Series { label: "oncoming valve".to_owned(), stroke: Stroke::SIGNAL, points }])
+    }
 }
 
 /// The phases, as the observer saw them or else as the ratio shows them.

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use config::Vehicle;
 use drivetrain::ReducedShift;
+use logs::shifts::Held;
 use logs::{Load, Shift};
 use observer::{ChannelHealth, Channels, Estimate, Health, Input, Phase, Reading};
 use trace::Cell;
@@ -56,9 +57,16 @@ const HELD_S: f64 = logs::shifts::LONGEST_S + logs::shifts::SETTLED_S + BEFORE_S
 const MOST_HELD: usize = 500_000;
 
 /// The last seconds of a log.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct RecentSamples {
     samples: VecDeque<LogSample>,
+    held: Held,
+}
+
+impl Default for RecentSamples {
+    fn default() -> Self {
+        Self { samples: VecDeque::new(), held: Held::new(HELD_S) }
+    }
 }
 
 impl RecentSamples {
@@ -69,9 +77,8 @@ impl RecentSamples {
             self.samples.pop_back();
         }
         self.samples.push_back(sample);
-        while self.samples.front().is_some_and(|first| sample.time_s - first.time_s > HELD_S)
-            || self.samples.len() > MOST_HELD
-        {
+        let oldest_s = self.held.oldest_s(sample.time_s);
+        while self.samples.front().is_some_and(|first| first.time_s < oldest_s) || self.samples.len() > MOST_HELD {
             self.samples.pop_front();
         }
     }

@@ -273,7 +273,7 @@ pub(crate) struct Simulate {
     /// Vehicle file with a gearbox, for a drive file; it replaces the one that the drive file names
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Scenario of the experiment to simulate; the files are then called NAME_SCENARIO
+    /// Scenario of the experiment to simulate; the files are then called NAME.SCENARIO
     #[arg(long, value_name = "NAME")]
     pub(crate) scenario: Option<String>,
     /// Folder for the signals

@@ -3,15 +3,16 @@
 use config::{Experiment, Vehicle};
 use report::bench_page;
 use report::tables::{coverage, number};
+use study::Bench;
 use study::bench::{BenchConsistency, BenchRow, open_loop};
 use trace::units;
 
-use crate::args::Bench;
+use crate::args;
 use crate::commands::{progress, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
-pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
+pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
     if let Some(vehicle) = &options.vehicle {
         return super::matrix::bench(options, vehicle);
     }
@@ -38,12 +39,29 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
         return Ok(());
     }
 
+    errors(&result)?;
+    ranking(&result)?;
+    ranges(&result)?;
+    if let Some(consistency) = &result.consistency {
+        output::line(&consistent(consistency))?;
+    }
+    failures(&result)?;
+    if let Some(folder) = &options.output {
+        output::line(&format!("\npage: {}", folder.join("bench.html").display()))?;
+    }
+    Ok(())
+}
+
+fn errors(result: &Bench) -> Result<(), Failure> {
     output::line("RMS error of the pressure in the torque phase / in the inertia phase, MPa\n")?;
     let names = result.rows.iter().take(1).flat_map(|row| row.cells.iter().map(|cell| cell.observer.clone()));
     let mut rows = vec![std::iter::once("scenario".to_owned()).chain(names).collect()];
     rows.extend(result.rows.iter().map(cells));
     output::table(1, &rows)?;
+    Ok(())
+}
 
+fn ranking(result: &Bench) -> Result<(), Failure> {
     output::line(
         "\nRMS error relative to that of the open loop, median and worst scenario; ranked by the median over the whole shift\n",
     )?;
@@ -77,7 +95,11 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
         ]
     }));
     output::table(1, &rows)?;
+    Ok(())
+}
 
+/// Coverage, width and cost of the guaranteed range.
+fn ranges(result: &Bench) -> Result<(), Failure> {
     if let Some(first) = result.ranking.first().filter(|s| s.range_least_coverage.is_some()) {
         let width = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |n_m| format!("{n_m:.0} N m"));
         output::line(&format!(
@@ -96,9 +118,11 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
             first.step_with_range_ns - first.step_ns,
         ))?;
     }
-    if let Some(consistency) = &result.consistency {
-        output::line(&consistent(consistency))?;
-    }
+    Ok(())
+}
+
+/// Observers that diverged, and scenarios without a completed shift.
+fn failures(result: &Bench) -> Result<(), Failure> {
     let diverged = result.ranking.iter().filter(|s| s.diverged > 0);
     let diverged: Vec<String> =
         diverged.map(|s| format!("{} in {} of {} scenarios", s.observer, s.diverged, result.completed())).collect();
@@ -111,9 +135,6 @@ pub(crate) fn bench(options: &Bench) -> Result<(), Failure> {
             "shift not completed within the simulated time, scenario not ranked: {}",
             missing.join(", ")
         ));
-    }
-    if let Some(folder) = &options.output {
-        output::line(&format!("\npage: {}", folder.join("bench.html").display()))?;
     }
     Ok(())
 }

@@ -57,28 +57,33 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
         }
         Kind::Study => {
             let study = Study::read(&options.file)?;
-            output::line(&format!(
-                "study {} \"{}\": {} runs ({}) over {} factors",
-                study.name,
-                study.title,
-                study.runs,
-                study.plan.name(),
-                study.factors.len()
-            ))?;
-            for factor in &study.factors {
-                let [low, high] = factor.values.taken().ends();
-                let sometimes = match &factor.values {
-                    Values::Sometimes(s) => {
-                        format!(", in {} % of the runs, otherwise {}", 100.0 * s.chance, s.otherwise)
-                    }
-                    _ => String::new(),
-                };
-                output::line(&format!("  {} from {low} to {high}{sometimes} ({})", factor.name, factor.key))?;
-            }
+            describe_study(&study)?;
             describe_experiment(&study.experiment)?;
             describe(&study.vehicle)
         }
     }
+}
+
+fn describe_study(study: &Study) -> Result<(), Failure> {
+    output::line(&format!(
+        "study {} \"{}\": {} runs ({}) over {} factors",
+        study.name,
+        study.title,
+        study.runs,
+        study.plan.name(),
+        study.factors.len()
+    ))?;
+    for factor in &study.factors {
+        let [low, high] = factor.values.taken().ends();
+        let sometimes = match &factor.values {
+            Values::Sometimes(s) => {
+                format!(", in {} % of the runs, otherwise {}", 100.0 * s.chance, s.otherwise)
+            }
+            _ => String::new(),
+        };
+        output::line(&format!("  {} from {low} to {high}{sometimes} ({})", factor.name, factor.key))?;
+    }
+    Ok(())
 }
 
 fn describe_experiment(experiment: &Experiment) -> Result<(), Failure> {

@@ -28,7 +28,7 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     let mut whole = Table::create(options.output.join(format!("{name}.csv")), &vehicle, |_| true)?;
     let path = options.output.join(format!("{name}_measured.csv"));
     let mut measured = Measured::create(path, &vehicle, &experiment)?;
-    if let Some(note) = size_note(&experiment) {
+    if let Some(note) = size_note(experiment.duration_s, experiment.sample_time_s, ROW_BYTES) {
         output::note(&note);
     }
     let mut rating = ShiftRating::new(&vehicle.shift);
@@ -143,10 +143,9 @@ const ROW_BYTES: f64 = 456.0;
 const LARGE_BYTES: f64 = 1e9;
 
 /// The size of the files, if they will be large.
-fn size_note(experiment: &Experiment) -> Option<String> {
-    let (duration_s, step_s) = (experiment.duration_s, experiment.sample_time_s);
+pub(super) fn size_note(duration_s: f64, step_s: f64, row_bytes: f64) -> Option<String> {
     let rows = (duration_s / step_s).round();
-    let bytes = rows * ROW_BYTES;
+    let bytes = rows * row_bytes;
     (bytes > LARGE_BYTES).then(|| {
         let giga = (1e-9 * bytes).round();
         format!(

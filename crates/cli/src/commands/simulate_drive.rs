@@ -11,9 +11,13 @@ use study::any_shift::recording::{lock_up_is_applied, reported_engine_n_m};
 use trace::units::km_h;
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
+use super::simulate::size_note;
 use crate::args::Simulate;
 use crate::failure::Failure;
 use crate::output;
+
+/// Bytes that a row takes in both files: those of the eight-speed car in `drives/city.toml`.
+const ROW_BYTES: f64 = 500.0;
 
 pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let drive = Drive::read(&options.experiment)?;
@@ -24,6 +28,9 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     if options.scenario.is_some() {
         let message = format!("{}: a drive has no scenarios\nhint: leave --scenario out", options.experiment.display());
         return Err(Failure::Input(message));
+    }
+    if let Some(note) = size_note(drive.duration_s(), drive.sample_time_s, ROW_BYTES) {
+        output::note(&note);
     }
     let name = drive.name.to_lowercase();
     let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;

@@ -1,9 +1,10 @@
 //! The shift clutches of a vehicle file.
 
 use drivetrain::{Clutch, ClutchValve, Cylinder};
+use observer::FillBudget;
 
 use super::raw::{RawClutch, RawVehicleFile};
-use super::{fill, valves};
+use super::{fill, fill_bounds, valves};
 use crate::ConfigError;
 use crate::check::{Check, Key};
 
@@ -27,6 +28,12 @@ pub struct ShiftClutch {
 }
 
 impl ShiftClutch {
+    /// Limits of the piston's stroke within the tolerances of an error budget that says nothing of it, with oil of this
+    /// temperature; none without a stroke.
+    pub fn standard_fill_budget(&self, oil_degc: f64) -> Option<FillBudget<f64>> {
+        self.has_stroke.then(|| fill_bounds::standard(&self.cylinder, oil_degc))
+    }
+
     /// Pressure on the plates, Pa, with this pressure at the valve's outlet and this oil in the cylinder.
     #[inline]
     pub fn pressure(&self, valve_pa: f64, volume_m3: f64) -> f64 {

@@ -58,16 +58,15 @@ pub(super) fn bounds(
         |key: &str, given: &Option<Numbers>, default| interval(check, key, given.as_ref(), 1.0, default, 0.05..=20.0);
     let volume = factors("volume_factor", &raw.volume_factor, VOLUME_FACTOR)?;
     let resistance = factors("resistance_factor", &raw.resistance_factor, RESISTANCE_FACTOR)?;
-    let oil = [oil_degc - OIL_K, oil_degc + OIL_K]
-        .map(|degc| degc.clamp(*OIL_TEMPERATURES_DEGC.start(), *OIL_TEMPERATURES_DEGC.end()));
+    let oil = oil_temperatures(oil_degc);
     let given = raw.oil_temperature_degc.as_ref();
     let [cold, hot] = interval(check, "oil_temperature_degc", given, oil_degc, oil, OIL_TEMPERATURES_DEGC)?;
     let number = |key: &str, given: &Option<Number>, default: f64, allowed| match given {
         Some(given) => check.number(key_of(key), given, allowed),
         None => Ok(default),
     };
-    let (flow, leak) = (cylinder.flow_max_m3_s, cylinder.leak_m3_s_pa);
-    let capacity = cylinder.capacity_m3_pa.max(cylinder.home_capacity_m3_pa);
+    let (flow, leak, capacity) = (cylinder.flow_max_m3_s, cylinder.leak_m3_s_pa, capacity(cylinder));
+    let standard = standard(cylinder, oil_degc);
     Ok(Some(FillBudget {
         volume_m3: volume.map(|factor| factor * cylinder.stroke_m3),
         preload_pressure_pa,
@@ -75,10 +74,36 @@ pub(super) fn bounds(
         supply: resistance.map(|factor| cylinder.supply.with_resistance_factor(factor)),
         exhaust: resistance.map(|factor| cylinder.exhaust.with_resistance_factor(factor)),
         viscosity_m2_s: [viscosity_m2_s(hot), viscosity_m2_s(cold)],
-        flow_max_m3_s: number("flow_max_m3_s", &raw.flow_max_m3_s, FLOW_SHARE * flow, 1e-7..=flow)?,
-        leak_m3_s_pa: number("leak_m3_s_pa", &raw.leak_m3_s_pa, LEAK_FACTOR * leak, leak..=1e-9)?,
-        capacity_m3_pa: number("capacity_m3_pa", &raw.capacity_m3_pa, CAPACITY_FACTOR * capacity, capacity..=1e-8)?,
+        flow_max_m3_s: number("flow_max_m3_s", &raw.flow_max_m3_s, standard.flow_max_m3_s, 1e-7..=flow)?,
+        leak_m3_s_pa: number("leak_m3_s_pa", &raw.leak_m3_s_pa, standard.leak_m3_s_pa, leak..=1e-9)?,
+        capacity_m3_pa: number("capacity_m3_pa", &raw.capacity_m3_pa, standard.capacity_m3_pa, capacity..=1e-8)?,
     }))
+}
+
+/// The limits of a cylinder's stroke within the tolerances above.
+pub(super) fn standard(cylinder: &Cylinder<f64>, oil_degc: f64) -> FillBudget<f64> {
+    let [cold, hot] = oil_temperatures(oil_degc);
+    FillBudget {
+        volume_m3: VOLUME_FACTOR.map(|factor| factor * cylinder.stroke_m3),
+        preload_pressure_pa: PLATEAU_FACTOR.map(|factor| factor * cylinder.preload_pa),
+        kiss_pressure_pa: PLATEAU_FACTOR.map(|factor| factor * cylinder.kiss_pa),
+        supply: RESISTANCE_FACTOR.map(|factor| cylinder.supply.with_resistance_factor(factor)),
+        exhaust: RESISTANCE_FACTOR.map(|factor| cylinder.exhaust.with_resistance_factor(factor)),
+        viscosity_m2_s: [viscosity_m2_s(hot), viscosity_m2_s(cold)],
+        flow_max_m3_s: FLOW_SHARE * cylinder.flow_max_m3_s,
+        leak_m3_s_pa: LEAK_FACTOR * cylinder.leak_m3_s_pa,
+        capacity_m3_pa: CAPACITY_FACTOR * capacity(cylinder),
+    }
+}
+
+fn oil_temperatures(oil_degc: f64) -> [f64; 2] {
+    [oil_degc - OIL_K, oil_degc + OIL_K]
+        .map(|degc| degc.clamp(*OIL_TEMPERATURES_DEGC.start(), *OIL_TEMPERATURES_DEGC.end()))
+}
+
+/// The greater of the capacities with the piston on its stop and at the plates, m^3/Pa.
+fn capacity(cylinder: &Cylinder<f64>) -> f64 {
+    cylinder.capacity_m3_pa.max(cylinder.home_capacity_m3_pa)
 }
 
 fn key_of(key: &str) -> String {

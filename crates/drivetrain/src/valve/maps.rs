@@ -2,6 +2,10 @@
 
 use crate::{Real, Table1};
 
+/// What is left of its way when a pressure at its furthest is taken to have arrived, Pa \[chosen\]: far below any reading. An
+/// exponential never arrives, and what stands still need not be computed again.
+const ARRIVED_PA: f64 = 1e-3;
+
 /// The proportional valve of the real car, `tau_cv dp/dt = -p + K_cv i(t - L_cv)`, Eq. (2.4), with lag, gain and
 /// delay that vary with the operating point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +57,9 @@ impl<T: Real> ValveMaps<T> {
     /// meet times `lag_factor[0]`, or at the nearest, with the longest times `lag_factor[1]`.
     #[inline]
     pub fn moved(&self, pressure_pa: T, settled_pa: T, dt_s: T, lag_factor: [T; 2], furthest: bool) -> T {
+        if furthest && (settled_pa - pressure_pa).abs() <= T::of(ARRIVED_PA) {
+            return settled_pa;
+        }
         let here = self.time_constant_s.place(pressure_pa);
         let lags = |to: T| {
             let there = self.time_constant_s.place(to);
@@ -93,6 +100,20 @@ mod tests {
         let settled = maps.settled_pressure(0.5);
         assert!((settled - 0.5e6).abs() < 1e-6);
         assert!((maps.pressure_rate(0.25e6, settled) - 0.25e6 / 0.08).abs() < 1e-6);
+    }
+
+    #[test]
+    fn only_at_the_furthest_a_pressure_arrives() {
+        let maps = ValveMaps {
+            time_constant_s: Table1::constant(0.05),
+            gain_pa_a: Table1::constant(1e6),
+            delay_s: Table1::constant(0.01),
+        };
+        for (start, end) in [(0.5 * ARRIVED_PA, 0.0), (0.2e6 - 0.5 * ARRIVED_PA, 0.2e6)] {
+            assert_eq!(maps.moved(start, end, 0.01, [0.5, 1.5], true), end);
+            let nearest = maps.moved(start, end, 0.01, [0.5, 1.5], false);
+            assert!((nearest - end).abs() > 0.3 * ARRIVED_PA && (nearest - end).abs() < (start - end).abs());
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! Readings go in one by one; some seconds of them are held in memory.
 
 mod gears;
+mod held;
 mod inside;
 mod quality;
 mod ratio;
@@ -14,6 +15,7 @@ mod track;
 use crate::map::check_ratios;
 use crate::{Gearbox, LogError, Reading, Role};
 use gears::{Change, Steady};
+pub use held::Held;
 pub use inside::GearsOfShift;
 use ratio::RatioWatch;
 use track::Track;
@@ -179,8 +181,8 @@ pub struct ShiftFinder {
     by_signal: Vec<Shift>,
 }
 
-/// Roles whose readings are held: all, by their place.
-const ROLES: usize = Role::OilTemperature as usize + 1;
+/// Roles whose readings are held, by their place: all before those of single elements, of which there are several channels.
+const ROLES: usize = Role::LockUpApplied as usize + 1;
 
 impl ShiftFinder {
     /// A finder for a gearbox and a log with these roles.
@@ -218,7 +220,9 @@ impl ShiftFinder {
     /// Takes a reading. Readings of each role come in the order of time.
     pub fn push(&mut self, reading: &Reading) {
         let Reading { role, time_s, value, .. } = *reading;
-        self.tracks[role as usize].push(time_s, value);
+        if let Some(track) = self.tracks.get_mut(role as usize) {
+            track.push(time_s, value);
+        }
         match role {
             Role::Gear => {
                 if let Some(change) = self.gear.push(time_s, self.gear_number(value)) {

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::held::Held;
 use super::track::Track;
 
 /// Below this output speed a ratio says nothing, rad/s.
@@ -61,7 +62,8 @@ pub(super) struct RatioWatch {
     /// Output readings for which the turbine speed is still to come.
     outputs: VecDeque<(f64, f64)>,
     raw: VecDeque<Point>,
-    held_s: f64,
+    held_outputs: Held,
+    held_points: Held,
     points: VecDeque<Point>,
     before: Option<InGear>,
     now: Option<InGear>,
@@ -80,7 +82,8 @@ impl RatioWatch {
             turbine: Track::new(held_s),
             outputs: VecDeque::new(),
             raw: VecDeque::new(),
-            held_s,
+            held_outputs: Held::new(held_s),
+            held_points: Held::new(held_s),
             points: VecDeque::new(),
             before: None,
             now: None,
@@ -96,7 +99,8 @@ impl RatioWatch {
     pub(super) fn output(&mut self, time_s: f64, rad_s: f64) {
         self.outputs.push_back((time_s, rad_s));
         // Without a turbine speed nothing is held for long.
-        while self.outputs.front().is_some_and(|(first_s, _)| time_s - first_s > self.held_s) {
+        let oldest_s = self.held_outputs.oldest_s(time_s);
+        while self.outputs.front().is_some_and(|(first_s, _)| *first_s < oldest_s) {
             self.outputs.pop_front();
         }
         self.join();
@@ -148,7 +152,8 @@ impl RatioWatch {
             (self.before, self.now) = (None, None);
         }
         self.points.push_back(point);
-        while self.points.front().is_some_and(|first| point.time_s - first.time_s > self.held_s) {
+        let oldest_s = self.held_points.oldest_s(point.time_s);
+        while self.points.front().is_some_and(|first| first.time_s < oldest_s) {
             self.points.pop_front();
         }
         let log = point.ratio.ln();

@@ -2,16 +2,18 @@
 
 use std::collections::VecDeque;
 
+use super::held::Held;
+
 /// Values of a signal with their times, the last seconds of them.
 #[derive(Debug, Clone)]
 pub(super) struct Track {
-    held_s: f64,
+    held: Held,
     values: VecDeque<(f64, f64)>,
 }
 
 impl Track {
     pub(super) fn new(held_s: f64) -> Self {
-        Self { held_s, values: VecDeque::new() }
+        Self { held: Held::new(held_s), values: VecDeque::new() }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -24,7 +26,8 @@ impl Track {
 
     pub(super) fn push(&mut self, time_s: f64, value: f64) {
         self.values.push_back((time_s, value));
-        while self.values.front().is_some_and(|(first_s, _)| time_s - first_s > self.held_s) {
+        let oldest_s = self.held.oldest_s(time_s);
+        while self.values.front().is_some_and(|(first_s, _)| *first_s < oldest_s) {
             self.values.pop_front();
         }
     }

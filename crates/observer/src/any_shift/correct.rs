@@ -30,7 +30,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             health[k] = self.correct(running, k, &reading, &rates);
         }
-        running.rates = rates.at(&running.x.mean);
+        running.rates = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &running.x));
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
             running.before = None;
         }
@@ -59,15 +59,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let sensor = &self.readings[k];
         let age_s = self.age(sensor, reading);
         let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.uncertainty.output_least_rad_s);
-        let rate = rates.at(&running.x.mean)[k];
+        let rate = rates.of(k, &running.x);
         // The speed at the time of the reading: `w - age w'`.
         let mut row = rates.rows[k].map(|x| -age_s * x);
         row[k] = row[k] + T::one();
         let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
         let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
-        let measured = Measured { row, value: reading.value + age_s * rates.rest[k], noise };
+        let innovation = reading.value - (running.x.mean[k] - age_s * rate);
+        let measured = Measured { row, innovation, noise };
         let mut look = running.x.look(&measured);
-        let (innovation, variance) = (look.innovation, look.variance);
+        let variance = look.variance;
         if k != WHEEL {
             let share = running.silent_s[k] / (running.silent_s[k] + T::of(MISFIT_S));
             running.misfit = running.misfit + share * (innovation * innovation / variance - running.misfit);

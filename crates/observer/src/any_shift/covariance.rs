@@ -18,8 +18,8 @@ pub(super) struct Gaussian<T> {
 /// A scalar measurement, as a row over the states.
 pub(super) struct Measured<T> {
     pub(super) row: [T; N],
-    /// Its value less what does not depend on the states.
-    pub(super) value: T,
+    /// Its value less what the states say.
+    pub(super) innovation: T,
     /// Variance of its noise.
     pub(super) noise: T,
 }
@@ -43,33 +43,31 @@ impl<T: Real> Gaussian<T> {
         Self { mean, covariance, active: N }
     }
 
-    /// Carries the first states on by their rows, and lets the others fade by their factors.
-    pub(super) fn pass(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE], stay: &[T; N]) {
-        if self.active <= IN_GEAR {
-            self.pass_first::<IN_GEAR>(rows, rest, stay);
-        } else {
-            self.pass_first::<N>(rows, rest, stay);
-        }
+    /// Whether only the states of a gear are active. Loops over a number of states that the compiler knows are unrolled; so
+    /// what is done most often is done by functions for the first `M` states.
+    fn in_gear(&self) -> bool {
+        self.active <= IN_GEAR
     }
 
-    /// The same for the first `M` states. With `M` known to the compiler the loops are unrolled.
-    fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE], stay: &[T; N]) {
-        let before = self.mean;
-        for (k, x) in self.mean.iter_mut().enumerate().take(M) {
-            *x = if k < CORE { dot(&rows[k], &before) + rest[k] } else { stay[k] * *x };
+    /// Carries the first states on by their rows; the others stay as they are.
+    pub(super) fn pass(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
+        if self.in_gear() { self.pass_first::<IN_GEAR>(rows, rest) } else { self.pass_first::<N>(rows, rest) }
+    }
+
+    fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
+        let mut mean = *rest;
+        for (mean, row) in mean.iter_mut().zip(rows) {
+            *mean = *mean + dot_first::<T, M>(row, &self.mean);
         }
+        self.mean[..CORE].copy_from_slice(&mean);
         let p = &mut self.covariance;
         let mut carried = [[T::zero(); M]; CORE];
         for (carried, row) in carried.iter_mut().zip(rows) {
             for (weight, p) in row.iter().zip(p.iter()).take(M) {
+                let Some(p) = p.first_chunk::<M>() else { continue };
                 for (x, p) in carried.iter_mut().zip(p) {
                     *x = *x + *weight * *p;
                 }
-            }
-        }
-        for (row, own) in p.iter_mut().zip(stay).take(M).skip(CORE) {
-            for (p, other) in row.iter_mut().zip(stay).take(M).skip(CORE) {
-                *p = *own * *other * *p;
             }
         }
         for i in 0..CORE {
@@ -77,11 +75,23 @@ impl<T: Real> Gaussian<T> {
                 let value = if j < CORE {
                     carried[i].iter().zip(&rows[j]).fold(T::zero(), |sum, (p, weight)| sum + *p * *weight)
                 } else {
-                    stay[j] * carried[i][j]
+                    carried[i][j]
                 };
                 p[i][j] = value;
                 p[j][i] = value;
             }
+        }
+    }
+
+    /// Lets a state fade by a factor.
+    pub(super) fn fade(&mut self, state: usize, factor: T) {
+        let (state, active) = (state.min(N - 1), self.active);
+        self.mean[state] = factor * self.mean[state];
+        for row in self.covariance.iter_mut().take(active) {
+            row[state] = factor * row[state];
+        }
+        for p in self.covariance[state].iter_mut().take(active) {
+            *p = factor * *p;
         }
     }
 
@@ -141,17 +151,18 @@ impl<T: Real> Gaussian<T> {
 
     /// Variance of a combination of the states.
     pub(super) fn variance(&self, row: &[T; N]) -> T {
-        dot(&self.with(row), row).max(T::zero())
+        let with = if self.in_gear() { self.with_first::<IN_GEAR>(row) } else { self.with_first::<N>(row) };
+        dot(&with, row).at_least(T::zero())
     }
 
-    /// Covariance of the states with a combination of them. Most combinations are of few states.
-    fn with(&self, row: &[T; N]) -> [T; N] {
+    /// Covariance of the first states with a combination of them. Some combinations are of few states.
+    fn with_first<const M: usize>(&self, row: &[T; N]) -> [T; N] {
         let mut with = [T::zero(); N];
-        for (per, p) in row.iter().zip(&self.covariance).take(self.active) {
-            if *per != T::zero() {
-                for (with, p) in with.iter_mut().zip(p) {
-                    *with = *with + *per * *p;
-                }
+        let Some(first) = with.first_chunk_mut::<M>() else { return with };
+        for (per, p) in row.iter().zip(&self.covariance).take(M) {
+            let Some(p) = p.first_chunk::<M>().filter(|_| *per != T::zero()) else { continue };
+            for (with, p) in first.iter_mut().zip(p) {
+                *with = *with + *per * *p;
             }
         }
         with
@@ -159,9 +170,13 @@ impl<T: Real> Gaussian<T> {
 
     /// What a measurement says beside the states.
     pub(super) fn look(&self, measured: &Measured<T>) -> Look<T> {
-        let with = self.with(&measured.row);
-        let variance = dot(&with, &measured.row).max(T::zero()) + measured.noise;
-        Look { innovation: measured.value - dot(&measured.row, &self.mean), variance, with }
+        if self.in_gear() { self.look_first::<IN_GEAR>(measured) } else { self.look_first::<N>(measured) }
+    }
+
+    fn look_first<const M: usize>(&self, measured: &Measured<T>) -> Look<T> {
+        let with = self.with_first::<M>(&measured.row);
+        let variance = dot_first::<T, M>(&with, &measured.row).at_least(T::zero()) + measured.noise;
+        Look { innovation: measured.innovation, variance, with }
     }
 
     /// Corrects by a measurement: `x + S e/V`, `P - S S'/V`. The product is made of two equal factors, so that `P` stays
@@ -170,23 +185,109 @@ impl<T: Real> Gaussian<T> {
         if look.variance <= T::zero() {
             return;
         }
+        if self.in_gear() { self.correct_first::<IN_GEAR>(look) } else { self.correct_first::<N>(look) }
+    }
+
+    fn correct_first<const M: usize>(&mut self, look: &Look<T>) {
         let per = look.variance.sqrt().recip();
-        let factor = look.with.map(|with| per * with);
-        for (i, (row, own)) in self.covariance.iter_mut().zip(&factor).enumerate().take(self.active) {
+        let Some(with) = look.with.first_chunk::<M>() else { return };
+        let factor = with.map(|with| per * with);
+        for (i, (row, own)) in self.covariance.iter_mut().zip(&factor).enumerate() {
+            let Some(row) = row.first_chunk_mut::<M>() else { continue };
             for (p, other) in row.iter_mut().zip(&factor) {
                 *p = *p - *own * *other;
             }
-            row[i] = row[i].max(T::zero());
+            if let Some(variance) = row.get_mut(i) {
+                *variance = variance.at_least(T::zero());
+            }
         }
         let innovation = per * look.innovation;
-        for (x, factor) in self.mean.iter_mut().zip(&factor).take(self.active) {
+        for (x, factor) in self.mean.iter_mut().zip(&factor) {
             *x = *x + *factor * innovation;
         }
     }
 
+    /// The value of a row over the states, of which those that are not active are zero.
+    #[inline]
+    pub(super) fn value(&self, row: &[T; N]) -> T {
+        if self.in_gear() { dot_first::<T, IN_GEAR>(row, &self.mean) } else { dot(row, &self.mean) }
+    }
+
     /// Whether all are numbers, and no variance is negative.
     pub(super) fn is_sound(&self) -> bool {
-        let variances = self.covariance.iter().enumerate().all(|(k, row)| row[k] >= T::zero() && row[k].is_finite());
-        variances && self.mean.iter().all(|x| x.is_finite())
+        let states = self.covariance.iter().zip(&self.mean).enumerate().take(self.active);
+        // What is no number, or infinite, makes a sum so.
+        let (sound, sum) = states.fold((true, T::zero()), |(sound, sum), (k, (row, x))| {
+            (sound & (row[k] >= T::zero()), sum + (row[k] + x.abs()))
+        });
+        sound && sum.is_finite()
+    }
+}
+
+/// The sum of the products of the first of two rows.
+#[inline]
+fn dot_first<T: Real, const M: usize>(a: &[T; N], b: &[T; N]) -> T {
+    a.iter().zip(b).take(M).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1 without order.
+    fn number(seed: usize) -> f64 {
+        (seed as f64 * 12.9898).sin() * 43758.5453 % 1.0
+    }
+
+    /// A covariance of the states of a gear; the others are independent of them.
+    fn states(active: usize) -> Gaussian<f64> {
+        let mut x = Gaussian::of([0.0; N], [1.0; N]);
+        for i in 0..IN_GEAR {
+            x.mean[i] = 10.0 * number(i);
+            for j in 0..IN_GEAR {
+                let product = |k: usize| number(7 * i + k) * number(7 * j + k);
+                x.covariance[i][j] += (20..30).map(product).sum::<f64>();
+            }
+        }
+        Gaussian { active, ..x }
+    }
+
+    #[test]
+    fn the_states_of_a_gear_are_those_of_the_whole() {
+        let row = |seed: usize| core::array::from_fn(|k| if k < IN_GEAR { number(seed + k) } else { 0.0 });
+        let rows = [row(100), row(200), row(300), row(400)];
+        let measured = Measured { row: row(500), innovation: 0.7, noise: 0.1 };
+        let after = |active: usize| {
+            let mut x = states(active);
+            x.pass(&rows, &[1.0, 2.0, 3.0, 4.0]);
+            x.fade(IN_GEAR - 1, 0.9);
+            let look = x.look(&measured);
+            x.correct(&look);
+            (x, ([look.variance, x.variance(&measured.row), x.value(&measured.row)], x.is_sound()))
+        };
+        let (gear, found) = after(IN_GEAR);
+        let (whole, all) = after(N);
+        assert_eq!((gear.mean, gear.covariance, found), (whole.mean, whole.covariance, all));
+        // The variance of what was measured is `1/(1/p + 1/r)`.
+        let ([before, after, _], sound) = found;
+        assert!(sound && (after - (before - measured.noise) * measured.noise / before).abs() < 1e-9);
+        for i in 0..N {
+            for j in 0..N {
+                assert_eq!(gear.covariance[i][j], gear.covariance[j][i]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_sound() {
+        for (k, wrong) in [(0, f64::NAN), (3, f64::INFINITY), (7, -1e-9)] {
+            let mut x = states(IN_GEAR);
+            assert!(x.is_sound());
+            x.covariance[k][k] = wrong;
+            assert!(!x.is_sound());
+            let mut x = states(IN_GEAR);
+            x.mean[k] = f64::NEG_INFINITY;
+            assert!(!x.is_sound());
+        }
     }
 }

@@ -4,10 +4,14 @@ use drivetrain::Real;
 
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
-use super::{PIECE_S, ShiftUncertainty, square};
+use super::{PIECE_S, ShiftUncertainty, pieces, square};
 use crate::bound::pressure_and_torque;
 use crate::kalman::valve_model::Commands;
 use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
+
+/// Distance from the pressure that the command ends at from which on the valve model rests there, Pa \[chosen\]: errors of a
+/// pressure are thousands of this.
+const RESTS_PA: f64 = 1.0;
 
 /// What is known of the errors of an element's pressure and kiss point, in their deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +46,19 @@ fn pressed<T: Real>(mean_pa: T, variance: T) -> (T, T) {
     }
 }
 
+/// The newest command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct NewestCommand<T> {
+    command: T,
+    /// The pressure that it ends at, Pa.
+    settled_pa: T,
+    age_s: T,
+    /// Since when all commands have been this one, s.
+    alike_s: T,
+    /// For how long the valve has rested where this command ends, s; none while it moves. Meanwhile `commands` stands still.
+    rests_s: Option<T>,
+}
+
 /// Memory of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ElementState<T> {
@@ -51,6 +68,7 @@ pub(super) struct ElementState<T> {
     rate_pa_s: T,
     /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
     per_lag_pa: T,
+    newest: Option<NewestCommand<T>>,
     range: Option<PressureRange<T>>,
 }
 
@@ -61,6 +79,7 @@ impl<T: Real> ElementState<T> {
             valve_pa: T::zero(),
             rate_pa_s: T::zero(),
             per_lag_pa: T::zero(),
+            newest: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
         }
     }
@@ -75,37 +94,83 @@ impl<T: Real> ElementState<T> {
         dt_s: T,
     ) -> ChannelHealth {
         if dt_s > T::zero() {
-            let before_pa = self.valve_pa;
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, super::MOST_PIECES);
-            let piece_s = dt_s / T::of(pieces as f64);
-            for _ in 0..pieces {
-                self.commands.pass(piece_s);
-                let settled_pa = element.valve.target_pa(&self.commands, piece_s);
-                let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
-                let before_pa = self.valve_pa;
-                self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
-                self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
-            }
-            self.rate_pa_s = (self.valve_pa - before_pa) / dt_s;
+            self.pass(element, limits, dt_s);
         }
         let usable = command.filter(|reading| limits.usable_command(reading));
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
             range.step(budget, dt_s, usable, limits.command_max);
         }
         match (command, usable) {
-            (None, _) if !self.commands.is_fresh(T::of(LOST_S)) => ChannelHealth::Lost,
+            (None, _) if self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
             (Some(_), Some(reading)) => {
-                let settled_pa = element.valve.valve.settled_pressure(reading.value);
-                if self.commands.newest_pa().is_none() {
-                    // The first command is taken to have stood for long.
-                    self.valve_pa = limits.possible_pressure(settled_pa);
-                }
-                self.commands.send(reading.age_s, settled_pa, element.valve.needed_s(T::of(PIECE_S)));
+                self.take(element, limits, &reading);
                 ChannelHealth::Good
             }
         }
+    }
+
+    /// Carries the valve on, unless it rests.
+    #[inline]
+    fn pass(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+        if let Some(newest) = &mut self.newest {
+            (newest.age_s, newest.alike_s) = (newest.age_s + dt_s, newest.alike_s + dt_s);
+            if let Some(rests_s) = &mut newest.rests_s {
+                *rests_s = *rests_s + dt_s;
+                return;
+            }
+        }
+        self.move_valve(element, limits, dt_s);
+        if let Some(newest) = &mut self.newest {
+            let end_pa = limits.possible_pressure(newest.settled_pa);
+            let near = (self.valve_pa - end_pa).abs().at_least(self.per_lag_pa.abs()) <= T::of(RESTS_PA);
+            if near && newest.alike_s - dt_s >= element.valve.delay_s {
+                (self.valve_pa, self.rate_pa_s, self.per_lag_pa) = (end_pa, T::zero(), T::zero());
+                newest.rests_s = Some(T::zero());
+            }
+        }
+    }
+
+    fn move_valve(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+        let start_pa = self.valve_pa;
+        let (pieces, piece_s) = pieces(dt_s);
+        for _ in 0..pieces {
+            self.commands.pass(piece_s);
+            let settled_pa = element.valve.target_pa(&self.commands, piece_s);
+            let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
+            let before_pa = self.valve_pa;
+            self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
+            self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
+        }
+        self.rate_pa_s = (self.valve_pa - start_pa) / dt_s;
+    }
+
+    /// Takes a usable command.
+    #[inline]
+    fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
+        let needed_s = element.valve.needed_s(T::of(PIECE_S));
+        if let Some(newest) = &mut self.newest {
+            // Commands arrive in their order.
+            newest.age_s = newest.age_s.at_most(reading.age_s);
+            if newest.command == reading.value {
+                if newest.rests_s.is_none() {
+                    self.commands.send(newest.age_s, newest.settled_pa, needed_s);
+                }
+                return;
+            }
+            if let Some(rests_s) = newest.rests_s {
+                self.commands.pass(rests_s);
+            }
+        }
+        let settled_pa = element.valve.valve.settled_pressure(reading.value);
+        if self.newest.is_none() {
+            // The first command is taken to have stood for long.
+            self.valve_pa = limits.possible_pressure(settled_pa);
+        }
+        let age_s = self.newest.map_or(reading.age_s, |newest| newest.age_s);
+        self.commands.send(age_s, settled_pa, needed_s);
+        self.newest = Some(NewestCommand { command: reading.value, settled_pa, age_s, alike_s: age_s, rests_s: None });
     }
 
     /// Forgets the range and the rate: time was lost, and with it commands.
@@ -119,8 +184,8 @@ impl<T: Real> ElementState<T> {
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
     pub(super) fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
-        let moving = (u.valve_lag_share * self.per_lag_pa).hypot(u.valve_delay_s * self.rate_pa_s);
-        moving.hypot(u.pressure_pa)
+        let moving = square(u.valve_lag_share * self.per_lag_pa) + square(u.valve_delay_s * self.rate_pa_s);
+        (moving + square(u.pressure_pa)).sqrt()
     }
 
     /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
@@ -165,7 +230,7 @@ impl<T: Real> ElementState<T> {
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
         let per_force = shift.alpha.abs() * friction * clutch.lever();
         let capacity = per_force * clutch.clamp_force(self.valve_pa);
-        let wrong_pa = self.deviation_pa(u).hypot(u.kiss_deviation_pa(clutch));
+        let wrong_pa = (square(self.deviation_pa(u)) + square(u.kiss_deviation_pa(clutch))).sqrt();
         let wrong = per_force * clutch.piston_area_m2 * wrong_pa;
         [capacity * (one + u.torque_share), capacity * (one + three * u.torque_share) + three * wrong]
     }
@@ -174,5 +239,72 @@ impl<T: Real> ElementState<T> {
     pub(super) fn ranges(&self, element: &FrictionElement<T>, slip_rad_s: Option<[T; 2]>) -> Option<([T; 2], [T; 2])> {
         let (range, budget) = (self.range.as_ref()?, element.budget.as_ref()?);
         Some(pressure_and_torque(&element.clutch, budget, range, slip_rad_s))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ValveModel;
+    use drivetrain::{Clutch, ClutchValve, Table1, ValveMaps};
+
+    const LIMITS: InputLimits<f64> =
+        InputLimits { speed_max_rad_s: 1e3, command_max: 1.2, pressure_max_pa: 1.1e6, shaft_torque_max_n_m: 1e4 };
+
+    fn element() -> FrictionElement<f64> {
+        let maps = ValveMaps {
+            time_constant_s: Table1::new(&[0.0, 1e5, 1e6], &[0.1, 0.06, 0.03]).unwrap(),
+            gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[0.7e6, 1.0e6, 1.2e6]).unwrap(),
+            delay_s: Table1::constant(0.015),
+        };
+        FrictionElement {
+            clutch: Clutch {
+                mean_radius_m: 0.13,
+                friction_faces: 3.0,
+                piston_area_m2: 0.01,
+                return_spring_n: 600.0,
+                friction: Table1::constant(0.13),
+                static_friction: 0.14,
+            },
+            valve: ValveModel { valve: ClutchValve::Proportional(maps), delay_s: 0.015 },
+            budget: None,
+        }
+    }
+
+    /// With late and missing readings, and commands above what the supply gives.
+    #[test]
+    fn a_valve_that_rests_goes_on_as_one_that_never_does() {
+        let element = element();
+        let mut rests = ElementState::new(&element, &LIMITS);
+        let (mut moves, mut rested) = (rests, 0);
+        for k in 0..6000_usize {
+            // Every new command is late, after two that were lost or out of order.
+            let (held, at) = (k / 495, k % 11);
+            let value = [0.3, 0.0, 1.0, 0.31, 0.9][held % 5];
+            let age_s = if at == 0 { 0.025 } else { 0.0 };
+            let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
+            let health = [&mut rests, &mut moves]
+                .map(|valve: &mut ElementState<f64>| valve.step(&element, &LIMITS, command, 0.01));
+            assert_eq!(health[0], health[1]);
+            // So it never begins to rest.
+            moves.newest.iter_mut().for_each(|newest| newest.alike_s = 0.0);
+            rested += usize::from(rests.rate_pa_s == 0.0);
+            assert!((rests.valve_pa - moves.valve_pa).abs() <= RESTS_PA, "{k}: {} {}", rests.valve_pa, moves.valve_pa);
+            assert!((rests.per_lag_pa - moves.per_lag_pa).abs() <= RESTS_PA, "{k}");
+            assert!((rests.rate_pa_s - moves.rate_pa_s).abs() <= 100.0 * RESTS_PA, "{k}");
+        }
+        assert!(rested > 3000 && moves.newest.is_some_and(|newest| newest.rests_s.is_none()), "{rested}");
+    }
+
+    #[test]
+    fn a_command_that_is_lost_while_the_valve_rests_is_said_to_be() {
+        let element = element();
+        let mut state = ElementState::new(&element, &LIMITS);
+        (0..500).for_each(|_| {
+            state.step(&element, &LIMITS, Some(Reading::now(0.3)), 0.01);
+        });
+        assert!(state.newest.is_some_and(|newest| newest.rests_s.is_some()));
+        let health: [ChannelHealth; 200] = core::array::from_fn(|_| state.step(&element, &LIMITS, None, 0.01));
+        assert_eq!((health[0], health[199]), (ChannelHealth::Absent, ChannelHealth::Lost));
     }
 }

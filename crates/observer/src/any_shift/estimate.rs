@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 use super::elements::{ElementState, PressureError};
-use super::powertrain::{ClutchTorque, dot};
+use super::powertrain::ClutchTorque;
 use super::{
     AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE, SHARE,
     SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
@@ -101,7 +101,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             (_, _, true) => Health::ReadingRefused,
             _ => Health::Good,
         });
-        let valve_pa = state.elements.map(|element| element.map_or(T::zero(), |element| element.valve_pa));
+        let valve_pa =
+            state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), |element| element.valve_pa));
         let estimate = &mut state.estimate;
         *estimate = ShiftEstimate { valve_pa, channels: *channels, commands: *commands, ..ShiftEstimate::nothing() };
         match &state.running {
@@ -217,7 +218,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             row[KISS[c]] = own.per_kiss_n_m;
             row[PRESSURE[c]] = own.per_pressure_n_m;
         }
-        let mut torque = dot(&row, &x.mean) + rest;
+        let mut torque = x.value(&row) + rest;
         if !holds && torque * own.per_pressure_n_m <= zero {
             // A slipping clutch does not push.
             torque = zero;

@@ -49,7 +49,7 @@ use elements::ElementState;
 use learnt::{ACTING, Acting, Correlations, Known};
 use newest::Newest;
 use phases::{Contact, PhaseMemory, Slip};
-use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, tied};
+use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
 use turbine::InputSide;
 
 pub use estimate::{ClutchEstimate, ShiftEstimate};
@@ -250,7 +250,13 @@ struct Running<T> {
 impl<T: Real> ShiftUncertainty<T> {
     /// Standard deviation of an element's kiss point, Pa: what lasts is an own one and that of the valve's gain.
     fn kiss_deviation_pa(&self, clutch: &Clutch<T>) -> T {
-        self.kiss_point_pa.hypot(self.valve_gain * clutch.kiss_pressure()) / self.slow_part.sqrt()
+        let by_gain_pa = self.valve_gain * clutch.kiss_pressure();
+        ((square(self.kiss_point_pa) + square(by_gain_pa)) / self.slow_part).sqrt()
+    }
+
+    /// Times in which the errors of turbine torque and pressure fade, s.
+    fn fading_s(&self) -> [T; 2] {
+        [self.turbine_share_s, self.pressure_s]
     }
 
     /// The same in another precision.
@@ -379,7 +385,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Follows the shift command.
     fn take_gear(&self, state: &mut AnyShiftState<T>, command: GearCommand) -> Health {
-        let speeds = self.measured(&state.newest, state.running.as_ref());
         let (learnt, fading_s) = (&mut state.learnt, &mut state.fading_s);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.from == command.to;
@@ -396,6 +401,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             _ => match self.tables.shift(command.from, command.to).filter(|_| !in_gear) {
                 Some(shift) => {
+                    let speeds = self.measured(&state.newest, Some(running));
                     let slips = shift.clutches.map(|clutch| self.slip(clutch.ratio, speeds));
                     self.begin_shift(running, *shift, slips, learnt, core::mem::replace(fading_s, T::zero()));
                     Health::Good
@@ -413,6 +419,15 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
 fn square<T: Real>(x: T) -> T {
     x * x
+}
+
+/// The pieces in which a time step is predicted, and the length of one, s.
+fn pieces<T: Real>(dt_s: T) -> (usize, T) {
+    if dt_s <= T::of(PIECE_S) {
+        return (1, dt_s);
+    }
+    let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+    (pieces, dt_s / T::of(pieces as f64))
 }
 
 /// A deviation as a share of a value and beside it.

@@ -63,12 +63,15 @@ impl<T: Real> Newest<T> {
         if line_s > T::of(LONGEST_S) || step_s <= T::zero() {
             return false;
         }
+        let distance = (value - self.at(age_s)).abs() - T::of(JERK_RAD_S3) * step_s * step_s.at_least(line_s);
+        if distance <= T::zero() {
+            return false;
+        }
         let reach = step_s / line_s;
         // Of the line's end, whose ends err by one deviation each, and of the reading.
         let one = T::one();
         let noise = deviation * ((one + reach) * (one + reach) + reach * reach + one).sqrt();
-        let most = T::of(DEVIATIONS) * noise + T::of(JERK_RAD_S3) * step_s * step_s.max(line_s);
-        (value - self.at(age_s)).abs() > most
+        distance > T::of(DEVIATIONS) * noise
     }
 
     /// Lets time pass.
@@ -81,6 +84,9 @@ impl<T: Real> Newest<T> {
 
     /// The speed a time ago, on the lines through the readings; before the oldest that reading.
     pub(super) fn at(&self, age_s: T) -> T {
+        if age_s == self.age_s {
+            return self.value;
+        }
         let mut late = (self.value, self.age_s);
         for early in self.before.into_iter().flatten() {
             let span_s = early.1 - late.1;
@@ -113,7 +119,11 @@ impl<T: Real> Newest<T> {
         let (value, drift) = (self.value + rate * self.age_s, bent + late);
         // The spread of the ages is that of a wheel that turns at half its reading or faster.
         let turns = value.abs() - drift >= half * self.value.abs() || self.late_s <= T::zero();
-        turns.then(|| SpeedNow { value, deviation: deviation * (one + reach).hypot(reach), drift })
+        turns.then(|| SpeedNow {
+            value,
+            deviation: deviation * ((one + reach) * (one + reach) + reach * reach).sqrt(),
+            drift,
+        })
     }
 }
 

@@ -11,6 +11,7 @@
 
 use drivetrain::{Driveline, Real};
 
+use super::covariance::Gaussian;
 use super::{
     FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SLOW_SHARE, SPEEDS, SPRING, TURBINE, WHEEL,
 };
@@ -199,10 +200,23 @@ impl<T: Real> Rates<T> {
         rates
     }
 
-    /// The rates at this mean, rad/s^2.
-    pub(super) fn at(&self, mean: &[T; N]) -> [T; SPEEDS] {
-        core::array::from_fn(|k| dot(&self.rows[k], mean) + self.rest[k])
+    /// One of the rates at the mean of the states, rad/s^2.
+    #[inline]
+    pub(super) fn of(&self, k: usize, x: &Gaussian<T>) -> T {
+        let k = k.min(SPEEDS - 1);
+        x.value(&self.rows[k]) + self.rest[k]
     }
+}
+
+/// The rate of the output speed as a row over the states, and what is left beside it, rad/s^2.
+pub(super) fn output_rate<T: Real>(
+    g: &Response<T>,
+    torques: &Torques<T>,
+    line: &Driveline<T>,
+    wheels_kg_m2: T,
+) -> ([T; N], T) {
+    let equations = Equations::new(g, line, wheels_kg_m2);
+    row(&equations.a[OUTPUT], &equations.b[OUTPUT], torques)
 }
 
 /// The sum of the products of two rows.
@@ -219,11 +233,13 @@ pub(super) struct Motion<T> {
     phi: [[T; CORE]; CORE],
     /// Its integral times what drives the states.
     gamma: [[T; DRIVES]; CORE],
+    /// What is left after the step of errors that fade: of turbine torque and pressure.
+    pub(super) stay: [T; 2],
 }
 
 impl<T: Real> Motion<T> {
     /// By the series of the matrix exponential.
-    pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T) -> Self {
+    pub(super) fn new(g: Response<T>, line: &Driveline<T>, wheels_kg_m2: T, dt_s: T, fading_s: [T; 2]) -> Self {
         let (zero, one) = (T::zero(), T::one());
         let Equations { a, b } = Equations::new(&g, line, wheels_kg_m2);
         // sum of (A h)^n/n!, and of h (A h)^n/(n+1)!.
@@ -255,7 +271,7 @@ impl<T: Real> Motion<T> {
                 *x = integral.iter().zip(&b).fold(zero, |sum, (i, b)| sum + *i * b[c]);
             }
         }
-        Self { of: (g, dt_s), phi, gamma }
+        Self { of: (g, dt_s), phi, gamma, stay: fading_s.map(|time_s| (-dt_s / time_s).exp()) }
     }
 
     /// The first states at the end as rows over all states, and what is left beside them.
@@ -315,11 +331,12 @@ mod tests {
     fn a_step_is_the_solution_of_the_rates() {
         for g in [free(&MASS), tied(4.7, MASS[1][1] + 2.0 * 4.7 * MASS[0][1] + 4.7 * 4.7 * MASS[0][0])] {
             let torques = torques();
-            let (rows, rest) = Motion::new(g, &LINE, WHEELS_KG_M2, 0.01).rows(&torques);
+            let (rows, rest) = Motion::new(g, &LINE, WHEELS_KG_M2, 0.01, [1.0; 2]).rows(&torques);
             let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
-            let mut x = state();
+            let mut x = Gaussian::of(state(), [0.0; N]);
             for _ in 0..100_000 {
-                let speeds = rates.at(&x);
+                let speeds: [f64; SPEEDS] = core::array::from_fn(|k| rates.of(k, &x));
+                let x = &mut x.mean;
                 let twist = x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE];
                 for k in 0..SPEEDS {
                     x[k] += 1e-7 * speeds[k];
@@ -328,7 +345,8 @@ mod tests {
             }
             for k in 0..CORE {
                 let whole = dot(&rows[k], &state()) + rest[k];
-                assert!((whole - x[k]).abs() < 2e-4 * (1.0 + x[k].abs()), "{k}: {whole} {}", x[k]);
+                let small = x.mean[k];
+                assert!((whole - small).abs() < 2e-4 * (1.0 + small.abs()), "{k}: {whole} {small}");
             }
         }
     }
@@ -345,8 +363,9 @@ mod tests {
     fn power_is_conserved_while_both_slip() {
         let (torques, g) = (torques(), free(&MASS));
         let rates = Rates::new(&g, &torques, &LINE, WHEELS_KG_M2);
-        let x = state();
-        let [turbine, output, wheel] = rates.at(&x);
+        let states = Gaussian::of(state(), [0.0; N]);
+        let [turbine, output, wheel] = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &states));
+        let x = states.mean;
         let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
             + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
         let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);

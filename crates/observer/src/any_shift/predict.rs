@@ -2,8 +2,8 @@
 
 use super::{
     AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, LOAD, MAX_ELEMENTS,
-    MODEL_SHARE, MOST_PIECES, Motion, N, OUTPUT, PIECE_S, PRESSURE, RATE, Rates, Response, Running, SHARE, SHARE_S,
-    SPRING, ShiftRow, TURBINE, TWIST_S, Torques, WHEEL, free, powertrain, square, tied, turbine,
+    MODEL_SHARE, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SHARE, SHARE_S, SPRING, ShiftRow, TURBINE,
+    TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
 };
 use drivetrain::Real;
 
@@ -71,9 +71,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let now = self.torques(running, elements, torque, speeds);
         let mean = running.torques.map_or(now, |before| before.mean(&now)).without(running.phase.phase.holding());
         if dt_s > T::zero() {
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+            let (pieces, piece_s) = pieces(dt_s);
             for _ in 0..pieces {
-                self.predict(running, &mean, torque.noise, dt_s / T::of(pieces as f64));
+                self.predict(running, &mean, torque.noise, piece_s);
             }
         }
         for silent_s in &mut running.silent_s {
@@ -86,30 +86,24 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     pub(super) fn predict(&self, running: &mut Running<T>, torques: &Torques<T>, torque_noise: T, dt_s: T) {
         let (u, response) = (&self.uncertainty, self.response(running));
-        let motion = match running.motion {
-            Some(motion) if motion.of == (response, dt_s) => motion,
-            _ => Motion::new(response, &self.driveline, self.wheels_kg_m2, dt_s),
-        };
-        running.motion = Some(motion);
+        running.motion.take_if(|motion| motion.of != (response, dt_s));
+        let new = || Motion::new(response, &self.driveline, self.wheels_kg_m2, dt_s, u.fading_s());
+        let motion = running.motion.get_or_insert_with(new);
         let (rows, rest) = motion.rows(torques);
-        let mut stay = [T::one(); N];
-        let share = (-dt_s / u.turbine_share_s).exp();
-        stay[SHARE] = share;
+        let (by_torque, [share, pressure]) = (motion.per_turbine_torque(), motion.stay);
         let in_shift = running.shift.is_some();
-        let pressure = if in_shift { (-dt_s / u.pressure_s).exp() } else { T::one() };
-        for state in PRESSURE {
-            stay[state] = pressure;
-        }
         let twist_rate =
             self.driveline.twist_rate(running.x.mean[OUTPUT], running.x.mean[WHEEL]) + running.x.mean[RATE];
         let x = &mut running.x;
-        x.pass(&rows, &rest, &stay);
+        x.pass(&rows, &rest);
+        x.fade(SHARE, share);
         // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
         let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;
         x.add(SPRING, SPRING, T::of(2.0 * TWIST_S) * dt_s * square(by_stiffness));
         if in_shift {
             let walked = u.friction_walk(dt_s);
             for c in 0..2 {
+                x.fade(PRESSURE[c], pressure);
                 x.add(FRICTION[c], FRICTION[c], walked);
                 x.add(PRESSURE[c], PRESSURE[c], T::one() - pressure * pressure);
                 if let Some(before) = &mut running.before {
@@ -121,7 +115,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             x.add(state, state, walk * walk * dt_s);
         }
         x.add(SHARE, SHARE, u.turbine_share * u.turbine_share * (T::one() - share * share));
-        let by_torque = motion.per_turbine_torque();
         for i in 0..CORE {
             for j in i..CORE {
                 x.add(i, j, torque_noise * by_torque[i] * by_torque[j]);
@@ -158,14 +151,18 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         speeds: [T; 2],
     ) {
         let Some(shift) = running.shift else { return };
+        let holding = running.phase.phase.holding();
         let contact = |c: usize| {
-            let clutch = &shift.clutches[c];
+            let (clutch, slip) = (&shift.clutches[c], self.slip(shift.clutches[c].ratio, speeds));
+            if slip.is_over() || holding.is_some_and(|held| held != c) {
+                // Its slip alone decides.
+                return Contact { slip, needed_n_m: T::zero(), holds_n_m: [T::zero(); 2] };
+            }
             let holds_n_m = self
                 .element(elements, clutch.element)
                 .map_or([T::zero(); 2], |(memory, element)| memory.holds(element, clutch, &self.uncertainty));
             let (row, rest) = self.held_torque(&shift, c, torques);
-            let needed_n_m = powertrain::dot(&row, &running.x.mean) + rest;
-            Contact { slip: self.slip(clutch.ratio, speeds), needed_n_m, holds_n_m }
+            Contact { slip, needed_n_m: running.x.value(&row) + rest, holds_n_m }
         };
         let contacts = [contact(0), contact(1)];
         let before = running.phase.phase;
@@ -199,15 +196,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn held_torque(&self, shift: &ShiftRow<T>, held: usize, torques: &Torques<T>) -> ([T; N], T) {
         let ratio = shift.clutches[held.min(1)].ratio;
         let torques = torques.without(Some(held));
-        let rates = Rates::new(&tied(ratio, shift.inertia_at(ratio)), &torques, &self.driveline, self.wheels_kg_m2);
-        let (mut row, mut rest) = torques.row([T::one(), T::zero()]);
-        for k in [TURBINE, OUTPUT] {
-            let mass = shift.mass_kg_m2[0][k];
-            rest = rest - mass * rates.rest[k];
-            for (x, rate) in row.iter_mut().zip(&rates.rows[k]) {
-                *x = *x - mass * *rate;
-            }
+        let g = tied(ratio, shift.inertia_at(ratio));
+        let (rates, rate) = output_rate(&g, &torques, &self.driveline, self.wheels_kg_m2);
+        let (mut row, rest) = torques.row([T::one(), T::zero()]);
+        // The turbine's rate is the ratio times that of the output.
+        let mass = ratio * shift.mass_kg_m2[0][TURBINE] + shift.mass_kg_m2[0][OUTPUT];
+        for (x, rate) in row.iter_mut().zip(&rates) {
+            *x = *x - mass * *rate;
         }
-        (row, rest)
+        (row, rest - mass * rate)
     }
 }

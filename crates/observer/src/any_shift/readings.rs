@@ -2,8 +2,8 @@
 
 use super::{
     AnyShiftFilter, AnyShiftState, ChannelHealth, Channels, Engine, FIRST_S, GearCommand, InputSide, LOST_S,
-    MAX_ELEMENTS, MOST_PIECES, Newest, OUTPUT, PIECE_S, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading,
-    TURBINE, Verdict, turbine,
+    MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, pieces,
+    square, turbine,
 };
 use drivetrain::Real;
 
@@ -31,15 +31,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// The health of all commands together: a refused one first, then a lost one of an element that shifts, which is what the
     /// estimate rests on.
     pub(super) fn of_commands(&self, each: &[ChannelHealth; MAX_ELEMENTS], gear: GearCommand) -> ChannelHealth {
-        let shifts = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
-        let lost = shifts.is_some_and(|shift| {
-            shift.clutches.iter().any(|clutch| each.get(clutch.element) == Some(&ChannelHealth::Lost))
-        });
-        if each.contains(&ChannelHealth::Refused) {
+        let is = |health: ChannelHealth| each.contains(&health);
+        let lost = || {
+            let shift = self.tables.shift(gear.from, gear.to).filter(|_| gear.from != gear.to);
+            let elements = shift.map(|shift| shift.clutches.map(|clutch| clutch.element));
+            elements.into_iter().flatten().any(|element| each.get(element) == Some(&ChannelHealth::Lost))
+        };
+        if is(ChannelHealth::Refused) {
             ChannelHealth::Refused
-        } else if lost {
+        } else if is(ChannelHealth::Lost) && lost() {
             ChannelHealth::Lost
-        } else if each.contains(&ChannelHealth::Good) {
+        } else if is(ChannelHealth::Good) {
             ChannelHealth::Good
         } else {
             ChannelHealth::Absent
@@ -77,9 +79,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (sensor, noise) = &self.engine;
         let lost = T::of(LOST_S);
         if let Some(engine) = &mut state.engine {
-            let pieces = (dt_s / T::of(PIECE_S)).ceil().whole().clamp(1, MOST_PIECES);
+            let (pieces, piece_s) = pieces(dt_s);
             for _ in 0..pieces {
-                engine.predict(noise, dt_s / T::of(pieces as f64));
+                engine.predict(noise, piece_s);
             }
             if engine.silent_s > lost {
                 state.engine = None;
@@ -146,14 +148,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.
     pub(super) fn measured(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
-        let fresh = |k: usize| newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S));
-        let older_s = |k: usize| fresh(k).map_or(T::zero(), |newest| newest.age_s);
-        let age_s = older_s(TURBINE).max(older_s(OUTPUT));
-        [TURBINE, OUTPUT].map(|k| match (fresh(k), running) {
-            (Some(newest), _) => newest.at(age_s),
+        let fresh = |k: usize| newest[k].as_ref().filter(|newest| newest.age_s <= T::of(FIRST_S));
+        let (turbine, output) = (fresh(TURBINE), fresh(OUTPUT));
+        let age_s = |newest: Option<&Newest<T>>| newest.map_or(T::zero(), |newest| newest.age_s);
+        let older_s = age_s(turbine).at_least(age_s(output));
+        let speed = |newest: Option<&Newest<T>>, k: usize| match (newest, running) {
+            (Some(newest), _) => newest.at(older_s),
             (None, Some(running)) => running.x.mean[k],
             (None, None) => T::zero(),
-        })
+        };
+        [speed(turbine, TURBINE), speed(output, OUTPUT)]
     }
 
     /// Whether turbine and output have been read of late.
@@ -166,7 +170,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn bounded_slip(&self, ratio: T, newest: &[Option<Newest<T>>; SPEEDS]) -> Option<[T; 2]> {
         let now = |k: usize| newest[k].and_then(|newest| newest.now(self.readings[k].deviation_rad_s, T::of(FIRST_S)));
         let (turbine, output) = (now(TURBINE)?, now(OUTPUT)?);
-        let deviation = turbine.deviation.hypot(ratio * output.deviation);
+        let deviation = (square(turbine.deviation) + square(ratio * output.deviation)).sqrt();
         let slip = Slip { value: turbine.value - ratio * output.value, deviation };
         let changed = (slip.value - self.slip(ratio, self.measured(newest, None)).value).abs();
         let error = T::of(2.0) * (slip.threshold() + changed) + turbine.drift + ratio.abs() * output.drift;
@@ -193,7 +197,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     }
 
     pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {
-        let deviation = self.readings[TURBINE].deviation_rad_s.hypot(ratio * self.readings[OUTPUT].deviation_rad_s);
+        let [turbine_deviation, output_deviation] = [TURBINE, OUTPUT].map(|k| self.readings[k].deviation_rad_s);
+        let deviation = (square(turbine_deviation) + square(ratio * output_deviation)).sqrt();
         Slip { value: turbine - ratio * output, deviation }
     }
 }

@@ -56,7 +56,6 @@ impl<T: Real> TurbineTorque<T> {
         let square = |x: T| x * x;
         let [engine, engine_variance, acceleration, acceleration_variance] = side.engine?;
         let [turbine, turbine_variance] = side.turbine;
-        let torques = converter.torques(engine, turbine);
         let (by_maps, slope) = converter.turbine_with_slope(engine, turbine);
         // The torque is of second degree in both speeds (Euler's theorem).
         let per_engine = (T::of(2.0) * by_maps - turbine * slope) / engine.max(one);
@@ -65,6 +64,7 @@ impl<T: Real> TurbineTorque<T> {
         let Some(reported) = side.reported_n_m else {
             return (!side.lock_up_applied).then_some(maps);
         };
+        let torques = converter.torques(engine, turbine);
         let pump = if side.lock_up_applied { zero } else { torques.turbine_n_m - torques.pump_n_m };
         let by_engine = reported - self.engine_inertia_kg_m2 * acceleration + pump;
         let by_engine_noise = square(self.engine_inertia_kg_m2) * acceleration_variance;

@@ -6,6 +6,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "a benchmark")]
 
+mod drive;
 mod paths;
 #[path = "../shared/mod.rs"]
 mod shared;

@@ -4,18 +4,15 @@ use std::hint::black_box;
 use std::io;
 use std::path::Path;
 
-use config::{Car, Experiment, GainMethod, ObserverKind, Vehicle};
+use config::{Experiment, GainMethod, ObserverKind, Vehicle};
 use design::rigid::design_phase;
-use design::{
-    ShiftErrors, ShiftTables, any_shift_filter, design_rigid, kalman_filter, range, requirement, rigid_observer,
-};
+use design::{design_rigid, kalman_filter, range, requirement, rigid_observer};
 use observer::{Estimator, Phase};
-use plant::car::CarShift;
 use plant::{Contact, Direction, Inputs, Mode, Powertrain, Simulation, State};
-use study::any_shift::{ShiftDraw, inputs, simulated};
 use study::{AnyObserver, Log, LogRow};
 use trace::{CsvRows, CsvWriter};
 
+use crate::drive;
 use crate::shared::{SAMPLE_TIME_S, THREE, campaign, samples, vehicle, write_log};
 
 /// A path, with what it does prepared outside of the count.
@@ -34,7 +31,17 @@ pub(crate) const PATHS: &[HotPath] = &[
     HotPath { name: "step of the Kalman filter", units: 200, prepare: kalman_step },
     HotPath { name: "step of the rigid observer", units: 200, prepare: rigid_step },
     HotPath { name: "step of the range", units: 200, prepare: range_step },
-    HotPath { name: "step of the filter for any shift", units: 300, prepare: any_shift_step },
+    HotPath { name: "step of the filter for any shift", units: drive::SHIFT_STEPS, prepare: drive::shift },
+    HotPath {
+        name: "step of the filter for any shift, over a drive",
+        units: drive::DRIVE_STEPS,
+        prepare: drive::drive,
+    },
+    HotPath {
+        name: "step of its valve models alone, over a drive",
+        units: drive::DRIVE_STEPS,
+        prepare: drive::open_loop,
+    },
     HotPath { name: "gain design of one phase", units: 1, prepare: gain_design },
     HotPath { name: "run of a study with three observers", units: 4, prepare: study_runs },
     HotPath { name: "estimate of 10,000 rows of CSV, with range", units: 1, prepare: estimate_rows },
@@ -106,24 +113,6 @@ fn range_step() -> Box<dyn FnMut()> {
     Box::new(move || {
         for sample in &samples[..STEPS] {
             black_box(range.step(&mut state, black_box(sample)));
-        }
-    })
-}
-
-fn any_shift_step() -> Box<dyn FnMut()> {
-    let car: &Car = Box::leak(Box::new(Car::eight_speed().unwrap()));
-    let (errors, sensors) = (ShiftErrors::STANDARD, Experiment::bench().unwrap().sensors.unwrap());
-    let tables: &ShiftTables<f64> = Box::leak(Box::new(ShiftTables::of_car(car, &errors).unwrap()));
-    let filter = any_shift_filter(car, tables, &errors, Some(&sensors));
-    let gear = |name: &str| car.gearbox.gear(name).unwrap();
-    let shift = CarShift::usual(car, gear("1"), gear("2"), 0.3);
-    let samples = simulated(car, &ShiftDraw::none(car).car(car), &shift).unwrap();
-    let inputs: Vec<_> = inputs(car, tables, &samples, &sensors, 1).into_iter().take(300).collect();
-    assert_eq!(inputs.len(), 300);
-    let mut state = filter.start();
-    Box::new(move || {
-        for (_, input) in &inputs {
-            black_box(filter.step(&mut state, black_box(input)));
         }
     })
 }

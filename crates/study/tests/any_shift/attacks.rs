@@ -332,11 +332,16 @@ fn single_precision_estimates_the_same() {
         for (from, to, throttle) in shifts(&car).into_iter().step_by(3) {
             let shift = CarShift::usual(&car, from, to, throttle);
             let samples = simulated(&car, &draw(&car, seed_of(&shift)), &shift).unwrap();
-            let (mut state, mut single_state) = (filter.start(), single.start());
+            let mut single_state = single.start();
             let inputs = inputs(&car, &tables, &samples, &sensors, 1);
-            let begun = std::time::Instant::now();
-            let estimates: Vec<_> = inputs.iter().map(|(_, input)| filter.step(&mut state, input)).collect();
-            time_s += begun.elapsed().as_secs_f64();
+            let mut estimates = Vec::with_capacity(inputs.len());
+            // A machine that does other things too is left alone in one of ten times.
+            time_s += (0..10).fold(f64::INFINITY, |fastest_s, _| {
+                let (mut state, begun) = (filter.start(), std::time::Instant::now());
+                estimates.clear();
+                estimates.extend(inputs.iter().map(|(_, input)| filter.step(&mut state, input)));
+                fastest_s.min(begun.elapsed().as_secs_f64())
+            });
             steps += inputs.len() as f64;
             for ((_, input), estimate) in inputs.iter().zip(estimates) {
                 let rounded = single.step(&mut single_state, &cast(input));
@@ -352,7 +357,7 @@ fn single_precision_estimates_the_same() {
         }
     }
     let rms = (square[0] / square[1]).sqrt();
-    println!("{:.2} us for a step with ranges", 1e6 * time_s / steps);
+    println!("{:.2} us for a step with ranges, each shift the fastest of ten times", 1e6 * time_s / steps);
     println!("single from double precision: RMS {rms:.3} N m, largest {largest:.2} N m");
     assert!(rms < 0.5, "{rms} {largest}");
 }

@@ -53,6 +53,16 @@ fn every_car_drives_through_all_its_gears_and_every_shift_is_estimated() {
     assert!(inertia.ratio().unwrap() < 0.55, "{inertia:?}");
 }
 
+/// The budget of a car whose pistons have a stroke has limits of the stroke, too.
+#[test]
+fn the_ranges_hold_while_pistons_move() {
+    let vehicles = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles");
+    let car = Car::read(&vehicles.join("eight_speed_stroke.toml")).unwrap();
+    for shift in driven(&car, 1).shifts {
+        assert_eq!(shift.inside(), Some(1.0), "{} {}-{}", shift.number, shift.from, shift.to);
+    }
+}
+
 /// A gearbox whose third gear can only be reached by two changes at once is driven without it.
 #[test]
 fn a_gear_without_a_shift_between_two_clutches_is_passed_over() {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::plausibility::{Extremes, Likely, findings};
+use logs::plausibility::{Extremes, Likely, Seen, findings};
 use logs::{
     ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, QualityCounts, Reading, Readings, Role, RoleSummary,
     Shift, ShiftFinder, Steps,
@@ -177,7 +177,7 @@ impl<'a> Measured<'a> {
         let looked_at: Vec<Input<f64>> = rows.log.looked_at().map(|(input, _)| *input).collect();
         looked_at.iter().for_each(|input| watch(&mut rows.summary, input));
         check_step(path, rows.log.median_step_s(), "divide it by 1000")?;
-        rows.check_units()?;
+        rows.check_units(Seen::Beginning)?;
         let gearbox = of_vehicle(vehicle);
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&rows.log, role))?;
@@ -237,7 +237,7 @@ impl<'a> Measured<'a> {
             channels.looked_at.push_back(step?);
         }
         // Wrong units are an error before the first estimate.
-        channels.steps.readings().check_units()?;
+        channels.steps.readings().check_first_units()?;
         let steps_s = channels.looked_at.iter().skip(1).map(|(step, _)| step.input.dt_s);
         channels.median_step_s = trace::median_step_s(steps_s.collect());
         check_step(path, channels.median_step_s, "set `unit = \"ms\"` under [time] in the channel map")?;
@@ -292,7 +292,7 @@ impl<'a> Measured<'a> {
                 if rows.was_cut.load(Ordering::Relaxed) {
                     say.note("warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells");
                 }
-                return rows.check_units();
+                return rows.check_units(Seen::All);
             }
             Source::Channels(channels) => channels,
         };
@@ -395,7 +395,7 @@ fn summary(rows: &CsvRows, vehicle: &Vehicle) -> Vec<RoleSummary> {
             _ => "rpm",
         };
         let (counts, extremes) = (QualityCounts::default(), Extremes::default());
-        RoleSummary { role, counts, extremes, unit_name: unit_name.to_owned() }
+        RoleSummary { role, name: role.name().to_owned(), counts, extremes, unit_name: unit_name.to_owned() }
     };
     speeds.into_iter().chain([command]).map(entry).collect()
 }
@@ -412,9 +412,9 @@ fn watch(summary: &mut [RoleSummary], input: &Input<f64>) {
 
 impl Rows {
     /// Refuses a unit that cannot be right.
-    fn check_units(&self) -> Result<(), Failure> {
-        let Some(finding) = findings(&self.summary).into_iter().next() else { return Ok(()) };
-        let (message, name) = (finding.message, finding.role.name());
+    fn check_units(&self, seen: Seen) -> Result<(), Failure> {
+        let Some(finding) = findings(&self.summary, seen).into_iter().next() else { return Ok(()) };
+        let (message, name) = (finding.message, finding.name);
         let ending = match finding.likely {
             Likely::Unit("rpm") => "rpm",
             Likely::Unit("rad/s") => "rad_s",

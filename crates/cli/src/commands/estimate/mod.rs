@@ -83,6 +83,7 @@ fn each_log<S: Sync>(
     for beside in output.iter().filter_map(|output| outputs::beside(output)).flatten() {
         not_an_input(Some(&beside), inputs(options).chain([log]))?;
     }
+    output.as_deref().map(outputs::only_own_beside).transpose()?;
     estimate(&prepare()?, log, output.as_deref(), &mut Messages { held: None })
 }
 
@@ -130,6 +131,7 @@ fn several<S: Sync>(
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;
+        outputs::only_own_beside(output)?;
         for output in outputs::beside(output).iter().flatten().chain([output]) {
             not_an_input(Some(output), logs.iter().chain(inputs(options)))?;
         }

@@ -1,5 +1,6 @@
 //! `wetclutch estimate` of a drive of a car with any gearbox.
 
+mod checks;
 mod columns;
 mod passing;
 mod source;
@@ -83,7 +84,9 @@ pub(super) fn estimate(
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
+    let mut checks = checks::Columns::of(car, tables);
     while let Some(step) = log.next_step()? {
+        checks.push(&step);
         let estimate = drive.push(&step);
         let gears = [step.input.gear.from, step.input.gear.to];
         let row = Row { car, places: &places, gears, estimate };
@@ -95,6 +98,7 @@ pub(super) fn estimate(
         }
     }
     log.finish(say)?;
+    checks.check()?;
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
     let mut drive = drive.finish();
     passing.check()?;
