@@ -32,7 +32,7 @@ pub(super) fn estimate(
     let Setup { options, vehicle, map, .. } = setup;
     let stop = options.follow.then(|| Arc::clone(&setup.stop));
     let mut opened = None;
-    let mut log = if map.channels.is_empty() {
+    let log = if map.channels.is_empty() {
         Measured::rows(path, vehicle, stop)?
     } else {
         let is_followed = stop.is_some();
