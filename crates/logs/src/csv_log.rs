@@ -6,13 +6,12 @@
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-use trace::{Quantity, Unit};
+use trace::csv_file::{LONGEST_ROW, number};
+use trace::{Quantity, RecordError, Records, Unit};
 
 use crate::samples::{Quality, Sample, Stream};
 use crate::{Channel, LogError, TimeColumn, error};
 
-/// Longest row that is read, bytes. A file without an end of line does not fill the memory.
-const LONGEST_ROW: usize = 32 << 20;
 /// Rows in a batch.
 const BATCH: usize = 64;
 
@@ -20,7 +19,7 @@ const BATCH: usize = 64;
 pub(crate) struct CsvLog {
     path: PathBuf,
     dialect: Dialect,
-    reader: Option<csv::Reader<RowByRow>>,
+    records: Option<Records>,
     /// Column and size in s of the time.
     time: (usize, f64),
     /// Column of each channel.
@@ -52,18 +51,12 @@ impl CsvLog {
         let dialect = Dialect::of(path, &text(&head[start..]))?;
         let mut input = Cursor::new(head).chain(rest);
         skip(&mut input, start, dialect.preamble).map_err(LogError::io(path))?;
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .delimiter(dialect.delimiter)
-            .from_reader(RowByRow { input: Box::new(input), left: LONGEST_ROW, last: b'\n', has_ended: false });
-        let mut row = csv::ByteRecord::new();
-        let mut next = |row: &mut csv::ByteRecord| read_row(path, &mut reader, dialect.preamble, row);
-        next(&mut row)?;
-        let titles: Vec<String> = row.iter().map(|cell| text(cell).trim().to_owned()).collect();
+        let mut records = Records::new(Box::new(input), dialect.delimiter);
+        read_row(path, &mut records, dialect.preamble)?;
+        let titles: Vec<String> = records.cells().map(|cell| text(cell).trim().to_owned()).collect();
         let units: Vec<String> = if dialect.units_row {
-            next(&mut row)?;
-            row.iter().map(|cell| unit_text(&text(cell))).collect()
+            read_row(path, &mut records, dialect.preamble)?;
+            records.cells().map(|cell| unit_text(&text(cell))).collect()
         } else {
             Vec::new()
         };
@@ -84,7 +77,7 @@ impl CsvLog {
             .collect();
         let batch = if is_followed { 1 } else { BATCH };
         let (path, width) = (path.to_owned(), titles.len());
-        let log = Self { path, dialect, reader: Some(reader), time, columns, width, batch, notes };
+        let log = Self { path, dialect, records: Some(records), time, columns, width, batch, notes };
         Ok((log, channels))
     }
 
@@ -97,7 +90,7 @@ impl CsvLog {
     }
 
     pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
-        let Some(reader) = self.reader.take() else {
+        let Some(records) = self.records.take() else {
             return Err(LogError::file(&self.path, "the log was read already"));
         };
         let columns = (self.columns.iter().zip(wanted).enumerate())
@@ -106,9 +99,8 @@ impl CsvLog {
         Ok(Box::new(Rows {
             columns: columns.collect(),
             log: self,
-            reader,
-            row: csv::ByteRecord::new(),
-            text: String::new(),
+            records,
+            text: Vec::new(),
             rows: 0,
             without_time: 0,
             short: 0,
@@ -123,11 +115,11 @@ impl CsvLog {
 /// The rows of a table.
 struct Rows<'a> {
     log: &'a CsvLog,
-    reader: csv::Reader<RowByRow>,
+    records: Records,
     /// Channel and column.
     columns: Vec<(usize, usize)>,
-    row: csv::ByteRecord,
-    text: String,
+    /// A cell with a point in place of its comma.
+    text: Vec<u8>,
     rows: u64,
     without_time: u64,
     short: u64,
@@ -139,36 +131,33 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The number in a cell: none where it is empty, an error where it is something else.
-    fn number(&mut self, column: usize) -> Result<Option<f64>, ()> {
-        let cell = self.row.get(column).unwrap_or_default().trim_ascii();
-        if cell.is_empty() {
-            return Ok(None);
+    /// The number in a cell: NaN where it is empty, none where it holds something else.
+    fn number(&mut self, column: usize) -> Option<f64> {
+        let cell = self.records.cell(column).unwrap_or_default();
+        if !self.log.dialect.decimal_comma {
+            return number(cell);
         }
         self.text.clear();
-        let comma = self.log.dialect.decimal_comma;
-        // Cells of numbers are ASCII; anything else fails to parse below.
-        self.text.extend(cell.iter().map(|&byte| if comma && byte == b',' { '.' } else { char::from(byte) }));
-        self.text.parse::<f64>().map(Some).map_err(drop)
+        self.text.extend(cell.iter().map(|&byte| if byte == b',' { b'.' } else { byte }));
+        number(&self.text)
     }
 
     /// Appends the samples of the row that was read.
     fn take_row(&mut self, batch: &mut Vec<Sample>) {
         self.rows += 1;
-        // The reader finds the end of the text before it gives a last line without an end.
-        let is_cut = self.reader.get_ref().ends_within_a_line();
-        if is_cut && self.row.len() < self.log.width {
+        let (is_cut, cells) = (self.records.has_no_end(), self.records.len());
+        if is_cut && cells < self.log.width {
             self.cut = Some("is left out");
             return;
         }
-        self.short += u64::from(self.row.len() < self.log.width);
-        self.long += u64::from((self.log.width..self.row.len()).any(|i| !self.row[i].trim_ascii().is_empty()));
+        self.short += u64::from(cells < self.log.width);
+        self.long += u64::from(self.records.cells().skip(self.log.width).any(|cell| !cell.trim_ascii().is_empty()));
         let time_s = match self.number(self.log.time.0) {
-            _ if is_cut && self.log.time.0 + 1 == self.row.len() => {
+            _ if is_cut && self.log.time.0 + 1 == cells => {
                 self.cut = Some("is left out");
                 return;
             }
-            Ok(Some(time)) if time.is_finite() => time * self.log.time.1,
+            Some(time) if time.is_finite() => time * self.log.time.1,
             _ => {
                 self.without_time += 1;
                 return;
@@ -176,22 +165,21 @@ impl Rows<'_> {
         };
         for i in 0..self.columns.len() {
             let (channel, column) = self.columns[i];
-            if is_cut && column + 1 == self.row.len() {
+            if is_cut && column + 1 == cells {
                 self.cut = Some("counts without its last cell, of which digits may be missing");
                 continue;
             }
             // An empty cell, or `nan`, is a reading that did not come: slow channels leave rows between theirs.
             let (value, quality) = match self.number(column) {
-                Ok(None) => continue,
-                Ok(Some(value)) if value.is_nan() => continue,
-                Ok(Some(value)) if value.is_finite() => (value, Quality::Good),
-                Ok(Some(value)) => (value, Quality::Missing),
-                Err(()) => {
+                Some(value) if value.is_nan() => continue,
+                Some(value) if value.is_finite() => (value, Quality::Good),
+                Some(value) => (value, Quality::Missing),
+                None => {
                     self.no_numbers += 1;
                     if self.first_text.is_none() {
-                        let line =
-                            self.row.position().map_or(0, csv::Position::line) + self.log.dialect.preamble as u64;
-                        self.first_text = Some(format!("line {line}: `{}`", error::shown(&text(&self.row[column]))));
+                        let line = self.records.line() + self.log.dialect.preamble as u64;
+                        let cell = text(self.records.cell(column).unwrap_or_default());
+                        self.first_text = Some(format!("line {line}: `{}`", error::shown(&cell)));
                     }
                     (f64::NAN, Quality::Missing)
                 }
@@ -204,7 +192,7 @@ impl Rows<'_> {
 impl Stream for Rows<'_> {
     fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
         for _ in 0..self.log.batch {
-            if !read_row(&self.log.path, &mut self.reader, self.log.dialect.preamble, &mut self.row)? {
+            if !read_row(&self.log.path, &mut self.records, self.log.dialect.preamble)? {
                 if self.rows == 0 {
                     return Err(LogError::file(&self.log.path, "there are no rows"));
                 }
@@ -242,58 +230,18 @@ impl Stream for Rows<'_> {
 }
 
 /// Reads a row; false at the end.
-fn read_row(
-    path: &Path,
-    reader: &mut csv::Reader<RowByRow>,
-    preamble: usize,
-    row: &mut csv::ByteRecord,
-) -> Result<bool, LogError> {
-    let line = reader.position().line() + preamble as u64;
-    reader.get_mut().left = LONGEST_ROW;
-    reader.read_byte_record(row).map_err(|error| match error.into_kind() {
-        _ if reader.get_ref().left == 0 => LogError::damaged(
+fn read_row(path: &Path, records: &mut Records, preamble: usize) -> Result<bool, LogError> {
+    records.advance().map_err(|error| match error {
+        RecordError::Io(source) => LogError::Io { path: path.to_owned(), source },
+        RecordError::TooLong => LogError::damaged(
             path,
-            format!("line {line}"),
+            format!("line {}", records.line() + preamble as u64),
             format!(
                 "the row that begins here is longer than {} MiB\nhint: a quotation mark may not be closed",
                 LONGEST_ROW >> 20
             ),
         ),
-        csv::ErrorKind::Io(source) => LogError::Io { path: path.to_owned(), source },
-        other => LogError::damaged(path, format!("line {line}"), format!("{other:?}")),
     })
-}
-
-/// An input of which no row may be longer than what is left.
-struct RowByRow {
-    input: Box<dyn Read>,
-    left: usize,
-    /// The last byte that was read, and whether it is the last of all.
-    last: u8,
-    has_ended: bool,
-}
-
-impl RowByRow {
-    /// Whether the text ended within a line.
-    fn ends_within_a_line(&self) -> bool {
-        self.has_ended && !matches!(self.last, b'\n' | b'\r')
-    }
-}
-
-impl Read for RowByRow {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.left == 0 {
-            return Err(io::ErrorKind::InvalidData.into());
-        }
-        let most = buffer.len().min(self.left);
-        let read = self.input.read(&mut buffer[..most])?;
-        self.left -= read;
-        match buffer[..read].last() {
-            Some(last) => self.last = *last,
-            None => self.has_ended = true,
-        }
-        Ok(read)
-    }
 }
 
 /// Text of a file: UTF-8, or else Latin-1, in which every byte is a letter.

@@ -2,16 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
+use falcon_mdf::blocks::channel::ChannelType;
 use falcon_mdf::{
-    CanFrames, Channel as MdfChannel, Mf4Error, Mf4File, OpenOptions, Signal, SignalValues, SignalsChunks,
+    CanFrames, Channel as MdfChannel, Conversion, Mf4Error, Mf4File, OpenOptions, Signal, SignalValues, SignalsChunks,
 };
 
 use crate::can::{Database, Decoder, Frame};
 use crate::samples::{Quality, Sample, Stream};
 use crate::{Channel, LogError};
 
-/// Records that are decoded at once.
+/// Records that are given at once.
 const BATCH: usize = 4096;
+/// Bytes of records that are decoded at once, and the limits of their number. What is left of an unpacked block is moved each time:
+/// with few records at once, that would take as long as to unpack it.
+const DECODED_AT_ONCE: usize = 4 << 20;
+const DECODED: std::ops::RangeInclusive<usize> = BATCH..=1 << 17;
 /// Largest block of data that is unpacked, bytes. Writers use up to 4 MiB.
 const LARGEST_BLOCK: u64 = 256 << 20;
 /// Memory that is taken on the word of the file, bytes.
@@ -96,13 +101,17 @@ impl MdfLog {
                 std::iter::once(master).chain(chosen.iter().map(|&i| &data.channels[self.places[i].channel])).collect();
             let name = group_name(&self.file, data, data_group);
             let place = format!("group `{name}`");
+            let records = (DECODED_AT_ONCE / data.record_size(0).max(1)).clamp(*DECODED.start(), *DECODED.end());
             let chunks =
-                self.file.signals_chunks(&channels, BATCH).map_err(|error| damaged(&self.path, &place, &error))?;
+                self.file.signals_chunks(&channels, records).map_err(|error| damaged(&self.path, &place, &error))?;
             streams.push(Box::new(Group {
                 path: &self.path,
                 place,
                 chunks,
                 channels: chosen,
+                times: Vec::new(),
+                columns: Vec::new(),
+                given: 0,
                 read: 0,
                 declared: data.sample_count,
                 without_time: 0,
@@ -152,26 +161,40 @@ struct Group<'a> {
     place: String,
     chunks: SignalsChunks<'a>,
     channels: Vec<usize>,
+    /// Times of the records that were decoded, s, and of each channel the values and which of them are valid.
+    times: Vec<f64>,
+    columns: Vec<(Vec<f64>, Option<Vec<bool>>)>,
+    /// How many of them were given.
+    given: usize,
     read: u64,
     declared: u64,
     without_time: u64,
 }
 
 impl Group<'_> {
-    fn decode(&mut self, signals: &[Signal], batch: &mut Vec<Sample>) -> Result<(), Mf4Error> {
+    /// Takes the next records.
+    fn decode(&mut self, signals: &[Signal]) -> Result<(), Mf4Error> {
+        (self.given, self.times) = (0, Vec::new());
         let Some((master, signals)) = signals.split_first() else { return Ok(()) };
-        let times = master.values_f64()?;
-        self.read += times.len() as u64;
-        let mut columns = Vec::with_capacity(signals.len());
-        for signal in signals {
-            columns.push((numbers(signal)?, signal.validity()));
-        }
-        for (row, &time_s) in times.iter().enumerate() {
+        self.times = numbers(master)?;
+        self.read += self.times.len() as u64;
+        let column = |signal: &Signal| Ok((numbers(signal)?, signal.validity()));
+        self.columns = signals.iter().map(column).collect::<Result<_, Mf4Error>>()?;
+        Ok(())
+    }
+
+    /// Gives some of the records that were decoded.
+    fn give(&mut self, batch: &mut Vec<Sample>) {
+        let rows = self.given..(self.given + BATCH).min(self.times.len());
+        self.given = rows.end;
+        batch.reserve(rows.len() * self.columns.len());
+        for row in rows {
+            let time_s = self.times[row];
             if !time_s.is_finite() {
                 self.without_time += 1;
                 continue;
             }
-            for ((values, valid), &channel) in columns.iter().zip(&self.channels) {
+            for ((values, valid), &channel) in self.columns.iter().zip(&self.channels) {
                 let value = values.get(row).copied().unwrap_or(f64::NAN);
                 let quality = match valid.as_ref().map(|valid| valid.get(row)) {
                     Some(Some(false)) => Quality::Invalid,
@@ -181,21 +204,39 @@ impl Group<'_> {
                 batch.push(Sample { channel, time_s, value, quality });
             }
         }
-        Ok(())
     }
 }
 
 /// The values of a signal; where the conversion makes text of them, the numbers before it.
 fn numbers(signal: &Signal) -> Result<Vec<f64>, Mf4Error> {
-    let values = signal.values()?;
-    if matches!(values, SignalValues::Str(_)) {
-        return Ok(signal.raw_values()?.to_f64());
+    let channel = signal.channel();
+    // `values` converts a scaled integer sample by sample, at several times the cost.
+    if let (Conversion::Linear { offset, factor }, ChannelType::FixedLength | ChannelType::Master) =
+        (&channel.conversion, channel.channel_type)
+    {
+        let mut values = plain(signal.raw_values()?);
+        values.iter_mut().for_each(|value| *value = factor * *value + offset);
+        return Ok(values);
     }
-    Ok(values.to_f64())
+    match signal.values()? {
+        SignalValues::Str(_) => Ok(plain(signal.raw_values()?)),
+        values => Ok(plain(values)),
+    }
+}
+
+fn plain(values: SignalValues) -> Vec<f64> {
+    match values {
+        SignalValues::F64(values) => values,
+        other => other.to_f64(),
+    }
 }
 
 impl Stream for Group<'_> {
     fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+        if self.given < self.times.len() {
+            self.give(batch);
+            return Ok(true);
+        }
         match self.chunks.next() {
             None if self.read < self.declared => {
                 let message = format!("the data end after {} of {} records", self.read, self.declared);
@@ -205,10 +246,12 @@ impl Stream for Group<'_> {
             }
             None => Ok(false),
             Some(signals) => {
-                let decoded = signals.and_then(|signals| self.decode(&signals, batch));
-                decoded
-                    .map(|()| true)
-                    .map_err(|error| damaged(self.path, &format!("{}, record {}", self.place, self.read + 1), &error))
+                let decoded = signals.and_then(|signals| self.decode(&signals));
+                decoded.map_err(|error| {
+                    damaged(self.path, &format!("{}, record {}", self.place, self.read + 1), &error)
+                })?;
+                self.give(batch);
+                Ok(true)
             }
         }
     }

@@ -219,6 +219,8 @@ struct Merged<'a> {
     at: usize,
     /// The sample whose place in time is on the heap.
     next: Option<Sample>,
+    /// The last stamp, s, and the time that the clock made of it: those of one record have the same.
+    stamp: Option<(f64, Option<f64>)>,
     /// How many stamps were seen to be far too late before they were used, and the last of them.
     too_late: Option<(u32, f64)>,
 }
@@ -289,8 +291,15 @@ struct Newest {
 
 impl<'a> Samples<'a> {
     pub(crate) fn new(channels: usize, streams: Vec<Box<dyn Stream + 'a>>) -> Result<Self, LogError> {
-        let merged =
-            |stream| Merged { stream, clock: Clock::default(), batch: Vec::new(), at: 0, next: None, too_late: None };
+        let merged = |stream| Merged {
+            stream,
+            clock: Clock::default(),
+            batch: Vec::new(),
+            at: 0,
+            next: None,
+            stamp: None,
+            too_late: None,
+        };
         let mut samples = Self {
             streams: streams.into_iter().map(merged).collect(),
             heap: BinaryHeap::new(),
@@ -347,31 +356,14 @@ impl<'a> Samples<'a> {
     /// Takes the next sample of a stream out of its batch, which has one.
     #[inline]
     fn stamped(&mut self, i: usize) -> Sample {
-        // Where streams wait for each other, a wrong stamp would hold its stream back until the others end.
-        let looks_ahead = self.streams.len() > 1;
         let merged = &mut self.streams[i];
         let mut sample = merged.batch[merged.at];
         merged.at += 1;
-        let (resets, wrong_jumps) = (merged.clock.resets, merged.clock.wrong_jumps);
-        let is_wrong = looks_ahead && merged.clock.would_jump(sample.time_s) && {
-            let after = merged.batch[merged.at..].iter().find(|after| after.time_s != sample.time_s);
-            after.is_some_and(|after| merged.clock.goes_on(after.time_s) && after.time_s < sample.time_s)
+        let stamped = match merged.stamp {
+            Some((stamp_s, time_s)) if stamp_s == sample.time_s => time_s,
+            _ => self.time(i, sample.time_s),
         };
-        let stamped = if is_wrong {
-            merged.note_too_late();
-            None
-        } else {
-            merged.clock.time(sample.time_s)
-        };
-        let newest_s = merged.clock.newest_s.unwrap_or(sample.time_s);
-        self.resets += merged.clock.resets - resets;
-        if merged.clock.wrong_jumps > wrong_jumps {
-            // What came with the wrong stamps is not newer than this; whoever has seen them starts again.
-            self.resets += 1;
-            for channel in self.channels.iter_mut().filter(|channel| channel.stream == i) {
-                channel.time_s = channel.time_s.min(newest_s.next_down());
-            }
-        }
+        let newest_s = self.streams[i].clock.newest_s.unwrap_or(sample.time_s);
         let channel = &mut self.channels[sample.channel];
         channel.stream = i;
         match stamped {
@@ -389,6 +381,35 @@ impl<'a> Samples<'a> {
             }
         }
         sample
+    }
+
+    /// The time of a stamp that is not the one before, of the sample that was taken last; none if it is not used.
+    fn time(&mut self, i: usize, stamp_s: f64) -> Option<f64> {
+        // Where streams wait for each other, a wrong stamp would hold its stream back until the others end.
+        let looks_ahead = self.streams.len() > 1;
+        let merged = &mut self.streams[i];
+        let (resets, wrong_jumps) = (merged.clock.resets, merged.clock.wrong_jumps);
+        let is_wrong = looks_ahead && merged.clock.would_jump(stamp_s) && {
+            let after = merged.batch[merged.at..].iter().find(|after| after.time_s != stamp_s);
+            after.is_some_and(|after| merged.clock.goes_on(after.time_s) && after.time_s < stamp_s)
+        };
+        let time_s = if is_wrong {
+            merged.note_too_late();
+            None
+        } else {
+            merged.clock.time(stamp_s)
+        };
+        merged.stamp = Some((stamp_s, time_s));
+        let newest_s = merged.clock.newest_s.unwrap_or(stamp_s);
+        self.resets += merged.clock.resets - resets;
+        if merged.clock.wrong_jumps > wrong_jumps {
+            // What came with the wrong stamps is not newer than this; whoever has seen them starts again.
+            self.resets += 1;
+            for channel in self.channels.iter_mut().filter(|channel| channel.stream == i) {
+                channel.time_s = channel.time_s.min(newest_s.next_down());
+            }
+        }
+        time_s
     }
 
     /// Goes on to the stream whose next sample is the earliest, and gives that.
@@ -413,6 +434,13 @@ impl<'a> Samples<'a> {
         Ok(())
     }
 
+    /// Lets a stream wait in place of the first one that waits; that one.
+    fn change_places(&mut self, next: Next) -> Option<usize> {
+        let mut first = self.heap.peek_mut()?;
+        let Reverse(Next(_, other)) = std::mem::replace(&mut *first, Reverse(next));
+        Some(other)
+    }
+
     /// Puts a sample where it waits for its time.
     fn put_back(&mut self, i: usize, sample: Sample) {
         self.streams[i].next = Some(sample);
@@ -428,9 +456,16 @@ impl Iterator for Samples<'_> {
             && self.streams[i].at < self.streams[i].batch.len()
         {
             let sample = self.stamped(i);
-            if Next(sample.time_s, i) <= until {
+            let next = Next(sample.time_s, i);
+            if next <= until {
                 self.given += 1;
                 return Some(Ok(sample));
+            }
+            if let Some(other) = self.change_places(next) {
+                self.streams[i].next = Some(sample);
+                self.front = Some((other, self.heap.peek().map_or(next, |Reverse(first)| *first)));
+                self.given += 1;
+                return self.streams[other].next.take().map(Ok);
             }
             self.put_back(i, sample);
         }

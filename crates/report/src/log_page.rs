@@ -1,5 +1,6 @@
 //! The page of a log: the whole drive, the table of its shifts, each shift drawn.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use config::Vehicle;
@@ -109,21 +110,48 @@ pub(crate) fn compact(svg: &str) -> String {
         let (path, rest) = part.split_once('"').unwrap_or((part, ""));
         compact.push_str(" d=\"");
         for word in path.split(' ') {
-            match word.parse::<f64>() {
-                Ok(number) => {
+            match tenth(word) {
+                Some((whole, tenth)) => {
                     if compact.ends_with(|c: char| c.is_ascii_digit()) {
                         compact.push(' ');
                     }
-                    let text = format!("{number:.1}");
-                    compact.push_str(text.strip_suffix(".0").unwrap_or(&text));
+                    compact.push_str(&whole);
+                    if tenth != b'0' {
+                        compact.extend(['.', char::from(tenth)]);
+                    }
                 }
-                Err(_) => compact.push_str(word),
+                None => compact.push_str(word),
             }
         }
         compact.push('"');
         compact.push_str(rest);
     }
     compact
+}
+
+/// A number to a tenth: what stands before the point, and the digit after it. None for what is no number.
+fn tenth(word: &str) -> Option<(Cow<'_, str>, u8)> {
+    /// Whole numbers with so many digits are exact.
+    const EXACT: usize = 15;
+    let (whole, decimals) = word.split_once('.').unwrap_or((word, ""));
+    let size = whole.strip_prefix('-').unwrap_or(whole);
+    if (1..=EXACT).contains(&size.len()) && size.bytes().chain(decimals.bytes()).all(|byte| byte.is_ascii_digit()) {
+        // The text of a figure has two decimals. It needs no more than its digits, but for a carry and for the middle between two.
+        let digit = match *decimals.as_bytes() {
+            [] => Some(b'0'),
+            [digit] | [digit, b'0'..=b'4'] => Some(digit),
+            [digit @ b'0'..=b'8', b'6'..=b'9'] => Some(digit + 1),
+            _ => None,
+        };
+        if let Some(digit) = digit {
+            return Some((Cow::Borrowed(whole), digit));
+        }
+    }
+    let text = format!("{:.1}", word.parse::<f64>().ok()?);
+    match text.split_once('.') {
+        Some((whole, tenth)) => Some((Cow::Owned(whole.to_owned()), *tenth.as_bytes().first()?)),
+        None => Some((Cow::Owned(text), b'0')),
+    }
 }
 
 /// Load and direction in words.
@@ -437,5 +465,20 @@ mod tests {
         let expected = r#"<svg><path d="M74.8 36.2L83 -35Z" fill="none"/><text x="1.25">0.25</text></svg>"#;
         assert_eq!(compact(svg), expected);
         assert_eq!(compact("<svg></svg>"), "<svg></svg>");
+    }
+
+    #[test]
+    fn a_tenth_from_the_digits_is_that_of_the_number() {
+        let parts = ["0", "7", "99", "8123"].into_iter().flat_map(|whole| [whole.to_owned(), format!("-{whole}")]);
+        for whole in parts {
+            let decimals = (0..100).map(|i| format!(".{i:02}")).chain((0..10).map(|i| format!(".{i}")));
+            let others = [".125", ".150000001", ".05e1", "e2", "", "."].map(str::to_owned);
+            for word in decimals.chain(others).map(|decimals| whole.clone() + &decimals) {
+                let number = format!("{:.1}", word.parse::<f64>().unwrap());
+                let expected = number.strip_suffix(".0").unwrap_or(&number);
+                assert_eq!(compact(&format!(" d=\"M {word} L\"")), format!(" d=\"M{expected}L\""), "{word}");
+            }
+        }
+        assert_eq!(compact(" d=\"M NaN 1 inf A\""), " d=\"MNaN1 infA\"");
     }
 }

@@ -47,15 +47,20 @@ impl Interval {
         }
     }
 
-    fn of(sample: &LogSample) -> Self {
+    /// Joins a sample to it.
+    fn take(&mut self, sample: &LogSample) {
         let LogSample { input, estimate, .. } = sample;
         let speeds = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
-        Self {
-            speeds_rad_s: speeds.map(|reading| [reading.map_or(f64::NAN, |reading| reading.value); 2]),
-            pressure_pa: [estimate.pressure_pa; 2],
-            range_pa: estimate.bounds.map_or([f64::NAN; 2], |bounds| bounds.pressure_pa),
-            healths: Health::ALL.map(|health| sample.is_estimated() && health == estimate.health),
+        for (extremes, reading) in self.speeds_rad_s.iter_mut().zip(speeds) {
+            if let Some(reading) = reading {
+                *extremes = joined(*extremes, [reading.value; 2]);
+            }
         }
+        self.pressure_pa = joined(self.pressure_pa, [estimate.pressure_pa; 2]);
+        if let Some(bounds) = estimate.bounds {
+            self.range_pa = joined(self.range_pa, bounds.pressure_pa);
+        }
+        self.healths[estimate.health as usize] |= sample.is_estimated();
     }
 }
 
@@ -91,7 +96,7 @@ impl Overview {
         if self.intervals.len() <= at {
             self.intervals.resize(at + 1, EMPTY);
         }
-        self.intervals[at] = self.intervals[at].joined(&Interval::of(sample));
+        self.intervals[at].take(sample);
     }
 
     /// The intervals with the times of their beginnings and ends, s.

@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 
 pub use atomic::{WholeFile, check_target, remove_unfinished, write_whole};
-pub use csv_file::{Cell, CsvRows, CsvWriter, csv_written, read_csv, write_csv};
+pub use csv_file::{Cell, CsvRows, CsvWriter, RecordError, Records, csv_written, read_csv, write_csv};
 pub use error::TraceError;
 pub use follow::Following;
 pub use last_line::LastLine;

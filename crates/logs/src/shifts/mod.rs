@@ -276,6 +276,9 @@ impl ShiftFinder {
         }
         self.join_signals();
         let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
+        if self.found.iter().chain(&self.by_signal).all(is_open) {
+            return Vec::new();
+        }
         let (open, mut settled): (Vec<_>, Vec<_>) = std::mem::take(&mut self.found).into_iter().partition(is_open);
         self.found = open;
         let (open, alone): (Vec<_>, Vec<_>) = std::mem::take(&mut self.by_signal).into_iter().partition(is_open);

@@ -47,7 +47,12 @@ impl Track {
 
     /// The value at a time by a line between its neighbours, if they are not further apart than this.
     pub(super) fn at(&self, time_s: f64, apart_s: f64) -> Option<f64> {
-        let after = self.values.partition_point(|(other_s, _)| *other_s < time_s);
+        // It is mostly the newest.
+        let is_before = |(other_s, _): &(f64, f64)| *other_s < time_s;
+        let newest = self.values.len().saturating_sub(1);
+        let is_newest = self.values.get(newest).is_some_and(|newest| !is_before(newest))
+            && newest.checked_sub(1).is_none_or(|before| is_before(&self.values[before]));
+        let after = if is_newest { newest } else { self.values.partition_point(is_before) };
         let &(after_s, after_value) = self.values.get(after)?;
         if after_s == time_s {
             return Some(after_value);

@@ -2,6 +2,7 @@
 //!
 //! They are read and written row by row, so that a file of any length needs the memory of one row.
 
+mod records;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -10,7 +11,8 @@ mod writer;
 use std::io;
 use std::path::Path;
 
-pub use rows::CsvRows;
+pub use records::{LONGEST_ROW, RecordError, Records};
+pub use rows::{CsvRows, number};
 pub use writer::{Cell, CsvWriter};
 
 use crate::{Column, Trace, TraceError, Values, WholeFile, Word};

@@ -4,25 +4,20 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::records::{LONGEST_ROW, RecordError, Records};
 use crate::{TraceError, signal, units};
-
-/// Longest row that is read, bytes: a million columns fit in. A file without an end of line does not fill the memory.
-pub(super) const LONGEST_ROW: usize = 32 << 20;
-/// Bytes that are read at once.
-pub(super) const READ_AT_ONCE: usize = 64 << 10;
 
 /// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
 /// them and rise. An empty cell, or `nan`, is a reading that did not come, and becomes NaN. A column without a name is passed over.
 pub struct CsvRows {
     path: PathBuf,
-    reader: csv::Reader<RowByRow>,
+    records: Records,
     /// Name in SI, and the factor that brings the cells there.
     pub(super) columns: Vec<(String, f64)>,
     pub(super) time_at: usize,
-    row: csv::ByteRecord,
     time_s: Option<f64>,
 }
 
@@ -41,17 +36,13 @@ impl CsvRows {
     /// # Errors
     /// See [`Self::open`].
     pub fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
-        let reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .buffer_capacity(READ_AT_ONCE)
-            .from_reader(RowByRow { input, left: LONGEST_ROW });
-        let row = csv::ByteRecord::new();
-        let mut rows = Self { path: path.to_owned(), reader, columns: Vec::new(), time_at: 0, row, time_s: None };
+        let records = Records::new(input, b',');
+        let mut rows = Self { path: path.to_owned(), records, columns: Vec::new(), time_at: 0, time_s: None };
         if !rows.read_row()? {
             return Err(TraceError::Table { path: rows.path, message: "the file is empty".to_owned() });
         }
-        let names: Vec<String> = rows.row.iter().map(|name| String::from_utf8_lossy(name).trim().to_owned()).collect();
+        let names: Vec<String> =
+            rows.records.cells().map(|name| String::from_utf8_lossy(name).trim().to_owned()).collect();
         rows.columns = names.iter().map(|name| units::to_si(name)).collect();
         rows.refuse_twins(&names)?;
         rows.time_at = rows.require(signal::TIME)?;
@@ -109,8 +100,8 @@ impl CsvRows {
                 None => Err(TraceError::Table { path: self.path.clone(), message: "there are no rows".to_owned() }),
             };
         }
-        if self.row.len() != self.columns.len() {
-            let (cells, names) = (self.row.len(), self.columns.len());
+        if self.records.len() != self.columns.len() {
+            let (cells, names) = (self.records.len(), self.columns.len());
             return Err(self.wrong(format!("the row has {cells} cells, but the first line names {names} columns")));
         }
         let time_s = self.number(self.time_at)?;
@@ -155,41 +146,42 @@ impl CsvRows {
     ///
     /// # Errors
     /// The cell holds something else.
+    #[inline]
     pub fn number(&self, column: usize) -> Result<f64, TraceError> {
-        let cell = self.row[column].trim_ascii();
-        if cell.is_empty() {
-            return Ok(f64::NAN);
+        match number(self.cell(column)) {
+            None => Err(self.not_a_number(column)),
+            Some(number) => Ok(number * self.columns[column].1),
         }
-        let (name, factor) = &self.columns[column];
-        let number = std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok());
-        number.map(|number| number * factor).ok_or_else(|| {
-            let (name, text) = (TraceError::shown(name), TraceError::shown(&self.text(column)));
-            self.wrong(format!(
-                "column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"
-            ))
-        })
+    }
+
+    #[cold]
+    fn not_a_number(&self, column: usize) -> TraceError {
+        let (name, text) = (TraceError::shown(&self.columns[column].0), TraceError::shown(&self.text(column)));
+        self.wrong(format!("column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"))
+    }
+
+    #[inline]
+    fn cell(&self, column: usize) -> &[u8] {
+        self.records.cell(column).unwrap_or_default()
     }
 
     /// The text in a column of this row.
     pub fn text(&self, column: usize) -> Cow<'_, str> {
-        String::from_utf8_lossy(self.row[column].trim_ascii())
+        String::from_utf8_lossy(self.cell(column).trim_ascii())
     }
 
     fn read_row(&mut self) -> Result<bool, TraceError> {
-        let line = self.reader.position().line();
-        self.reader.get_mut().left = LONGEST_ROW;
-        let read = self.reader.read_byte_record(&mut self.row);
-        read.map_err(into_io).map_err(|source| match self.reader.get_ref().left {
-            0 => TraceError::Row {
+        self.records.advance().map_err(|error| match error {
+            RecordError::Io(source) => TraceError::Io { path: self.path.clone(), source },
+            RecordError::TooLong => TraceError::Row {
                 path: self.path.clone(),
-                line,
+                line: self.records.line(),
                 message: format!(
                     "the row that begins here is longer than {} MiB\nhint: the file is not comma-separated, or a quotation \
                      mark is not closed",
                     LONGEST_ROW >> 20
                 ),
             },
-            _ => TraceError::Io { path: self.path.clone(), source },
         })
     }
 
@@ -200,33 +192,19 @@ impl CsvRows {
 
     /// An error in this row.
     pub fn wrong(&self, message: String) -> TraceError {
-        let line = self.row.position().map_or(0, csv::Position::line);
-        TraceError::Row { path: self.path.clone(), line, message }
+        TraceError::Row { path: self.path.clone(), line: self.records.line(), message }
     }
 }
 
-/// An input of which no row may be longer than what is left.
-struct RowByRow {
-    input: Box<dyn Read>,
-    left: usize,
-}
-
-impl Read for RowByRow {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.left == 0 {
-            return Err(io::ErrorKind::InvalidData.into());
-        }
-        let most = buffer.len().min(self.left);
-        let read = self.input.read(&mut buffer[..most])?;
-        self.left -= read;
-        Ok(read)
+/// The number in a cell: NaN where it is empty, none where it holds something else.
+#[inline]
+pub fn number(cell: &[u8]) -> Option<f64> {
+    let cell = match cell {
+        [first, .., last] if *first > b' ' && *last > b' ' => cell,
+        _ => cell.trim_ascii(),
+    };
+    if cell.is_empty() {
+        return Some(f64::NAN);
     }
-}
-
-/// The error of the file below, with its kind: a broken pipe must stay one.
-fn into_io(error: csv::Error) -> io::Error {
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => error,
-        other => io::Error::other(format!("{other:?}")),
-    }
+    fast_float2::parse(cell).ok()
 }

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use super::rows::{LONGEST_ROW, READ_AT_ONCE};
+use super::records::READ_AT_ONCE;
 use super::writer::push_number;
 use super::*;
 use crate::signal;
@@ -115,6 +115,7 @@ fn a_broken_file_says_where_it_is_broken() {
         "FILE:4: the time 0.1 s is not after the time before it, 0.2 s"
     );
     assert_eq!(error("blank", "time_s,a\n0,1\n,1\n"), "FILE:3: the time is missing");
+    assert_eq!(error("windows", "time_s,a\r\n0,1\r\n\r\n,1\r\n"), "FILE:4: the time is missing");
     assert_eq!(error("none", "time_s,a\n"), "FILE: there are no rows");
     assert_eq!(error("untimed", "t,a\n0,1\n"), "FILE: there is no column `time_s`\nhint: the columns are t, a");
     assert_eq!(

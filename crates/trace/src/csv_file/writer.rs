@@ -67,19 +67,21 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// As [`Self::row`].
     pub fn cells<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let begin = self.rows.len();
+        let Self { rows, .. } = self;
+        let begin = rows.len();
         let mut count = 0;
-        for cell in cells {
+        // A chain of cells is faster from within.
+        cells.into_iter().for_each(|cell| {
             if count > 0 {
-                self.rows.push(b',');
+                rows.push(b',');
             }
             count += 1;
             match cell {
-                Cell::Word(word) => push_word(&mut self.rows, word),
-                Cell::Whole(number) => write!(self.rows, "{number}")?,
-                Cell::Number(number) => push_number(&mut self.rows, number),
+                Cell::Number(number) => push_number(rows, number),
+                Cell::Word(word) => push_word(rows, word),
+                Cell::Whole(number) => rows.extend_from_slice(number.to_string().as_bytes()),
             }
-        }
+        });
         if count != self.columns {
             self.rows.truncate(begin);
             return Err(io::Error::other(format!("a row of {count} cells for {} columns", self.columns)));
@@ -119,18 +121,23 @@ impl<W: Write> CsvWriter<W> {
 }
 
 /// A number; NaN leaves the cell empty.
+#[inline]
 pub(super) fn push_number(row: &mut Vec<u8>, number: f64) {
+    let size = number.abs();
+    let mut digits = zmij::Buffer::new();
+    if (1e-5..1e16).contains(&size) {
+        // Of a number of this size the text has no exponent.
+        let text = digits.format_finite(number).as_bytes();
+        return row.extend_from_slice(text.strip_suffix(b".0").unwrap_or(text));
+    }
+    if size == 0.0 {
+        return row.extend_from_slice(if number.is_sign_negative() { b"-0" } else { b"0" });
+    }
     if number.is_nan() {
         return;
     }
-    let mut digits = zmij::Buffer::new();
-    let text = digits.format(number);
-    if (1e-5..1e16).contains(&number.abs()) {
-        // Of a number of this size the text has no exponent.
-        return row.extend_from_slice(text.strip_suffix(".0").unwrap_or(text).as_bytes());
-    }
-    match text.split_once('e') {
-        None => row.extend_from_slice(text.strip_suffix(".0").unwrap_or(text).as_bytes()),
+    match digits.format(number).split_once('e') {
+        None => row.extend_from_slice(digits.format(number).as_bytes()),
         Some((mantissa, exponent)) => push_expanded(row, mantissa, exponent.parse().unwrap_or(0)),
     }
 }
@@ -157,10 +164,11 @@ fn push_expanded(row: &mut Vec<u8>, mantissa: &str, exponent: i32) {
 
 /// A word, in quotation marks where it needs them.
 fn push_word(row: &mut Vec<u8>, word: &str) {
-    // No letter is below the comma.
-    if !word.bytes().any(|byte| byte <= b',' && matches!(byte, b',' | b'"' | b'\n' | b'\r')) {
-        row.extend_from_slice(word.as_bytes());
-        return;
+    // No letter is below the comma, as all signs are that need the marks.
+    let is_plain =
+        word.bytes().all(|byte| byte > b',') || !word.bytes().any(|byte| matches!(byte, b',' | b'"' | b'\n' | b'\r'));
+    if is_plain {
+        return row.extend_from_slice(word.as_bytes());
     }
     row.push(b'"');
     row.extend_from_slice(word.replace('"', "\"\"").as_bytes());

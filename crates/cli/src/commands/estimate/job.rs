@@ -32,7 +32,7 @@ pub(super) fn estimate(
     let Setup { options, vehicle, map, .. } = setup;
     let stop = options.follow.then(|| Arc::clone(&setup.stop));
     let mut opened = None;
-    let mut log = if map.channels.is_empty() {
+    let log = if map.channels.is_empty() {
         Measured::rows(path, vehicle, stop)?
     } else {
         let is_followed = stop.is_some();
@@ -52,22 +52,27 @@ pub(super) fn estimate(
         written_s: f64::NEG_INFINITY,
         follow: options.follow,
     });
+    let log = RefCell::new(log);
     // The observer gets the steps in the gears of its shift; the others go by it.
     let in_gears = std::iter::from_fn(|| {
+        let mut log = log.borrow_mut();
         loop {
-            match log.next()? {
-                Ok(step) if step.is_other_gear => {
-                    if let Err(failure) = rows.borrow_mut().take(step, None) {
+            match log.advance() {
+                Ok(false) => return None,
+                Ok(true) if log.step.is_other_gear => {
+                    if let Err(failure) = rows.borrow_mut().take(&mut log.step, None) {
                         return Some(Err(failure));
                     }
                 }
-                step => return Some(step.map(|step| (step.input, step))),
+                Ok(true) => return Some(Ok((log.step.input, ()))),
+                Err(failure) => return Some(Err(failure)),
             }
         }
     });
-    chosen_observer
-        .observer
-        .run_over(Some(vehicle), in_gears, |step, estimate| rows.borrow_mut().take(step, Some(estimate)))?;
+    chosen_observer.observer.run_over(Some(vehicle), in_gears, |(), estimate| {
+        rows.borrow_mut().take(&mut log.borrow_mut().step, Some(&estimate))
+    })?;
+    let mut log = log.into_inner();
     let mut rows = rows.into_inner();
     for shift in log.last_shifts() {
         rows.shift(shift)?;
@@ -133,24 +138,19 @@ struct Rows<'a> {
 
 impl Rows<'_> {
     /// Takes a step with its estimate; none in a gear that the vehicle file does not describe.
-    fn take(&mut self, step: Step, estimate: Option<Estimate<f64>>) -> Result<(), Failure> {
-        match &estimate {
-            Some(estimate) => self.findings.push(&step, estimate),
+    fn take(&mut self, step: &mut Step, estimate: Option<&Estimate<f64>>) -> Result<(), Failure> {
+        match estimate {
+            Some(estimate) => self.findings.push(step, estimate),
             None => self.findings.push_other_gear(step.time_s),
         }
-        let Step { time_s, input, pressure_pa, torque_n_m, .. } = step;
-        self.shifts.push(LogSample {
-            time_s,
-            input,
-            estimate: estimate.unwrap_or_else(no_estimate),
-            pressure_pa,
-            torque_n_m,
-        });
-        for shift in step.shifts {
+        let Step { time_s, input, pressure_pa, torque_n_m, .. } = *step;
+        let sample_estimate = estimate.copied().unwrap_or_else(no_estimate);
+        self.shifts.push(&LogSample { time_s, input, estimate: sample_estimate, pressure_pa, torque_n_m });
+        for shift in std::mem::take(&mut step.shifts) {
             self.shift(shift)?;
         }
         if !self.shifts.is_selective() {
-            match &estimate {
+            match estimate {
                 Some(estimate) => self.table.row(time_s, estimate, self.columns)?,
                 None => self.table.empty_row(time_s, self.columns)?,
             }

@@ -28,6 +28,8 @@ const FOLLOWED_LOOK: usize = 50;
 /// A log with its shifts.
 pub(super) struct Measured<'a> {
     source: Source<'a>,
+    /// The step that [`Self::advance`] went on to.
+    pub(super) step: Step,
     finder: ShiftFinder,
     /// Ratios of the gears that the finder numbers, 1st first.
     pub(super) ratios: Vec<f64>,
@@ -86,6 +88,21 @@ impl Step {
     fn new(time_s: f64, input: Input<f64>, resets: u32) -> Self {
         let (truth, pressure_pa, torque_n_m, shifts) = (None, None, None, Vec::new());
         Self { time_s, input, truth, resets, is_other_gear: false, pressure_pa, torque_n_m, shifts }
+    }
+
+    /// Before the first step.
+    fn none() -> Self {
+        let input = Input {
+            dt_s: 0.0,
+            engine_rad_s: None,
+            turbine_rad_s: None,
+            output_rad_s: None,
+            wheel_rad_s: None,
+            command: None,
+            offgoing_command: None,
+            engine_torque_n_m: None,
+        };
+        Self::new(f64::NAN, input, 0)
     }
 
     /// A row of a table with the names of the program.
@@ -165,7 +182,7 @@ impl<'a> Measured<'a> {
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&rows.log, role))?;
         let source = Source::Rows(Box::new(rows));
-        Ok(Self { source, finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
+        Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
     }
 
     /// Channels of a log by a map.
@@ -227,7 +244,7 @@ impl<'a> Measured<'a> {
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
         let source = Source::Channels(Box::new(channels));
-        Ok(Self { source, finder, ratios: gearbox.ratios, resets: 0, gears, waited_s: 0.0 })
+        Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears, waited_s: 0.0 })
     }
 
     pub(super) fn has_wheel_speed(&self) -> bool {
@@ -422,20 +439,20 @@ impl Rows {
         )))
     }
 
-    /// The next step; `see` gets its readings, with the resets of the clock so far.
-    fn read(&mut self, mut see: impl FnMut(u32, &Reading)) -> Option<Result<Step, Failure>> {
+    /// Reads the next step; `see` gets its readings, with the resets of the clock so far. False at the end.
+    fn read(&mut self, step: &mut Step, mut see: impl FnMut(u32, &Reading)) -> Result<bool, Failure> {
         /// Rows after the first look of which one is watched for its units.
         const EVERY: u64 = 32;
-        let row = self.log.next()?;
+        let Some(row) = self.log.next() else { return Ok(false) };
+        let (input, row) = row?;
         self.rows += 1;
-        Some(row.map_err(Failure::from).map(|(input, row)| {
-            if self.rows > self.look && self.rows.is_multiple_of(EVERY) {
-                watch(&mut self.summary, &input);
-            }
-            let resets = self.log.resets();
-            readings(&input, &row).for_each(|reading| see(resets, &reading));
-            Step::of_row(input, &row, resets)
-        }))
+        if self.rows > self.look && self.rows.is_multiple_of(EVERY) {
+            watch(&mut self.summary, &input);
+        }
+        let resets = self.log.resets();
+        readings(&input, &row).for_each(|reading| see(resets, &reading));
+        *step = Step::of_row(input, &row, resets);
+        Ok(true)
     }
 }
 
@@ -451,11 +468,13 @@ impl Channels<'_> {
     }
 }
 
-impl Iterator for Measured<'_> {
-    type Item = Result<Step, Failure>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let Self { source, finder, resets, gears, .. } = self;
+impl Measured<'_> {
+    /// Goes on to the next step; false at the end.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    pub(super) fn advance(&mut self) -> Result<bool, Failure> {
+        let Self { source, step, finder, resets, gears, .. } = self;
         // A clock that begins anew begins a new log for the finder, before the first reading of it.
         let mut see = |log_resets: u32, reading: &Reading| {
             if log_resets > *resets {
@@ -467,33 +486,36 @@ impl Iterator for Measured<'_> {
                 gears.push(reading);
             }
         };
-        let step = match source {
-            Source::Rows(rows) => rows.read(see)?,
+        match source {
+            Source::Rows(rows) => {
+                if !rows.read(step, see)? {
+                    return Ok(false);
+                }
+            }
             Source::Channels(channels) => {
                 let next = match channels.looked_at.pop_front() {
-                    Some(next) => Ok(next),
-                    None => channels.read()?,
+                    Some(next) => next,
+                    None => match channels.read() {
+                        Some(next) => next?,
+                        None => return Ok(false),
+                    },
                 };
-                next.map(|(step, readings)| {
-                    readings.iter().for_each(|reading| see(step.resets, reading));
-                    step
-                })
+                next.1.iter().for_each(|reading| see(next.0.resets, reading));
+                *step = next.0;
             }
-        };
-        Some(step.map(|mut step| {
-            if step.resets > self.resets {
-                // It had no reading.
-                self.resets = step.resets;
-                self.finder.restart();
-            }
-            step.is_other_gear = self.gears.as_ref().is_some_and(|gears| !gears.is_inside());
-            if step.is_other_gear {
-                self.waited_s += step.input.dt_s;
-            } else {
-                step.input.dt_s += std::mem::take(&mut self.waited_s);
-            }
-            step.shifts = self.finder.take_settled(step.time_s);
-            step
-        }))
+        }
+        if step.resets > self.resets {
+            // It had no reading.
+            self.resets = step.resets;
+            self.finder.restart();
+        }
+        step.is_other_gear = self.gears.as_ref().is_some_and(|gears| !gears.is_inside());
+        if step.is_other_gear {
+            self.waited_s += step.input.dt_s;
+        } else {
+            step.input.dt_s += std::mem::take(&mut self.waited_s);
+        }
+        step.shifts = self.finder.take_settled(step.time_s);
+        Ok(true)
     }
 }

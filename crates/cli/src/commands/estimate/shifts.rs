@@ -48,9 +48,9 @@ impl<'a> Shifts<'a> {
         self.selection.seen
     }
 
-    pub(super) fn push(&mut self, sample: LogSample) {
-        self.overview.push(&sample);
-        self.recent.push(sample);
+    pub(super) fn push(&mut self, sample: &LogSample) {
+        self.overview.push(sample);
+        self.recent.push(*sample);
     }
 
     /// Takes a shift that is known now; `write` gets its samples if it is wanted.

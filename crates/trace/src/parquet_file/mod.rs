@@ -1,18 +1,22 @@
 //! Tables as Parquet files.
 
+mod words;
+
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
 
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
-use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::{ColumnPath, Type};
+use parquet::schema::types::{ColumnDescPtr, ColumnPath, Type};
 
-use crate::{Cell, write_whole};
+use crate::csv_file::number;
+use crate::{Cell, RecordError, Records, write_whole};
+use words::Words;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,17 +36,16 @@ const GROUP: usize = 1 << 16;
 pub struct ParquetWriter<W: Write + Send> {
     file: SerializedFileWriter<W>,
     columns: Vec<Values>,
+    descriptions: Vec<ColumnDescPtr>,
     rows: usize,
-    /// Every word so far, so that it is held once.
-    words: Vec<ByteArray>,
 }
 
 /// The cells of a column that wait to be written.
 enum Values {
     Whole(Vec<i64>),
-    /// The numbers, and for each cell whether it has one.
-    Numbers(Vec<f64>, Vec<i16>),
-    Words(Vec<ByteArray>),
+    /// The numbers, and the rows without one.
+    Numbers(Vec<f64>, Vec<usize>),
+    Words(Words),
 }
 
 impl<W: Write + Send> ParquetWriter<W> {
@@ -52,22 +55,27 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// What the writer meets.
     pub fn new<'a>(writer: W, columns: impl IntoIterator<Item = (&'a str, ColumnKind)>) -> io::Result<Self> {
         let (mut fields, mut values) = (Vec::new(), Vec::new());
-        let mut properties = WriterProperties::builder().set_statistics_enabled(EnabledStatistics::Chunk);
+        // Hardly two numbers of a column are the same: a dictionary of them costs time and saves nothing. (Words make their own.)
+        let mut properties =
+            WriterProperties::builder().set_dictionary_enabled(false).set_statistics_enabled(EnabledStatistics::None);
         for (name, kind) in columns {
-            // Hardly two numbers of a column are the same: a dictionary of them costs time and saves nothing.
-            let path = ColumnPath::new(vec![name.to_owned()]);
-            properties = properties.set_column_dictionary_enabled(path, kind == ColumnKind::Word);
+            if fields.is_empty() {
+                // Readers find rows by the first column, the time or the number of the row.
+                let first = ColumnPath::new(vec![name.to_owned()]);
+                properties = properties.set_column_statistics_enabled(first, EnabledStatistics::Chunk);
+            }
             fields.push(field(name, kind).map_err(io::Error::other)?);
             values.push(match kind {
                 ColumnKind::Whole => Values::Whole(Vec::new()),
                 ColumnKind::Number => Values::Numbers(Vec::new(), Vec::new()),
-                ColumnKind::Word => Values::Words(Vec::new()),
+                ColumnKind::Word => Values::Words(Words::default()),
             });
         }
         let schema = Type::group_type_builder("rows").with_fields(fields).build().map_err(io::Error::other)?;
         let properties = Arc::new(properties.build());
         let file = SerializedFileWriter::new(writer, Arc::new(schema), properties).map_err(io::Error::other)?;
-        Ok(Self { file, columns: values, rows: 0, words: Vec::new() })
+        let descriptions = file.schema_descr().columns().to_vec();
+        Ok(Self { file, columns: values, descriptions, rows: 0 })
     }
 
     /// Writes a row.
@@ -75,66 +83,50 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// # Errors
     /// What the writer meets, or a cell that is not of the kind of its column.
     pub fn row<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let mut cells = cells.into_iter();
-        for column in &mut self.columns {
-            match (column, cells.next()) {
-                (Values::Whole(values), Some(Cell::Whole(value))) => values.push(value.cast_signed()),
-                (Values::Numbers(values, present), Some(Cell::Number(value))) => {
-                    present.push(i16::from(!value.is_nan()));
-                    if !value.is_nan() {
-                        values.push(value);
-                    }
-                }
-                (Values::Words(values), Some(Cell::Word(word))) => {
-                    let known = self.words.iter().find(|known| known.data() == word.as_bytes());
-                    values.push(match known {
-                        Some(known) => known.clone(),
-                        None => {
-                            let new = ByteArray::from(word);
-                            // The words of a column are few; a column of texts is not searched for long.
-                            if self.words.len() < 64 {
-                                self.words.push(new.clone());
-                            }
-                            new
-                        }
-                    });
-                }
-                _ => return Err(io::Error::other("a cell is not of the kind of its column")),
-            }
+        let (mut columns, rows, mut is_of_kind) = (self.columns.iter_mut(), self.rows, true);
+        // A chain of cells is faster from within.
+        cells.into_iter().for_each(|cell| match (columns.next(), cell) {
+            (Some(Values::Numbers(_, absent)), Cell::Number(value)) if value.is_nan() => absent.push(rows),
+            (Some(Values::Numbers(values, _)), Cell::Number(value)) => values.push(value),
+            (Some(Values::Words(words)), Cell::Word(word)) => words.push(word),
+            (Some(Values::Whole(values)), Cell::Whole(value)) => values.push(value.cast_signed()),
+            _ => is_of_kind = false,
+        });
+        if !is_of_kind || columns.next().is_some() {
+            return Err(io::Error::other("a row has not one cell of its kind for each column"));
         }
         self.rows += 1;
         if self.rows == GROUP { self.write_group() } else { Ok(()) }
     }
 
     fn write_group(&mut self) -> io::Result<()> {
-        if std::mem::take(&mut self.rows) == 0 {
+        let rows = std::mem::take(&mut self.rows);
+        if rows == 0 {
             return Ok(());
         }
         let mut group = self.file.next_row_group().map_err(io::Error::other)?;
-        for values in &mut self.columns {
+        for (values, description) in self.columns.iter_mut().zip(&self.descriptions) {
+            if let Values::Words(words) = values {
+                let (bytes, close) = words.encode(description.clone()).map_err(io::Error::other)?;
+                group.append_column(&bytes, close).map_err(io::Error::other)?;
+                words.clear();
+                continue;
+            }
             let Some(mut column) = group.next_column().map_err(io::Error::other)? else { break };
             match (column.untyped(), &mut *values) {
                 (ColumnWriter::Int64ColumnWriter(writer), Values::Whole(values)) => {
-                    writer.write_batch(values, None, None)
+                    writer.write_batch(values, None, None).map_err(io::Error::other)?;
+                    values.clear();
                 }
-                (ColumnWriter::DoubleColumnWriter(writer), Values::Numbers(values, present)) => {
-                    writer.write_batch(values, Some(present), None)
-                }
-                (ColumnWriter::ByteArrayColumnWriter(writer), Values::Words(values)) => {
-                    writer.write_batch(values, None, None)
+                (ColumnWriter::DoubleColumnWriter(writer), Values::Numbers(values, absent)) => {
+                    let mut present = vec![1; rows];
+                    absent.drain(..).for_each(|row| present[row] = 0);
+                    writer.write_batch(values, Some(&present), None).map_err(io::Error::other)?;
+                    values.clear();
                 }
                 _ => return Err(io::Error::other("a column is not of its kind")),
             }
-            .map_err(io::Error::other)?;
             column.close().map_err(io::Error::other)?;
-            match values {
-                Values::Whole(values) => values.clear(),
-                Values::Numbers(values, present) => {
-                    values.clear();
-                    present.clear();
-                }
-                Values::Words(values) => values.clear(),
-            }
         }
         group.close().map_err(io::Error::other)?;
         Ok(())
@@ -168,19 +160,35 @@ fn field(name: &str, kind: ColumnKind) -> Result<Arc<Type>, ParquetError> {
 /// # Errors
 /// A file cannot be read or written, or a cell does not hold what its column should.
 pub fn write_parquet(csv: &Path, path: &Path, kind: impl Fn(&str) -> ColumnKind) -> io::Result<()> {
-    let mut reader = csv::Reader::from_path(csv).map_err(io::Error::other)?;
-    let names: Vec<String> = reader.headers().map_err(io::Error::other)?.iter().map(str::to_owned).collect();
+    let mut records = Records::new(Box::new(File::open(csv)?), b',');
+    let advance = |records: &mut Records| {
+        records.advance().map_err(|error| match error {
+            RecordError::Io(error) => error,
+            RecordError::TooLong => io::Error::other("a row is too long"),
+        })
+    };
+    let text = |cell: &[u8]| std::str::from_utf8(cell).map(str::to_owned).map_err(io::Error::other);
+    advance(&mut records)?;
+    let names = records.cells().map(text).collect::<io::Result<Vec<String>>>()?;
     let kinds: Vec<ColumnKind> = names.iter().map(|name| kind(name)).collect();
     write_whole(path, |writer| {
         let columns = names.iter().map(String::as_str).zip(kinds.iter().copied());
         let mut file = ParquetWriter::new(writer, columns)?;
-        let mut row = csv::StringRecord::new();
-        while reader.read_record(&mut row).map_err(io::Error::other)? {
-            let cells = row.iter().zip(&kinds).map(|(cell, kind)| match kind {
-                ColumnKind::Whole => cell.parse().map(Cell::Whole).map_err(io::Error::other),
-                ColumnKind::Number if cell.is_empty() => Ok(Cell::Number(f64::NAN)),
-                ColumnKind::Number => cell.parse().map(Cell::Number).map_err(io::Error::other),
-                ColumnKind::Word => Ok(Cell::Word(cell)),
+        while advance(&mut records)? {
+            if records.len() != kinds.len() {
+                return Err(io::Error::other(format!("line {} has {} cells", records.line(), records.len())));
+            }
+            let cells = records.cells().zip(&kinds).map(|(cell, kind)| match kind {
+                ColumnKind::Number => number(cell)
+                    .map(Cell::Number)
+                    .ok_or_else(|| io::Error::other(format!("line {}: a cell is not a number", records.line()))),
+                _ => {
+                    let text = std::str::from_utf8(cell).map_err(io::Error::other)?;
+                    match kind {
+                        ColumnKind::Whole => text.parse().map(Cell::Whole).map_err(io::Error::other),
+                        _ => Ok(Cell::Word(text)),
+                    }
+                }
             });
             file.row(cells.collect::<io::Result<Vec<Cell<'_>>>>()?)?;
         }
@@ -191,6 +199,7 @@ pub fn write_parquet(csv: &Path, path: &Path, kind: impl Fn(&str) -> ColumnKind)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bytes::Bytes;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::RowAccessor;
 
@@ -217,5 +226,36 @@ mod tests {
         assert_eq!(read[7].get_string(1).unwrap(), "ok");
         assert!(read[last].get_double(2).is_err());
         std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn words_that_change_often_or_are_many_are_those_that_were_written() {
+        let word = |row: usize| match row {
+            0..10_000 => "good".to_owned(),
+            10_000..20_000 => ["good", "flare", ""][row % 3].to_owned(),
+            _ => format!("number {}", row % 700),
+        };
+        let columns = [
+            ("run", ColumnKind::Whole),
+            ("word", ColumnKind::Word),
+            ("x", ColumnKind::Number),
+            ("same", ColumnKind::Word),
+        ];
+        let mut writer = ParquetWriter::new(Vec::new(), columns).unwrap();
+        let rows = 2 * GROUP + 5;
+        for row in 0..rows {
+            let x = if row % 5 == 2 { f64::NAN } else { row as f64 };
+            writer.row([Cell::Whole(row as u64), Cell::Word(&word(row)), Cell::Number(x), Cell::Word("e")]).unwrap();
+        }
+        let reader = SerializedFileReader::new(Bytes::from(writer.finish().unwrap())).unwrap();
+        let mut read = 0;
+        for (row, values) in reader.get_row_iter(None).unwrap().map(Result::unwrap).enumerate() {
+            assert_eq!(values.get_ulong(0).unwrap(), row as u64);
+            assert_eq!(values.get_string(1).unwrap(), &word(row));
+            assert_eq!(values.get_double(2).ok(), (row % 5 != 2).then_some(row as f64));
+            assert_eq!(values.get_string(3).unwrap(), "e");
+            read += 1;
+        }
+        assert_eq!(read, rows);
     }
 }
