@@ -35,11 +35,13 @@ pub(crate) use simulate::simulate;
 pub(crate) use study::{merge, study};
 pub(crate) use worst_case::worst_case;
 
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use config::{Car, Kind, Source};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
+use serde::Serializer as _;
 use trace::{Cell, CsvWriter, Trace, WholeFile};
 
 use crate::args::Mapping;
@@ -77,6 +79,20 @@ fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Fail
         table.finish()?.finish()
     };
     write().map_err(|error| Failure::writing(path, &error))
+}
+
+/// Writes objects as a list in JSON, one after the other: there may be many.
+fn write_json_list(
+    path: &Path,
+    objects: impl Iterator<Item = serde_json::Map<String, serde_json::Value>>,
+) -> Result<(), Failure> {
+    let write = |writer: &mut (dyn io::Write + Send)| {
+        let mut writer = BufWriter::new(writer);
+        serde_json::Serializer::pretty(&mut writer).collect_seq(objects)?;
+        writer.write_all(b"\n")?;
+        writer.flush()
+    };
+    trace::write_whole(path, write).map_err(|error| Failure::writing(path, &error))
 }
 
 /// Named cells as a JSON object; not a number becomes null.

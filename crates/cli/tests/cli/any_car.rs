@@ -75,7 +75,7 @@ fn a_drive_file_can_be_driven_by_the_demo() {
     assert!(text.contains("1-2    power-on upshift"), "{text}");
     let none = folder.write("none.toml", "name = \"n\"\n[[segment]]\nduration_s = 2\nthrottle = 0.1\n");
     let text = printed(&wetclutch(&["demo", "--vehicle", &car, "--drive", &none, "-o", &out]));
-    assert!(text.contains("0 of 0 shifts"), "{text}");
+    assert!(text.contains("The drive has no shift."), "{text}");
 }
 
 #[test]
@@ -180,13 +180,34 @@ fn lost_repeated_and_late_readings_of_a_drive_are_no_error() {
     assert!(!estimates.contains("NaN") && !estimates.contains("inf"));
 }
 
+/// A table with the cells of a column changed.
+fn with_column(table: &str, column: &str, change: impl Fn(&str) -> String) -> String {
+    let at = table.lines().next().unwrap().split(',').position(|name| name == column).unwrap();
+    let changed = |(row, line): (usize, &str)| {
+        let cells = line.split(',').enumerate();
+        let cells = cells.map(|(cell, value)| if row > 0 && cell == at { change(value) } else { value.to_owned() });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    };
+    table.lines().enumerate().map(changed).collect()
+}
+
 #[test]
 fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
     let folder = simulated("wrong-car");
     let text = folder.read("sim/short_measured.csv");
     let first = text.lines().take(2).collect::<Vec<_>>().join("\n") + "\n";
     let cases = [
-        (text.replacen("turbine_speed_rad_s", "turbine_speed_rpm", 1), "check the units of both speeds"),
+        (text.replacen("turbine_speed_rad_s", "turbine_speed_rpm", 1), "turbine_speed cannot be in rpm: "),
+        (text.replacen("element_int_current_a", "element_int_current_ma", 1), "element_int_current cannot be in mA: "),
+        (with_column(&text, "engine_speed_rad_s", |_| String::new()), "engine_speed has no value in any of"),
+        (
+            with_column(&text, "output_speed_rad_s", |value| format!("-{value}")),
+            "output_speed is negative and turbine_speed",
+        ),
+        (
+            with_column(&text, "element_int_current_a", |value| format!("{value}e3")),
+            "element_int_current cannot be in A: ",
+        ),
         (text.replacen("output_speed_rad_s", "other_rad_s", 1), "there is no column `output_speed_rad_s`"),
         (text.replacen("element_int_current_a", "int", 1), "there is no column `element_int_current_a`"),
         (text.replacen("target_gear", "goal", 1), "there is no column `target_gear`"),

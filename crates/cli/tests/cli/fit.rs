@@ -108,6 +108,11 @@ fn what_a_log_lacks_is_said_and_no_file_is_written() {
         assert!(stderr(&output).contains(expected), "{case}: {}", stderr(&output));
         assert!(!std::path::Path::new(&fitted).exists(), "{case}");
     }
+    // Nor is a measurement replaced.
+    let (log, other) = (folder.write("log.csv", &text), folder.write("other.csv", &text));
+    let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &other]);
+    assert!(stderr(&output).contains("exists and is no vehicle file"), "{}", stderr(&output));
+    assert!(folder.read("other.csv") == text);
 }
 
 #[test]

@@ -131,6 +131,24 @@ fn a_log_may_be_replaced_by_its_own_estimate() {
 }
 
 #[test]
+fn a_file_that_no_estimate_wrote_is_neither_replaced_nor_removed() {
+    let folder = Folder::new("foreign");
+    let path = folder.write("log.csv", log(20));
+    for name in ["out_report.html", "out_shifts.csv", "out_shifts.json"] {
+        let mine = folder.write(name, "mine\n");
+        let output = estimate(&path, &["-o", &folder.path("out.csv")]);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains("no estimate wrote this file"), "{}", stderr(&output));
+        assert_eq!(folder.read(name), "mine\n");
+        std::fs::remove_file(mine).unwrap();
+    }
+    // A page of an earlier estimate is not of this log, which has no shift.
+    folder.write("out_report.html", "<title>log.csv: estimate | wetclutch</title>");
+    assert!(estimate(&path, &["-o", &folder.path("out.csv")]).status.success());
+    assert_eq!(folder.names(), ["log.csv", "out.csv"]);
+}
+
+#[test]
 fn an_existing_folder_takes_the_estimate_under_the_name_of_its_log() {
     let folder = Folder::new("target");
     let path = folder.write("log.csv", log(20));

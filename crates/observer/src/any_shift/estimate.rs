@@ -138,7 +138,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.clutches =
                     self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(
                         |shift| {
-                            let learnt = self.known(&state.learnt, &self.acting(shift)).mean;
+                            let learnt = state.learnt.known_mean(&self.acting(shift));
                             [0, 1].map(|c| {
                                 let clutch = &shift.clutches[c];
                                 let lasting = [learnt[c], learnt[c + 2]];

@@ -215,7 +215,7 @@ impl<T: Real> Learnt<T> {
     /// What the acting quantities are before a shift: mean and covariance of what is learnt and of the budget together.
     pub(super) fn known(&self, acting: &Acting<T>, correlations: &Correlations<T>) -> Known<T> {
         let (mut known, budget) = (self.of_car(acting), Self::nothing(correlations).of_car(acting));
-        let car = (T::one() + (-self.odds).exp()).recip();
+        let car = self.probability();
         let rest = T::one() - car;
         let mean = known.mean;
         for (a, row) in known.covariance.iter_mut().enumerate() {
@@ -225,6 +225,20 @@ impl<T: Real> Learnt<T> {
         }
         known.mean = mean.map(|mean| car * mean);
         known
+    }
+
+    /// The mean of [`Self::known`].
+    pub(super) fn known_mean(&self, acting: &Acting<T>) -> [T; ACTING] {
+        let car = self.probability();
+        core::array::from_fn(|a| {
+            let learnt = acting.places[a].and_then(|place| self.mean.get(place).copied());
+            car * acting.per_unit(a).0 * learnt.unwrap_or(T::zero())
+        })
+    }
+
+    /// Probability of what is learnt against any car of the budget.
+    fn probability(&self) -> T {
+        (T::one() + (-self.odds).exp()).recip()
     }
 
     /// What a new drive begins with. What was learnt may be of another car, or of a bad log: it is the mean and covariance of it

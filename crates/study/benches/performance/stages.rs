@@ -80,7 +80,10 @@ fn timed(campaign: &Campaign) -> [f64; STAGES.len()] {
         sensors.seed = run_seed(study, run);
         let begin_s = experiment.shift.request_s - study.record_before_s;
         let powertrain = Powertrain::new(experiment.simulated_vehicle(&varied.car));
-        Simulation::new(&powertrain, &varied.vehicle, experiment).unwrap().advance(begin_s, |_| {}).unwrap();
+        let mut launch = Simulation::new(&powertrain, &varied.vehicle, experiment).unwrap();
+        // A study records nothing of it.
+        launch.record_from(begin_s);
+        launch.advance_to(begin_s, |_| {}).unwrap();
         stage(1);
         let (car, vehicle) = (&varied.car, &varied.vehicle);
         let shift = scored_shift(std::mem::take(&mut spare), car, vehicle, experiment, study.record_before_s).unwrap();

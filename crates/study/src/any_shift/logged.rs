@@ -165,6 +165,11 @@ impl<'c> CarLog<'c> {
         Ok(Self { car, columns: Columns::of(&rows, car, tables)?, rows, last_s: None, gear: None })
     }
 
+    /// Whether the table has a signal, of this name in SI, in its SI unit.
+    pub fn is_in_si(&self, name: &str) -> bool {
+        self.rows.find(name).is_none_or(|column| self.rows.factor(column) == 1.0)
+    }
+
     /// The next row; `None` at the end.
     ///
     /// # Errors

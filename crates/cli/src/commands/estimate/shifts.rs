@@ -12,7 +12,7 @@ use trace::{Cell, CsvWriter, WholeFile};
 
 use super::selection::Selection;
 use crate::args::Estimate;
-use crate::commands::json_object;
+use crate::commands::{json_object, write_json_list};
 use crate::failure::Failure;
 
 /// Collects the shifts of a log while its estimates pass by.
@@ -95,7 +95,5 @@ pub(super) fn write(shifts: &[ShiftEstimate], csv: &Path, json: &Path) -> Result
         let cells = time.chain(columns.iter().map(|(name, cell)| (*name, cell(shift))));
         json_object(cells.map(|(name, cell)| (name.to_owned(), cell)))
     };
-    let objects: Vec<_> = shifts.iter().map(object).collect();
-    let text = serde_json::to_string_pretty(&objects)? + "\n";
-    trace::write_whole(json, |writer| writer.write_all(text.as_bytes())).map_err(writing(json))
+    write_json_list(json, shifts.iter().map(object))
 }

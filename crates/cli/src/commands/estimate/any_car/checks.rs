@@ -19,7 +19,6 @@ pub(super) struct Columns {
 }
 
 struct Watched {
-    column: String,
     /// Place of a command in the filter's tables.
     place: Option<usize>,
     is_needed: bool,
@@ -28,19 +27,28 @@ struct Watched {
 }
 
 impl Columns {
-    pub(super) fn of(car: &Car, tables: &ShiftTables<f64>) -> Self {
+    /// `is_in_si` tells whether a signal is there in its SI unit.
+    pub(super) fn of(car: &Car, tables: &ShiftTables<f64>, is_in_si: impl Fn(&str) -> bool) -> Self {
         let has_converter = car.converter.is_some();
         let watched = |role: Role, column: &str, place: Option<usize>, is_needed: bool| Watched {
-            column: column.to_owned(),
             place,
             is_needed,
             values: 0,
             summary: RoleSummary {
                 role,
-                name: column.to_owned(),
+                name: column
+                    .rsplit_once('_')
+                    .filter(|_| place.is_some())
+                    .map_or(role.name(), |(name, _)| name)
+                    .to_owned(),
                 counts: QualityCounts::default(),
                 extremes: Extremes::default(),
-                unit_name: role.unit().to_owned(),
+                unit_name: match role {
+                    _ if is_in_si(column) => role.unit(),
+                    Role::ElementCurrent => "mA",
+                    _ => "rpm",
+                }
+                .to_owned(),
             },
         };
         let others = [
@@ -87,7 +95,7 @@ impl Columns {
         if let Some(entry) = empty {
             return Err(Failure::Input(format!(
                 "{} has no value in any of {} rows\nhint: an estimate of this car needs it; look at the log with `wetclutch inspect`",
-                entry.column,
+                entry.summary.name,
                 output::grouped(self.rows)
             )));
         }

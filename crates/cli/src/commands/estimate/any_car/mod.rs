@@ -25,7 +25,7 @@ use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::selection::Selection;
 use crate::args::{Estimate, ObserverChoice};
-use crate::commands::{channel_map, json_object, write_cells, write_text};
+use crate::commands::{channel_map, json_object, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -85,9 +85,11 @@ pub(super) fn estimate(
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
-    let mut checks = checks::Columns::of(car, tables);
+    let mut checks = log.columns(car, tables);
     while let Some(step) = log.next_step()? {
-        checks.push(&step);
+        if let Some(checks) = &mut checks {
+            checks.push(&step);
+        }
         let estimate = drive.push(&step);
         let gears = [step.input.gear.from, step.input.gear.to];
         let row = Row { car, places: &places, gears, estimate };
@@ -99,7 +101,7 @@ pub(super) fn estimate(
         }
     }
     log.finish(say)?;
-    checks.check()?;
+    checks.map_or(Ok(()), |checks| checks.check())?;
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
     let mut drive = drive.finish();
     passing.check()?;
@@ -135,8 +137,7 @@ fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path, say: 
     let [csv, json, page] = places;
     let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
     write_cells(&csv, &cells)?;
-    let objects: Vec<_> = cells.into_iter().map(json_object).collect();
-    write_text(&json, &(serde_json::to_string_pretty(&objects)? + "\n"))?;
+    write_json_list(&json, cells.into_iter().map(json_object))?;
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
     write_text(&page, &html)?;

@@ -15,6 +15,7 @@ use trace::{CsvRows, Following};
 
 use super::super::Messages;
 use super::super::measured::report_readings;
+use super::checks::Columns;
 use crate::failure::Failure;
 
 /// How a log of a car is read.
@@ -71,6 +72,14 @@ impl<'a> CarSource<'a> {
         };
         let channels = CarChannels::of(opened.insert(log), map, car, tables)?;
         Ok(Self::Channels(Box::new(channels)))
+    }
+
+    /// What watches the columns of a table; mapped channels are watched by their readings.
+    pub(super) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
+        match self {
+            Self::Rows(rows) => Some(Columns::of(car, tables, |name| rows.is_in_si(name))),
+            Self::Channels(_) => None,
+        }
     }
 
     pub(in crate::commands) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
