@@ -1,5 +1,7 @@
 //! What a fit has found, in words.
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
@@ -83,16 +85,7 @@ impl Fit {
             );
         }
         lines.push(self.torque_said());
-        if !self.is_converged {
-            lines.push(
-                "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
-            );
-        }
-        if self.shifts == 1 {
-            lines.push(
-                "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),
-            );
-        }
+        lines.extend(cautions(self.is_converged, self.shifts));
         lines.extend(self.channel_map());
         lines.extend(self.proposals());
         lines
@@ -112,15 +105,16 @@ impl Fit {
         (!words.is_empty()).then(|| format!("correlated: {}", words.join("; ")))
     }
 
-    /// Whether the values of the given file lie in the intervals of the car's parameters that all hold in 95 %: by Bonferroni, of so many
-    /// parameters each in 95 % of one over their number.
+    /// Whether the values of the given file lie in the region of the car's parameters that holds all in 95 %. The parameters count
+    /// together: speeds tell ratios of parameters better than each of them.
     fn given_is_possible(&self) -> bool {
-        /// Standard deviations on either side that 99.7 % lie within: 5 % over 17 parameters, about as many as there are.
-        const SIDES_OF_ALL: f64 = 3.0;
-        let mut of_car = self.priors.iter().enumerate().filter(|(_, prior)| !prior.parameter.is_of_signals());
-        of_car.all(|(i, prior)| {
-            (self.unknowns[i] - prior.mean).abs() <= SIDES_OF_ALL * self.precision.stated[(i, i)].sqrt()
-        })
+        let of_car = self.priors.iter().enumerate().filter(|(_, prior)| !prior.parameter.is_of_signals());
+        let places: Vec<usize> = of_car.map(|(i, _)| i).collect();
+        let count = places.len();
+        let change = DVector::from_fn(count, |a, _| self.unknowns[places[a]] - self.priors[places[a]].mean);
+        let covariance = DMatrix::from_fn(count, count, |a, b| self.precision.stated[(places[a], places[b])]);
+        let distance = covariance.cholesky().map(|root| change.dot(&root.solve(&change)));
+        distance.is_some_and(|distance| distance <= chi_squared_95(count))
     }
 
     /// How much the clutch torque changes, and whether the logs show that this is better.
@@ -251,4 +245,34 @@ fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -
         }
     };
     ReportRow { name: name.to_owned(), value, interval, share: format!("{:.2}", sd / before), verdict }
+}
+
+/// Why intervals may be too small.
+pub(crate) fn cautions(is_converged: bool, shifts: usize) -> impl Iterator<Item = String> {
+    let used_up =
+        "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold";
+    let one = "one shift only: nothing shows how much shifts differ, so the intervals may be too small";
+    [(!is_converged, used_up), (shifts == 1, one)]
+        .into_iter()
+        .filter(|(is_so, _)| *is_so)
+        .map(|(_, text)| text.to_owned())
+}
+
+/// What the sum of the squares of so many independent normal numbers is below in 95 %, by the cube root of Wilson and Hilferty.
+fn chi_squared_95(count: usize) -> f64 {
+    let (count, ninth) = (count as f64, 2.0 / (9.0 * count as f64));
+    count * (1.0 - ninth + 1.645 * ninth.sqrt()).powi(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_chi_squared_are_those_of_tables() {
+        for (count, limit) in [(2, 5.99), (5, 11.07), (10, 18.31), (20, 31.41)] {
+            let found = chi_squared_95(count);
+            assert!((found / limit - 1.0).abs() < 0.01, "{count}: {found}");
+        }
+    }
 }

@@ -98,18 +98,7 @@ impl Read for LastLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Gives a few bytes at a time.
-    struct Slow(Vec<u8>, usize);
-
-    impl Read for Slow {
-        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            let count = self.1.min(self.0.len()).min(buffer.len());
-            buffer[..count].copy_from_slice(&self.0[..count]);
-            self.0.drain(..count);
-            Ok(count)
-        }
-    }
+    use crate::slow::Slow;
 
     fn lines(text: &str, at_once: usize) -> (String, bool) {
         let (mut lines, was_cut) = LastLine::new(Box::new(Slow(text.as_bytes().to_vec(), at_once)));

@@ -13,6 +13,8 @@ pub mod mdf_file;
 pub mod parquet_file;
 pub mod rows;
 pub mod signal;
+#[cfg(test)]
+mod slow;
 pub mod table;
 pub mod units;
 

@@ -5,6 +5,7 @@ use drivetrain::ShiftKind;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
 use crate::fitted_file::SIDES;
+use crate::report::cautions;
 use crate::{ReportRow, Verdict};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
@@ -106,16 +107,7 @@ impl GearboxFit {
                 self.at_limit.join(", ")
             ));
         }
-        if !self.is_converged {
-            lines.push(
-                "warning: not converged: the iterations were used up while the values still changed; the intervals do not hold".to_owned(),
-            );
-        }
-        if self.shifts == 1 {
-            lines.push(
-                "one shift only: nothing shows how much shifts differ, so the intervals may be too small".to_owned(),
-            );
-        }
+        lines.extend(cautions(self.is_converged, self.shifts));
         lines
     }
 
