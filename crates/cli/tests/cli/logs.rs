@@ -131,6 +131,24 @@ fn a_log_may_be_replaced_by_its_own_estimate() {
 }
 
 #[test]
+fn a_log_without_a_command_in_most_rows_is_refused() {
+    let folder = Folder::new("command");
+    let cut = |kept: usize| {
+        let rows = log(1000);
+        let rows = rows.lines().enumerate();
+        rows.map(|(row, line)| if row > kept { line.replace(",0.1", ",") + "\n" } else { format!("{line}\n") })
+            .collect::<String>()
+    };
+    let path = folder.write("log.csv", cut(700));
+    assert!(estimate(&path, &[]).status.success());
+    let path = folder.write("log.csv", cut(300));
+    let output = estimate(&path, &["-o", &folder.path("out.csv")]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("of 1,000 samples have no command of the valve"), "{}", stderr(&output));
+    assert_eq!(folder.names(), ["log.csv"]);
+}
+
+#[test]
 fn a_file_that_no_estimate_wrote_is_neither_replaced_nor_removed() {
     let folder = Folder::new("foreign");
     let path = folder.write("log.csv", log(20));

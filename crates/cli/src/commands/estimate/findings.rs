@@ -139,6 +139,15 @@ impl Findings {
     fn check_estimates(&self) -> Result<(), Failure> {
         let impossible = [Health::OutsideRange, Health::LimitedToRange, Health::HeldClutchSlips, Health::Flare];
         let of = |health: &Health| self.health.iter().find(|(other, _)| other == health).map_or(0, |(_, count)| *count);
+        let lost = of(&Health::CommandRejected);
+        if 2 * lost > self.rows && self.rows >= ENOUGH_ROWS {
+            return Err(Failure::Input(format!(
+                "{} of {} samples have no command of the valve that can be used\nhint: look at its channel with `wetclutch inspect`; a log of \
+                 another car, or of one with a whole gearbox, may have it in its shifts alone, and that needs the vehicle file of that car",
+                output::grouped(lost),
+                output::grouped(self.rows)
+            )));
+        }
         let count: u64 = impossible.iter().map(of).sum();
         if 2 * count <= self.rows || self.rows < ENOUGH_ROWS {
             return Ok(());
