@@ -9,6 +9,7 @@ mod outputs;
 mod ratios;
 mod selection;
 mod shifts;
+mod watched;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
