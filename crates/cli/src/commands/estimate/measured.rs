@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::plausibility::Seen;
+use logs::plausibility::{Seen, likely_time_unit};
 use logs::{
     ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
 };
@@ -173,7 +173,7 @@ impl<'a> Measured<'a> {
         let mut watched = watched(&rows, vehicle, look);
         let log = study::log::Log::of(rows, vehicle, look)?;
         log.looked_at().for_each(|(input, _)| watched.push(values(input)));
-        check_step(path, log.median_step_s(), "divide it by 1000")?;
+        check_step(path, log.median_step_s(), false)?;
         watched.check(Seen::Beginning)?;
         let gearbox = of_vehicle(vehicle);
         // Turbine and output speed are there, and tell shifts.
@@ -238,7 +238,7 @@ impl<'a> Measured<'a> {
         channels.steps.readings().check_first_units()?;
         let steps_s = channels.looked_at.iter().skip(1).map(|(step, _)| step.input.dt_s);
         channels.median_step_s = trace::median_step_s(steps_s.collect());
-        check_step(path, channels.median_step_s, "set `unit = \"ms\"` under [time] in the channel map")?;
+        check_step(path, channels.median_step_s, true)?;
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
         let source = Source::Channels(Box::new(channels));
@@ -294,6 +294,9 @@ impl<'a> Measured<'a> {
             }
             Source::Channels(channels) => channels,
         };
+        if let Some(contradiction) = self.finder.contradiction() {
+            say.note(&format!("warning: {contradiction}"));
+        }
         report_readings(channels.steps.readings(), say)
     }
 }
@@ -317,14 +320,20 @@ fn other_delimiter(path: &Path, error: TraceError) -> Failure {
 }
 
 /// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
-fn check_step(path: &Path, median_s: f64, hint: &str) -> Result<(), Failure> {
+pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<(), Failure> {
     const LONGEST_S: f64 = 1.0;
     if median_s < LONGEST_S || median_s.is_nan() {
         return Ok(());
     }
+    let unit = likely_time_unit(median_s).unwrap_or("ms");
+    let hint = match (is_mapped, unit) {
+        (true, unit) => format!("set `unit = \"{unit}\"` under [time] in the channel map"),
+        (false, "ms") => format!("call its column `time_ms` in place of `{}`", signal::TIME),
+        (false, _) => format!("convert it to s, or let a channel map read it, with `unit = \"{unit}\"` under [time]"),
+    };
     Err(Failure::Input(format!(
         "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
-         hint: if the time is in ms, {hint}",
+         hint: if the time is in {unit}, {hint}",
         path.display()
     )))
 }
