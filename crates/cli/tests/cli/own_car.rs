@@ -157,3 +157,12 @@ fn what_is_wrong_with_a_short_file_is_said_with_its_line() {
     let text = refused(&wetclutch(&["check", &folder.write("whole.toml", text)]));
     assert!(text.contains("`engine.max_torque_n_m`: scales the defaults of a file with `gear_train.ratios`"), "{text}");
 }
+
+#[test]
+fn a_negative_number_is_outside_its_range_and_no_option() {
+    let folder = Folder::new("negative");
+    let mut numbers = NUMBERS;
+    numbers[1] = "-5";
+    let error = refused(&wetclutch(&[&["init"], &numbers[..], &["-o", &folder.path("car.toml")]].concat()));
+    assert!(error.contains("invalid value '-5' for '--mass-kg <KG>': expected a number from 200 to 60000"), "{error}");
+}
