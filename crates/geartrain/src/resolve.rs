@@ -96,8 +96,8 @@ pub(crate) fn train(diagram: &StickDiagram) -> Result<(GearTrain, Vec<Finding>),
             return Err(Finding { part: Part::Gearbox, key: list, fault: Fault::TooMany { count, most: MOST } });
         }
     }
-    let (sets, unusual) = sets(diagram, &member)?;
-    let pairs = pairs(diagram, &shaft)?;
+    let (sets, unusual) = sets(diagram, member)?;
+    let pairs = pairs(diagram, shaft)?;
     let elements = elements(diagram, member)?;
     let (input, output) =
         (shaft(Part::Gearbox, "input", &diagram.input)?, shaft(Part::Gearbox, "output", &diagram.output)?);

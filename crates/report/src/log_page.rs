@@ -469,7 +469,7 @@ mod tests {
             held(&one(count, at), Health::Flare, 1.0).iter().filter(|(_, height)| !height.is_nan()).count()
         };
         // Until the next sample, and of a long drive for a part of it.
-        assert_eq!((drawn(100, 50), drawn(30_000, 50), drawn(100, 99)), (2, 101, 1));
+        assert_eq!((drawn(100, 50), drawn(30_000, 50), drawn(100, 99)), (2, 100, 1));
     }
 
     #[test]
