@@ -11,7 +11,9 @@ pub mod influence;
 pub mod logged;
 pub mod matrix;
 pub mod measured;
+mod nominal;
 pub mod recording;
+pub mod sensitivity;
 pub mod tour;
 
 use config::{Car, Sensors};

@@ -233,6 +233,9 @@ pub(crate) enum Command {
     ///
     /// Reads the error bounds of a vehicle file. For each phase it prints the equivalent pressure error of each of them,
     /// and whether an observer can distinguish the error from a pressure.
+    ///
+    /// With the vehicle file of a car with a gearbox: what each error does to the estimate of every shift between neighbouring gears, and
+    /// in which of them the speeds show nothing of the clutch torque, so that the valve model serves.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
     /// Check a vehicle, gearbox, experiment or study file

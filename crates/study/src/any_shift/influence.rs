@@ -4,12 +4,12 @@
 //! changed by its stated uncertainty, one way and the other.
 
 use config::{Car, Sensors, ShiftClutch};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::ShiftErrors;
 use drivetrain::Table1;
-use plant::car::{CarSample, CarShift};
 
-use super::matrix::{MatrixShift, controlling, neighbouring_shifts};
-use super::{AnyShiftError, ShiftScoreRow, SquaredErrors, TruePhase, inputs, score_samples, simulated};
+use super::matrix::controlling;
+use super::nominal::{NominalShift, nominal_shifts};
+use super::{AnyShiftError, SquaredErrors, TruePhase};
 use crate::StudyError;
 
 /// Where a value of a car stands.
@@ -156,17 +156,11 @@ pub struct CarInfluences {
 /// # Errors
 /// A shift of the car cannot be simulated, or the gearbox has more clutches than the filter has room for.
 pub fn car_influences(car: &Car, sensors: &Sensors) -> Result<Option<CarInfluences>, StudyError> {
-    let tables = ShiftTables::of_car(car, &ERRORS).map_err(AnyShiftError::TooManyElements)?;
-    let (shifts, _) = neighbouring_shifts(car, &tables);
+    let shifts = nominal_shifts(car, sensors)?;
     if shifts.is_empty() {
         return Ok(None);
     }
-    let recorded = |shift: &MatrixShift| -> Result<(MatrixShift, Vec<CarSample>), AnyShiftError> {
-        let usual = CarShift::usual(car, shift.from, shift.to, shift.throttle());
-        Ok((*shift, simulated(car, car, &usual)?))
-    };
-    let recorded = shifts.iter().map(recorded).collect::<Result<Vec<_>, _>>()?;
-    let as_it_is = errors(car, sensors, &recorded)?;
+    let as_it_is = errors(car, sensors, &shifts)?;
     let mut values = Vec::new();
     for value in &VALUES {
         if value.key.starts_with("converter.") && car.converter.is_none() {
@@ -175,7 +169,7 @@ pub fn car_influences(car: &Car, sensors: &Sensors) -> Result<Option<CarInfluenc
         let at = |factor: f64| {
             let mut changed = car.clone();
             (value.change)(&mut changed, factor);
-            errors(&changed, sensors, &recorded)
+            errors(&changed, sensors, &shifts)
         };
         let [low, high] = [at(value.limits[0])?, at(value.limits[1])?];
         let errors = if low.torque_n_m[0] > high.torque_n_m[0] { low } else { high };
@@ -185,19 +179,12 @@ pub fn car_influences(car: &Car, sensors: &Sensors) -> Result<Option<CarInfluenc
     Ok(Some(CarInfluences { shifts: shifts.len(), as_it_is, values }))
 }
 
-/// The errors of the estimates with this file over the recorded shifts.
-fn errors(
-    file: &Car,
-    sensors: &Sensors,
-    recorded: &[(MatrixShift, Vec<CarSample>)],
-) -> Result<ErrorOfEstimate, AnyShiftError> {
-    let tables = ShiftTables::of_car(file, &ERRORS).map_err(AnyShiftError::TooManyElements)?;
-    let filter = any_shift_filter(file, &tables, &ERRORS, Some(sensors));
+/// The errors of the estimates with this file over the shifts.
+fn errors(file: &Car, sensors: &Sensors, shifts: &[NominalShift]) -> Result<ErrorOfEstimate, AnyShiftError> {
     let [mut torque, mut pressure] = [SquaredErrors::default(); 2];
-    for (seed, (shift, samples)) in (1..).zip(recorded) {
-        let inputs = inputs(file, &tables, samples, sensors, seed);
-        let rows: Vec<ShiftScoreRow> = score_samples(&tables, &filter, samples, &inputs);
-        let clutch = controlling(shift.kind);
+    for nominal in shifts {
+        let rows = nominal.estimated(file, sensors, ERRORS.valve_delay_s, &nominal.inputs)?;
+        let clutch = controlling(nominal.shift.kind);
         for phase in [TruePhase::Torque, TruePhase::Inertia] {
             torque.add(&SquaredErrors::of(&rows, phase, clutch));
             pressure.add(&SquaredErrors::of_pressure(&rows, phase, clutch));
