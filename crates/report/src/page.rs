@@ -75,7 +75,7 @@ impl Page {
             range_mpa => format!("{:.1}", mpa(experiment.shift.line_pressure_pa)),
             certificates => rigid_certificates(comparison),
             compliant => compliant_certificates(comparison),
-            quality => quality_rows(comparison),
+            quality => comparison.quality.as_ref().map(quality_rows),
             inputs => origin(&[&vehicle.source, &experiment.source]),
             seed => experiment.sensors.map(|sensors| sensors.seed),
             certified => comparison.runs.first().filter(|_| !comparison.bound_pa.is_empty()).map(|run| &run.entry.name),

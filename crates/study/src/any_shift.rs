@@ -6,6 +6,7 @@
 
 pub mod campaign;
 pub mod channels;
+mod contradictions;
 pub mod drive;
 pub mod influence;
 pub mod logged;

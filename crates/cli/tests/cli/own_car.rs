@@ -158,6 +158,15 @@ fn what_is_wrong_with_a_short_file_is_said_with_its_line() {
     assert!(text.contains("`engine.max_torque_n_m`: scales the defaults of a file with `gear_train.ratios`"), "{text}");
 }
 
+#[test]
+fn a_negative_number_is_outside_its_range_and_no_option() {
+    let folder = Folder::new("negative");
+    let mut numbers = NUMBERS;
+    numbers[1] = "-5";
+    let error = refused(&wetclutch(&[&["init"], &numbers[..], &["-o", &folder.path("car.toml")]].concat()));
+    assert!(error.contains("invalid value '-5' for '--mass-kg <KG>': expected a number from 200 to 60000"), "{error}");
+}
+
 /// The numbers of a large car with a gearbox.
 const CAR: [&str; 8] =
     ["--mass-kg", "1900", "--wheel-radius-m", "0.33", "--final-ratio", "2.8", "--engine-torque-n-m", "400"];

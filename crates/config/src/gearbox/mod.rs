@@ -8,7 +8,7 @@ use std::path::Path;
 use geartrain::{Finding, Gearbox, Part};
 
 use crate::check::Check;
-use crate::{ConfigError, Source};
+use crate::{ConfigError, Kind, Source};
 use convert::{Read, Spans};
 use raw::{RawHead, RawRatios, RawShares, RawStickDiagram};
 
@@ -60,7 +60,8 @@ impl GearboxFile {
             _ => {
                 let at = head.level.as_ref().map_or(0, |level| level.span().start);
                 let message = if head.level.is_some() { "there is no such level" } else { "missing `level`" };
-                return Err(check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned())));
+                let error = check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned()));
+                return Err(source.unless_other(Kind::Gearbox, error));
             }
         };
         let Read { description, spans } = read;
