@@ -36,6 +36,7 @@ pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("error_bound.html", include_str!("../templates/error_bound.html"))?;
     environment.add_template("log.html", include_str!("../templates/log.html"))?;
     environment.add_template("matrix.html", include_str!("../templates/matrix.html"))?;
+    environment.add_template("car_sensitivity.html", include_str!("../templates/car_sensitivity.html"))?;
     environment.add_template("sensitivity.html", include_str!("../templates/sensitivity.html"))?;
     environment.add_template("speeds.html", include_str!("../templates/speeds.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
