@@ -268,3 +268,75 @@ impl<'a> Field<'a> {
 fn is_by_text(channel: &MdfChannel) -> bool {
     matches!(channel.conversion, Conversion::TextToValue { .. } | Conversion::TextToText { .. })
 }
+
+#[cfg(test)]
+mod tests {
+    use falcon_mdf::write::WriteCodec;
+    use falcon_mdf::{Mf4File, Mf4Writer, SignalValues};
+    use rand_pcg::Pcg64Mcg;
+    use rand_pcg::rand_core::{Rng, SeedableRng};
+
+    use super::super::numbers;
+    use super::super::records::Records;
+    use super::*;
+
+    /// Records of a time and sixteen random bytes.
+    fn random(codec: Option<WriteCodec>) -> Mf4File {
+        let mut generator = Pcg64Mcg::seed_from_u64(7);
+        let times: Vec<f64> = (0..3 * TILE + 5).map(|i| i as f64).collect();
+        let mut writer = Mf4Writer::new();
+        writer.set_compression(codec.is_some());
+        writer.set_codec(codec.unwrap_or_default());
+        let group = writer.add_group(&times).unwrap();
+        for name in ["one", "two"] {
+            let words = SignalValues::U64(times.iter().map(|_| generator.next_u64()).collect());
+            group.add_channel_typed_with(name, "", words, None, None).unwrap();
+        }
+        let mut bytes = Vec::new();
+        writer.write(&mut bytes).unwrap();
+        Mf4File::from_bytes(bytes).unwrap()
+    }
+
+    #[test]
+    fn numbers_of_every_kind_and_place_are_those_of_the_library() {
+        use DataType::{FloatBe, FloatLe, IntBe, IntLe, UIntBe, UIntLe};
+        let conversions = [
+            Conversion::None,
+            Conversion::Linear { offset: -3.0, factor: 0.25 },
+            Conversion::Rational { coefficients: [0.0, 2.0, 6.0, 0.0, 0.0, 4.0] },
+        ];
+        let mut generator = Pcg64Mcg::seed_from_u64(8);
+        let mut tile = Tile::new();
+        for codec in [None, Some(WriteCodec::Deflate), Some(WriteCodec::TransposedDeflate)] {
+            let file = random(codec);
+            let data = &file.data_groups()[0];
+            let group = &data.channel_groups[0];
+            let mut compared = 0;
+            for case in 0..600 {
+                let mut channel = group.channels[1].clone();
+                channel.data_type = [UIntLe, UIntBe, IntLe, IntBe, FloatLe, FloatBe][case % 6];
+                let is_float = channel.is_float();
+                channel.bit_count =
+                    if is_float { 32 + 32 * (generator.next_u32() % 2) } else { 1 + generator.next_u32() % 64 };
+                channel.bit_offset = if is_float { 0 } else { (generator.next_u32() % 8) as u8 };
+                channel.byte_offset = generator.next_u32() % 24;
+                channel.conversion = conversions[case / 6 % 3].clone();
+                let Some(field) = Field::of(&channel, group, 0) else { continue };
+                let mut records = Records::of(&file, data, group).unwrap();
+                let (mut memory, mut values, mut found) = (Vec::new(), Vec::new(), Vec::new());
+                // Some records at once, of which the last are fewer.
+                while let Some(window) = records.next(TILE + 3, &mut memory).unwrap() {
+                    field.decode(&window, &mut tile, &mut values);
+                    found.extend_from_slice(&values);
+                }
+                let expected = numbers(&file.signal(&channel).unwrap()).unwrap();
+                let is_same =
+                    |(one, other): (&f64, &f64)| one.to_bits() == other.to_bits() || one.is_nan() && other.is_nan();
+                assert_eq!(found.len(), expected.len());
+                assert!(found.iter().zip(&expected).all(is_same), "{codec:?} {field:?}");
+                compared += 1;
+            }
+            assert!(compared > 300, "{compared}");
+        }
+    }
+}
