@@ -73,8 +73,14 @@ fn kept<T>(elements: &mut Vec<T>, keep: &[bool]) {
 pub(crate) struct Batch {
     pub(crate) samples: Vec<Sample>,
     pub(crate) block: Block,
-    /// What the stream that fills the batch has unpacked and not yet given. Another stream can use the memory after it.
-    pub(crate) memory: Vec<u8>,
+    pub(crate) memory: Memory,
+}
+
+/// What the stream that fills a batch has read and unpacked, and not yet given. Another stream can use the memory after it.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    pub(crate) packed: Vec<u8>,
+    pub(crate) unpacked: Vec<u8>,
 }
 
 impl Batch {

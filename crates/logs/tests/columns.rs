@@ -1,12 +1,16 @@
 //! A log in columns has the samples that it has in time order.
 
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
 mod common;
 
 use common::{Folder, channel, data, read, with_dbc};
 use logs::{Log, OpenOptions, Quality};
 
-/// Times, values and qualities of each channel.
-fn in_columns(log: &mut Log) -> (Vec<Vec<(f64, f64, Quality)>>, Vec<String>) {
+type Samples = Vec<(f64, f64, Quality)>;
+
+/// Times, values and qualities of each channel, and the notes.
+fn in_columns(log: &mut Log) -> (Vec<Samples>, Vec<String>) {
     let all: Vec<usize> = (0..log.channels().len()).collect();
     let mut channels = vec![Vec::new(); all.len()];
     let mut columns = log.columns(&all).unwrap();
@@ -48,7 +52,7 @@ fn columns_have_the_samples_that_are_merged() {
         let mut count = 0;
         for (i, found) in columns.iter().enumerate() {
             let own = samples.iter().filter(|sample| sample.channel == i);
-            let own: Vec<_> = own.map(|sample| (sample.time_s, sample.value, sample.quality)).collect();
+            let own: Samples = own.map(|sample| (sample.time_s, sample.value, sample.quality)).collect();
             // What cannot be a number is not the same as itself.
             assert_eq!(format!("{found:?}"), format!("{own:?}"), "{name} {}", log.channels()[i].name);
             count += own.len();

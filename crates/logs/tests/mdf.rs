@@ -1,5 +1,7 @@
 //! MDF files that a test writes: every compression, and blocks that end anywhere.
 
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
 mod common;
 
 use std::io::Write as _;

@@ -271,6 +271,8 @@ fn is_by_text(channel: &MdfChannel) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use falcon_mdf::write::WriteCodec;
     use falcon_mdf::{Mf4File, Mf4Writer, SignalValues};
     use rand_pcg::Pcg64Mcg;
@@ -279,9 +281,10 @@ mod tests {
     use super::super::numbers;
     use super::super::records::Records;
     use super::*;
+    use crate::columns::Memory;
 
     /// Records of a time and sixteen random bytes.
-    fn random(codec: Option<WriteCodec>) -> Mf4File {
+    fn random(codec: Option<WriteCodec>) -> (Mf4File, File) {
         let mut generator = Pcg64Mcg::seed_from_u64(7);
         let times: Vec<f64> = (0..3 * TILE + 5).map(|i| i as f64).collect();
         let mut writer = Mf4Writer::new();
@@ -292,9 +295,11 @@ mod tests {
             let words = SignalValues::U64(times.iter().map(|_| generator.next_u64()).collect());
             group.add_channel_typed_with(name, "", words, None, None).unwrap();
         }
-        let mut bytes = Vec::new();
-        writer.write(&mut bytes).unwrap();
-        Mf4File::from_bytes(bytes).unwrap()
+        let path = std::env::temp_dir().join(format!("wetclutch-fields-{}.mf4", std::process::id()));
+        writer.write_to_file(&path).unwrap();
+        let open = (Mf4File::open(&path).unwrap(), File::open(&path).unwrap());
+        let _ = std::fs::remove_file(path);
+        open
     }
 
     #[test]
@@ -308,7 +313,7 @@ mod tests {
         let mut generator = Pcg64Mcg::seed_from_u64(8);
         let mut tile = Tile::new();
         for codec in [None, Some(WriteCodec::Deflate), Some(WriteCodec::TransposedDeflate)] {
-            let file = random(codec);
+            let (file, blocks) = random(codec);
             let data = &file.data_groups()[0];
             let group = &data.channel_groups[0];
             let mut compared = 0;
@@ -322,8 +327,8 @@ mod tests {
                 channel.byte_offset = generator.next_u32() % 24;
                 channel.conversion = conversions[case / 6 % 3].clone();
                 let Some(field) = Field::of(&channel, group, 0) else { continue };
-                let mut records = Records::of(&file, data, group).unwrap();
-                let (mut memory, mut values, mut found) = (Vec::new(), Vec::new(), Vec::new());
+                let mut records = Records::of(&blocks, data, group).unwrap();
+                let (mut memory, mut values, mut found) = (Memory::default(), Vec::new(), Vec::new());
                 // Some records at once, of which the last are fewer.
                 while let Some(window) = records.next(TILE + 3, &mut memory).unwrap() {
                     field.decode(&window, &mut tile, &mut values);

@@ -6,6 +6,7 @@
 mod field;
 mod records;
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use falcon_mdf::blocks::channel::ChannelType;
@@ -36,6 +37,8 @@ const ON_TRUST: usize = 16 << 20;
 pub(crate) struct MdfLog {
     path: PathBuf,
     file: Mf4File,
+    /// The same, for blocks of data.
+    blocks: File,
     places: Vec<Place>,
     /// Signals on a logged bus, behind the channels of the file.
     database: Option<Database>,
@@ -89,7 +92,8 @@ impl MdfLog {
         if file.unfinalized().is_some() {
             notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
         }
-        let log = Self { path: path.to_owned(), file, places, database, notes };
+        let blocks = File::open(path).map_err(LogError::io(path))?;
+        let log = Self { path: path.to_owned(), file, blocks, places, database, notes };
         if let Some(database) = log.database.as_ref().filter(|_| !log.file.can_frame_groups().is_empty()) {
             channels.extend_from_slice(database.channels());
         }
@@ -110,8 +114,8 @@ impl MdfLog {
             let channels: Vec<&MdfChannel> =
                 std::iter::once(master).chain(chosen.iter().map(|&i| &data.channels[self.places[i].channel])).collect();
             let place = format!("group `{}`", group_name(&self.file, data, data_group));
-            let decoder = Decoding::of(&self.file, data_group, data, &channels)
-                .map_err(|error| damaged(&self.path, &place, &error))?;
+            let decoder =
+                Decoding::of(self, data_group, data, &channels).map_err(|error| damaged(&self.path, &place, &error))?;
             let (path, declared) = (&self.path, data.sample_count);
             streams.push(Box::new(Group {
                 path,
@@ -185,22 +189,17 @@ enum Decoding<'a> {
 }
 
 impl<'a> Decoding<'a> {
-    fn of(
-        file: &'a Mf4File,
-        at: usize,
-        group: &'a ChannelGroup,
-        channels: &[&'a MdfChannel],
-    ) -> Result<Self, Mf4Error> {
-        let data = &file.data_groups()[at];
+    fn of(log: &'a MdfLog, at: usize, group: &'a ChannelGroup, channels: &[&'a MdfChannel]) -> Result<Self, Mf4Error> {
+        let data = &log.file.data_groups()[at];
         let id_bytes = Records::id_bytes(data);
         let fields: Option<Vec<Field<'_>>> =
             channels.iter().map(|channel| Field::of(channel, group, id_bytes)).collect();
         let mut fields = fields.unwrap_or_default().into_iter();
-        if let (Some(time), Some(records)) = (fields.next(), Records::of(file, data, group)) {
+        if let (Some(time), Some(records)) = (fields.next(), Records::of(&log.blocks, data, group)) {
             return Ok(Self::Own { records: Box::new(records), tile: Tile::new(), time, fields: fields.collect() });
         }
         let records = (DECODED_AT_ONCE / group.record_size(0).max(1)).clamp(*DECODED.start(), *DECODED.end());
-        file.signals_chunks(channels, records).map(|chunks| Self::Library(Box::new(chunks)))
+        log.file.signals_chunks(channels, records).map(|chunks| Self::Library(Box::new(chunks)))
     }
 
     /// Decodes the next records, in place of those that the columns have; false at the end.

@@ -1,11 +1,15 @@
 //! The records of a channel group: its blocks of data, one after the other, unpacked.
 
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+
 use falcon_mdf::blocks::data_block::CompressionType;
 use falcon_mdf::data_index::DataBlockInfo;
-use falcon_mdf::{ChannelGroup, DataGroup, Mf4File};
+use falcon_mdf::{ChannelGroup, DataGroup};
 use libdeflater::{DecompressionError, Decompressor};
 
 use super::{LARGEST_BLOCK, ON_TRUST};
+use crate::columns::Memory;
 
 /// Bytes of a block that is not packed that are read at once.
 const READ_AT_ONCE: usize = 4 << 20;
@@ -105,7 +109,7 @@ struct Mixed {
 
 /// The records of a group, read block by block.
 pub(super) struct Records<'a> {
-    file: &'a Mf4File,
+    file: &'a File,
     blocks: &'a [DataBlockInfo],
     /// Bytes of the first of them that were read: it is not packed, and long.
     read: usize,
@@ -133,7 +137,7 @@ impl<'a> Records<'a> {
     }
 
     /// The records of a group; none where its blocks are in a form that the library must read.
-    pub(super) fn of(file: &'a Mf4File, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
+    pub(super) fn of(file: &'a File, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
         let blocks = data.block_index().blocks();
         let is_known = |block: &DataBlockInfo| {
             let is_known =
@@ -170,7 +174,7 @@ impl<'a> Records<'a> {
     }
 
     /// The next records, at most so many; none at the end. The memory is that of the calls before.
-    pub(super) fn next<'m>(&mut self, most: usize, memory: &'m mut Vec<u8>) -> Result<Option<Window<'m>>, String> {
+    pub(super) fn next<'m>(&mut self, most: usize, memory: &'m mut Memory) -> Result<Option<Window<'m>>, String> {
         while self.given == self.held {
             if let Some(damage) = self.damage.take() {
                 self.blocks = &[];
@@ -183,7 +187,7 @@ impl<'a> Records<'a> {
         let left = usize::try_from(self.count - self.index).unwrap_or(usize::MAX);
         let count = most.min(self.held - self.given).min(left);
         let window = Window {
-            bytes: &memory[..self.length],
+            bytes: &memory.unpacked[..self.length],
             stride: if self.is_planes { self.held } else { self.size },
             is_planes: self.is_planes,
             first: self.given,
@@ -196,7 +200,7 @@ impl<'a> Records<'a> {
     }
 
     /// Reads the next bytes and finds the records in them; false at the end.
-    fn next_block(&mut self, memory: &mut Vec<u8>) -> Result<bool, String> {
+    fn next_block(&mut self, Memory { packed, unpacked }: &mut Memory) -> Result<bool, String> {
         let Some((block, others)) = self.blocks.split_first() else { return Ok(false) };
         (self.given, self.held, self.is_planes) = (0, 0, false);
         let place = |message: String| format!("block at byte {}: {message}", block.offset);
@@ -204,32 +208,31 @@ impl<'a> Records<'a> {
             None => {
                 let size = usize::try_from(block.original_size).unwrap_or(usize::MAX);
                 let length = (size - self.read).min(READ_AT_ONCE);
-                let at = block.offset + HEAD + self.read as u64;
-                let bytes = self.file.read_raw(at, length).map_err(|error| place(error.to_string()))?;
+                read(self.file, block.offset + HEAD + self.read as u64, length as u64, packed).map_err(place)?;
                 self.read += length;
                 if self.read == size {
                     (self.read, self.blocks) = (0, others);
                 }
-                self.divide(&bytes, memory);
+                self.divide(packed, unpacked);
             }
             Some(with) => {
-                let packed = usize::try_from(block.compressed_size).unwrap_or(usize::MAX);
-                let packed = self.file.read_raw(with.data_offset, packed).map_err(|error| place(error.to_string()))?;
-                self.length = inflate(&mut self.inflater, &packed, block.original_size, memory).map_err(place)?;
+                read(self.file, with.data_offset, block.compressed_size, packed).map_err(place)?;
+                self.length = inflate(&mut self.inflater, packed, block.original_size, unpacked).map_err(place)?;
                 self.blocks = others;
                 let columns = with.parameter as usize;
                 let is_transposed = with.algorithm == CompressionType::TransposedDeflate;
                 let is_as_it_stands = self.rest.is_empty() && matches!(self.layout, Layout::Sorted);
+                let bytes = &unpacked[..self.length];
                 if is_as_it_stands && (!is_transposed || columns == self.size) {
                     (self.is_planes, self.held) = (is_transposed, self.length / self.size);
-                    self.rest.extend_from_slice(&memory[self.held * self.size..self.length]);
+                    self.rest.extend_from_slice(&bytes[self.held * self.size..]);
                 } else if is_transposed {
-                    let unpacked = &memory[..self.length];
-                    let rows = in_rows(unpacked, columns).ok_or_else(|| place("it has no columns".to_owned()))?;
-                    self.divide(&rows, memory);
+                    let rows = in_rows(bytes, columns).ok_or_else(|| place("it has no columns".to_owned()))?;
+                    self.divide(&rows, unpacked);
                 } else {
-                    let bytes = memory[..self.length].to_vec();
-                    self.divide(&bytes, memory);
+                    packed.clear();
+                    packed.extend_from_slice(bytes);
+                    self.divide(packed, unpacked);
                 }
             }
         }
@@ -288,6 +291,16 @@ impl Mixed {
         }
         (at, None)
     }
+}
+
+/// Reads bytes of the file, in place of what is in `bytes`.
+fn read(mut file: &File, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
+    let of_file = file.metadata().map_err(|error| error.to_string())?.len();
+    let end = at.checked_add(length).filter(|end| *end <= of_file);
+    let length = end.and_then(|_| usize::try_from(length).ok());
+    let length = length.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
+    bytes.resize(length, 0);
+    file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).map_err(|error| error.to_string())
 }
 
 /// Unpacks a block to the beginning of the memory; its bytes.
