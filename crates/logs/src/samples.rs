@@ -159,25 +159,24 @@ impl Clock {
     /// The time of a stamp that simply goes on from the newest one, s; none, and nothing happens, if it does not.
     #[inline]
     fn step(&mut self, stamp_s: f64) -> Option<f64> {
-        let time_s = stamp_s + self.shift_s;
-        let step_s = time_s - self.newest_s?;
-        if !(step_s > 0.0 && step_s <= FAR_S) {
-            return None;
-        }
+        let (time_s, newest_s) = (stamp_s + self.shift_s, self.newest_s?);
+        (time_s > newest_s && time_s <= newest_s + FAR_S).then(|| self.go_on(time_s, newest_s))
+    }
+
+    /// Takes a time, s, that is after the newest one.
+    #[inline]
+    fn go_on(&mut self, time_s: f64, newest_s: f64) -> f64 {
         self.behind = 0;
-        if step_s >= self.jump_s {
-            self.jump_s = step_s;
-            self.before_jump_s = self.newest_s.unwrap_or(time_s);
+        if time_s - newest_s >= self.jump_s {
+            self.jump_s = time_s - newest_s;
+            self.before_jump_s = newest_s;
         }
         self.newest_s = Some(time_s);
-        Some(time_s)
+        time_s
     }
 
     /// The time of a stamp, s; none if it is backward.
     pub fn time(&mut self, stamp_s: f64) -> Option<f64> {
-        if let Some(time_s) = self.step(stamp_s) {
-            return Some(time_s);
-        }
         let time_s = stamp_s + self.shift_s;
         let Some(newest_s) = self.newest_s else {
             self.newest_s = Some(time_s);
@@ -206,14 +205,7 @@ impl Clock {
             return self.newest_s;
         }
         self.behind = 0;
-        if time_s > newest_s {
-            if time_s - newest_s >= self.jump_s {
-                self.jump_s = time_s - newest_s;
-                self.before_jump_s = newest_s;
-            }
-            self.newest_s = Some(time_s);
-        }
-        Some(time_s)
+        Some(if time_s > newest_s { self.go_on(time_s, newest_s) } else { time_s })
     }
 }
 

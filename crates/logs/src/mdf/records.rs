@@ -69,26 +69,19 @@ impl Window<'_> {
         let from_record = if self.is_planes { self.stride } else { 1 };
         let bytes = |at: usize| &self.bytes[start + at * from_record..];
         match places.map(|place| place.map(bytes)) {
-            [Some(low), Some(high)] if step == 1 => {
-                let pairs = low.iter().zip(high);
-                words
-                    .iter_mut()
-                    .zip(pairs)
-                    .for_each(|(word, (low, high))| *word = u16::from(*high) << 8 | u16::from(*low));
-            }
-            [Some(low), Some(high)] => {
-                let pairs = low.iter().step_by(step).zip(high.iter().step_by(step));
-                words
-                    .iter_mut()
-                    .zip(pairs)
-                    .for_each(|(word, (low, high))| *word = u16::from(*high) << 8 | u16::from(*low));
-            }
-            [Some(low), None] => {
-                words.iter_mut().zip(low.iter().step_by(step)).for_each(|(word, low)| *word = u16::from(*low));
-            }
+            // Bytes that stand together are taken many at once.
+            [Some(low), Some(high)] if step == 1 => of_pairs(words, low.iter().zip(high)),
+            [Some(low), Some(high)] => of_pairs(words, low.iter().step_by(step).zip(high.iter().step_by(step))),
+            [Some(low), None] if step == 1 => of_pairs(words, low.iter().zip(std::iter::repeat(&0))),
+            [Some(low), None] => of_pairs(words, low.iter().step_by(step).zip(std::iter::repeat(&0))),
             _ => words.fill(0),
         }
     }
+}
+
+/// Makes words of low and high bytes.
+fn of_pairs<'b>(words: &mut [u16], pairs: impl Iterator<Item = (&'b u8, &'b u8)>) {
+    words.iter_mut().zip(pairs).for_each(|(word, (low, high))| *word = u16::from_le_bytes([*low, *high]));
 }
 
 /// How the records of a group are found among the bytes.
@@ -240,25 +233,23 @@ impl<'a> Records<'a> {
     }
 
     /// Finds the records in these bytes, behind what was left of those before, and keeps what is less than one.
-    fn divide(&mut self, bytes: &[u8], memory: &mut Vec<u8>) {
-        let mut all = std::mem::take(&mut self.rest);
-        all.extend_from_slice(bytes);
-        let used = match &self.layout {
+    fn divide(&mut self, bytes: &[u8], unpacked: &mut Vec<u8>) {
+        unpacked.clear();
+        match &self.layout {
             Layout::Sorted => {
-                memory.clear();
-                let used = all.len() / self.size * self.size;
-                memory.extend_from_slice(&all[..used]);
-                used
+                unpacked.append(&mut self.rest);
+                unpacked.extend_from_slice(bytes);
+                self.rest.extend_from_slice(&unpacked[unpacked.len() / self.size * self.size..]);
             }
             Layout::Unsorted(mixed) => {
-                memory.clear();
-                let (used, damage) = mixed.take_own(&all, memory);
+                let mut all = std::mem::take(&mut self.rest);
+                all.extend_from_slice(bytes);
+                let (used, damage) = mixed.take_own(&all, unpacked);
                 self.damage = damage;
-                used
+                self.rest.extend_from_slice(&all[used..]);
             }
-        };
-        (self.length, self.held) = (memory.len(), memory.len() / self.size);
-        self.rest.extend_from_slice(&all[used..]);
+        }
+        (self.length, self.held) = (unpacked.len(), unpacked.len() / self.size);
     }
 }
 
@@ -297,8 +288,11 @@ impl Mixed {
 fn read(mut file: &File, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
     let of_file = file.metadata().map_err(|error| error.to_string())?.len();
     let end = at.checked_add(length).filter(|end| *end <= of_file);
-    let length = end.and_then(|_| usize::try_from(length).ok());
-    let length = length.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
+    end.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
+    if length > LARGEST_BLOCK {
+        return Err(format!("it has {length} packed bytes, expected at most {LARGEST_BLOCK}"));
+    }
+    let length = usize::try_from(length).map_err(|error| error.to_string())?;
     bytes.resize(length, 0);
     file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).map_err(|error| error.to_string())
 }
