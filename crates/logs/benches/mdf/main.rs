@@ -65,6 +65,13 @@ fn measure(path: &Path) {
             inflater.zlib_decompress(block, &mut memory[..*size]).unwrap() + usize::from(black_box(&memory)[0])
         };
         show("decompression of the blocks alone", fastest(|| blocks.iter().map(&mut inflate).sum::<usize>()).1);
+        let mut memory = vec![0; blocks.iter().map(|(_, size)| *size).max().unwrap_or(0)];
+        let mut inflate = |(block, size): &(&[u8], usize)| {
+            let finish = flate2::FlushDecompress::Finish;
+            flate2::Decompress::new(true).decompress(block, &mut memory[..*size], finish).unwrap();
+            usize::from(black_box(&memory)[0])
+        };
+        show("the same with flate2 (zlib-rs)", fastest(|| blocks.iter().map(&mut inflate).sum::<usize>()).1);
     }
     show("all channels in columns, some thousand records at once", columns_s);
     let (channels, kept_s) = fastest(|| kept(path));
