@@ -31,10 +31,30 @@ pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
     let open = || Log::open(&path, &options).ok();
     let Some(mut log) = open() else { return };
     let map = written(fuzzer, "suggested.toml", suggest(log.channels(), None).as_bytes());
-    let _ = inspect(&mut log);
+    let inspected = inspect(&mut log).ok();
+    // In columns a log has the same samples.
+    if let (Some(inspection), Some(count)) = (inspected, open().and_then(in_columns)) {
+        let total: u64 = inspection.channels.iter().map(|channel| channel.counts.total()).sum();
+        assert_eq!(count, total);
+    }
     // A suggestion is a map that can be read.
     let map = ChannelMap::read(&map).unwrap_or_else(|error| panic!("{error}"));
     replay(open(), &map);
+}
+
+/// How many values a log has in columns; none where it cannot be read.
+fn in_columns(mut log: Log) -> Option<u64> {
+    let all: Vec<usize> = (0..log.channels().len()).collect();
+    let mut columns = log.columns(&all).ok()?;
+    let mut count = 0;
+    while let Some(block) = columns.next_block().ok()? {
+        assert!(block.times_s.iter().all(|time_s| time_s.is_finite()));
+        for column in &block.columns {
+            assert_eq!(column.values.len(), block.times_s.len());
+            count += (0..column.values.len()).filter(|record| column.quality(*record).is_some()).count() as u64;
+        }
+    }
+    Some(count)
 }
 
 /// Uses a map as `inspect --shifts` and `estimate` do.

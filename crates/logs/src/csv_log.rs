@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use trace::csv_file::{LONGEST_ROW, number};
 use trace::{Quantity, RecordError, Records, Unit};
 
-use crate::samples::{Quality, Sample, Stream};
+use crate::columns::{Batch, Stream};
+use crate::samples::{Quality, Sample};
 use crate::{Channel, LogError, TimeColumn, error};
 
 /// Rows in a batch.
@@ -190,7 +191,7 @@ impl Rows<'_> {
 }
 
 impl Stream for Rows<'_> {
-    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+    fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
         for _ in 0..self.log.batch {
             if !read_row(&self.log.path, &mut self.records, self.log.dialect.preamble)? {
                 if self.rows == 0 {
@@ -204,7 +205,7 @@ impl Stream for Rows<'_> {
                 }
                 return Ok(false);
             }
-            self.take_row(batch);
+            self.take_row(&mut batch.samples);
         }
         Ok(true)
     }

@@ -1,13 +1,14 @@
 //! Measured logs, in the files that engineers have.
 //!
 //! A log is a set of channels, each with its own clock. [`Log`] reads CSV, Parquet, ASAM MDF 4 and CAN logs with a DBC and
-//! gives their samples merged in time order, in bounded memory. A [`ChannelMap`] says which channel is which signal;
+//! gives their samples merged in time order, or their channels in columns, in bounded memory. A [`ChannelMap`] says which channel is which signal;
 //! [`Readings`] applies it, with stated rules for what cannot be a reading (see [`Quality`]). [`Steps`] makes the inputs of an
 //! observer from readings; [`ShiftFinder`] finds the shifts of a drive.
 //!
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
 pub mod can;
+pub mod columns;
 pub mod csv_log;
 pub mod error;
 pub mod frozen;
@@ -24,6 +25,7 @@ pub mod shifts;
 pub mod steps;
 pub mod suggest;
 
+pub use columns::{Block, Column, Columns};
 pub use error::LogError;
 pub use frozen::{FrozenSpeed, Speeds};
 pub use inspect::{ChannelSummary, Inspection, inspect};

@@ -9,10 +9,11 @@ use std::sync::atomic::AtomicBool;
 use trace::Following;
 
 use crate::can::{CanLog, Database};
+use crate::columns::{Columns, Stream};
 use crate::csv_log::CsvLog;
 use crate::mdf::MdfLog;
 use crate::parquet_log::ParquetLog;
-use crate::samples::{Samples, Stream};
+use crate::samples::Samples;
 use crate::{LogError, error};
 
 /// A channel of a log.
@@ -163,17 +164,29 @@ impl Log {
     /// The log cannot be read.
     pub fn samples(&mut self, wanted: &[usize]) -> Result<Samples<'_>, LogError> {
         let count = self.channels.len();
-        let mut mask = vec![false; count];
+        Samples::new(count, self.streams(wanted)?)
+    }
+
+    /// These channels in columns, as they stand in the file: not merged, and with its time stamps. Several times as fast as
+    /// [`Self::samples`] where the file has columns (MDF, Parquet). Tables and bus logs are read once: a second call is an error.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    pub fn columns(&mut self, wanted: &[usize]) -> Result<Columns<'_>, LogError> {
+        Ok(Columns::new(self.streams(wanted)?))
+    }
+
+    fn streams(&mut self, wanted: &[usize]) -> Result<Vec<Box<dyn Stream + '_>>, LogError> {
+        let mut mask = vec![false; self.channels.len()];
         for &channel in wanted {
             mask[channel] = true;
         }
-        let streams: Vec<Box<dyn Stream + '_>> = match &mut self.source {
+        Ok(match &mut self.source {
             Source::Csv(log) => vec![log.stream(&mask)?],
             Source::Parquet(log) => vec![log.stream(&mask)?],
             Source::Mdf(log) => log.streams(&mask)?,
             Source::Can(log) => vec![log.stream(&mask)?],
-        };
-        Samples::new(count, streams)
+        })
     }
 
     /// The place of the channel with this name. `group` chooses between several; a name may also be `group.name`.

@@ -12,13 +12,14 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
 
+use crate::columns::{Batch, Block, Stream};
 use crate::csv_log::{is_time_name, split_unit, time_column};
-use crate::samples::{Quality, Sample, Stream};
+use crate::samples::Quality;
 use crate::{Channel, LogError, TimeColumn, error};
 use trace::Unit;
 
-/// Rows that are decoded at once.
-const BATCH: usize = 4096;
+/// Rows that are decoded at once: their columns stay in the second cache.
+const BATCH: usize = 8192;
 
 /// An open Parquet file.
 pub(crate) struct ParquetLog {
@@ -87,10 +88,8 @@ impl ParquetLog {
     }
 
     pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
-        let columns = (self.columns.iter().zip(wanted).enumerate())
-            .filter(|(_, (_, wanted))| **wanted)
-            .map(|(channel, (&column, _))| (channel, column));
-        Ok(Box::new(Groups { columns: columns.collect(), log: self, group: 0, open: None, without_time: 0 }))
+        let channels = (0..self.columns.len()).filter(|&channel| wanted[channel]).collect();
+        Ok(Box::new(Groups { channels, log: self, group: 0, open: None, without_time: 0 }))
     }
 }
 
@@ -213,8 +212,7 @@ struct OpenGroup {
 /// The row groups of a file.
 struct Groups<'a> {
     log: &'a ParquetLog,
-    /// Channel and column.
-    columns: Vec<(usize, usize)>,
+    channels: Vec<usize>,
     group: usize,
     open: Option<OpenGroup>,
     without_time: u64,
@@ -230,46 +228,48 @@ impl Groups<'_> {
             let pages = CheckedPages { pages, column: descriptor.clone(), dictionary: false };
             Ok::<_, ParquetError>(get_column_reader(descriptor, Box::new(pages)))
         };
-        let columns = self.columns.iter().map(|(_, column)| reader(*column)).collect::<Result<_, _>>()?;
+        let of = |channel: &usize| reader(self.log.columns[*channel]);
+        let columns = self.channels.iter().map(of).collect::<Result<_, _>>()?;
         Ok(OpenGroup { time: reader(self.log.time.0)?, columns, rows_left })
     }
 
-    fn decode(&mut self, open: &mut OpenGroup, batch: &mut Vec<Sample>) -> Result<(), ParquetError> {
+    fn decode(&mut self, open: &mut OpenGroup, block: &mut Block) -> Result<(), ParquetError> {
         let rows = BATCH.min(usize::try_from(open.rows_left).unwrap_or(BATCH));
-        let times = numbers(&mut open.time, rows)?;
-        let columns = open.columns.iter_mut().map(|column| numbers(column, rows)).collect::<Result<Vec<_>, _>>()?;
-        if times.len() < rows || columns.iter().any(|column| column.len() < rows) {
+        numbers(&mut open.time, rows, &mut block.times_s)?;
+        block.times_s.iter_mut().for_each(|time_s| *time_s *= self.log.time.1);
+        for (reader, column) in open.columns.iter_mut().zip(&mut block.columns) {
+            numbers(reader, rows, &mut column.values)?;
+            column.qualities.clear();
+            if !column.values.iter().fold(true, |all, value| all & value.is_finite()) {
+                // An absent value, or NaN, is a reading that did not come.
+                let of = |value: &f64| match value.is_finite() {
+                    true => Some(Quality::Good),
+                    false => (!value.is_nan()).then_some(Quality::Missing),
+                };
+                column.qualities.extend(column.values.iter().map(of));
+            }
+        }
+        if block.times_s.len() < rows || block.columns.iter().any(|column| column.values.len() < rows) {
             return Err(ParquetError::EOF("a column has fewer rows than its group".to_owned()));
         }
         open.rows_left -= rows as u64;
-        for (row, time) in times.iter().enumerate() {
-            if !time.is_finite() {
-                self.without_time += 1;
-                continue;
-            }
-            for (column, (channel, _)) in columns.iter().zip(&self.columns) {
-                let value = column[row];
-                // An absent value, or NaN, is a reading that did not come.
-                if value.is_nan() {
-                    continue;
-                }
-                let quality = if value.is_finite() { Quality::Good } else { Quality::Missing };
-                batch.push(Sample { channel: *channel, time_s: time * self.log.time.1, value, quality });
-            }
-        }
+        self.without_time += block.leave_out_without_time();
         Ok(())
     }
 }
 
 impl Stream for Groups<'_> {
-    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+    fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
+        let block = batch.block_of(&self.channels);
         // The decoders of `parquet` 60.1 index and assert on what pages say (byte-stream split, for one), deeper than can be checked
         // before. What they leave behind is not used again: the stream ends here.
-        let read = catch_unwind(AssertUnwindSafe(|| self.read(batch)));
-        read.unwrap_or_else(|_| {
+        let read = catch_unwind(AssertUnwindSafe(|| self.read(block)));
+        let read = read.unwrap_or_else(|_| {
             let place = format!("row group {}", self.group + 1);
             Err(LogError::damaged(&self.log.path, place, "the pages of a column contradict themselves"))
-        })
+        });
+        // What is not whole is not given.
+        read.inspect_err(|_| block.times_s.clear())
     }
 
     fn notes(&self) -> Vec<String> {
@@ -282,7 +282,7 @@ impl Stream for Groups<'_> {
 }
 
 impl Groups<'_> {
-    fn read(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+    fn read(&mut self, block: &mut Block) -> Result<bool, LogError> {
         let place = format!("row group {}", self.group + 1);
         let mut open = match self.open.take() {
             Some(open) => open,
@@ -291,7 +291,7 @@ impl Groups<'_> {
             }
             None => return Ok(false),
         };
-        self.decode(&mut open, batch).map_err(|error| damaged(&self.log.path, &place, &error))?;
+        self.decode(&mut open, block).map_err(|error| damaged(&self.log.path, &place, &error))?;
         if open.rows_left == 0 {
             self.group += 1;
         } else {
@@ -301,13 +301,14 @@ impl Groups<'_> {
     }
 }
 
-/// The next numbers of a column; NaN where there is none.
-fn numbers(column: &mut ColumnReader, rows: usize) -> Result<Vec<f64>, ParquetError> {
+/// The next numbers of a column, in place of those before; NaN where there is none.
+fn numbers(column: &mut ColumnReader, rows: usize, numbers: &mut Vec<f64>) -> Result<(), ParquetError> {
     fn read<D: DataType>(
         column: &mut ColumnReaderImpl<D>,
         rows: usize,
+        numbers: &mut Vec<f64>,
         number: impl Fn(&D::T) -> f64,
-    ) -> Result<Vec<f64>, ParquetError> {
+    ) -> Result<(), ParquetError> {
         let (mut levels, mut values) = (Vec::new(), Vec::new());
         let mut got = 0;
         // A call may end with a page.
@@ -319,23 +320,24 @@ fn numbers(column: &mut ColumnReader, rows: usize) -> Result<Vec<f64>, ParquetEr
             got += records;
         }
         if values.len() == got {
-            return Ok(values.iter().map(number).collect());
+            numbers.extend(values.iter().map(number));
+            return Ok(());
         }
         // Where values are absent, their level is below the highest.
         let highest = levels.iter().copied().max().unwrap_or(0);
         let mut values = values.iter();
-        Ok(levels
-            .iter()
-            .map(|level| if *level == highest { values.next().map_or(f64::NAN, &number) } else { f64::NAN })
-            .collect())
+        let mut next = |level: &i16| if *level == highest { values.next().map(&number) } else { None };
+        numbers.extend(levels.iter().map(|level| next(level).unwrap_or(f64::NAN)));
+        Ok(())
     }
+    numbers.clear();
     #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
     match column {
-        ColumnReader::BoolColumnReader(column) => read(column, rows, |value| f64::from(u8::from(*value))),
-        ColumnReader::Int32ColumnReader(column) => read(column, rows, |value| f64::from(*value)),
-        ColumnReader::Int64ColumnReader(column) => read(column, rows, |value| *value as f64),
-        ColumnReader::FloatColumnReader(column) => read(column, rows, |value| f64::from(*value)),
-        ColumnReader::DoubleColumnReader(column) => read(column, rows, |value| *value),
+        ColumnReader::BoolColumnReader(column) => read(column, rows, numbers, |value| f64::from(u8::from(*value))),
+        ColumnReader::Int32ColumnReader(column) => read(column, rows, numbers, |value| f64::from(*value)),
+        ColumnReader::Int64ColumnReader(column) => read(column, rows, numbers, |value| *value as f64),
+        ColumnReader::FloatColumnReader(column) => read(column, rows, numbers, |value| f64::from(*value)),
+        ColumnReader::DoubleColumnReader(column) => read(column, rows, numbers, |value| *value),
         _ => Err(ParquetError::General("the column does not hold numbers".to_owned())),
     }
 }

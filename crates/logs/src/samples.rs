@@ -1,12 +1,10 @@
 //! Samples of several streams, merged in time order, and the rules for time stamps.
 //!
-//! A stream is what shares one clock: a table, a bus, a channel group. Within a stream samples keep their order in the file;
-//! the streams are merged by time, so that no more than one batch of each is held in memory.
-
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+//! Within a stream (see [`crate::columns`]) samples keep their order in the file; the streams are merged by time, record by record, so
+//! that no more than one batch of each is held in memory.
 
 use crate::LogError;
+use crate::columns::{Batch, Said, Source, Stream};
 
 /// What a sample is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -97,18 +95,6 @@ pub struct Sample {
     pub quality: Quality,
 }
 
-/// What shares one clock.
-pub(crate) trait Stream {
-    /// Appends the next samples in the order of the file, with finite times and the quality as far as the format says it.
-    /// False at the end.
-    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError>;
-
-    /// What else is to be said about the stream, at its end.
-    fn notes(&self) -> Vec<String> {
-        Vec::new()
-    }
-}
-
 /// A time stamp this far behind the newest one of its stream is not a matter of order on a bus, s.
 pub const BEHIND_S: f64 = 0.5;
 /// So many rising time stamps behind the newest one are a reset of the clock.
@@ -170,6 +156,25 @@ impl Clock {
         self.newest_s.is_some_and(|newest_s| time_s >= newest_s && time_s <= newest_s + FAR_S)
     }
 
+    /// The time of a stamp that simply goes on from the newest one, s; none, and nothing happens, if it does not.
+    #[inline]
+    fn step(&mut self, stamp_s: f64) -> Option<f64> {
+        let (time_s, newest_s) = (stamp_s + self.shift_s, self.newest_s?);
+        (time_s > newest_s && time_s <= newest_s + FAR_S).then(|| self.go_on(time_s, newest_s))
+    }
+
+    /// Takes a time, s, that is after the newest one.
+    #[inline]
+    fn go_on(&mut self, time_s: f64, newest_s: f64) -> f64 {
+        self.behind = 0;
+        if time_s - newest_s >= self.jump_s {
+            self.jump_s = time_s - newest_s;
+            self.before_jump_s = newest_s;
+        }
+        self.newest_s = Some(time_s);
+        time_s
+    }
+
     /// The time of a stamp, s; none if it is backward.
     pub fn time(&mut self, stamp_s: f64) -> Option<f64> {
         let time_s = stamp_s + self.shift_s;
@@ -200,38 +205,54 @@ impl Clock {
             return self.newest_s;
         }
         self.behind = 0;
-        if time_s > newest_s {
-            if time_s - newest_s >= self.jump_s {
-                self.jump_s = time_s - newest_s;
-                self.before_jump_s = newest_s;
-            }
-            self.newest_s = Some(time_s);
-        }
-        Some(time_s)
+        Some(if time_s > newest_s { self.go_on(time_s, newest_s) } else { time_s })
     }
 }
 
-/// A stream with the batch that is held of it.
+/// A stream and where it stands.
 struct Merged<'a> {
-    stream: Box<dyn Stream + 'a>,
+    source: Source<'a>,
     clock: Clock,
-    batch: Vec<Sample>,
+    /// The record of its batch after those that were taken out.
     at: usize,
-    /// The sample whose place in time is on the heap.
-    next: Option<Sample>,
     /// The last stamp, s, and the time that the clock made of it: those of one record have the same.
     stamp: Option<(f64, Option<f64>)>,
     /// How many stamps were seen to be far too late before they were used, and the last of them.
     too_late: Option<(u32, f64)>,
 }
 
+/// A record that was taken out of its batch.
+#[derive(Debug, Clone, Copy)]
+struct Record {
+    /// Its place in time, s: its time, or that of the newest record of its stream where its stamp is not used.
+    place_s: f64,
+    is_used: bool,
+    stream: usize,
+    at: usize,
+}
+
+impl Record {
+    /// Whether it comes before another one.
+    fn is_before(&self, other: &Self) -> bool {
+        self.place_s < other.place_s || self.place_s == other.place_s && self.stream < other.stream
+    }
+}
+
 impl Merged<'_> {
     /// Counts a stamp that is far too late; those of one record are one.
-    fn note_too_late(&mut self) {
-        let stamp_s = self.batch[self.at - 1].time_s;
+    fn note_too_late(&mut self, stamp_s: f64) {
         if self.too_late.is_none_or(|(_, last_s)| last_s != stamp_s) {
             self.too_late = Some((self.too_late.map_or(0, |(count, _)| count) + 1, stamp_s));
         }
+    }
+
+    /// Whether the stamp of the record that was taken last is far later than those after it, which go on from the one before.
+    fn is_too_late(&self, stamp_s: f64) -> bool {
+        let after = || (self.at..self.source.batch.len()).filter_map(|record| self.source.batch.stamp_s(record));
+        self.clock.would_jump(stamp_s)
+            && after()
+                .find(|after_s| *after_s != stamp_s)
+                .is_some_and(|after_s| self.clock.goes_on(after_s) && after_s < stamp_s)
     }
 
     /// What was met in the stamps, in sentences.
@@ -244,24 +265,6 @@ impl Merged<'_> {
     }
 }
 
-/// Time and stream, earliest first.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Next(f64, usize);
-
-impl Eq for Next {}
-
-impl PartialOrd for Next {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Next {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
-    }
-}
-
 /// The samples of a log in time order.
 ///
 /// Within a channel the times of good samples rise: repeated and backward ones are marked. A stream whose clock was reset
@@ -269,17 +272,19 @@ impl Ord for Next {
 /// where nothing could be read it is an error.
 pub struct Samples<'a> {
     streams: Vec<Merged<'a>>,
-    /// Where the next samples of the streams are in time, but for the stream in front.
-    heap: BinaryHeap<Reverse<Next>>,
-    /// The stream that gave the last sample: it often gives the next ones too. It does so up to this place in time.
-    front: Option<(usize, Next)>,
+    /// The next record of each stream but for the one in front; the earliest last.
+    waiting: Vec<Record>,
+    /// The stream whose record is given: it often gives the next ones too.
+    front: Option<usize>,
+    /// Samples in time order, and how many of them were given.
+    ready: Vec<Sample>,
+    given: usize,
     channels: Vec<Newest>,
-    notes: Vec<String>,
-    /// Resets of clocks so far.
+    said: Said,
+    /// Resets of clocks in the samples so far, and in the records that were taken.
     resets: u32,
-    given: u64,
-    /// The first damage; an error if nothing could be read.
-    damage: Option<LogError>,
+    resets_taken: u32,
+    is_empty: bool,
 }
 
 /// The newest good sample of a channel.
@@ -292,23 +297,23 @@ struct Newest {
 impl<'a> Samples<'a> {
     pub(crate) fn new(channels: usize, streams: Vec<Box<dyn Stream + 'a>>) -> Result<Self, LogError> {
         let merged = |stream| Merged {
-            stream,
+            source: Source::new(stream),
             clock: Clock::default(),
-            batch: Vec::new(),
             at: 0,
-            next: None,
             stamp: None,
             too_late: None,
         };
         let mut samples = Self {
             streams: streams.into_iter().map(merged).collect(),
-            heap: BinaryHeap::new(),
+            waiting: Vec::new(),
             front: None,
-            channels: vec![Newest { time_s: f64::NEG_INFINITY, stream: 0 }; channels],
-            notes: Vec::new(),
-            resets: 0,
+            ready: Vec::new(),
             given: 0,
-            damage: None,
+            channels: vec![Newest { time_s: f64::NEG_INFINITY, stream: 0 }; channels],
+            said: Said::default(),
+            resets: 0,
+            resets_taken: 0,
+            is_empty: true,
         };
         for i in 0..samples.streams.len() {
             samples.refill(i)?;
@@ -318,7 +323,7 @@ impl<'a> Samples<'a> {
 
     /// What is to be said about the log, complete after the last sample.
     pub fn notes(&self) -> &[String] {
-        &self.notes
+        &self.said.notes
     }
 
     /// How often a clock did not simply go on: resets, and stamps that were far too late.
@@ -326,85 +331,61 @@ impl<'a> Samples<'a> {
         self.resets
     }
 
-    /// Reads the next batch of a stream; false at its end.
-    fn read(&mut self, i: usize) -> Result<bool, LogError> {
-        let merged = &mut self.streams[i];
-        merged.batch.clear();
-        merged.at = 0;
-        while merged.batch.is_empty() {
-            let damage = match merged.stream.next_batch(&mut merged.batch) {
-                Ok(true) => continue,
-                Ok(false) => None,
-                Err(error @ LogError::Damaged { .. }) => Some(error),
-                Err(error) => return Err(error),
-            };
-            self.notes.append(&mut merged.stream.notes());
-            if let Some(error) = damage {
-                self.notes.push(format!("{error}\nhint: the log is read up to this place"));
-                self.damage.get_or_insert(error);
-            }
-            // What came with the end or before the damage is given first.
-            merged.stream = Box::new(Ended);
-            if merged.batch.is_empty() {
-                self.notes.append(&mut merged.notes());
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    /// Takes the next sample of a stream out of its batch, which has one.
+    /// Gives the samples of a record of a stream: what each is worth follows from the times of its channel.
     #[inline]
-    fn stamped(&mut self, i: usize) -> Sample {
-        let merged = &mut self.streams[i];
-        let mut sample = merged.batch[merged.at];
-        merged.at += 1;
-        let stamped = match merged.stamp {
-            Some((stamp_s, time_s)) if stamp_s == sample.time_s => time_s,
-            _ => self.time(i, sample.time_s),
-        };
-        let newest_s = self.streams[i].clock.newest_s.unwrap_or(sample.time_s);
-        let channel = &mut self.channels[sample.channel];
-        channel.stream = i;
-        match stamped {
-            Some(time_s) if time_s > channel.time_s => {
-                sample.time_s = time_s;
-                channel.time_s = time_s;
+    fn give(&mut self, record: Record) {
+        let Self { streams, channels, ready, .. } = self;
+        streams[record.stream].source.batch.samples_of(record.at, |mut sample| {
+            let channel = &mut channels[sample.channel];
+            channel.stream = record.stream;
+            sample.time_s = record.place_s;
+            match record.is_used {
+                true if record.place_s > channel.time_s => channel.time_s = record.place_s,
+                true if record.place_s == channel.time_s => sample.quality = Quality::Repeated,
+                _ => sample.quality = Quality::Backward,
             }
-            Some(time_s) => {
-                sample.quality = if time_s == channel.time_s { Quality::Repeated } else { Quality::Backward };
-                sample.time_s = time_s;
-            }
-            None => {
-                sample.quality = Quality::Backward;
-                sample.time_s = newest_s;
-            }
-        }
-        sample
+            ready.push(sample);
+        });
     }
 
-    /// The time of a stamp that is not the one before, of the sample that was taken last; none if it is not used.
+    /// Takes the next record of a stream out of its batch; none if that has no more.
+    #[inline]
+    fn take(&mut self, i: usize) -> Option<Record> {
+        let merged = &mut self.streams[i];
+        let at = merged.at;
+        let stamp_s = merged.source.batch.stamp_s(at)?;
+        merged.at += 1;
+        if let Some(time_s) = merged.clock.step(stamp_s) {
+            merged.stamp = Some((stamp_s, Some(time_s)));
+            return Some(Record { place_s: time_s, is_used: true, stream: i, at });
+        }
+        let time_s = match merged.stamp {
+            Some((last_s, time_s)) if last_s == stamp_s => time_s,
+            _ => self.time(i, stamp_s),
+        };
+        let place_s = time_s.or(self.streams[i].clock.newest_s).unwrap_or(stamp_s);
+        Some(Record { place_s, is_used: time_s.is_some(), stream: i, at })
+    }
+
+    /// The time of a stamp that is not the one before, of the record that was taken last; none if it is not used.
+    #[cold]
     fn time(&mut self, i: usize, stamp_s: f64) -> Option<f64> {
         // Where streams wait for each other, a wrong stamp would hold its stream back until the others end.
         let looks_ahead = self.streams.len() > 1;
         let merged = &mut self.streams[i];
         let (resets, wrong_jumps) = (merged.clock.resets, merged.clock.wrong_jumps);
-        let is_wrong = looks_ahead && merged.clock.would_jump(stamp_s) && {
-            let after = merged.batch[merged.at..].iter().find(|after| after.time_s != stamp_s);
-            after.is_some_and(|after| merged.clock.goes_on(after.time_s) && after.time_s < stamp_s)
-        };
-        let time_s = if is_wrong {
-            merged.note_too_late();
+        let time_s = if looks_ahead && merged.is_too_late(stamp_s) {
+            merged.note_too_late(stamp_s);
             None
         } else {
             merged.clock.time(stamp_s)
         };
         merged.stamp = Some((stamp_s, time_s));
         let newest_s = merged.clock.newest_s.unwrap_or(stamp_s);
-        self.resets += merged.clock.resets - resets;
+        self.resets_taken += merged.clock.resets - resets;
         if merged.clock.wrong_jumps > wrong_jumps {
             // What came with the wrong stamps is not newer than this; whoever has seen them starts again.
-            self.resets += 1;
+            self.resets_taken += 1;
             for channel in self.channels.iter_mut().filter(|channel| channel.stream == i) {
                 channel.time_s = channel.time_s.min(newest_s.next_down());
             }
@@ -412,73 +393,93 @@ impl<'a> Samples<'a> {
         time_s
     }
 
-    /// Goes on to the stream whose next sample is the earliest, and gives that.
-    fn of_the_earliest(&mut self) -> Result<Option<Sample>, LogError> {
-        if let Some((i, _)) = self.front.take() {
-            self.refill(i)?;
-        }
-        let Some(Reverse(Next(_, i))) = self.heap.pop() else {
-            return self.damage.take().filter(|_| self.given == 0).map_or(Ok(None), Err);
-        };
-        self.front = Some((i, self.heap.peek().map_or(Next(f64::INFINITY, i), |Reverse(next)| *next)));
-        self.given += 1;
-        Ok(self.streams[i].next.take())
-    }
-
-    /// Reads the next batch of a stream if there is none, and lets its first sample wait for its time.
-    fn refill(&mut self, i: usize) -> Result<(), LogError> {
-        if self.streams[i].next.is_none() && (self.streams[i].at < self.streams[i].batch.len() || self.read(i)?) {
-            let sample = self.stamped(i);
-            self.put_back(i, sample);
+    /// Makes the next samples ready; none at the end. Does not wait for more of a stream while there are some, and ends before a clock
+    /// that did not simply go on, so that [`Self::resets`] is that of the samples that are given.
+    #[inline(never)]
+    fn fill(&mut self) -> Result<(), LogError> {
+        const AT_ONCE: usize = 256;
+        self.ready.clear();
+        self.given = 0;
+        while self.ready.len() < AT_ONCE {
+            let mut next = None;
+            if let Some(i) = self.front {
+                let resets = self.resets_taken;
+                match self.take(i) {
+                    Some(record) if self.resets_taken > resets && !self.ready.is_empty() => {
+                        self.front = None;
+                        self.wait(record);
+                        return Ok(());
+                    }
+                    Some(record) => next = Some(self.exchange(record)),
+                    None if self.ready.is_empty() => self.refill(i)?,
+                    None => return Ok(()),
+                }
+            }
+            self.resets = self.resets_taken;
+            self.front = None;
+            let Some(record) = next.or_else(|| self.waiting.pop()) else {
+                return self.said.damage.take().filter(|_| self.is_empty).map_or(Ok(()), Err);
+            };
+            (self.front, self.is_empty) = (Some(record.stream), false);
+            self.give(record);
         }
         Ok(())
     }
 
-    /// Lets a stream wait in place of the first one that waits; that one.
-    fn change_places(&mut self, next: Next) -> Option<usize> {
-        let mut first = self.heap.peek_mut()?;
-        let Reverse(Next(_, other)) = std::mem::replace(&mut *first, Reverse(next));
-        Some(other)
+    /// The earliest of a record and those that wait; the others wait.
+    #[inline]
+    fn exchange(&mut self, record: Record) -> Record {
+        match self.waiting.last() {
+            Some(&earliest) if earliest.is_before(&record) => {
+                self.waiting.pop();
+                self.wait(record);
+                earliest
+            }
+            _ => record,
+        }
     }
 
-    /// Puts a sample where it waits for its time.
-    fn put_back(&mut self, i: usize, sample: Sample) {
-        self.streams[i].next = Some(sample);
-        self.heap.push(Reverse(Next(sample.time_s, i)));
+    /// Lets a record wait for its time. Streams are few, and it is mostly among the next.
+    #[inline]
+    fn wait(&mut self, record: Record) {
+        let mut at = self.waiting.len();
+        while at > 0 && self.waiting[at - 1].is_before(&record) {
+            at -= 1;
+        }
+        self.waiting.insert(at, record);
+    }
+
+    /// Reads the next batch of a stream if there is none, and lets its first record wait for its time.
+    fn refill(&mut self, i: usize) -> Result<(), LogError> {
+        let merged = &mut self.streams[i];
+        if merged.at >= merged.source.batch.len() {
+            merged.at = 0;
+            if !merged.source.read(&mut self.said)? {
+                merged.source.batch = Batch::default();
+                self.said.notes.append(&mut merged.notes());
+                return Ok(());
+            }
+        }
+        if let Some(record) = self.take(i) {
+            self.wait(record);
+        }
+        Ok(())
     }
 }
 
 impl Iterator for Samples<'_> {
     type Item = Result<Sample, LogError>;
 
+    #[inline]
     fn next(&mut self) -> Option<Self::Item> {
-        if let Some((i, until)) = self.front
-            && self.streams[i].at < self.streams[i].batch.len()
+        if self.given == self.ready.len()
+            && let Err(error) = self.fill()
         {
-            let sample = self.stamped(i);
-            let next = Next(sample.time_s, i);
-            if next <= until {
-                self.given += 1;
-                return Some(Ok(sample));
-            }
-            if let Some(other) = self.change_places(next) {
-                self.streams[i].next = Some(sample);
-                self.front = Some((other, self.heap.peek().map_or(next, |Reverse(first)| *first)));
-                self.given += 1;
-                return self.streams[other].next.take().map(Ok);
-            }
-            self.put_back(i, sample);
+            return Some(Err(error));
         }
-        self.of_the_earliest().transpose()
-    }
-}
-
-/// What is left of a stream after its end.
-struct Ended;
-
-impl Stream for Ended {
-    fn next_batch(&mut self, _: &mut Vec<Sample>) -> Result<bool, LogError> {
-        Ok(false)
+        let sample = self.ready.get(self.given).copied()?;
+        self.given += 1;
+        Some(Ok(sample))
     }
 }
 
@@ -490,13 +491,13 @@ mod tests {
     struct Records(Vec<f64>, usize);
 
     impl Stream for Records {
-        fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+        fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
             let Self(times, first) = self;
             let both = |time_s: f64| {
                 [*first, *first + 1].map(|channel| Sample { channel, time_s, value: time_s, quality: Quality::Good })
             };
-            batch.extend(times.drain(..).flat_map(both));
-            Ok(!batch.is_empty())
+            batch.samples.extend(times.drain(..).flat_map(both));
+            Ok(!batch.samples.is_empty())
         }
     }
 

@@ -1,11 +1,18 @@
-//! MDF files that a test writes: the block compressions of MDF 4.3.
+//! MDF files that a test writes: every compression, and blocks that end anywhere.
+
+#![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
 
-use common::{Folder, channel, read};
+use std::io::Write as _;
+use std::path::Path;
+
+use common::{Folder, channel, data, read};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
-use logs::OpenOptions;
+use logs::{OpenOptions, Sample};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng, SeedableRng};
 
 #[test]
 fn blocks_of_every_compression_give_the_same_samples() {
@@ -38,4 +45,143 @@ fn blocks_of_every_compression_give_the_same_samples() {
         assert_eq!(samples, plain, "{codec:?}");
         assert!(compressed < size, "{codec:?}: {compressed} of {size}");
     }
+}
+
+/// How a block is stored.
+#[derive(Debug, Clone, Copy)]
+enum Packing {
+    Plain,
+    Deflated,
+    /// Transposed, with rows of so many bytes.
+    Transposed(usize),
+}
+
+const HEAD: usize = 24;
+
+fn number(bytes: &[u8], at: usize) -> usize {
+    usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap()
+}
+
+fn block(id: &[u8; 4], links: &[usize], content: &[u8]) -> Vec<u8> {
+    let length = HEAD + 8 * links.len() + content.len();
+    let words = [length, links.len()].into_iter().chain(links.iter().copied());
+    let words = words.flat_map(|word| (word as u64).to_le_bytes());
+    [id.as_slice(), &[0; 4]].concat().into_iter().chain(words).chain(content.iter().copied()).collect()
+}
+
+fn packed(content: &[u8], packing: Packing) -> Vec<u8> {
+    let (kind, columns) = match packing {
+        Packing::Plain => return block(b"##DT", &[], content),
+        Packing::Deflated => (0_u8, 0),
+        Packing::Transposed(columns) => (1, columns),
+    };
+    let rows = content.len().checked_div(columns).unwrap_or(0);
+    let (table, tail) = content.split_at(rows * columns);
+    let transposed = (0..columns).flat_map(|column| table.iter().skip(column).step_by(columns)).chain(tail).copied();
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(&transposed.collect::<Vec<u8>>()).unwrap();
+    let deflated = encoder.finish().unwrap();
+    let columns = u32::try_from(columns).unwrap().to_le_bytes();
+    let sizes = [content.len(), deflated.len()].map(|size| (size as u64).to_le_bytes()).concat();
+    block(b"##DZ", &[], &[b"DT", [kind, 0].as_slice(), &columns, &sizes, &deflated].concat())
+}
+
+/// The blocks of a file with this id.
+fn places(bytes: &[u8], id: &[u8; 8]) -> Vec<usize> {
+    (0..bytes.len() - HEAD).filter(|at| bytes[*at..].starts_with(id)).collect()
+}
+
+/// The file with the data of each group, which must be one plain block, in several that are cut at these places.
+fn divided(mut bytes: Vec<u8>, cuts: &[usize], packing: impl Fn(usize) -> Packing) -> Vec<u8> {
+    for group in places(&bytes, b"##DG\0\0\0\0") {
+        let link = group + HEAD + 16;
+        let at = number(&bytes, link);
+        assert!(bytes[at..].starts_with(b"##DT"));
+        let content = bytes[at + HEAD..at + number(&bytes, at + 8)].to_vec();
+        let mut ends: Vec<usize> = cuts.iter().map(|cut| cut % content.len()).chain([content.len()]).collect();
+        ends.sort_unstable();
+        let (mut from, mut links, mut offsets) = (0, vec![0], Vec::new());
+        for (i, end) in ends.into_iter().enumerate() {
+            bytes.resize(bytes.len().next_multiple_of(8), 0);
+            links.push(bytes.len());
+            offsets.extend((from as u64).to_le_bytes());
+            bytes.extend(packed(&content[from..end], packing(i)));
+            from = end;
+        }
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        let list = bytes.len();
+        let count = u32::try_from(links.len() - 1).unwrap().to_le_bytes();
+        bytes.extend(block(b"##DL", &links, &[[0; 4], count].concat().into_iter().chain(offsets).collect::<Vec<u8>>()));
+        bytes[link..link + 8].copy_from_slice(&(list as u64).to_le_bytes());
+    }
+    bytes
+}
+
+fn samples(path: &Path) -> (Vec<Sample>, Vec<String>) {
+    let (_, samples, notes) = read(path, &OpenOptions::default()).unwrap();
+    (samples, notes)
+}
+
+#[test]
+fn records_lie_over_the_ends_of_blocks() {
+    let folder = Folder::new("blocks");
+    let mut generator = Pcg64Mcg::seed_from_u64(4);
+    for name in ["plain_410.mf4", "invalidation.mf4", "unsorted.mf4"] {
+        let (whole, _) = samples(&data(name));
+        assert!(whole.len() > 40, "{name}");
+        let bytes = std::fs::read(data(name)).unwrap();
+        for case in 0..60 {
+            let cuts: Vec<usize> = (0..case % 6).map(|_| generator.next_u32() as usize).collect();
+            let columns = generator.next_u32() as usize % 30 + 1;
+            let packing = |i: usize| match (case + i) % 3 {
+                0 => Packing::Plain,
+                1 => Packing::Deflated,
+                _ => Packing::Transposed(columns),
+            };
+            let path = folder.write("divided.mf4", divided(bytes.clone(), &cuts, packing));
+            let (found, notes) = samples(&path);
+            // What cannot be a number is not the same as itself.
+            assert_eq!(format!("{found:?}"), format!("{whole:?}"), "{name} {cuts:?} {columns}");
+            assert_eq!(notes, Vec::<String>::new(), "{name} {cuts:?}");
+        }
+    }
+}
+
+#[test]
+fn a_damaged_block_is_told_by_its_place_and_what_is_before_it_is_read() {
+    let folder = Folder::new("damaged-block");
+    let whole = samples(&data("unsorted.mf4")).0.len();
+    let bytes = std::fs::read(data("unsorted.mf4")).unwrap();
+    // Somewhere in the middle of the only block of records, where one of them begins, its identifier is one that no group has.
+    let two = divided(bytes.clone(), &[200], |_| Packing::Plain);
+    let group = places(&two, b"##DG\0\0\0\0")[0];
+    let second = number(&two, number(&two, group + HEAD + 16) + HEAD + 16);
+    let mut said = 0;
+    for at in 0..24 {
+        let mut broken = two.clone();
+        broken[second + HEAD + at] = 0xee;
+        let (found, notes) = samples(&folder.write("broken.mf4", &broken));
+        assert!(found.len() <= whole);
+        // Other bytes are times and values.
+        if let Some(note) =
+            notes.iter().find(|note| note.contains("a record has the identifier 238, which no group has"))
+        {
+            said += 1;
+            assert!(note.contains("group `") && note.ends_with("hint: the log is read up to this place"), "{note}");
+        }
+    }
+    assert!(said > 0);
+
+    // (Mixed records are unpacked when the file is opened.)
+    let whole = samples(&data("plain_410.mf4")).0.len();
+    let bytes = std::fs::read(data("plain_410.mf4")).unwrap();
+    let mut huge = divided(bytes, &[200], |_| Packing::Deflated);
+    let place = *places(&huge, b"##DZ\0\0\0\0").last().unwrap();
+    huge[place + 32..place + 40].copy_from_slice(&(200_u64 << 20).to_le_bytes());
+    let (found, notes) = samples(&folder.write("huge.mf4", &huge));
+    assert!(!found.is_empty() && found.len() < whole);
+    assert!(
+        notes[0].contains(&format!("block at byte {place}: it says that it unpacks to 209715200 bytes")),
+        "{notes:?}"
+    );
 }

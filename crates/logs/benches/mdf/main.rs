@@ -1,22 +1,23 @@
-//! Reading of a compressed MDF 4 file, beside asammdf and beside the decompression of its blocks alone.
+//! Reading of MDF 4 and of Parquet, beside asammdf and pyarrow and beside the decompression of the blocks alone.
 //!
-//! `cargo bench -p logs --bench mdf -- LOG.mf4` reads all channels of a file whose blocks are deflated; without a file, of an hour with
-//! nine channels that it writes. Every time is the least of several in one process, of the processor and on one thread, with the file in the memory of
-//! the system. asammdf is a rival where `python3`, or the Python of `WETCLUTCH_PYTHON`, has it.
+//! `cargo bench -p logs --bench mdf -- LOG` reads all channels of a log; without a file, of an hour with nine channels that it writes as
+//! MDF with transposed and deflated blocks, and as Parquet. Every time is the least of several in one process, of the processor and on
+//! one thread, with the file in the memory of the system. A rival is measured where `python3`, or the Python of `WETCLUTCH_PYTHON`, has
+//! it; what it decodes must have the same sums. `-- LOG --only columns` (or `kept`, `merged`) reads once, for a profiler.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark")]
 
 mod hour;
 
 use std::hint::black_box;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use logs::{Log, OpenOptions};
+use libdeflater::Decompressor;
+use logs::{Column, Log, OpenOptions, Quality};
 
-const TRIES: usize = 15;
+const TRIES: usize = 25;
 const RIVAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/mdf/rival.py");
 
 fn main() {
@@ -25,96 +26,175 @@ fn main() {
     if arguments.iter().any(|argument| argument == "--test") {
         return;
     }
-    let own = std::env::temp_dir().join(format!("wetclutch-mdf-{}.mf4", std::process::id()));
-    let path = match arguments.first() {
-        Some(path) => PathBuf::from(path),
-        None => {
-            hour::write(&own);
-            own.clone()
+    match &arguments[..] {
+        [path, only, job] if only == "--only" => println!("{:?}", job_of(job)(Path::new(path))),
+        [path] => measure(Path::new(path)),
+        _ => {
+            for ending in ["mf4", "parquet"] {
+                let path = std::env::temp_dir().join(format!("wetclutch-hour-{}.{ending}", std::process::id()));
+                hour::write(&path);
+                measure(&path);
+                std::fs::remove_file(path).unwrap();
+            }
         }
-    };
-    measure(&path);
-    let _ = std::fs::remove_file(own);
+    }
+}
+
+fn job_of(name: &str) -> fn(&Path) -> usize {
+    match name {
+        "columns" => columns,
+        "kept" => |path| kept(path).len(),
+        _ => merged,
+    }
 }
 
 fn measure(path: &Path) {
     let bytes = std::fs::read(path).unwrap();
     let blocks = deflated(&bytes);
-    let unpacked: usize = blocks.iter().map(|block| inflate(block).len()).sum();
-    println!("{} deflated blocks, {} bytes, unpacked {unpacked}", blocks.len(), bytes.len());
-    let (samples, merged_s) = fastest(|| merged(path));
-    println!("samples {samples}");
+    let unpacked: usize = blocks.iter().map(|(_, size)| size).sum();
+    let (samples, columns_s) = fastest(|| columns(path));
+    println!("{}: {} bytes, {samples} values", path.display(), bytes.len());
     let show = |what: &str, seconds: f64| {
-        println!("{:9.2} ms {:6.1} million samples/s  {what}", 1e3 * seconds, 1e-6 * samples as f64 / seconds);
+        println!("{:9.2} ms {:7.1} million samples/s  {what}", 1e3 * seconds, 1e-6 * samples as f64 / seconds);
     };
-    show("decompression of the blocks alone, with the library of the reader", {
-        fastest(|| blocks.iter().map(|block| black_box(inflate(block)).len()).sum()).1
-    });
-    show("all channels, merged in time order, into vectors of times and of values", merged_s);
-    match rival(path) {
-        None => println!("asammdf was not measured: no Python with asammdf (WETCLUTCH_PYTHON names one)"),
-        Some([select_s, inflate_s]) => {
-            show("decompression of the blocks alone, with the library of asammdf", inflate_s);
-            show("asammdf: all channels, each into arrays of times and of values", select_s);
-            println!("asammdf takes {:.2} of the time of this reader", select_s / merged_s);
-        }
+    if !blocks.is_empty() {
+        println!("{} deflated blocks, unpacked {unpacked} bytes", blocks.len());
+        let mut memory = vec![0; blocks.iter().map(|(_, size)| *size).max().unwrap_or(0)];
+        let mut inflater = Decompressor::new();
+        let mut inflate = |(block, size): &(&[u8], usize)| {
+            inflater.zlib_decompress(block, &mut memory[..*size]).unwrap() + usize::from(black_box(&memory)[0])
+        };
+        show("decompression of the blocks alone", fastest(|| blocks.iter().map(&mut inflate).sum::<usize>()).1);
+        let mut memory = vec![0; blocks.iter().map(|(_, size)| *size).max().unwrap_or(0)];
+        let mut inflate = |(block, size): &(&[u8], usize)| {
+            let finish = flate2::FlushDecompress::Finish;
+            flate2::Decompress::new(true).decompress(block, &mut memory[..*size], finish).unwrap();
+            usize::from(black_box(&memory)[0])
+        };
+        show("the same with flate2 (zlib-rs)", fastest(|| blocks.iter().map(&mut inflate).sum::<usize>()).1);
     }
+    show("all channels in columns, some thousand records at once", columns_s);
+    let (channels, kept_s) = fastest(|| kept(path));
+    show("all channels in columns, each kept as arrays of times and of values", kept_s);
+    let sum = channels.iter().map(|(_, values)| values.iter().filter(|value| value.is_finite()).sum::<f64>()).sum();
+    let (count_merged, merged_s) = fastest(|| merged(path));
+    show("all channels, merged in time order", merged_s);
+    assert_eq!(count_merged, samples);
+    let Some([rival_s, rival_sum, inflate_s]) = rival(path) else {
+        println!("no rival: no Python with asammdf and pyarrow (WETCLUTCH_PYTHON names one)");
+        return;
+    };
+    assert!(is_same(sum, rival_sum), "{sum} {rival_sum}");
+    if inflate_s > 0.0 {
+        show("decompression of the blocks alone, with the library of the rival", inflate_s);
+    }
+    show("the rival (asammdf, pyarrow): all channels, each as an array of values, and the times", rival_s);
+    for (what, seconds) in [("columns", columns_s), ("kept columns", kept_s), ("merged", merged_s)] {
+        println!("the rival takes {:.2} times as long as {what}", rival_s / seconds);
+    }
+}
+
+/// Whether two sums in different orders are of the same values.
+fn is_same(one: f64, other: f64) -> bool {
+    (one - other).abs() <= 1e-9 * one.abs().max(1.0)
 }
 
 /// The result of a job and its least time, s.
-fn fastest(mut job: impl FnMut() -> usize) -> (usize, f64) {
+fn fastest<T>(mut job: impl FnMut() -> T) -> (T, f64) {
     let start = Instant::now();
-    let mut best = (0, f64::INFINITY);
-    for _ in 0..TRIES {
-        let began = now_s(start);
+    let mut timed = || {
+        let began_s = used_s(start);
         let result = job();
-        best = (result, (now_s(start) - began).min(best.1));
+        (result, used_s(start) - began_s)
+    };
+    let first = timed();
+    (1..TRIES).fold(first, |best, _| {
+        let (result, seconds) = timed();
+        (result, seconds.min(best.1))
+    })
+}
+
+/// Time of the processor that the program has used, s, which others on the machine change little; where it is not known, the time
+/// since `start`.
+fn used_s(start: Instant) -> f64 {
+    #[cfg(unix)]
+    {
+        let used = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        let _ = start;
+        used.tv_sec as f64 + 1e-9 * used.tv_nsec as f64
     }
-    best
+    #[cfg(not(unix))]
+    start.elapsed().as_secs_f64()
 }
 
-/// Time of the processor that the program has used, s, which others on the machine do not change; where the system does not say it,
-/// the time since `start`.
-fn now_s(start: Instant) -> f64 {
-    let of_system = std::fs::read_to_string("/proc/self/schedstat").ok();
-    let used_ns = of_system.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
-    used_ns.map_or(start.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
+fn opened(path: &Path) -> (Log, Vec<usize>) {
+    let log = Log::open(path, &OpenOptions::default()).unwrap();
+    let all = (0..log.channels().len()).collect();
+    (log, all)
 }
 
-/// Reads all samples of all channels.
-fn merged(path: &Path) -> usize {
-    let mut log = Log::open(path, &OpenOptions::default()).unwrap();
-    let all: Vec<usize> = (0..log.channels().len()).collect();
+/// Reads all channels in columns, and counts their values.
+fn columns(path: &Path) -> usize {
+    let (mut log, all) = opened(path);
+    let mut columns = log.columns(&all).unwrap();
+    let mut count = 0;
+    while let Some(block) = columns.next_block().unwrap() {
+        count += block.columns.iter().map(present).sum::<usize>();
+        black_box(block);
+    }
+    count
+}
+
+fn present(column: &Column) -> usize {
+    match column.qualities.len() {
+        0 => column.values.len(),
+        _ => column.qualities.iter().flatten().count(),
+    }
+}
+
+/// Reads all channels in columns and keeps their times and values.
+fn kept(path: &Path) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let (mut log, all) = opened(path);
+    let mut columns = log.columns(&all).unwrap();
     let mut channels = vec![(Vec::new(), Vec::new()); all.len()];
-    for sample in log.samples(&all).unwrap() {
-        let sample = sample.unwrap();
-        let (times_s, values) = &mut channels[sample.channel];
-        times_s.push(sample.time_s);
-        values.push(sample.value);
+    while let Some(block) = columns.next_block().unwrap() {
+        for (i, column) in block.columns.iter().enumerate() {
+            let (times_s, values) = &mut channels[column.channel];
+            // Times stand once for all channels of a group, as the rival has them: with the first of them.
+            if i == 0 {
+                times_s.extend_from_slice(&block.times_s);
+            }
+            values.extend_from_slice(&column.values);
+        }
     }
-    black_box(&channels).iter().map(|(times_s, _)| times_s.len()).sum()
+    channels
 }
 
-/// The contents of the deflated blocks of a file.
-fn deflated(bytes: &[u8]) -> Vec<&[u8]> {
+/// Reads all samples in time order, and counts them.
+fn merged(path: &Path) -> usize {
+    let (mut log, all) = opened(path);
+    log.samples(&all)
+        .unwrap()
+        .map(|sample| black_box(sample.unwrap()))
+        .filter(|sample| sample.quality == Quality::Good)
+        .count()
+}
+
+/// The contents of the deflated blocks of an MDF file, and the bytes that they unpack to.
+fn deflated(bytes: &[u8]) -> Vec<(&[u8], usize)> {
     const HEADER: usize = 48;
-    let length = |at: usize| usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap();
-    let is_block = |at: &usize| bytes[*at..].starts_with(b"##DZ");
-    let blocks = (0..bytes.len().saturating_sub(HEADER)).step_by(8).filter(is_block);
-    blocks.map(|at| &bytes[at + HEADER..at + HEADER + length(at + 40)]).collect()
+    let number = |at: usize| usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap();
+    // Some writers do not align their blocks.
+    let is_block = |at: &usize| bytes[*at..].starts_with(b"##DZ\0\0\0\0");
+    let blocks = (0..bytes.len().saturating_sub(HEADER)).filter(is_block);
+    blocks.map(|at| (&bytes[at + HEADER..at + HEADER + number(at + 40)], number(at + 32))).collect()
 }
 
-fn inflate(block: &[u8]) -> Vec<u8> {
-    let mut unpacked = Vec::with_capacity(4 << 20);
-    flate2::bufread::ZlibDecoder::new(block).read_to_end(&mut unpacked).unwrap();
-    unpacked
-}
-
-/// Times of asammdf and of its decompression, s.
-fn rival(path: &Path) -> Option<[f64; 2]> {
-    let python = std::env::var_os("WETCLUTCH_PYTHON").unwrap_or_else(|| "python3".into());
+/// Time of the rival, s, the sum of what it decoded, and the time of its decompression alone, s; that is 0 where there is none.
+fn rival(path: &Path) -> Option<[f64; 3]> {
+    let python = std::env::var_os("WETCLUTCH_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let output = Command::new(python).arg(RIVAL).arg(path).arg(TRIES.to_string()).output().ok()?;
     let text = String::from_utf8(output.stdout).ok().filter(|_| output.status.success())?;
-    let mut times = text.split_whitespace().filter_map(|word| word.parse().ok());
-    Some([times.next()?, times.next()?])
+    let numbers: Vec<f64> = text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    numbers.try_into().ok()
 }

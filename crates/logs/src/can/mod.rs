@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 pub use database::Database;
 
 use crate::LogError;
+use crate::columns::{Batch, Stream};
 use crate::log::CanKind;
-use crate::samples::{Sample, Stream};
+use crate::samples::Sample;
 
 /// Largest payload, bytes: that of CAN FD.
 const PAYLOAD: usize = 64;
@@ -110,10 +111,10 @@ struct Signals<'a> {
 }
 
 impl Stream for Signals<'_> {
-    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+    fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
         for _ in 0..self.batch {
             let Some(frame) = self.frames.next_frame()? else { return Ok(false) };
-            self.decoder.decode(&frame, batch);
+            self.decoder.decode(&frame, &mut batch.samples);
         }
         Ok(true)
     }

@@ -1,18 +1,29 @@
-//! ASAM MDF 4, through `falcon_mdf`: each channel group is a stream with its own clock.
+//! ASAM MDF 4: each channel group is a stream with its own clock.
+//!
+//! `falcon_mdf` reads the structure of a file. Plain numbers in deflated or unpacked blocks are decoded here, column by column;
+//! what is rarer is decoded by the library.
 
+mod field;
+mod records;
+
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use falcon_mdf::blocks::channel::ChannelType;
 use falcon_mdf::{
-    CanFrames, Channel as MdfChannel, Conversion, Mf4Error, Mf4File, OpenOptions, Signal, SignalValues, SignalsChunks,
+    CanFrames, Channel as MdfChannel, ChannelGroup, Conversion, Mf4Error, Mf4File, OpenOptions, Signal, SignalValues,
+    SignalsChunks,
 };
 
 use crate::can::{Database, Decoder, Frame};
-use crate::samples::{Quality, Sample, Stream};
+use crate::columns::{Batch, Block, Column, Stream};
+use crate::samples::Quality;
 use crate::{Channel, LogError};
+use field::{Field, Tile};
+use records::Records;
 
-/// Records that are given at once.
-const BATCH: usize = 4096;
+/// Records that are given at once: their columns stay in the second cache.
+const BATCH: usize = 8192;
 /// Bytes of records that are decoded at once, and the limits of their number. What is left of an unpacked block is moved each time:
 /// with few records at once, that would take as long as to unpack it.
 const DECODED_AT_ONCE: usize = 4 << 20;
@@ -26,6 +37,8 @@ const ON_TRUST: usize = 16 << 20;
 pub(crate) struct MdfLog {
     path: PathBuf,
     file: Mf4File,
+    /// The same, for blocks of data.
+    blocks: File,
     places: Vec<Place>,
     /// Signals on a logged bus, behind the channels of the file.
     database: Option<Database>,
@@ -79,7 +92,8 @@ impl MdfLog {
         if file.unfinalized().is_some() {
             notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
         }
-        let log = Self { path: path.to_owned(), file, places, database, notes };
+        let blocks = File::open(path).map_err(LogError::io(path))?;
+        let log = Self { path: path.to_owned(), file, blocks, places, database, notes };
         if let Some(database) = log.database.as_ref().filter(|_| !log.file.can_frame_groups().is_empty()) {
             channels.extend_from_slice(database.channels());
         }
@@ -99,21 +113,17 @@ impl MdfLog {
             let Some(master) = data.master_channel().filter(|_| !chosen.is_empty()) else { continue };
             let channels: Vec<&MdfChannel> =
                 std::iter::once(master).chain(chosen.iter().map(|&i| &data.channels[self.places[i].channel])).collect();
-            let name = group_name(&self.file, data, data_group);
-            let place = format!("group `{name}`");
-            let records = (DECODED_AT_ONCE / data.record_size(0).max(1)).clamp(*DECODED.start(), *DECODED.end());
-            let chunks =
-                self.file.signals_chunks(&channels, records).map_err(|error| damaged(&self.path, &place, &error))?;
+            let place = format!("group `{}`", group_name(&self.file, data, data_group));
+            let decoder =
+                Decoding::of(self, data_group, data, &channels).map_err(|error| damaged(&self.path, &place, &error))?;
+            let (path, declared) = (&self.path, data.sample_count);
             streams.push(Box::new(Group {
-                path: &self.path,
+                path,
                 place,
-                chunks,
+                decoder,
                 channels: chosen,
-                times: Vec::new(),
-                columns: Vec::new(),
-                given: 0,
                 read: 0,
-                declared: data.sample_count,
+                declared,
                 without_time: 0,
             }));
         }
@@ -133,7 +143,7 @@ impl MdfLog {
 }
 
 /// Data group, channel group, and the group itself.
-fn groups(file: &Mf4File) -> impl Iterator<Item = (usize, usize, &falcon_mdf::ChannelGroup)> {
+fn groups(file: &Mf4File) -> impl Iterator<Item = (usize, usize, &ChannelGroup)> {
     file.data_groups()
         .iter()
         .enumerate()
@@ -141,7 +151,7 @@ fn groups(file: &Mf4File) -> impl Iterator<Item = (usize, usize, &falcon_mdf::Ch
 }
 
 /// A group by the name that its recorder gave it, or its number; by both where several have the name.
-fn group_name(file: &Mf4File, group: &falcon_mdf::ChannelGroup, data_group: usize) -> String {
+fn group_name(file: &Mf4File, group: &ChannelGroup, data_group: usize) -> String {
     let number = data_group + 1;
     let same = groups(file).filter(|(.., other)| other.acquisition_name == group.acquisition_name).count();
     match group.acquisition_name.trim() {
@@ -159,52 +169,78 @@ fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
 struct Group<'a> {
     path: &'a Path,
     place: String,
-    chunks: SignalsChunks<'a>,
+    decoder: Decoding<'a>,
     channels: Vec<usize>,
-    /// Times of the records that were decoded, s, and of each channel the values and which of them are valid.
-    times: Vec<f64>,
-    columns: Vec<(Vec<f64>, Option<Vec<bool>>)>,
-    /// How many of them were given.
-    given: usize,
     read: u64,
     declared: u64,
     without_time: u64,
 }
 
-impl Group<'_> {
-    /// Takes the next records.
-    fn decode(&mut self, signals: &[Signal]) -> Result<(), Mf4Error> {
-        (self.given, self.times) = (0, Vec::new());
-        let Some((master, signals)) = signals.split_first() else { return Ok(()) };
-        self.times = numbers(master)?;
-        self.read += self.times.len() as u64;
-        let column = |signal: &Signal| Ok((numbers(signal)?, signal.validity()));
-        self.columns = signals.iter().map(column).collect::<Result<_, Mf4Error>>()?;
-        Ok(())
+/// What decodes the records of a group.
+enum Decoding<'a> {
+    /// Time and channels as fields of the records.
+    Own {
+        records: Box<Records<'a>>,
+        tile: Box<Tile>,
+        time: Field<'a>,
+        fields: Vec<Field<'a>>,
+    },
+    Library(Box<SignalsChunks<'a>>),
+}
+
+impl<'a> Decoding<'a> {
+    fn of(log: &'a MdfLog, at: usize, group: &'a ChannelGroup, channels: &[&'a MdfChannel]) -> Result<Self, Mf4Error> {
+        let data = &log.file.data_groups()[at];
+        let id_bytes = Records::id_bytes(data);
+        let fields: Option<Vec<Field<'_>>> =
+            channels.iter().map(|channel| Field::of(channel, group, id_bytes)).collect();
+        let mut fields = fields.unwrap_or_default().into_iter();
+        if let (Some(time), Some(records)) = (fields.next(), Records::of(&log.blocks, data, group)) {
+            return Ok(Self::Own { records: Box::new(records), tile: Tile::new(), time, fields: fields.collect() });
+        }
+        let records = (DECODED_AT_ONCE / group.record_size(0).max(1)).clamp(*DECODED.start(), *DECODED.end());
+        log.file.signals_chunks(channels, records).map(|chunks| Self::Library(Box::new(chunks)))
     }
 
-    /// Gives some of the records that were decoded.
-    fn give(&mut self, batch: &mut Vec<Sample>) {
-        let rows = self.given..(self.given + BATCH).min(self.times.len());
-        self.given = rows.end;
-        batch.reserve(rows.len() * self.columns.len());
-        for row in rows {
-            let time_s = self.times[row];
-            if !time_s.is_finite() {
-                self.without_time += 1;
-                continue;
+    /// Decodes the next records, in place of those that the columns have; false at the end.
+    fn next(&mut self, Batch { block, memory, .. }: &mut Batch) -> Result<bool, String> {
+        let Block { times_s, columns } = block;
+        match self {
+            Self::Own { records, tile, time, fields } => {
+                let Some(window) = records.next(BATCH, memory)? else { return Ok(false) };
+                time.decode(&window, tile, times_s);
+                fields.iter().zip(columns).for_each(|(field, column)| field.fill(&window, tile, column));
+                Ok(true)
             }
-            for ((values, valid), &channel) in self.columns.iter().zip(&self.channels) {
-                let value = values.get(row).copied().unwrap_or(f64::NAN);
-                let quality = match valid.as_ref().map(|valid| valid.get(row)) {
-                    Some(Some(false)) => Quality::Invalid,
-                    _ if value.is_finite() => Quality::Good,
-                    _ => Quality::Missing,
+            Self::Library(chunks) => {
+                let Some(signals) = chunks.next() else { return Ok(false) };
+                let fill = |signals: Vec<Signal>| {
+                    let Some((master, signals)) = signals.split_first() else { return Ok(()) };
+                    *times_s = numbers(master)?;
+                    signals.iter().zip(columns).try_for_each(|(signal, column)| fill(signal, column, times_s.len()))
                 };
-                batch.push(Sample { channel, time_s, value, quality });
+                signals.and_then(fill).map_err(|error: Mf4Error| error.to_string())?;
+                Ok(true)
             }
         }
     }
+}
+
+/// The numbers of a signal, in place of those that the column has.
+fn fill(signal: &Signal, column: &mut Column, rows: usize) -> Result<(), Mf4Error> {
+    column.values = numbers(signal)?;
+    column.values.resize(rows, f64::NAN);
+    let valid = signal.validity();
+    let quality = |(row, value): (usize, &f64)| {
+        let is_valid = valid.as_ref().is_none_or(|valid| valid.get(row).copied().unwrap_or(true));
+        Some(match value.is_finite() {
+            _ if !is_valid => Quality::Invalid,
+            true => Quality::Good,
+            false => Quality::Missing,
+        })
+    };
+    column.qualities = column.values.iter().enumerate().map(quality).collect();
+    Ok(())
 }
 
 /// The values of a signal; where the conversion makes text of them, the numbers before it.
@@ -232,25 +268,26 @@ fn plain(values: SignalValues) -> Vec<f64> {
 }
 
 impl Stream for Group<'_> {
-    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
-        if self.given < self.times.len() {
-            self.give(batch);
-            return Ok(true);
-        }
-        match self.chunks.next() {
-            None if self.read < self.declared => {
+    fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
+        batch.block_of(&self.channels);
+        let read = self.decoder.next(batch);
+        let block = &mut batch.block;
+        match read {
+            Err(message) => {
+                block.times_s.clear();
+                let place = format!("{}, record {}", self.place, self.read + 1);
+                Err(LogError::damaged(self.path, place, message))
+            }
+            Ok(false) if self.read < self.declared => {
                 let message = format!("the data end after {} of {} records", self.read, self.declared);
                 // Said once: the next call ends the stream.
                 self.declared = self.read;
                 Err(LogError::damaged(self.path, &self.place, message))
             }
-            None => Ok(false),
-            Some(signals) => {
-                let decoded = signals.and_then(|signals| self.decode(&signals));
-                decoded.map_err(|error| {
-                    damaged(self.path, &format!("{}, record {}", self.place, self.read + 1), &error)
-                })?;
-                self.give(batch);
+            Ok(false) => Ok(false),
+            Ok(true) => {
+                self.read += block.times_s.len() as u64;
+                self.without_time += block.leave_out_without_time();
                 Ok(true)
             }
         }
@@ -274,7 +311,8 @@ struct Bus<'a> {
 }
 
 impl Stream for Bus<'_> {
-    fn next_batch(&mut self, batch: &mut Vec<Sample>) -> Result<bool, LogError> {
+    fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
+        let batch = &mut batch.samples;
         let end = (self.at + BATCH).min(self.frames.len());
         if self.at == end {
             return Ok(false);
@@ -301,7 +339,7 @@ impl Stream for Bus<'_> {
 struct Remarks<'a>(&'a [String]);
 
 impl Stream for Remarks<'_> {
-    fn next_batch(&mut self, _: &mut Vec<Sample>) -> Result<bool, LogError> {
+    fn next_batch(&mut self, _: &mut Batch) -> Result<bool, LogError> {
         Ok(false)
     }
 

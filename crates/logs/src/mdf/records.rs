@@ -1,0 +1,338 @@
+//! The records of a channel group: its blocks of data, one after the other, unpacked.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+
+use falcon_mdf::blocks::data_block::CompressionType;
+use falcon_mdf::data_index::DataBlockInfo;
+use falcon_mdf::{ChannelGroup, DataGroup};
+use libdeflater::{DecompressionError, Decompressor};
+
+use super::{LARGEST_BLOCK, ON_TRUST};
+use crate::columns::Memory;
+
+/// Bytes of a block that is not packed that are read at once.
+const READ_AT_ONCE: usize = 4 << 20;
+/// Bytes of the head of a block.
+const HEAD: u64 = 24;
+/// Deflate makes at most so many bytes of one.
+const MOST_FROM_A_BYTE: u64 = 1032;
+
+/// Some records that follow each other.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window<'a> {
+    bytes: &'a [u8],
+    /// Bytes from one record to the next; with planes, from one byte of a record to the next.
+    stride: usize,
+    /// Whether the first bytes of all records stand together, then all second ones, and so on.
+    is_planes: bool,
+    /// The first of them in `bytes`.
+    first: usize,
+    /// How many they are.
+    pub(super) count: usize,
+    /// The number of the first of them in the group.
+    pub(super) index: u64,
+}
+
+impl Window<'_> {
+    /// One byte of one record.
+    pub(super) fn byte(&self, record: usize, at: usize) -> u8 {
+        let record = self.first + record;
+        let place = if self.is_planes { at * self.stride + record } else { record * self.stride + at };
+        self.bytes.get(place).copied().unwrap_or_default()
+    }
+
+    /// Takes a number of `N` bytes at `at` out of each record from `from` on; false where its bytes do not stand together.
+    pub(super) fn gather<const N: usize, W>(
+        &self,
+        from: usize,
+        at: usize,
+        words: &mut [W],
+        word: impl Fn([u8; N]) -> W,
+    ) -> bool {
+        if self.is_planes {
+            return false;
+        }
+        let records = self.bytes[(self.first + from) * self.stride..].chunks_exact(self.stride);
+        for (place, record) in words.iter_mut().zip(records) {
+            if let Some(bytes) = record[at..].first_chunk::<N>() {
+                *place = word(*bytes);
+            }
+        }
+        true
+    }
+
+    /// Makes words of two bytes of each record from `from` on, the lower one first; zero for a byte that is not there.
+    pub(super) fn pair(&self, from: usize, places: [Option<usize>; 2], words: &mut [u16]) {
+        let from = self.first + from;
+        let (start, step) = if self.is_planes { (from, 1) } else { (from * self.stride, self.stride) };
+        let from_record = if self.is_planes { self.stride } else { 1 };
+        let bytes = |at: usize| &self.bytes[start + at * from_record..];
+        match places.map(|place| place.map(bytes)) {
+            // Bytes that stand together are taken many at once.
+            [Some(low), Some(high)] if step == 1 => of_pairs(words, low.iter().zip(high)),
+            [Some(low), Some(high)] => of_pairs(words, low.iter().step_by(step).zip(high.iter().step_by(step))),
+            [Some(low), None] if step == 1 => of_pairs(words, low.iter().zip(std::iter::repeat(&0))),
+            [Some(low), None] => of_pairs(words, low.iter().step_by(step).zip(std::iter::repeat(&0))),
+            _ => words.fill(0),
+        }
+    }
+}
+
+/// Makes words of low and high bytes.
+fn of_pairs<'b>(words: &mut [u16], pairs: impl Iterator<Item = (&'b u8, &'b u8)>) {
+    words.iter_mut().zip(pairs).for_each(|(word, (low, high))| *word = u16::from_le_bytes([*low, *high]));
+}
+
+/// How the records of a group are found among the bytes.
+enum Layout {
+    /// One after the other.
+    Sorted,
+    /// Between those of other groups, each behind the identifier of its group.
+    Unsorted(Mixed),
+}
+
+/// Records of several groups.
+struct Mixed {
+    id_bytes: usize,
+    /// Identifier and bytes of the records of each group; none where each record says its length.
+    groups: Vec<(u64, Option<usize>)>,
+    wanted: u64,
+}
+
+/// The records of a group, read block by block.
+pub(super) struct Records<'a> {
+    file: &'a File,
+    blocks: &'a [DataBlockInfo],
+    /// Bytes of the first of them that were read: it is not packed, and long.
+    read: usize,
+    layout: Layout,
+    /// Bytes of a record.
+    size: usize,
+    inflater: Decompressor,
+    /// Of what was unpacked: its bytes, the records in it, whether they stand in planes, and how many were given.
+    length: usize,
+    held: usize,
+    is_planes: bool,
+    given: usize,
+    /// The beginning of a record whose end is in the next block.
+    rest: Vec<u8>,
+    index: u64,
+    count: u64,
+    /// Why the records end here.
+    damage: Option<String>,
+}
+
+impl<'a> Records<'a> {
+    /// Bytes before the numbers of a record: of a sorted group, its identifier stands in it.
+    pub(super) fn id_bytes(data: &DataGroup) -> usize {
+        if data.is_unsorted() { 0 } else { usize::from(data.rec_id_size()) }
+    }
+
+    /// The records of a group; none where its blocks are in a form that the library must read.
+    pub(super) fn of(file: &'a File, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
+        let blocks = data.block_index().blocks();
+        let is_known = |block: &DataBlockInfo| {
+            let is_known =
+                |algorithm| matches!(algorithm, CompressionType::Deflate | CompressionType::TransposedDeflate);
+            block.invalidation_block.is_none() && block.compression.is_none_or(|with| is_known(with.algorithm))
+        };
+        let id_bytes = data.rec_id_size();
+        let (layout, size) = if data.is_unsorted() {
+            let of =
+                |other: &ChannelGroup| (other.record_id(), (!other.is_vlsd()).then(|| other.record_size(id_bytes)));
+            let groups = data.channel_groups.iter().map(of).collect();
+            let mixed = Mixed { id_bytes: usize::from(id_bytes), groups, wanted: group.record_id() };
+            (Layout::Unsorted(mixed), group.payload_size())
+        } else {
+            (Layout::Sorted, group.record_size(id_bytes))
+        };
+        (size > 0 && blocks.iter().all(is_known)).then(|| Self {
+            file,
+            blocks,
+            read: 0,
+            layout,
+            size,
+            inflater: Decompressor::new(),
+            length: 0,
+            held: 0,
+            is_planes: false,
+            given: 0,
+            rest: Vec::new(),
+            index: 0,
+            // Of mixed records the library has not counted those that lie over the end of a block.
+            count: if data.is_unsorted() { u64::MAX } else { group.sample_count },
+            damage: None,
+        })
+    }
+
+    /// The next records, at most so many; none at the end. The memory is that of the calls before.
+    pub(super) fn next<'m>(&mut self, most: usize, memory: &'m mut Memory) -> Result<Option<Window<'m>>, String> {
+        while self.given == self.held {
+            if let Some(damage) = self.damage.take() {
+                self.blocks = &[];
+                return Err(damage);
+            }
+            if self.index == self.count || !self.next_block(memory)? {
+                return Ok(None);
+            }
+        }
+        let left = usize::try_from(self.count - self.index).unwrap_or(usize::MAX);
+        let count = most.min(self.held - self.given).min(left);
+        let window = Window {
+            bytes: &memory.unpacked[..self.length],
+            stride: if self.is_planes { self.held } else { self.size },
+            is_planes: self.is_planes,
+            first: self.given,
+            count,
+            index: self.index,
+        };
+        self.given = if count == left { self.held } else { self.given + count };
+        self.index += count as u64;
+        Ok(Some(window))
+    }
+
+    /// Reads the next bytes and finds the records in them; false at the end.
+    fn next_block(&mut self, Memory { packed, unpacked }: &mut Memory) -> Result<bool, String> {
+        let Some((block, others)) = self.blocks.split_first() else { return Ok(false) };
+        (self.given, self.held, self.is_planes) = (0, 0, false);
+        let place = |message: String| format!("block at byte {}: {message}", block.offset);
+        match block.compression {
+            None => {
+                let size = usize::try_from(block.original_size).unwrap_or(usize::MAX);
+                let length = (size - self.read).min(READ_AT_ONCE);
+                read(self.file, block.offset + HEAD + self.read as u64, length as u64, packed).map_err(place)?;
+                self.read += length;
+                if self.read == size {
+                    (self.read, self.blocks) = (0, others);
+                }
+                self.divide(packed, unpacked);
+            }
+            Some(with) => {
+                read(self.file, with.data_offset, block.compressed_size, packed).map_err(place)?;
+                self.length = inflate(&mut self.inflater, packed, block.original_size, unpacked).map_err(place)?;
+                self.blocks = others;
+                let columns = with.parameter as usize;
+                let is_transposed = with.algorithm == CompressionType::TransposedDeflate;
+                let is_as_it_stands = self.rest.is_empty() && matches!(self.layout, Layout::Sorted);
+                let bytes = &unpacked[..self.length];
+                if is_as_it_stands && (!is_transposed || columns == self.size) {
+                    (self.is_planes, self.held) = (is_transposed, self.length / self.size);
+                    self.rest.extend_from_slice(&bytes[self.held * self.size..]);
+                } else if is_transposed {
+                    let rows = in_rows(bytes, columns).ok_or_else(|| place("it has no columns".to_owned()))?;
+                    self.divide(&rows, unpacked);
+                } else {
+                    packed.clear();
+                    packed.extend_from_slice(bytes);
+                    self.divide(packed, unpacked);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Finds the records in these bytes, behind what was left of those before, and keeps what is less than one.
+    fn divide(&mut self, bytes: &[u8], unpacked: &mut Vec<u8>) {
+        unpacked.clear();
+        match &self.layout {
+            Layout::Sorted => {
+                unpacked.append(&mut self.rest);
+                unpacked.extend_from_slice(bytes);
+                self.rest.extend_from_slice(&unpacked[unpacked.len() / self.size * self.size..]);
+            }
+            Layout::Unsorted(mixed) => {
+                let mut all = std::mem::take(&mut self.rest);
+                all.extend_from_slice(bytes);
+                let (used, damage) = mixed.take_own(&all, unpacked);
+                self.damage = damage;
+                self.rest.extend_from_slice(&all[used..]);
+            }
+        }
+        (self.length, self.held) = (unpacked.len(), unpacked.len() / self.size);
+    }
+}
+
+impl Mixed {
+    /// Copies the records of the wanted group, without their identifiers. How many bytes were gone through: the rest is the beginning of
+    /// a record, or cannot be read.
+    fn take_own(&self, bytes: &[u8], own: &mut Vec<u8>) -> (usize, Option<String>) {
+        let mut at = 0;
+        while let Some(id) = bytes.get(at..at + self.id_bytes) {
+            let id = id.iter().rev().fold(0, |id, byte| id << 8 | u64::from(*byte));
+            let Some((_, size)) = self.groups.iter().find(|(other, _)| *other == id) else {
+                return (at, Some(format!("a record has the identifier {id}, which no group has")));
+            };
+            let (head, size) = match size {
+                Some(size) => (self.id_bytes, *size),
+                None => {
+                    let Some(length) = bytes[at + self.id_bytes..].first_chunk() else { break };
+                    let head = self.id_bytes + size_of::<u32>();
+                    (head, head.saturating_add(u32::from_le_bytes(*length) as usize))
+                }
+            };
+            if size > ON_TRUST || size == 0 {
+                return (at, Some(format!("a record has {size} bytes, expected 1 to {ON_TRUST}")));
+            }
+            let Some(record) = bytes.get(at + head..at + size) else { break };
+            if id == self.wanted {
+                own.extend_from_slice(record);
+            }
+            at += size;
+        }
+        (at, None)
+    }
+}
+
+/// Reads bytes of the file, in place of what is in `bytes`.
+fn read(mut file: &File, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
+    let of_file = file.metadata().map_err(|error| error.to_string())?.len();
+    let end = at.checked_add(length).filter(|end| *end <= of_file);
+    end.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
+    if length > LARGEST_BLOCK {
+        return Err(format!("it has {length} packed bytes, expected at most {LARGEST_BLOCK}"));
+    }
+    let length = usize::try_from(length).map_err(|error| error.to_string())?;
+    bytes.resize(length, 0);
+    file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).map_err(|error| error.to_string())
+}
+
+/// Unpacks a block to the beginning of the memory; its bytes.
+fn inflate(inflater: &mut Decompressor, packed: &[u8], size: u64, memory: &mut Vec<u8>) -> Result<usize, String> {
+    let most = LARGEST_BLOCK.min((packed.len() as u64).saturating_mul(MOST_FROM_A_BYTE));
+    if size > most {
+        return Err(format!("it says that it unpacks to {size} bytes, expected at most {most}"));
+    }
+    let size = usize::try_from(size).map_err(|error| error.to_string())?;
+    if memory.len() < size {
+        // Fresh memory is zero already.
+        *memory = vec![0; size];
+    }
+    match inflater.zlib_decompress(packed, &mut memory[..size]) {
+        Ok(unpacked) if unpacked == size => Ok(size),
+        Ok(unpacked) => Err(format!("it unpacks to {unpacked} bytes, and says {size}")),
+        Err(DecompressionError::BadData) => Err("what is packed in it is damaged".to_owned()),
+        Err(DecompressionError::InsufficientSpace) => {
+            Err(format!("it unpacks to more than the {size} bytes that it says"))
+        }
+    }
+}
+
+/// The bytes of a transposed block row by row; what is less than a row stands behind them. None without columns.
+fn in_rows(transposed: &[u8], columns: usize) -> Option<Vec<u8>> {
+    let rows = transposed.len().checked_div(columns)?;
+    let (planes, tail) = transposed.split_at(rows * columns);
+    let mut bytes = vec![0; planes.len()];
+    if rows > 0 {
+        // Rows that stay in the cache while all their columns are filled.
+        let at_once = (16_usize << 10).div_ceil(columns);
+        for (part, rows_of_part) in bytes.chunks_mut(at_once * columns).enumerate() {
+            for (column, plane) in planes.chunks_exact(rows).enumerate() {
+                let places = rows_of_part[column..].iter_mut().step_by(columns);
+                places.zip(&plane[part * at_once..]).for_each(|(place, byte)| *place = *byte);
+            }
+        }
+    }
+    bytes.extend_from_slice(tail);
+    Some(bytes)
+}
