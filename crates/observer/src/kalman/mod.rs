@@ -42,7 +42,7 @@ pub(crate) mod valve_model;
 use drivetrain::{Engagement, Real, ShiftCoefficients};
 
 use crate::{
-    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Phase,
+    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Phase, Reading,
     Supervisor, SupervisorState,
 };
 use covariance::{CONSIDERED, Covariance, Measured};
@@ -79,6 +79,8 @@ const LEARNT: [usize; 5] = [FRICTION, GAIN, SCALE, DELAY, SKEW];
 
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
+/// Time for which the oldest speeds of turbine and output are kept up to date after a reading that needed them, s \[chosen\].
+const LATE_S: f64 = 1.0;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
 
@@ -138,6 +140,8 @@ struct Running<T> {
     covariance: Covariance<T>,
     /// The speeds at earlier times, with which readings are compared that are older than this step.
     past: Past<T>,
+    /// Time since a reading of turbine or output was older than the newest of the past, s.
+    late_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
     acting: Phase,
@@ -308,32 +312,13 @@ impl<T: Real> KalmanFilter<T> {
     /// Takes the readings of turbine, output and wheel.
     #[inline]
     fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>, dt_s: T) -> [ChannelHealth; 3] {
-        let given = [&input.turbine_rad_s, &input.output_rad_s, &input.wheel_rad_s];
         let mut health = [ChannelHealth::Absent; 3];
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
-        for (k, reading) in given.into_iter().enumerate() {
-            let Some(reading) = *reading else { continue };
-            let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
-            if !(self.limits.speed_valid(reading.value) && aged) {
-                health[k] = ChannelHealth::Refused;
-                continue;
-            }
-            if state.newest[k].is_some_and(|(_, age_s)| age_s < reading.age_s) {
-                // It came too late: a newer one has been taken.
-                health[k] = ChannelHealth::Refused;
-                continue;
-            }
-            health[k] = match &mut state.running {
-                Some(running) => self.correct(running, k, reading),
-                None => ChannelHealth::Good,
-            };
-            // What the filter refuses shows no slip either.
-            if health[k] == ChannelHealth::Good {
-                state.newest[k] = Some((reading.value, reading.age_s));
-            }
-        }
+        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s);
+        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s);
+        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             for (health, silent_s) in health.iter_mut().zip(running.silent_s) {
@@ -355,6 +340,27 @@ impl<T: Real> KalmanFilter<T> {
             if self.uncertainty.output_least_rad_s == T::infinity() {
                 health[WHEEL] = ChannelHealth::Unused;
             }
+        }
+        health
+    }
+
+    /// Takes a reading of the speed `K`, if there is one.
+    #[inline]
+    fn take_speed<const K: usize>(&self, state: &mut KalmanState<T>, reading: Option<Reading<T>>) -> ChannelHealth {
+        let Some(reading) = reading else { return ChannelHealth::Absent };
+        let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
+        // One that comes too late, after a newer one, is refused as well.
+        let late = state.newest[K].is_some_and(|(_, age_s)| age_s < reading.age_s);
+        if !(self.limits.speed_valid(reading.value) && aged) || late {
+            return ChannelHealth::Refused;
+        }
+        let health = match &mut state.running {
+            Some(running) => self.correct::<K>(running, reading),
+            None => ChannelHealth::Good,
+        };
+        // What the filter refuses shows no slip either.
+        if health == ChannelHealth::Good {
+            state.newest[K] = Some((reading.value, reading.age_s));
         }
         health
     }
@@ -496,7 +502,14 @@ impl<T: Real> Running<T> {
         for (x, gain) in self.mean.iter_mut().zip(&gain) {
             *x = *x + *gain * innovation;
         }
-        self.past.correct(&gain[N..], innovation);
+        self.past.correct(&gain, innovation);
+    }
+
+    /// Remembers the speeds of now; the oldest are forgotten.
+    #[inline]
+    fn remember(&mut self) {
+        self.past.remember([self.mean[TURBINE], self.mean[OUTPUT], self.mean[WHEEL]]);
+        self.covariance.remember(self.late_s < T::of(LATE_S));
     }
 
     /// Whether mean and covariance are numbers, and no variance is negative.

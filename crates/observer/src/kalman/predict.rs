@@ -99,6 +99,7 @@ impl<T: Real> KalmanFilter<T> {
             mean,
             covariance,
             past,
+            late_s: zero,
             motion_pa_s: zero,
             acting,
             direction: direction(model.shift.oncoming_slip(turbine, output)),
@@ -146,16 +147,17 @@ impl<T: Real> KalmanFilter<T> {
     /// A step in one phase, that ends `left_s` before now.
     #[inline]
     fn advance(&self, running: &mut Running<T>, engine: &Engine<T>, settled_pa: T, dt_s: T, left_s: T) {
-        if running.past.is_due() {
-            running.past.remember([running.mean[TURBINE], running.mean[OUTPUT], running.mean[WHEEL]]);
-            running.covariance.remember();
+        let remembered = running.past.is_due();
+        if remembered {
+            running.remember();
         }
         let x = running.mean;
         let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
         running.mean = step.propagate(&x);
-        running.covariance.spread(&step.tangent(&x, &running.mean));
+        running.covariance.spread(&step.tangent(&x, &running.mean), remembered);
         self.add_noise(running, engine, &step, &x, settled_pa);
         running.past.pass(dt_s);
+        running.late_s = running.late_s + dt_s;
         for silent_s in &mut running.silent_s {
             *silent_s = *silent_s + dt_s;
         }
