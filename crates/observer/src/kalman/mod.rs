@@ -79,8 +79,6 @@ const LEARNT: [usize; 5] = [FRICTION, GAIN, SCALE, DELAY, SKEW];
 
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
-/// Time for which the oldest speeds of turbine and output are kept up to date after a reading that needed them, s \[chosen\].
-const LATE_S: f64 = 1.0;
 /// How old the first readings may be, s.
 const FIRST_S: f64 = 0.05;
 
@@ -140,7 +138,8 @@ struct Running<T> {
     covariance: Covariance<T>,
     /// The speeds at earlier times, with which readings are compared that are older than this step.
     past: Past<T>,
-    /// Time since a reading of turbine or output was older than the newest of the past, s.
+    /// Time since a reading of turbine or output was older than the newest of the past, s: for as long as a channel may be
+    /// silent, the next one may be.
     late_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
@@ -254,8 +253,7 @@ impl<T: Real> KalmanFilter<T> {
             state.commands.pass(piece_s);
             state.offgoing.pass(&self.offgoing, &self.limits, piece_s);
             let settled_pa = self.valve.target_pa(&state.commands, piece_s);
-            let step = self.valve.step(settled_pa, state.valve_pa, piece_s);
-            state.valve_pa = self.limits.possible_pressure(step.phi * state.valve_pa + step.drift_pa);
+            state.valve_pa = self.limits.possible_pressure(self.valve.carried_pa(settled_pa, state.valve_pa, piece_s));
             if let Some(engine) = &mut state.engine {
                 engine.predict(&self.engine.1, piece_s);
             }
@@ -505,11 +503,12 @@ impl<T: Real> Running<T> {
         self.past.correct(&gain, innovation);
     }
 
-    /// Remembers the speeds of now; the oldest are forgotten.
+    /// Remembers the speeds of now; the oldest are forgotten, and in the covariance those of turbine and output left out if
+    /// it is not to be `whole`.
     #[inline]
-    fn remember(&mut self) {
+    fn remember(&mut self, whole: bool) {
         self.past.remember([self.mean[TURBINE], self.mean[OUTPUT], self.mean[WHEEL]]);
-        self.covariance.remember(self.late_s < T::of(LATE_S));
+        self.covariance.remember(whole);
     }
 
     /// Whether mean and covariance are numbers, and no variance is negative.

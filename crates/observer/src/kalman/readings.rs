@@ -198,18 +198,17 @@ impl<T: Real> Parts<T> {
         const { assert!(PASTS == 2, "a reading is between now and the newer of the past, or between both") };
         let ([scale, delay, skew], [late, early]) = (self.learnt, self.place.shares);
         let wheel = [late, early, scale, delay];
-        // As a rule readings of turbine and output are newer than the newest past, and those of the wheel older.
-        let mut with = match K {
-            TURBINE if points == [TURBINE, speed_at(TURBINE, 1)] => {
-                p.sum_of::<TURBINE, { speed_at(TURBINE, 1) }>([late, early])
-            }
-            OUTPUT if points == [OUTPUT, speed_at(OUTPUT, 1)] => {
-                p.sum_of::<OUTPUT, { speed_at(OUTPUT, 1) }>([late, early])
-            }
-            WHEEL if points == [speed_at(WHEEL, 1), speed_at(WHEEL, 2)] => {
-                p.sum_of_four::<{ speed_at(WHEEL, 1) }, { speed_at(WHEEL, 2) }, SCALE, DELAY>(wheel)
-            }
-            _ => return self.with_any(p, points),
+        let recent = points == [K, speed_at(K, 1)];
+        if !recent && points != [speed_at(K, 1), speed_at(K, 2)] {
+            return self.with_any(p, points);
+        }
+        let mut with = match (K, recent) {
+            (TURBINE, true) => p.sum_of::<TURBINE, { speed_at(TURBINE, 1) }>([late, early]),
+            (TURBINE, false) => p.sum_of::<{ speed_at(TURBINE, 1) }, { speed_at(TURBINE, 2) }>([late, early]),
+            (OUTPUT, true) => p.sum_of::<OUTPUT, { speed_at(OUTPUT, 1) }>([late, early]),
+            (OUTPUT, false) => p.sum_of::<{ speed_at(OUTPUT, 1) }, { speed_at(OUTPUT, 2) }>([late, early]),
+            (_, true) => p.sum_of_four::<WHEEL, { speed_at(WHEEL, 1) }, SCALE, DELAY>(wheel),
+            (_, false) => p.sum_of_four::<{ speed_at(WHEEL, 1) }, { speed_at(WHEEL, 2) }, SCALE, DELAY>(wheel),
         };
         p.add_row::<SKEW>(&mut with, skew);
         with

@@ -53,7 +53,10 @@ impl Counts {
             return Ok(true);
         };
         if kept.toolchain != self.toolchain {
-            println!("not compared: the counts are of\n  {}\nand this is\n  {}\n{renew}", kept.toolchain, self.toolchain);
+            println!(
+                "not compared: the counts are of\n  {}\nand this is\n  {}\n{renew}",
+                kept.toolchain, self.toolchain
+            );
             return Ok(true);
         }
         if !self.grown.is_empty() {
