@@ -38,12 +38,14 @@ const KEPT: usize = ALL - 2;
 pub(super) const fn speed_at(k: usize, point: usize) -> usize {
     match (point, k) {
         (0, _) => k,
-        (1, _) => N + k,
-        (_, WHEEL) => N + SPEEDS,
+        (1, _) => N + 1 + k,
+        (_, WHEEL) => N,
         (_, TURBINE) => KEPT,
         (_, _) => KEPT + 1,
     }
 }
+/// Place of the newest past of the first speed.
+const NEWEST: usize = speed_at(0, 1);
 const _: () = assert!(PASTS == 2 && SPEEDS == 3 && speed_at(OUTPUT, 2) == ALL - 1);
 
 impl<T: Real> Covariance<T> {
@@ -132,19 +134,24 @@ impl<T: Real> Covariance<T> {
         self.whole = whole;
     }
 
-    /// Makes one the same as one before it.
+    /// Makes another the same as one.
     #[inline(always)]
     fn repeat<const ONE: usize, const SAME: usize>(&mut self) {
-        const { assert!(ONE < SAME) };
         let p = &mut self.upper;
-        for i in 0..ONE {
+        for i in 0..ONE.min(SAME) {
             p[i][SAME] = p[i][ONE];
         }
-        for i in ONE..SAME {
-            p[i][SAME] = p[ONE][i];
+        if ONE < SAME {
+            for i in ONE..SAME {
+                p[i][SAME] = p[ONE][i];
+            }
+        } else {
+            for i in SAME + 1..=ONE {
+                p[SAME][i] = p[i][ONE];
+            }
         }
         p[SAME][SAME] = p[ONE][ONE];
-        for i in SAME + 1..ALL {
+        for i in ONE.max(SAME) + 1..ALL {
             p[SAME][i] = p[ONE][i];
         }
     }
@@ -153,7 +160,7 @@ impl<T: Real> Covariance<T> {
     /// are the speeds at its start is `remembered`.
     #[inline]
     pub(super) fn spread(&mut self, step: &Tangent<T>, remembered: bool) {
-        let (p, kept) = (&mut self.upper, if self.whole { ALL } else { KEPT });
+        let p = &mut self.upper;
         // The step takes whole rows of the states that it depends on.
         for i in 1..COLUMNS {
             let (above, below) = p.split_at_mut(i);
@@ -162,20 +169,18 @@ impl<T: Real> Covariance<T> {
             }
         }
         // `F P`; the newest of the past are among its columns where they are the speeds at the start.
-        let skipped = if remembered { SPEEDS } else { 0 };
-        for n in 0..kept - skipped {
-            let c = if n < N { n } else { n + skipped };
-            let next = step.of(&core::array::from_fn(|i| p[i][c]));
-            for (row, next) in p.iter_mut().zip(next) {
-                row[c] = next;
-            }
-        }
         if remembered {
+            first_product::<T, 0, NEWEST>(p, step);
             for row in p.iter_mut().take(LAWS) {
                 for k in 0..SPEEDS {
-                    row[N + k] = row[k];
+                    row[NEWEST + k] = row[k];
                 }
             }
+            if self.whole {
+                first_product::<T, KEPT, ALL>(p, step);
+            }
+        } else {
+            first_product::<T, 0, ALL>(p, step);
         }
         // `(F P) F'`.
         for c in 0..LAWS {
@@ -278,6 +283,17 @@ impl<T: Real> Covariance<T> {
     }
 }
 
+/// Columns of `F P`.
+#[inline(always)]
+fn first_product<T: Real, const FIRST: usize, const END: usize>(p: &mut [[T; ALL]; ALL], step: &Tangent<T>) {
+    for c in FIRST..END {
+        let next = step.of(&core::array::from_fn(|i| p[i][c]));
+        for (row, next) in p.iter_mut().zip(next) {
+            row[c] = next;
+        }
+    }
+}
+
 /// Subtracts `x y'`, which is symmetric, on and above the diagonal of the first `END`, and between considered states gives
 /// the product of `back` back.
 ///
@@ -312,4 +328,77 @@ fn subtract_product<T: Real, const END: usize>(
         };
     }
     rows!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::powertrain::tests::step;
+    use super::super::{LOAD, SPRING};
+    use super::*;
+
+    /// A covariance of full rank with entries of any size.
+    fn any() -> Covariance<f64> {
+        let mut seed = 1_u32;
+        let factors: [[f64; ALL]; ALL] = core::array::from_fn(|_| {
+            core::array::from_fn(|_| {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(seed) / f64::from(u32::MAX) - 0.5
+            })
+        });
+        let mut covariance = Covariance::of([0.0; N]);
+        for i in 0..ALL {
+            for j in i..ALL {
+                covariance.upper[i][j] = (0..ALL).map(|k| factors[i][k] * factors[j][k]).sum();
+            }
+        }
+        covariance
+    }
+
+    fn tangent() -> Tangent<f64> {
+        let mut x = [0.0; N];
+        (x[TURBINE], x[OUTPUT], x[WHEEL], x[SPRING], x[LOAD]) = (300.0, 120.0, 40.5, 900.0, 700.0);
+        let step = step();
+        step.tangent(&x, &step.propagate(&x))
+    }
+
+    fn assert_alike(one: &Covariance<f64>, other: &Covariance<f64>, end: usize) {
+        for i in 0..end {
+            for j in i..end {
+                let (a, b) = (one.at(i, j), other.at(i, j));
+                assert!((a - b).abs() <= 1e-9 * (a.abs() + b.abs()).max(1.0), "{i} {j}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_newest_past_after_a_step_is_its_start() {
+        let (mut covariance, step) = (any(), tangent());
+        covariance.remember(true);
+        assert!((0..ALL).all(|i| covariance.at(i, speed_at(OUTPUT, 1)) == covariance.at(i, OUTPUT)));
+        let mut each = covariance;
+        covariance.spread(&step, true);
+        each.spread(&step, false);
+        assert_alike(&covariance, &each, ALL);
+    }
+
+    #[test]
+    fn what_is_left_out_changes_nothing_of_the_rest() {
+        let (mut whole, step, shares) = (any(), tangent(), [0.0, 0.3, 0.0, 1.0, 0.05, 1.0]);
+        let mut rest = whole;
+        for k in [TURBINE, OUTPUT, WHEEL, TURBINE] {
+            for (covariance, is_whole) in [(&mut whole, true), (&mut rest, false)] {
+                covariance.remember(is_whole);
+                covariance.spread(&step, true);
+                let with = core::array::from_fn(|i| 0.7 * covariance.at(i, k) + 0.3 * covariance.at(i, speed_at(k, 1)));
+                let variance = 0.7 * with[k] + 0.3 * with[speed_at(k, 1)] + 0.1;
+                let gain = covariance.correct(&Measured { with: &with, variance }, &shares);
+                assert_eq!(gain[speed_at(TURBINE, 2)] == 0.0, !is_whole);
+            }
+            assert_alike(&whole, &rest, KEPT);
+        }
+        // As soon as a reading needs them again, they are there.
+        whole.remember(true);
+        rest.remember(true);
+        assert_alike(&whole, &rest, ALL);
+    }
 }

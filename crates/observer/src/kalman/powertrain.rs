@@ -223,10 +223,10 @@ impl<T: Real> Implicit<T> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn step() -> Step<f64> {
+    pub(in crate::kalman) fn step() -> Step<f64> {
         let row = |a: [f64; 4]| AccelerationRow {
             per_turbine_torque: a[0],
             per_offgoing_torque: a[1],
