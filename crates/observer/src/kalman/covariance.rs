@@ -136,6 +136,7 @@ impl<T: Real> Covariance<T> {
 
     /// Makes another the same as one.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "with an iterator over rows it takes four times the instructions")]
     fn repeat<const ONE: usize, const SAME: usize>(&mut self) {
         let p = &mut self.upper;
         for i in 0..ONE.min(SAME) {
