@@ -12,7 +12,8 @@
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
-//! with the speed at the time at which it was measured, which lies between two steps or before both. Before the shift
+//! with the speed at the time at which it was measured, which lies between two steps or before both: the covariance holds
+//! speeds at two earlier times, the older ones of turbine and output only while readings are that old. Before the shift
 //! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
 //! friction and gain are kept for some shifts and then forgotten.
 //!
