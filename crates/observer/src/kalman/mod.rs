@@ -12,7 +12,8 @@
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
-//! with the speed at the time at which it was measured, which lies between two steps or before both. Before the shift
+//! with the speed at the time at which it was measured, which lies between two steps or before both: the covariance holds
+//! speeds at two earlier times, the older ones of turbine and output only while readings are that old. Before the shift
 //! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
 //! friction and gain are kept for some shifts and then forgotten.
 //!
@@ -42,7 +43,7 @@ pub(crate) mod valve_model;
 use drivetrain::{Engagement, Real, ShiftCoefficients};
 
 use crate::{
-    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Phase,
+    ChannelHealth, Channels, CompliantModel, Estimate, Estimator, Health, Input, InputLimits, LOST_S, Phase, Reading,
     Supervisor, SupervisorState,
 };
 use covariance::{CONSIDERED, Covariance, Measured};
@@ -138,6 +139,9 @@ struct Running<T> {
     covariance: Covariance<T>,
     /// The speeds at earlier times, with which readings are compared that are older than this step.
     past: Past<T>,
+    /// Time since a reading of turbine or output was older than the newest of the past, s: for as long as a channel may be
+    /// silent, the next one may be.
+    late_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
     acting: Phase,
@@ -250,8 +254,7 @@ impl<T: Real> KalmanFilter<T> {
             state.commands.pass(piece_s);
             state.offgoing.pass(&self.offgoing, &self.limits, piece_s);
             let settled_pa = self.valve.target_pa(&state.commands, piece_s);
-            let step = self.valve.step(settled_pa, state.valve_pa, piece_s);
-            state.valve_pa = self.limits.possible_pressure(step.phi * state.valve_pa + step.drift_pa);
+            state.valve_pa = self.limits.possible_pressure(self.valve.carried_pa(settled_pa, state.valve_pa, piece_s));
             if let Some(engine) = &mut state.engine {
                 engine.predict(&self.engine.1, piece_s);
             }
@@ -308,32 +311,13 @@ impl<T: Real> KalmanFilter<T> {
     /// Takes the readings of turbine, output and wheel.
     #[inline]
     fn take_speeds(&self, state: &mut KalmanState<T>, input: &Input<T>, dt_s: T) -> [ChannelHealth; 3] {
-        let given = [&input.turbine_rad_s, &input.output_rad_s, &input.wheel_rad_s];
         let mut health = [ChannelHealth::Absent; 3];
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
-        for (k, reading) in given.into_iter().enumerate() {
-            let Some(reading) = *reading else { continue };
-            let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
-            if !(self.limits.speed_valid(reading.value) && aged) {
-                health[k] = ChannelHealth::Refused;
-                continue;
-            }
-            if state.newest[k].is_some_and(|(_, age_s)| age_s < reading.age_s) {
-                // It came too late: a newer one has been taken.
-                health[k] = ChannelHealth::Refused;
-                continue;
-            }
-            health[k] = match &mut state.running {
-                Some(running) => self.correct(running, k, reading),
-                None => ChannelHealth::Good,
-            };
-            // What the filter refuses shows no slip either.
-            if health[k] == ChannelHealth::Good {
-                state.newest[k] = Some((reading.value, reading.age_s));
-            }
-        }
+        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s);
+        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s);
+        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             for (health, silent_s) in health.iter_mut().zip(running.silent_s) {
@@ -355,6 +339,27 @@ impl<T: Real> KalmanFilter<T> {
             if self.uncertainty.output_least_rad_s == T::infinity() {
                 health[WHEEL] = ChannelHealth::Unused;
             }
+        }
+        health
+    }
+
+    /// Takes a reading of the speed `K`, if there is one.
+    #[inline]
+    fn take_speed<const K: usize>(&self, state: &mut KalmanState<T>, reading: Option<Reading<T>>) -> ChannelHealth {
+        let Some(reading) = reading else { return ChannelHealth::Absent };
+        let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
+        // One that comes too late, after a newer one, is refused as well.
+        let late = state.newest[K].is_some_and(|(_, age_s)| age_s < reading.age_s);
+        if !(self.limits.speed_valid(reading.value) && aged) || late {
+            return ChannelHealth::Refused;
+        }
+        let health = match &mut state.running {
+            Some(running) => self.correct::<K>(running, reading),
+            None => ChannelHealth::Good,
+        };
+        // What the filter refuses shows no slip either.
+        if health == ChannelHealth::Good {
+            state.newest[K] = Some((reading.value, reading.age_s));
         }
         health
     }
@@ -496,7 +501,15 @@ impl<T: Real> Running<T> {
         for (x, gain) in self.mean.iter_mut().zip(&gain) {
             *x = *x + *gain * innovation;
         }
-        self.past.correct(&gain[N..], innovation);
+        self.past.correct(&gain, innovation);
+    }
+
+    /// Remembers the speeds of now; the oldest are forgotten, and in the covariance those of turbine and output left out if
+    /// it is not to be `whole`.
+    #[inline]
+    fn remember(&mut self, whole: bool) {
+        self.past.remember([self.mean[TURBINE], self.mean[OUTPUT], self.mean[WHEEL]]);
+        self.covariance.remember(whole);
     }
 
     /// Whether mean and covariance are numbers, and no variance is negative.

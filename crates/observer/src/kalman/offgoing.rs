@@ -8,9 +8,6 @@ use super::valve_model::Commands;
 use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
 use crate::{ChannelHealth, InputLimits, LOST_S, Reading};
 
-/// A pressure this near to what the commands end at is there, Pa.
-const SETTLED_PA: f64 = 1.0;
-
 /// The offgoing clutch as the filter knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -46,13 +43,7 @@ impl<T: Real> OffgoingPressure<T> {
         }
         self.commands.pass(dt_s);
         self.settled_pa = offgoing.valve.target_pa(&self.commands, dt_s);
-        // Most of a drive it is full or empty.
-        if (self.settled_pa - self.pressure_pa).abs() < T::of(SETTLED_PA) {
-            self.pressure_pa = limits.possible_pressure(self.settled_pa);
-            return;
-        }
-        let step = offgoing.valve.step(self.settled_pa, self.pressure_pa, dt_s);
-        self.pressure_pa = limits.possible_pressure(step.phi * self.pressure_pa + step.drift_pa);
+        self.pressure_pa = limits.possible_pressure(offgoing.valve.carried_pa(self.settled_pa, self.pressure_pa, dt_s));
     }
 
     /// Takes a command.

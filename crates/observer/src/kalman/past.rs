@@ -2,6 +2,8 @@
 
 use drivetrain::Real;
 
+use super::covariance::{ALL, speed_at};
+
 /// Earlier times that are remembered.
 pub(super) const PASTS: usize = 2;
 /// Turbine, output and wheel.
@@ -38,6 +40,14 @@ pub(super) struct Place<T> {
     pub(super) width_s: T,
     /// How much older it is than the oldest, s.
     pub(super) beyond_s: T,
+}
+
+impl<T> Place<T> {
+    /// Whether it is between now and the newest.
+    #[inline]
+    pub(super) fn is_recent(&self) -> bool {
+        self.between[0] == 0
+    }
 }
 
 impl<T: Real> Past<T> {
@@ -79,12 +89,12 @@ impl<T: Real> Past<T> {
         core::array::from_fn(|n| self.points[n].age_s)
     }
 
-    /// Moves the remembered speeds, in the order of [`super::covariance::speed_at`], by a gain each times an innovation.
+    /// Moves the remembered speeds, in the order of [`speed_at`], by a gain each times an innovation.
     #[inline]
-    pub(super) fn correct(&mut self, gains: &[T], innovation: T) {
-        for (point, gains) in self.points.iter_mut().zip(gains.chunks_exact(SPEEDS)) {
-            for (speed, gain) in point.speeds.iter_mut().zip(gains) {
-                *speed = *speed + *gain * innovation;
+    pub(super) fn correct(&mut self, gains: &[T; ALL], innovation: T) {
+        for (n, point) in self.points.iter_mut().enumerate() {
+            for (k, speed) in point.speeds.iter_mut().enumerate() {
+                *speed = *speed + gains[speed_at(k, n + 1)] * innovation;
             }
         }
     }

@@ -122,17 +122,19 @@ impl<T: Real> Step<T> {
         let implicit = self.implicit(x[SHARE], slope_n_m_s);
         let [t, o] = &self.rows;
         let per = |t: T, o: T| implicit.solve([dt * t, dt * o]);
+        let per_ratio = self.ratio.recip();
         Tangent {
-            dt_s: dt,
-            per_ratio: self.ratio.recip(),
-            stiffness: self.stiffness,
+            per_ratio,
+            half_per_ratio: half * per_ratio,
             damping: self.damping,
             per_inertia: dt / self.inertia,
+            half_per_inertia: half * dt / self.inertia,
             shaft_per_twist: self.shaft_per_twist(),
+            spring_per_twist: self.stiffness * dt,
             per_turbine_torque: per(t.per_turbine_torque, o.per_turbine_torque),
             per_oncoming_torque: per(t.per_oncoming_torque, o.per_oncoming_torque),
             per_offgoing_torque: per(t.per_offgoing_torque, o.per_offgoing_torque),
-            per_output_torque: per(t.per_output_torque, o.per_output_torque),
+            per_shaft_torque: per(t.per_output_torque * per_ratio, o.per_output_torque * per_ratio),
             turbine_per_share: mean_turbine_n_m,
             turbine_per_speed: (one + x[SHARE]) * slope_n_m_s,
             oncoming_per_pressure: self.per_pressure * (one + x[FRICTION]) * self.above_kiss[1],
@@ -149,17 +151,18 @@ impl<T: Real> Step<T> {
 /// A step's derivative, as what it makes of a small change of the states: a change of a torque first, then of the speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tangent<T> {
-    dt_s: T,
     per_ratio: T,
-    stiffness: T,
+    half_per_ratio: T,
     damping: T,
     per_inertia: T,
+    half_per_inertia: T,
     shaft_per_twist: T,
+    spring_per_twist: T,
     /// Changes of turbine and output speed per torque.
     per_turbine_torque: [T; 2],
     per_oncoming_torque: [T; 2],
     per_offgoing_torque: [T; 2],
-    per_output_torque: [T; 2],
+    per_shaft_torque: [T; 2],
     /// Torques per state.
     turbine_per_share: T,
     turbine_per_speed: T,
@@ -178,27 +181,28 @@ impl<T: Real> Tangent<T> {
     /// Changes of the states that have a law at the end, of changes of the states that it depends on.
     #[inline(always)]
     pub(super) fn of(&self, x: &[T; COLUMNS]) -> [T; LAWS] {
-        let half = T::of(0.5);
         let (output, wheel, spring) = (x[OUTPUT], x[WHEEL], x[SPRING]);
-        let twist = output * self.per_ratio - wheel;
-        let middle = wheel + half * self.per_inertia * (spring + self.damping * twist - x[LOAD]);
-        let held = (spring + self.shaft_per_twist * (output * self.per_ratio - middle)) * self.per_ratio;
+        let by_ratio = output * self.per_ratio;
+        let force = spring + self.damping * (by_ratio - wheel) - x[LOAD];
+        // The twist rate with the output speed of the start, and the shaft torque with it.
+        let rate = by_ratio - (wheel + self.half_per_inertia * force);
+        let held = spring + self.shaft_per_twist * rate;
         let turbine_torque = self.turbine_per_share * x[SHARE] + self.turbine_per_speed * x[TURBINE];
         let oncoming = self.oncoming_per_pressure * x[PRESSURE] + self.oncoming_per_friction * x[FRICTION];
         let by = |end: usize| {
             self.per_turbine_torque[end] * turbine_torque
                 + self.per_oncoming_torque[end] * oncoming
                 + self.per_offgoing_torque[end] * x[OFFGOING]
-                + self.per_output_torque[end] * held
+                + self.per_shaft_torque[end] * held
         };
         let (by_turbine, by_output) = (by(0), by(1));
-        let mean_twist = (output + half * by_output) * self.per_ratio - middle;
-        let shaft = spring + self.shaft_per_twist * mean_twist;
+        let mean_rate = rate + self.half_per_ratio * by_output;
+        let shaft = spring + self.shaft_per_twist * mean_rate;
         let mut next = [T::zero(); LAWS];
         next[TURBINE] = x[TURBINE] + by_turbine;
         next[OUTPUT] = output + by_output;
         next[WHEEL] = wheel + self.per_inertia * (shaft - x[LOAD]);
-        next[SPRING] = spring + self.stiffness * self.dt_s * mean_twist;
+        next[SPRING] = spring + self.spring_per_twist * mean_rate;
         next[PRESSURE] = self.phi * x[PRESSURE] + self.per_gain * x[GAIN];
         next
     }
@@ -219,10 +223,10 @@ impl<T: Real> Implicit<T> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn step() -> Step<f64> {
+    pub(in crate::kalman) fn step() -> Step<f64> {
         let row = |a: [f64; 4]| AccelerationRow {
             per_turbine_torque: a[0],
             per_offgoing_torque: a[1],

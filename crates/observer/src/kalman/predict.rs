@@ -11,7 +11,7 @@ use super::{
     DELAY, FIRST_S, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE, Running,
     SCALE, SHARE, SKEW, SPRING, TURBINE, WHEEL,
 };
-use crate::Phase;
+use crate::{LOST_S, Phase};
 
 /// Innovation beyond which a reading is refused, in its deviations.
 const GATE: u8 = 4;
@@ -59,31 +59,9 @@ impl<T: Real> KalmanFilter<T> {
         mean[PRESSURE] = state.valve_pa;
         mean[OFFGOING] = offgoing;
         mean[LOAD] = load;
-        let [least, most] = u.wheel_delay_s;
-        let mut deviations = [zero; N];
-        for k in [TURBINE, OUTPUT] {
-            // In a shift, or on a hill, the acceleration is another one.
-            let old = (ages[k] + u.skew_s) * accelerations[k];
-            deviations[k] = hypot(self.readings[k].deviation_rad_s, old);
-        }
-        // Out of balance the shafts swing, at the start of a log as much as the torque itself.
-        deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
-        deviations[SPRING] = at_start(SHAFT_START, shaft);
-        deviations[PRESSURE] = self.first_pressure_deviation(acting, state.valve_pa);
-        deviations[SHARE] = u.turbine_share;
-        deviations[OFFGOING] = at_start(OFFGOING_START, offgoing);
-        deviations[LOAD] = at_start(LOAD_START, shaft);
-        deviations[FRICTION] = u.friction;
-        deviations[GAIN] = u.valve_gain;
-        deviations[SCALE] = u.wheel_scale;
-        // A uniform distribution between its limits, about zero.
-        deviations[DELAY] = ((most * most * most - least * least * least) / (T::of(3.0) * (most - least))).sqrt();
-        deviations[SKEW] = u.skew_s / T::of(3.0).sqrt();
-        let mut covariance = Covariance::of(deviations);
-        // An error of the turbine torque is one of the shaft torque in balance with it.
-        let shared = u.turbine_share * u.turbine_share * shaft;
-        covariance.set(SPRING, SHARE, shared);
-        covariance.add(SPRING, shared * shaft);
+        // In a shift, or on a hill, the acceleration is another one.
+        let old = [TURBINE, OUTPUT].map(|k| (ages[k] + u.skew_s) * accelerations[k]);
+        let mut covariance = self.first_covariance(&mean, old, acting);
         if let Some((learnt, block)) = &state.learnt {
             for (a, i) in LEARNT.into_iter().enumerate() {
                 mean[i] = learnt[a];
@@ -99,6 +77,7 @@ impl<T: Real> KalmanFilter<T> {
             mean,
             covariance,
             past,
+            late_s: zero,
             motion_pa_s: zero,
             acting,
             direction: direction(model.shift.oncoming_slip(turbine, output)),
@@ -108,6 +87,35 @@ impl<T: Real> KalmanFilter<T> {
             silent_s: [zero; 3],
             squared_innovations: [None; 3],
         })
+    }
+
+    /// The first covariance; the readings of turbine and output speed are old by this, rad/s.
+    fn first_covariance(&self, mean: &[T; N], old_rad_s: [T; 2], acting: Phase) -> Covariance<T> {
+        let (u, shaft) = (&self.uncertainty, mean[SPRING]);
+        let mut deviations = [T::zero(); N];
+        for k in [TURBINE, OUTPUT] {
+            deviations[k] = hypot(self.readings[k].deviation_rad_s, old_rad_s[k]);
+        }
+        // Out of balance the shafts swing, at the start of a log as much as the torque itself.
+        deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
+        deviations[SPRING] = at_start(SHAFT_START, shaft);
+        deviations[PRESSURE] = self.first_pressure_deviation(acting, mean[PRESSURE]);
+        deviations[SHARE] = u.turbine_share;
+        deviations[OFFGOING] = at_start(OFFGOING_START, mean[OFFGOING]);
+        deviations[LOAD] = at_start(LOAD_START, shaft);
+        deviations[FRICTION] = u.friction;
+        deviations[GAIN] = u.valve_gain;
+        deviations[SCALE] = u.wheel_scale;
+        // A uniform distribution between its limits, about zero.
+        let [least, most] = u.wheel_delay_s;
+        deviations[DELAY] = ((most * most * most - least * least * least) / (T::of(3.0) * (most - least))).sqrt();
+        deviations[SKEW] = u.skew_s / T::of(3.0).sqrt();
+        let mut covariance = Covariance::of(deviations);
+        // An error of the turbine torque is one of the shaft torque in balance with it.
+        let shared = u.turbine_share * u.turbine_share * shaft;
+        covariance.set(SPRING, SHARE, shared);
+        covariance.add(SPRING, shared * shaft);
+        covariance
     }
 
     /// Torque by which the offgoing clutch holds the gear before the shift, N m.
@@ -134,28 +142,37 @@ impl<T: Real> KalmanFilter<T> {
             let rate = shift.oncoming_slip(turbine, output);
             let until_s = -slip / rate;
             if until_s > T::zero() && until_s < dt_s {
-                self.advance(running, engine, settled_pa, until_s, dt_s - until_s);
+                self.advance(running, engine, settled_pa, [until_s, dt_s - until_s], false);
                 running.acting = Phase::AfterShift;
-                self.advance(running, engine, settled_pa, dt_s - until_s, T::zero());
+                self.advance(running, engine, settled_pa, [dt_s - until_s, T::zero()], true);
                 return;
             }
         }
-        self.advance(running, engine, settled_pa, dt_s, T::zero());
+        self.advance(running, engine, settled_pa, [dt_s, T::zero()], false);
     }
 
-    /// A step in one phase, that ends `left_s` before now.
+    /// A step in one phase, that ends `left_s` before now; `second` if it is not the first of its time step.
     #[inline]
-    fn advance(&self, running: &mut Running<T>, engine: &Engine<T>, settled_pa: T, dt_s: T, left_s: T) {
-        if running.past.is_due() {
-            running.past.remember([running.mean[TURBINE], running.mean[OUTPUT], running.mean[WHEEL]]);
-            running.covariance.remember();
+    fn advance(
+        &self,
+        running: &mut Running<T>,
+        engine: &Engine<T>,
+        settled_pa: T,
+        [dt_s, left_s]: [T; 2],
+        second: bool,
+    ) {
+        let remembered = running.past.is_due();
+        if remembered {
+            // The readings of this time step may be older than its second half.
+            running.remember(second || running.late_s < T::of(LOST_S));
         }
         let x = running.mean;
         let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
         running.mean = step.propagate(&x);
-        running.covariance.spread(&step.tangent(&x, &running.mean));
+        running.covariance.spread(&step.tangent(&x, &running.mean), remembered);
         self.add_noise(running, engine, &step, &x, settled_pa);
         running.past.pass(dt_s);
+        running.late_s = running.late_s + dt_s;
         for silent_s in &mut running.silent_s {
             *silent_s = *silent_s + dt_s;
         }

@@ -2,10 +2,10 @@
 
 use drivetrain::Real;
 
-use super::covariance::{ALL, CONSIDERED, Measured, speed_at};
+use super::covariance::{ALL, CONSIDERED, Covariance, Measured, speed_at};
 use super::gate::Verdict;
-use super::past::{PASTS, Place, SPEEDS};
-use super::{DELAY, FRICTION, GAIN, KalmanFilter, N, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
+use super::past::{PASTS, Place};
+use super::{DELAY, FRICTION, GAIN, KalmanFilter, OUTPUT, Running, SCALE, SHARE, SKEW, TURBINE, WHEEL};
 use crate::{ChannelHealth, Phase, Reading};
 
 /// Standard deviation of a uniform distribution, in its width.
@@ -25,76 +25,65 @@ struct Line<T> {
 }
 
 impl<T: Real> KalmanFilter<T> {
-    /// Takes a reading of the speed `k`.
+    /// How old a reading of the speed `K` is, s, and the size of the speed, by which the time from tooth to tooth is found.
     #[inline]
-    pub(super) fn correct(&self, running: &mut Running<T>, k: usize, reading: Reading<T>) -> ChannelHealth {
-        let (zero, one, sensor) = (T::zero(), T::one(), &self.readings[k]);
-        let skew = running.mean[SKEW];
+    fn age_s<const K: usize>(&self, running: &Running<T>, reading: Reading<T>) -> (T, T) {
+        let (zero, sensor) = (T::zero(), &self.readings[K]);
         // The earlier one of turbine and output has no delay.
-        let (late_turbine, late_output) = ((-skew).at_least(zero), skew.at_least(zero));
-        let learnt_s = match k {
-            TURBINE => late_turbine,
-            OUTPUT => late_output,
-            _ => running.mean[DELAY] + late_turbine,
+        let skew = running.mean[SKEW];
+        let learnt_s = match K {
+            TURBINE => (-skew).at_least(zero),
+            OUTPUT => skew.at_least(zero),
+            _ => running.mean[DELAY] + (-skew).at_least(zero),
         };
-        let slowest = self.uncertainty.output_least_rad_s * if k == WHEEL { self.wheel_per_output() } else { one };
-        let size = reading.value.abs().at_least(slowest);
-        let age_s = (reading.age_s + sensor.delay_s + sensor.lag_rad / size + learnt_s).at_least(zero);
-        let line = self.line(running, k, age_s, size);
-        let scale = if k == WHEEL { one + running.mean[SCALE] } else { one };
-        let by_delay = scale * line.per_age;
-        let mut by = [zero; 3];
-        // By scale, wheel delay, skew.
-        if k == WHEEL {
-            by[0] = line.value;
-            by[1] = by_delay;
+        let per_output = if K == WHEEL { self.model.rigid.driveline.final_ratio.recip() } else { T::one() };
+        let size = reading.value.abs().at_least(self.uncertainty.output_least_rad_s * per_output);
+        ((reading.age_s + sensor.delay_s + sensor.lag_rad / size + learnt_s).at_least(zero), size)
+    }
+
+    /// Takes a reading of the speed `K`.
+    #[inline]
+    pub(super) fn correct<const K: usize>(&self, running: &mut Running<T>, reading: Reading<T>) -> ChannelHealth {
+        let (zero, one, sensor) = (T::zero(), T::one(), &self.readings[K]);
+        let (age_s, size_rad_s) = self.age_s::<K>(running, reading);
+        let line = self.line::<K>(running, age_s, size_rad_s);
+        if K != WHEEL && !line.place.is_recent() {
+            running.late_s = zero;
         }
-        by[2] = match k {
-            OUTPUT if skew >= zero => by_delay,
-            OUTPUT => zero,
-            _ if skew < zero => -by_delay,
-            _ => zero,
-        };
+        let scale = if K == WHEEL { one + running.mean[SCALE] } else { one };
         // Readings that come more often than teeth tell no more than the teeth do.
-        let since_s = core::mem::replace(&mut running.silent_s[k], zero);
-        let repeated = if since_s > zero { (sensor.pitch_rad / (size * since_s)).at_least(one) } else { one };
+        let since_s = core::mem::replace(&mut running.silent_s[K], zero);
+        let repeated = if since_s > zero { (sensor.pitch_rad / (size_rad_s * since_s)).at_least(one) } else { one };
         let noise = repeated * (sensor.deviation_rad_s * sensor.deviation_rad_s + line.variance);
         let innovation = reading.value - scale * line.value;
-        let place = Place { shares: line.place.shares.map(|share| scale * share), ..line.place };
-        let with = with_reading(running, k, &place, by);
-        let variance = variance_of(&with, k, &place, by, noise);
-        match running.gates[k].judge(innovation, variance) {
+        let parts = Parts {
+            place: Place { shares: line.place.shares.map(|share| scale * share), ..line.place },
+            learnt: by_learnt::<T, K>(running.mean[SKEW], line.value, scale * line.per_age),
+        };
+        let points = parts.place.points::<K>(&running.covariance);
+        let mut with = parts.with::<K>(&running.covariance, points);
+        let mut variance = parts.variance(&with, points, noise);
+        match running.gates[K].judge(innovation, variance) {
             Verdict::Refused => {
-                running.silent_s[k] = since_s;
+                running.silent_s[K] = since_s;
                 return ChannelHealth::Refused;
             }
             Verdict::Jumped => {
-                running.covariance.add(k, innovation * innovation);
-                let with = with_reading_again(running, k, &place, by);
-                let variance = variance_of(&with, k, &place, by, noise);
-                self.take(running, k, &Measured { with: &with, variance }, innovation, since_s);
+                running.covariance.add(K, innovation * innovation);
+                with = parts.with_any(&running.covariance, points);
+                variance = parts.variance(&with, points, noise);
             }
-            Verdict::Taken => self.take(running, k, &Measured { with: &with, variance }, innovation, since_s),
+            Verdict::Taken => {}
         }
+        running.squared_innovations[K] = Some(innovation * innovation / variance);
+        self.apply(running, &Measured { with: &with, variance }, innovation, since_s);
         ChannelHealth::Good
     }
 
-    /// Corrects for a reading of the speed `k`.
+    /// The speed `K` an age ago.
     #[inline]
-    fn take(&self, running: &mut Running<T>, k: usize, measured: &Measured<'_, T>, innovation: T, since_s: T) {
-        running.squared_innovations[k] = Some(innovation * innovation / measured.variance);
-        self.apply(running, measured, innovation, since_s);
-    }
-
-    #[inline]
-    fn wheel_per_output(&self) -> T {
-        self.model.rigid.driveline.final_ratio.recip()
-    }
-
-    /// The speed `k` an age ago.
-    #[inline]
-    fn line(&self, running: &Running<T>, k: usize, age_s: T, size_rad_s: T) -> Line<T> {
-        let square = |x: T| x * x;
+    fn line<const K: usize>(&self, running: &Running<T>, age_s: T, size_rad_s: T) -> Line<T> {
+        let (k, square) = (K, |x: T| x * x);
         let (past, now) = (&running.past, running.mean[k]);
         let place = past.place(age_s);
         let [late, early] = place.between.map(|point| past.speed(k, now, point));
@@ -106,7 +95,8 @@ impl<T: Real> KalmanFilter<T> {
         let mut variance = square(bend_s * (newest - before)) + square(T::of(UNIFORM) * pitch_s * acceleration);
         if place.beyond_s > T::zero() && place.width_s > T::zero() {
             // The acceleration of before is carried on, as well as it is known.
-            variance = variance + square(place.beyond_s / place.width_s) * variance_between(running, k, place.between);
+            let points = place.points::<K>(&running.covariance);
+            variance = variance + square(place.beyond_s / place.width_s) * variance_between(running, points);
         }
         if k == WHEEL {
             let u = &self.uncertainty;
@@ -165,44 +155,81 @@ impl<T: Real> KalmanFilter<T> {
 
 /// Variance of the change of a speed between two points in time.
 #[inline]
-fn variance_between<T: Real>(running: &Running<T>, k: usize, points: [usize; 2]) -> T {
-    let [late, early] = points.map(|point| speed_at(k, point));
+fn variance_between<T: Real>(running: &Running<T>, [late, early]: [usize; 2]) -> T {
     let p = &running.covariance;
     (p.at(late, late) - T::of(2.0) * p.at(late, early) + p.at(early, early)).at_least(T::zero())
 }
 
-/// The covariance of all with a reading of the speed `k` at a place in time, which also depends on scale, wheel delay and
-/// skew as `by` says.
+/// What the speed `K` in a reading, of this value and with this derivative by its delay, depends on beside the speeds: scale,
+/// wheel delay and skew.
 #[inline(always)]
-fn with_reading<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3]) -> [T; ALL] {
-    const { assert!(PASTS == 2, "a reading is between now and the newer of the past, or between both") };
-    let (p, recent) = (&running.covariance, place.between[0] == 0);
-    let [late, early] = place.shares;
-    let wheel = [late, early, by[0], by[1]];
-    let mut with = match (k, recent) {
-        (TURBINE, true) => p.sum_of::<TURBINE, { N + TURBINE }>(place.shares),
-        (TURBINE, false) => p.sum_of::<{ N + TURBINE }, { N + SPEEDS + TURBINE }>(place.shares),
-        (OUTPUT, true) => p.sum_of::<OUTPUT, { N + OUTPUT }>(place.shares),
-        (OUTPUT, false) => p.sum_of::<{ N + OUTPUT }, { N + SPEEDS + OUTPUT }>(place.shares),
-        (_, true) => p.sum_of_four::<WHEEL, { N + WHEEL }, SCALE, DELAY>(wheel),
-        (_, false) => p.sum_of_four::<{ N + WHEEL }, { N + SPEEDS + WHEEL }, SCALE, DELAY>(wheel),
+fn by_learnt<T: Real, const K: usize>(skew_s: T, value: T, by_delay: T) -> [T; 3] {
+    let zero = T::zero();
+    let by_skew = match K {
+        OUTPUT if skew_s >= zero => by_delay,
+        TURBINE | WHEEL if skew_s < zero => -by_delay,
+        _ => zero,
     };
-    p.add_row::<SKEW>(&mut with, by[2]);
-    with
+    if K == WHEEL { [value, by_delay, by_skew] } else { [zero, zero, by_skew] }
 }
 
-/// The same after the speed has jumped, which is rare.
-#[cold]
-#[inline(never)]
-fn with_reading_again<T: Real>(running: &Running<T>, k: usize, place: &Place<T>, by: [T; 3]) -> [T; ALL] {
-    with_reading(running, k, place, by)
+/// The parts of a reading: the speeds around its place in time, and scale, wheel delay and skew, each with its factor.
+struct Parts<T> {
+    place: Place<T>,
+    learnt: [T; 3],
 }
 
-/// The variance of that reading.
-#[inline]
-fn variance_of<T: Real>(with: &[T; ALL], k: usize, place: &Place<T>, by: [T; 3], noise: T) -> T {
-    let [late, early] = place.between.map(|point| with[speed_at(k, point)]);
-    let by_speed = place.shares[0] * late + place.shares[1] * early;
-    let total = by_speed + by[0] * with[SCALE] + by[1] * with[DELAY] + by[2] * with[SKEW];
-    noise + total.at_least(T::zero())
+impl<T: Real> Place<T> {
+    /// The places of the speed `K` around it in the covariance. For a time that is left out there the speed now stands in.
+    #[inline]
+    fn points<const K: usize>(&self, p: &Covariance<T>) -> [usize; 2] {
+        match self.is_recent() {
+            true => [K, speed_at(K, 1)],
+            false if p.keeps(K, 2) => [speed_at(K, 1), speed_at(K, 2)],
+            false => [K; 2],
+        }
+    }
+}
+
+impl<T: Real> Parts<T> {
+    /// The covariance of all with a reading of the speed `K`.
+    #[inline(always)]
+    fn with<const K: usize>(&self, p: &Covariance<T>, points: [usize; 2]) -> [T; ALL] {
+        const { assert!(PASTS == 2, "a reading is between now and the newer of the past, or between both") };
+        let ([scale, delay, skew], [late, early]) = (self.learnt, self.place.shares);
+        let wheel = [late, early, scale, delay];
+        let recent = points == [K, speed_at(K, 1)];
+        if !recent && points != [speed_at(K, 1), speed_at(K, 2)] {
+            return self.with_any(p, points);
+        }
+        let mut with = match (K, recent) {
+            (TURBINE, true) => p.sum_of::<TURBINE, { speed_at(TURBINE, 1) }>([late, early]),
+            (TURBINE, false) => p.sum_of::<{ speed_at(TURBINE, 1) }, { speed_at(TURBINE, 2) }>([late, early]),
+            (OUTPUT, true) => p.sum_of::<OUTPUT, { speed_at(OUTPUT, 1) }>([late, early]),
+            (OUTPUT, false) => p.sum_of::<{ speed_at(OUTPUT, 1) }, { speed_at(OUTPUT, 2) }>([late, early]),
+            (_, true) => p.sum_of_four::<WHEEL, { speed_at(WHEEL, 1) }, SCALE, DELAY>(wheel),
+            (_, false) => p.sum_of_four::<{ speed_at(WHEEL, 1) }, { speed_at(WHEEL, 2) }, SCALE, DELAY>(wheel),
+        };
+        p.add_row::<SKEW>(&mut with, skew);
+        with
+    }
+
+    /// The same of a speed at any of the points.
+    #[inline(never)]
+    fn with_any(&self, p: &Covariance<T>, points: [usize; 2]) -> [T; ALL] {
+        let ([scale, delay, skew], [late, early]) = (self.learnt, self.place.shares);
+        core::array::from_fn(|i| {
+            let by_learnt = scale * p.at(i, SCALE) + delay * p.at(i, DELAY) + skew * p.at(i, SKEW);
+            late * p.at(i, points[0]) + early * p.at(i, points[1]) + by_learnt
+        })
+    }
+
+    /// The variance of that reading.
+    #[inline]
+    fn variance(&self, with: &[T; ALL], points: [usize; 2], noise: T) -> T {
+        let ([scale, delay, skew], [late, early]) = (self.learnt, self.place.shares);
+        let [at_late, at_early] = points.map(|point| with[point.min(ALL - 1)]);
+        let by_learnt = scale * with[SCALE] + delay * with[DELAY] + skew * with[SKEW];
+        noise + (late * at_late + early * at_early + by_learnt).at_least(T::zero())
+    }
 }

@@ -5,6 +5,9 @@ use drivetrain::{ClutchValve, Real, ValveStep};
 /// Commands that are remembered: enough for a delay of 30 ms at a sample time of 1 ms.
 const REMEMBERED: usize = 32;
 
+/// A pressure this near to what the commands end at is there, Pa.
+const SETTLED_PA: f64 = 1.0;
+
 /// The valve model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -85,9 +88,9 @@ impl<T: Real> Commands<T> {
         }
         // At a time `x` ago the newest command was in effect that is older than `x` and the delay.
         let (newest, oldest) = (delay_s, delay_s + dt_s);
-        let first = self.sent.iter().take(self.count).find(|sent| sent.age_s >= newest);
-        let earliest = self.sent.iter().take(self.count).last()?;
+        let earliest = self.sent.get(self.count.checked_sub(1)?)?;
         if dt_s <= T::zero() {
+            let first = self.sent.iter().take(self.count).find(|sent| sent.age_s >= newest);
             return Some(first.unwrap_or(earliest).settled_pa);
         }
         let (mut until, mut sum) = (newest, T::zero());
@@ -114,6 +117,17 @@ impl<T: Real> ValveModel<T> {
     #[inline]
     pub(crate) fn needed_s(&self, dt_s: T) -> T {
         self.delay_s + dt_s
+    }
+
+    /// The pressure `dt_s` after it was `pressure_pa`, under commands that end at `settled_pa`, Pa.
+    #[inline]
+    pub(crate) fn carried_pa(&self, settled_pa: T, pressure_pa: T, dt_s: T) -> T {
+        // Most of a drive a clutch is full or empty.
+        if (settled_pa - pressure_pa).abs() < T::of(SETTLED_PA) {
+            return settled_pa;
+        }
+        let step = self.step(settled_pa, pressure_pa, dt_s);
+        step.phi * pressure_pa + step.drift_pa
     }
 
     /// The valve over `dt_s` on its way from `pressure_pa` to `settled_pa`.

@@ -6,29 +6,17 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "a benchmark")]
 
+#[path = "../counts/mod.rs"]
+mod counts;
 mod drive;
 mod paths;
 #[path = "../shared/mod.rs"]
 mod shared;
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::path::Path;
 use std::process::{Command, ExitCode};
 
-use serde::Deserialize;
-
+use counts::Counts;
 use paths::{HotPath, PATHS};
-
-/// Growth of a count beyond which the comparison fails.
-const TOLERANCE: f64 = 0.05;
-
-/// The counts of a toolchain.
-#[derive(Deserialize)]
-struct Counts {
-    toolchain: String,
-    instructions: BTreeMap<String, u64>,
-}
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -59,53 +47,13 @@ fn counted(job: &mut dyn FnMut()) {
 }
 
 fn check(write: bool) -> Result<bool, String> {
-    let file = shared::root().join("crates/study/benches/instructions.toml");
-    let toolchain = toolchain()?;
-    let known = (!write).then(|| read(&file)).transpose()?;
-    let same = known.as_ref().is_none_or(|known| known.toolchain == toolchain);
-    let mut grown = Vec::new();
-    let mut counts = BTreeMap::new();
+    let mut counts = Counts::new("instructions", toolchain()?, write)?;
     for path in PATHS {
         let count = count(path)?;
-        let before = known.as_ref().and_then(|known| known.instructions.get(path.name));
-        let change = before.map(|&before| count as f64 / before as f64 - 1.0);
-        let beside = change.map_or_else(String::new, |change| format!("{:+9.2} %", 100.0 * change));
-        println!("{count:>12} {beside:>12}  {}", path.name);
-        if known.is_some() && change.is_none_or(|change| change > TOLERANCE) {
-            grown.push(path.name);
-        }
-        counts.insert(path.name, count);
+        let change = counts.take(path.name, count);
+        println!("{count:>12} {change:>12}  {}", path.name);
     }
-    if write {
-        return std::fs::write(&file, text(&toolchain, &counts)).map(|()| true).map_err(|error| error.to_string());
-    }
-    if !same {
-        let of_file = known.map_or_else(String::new, |known| known.toolchain);
-        println!("not compared: the counts are of\n  {of_file}\nand this is\n  {toolchain}\n{RENEW}");
-        return Ok(true);
-    }
-    if !grown.is_empty() {
-        println!("more than {:.0} % above the file, or not in it: {}\n{RENEW}", 100.0 * TOLERANCE, grown.join(", "));
-    }
-    Ok(grown.is_empty())
-}
-
-const RENEW: &str = "to renew the file: cargo bench -p study --bench instructions -- --write";
-
-fn read(file: &Path) -> Result<Counts, String> {
-    let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}\n{RENEW}", file.display()))?;
-    toml::from_str(&text).map_err(|error| format!("{}: {error}\n{RENEW}", file.display()))
-}
-
-fn text(toolchain: &str, counts: &BTreeMap<&str, u64>) -> String {
-    let mut text = format!(
-        "# Instructions of the hot paths, see `benches/instructions/main.rs`; do not edit.\n\
-         toolchain = {toolchain:?}\n\n[instructions]\n"
-    );
-    for (name, count) in counts {
-        let _ = writeln!(text, "{name:?} = {count}");
-    }
-    text
+    counts.conclude()
 }
 
 /// Compiler, C library and Valgrind: all that the counts depend on beside the program.
