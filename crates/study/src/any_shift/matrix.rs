@@ -94,10 +94,11 @@ impl MatrixShift {
         }
     }
 
-    /// Seed of the sensors' noise of a draw: another in each shift. Shifts that share their noise err alike, and a mean over
-    /// them is less certain than their number says.
+    /// Seed of the sensors' noise of a draw: another in each shift of each gearbox. Shifts that share their noise err alike, and
+    /// a mean over them is less certain than their number says.
     pub fn noise(&self, draw: u64) -> u64 {
-        mixed(mixed(draw, mixed(self.from as u64, self.to as u64)), u64::from(self.throttle() > 0.0))
+        let of_shift = [self.gain.to_bits(), self.from as u64, self.to as u64, u64::from(self.throttle() > 0.0)];
+        of_shift.into_iter().fold(draw, mixed)
     }
 }
 
