@@ -7,6 +7,7 @@
 pub mod campaign;
 pub mod channels;
 pub mod drive;
+pub mod influence;
 pub mod logged;
 pub mod matrix;
 pub mod measured;

@@ -308,9 +308,6 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
             ))?;
         }
     }
-    if !car.defaults_taken.is_empty() {
-        output::line(&format!("left out, as in vehicles/eight_speed.toml: {}", car.defaults_taken.join(", ")))?;
-    }
     Ok(())
 }
 

@@ -16,6 +16,15 @@ use raw::{RawHead, RawRatios, RawShares, RawStickDiagram};
 const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements), \"shares\" (ratios and holding torques) and \
                       \"ratios\" (ratios alone)";
 
+/// The gearbox files of the program, each by its name, for the gasoline engine of `vehicles/eight_speed.toml`.
+pub const SHIPPED: [(&str, &str); 5] = [
+    ("8hp", include_str!("../../../../gearboxes/8hp.toml")),
+    ("10_speed", include_str!("../../../../gearboxes/10_speed.toml")),
+    ("dual_clutch_7", include_str!("../../../../gearboxes/dual_clutch_7.toml")),
+    ("lepelletier_6", include_str!("../../../../gearboxes/lepelletier_6.toml")),
+    ("ravigneaux_4", include_str!("../../../../gearboxes/ravigneaux_4.toml")),
+];
+
 /// A checked gearbox file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GearboxFile {

@@ -1,6 +1,7 @@
 //! Vehicle files with a whole gearbox: a car that shifts through all of its gears.
 //!
-//! The gearbox is a file of its own. What a vehicle file leaves out it takes from `vehicles/eight_speed.toml`, key by key.
+//! The gearbox is a file of its own. What a vehicle file leaves out it takes from `vehicles/eight_speed.toml`, key by key; scaled to
+//! the size of the car, if the file has `engine.max_torque_n_m`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +13,11 @@ use toml::Spanned;
 
 use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
-use super::{HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre, valves};
+use super::short::{car_defaults, car_defaults_taken};
+use super::{
+    DefaultTaken, HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre,
+    valves,
+};
 use crate::check::{Check, Number, Word};
 use crate::source::Layers;
 use crate::{ConfigError, GearboxFile, Source};
@@ -20,10 +25,6 @@ use crate::{ConfigError, GearboxFile, Source};
 /// What a vehicle file leaves out.
 const DEFAULTS: (&str, &str) = ("vehicles/eight_speed.toml", include_str!("../../../../vehicles/eight_speed.toml"));
 const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../gearboxes/8hp.toml"));
-
-/// Tables and keys that a vehicle file may leave out.
-const OPTIONAL: [&str; 10] =
-    ["launch", "engine", "converter", "hydraulics", "friction", "valve", "driveline", "tyre", "vehicle", "oil"];
 
 /// The lock-up clutch of the converter, and when it is closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,8 +72,8 @@ pub struct Car {
     pub road: RoadLoad<f64>,
     /// Temperature of the oil, degC.
     pub oil_temperature_degc: f64,
-    /// Tables that the file leaves out, so that they are those of `vehicles/eight_speed.toml`.
-    pub defaults_taken: Vec<&'static str>,
+    /// What the file leaves out, so that it is as in `vehicles/eight_speed.toml`, scaled if the file has `engine.max_torque_n_m`.
+    pub defaults_taken: Vec<DefaultTaken>,
 }
 
 impl Car {
@@ -111,11 +112,10 @@ impl Car {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_sources(source: Source, gearbox: Source) -> Result<Self, ConfigError> {
-        let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
-        let given: toml::Table = source.parse()?;
+        let mut gearbox = GearboxFile::from_source(gearbox)?.gearbox;
+        let defaults = car_defaults(&source, Source::built_in(DEFAULTS.0, DEFAULTS.1), &gearbox)?;
         let raw: RawCar = Layers { source: &defaults, over: Some(&source) }.parse()?;
         let check = Check { layers: Layers { source: &defaults, over: Some(&source) } };
-        let mut gearbox = GearboxFile::from_source(gearbox)?.gearbox;
         let at = raw.gearbox.span().start;
         if gearbox.train.is_none() {
             let message = format!("\"{}\" has no stick diagram", raw.gearbox.get_ref());
@@ -135,13 +135,7 @@ impl Car {
             name: check.title("name", &raw.name)?,
             clutches,
             line_pressure_pa,
-            engine: match &raw.engine.max_torque_n_m {
-                None => engine(&check, &raw.engine)?,
-                Some(value) => {
-                    let message = "is for vehicle files with `gear_train.ratios`".to_owned();
-                    return Err(check.meaning("engine.max_torque_n_m", value.span().start, message, None));
-                }
-            },
+            engine: engine(&check, &raw.engine)?,
             converter: match raw.launch {
                 RawLaunch::Converter => Some(converter(&check, &raw.converter)?),
                 RawLaunch::Clutch => None,
@@ -157,11 +151,7 @@ impl Car {
             tyre: tyre(&check, &raw.tyre)?,
             road: road(&check, &raw.vehicle)?,
             oil_temperature_degc,
-            defaults_taken: OPTIONAL
-                .into_iter()
-                .filter(|key| !given.contains_key(*key))
-                .filter(|&key| key != "converter" || matches!(raw.launch, RawLaunch::Converter))
-                .collect(),
+            defaults_taken: car_defaults_taken(&source, &defaults, matches!(raw.launch, RawLaunch::Converter))?,
             source,
         })
     }
