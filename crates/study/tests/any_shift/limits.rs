@@ -53,10 +53,10 @@ const LITTLE: f64 = 0.005;
 const EXACT_RAD_S: [f64; 3] = [0.01, 0.01, 0.002];
 
 impl Without {
-    /// The car without the error.
-    fn car(self, truth: &Car) -> Car {
+    /// The car without the error, if it is one of the car.
+    fn car(self, truth: &Car) -> Option<Car> {
         let [least_s, most_s] = ShiftErrors::STANDARD.valve_delay_s;
-        let mut car = truth.clone();
+        let mut car = [Self::Drag, Self::Delay].contains(&self).then(|| truth.clone())?;
         for clutch in car.clutches.iter_mut().flatten() {
             match (self, &mut clutch.valve) {
                 (Self::Drag, _) => clutch.drag_n_m = 0.0,
@@ -66,7 +66,7 @@ impl Without {
                 _ => {}
             }
         }
-        car
+        Some(car)
     }
 
     /// The car that the filter knows, and what it does not know.
@@ -110,18 +110,15 @@ impl Without {
         }
     }
 
-    /// Rows of a shift, beside the valve models of a filter that is told nothing.
-    fn rows(self, known: &Car, shift: &MatrixShift, draw: u64) -> Vec<ShiftScoreRow> {
-        let truth = self.car(&drawn_car(known, shift.from, shift.to, draw));
-        let usual = CarShift::usual(known, shift.from, shift.to, shift.throttle());
-        let samples = simulated(known, &truth, &usual).unwrap();
+    /// Rows of a recorded shift of the car that truly is `truth`, beside the valve models of a filter that is told nothing.
+    fn rows(self, [known, truth]: [&Car; 2], samples: &[CarSample], noise: u64) -> Vec<ShiftScoreRow> {
         let seen = sensors();
-        let read = |sensors: &Sensors, tables: &_| inputs(known, tables, &samples, sensors, shift.noise(draw));
+        let read = |sensors: &Sensors, tables: &_| inputs(known, tables, samples, sensors, noise);
         let standard = ShiftErrors::STANDARD;
         let tables = ShiftTables::of_car(known, &standard).unwrap();
         let filter = any_shift_filter(known, &tables, &standard, Some(&seen));
-        let untold = score_samples(&tables, &filter, &samples, &read(&seen, &tables));
-        let (car, errors) = self.known(known, &truth);
+        let untold = score_samples(&tables, &filter, samples, &read(&seen, &tables));
+        let (car, errors) = self.known(known, truth);
         let tables = ShiftTables::of_car(&car, &errors).unwrap();
         let mut filter = any_shift_filter(&car, &tables, &errors, Some(&seen));
         let mut inputs = read(&self.sensors(&seen), &tables);
@@ -140,7 +137,7 @@ impl Without {
         if self != Self::TurbineTorque || filter.turbine.converter.take().is_some() {
             inputs.iter_mut().for_each(|(at, input)| self.tell(input, &samples[*at]));
         }
-        let mut rows = score_samples(&tables, &filter, &samples, &inputs);
+        let mut rows = score_samples(&tables, &filter, samples, &inputs);
         for (row, untold) in rows.iter_mut().zip(&untold) {
             assert_eq!(row.time_s, untold.time_s);
             for (clutch, untold) in row.clutches.iter_mut().zip(&untold.clutches) {
@@ -149,26 +146,37 @@ impl Without {
         }
         rows
     }
+}
 
-    /// All shifts of all cars.
-    fn matrix(self, cars: &[Car], draws: u64) -> Vec<MatrixRow> {
-        let mut all = Vec::new();
-        for car in cars {
-            let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
-            all.extend(neighbouring_shifts(car, &tables).0.into_iter().map(|shift| {
-                let (errors, none) = (ErrorsByPhase::default(), MatrixCounts::default());
-                let mut sum = MatrixRow { shift, errors, counts: none, failure: None };
-                for draw in 1..=draws {
-                    let rows = self.rows(car, &shift, draw);
-                    let errors = errors_by_phase(&rows, shift.kind);
-                    sum.counts.add(&counts(&rows, &errors));
-                    sum.errors.iter_mut().flatten().zip(errors.iter().flatten()).for_each(|(sum, more)| sum.add(more));
-                }
-                sum
-            }));
+/// The runs of one shift, a row for each error.
+fn runs(known: &Car, shift: MatrixShift, draws: u64) -> Vec<MatrixRow> {
+    let row = MatrixRow { shift, errors: ErrorsByPhase::default(), counts: MatrixCounts::default(), failure: None };
+    let mut sums = vec![row; ALL.len()];
+    let usual = CarShift::usual(known, shift.from, shift.to, shift.throttle());
+    for draw in 1..=draws {
+        let truth = drawn_car(known, shift.from, shift.to, draw);
+        let as_is = simulated(known, &truth, &usual).unwrap();
+        for (sum, (without, _)) in sums.iter_mut().zip(ALL) {
+            let other = without.car(&truth).map(|car| simulated(known, &car, &usual).unwrap());
+            let rows = without.rows([known, &truth], other.as_deref().unwrap_or(&as_is), shift.noise(draw));
+            let errors = errors_by_phase(&rows, shift.kind);
+            sum.counts.add(&counts(&rows, &errors));
+            sum.errors.iter_mut().flatten().zip(errors.iter().flatten()).for_each(|(sum, more)| sum.add(more));
         }
-        all
     }
+    sums
+}
+
+/// All shifts of these cars, a column for each error.
+fn columns(cars: &[Car], draws: u64) -> Vec<Vec<MatrixRow>> {
+    let mut columns = vec![Vec::new(); ALL.len()];
+    for car in cars {
+        let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
+        for shift in neighbouring_shifts(car, &tables).0 {
+            columns.iter_mut().zip(runs(car, shift, draws)).for_each(|(column, row)| column.push(row));
+        }
+    }
+    columns
 }
 
 /// Prints the ratios to the open loop of the controlling clutch by kind, phase and class, one column for each error.
@@ -195,26 +203,28 @@ fn print(columns: &[Vec<MatrixRow>]) {
 /// The numbers of the documentation: `LIMITS_DRAWS=10 cargo test --release -p study --test any_shift limits -- --nocapture`.
 #[test]
 fn an_error_that_is_taken_away_shows_what_it_costs() {
-    let draws = std::env::var("LIMITS_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap());
+    let draws = std::env::var("LIMITS_DRAWS").ok().map(|draws| draws.parse().unwrap());
     let cars = cars();
     let dual_clutch = cars.len() - 1;
-    let mut columns = ALL.map(|(without, _)| without.matrix(&cars[..dual_clutch], draws)).to_vec();
+    // Without a number of cars those of two gearboxes, once.
+    let others = if draws.is_some() { dual_clutch } else { 1 };
+    let mut all = columns(&cars[..others], draws.unwrap_or(1));
     println!("with a converter:");
-    print(&columns);
-    let alone = ALL.map(|(without, _)| without.matrix(&cars[dual_clutch..], draws));
+    print(&all);
+    let alone = columns(&cars[dual_clutch..], draws.unwrap_or(1));
     println!("dual clutch:");
     print(&alone);
-    columns.iter_mut().zip(alone).for_each(|(rows, more)| rows.extend(more));
+    all.iter_mut().zip(alone).for_each(|(rows, more)| rows.extend(more));
     println!("all:");
-    print(&columns);
+    print(&all);
     // Over all kinds and classes each of these costs something in the phase.
     let error = |rows: &Vec<MatrixRow>, phase: usize| Pooled::of(rows, |_| true).torque[phase][0].rms_n_m()[0];
     for (phase, costly) in [
         (0, [Without::Clutches, Without::Noise, Without::SpeedErrors]),
         (1, [Without::TurbineTorque, Without::Clutches, Without::SpeedErrors]),
     ] {
-        let as_is = error(&columns[0], phase);
-        for ((without, name), rows) in ALL.iter().zip(&columns).filter(|((without, _), _)| costly.contains(without)) {
+        let as_is = error(&all[0], phase);
+        for ((without, name), rows) in ALL.iter().zip(&all).filter(|((without, _), _)| costly.contains(without)) {
             let told = error(rows, phase);
             println!("{} phase without {without:?}: {told:.2} in place of {as_is:.2} N m", PHASES[phase]);
             assert!(told < 0.97 * as_is, "{name}, {}: {told} {as_is}", PHASES[phase]);
