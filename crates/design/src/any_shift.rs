@@ -120,7 +120,7 @@ pub struct ShiftErrors {
     pub converter: f64,
     /// Of the engine torque that the engine's controller reports.
     pub engine: f64,
-    /// Of the turbine-side inertia `M11` of a shift.
+    /// Of the turbine-side inertia `M11` of a shift, of the true one.
     pub inertia: f64,
     /// Of the stiffness of the drive shafts.
     pub stiffness: f64,
@@ -278,7 +278,8 @@ fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
         pressure_s: 0.15,
         turbine_share: TURBINE_SHARE,
         turbine_share_s: 3.0,
-        inertia_share: deviation_of(errors.inertia),
+        // What is low by a share is exceeded by more than that share.
+        inertia_share: deviation_of(errors.inertia / (1.0 - errors.inertia)),
         stiffness_share: deviation_of(errors.stiffness),
         rate_rad_s: 0.1,
         rate_walk: 0.01,

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{AnyShiftError, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase, score_shift};
 use crate::StudyError;
-use crate::campaign::in_order;
+use crate::campaign::{in_order, plan::mixed};
 
 /// Throttle of the shifts with power, 0 to 1 \[chosen\]: a car in traffic.
 const POWER_ON: f64 = 0.15;
@@ -92,6 +92,13 @@ impl MatrixShift {
             ShiftKind::PowerOnUp | ShiftKind::PowerOnDown => POWER_ON,
             ShiftKind::PowerOffUp | ShiftKind::CoastDown => 0.0,
         }
+    }
+
+    /// Seed of the sensors' noise of a draw: another in each shift of each gearbox. Shifts that share their noise err alike, and
+    /// a mean over them is less certain than their number says.
+    pub fn noise(&self, draw: u64) -> u64 {
+        let of_shift = [self.gain.to_bits(), self.from as u64, self.to as u64, u64::from(self.throttle() > 0.0)];
+        of_shift.into_iter().fold(draw, mixed)
     }
 }
 
@@ -233,7 +240,7 @@ fn run(known: &Car, shift: &MatrixShift, seed: u64, plan: &MatrixPlan<'_>) -> Ru
     let mut truth = draw(known, from, to, seed, plan.timing).car(known);
     (plan.change)(&mut truth);
     let usual = CarShift::usual(known, from, to, shift.throttle());
-    match score_shift(known, &truth, &usual, plan.sensors, seed) {
+    match score_shift(known, &truth, &usual, plan.sensors, shift.noise(seed)) {
         Ok(rows) => {
             let errors = errors_by_phase(&rows, kind);
             Run { counts: counts(&rows, &errors), errors, failure: None }
@@ -245,7 +252,8 @@ fn run(known: &Car, shift: &MatrixShift, seed: u64, plan: &MatrixPlan<'_>) -> Ru
     }
 }
 
-pub(super) fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCounts {
+/// Counts over the rows of one run.
+pub fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCounts {
     let clutches = || rows.iter().flat_map(|row| row.clutches);
     let main = errors.iter().map(|phase| phase[0].torque).filter(|sum| sum.rows >= COMPARED_ROWS);
     let above = main.clone().filter(|sum| {

@@ -4,11 +4,11 @@ use config::Car;
 use observer::Reading;
 use observer::any_shift::{Learnt, ShiftInput};
 use plant::car::CarShift;
-use study::any_shift::{ShiftDraw, SquaredErrors, TruePhase};
+use study::any_shift::matrix::{MatrixCounts, counts, errors_by_phase};
+use study::any_shift::{ShiftDraw, SquaredErrors};
 use study::shift_learning::{RecordedShift, filter, tables_with_inertia};
 
 use crate::cars::{Random, cars, sensors, shifts};
-use crate::controlling;
 use drivetrain::ShiftKind;
 
 /// Shifts of the first car, recorded once.
@@ -65,12 +65,11 @@ impl Drive {
             let kind = ShiftKind::of(at.throttle - 0.01, gears[at.from].ratio, gears[at.to].ratio).unwrap();
             let rows = shift.rows(&tables, &filter, learnt);
             let of = ShiftKind::ALL.iter().position(|&other| other == kind).unwrap();
-            for (p, phase) in [TruePhase::Torque, TruePhase::Inertia].into_iter().enumerate() {
-                for c in 0..2 {
-                    let place = usize::from(c != controlling(kind));
-                    errors.of[of][p][place].add(&SquaredErrors::of(&rows, phase, c));
-                }
+            let by_phase = errors_by_phase(&rows, kind);
+            for (sum, more) in errors.of[of].iter_mut().flatten().zip(by_phase.iter().flatten()) {
+                sum.add(&more.torque);
             }
+            errors.counts.add(&counts(&rows, &by_phase));
         }
         errors
     }
@@ -80,6 +79,7 @@ impl Drive {
 #[derive(Default, Clone)]
 struct Errors {
     of: [[[SquaredErrors; 2]; 2]; 4],
+    counts: MatrixCounts,
 }
 
 impl Errors {
@@ -87,6 +87,7 @@ impl Errors {
         for (sum, more) in self.of.iter_mut().flatten().flatten().zip(more.of.iter().flatten().flatten()) {
             sum.add(more);
         }
+        self.counts.add(&more.counts);
     }
 
     fn all(&self) -> [f64; 2] {
@@ -110,7 +111,8 @@ impl Errors {
             let [a, b] = self.of[kind][1][0].rms_n_m();
             line += &format!(" {:.2}({a:.1}/{b:.1})", a / b);
         }
-        line += "; torque";
+        let MatrixCounts { above, compared, .. } = self.counts;
+        line += &format!("; above the open loop by 1 N m {above} of {compared}; torque");
         for kind in 0..4 {
             let [a, b] = self.of[kind][0][0].rms_n_m();
             line += &format!(" {:.2}({a:.1}/{b:.1})", a / b);

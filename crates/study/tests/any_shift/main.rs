@@ -7,6 +7,7 @@ mod attacks;
 mod cars;
 mod drives;
 mod learning;
+mod limits;
 mod sensitivity;
 
 use cars::{cars, sensors};

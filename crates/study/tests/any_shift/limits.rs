@@ -1,0 +1,233 @@
+//! What limits the estimate of which shift: the runs of the matrix with one error less. Either the filter is told what it does
+//! not know, or the car or its sensors are without it.
+
+use config::{Car, Sensors};
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::{ClutchValve, ShiftKind, Table1};
+use observer::Reading;
+use observer::any_shift::ShiftInput;
+use plant::car::{CarSample, CarShift};
+use study::any_shift::matrix::{
+    CLASSES, ErrorsByPhase, MatrixCounts, MatrixRow, MatrixShift, Pooled, class, counts, drawn_car, errors_by_phase,
+    neighbouring_shifts,
+};
+use study::any_shift::{ShiftScoreRow, inputs, score_samples, simulated};
+
+use crate::PHASES;
+use crate::cars::{cars, sensors};
+
+/// The error that is taken away.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Without {
+    Nothing,
+    /// The filter knows the torque at the gearbox input.
+    TurbineTorque,
+    /// It knows friction, gain and kiss point of all clutches.
+    Clutches,
+    /// It knows `M11` and the stiffness of the shafts.
+    Inertia,
+    /// All valves have the delay that the filter takes them to have.
+    Delay,
+    /// No open clutch has drag.
+    Drag,
+    /// The readings of the toothed wheels have no noise.
+    Noise,
+    /// The speeds are read exactly, at the moment.
+    SpeedErrors,
+}
+
+const ALL: [(Without, &str); 8] = [
+    (Without::Nothing, "as is"),
+    (Without::TurbineTorque, "T_t"),
+    (Without::Clutches, "mu, gain"),
+    (Without::Inertia, "M11, K_s"),
+    (Without::Delay, "delay"),
+    (Without::Drag, "drag"),
+    (Without::Noise, "noise"),
+    (Without::SpeedErrors, "speeds"),
+];
+
+/// An error that is almost none, as a share.
+const LITTLE: f64 = 0.005;
+/// Deviation of a speed that is read exactly, rad/s: that of turbine, output and wheel.
+const EXACT_RAD_S: [f64; 3] = [0.01, 0.01, 0.002];
+
+impl Without {
+    /// The car without the error, if it is one of the car.
+    fn car(self, truth: &Car) -> Option<Car> {
+        let [least_s, most_s] = ShiftErrors::STANDARD.valve_delay_s;
+        let mut car = [Self::Drag, Self::Delay].contains(&self).then(|| truth.clone())?;
+        for clutch in car.clutches.iter_mut().flatten() {
+            match (self, &mut clutch.valve) {
+                (Self::Drag, _) => clutch.drag_n_m = 0.0,
+                (Self::Delay, ClutchValve::Proportional(maps)) => {
+                    maps.delay_s = Table1::constant(0.5 * (least_s + most_s));
+                }
+                _ => {}
+            }
+        }
+        Some(car)
+    }
+
+    /// The car that the filter knows, and what it does not know.
+    fn known(self, known: &Car, truth: &Car) -> (Car, ShiftErrors) {
+        let (mut car, mut errors) = (known.clone(), ShiftErrors::STANDARD);
+        if self == Self::Clutches {
+            (errors.friction, errors.valve_gain) = (LITTLE, LITTLE);
+            for (clutch, truth) in car.clutches.iter_mut().zip(&truth.clutches) {
+                if let (Some(clutch), Some(truth)) = (clutch, truth) {
+                    (clutch.clutch, clutch.valve) = (truth.clutch, truth.valve);
+                }
+            }
+        }
+        if self == Self::Inertia {
+            (errors.inertia, errors.stiffness) = (LITTLE, LITTLE);
+        }
+        (car, errors)
+    }
+
+    fn sensors(self, sensors: &Sensors) -> Sensors {
+        let mut sensors = *sensors;
+        if self == Self::Noise {
+            for sensor in [&mut sensors.turbine, &mut sensors.output, &mut sensors.wheel] {
+                sensor.noise_rad_s = 0.0;
+            }
+        }
+        sensors
+    }
+
+    /// Puts the truth into what the filter is shown.
+    fn tell(self, input: &mut ShiftInput<f64>, sample: &CarSample) {
+        match self {
+            Self::TurbineTorque => input.engine_n_m = Some(Reading::now(sample.turbine_n_m)),
+            Self::SpeedErrors => {
+                let now = |speed| Some(Reading::now(speed));
+                input.turbine_rad_s = now(sample.torques.turbine_rad_s);
+                input.output_rad_s = now(sample.torques.output_rad_s);
+                input.wheel_rad_s = now(sample.wheel_rad_s);
+            }
+            _ => {}
+        }
+    }
+
+    /// Rows of a recorded shift of the car that truly is `truth`, beside the valve models of a filter that is told nothing.
+    fn rows(self, [known, truth]: [&Car; 2], samples: &[CarSample], noise: u64) -> Vec<ShiftScoreRow> {
+        let seen = sensors();
+        let read = |sensors: &Sensors, tables: &_| inputs(known, tables, samples, sensors, noise);
+        let standard = ShiftErrors::STANDARD;
+        let tables = ShiftTables::of_car(known, &standard).unwrap();
+        let filter = any_shift_filter(known, &tables, &standard, Some(&seen));
+        let untold = score_samples(&tables, &filter, samples, &read(&seen, &tables));
+        let (car, errors) = self.known(known, truth);
+        let tables = ShiftTables::of_car(&car, &errors).unwrap();
+        let mut filter = any_shift_filter(&car, &tables, &errors, Some(&seen));
+        let mut inputs = read(&self.sensors(&seen), &tables);
+        // Without a converter the reported torque of the engine is already exact.
+        if self == Self::TurbineTorque {
+            (filter.turbine.engine_share, filter.uncertainty.turbine_share) = (LITTLE, 0.5 * LITTLE);
+        }
+        if self == Self::Clutches {
+            filter.uncertainty.kiss_point_pa = LITTLE * 1e5;
+        }
+        if self == Self::SpeedErrors {
+            for (reading, deviation_rad_s) in filter.readings.iter_mut().zip(EXACT_RAD_S) {
+                (reading.deviation_rad_s, reading.lag_rad, reading.pitch_rad) = (deviation_rad_s, 0.0, 0.0);
+            }
+        }
+        if self != Self::TurbineTorque || filter.turbine.converter.take().is_some() {
+            inputs.iter_mut().for_each(|(at, input)| self.tell(input, &samples[*at]));
+        }
+        let mut rows = score_samples(&tables, &filter, samples, &inputs);
+        for (row, untold) in rows.iter_mut().zip(&untold) {
+            assert_eq!(row.time_s, untold.time_s);
+            for (clutch, untold) in row.clutches.iter_mut().zip(&untold.clutches) {
+                clutch.torque_n_m[2] = untold.torque_n_m[2];
+            }
+        }
+        rows
+    }
+}
+
+/// The runs of one shift, a row for each error.
+fn runs(known: &Car, shift: MatrixShift, draws: u64) -> Vec<MatrixRow> {
+    let row = MatrixRow { shift, errors: ErrorsByPhase::default(), counts: MatrixCounts::default(), failure: None };
+    let mut sums = vec![row; ALL.len()];
+    let usual = CarShift::usual(known, shift.from, shift.to, shift.throttle());
+    for draw in 1..=draws {
+        let truth = drawn_car(known, shift.from, shift.to, draw);
+        let as_is = simulated(known, &truth, &usual).unwrap();
+        for (sum, (without, _)) in sums.iter_mut().zip(ALL) {
+            let other = without.car(&truth).map(|car| simulated(known, &car, &usual).unwrap());
+            let rows = without.rows([known, &truth], other.as_deref().unwrap_or(&as_is), shift.noise(draw));
+            let errors = errors_by_phase(&rows, shift.kind);
+            sum.counts.add(&counts(&rows, &errors));
+            sum.errors.iter_mut().flatten().zip(errors.iter().flatten()).for_each(|(sum, more)| sum.add(more));
+        }
+    }
+    sums
+}
+
+/// All shifts of these cars, a column for each error.
+fn columns(cars: &[Car], draws: u64) -> Vec<Vec<MatrixRow>> {
+    let mut columns = vec![Vec::new(); ALL.len()];
+    for car in cars {
+        let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
+        for shift in neighbouring_shifts(car, &tables).0 {
+            columns.iter_mut().zip(runs(car, shift, draws)).for_each(|(column, row)| column.push(row));
+        }
+    }
+    columns
+}
+
+/// Prints the ratios to the open loop of the controlling clutch by kind, phase and class, one column for each error.
+fn print(columns: &[Vec<MatrixRow>]) {
+    println!("{:32}{}", "", ALL.map(|(_, name)| format!("{name:>9}")).concat());
+    let line = |name: String, of: &dyn Fn(&Vec<MatrixRow>) -> Option<f64>| {
+        let cells = columns.iter().map(|rows| of(rows).map_or_else(|| format!("{:>9}", "-"), |x| format!("{x:9.2}")));
+        println!("{name:32}{}", cells.collect::<String>());
+    };
+    for kind in ShiftKind::ALL {
+        for (p, phase) in PHASES.iter().enumerate() {
+            for at in 0..CLASSES.len() {
+                let of = |shift: &MatrixShift| shift.kind == kind && class(shift.gain) == at;
+                line(format!("{kind:?} {phase} class {at}"), &|rows| Pooled::of(rows, of).torque[p][0].ratio());
+            }
+        }
+    }
+    line("above by 1 N m, %".to_owned(), &|rows| {
+        let MatrixCounts { above, compared, .. } = Pooled::of(rows, |_| true).counts;
+        Some(100.0 * above as f64 / compared as f64)
+    });
+}
+
+/// The numbers of the documentation: `LIMITS_DRAWS=10 cargo test --release -p study --test any_shift limits -- --nocapture`.
+#[test]
+fn an_error_that_is_taken_away_shows_what_it_costs() {
+    let draws = std::env::var("LIMITS_DRAWS").ok().map(|draws| draws.parse().unwrap());
+    let cars = cars();
+    let dual_clutch = cars.len() - 1;
+    // Without a number of cars those of two gearboxes, once.
+    let others = if draws.is_some() { dual_clutch } else { 1 };
+    let mut all = columns(&cars[..others], draws.unwrap_or(1));
+    println!("with a converter:");
+    print(&all);
+    let alone = columns(&cars[dual_clutch..], draws.unwrap_or(1));
+    println!("dual clutch:");
+    print(&alone);
+    all.iter_mut().zip(alone).for_each(|(rows, more)| rows.extend(more));
+    println!("all:");
+    print(&all);
+    // Over all kinds and classes each of these costs something in the phase.
+    let error = |rows: &Vec<MatrixRow>, phase: usize| Pooled::of(rows, |_| true).torque[phase][0].rms_n_m()[0];
+    for (phase, costly) in [
+        (0, [Without::Clutches, Without::Noise, Without::SpeedErrors]),
+        (1, [Without::TurbineTorque, Without::Clutches, Without::SpeedErrors]),
+    ] {
+        let as_is = error(&all[0], phase);
+        for ((without, name), rows) in ALL.iter().zip(&all).filter(|((without, _), _)| costly.contains(without)) {
+            let told = error(rows, phase);
+            println!("{} phase without {without:?}: {told:.2} in place of {as_is:.2} N m", PHASES[phase]);
+            assert!(told < 0.97 * as_is, "{name}, {}: {told} {as_is}", PHASES[phase]);
+        }
+    }
+}
