@@ -86,7 +86,8 @@ impl RecentSamples {
     /// The samples from one time to another, with the one before them.
     fn between(&self, [from_s, to_s]: [f64; 2]) -> Vec<LogSample> {
         let first = self.samples.partition_point(|sample| sample.time_s < from_s).saturating_sub(1);
-        self.samples.range(first..).take_while(|sample| sample.time_s <= to_s).copied().collect()
+        let end = self.samples.partition_point(|sample| sample.time_s <= to_s).max(first);
+        self.samples.range(first..end).copied().collect()
     }
 }
 
@@ -168,8 +169,8 @@ impl ShiftEstimate {
     /// A shift of the recent samples; `of_vehicle` as of [`is_of_vehicle`].
     pub fn of(number: usize, shift: Shift, of_vehicle: bool, recent: &RecentSamples, vehicle: &Vehicle) -> Self {
         let around_s = [shift.start_s() - BEFORE_S - logs::shifts::LONGEST_S, shift.end_s() + AFTER_S];
-        let samples = recent.between(around_s);
-        let estimated = of_vehicle.then(|| EstimatedShift::of(&shift, &samples, &vehicle.shift)).flatten();
+        let around = of_vehicle.then(|| recent.between(around_s));
+        let estimated = around.and_then(|samples| EstimatedShift::of(&shift, &samples, &vehicle.shift));
         let begin_s = estimated.as_ref().map_or(shift.start_s(), |e| e.torque_phase_s[0].min(shift.start_s()));
         let end_s = estimated.as_ref().and_then(|e| e.lock_up_s).map_or(shift.end_s(), |s| s.max(shift.end_s()));
         let window_s = [begin_s - BEFORE_S, end_s + AFTER_S];

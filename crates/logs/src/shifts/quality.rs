@@ -14,8 +14,6 @@ const SLIP_RAD_S: f64 = 3.0;
 const TORQUE_N_M: f64 = 5.0;
 /// Throttle of a driver who accelerates.
 const THROTTLE: f64 = 0.03;
-/// Readings further apart are not joined by a line, s.
-const APART_S: f64 = 0.3;
 
 /// Power-on or power-off: from the slip of the converter, else the engine torque, else the throttle.
 pub(super) fn load(shift: &Shift, tracks: &[Track]) -> Load {
@@ -72,39 +70,43 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Optio
             _ => return None,
         };
     let (from_s, to_s) = (shift.start_s() - AROUND_S, shift.end_s() + AROUND_S);
-    let centres: Vec<f64> = track.between(from_s, to_s).map(|(time_s, _)| time_s).collect();
+    let around: Vec<(f64, f64)> = track.between(from_s - HALF_S, to_s + HALF_S).collect();
+    let (mut begin, mut end) = (0, 0);
     let mut most: Option<f64> = None;
-    for centre_s in centres {
-        // A hole in the middle would leave the parabola free.
-        track.at(centre_s, APART_S)?;
-        let points: Vec<(f64, f64)> = track
-            .between(centre_s - HALF_S, centre_s + HALF_S)
-            .map(|(time_s, value)| (time_s - centre_s, value))
-            .collect();
-        let spread = points.first().zip(points.last()).map_or(0.0, |(first, last)| last.0 - first.0);
+    for &(centre_s, _) in around.iter().filter(|(time_s, _)| (from_s..=to_s).contains(time_s)) {
+        // From one centre to the next, a few points leave and a few come.
+        begin += around[begin..].iter().take_while(|(time_s, _)| *time_s < centre_s - HALF_S).count();
+        end += around[end..].iter().take_while(|(time_s, _)| *time_s <= centre_s + HALF_S).count();
+        let points = around.get(begin..end).unwrap_or_default();
+        let ends = points.first().zip(points.last());
+        let spread = ends.map_or(0.0, |(first, last)| (last.0 - centre_s) - (first.0 - centre_s));
         if points.len() < 7 || spread < 1.5 * HALF_S {
             continue;
         }
-        let Some([_, linear, quadratic]) = parabola(&points) else { continue };
+        let Some([_, linear, quadratic]) = parabola(points, centre_s) else { continue };
         let jerk = factor * if of_speed { 2.0 * quadratic } else { linear };
         most = Some(most.map_or(jerk.abs(), |most| most.max(jerk.abs())));
     }
     most
 }
 
-/// Coefficients of the parabola with the least squares of distances.
-fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
+/// Coefficients of the parabola with the least squares of distances, over the time from a centre.
+fn parabola(points: &[(f64, f64)], centre_s: f64) -> Option<[f64; 3]> {
     // Normal equations; times are within a fraction of a second, so they are scaled to 1.
-    let scale = points.iter().map(|(time_s, _)| time_s.abs()).fold(0.0, f64::max);
-    let mut sums = [[0.0; 4]; 3];
+    let scale = points.iter().map(|(time_s, _)| (time_s - centre_s).abs()).fold(0.0, f64::max);
+    // Sums of the powers of the time, and of these times the value.
+    let (mut powers, mut values) = ([0.0; 5], [0.0; 3]);
     for (time_s, value) in points {
-        let powers = [1.0, time_s / scale, (time_s / scale).powi(2)];
-        for (row, power) in sums.iter_mut().zip(powers) {
-            for (sum, factor) in row.iter_mut().zip([powers[0], powers[1], powers[2], *value]) {
-                *sum += power * factor;
-            }
+        let time = (time_s - centre_s) / scale;
+        let square = time * time;
+        for (sum, power) in powers.iter_mut().zip([1.0, time, square, time * square, square * square]) {
+            *sum += power;
+        }
+        for (sum, power) in values.iter_mut().zip([1.0, time, square]) {
+            *sum += power * value;
         }
     }
+    let mut sums: [[f64; 4]; 3] = std::array::from_fn(|i| [powers[i], powers[i + 1], powers[i + 2], values[i]]);
     // The matrix is symmetric and positive definite: no pivots are needed.
     for i in 0..3 {
         let pivot = sums[i];
@@ -132,10 +134,10 @@ mod tests {
     fn a_parabola_through_its_own_points_is_found() {
         let points: Vec<(f64, f64)> =
             (0_i32..11).map(|i| f64::from(i - 4) * 0.02).map(|t| (t, 3.0 - 2.0 * t + 7.0 * t * t)).collect();
-        let found = parabola(&points).unwrap();
+        let found = parabola(&points, 0.0).unwrap();
         for (found, expected) in found.into_iter().zip([3.0, -2.0, 7.0]) {
             assert!((found - expected).abs() < 1e-9, "{found} {expected}");
         }
-        assert!(parabola(&[(0.0, 1.0); 9]).is_none());
+        assert!(parabola(&[(0.0, 1.0); 9], 0.0).is_none());
     }
 }

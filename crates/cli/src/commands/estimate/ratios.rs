@@ -1,5 +1,7 @@
 //! Whether the speeds of a log are those of the vehicle file's car: ratios that a wrong scale changes.
 
+use std::ops::Range;
+
 use config::Vehicle;
 use observer::{Input, Reading};
 
@@ -97,11 +99,14 @@ impl Ratios {
 /// Counts of ratios from 1/20 to 20 by their logarithm.
 struct Histogram {
     counts: Vec<u32>,
+    /// The bin of the ratio before, and ratios that are in it for certain: a car keeps its ratio for long.
+    last: usize,
+    within: Range<f64>,
 }
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: vec![0; Self::BINS] }
+        Self { counts: vec![0; Self::BINS], last: 0, within: 0.0..0.0 }
     }
 }
 
@@ -111,11 +116,20 @@ impl Histogram {
     const FINE: f64 = 100.0;
 
     fn push(&mut self, ratio: f64) {
-        let place = ratio.ln() * Self::FINE + 300.0;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
-        if (0.0..600.0).contains(&place) {
-            self.counts[place as usize] = self.counts[place as usize].saturating_add(1);
+        /// Share by which a ratio near the end of a bin may be taken for one in the next.
+        const ROUNDING: f64 = 1e-9;
+        if !self.within.contains(&ratio) {
+            let place = ratio.ln() * Self::FINE + 300.0;
+            if !(0.0..600.0).contains(&place) {
+                return;
+            }
+            let begin = |bin: f64| ((bin - 300.0) / Self::FINE).exp();
+            self.within = begin(place.floor()) * (1.0 + ROUNDING)..begin(place.floor() + 1.0) * (1.0 - ROUNDING);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
+            let bin = place as usize;
+            self.last = bin;
         }
+        self.counts[self.last] = self.counts[self.last].saturating_add(1);
     }
 
     /// The middle ratio, to half a per cent; not a number without any.
