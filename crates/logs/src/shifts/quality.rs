@@ -140,4 +140,50 @@ mod tests {
         }
         assert!(parabola(&[(0.0, 1.0); 9], 0.0).is_none());
     }
+
+    #[test]
+    fn the_jerk_is_the_greatest_of_the_parabolas_laid_one_by_one_whatever_is_missing() {
+        let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = move || {
+            bits ^= bits << 13;
+            bits ^= bits >> 7;
+            bits ^= bits << 17;
+            (bits >> 40) as f64 / f64::from(1 << 24)
+        };
+        for holes in [0.0, 0.05, 0.5, 0.9] {
+            let mut tracks: [Track; Role::LockUpApplied as usize + 1] = std::array::from_fn(|_| Track::new(12.0));
+            let mut readings = Vec::new();
+            for step in 0..400 {
+                if random() < holes || (holes > 0.0 && (150..200).contains(&step)) {
+                    continue;
+                }
+                let (time_s, value) = (0.01 * f64::from(step) + 0.004 * random(), 20.0 + random());
+                tracks[Role::VehicleSpeed as usize].push(time_s, value);
+                readings.push((time_s, value));
+            }
+            let (begin_s, end_s) = (1.0, 2.5);
+            let shift = Shift {
+                from: 1,
+                to: 2,
+                direction: Direction::Up,
+                load: Load::Unknown,
+                command_s: None,
+                inertia_s: Some([begin_s, end_s]),
+                gear_s: None,
+                quality: ShiftQuality::default(),
+            };
+            let of = |centre_s: f64| {
+                let within = readings.iter().filter(|(time_s, _)| (centre_s - 0.15..=centre_s + 0.15).contains(time_s));
+                let points: Vec<(f64, f64)> = within.copied().collect();
+                let spread = points.last()?.0 - points.first()?.0;
+                let is_laid = points.len() >= 7 && spread >= 0.225;
+                is_laid.then(|| parabola(&points, centre_s)).flatten().map(|[.., quadratic]| (2.0 * quadratic).abs())
+            };
+            let centres = readings.iter().map(|(time_s, _)| *time_s);
+            let around = centres.filter(|time_s| (begin_s - 0.3..=end_s + 0.3).contains(time_s));
+            let expected = around.filter_map(of).reduce(f64::max);
+            assert_eq!(jerk(&shift, &tracks, None), expected, "{holes}");
+            assert_eq!(expected.is_some(), holes < 0.9);
+        }
+    }
 }

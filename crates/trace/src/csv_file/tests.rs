@@ -141,6 +141,46 @@ fn a_row_cannot_repeat_what_no_row_has() {
 }
 
 #[test]
+fn the_number_of_a_cell_is_the_one_nearest_to_its_text() {
+    let mut bits = 0x2545_f491_4f6c_dd1d_u64;
+    let mut random = move |below: u64| {
+        bits ^= bits << 13;
+        bits ^= bits >> 7;
+        bits ^= bits << 17;
+        (bits >> 20) % below
+    };
+    let expect = |text: &str| {
+        let (read, expected) = (number(text.as_bytes()), text.parse::<f64>().ok());
+        assert_eq!(read.map(f64::to_bits), expected.map(f64::to_bits), "{text}");
+    };
+    // Digits with a point anywhere, with some other signs among them.
+    for _ in 0..100_000 {
+        let length = 1 + random(20) as usize;
+        let mut text: Vec<u8> = (0..length).map(|_| b'0' + random(10) as u8).collect();
+        if random(4) > 0 {
+            text.insert(random(length as u64 + 1) as usize, b'.');
+        }
+        if random(3) == 0 {
+            text.insert(0, b'-');
+        }
+        if random(10) == 0 {
+            let at = random(text.len() as u64) as usize;
+            text[at] = b"x:/ e-+.\xb0"[random(9) as usize];
+        }
+        if let Ok(text) = std::str::from_utf8(&text)
+            && text.trim() == text
+        {
+            expect(text);
+        }
+    }
+    for text in
+        ["0", "-0", "-0.0", ".5", "5.", "-.5", ".", "-", "-.", "--1", "+1", "1e5", "1.5e-3", "inf", "0.00000000000001"]
+    {
+        expect(text);
+    }
+}
+
+#[test]
 fn other_units_are_converted_to_si() {
     let path = file("units", "time_ms, Turbine_Speed_rpm\n0, 300\n10, 600\n");
     let trace = read_csv(&path).unwrap();

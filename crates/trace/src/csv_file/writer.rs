@@ -34,15 +34,22 @@ pub struct CsvWriter<W: Write> {
 /// A cell as it stands in a row.
 #[derive(Debug, Clone, Copy)]
 struct Written {
-    /// The bits of its number; [`NO_NUMBER`] where it has none.
+    /// The bits of its number, or what else it is.
     bits: u64,
     /// Where its text begins and ends in the row.
     begin: usize,
     end: usize,
 }
 
-/// Bits that no number has whose text is repeated.
+impl Written {
+    const NONE: Self = Self { bits: NOT_YET, begin: 0, end: 0 };
+}
+
+/// What stands for the bits of a cell that has no number. No number has these bits: each is a NaN, and of those only the first is used.
 const NO_NUMBER: u64 = u64::MAX;
+const WORD: u64 = u64::MAX - 1;
+const WHOLE: u64 = u64::MAX - 2;
+const NOT_YET: u64 = u64::MAX - 3;
 
 /// Bytes that are handed on at once.
 const WRITTEN_AT_ONCE: usize = 64 << 10;
@@ -71,7 +78,7 @@ impl<W: Write> CsvWriter<W> {
             columns += 1;
         }
         rows.push(b'\n');
-        let (handed_on, before, written) = (0, 0, Vec::with_capacity(columns));
+        let (handed_on, before, written) = (0, 0, vec![Written::NONE; columns]);
         Ok(Self { writer, rows, handed_on, before, written, columns })
     }
 
@@ -94,7 +101,7 @@ impl<W: Write> CsvWriter<W> {
         let (begin, count, is_whole) = row.finish();
         if count != self.columns || !is_whole {
             self.rows.truncate(begin);
-            self.written.clear();
+            self.written.fill(Written::NONE);
             return Err(io::Error::other(match is_whole {
                 true => format!("a row of {count} cells for {} columns", self.columns),
                 false => "a cell repeats that of the row before, and there is none".to_owned(),
@@ -140,39 +147,42 @@ impl<W: Write> CsvWriter<W> {
 /// A row while it is written. Cells one after the other that are those of the row before are copied together.
 struct Row<'a> {
     rows: &'a mut Vec<u8>,
-    written: &'a mut Vec<Written>,
+    written: &'a mut [Written],
     /// Where the row before begins, and this one.
     before: usize,
     begin: usize,
-    /// Cells so far, and the first of those that wait to be copied.
+    /// Cells so far, and how many of them are in the row; the others wait to be copied.
     count: usize,
-    repeated: Option<usize>,
+    done: usize,
     is_whole: bool,
 }
 
 impl<'a> Row<'a> {
-    fn behind(rows: &'a mut Vec<u8>, written: &'a mut Vec<Written>, before: usize) -> Self {
+    fn behind(rows: &'a mut Vec<u8>, written: &'a mut [Written], before: usize) -> Self {
         let begin = rows.len();
-        Self { rows, written, before, begin, count: 0, repeated: None, is_whole: true }
+        Self { rows, written, before, begin, count: 0, done: 0, is_whole: true }
     }
 
     #[inline]
     fn push(&mut self, cell: Cell<'_>) {
         let at = self.count;
         self.count += 1;
+        let Some(before) = self.written.get(at) else { return };
         let bits = match cell {
-            Cell::Number(number) if !number.is_nan() => number.to_bits(),
-            Cell::Number(_) => f64::NAN.to_bits(),
-            _ => NO_NUMBER,
+            Cell::Number(number) if number.is_nan() => NO_NUMBER,
+            Cell::Number(number) => number.to_bits(),
+            Cell::Word(_) | Cell::SameWord => WORD,
+            Cell::Whole(_) => WHOLE,
         };
-        let is_repeated = self.written.get(at).is_some_and(|before| before.bits == bits);
-        let is_same_word = matches!(cell, Cell::SameWord);
-        if is_same_word || (is_repeated && bits != NO_NUMBER) {
-            self.is_whole &= is_repeated;
-            self.repeated.get_or_insert(at);
-            return;
+        match cell {
+            Cell::Number(_) if before.bits == bits => return,
+            Cell::SameWord => {
+                self.is_whole &= before.bits == bits;
+                return;
+            }
+            _ => {}
         }
-        self.copy_repeated(at);
+        self.copy_until(at);
         if at > 0 {
             self.rows.push(b',');
         }
@@ -183,35 +193,38 @@ impl<'a> Row<'a> {
             Cell::Whole(number) => self.rows.extend_from_slice(number.to_string().as_bytes()),
             Cell::SameWord => {}
         }
-        let written = Written { bits, begin, end: self.rows.len() - self.begin };
-        match self.written.get_mut(at) {
-            Some(before) => *before = written,
-            None => self.written.push(written),
+        if let Some(written) = self.written.get_mut(at) {
+            *written = Written { bits, begin, end: self.rows.len() - self.begin };
+        }
+        self.done = at + 1;
+    }
+
+    /// Copies the cells that wait, all before this one.
+    #[inline]
+    fn copy_until(&mut self, end: usize) {
+        if self.done < end {
+            self.copy(end);
         }
     }
 
-    /// Copies the cells that wait, which end before this one.
-    #[inline]
-    fn copy_repeated(&mut self, end: usize) {
-        let Some(first) = self.repeated.take() else { return };
-        let Some(cells) = self.written.get_mut(first..end) else { return };
-        let (Some(&Written { begin: from, .. }), Some(&Written { end: to, .. })) = (cells.first(), cells.last()) else {
-            return;
-        };
-        if first > 0 {
+    fn copy(&mut self, end: usize) {
+        let Some(cells) = self.written.get_mut(self.done..end) else { return };
+        let (Some(first), Some(last)) = (cells.first(), cells.last()) else { return };
+        let (from, to) = (first.begin, last.end);
+        if self.done > 0 {
             self.rows.push(b',');
         }
         let begin = self.rows.len() - self.begin;
         self.rows.extend_from_within(self.before + from..self.before + to);
-        for written in cells {
-            written.begin = written.begin - from + begin;
-            written.end = written.end - from + begin;
+        for cell in cells {
+            cell.begin = cell.begin - from + begin;
+            cell.end = cell.end - from + begin;
         }
     }
 
     /// Where it begins, how many cells it has, and whether all were there.
     fn finish(mut self) -> (usize, usize, bool) {
-        self.copy_repeated(self.count);
+        self.copy_until(self.count);
         (self.begin, self.count, self.is_whole)
     }
 }

@@ -123,8 +123,10 @@ impl Histogram {
             if !(0.0..600.0).contains(&place) {
                 return;
             }
-            let begin = |bin: f64| ((bin - 300.0) / Self::FINE).exp();
-            self.within = begin(place.floor()) * (1.0 + ROUNDING)..begin(place.floor() + 1.0) * (1.0 - ROUNDING);
+            // From the ratio to an end of the bin: of the exponential of less than a hundredth, these two powers stay within it.
+            let factor = |way: f64| 1.0 + way + 0.5 * way * way;
+            let [down, up] = [place.floor() - place, place.floor() + 1.0 - place].map(|way| factor(way / Self::FINE));
+            self.within = ratio * down * (1.0 + ROUNDING)..ratio * up * (1.0 - ROUNDING);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
             let bin = place as usize;
             self.last = bin;
@@ -143,5 +145,29 @@ impl Histogram {
             }
         }
         f64::NAN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ratio_is_counted_in_the_bin_of_its_logarithm_whatever_the_one_before_was() {
+        // Slow changes, jumps, and the ends of bins from both sides.
+        let slow = (0..100_000).map(|i| 0.9 + 2e-6 * f64::from(i));
+        let ends = (-310_i32..310).map(|bin| (f64::from(bin) / Histogram::FINE).exp());
+        let near = ends.flat_map(|end| [end, end * (1.0 - 1e-12), end * (1.0 + 1e-12), end * (1.0 - 1e-15), 2.5]);
+        let odd = [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300, 1e300];
+        let mut histogram = Histogram::default();
+        let mut expected = vec![0_u32; Histogram::BINS];
+        for ratio in slow.chain(near).chain(odd) {
+            histogram.push(ratio);
+            let place = ratio.ln() * Histogram::FINE + 300.0;
+            if (0.0..600.0).contains(&place) {
+                expected[place as usize] += 1;
+            }
+        }
+        assert_eq!(histogram.counts, expected);
     }
 }
