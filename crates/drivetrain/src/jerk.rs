@@ -105,16 +105,18 @@ fn second_derivative(points: &[(f64, f64)]) -> Option<f64> {
     let ((first_s, first), (last_s, _)) = (*points.first()?, *points.last()?);
     let (middle_s, half_s) = (0.5 * (first_s + last_s), 0.5 * (last_s - first_s));
     // Normal equations in times from -1 to 1; with speeds over the first one their sums keep their digits.
-    let mut sums = [[0.0; 4]; 3];
+    let (mut powers, mut values) = ([0.0; 5], [0.0; 3]);
     for (time_s, value) in points {
         let time = (time_s - middle_s) / half_s;
-        let powers = [1.0, time, time * time];
-        for (row, power) in sums.iter_mut().zip(powers) {
-            for (sum, factor) in row.iter_mut().zip([powers[0], powers[1], powers[2], value - first]) {
-                *sum += power * factor;
-            }
+        let square = time * time;
+        for (sum, power) in powers.iter_mut().zip([1.0, time, square, time * square, square * square]) {
+            *sum += power;
+        }
+        for (sum, power) in values.iter_mut().zip([1.0, time, square]) {
+            *sum += power * (value - first);
         }
     }
+    let mut sums = [0, 1, 2].map(|i| [powers[i], powers[i + 1], powers[i + 2], values[i]]);
     // The matrix is symmetric and positive definite: no pivots are needed.
     for i in 0..2 {
         let pivot = sums[i];

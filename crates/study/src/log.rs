@@ -19,7 +19,8 @@ pub struct Log {
     rows: CsvRows,
     signals: Signals<usize>,
     truth: Option<TruthColumns>,
-    beside: [Option<usize>; BESIDE.len()],
+    /// Places of the columns of [`Beside`]; none if the log has none of them.
+    beside: Option<[Option<usize>; BESIDE.len()]>,
     clock: RowClock,
     frozen: FrozenRows,
     looked_at: VecDeque<(Input<f64>, LogRow)>,
@@ -61,6 +62,18 @@ pub struct Beside {
     pub vehicle_m_s2: f64,
 }
 
+impl Beside {
+    /// Of a log that has none of these signals.
+    const NONE: Self = Self {
+        pressure_pa: f64::NAN,
+        torque_n_m: f64::NAN,
+        engine_n_m: f64::NAN,
+        throttle: f64::NAN,
+        vehicle_m_s: f64::NAN,
+        vehicle_m_s2: f64::NAN,
+    };
+}
+
 /// The columns of [`Beside`].
 const BESIDE: [&str; 6] = [
     signal::ONCOMING_PRESSURE,
@@ -97,7 +110,7 @@ impl Log {
         let signals = Signals::choose(vehicle, |name| rows.find(name), |name| rows.require(name))?;
         let truth = rows.find(signal::TRUE_PHASE).zip(rows.find(signal::ONCOMING_PRESSURE));
         let truth = truth.map(|(phase, pressure)| TruthColumns { phase, pressure });
-        let beside = BESIDE.map(|name| rows.find(name));
+        let beside = Some(BESIDE.map(|name| rows.find(name))).filter(|columns| columns.iter().any(Option::is_some));
         let looked_at = VecDeque::with_capacity(look);
         let mut log = Self {
             rows,
@@ -126,7 +139,7 @@ impl Log {
 
     /// Which of the signals in [`Beside`] there are, by their names.
     pub fn has_beside(&self, name: &str) -> bool {
-        BESIDE.iter().zip(self.beside).any(|(known, column)| *known == name && column.is_some())
+        BESIDE.iter().zip(self.beside.iter().flatten()).any(|(known, column)| *known == name && column.is_some())
     }
 
     /// Where the signals are.
@@ -175,9 +188,11 @@ impl Log {
             Some(rows.number(columns.pressure).map(|pressure_pa| Truth { phase, pressure_pa }))
         });
         // A word in a signal that is not needed is no error.
-        let [pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2] =
-            self.beside.map(|column| column.and_then(|column| rows.number(column).ok()).unwrap_or(f64::NAN));
-        let beside = Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 };
+        let beside = self.beside.map_or(Beside::NONE, |columns| {
+            let [pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2] =
+                columns.map(|column| column.and_then(|column| rows.number(column).ok()).unwrap_or(f64::NAN));
+            Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 }
+        });
         Ok(Some((input, LogRow { time_s, truth: truth.transpose()?, beside })))
     }
 }

@@ -84,9 +84,13 @@ impl RecentSamples {
     }
 
     /// The samples from one time to another, with the one before them.
-    fn between(&self, [from_s, to_s]: [f64; 2]) -> Vec<LogSample> {
+    pub fn between(&self, [from_s, to_s]: [f64; 2]) -> Vec<LogSample> {
         let first = self.samples.partition_point(|sample| sample.time_s < from_s).saturating_sub(1);
-        self.samples.range(first..).take_while(|sample| sample.time_s <= to_s).copied().collect()
+        let end = self.samples.partition_point(|sample| sample.time_s <= to_s).max(first);
+        let (front, back) = self.samples.as_slices();
+        let back_at = |at: usize| at.saturating_sub(front.len());
+        let front_at = |at: usize| at.min(front.len());
+        [&front[front_at(first)..front_at(end)], &back[back_at(first)..back_at(end)]].concat()
     }
 }
 
@@ -150,7 +154,7 @@ pub struct ShiftEstimate {
     pub of_vehicle: bool,
     /// The time that belongs to it, s.
     pub window_s: [f64; 2],
-    /// The samples in that time.
+    /// Samples in that time that are kept for a figure.
     pub samples: Vec<LogSample>,
 }
 
@@ -165,19 +169,17 @@ pub fn is_of_vehicle(shift: &Shift, ratios: &[f64], vehicle: &Vehicle) -> bool {
 }
 
 impl ShiftEstimate {
-    /// A shift of the recent samples; `of_vehicle` as of [`is_of_vehicle`].
+    /// A shift of the recent samples; `of_vehicle` as of [`is_of_vehicle`]. It keeps none of them.
     pub fn of(number: usize, shift: Shift, of_vehicle: bool, recent: &RecentSamples, vehicle: &Vehicle) -> Self {
         let around_s = [shift.start_s() - BEFORE_S - logs::shifts::LONGEST_S, shift.end_s() + AFTER_S];
-        let samples = recent.between(around_s);
-        let estimated = of_vehicle.then(|| EstimatedShift::of(&shift, &samples, &vehicle.shift)).flatten();
+        let around = of_vehicle.then(|| recent.between(around_s));
+        let estimated = around.and_then(|samples| EstimatedShift::of(&shift, &samples, &vehicle.shift));
         let begin_s = estimated.as_ref().map_or(shift.start_s(), |e| e.torque_phase_s[0].min(shift.start_s()));
         let end_s = estimated.as_ref().and_then(|e| e.lock_up_s).map_or(shift.end_s(), |s| s.max(shift.end_s()));
         let window_s = [begin_s - BEFORE_S, end_s + AFTER_S];
-        Self { number, shift, estimated, of_vehicle, window_s, samples: recent.between(window_s) }
+        Self { number, shift, estimated, of_vehicle, window_s, samples: Vec::new() }
     }
-}
 
-impl ShiftEstimate {
     /// Keeps at most so many samples, of those that lie together the one with the worst health.
     pub fn thin(&mut self, most: usize) {
         if most == 0 {
@@ -405,4 +407,41 @@ fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
         (health, share)
     };
     Health::ALL.into_iter().skip(1).rev().map(share).filter(|(_, share)| *share > 0.0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_recent_samples_of_a_time_are_those_of_it_and_the_one_before() {
+        let mut recent = RecentSamples::default();
+        let none = None::<Reading<f64>>;
+        let input = Input {
+            dt_s: 0.01,
+            engine_rad_s: none,
+            turbine_rad_s: none,
+            output_rad_s: none,
+            wheel_rad_s: none,
+            command: none,
+            offgoing_command: none,
+            engine_torque_n_m: none,
+        };
+        for step in 0..7000 {
+            let time_s = 0.01 * f64::from(step);
+            recent.push(LogSample { time_s, input, estimate: no_estimate(), pressure_pa: none, torque_n_m: none });
+            if step % 97 > 0 {
+                continue;
+            }
+            let held: Vec<f64> = recent.samples.iter().map(|sample| sample.time_s).collect();
+            for [from_s, to_s] in [[-9.0, -2.0], [-20.0, 0.0], [-0.5, 5.0], [-3.001, -3.0005], [-2.0, -4.0], [1.0, 2.0]]
+            {
+                let [from_s, to_s] = [time_s + from_s, time_s + to_s];
+                let times: Vec<f64> = recent.between([from_s, to_s]).iter().map(|sample| sample.time_s).collect();
+                let before = held.iter().rposition(|held_s| *held_s < from_s).unwrap_or(0);
+                let expected: Vec<f64> = held[before..].iter().copied().take_while(|held_s| *held_s <= to_s).collect();
+                assert_eq!(times, expected, "{from_s} to {to_s} s");
+            }
+        }
+    }
 }

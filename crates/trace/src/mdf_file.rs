@@ -24,6 +24,7 @@ pub struct MdfWriter<W: Write + Seek> {
     writer: W,
     places: Places,
     columns: Vec<Column>,
+    /// The newest record.
     record: Vec<u8>,
     rows: u64,
 }
@@ -131,7 +132,8 @@ impl<W: Write + Seek> MdfWriter<W> {
             ColumnKind::Word => Column::Words(Vec::new()),
             ColumnKind::Whole | ColumnKind::Number => Column::Number,
         });
-        Ok(Self { writer, places, columns: columns.collect(), record: Vec::new(), rows: 0 })
+        let record = vec![0; usize::try_from(byte_offset).map_err(io::Error::other)?];
+        Ok(Self { writer, places, columns: columns.collect(), record, rows: 0 })
     }
 
     /// Writes a row.
@@ -139,23 +141,23 @@ impl<W: Write + Seek> MdfWriter<W> {
     /// # Errors
     /// What the writer meets, a cell that is not of the kind of its column, or too many words.
     pub fn row<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        self.record.clear();
-        self.record.extend_from_slice(&time_s.to_le_bytes());
-        let mut cells = cells.into_iter();
+        let (mut cells, mut record) = (cells.into_iter(), self.record.as_mut_slice());
+        set(&mut record, &time_s.to_le_bytes());
         for column in &mut self.columns {
             match (column, cells.next()) {
-                (Column::Number, Some(Cell::Number(number))) => self.record.extend_from_slice(&number.to_le_bytes()),
+                (Column::Number, Some(Cell::Number(number))) => set(&mut record, &number.to_le_bytes()),
                 #[expect(clippy::cast_precision_loss, reason = "counts")]
                 (Column::Number, Some(Cell::Whole(number))) => {
-                    self.record.extend_from_slice(&(number as f64).to_le_bytes());
+                    set(&mut record, &(number as f64).to_le_bytes());
                 }
+                (Column::Words(words), Some(Cell::SameWord)) if !words.is_empty() => _ = record.split_off_first_mut(),
                 (Column::Words(words), Some(Cell::Word(word))) => {
                     let at = words.iter().position(|known| known == word).unwrap_or_else(|| {
                         words.push(word.to_owned());
                         words.len() - 1
                     });
                     let number = u8::try_from(at).ok().filter(|_| words.len() <= MOST_WORDS);
-                    self.record.push(number.ok_or_else(|| io::Error::other("a column has more than 255 words"))?);
+                    set(&mut record, &[number.ok_or_else(|| io::Error::other("a column has more than 255 words"))?]);
                 }
                 _ => return Err(io::Error::other("a cell is not of the kind of its column")),
             }
@@ -190,6 +192,13 @@ impl<W: Write + Seek> MdfWriter<W> {
         }
         self.writer.seek(SeekFrom::End(0))?;
         Ok(self.writer)
+    }
+}
+
+/// Sets the next bytes of a record.
+fn set(record: &mut &mut [u8], bytes: &[u8]) {
+    if let Some(next) = record.split_off_mut(..bytes.len()) {
+        next.copy_from_slice(bytes);
     }
 }
 
@@ -266,5 +275,20 @@ mod tests {
         assert_eq!((of("##HD"), of("##CN"), of("##CC"), of("##DT")), (1, 3, 1, 1));
         let mut writer = MdfWriter::new(Cursor::new(Vec::new()), columns).unwrap();
         assert!(writer.row(0.0, [Cell::Word("x"), Cell::Word("x")]).is_err());
+    }
+
+    #[test]
+    fn a_word_that_repeats_that_of_the_row_before_is_the_same_in_the_file() {
+        let columns = [("health", ColumnKind::Word), ("pressure_pa", ColumnKind::Number)];
+        let written = |cells: [Cell<'_>; 4]| {
+            let mut writer = MdfWriter::new(Cursor::new(Vec::new()), columns).unwrap();
+            for (time_s, cell) in (0..).map(f64::from).zip(cells) {
+                writer.row(time_s, [cell, Cell::Number(time_s)])?;
+            }
+            writer.finish().map(Cursor::into_inner)
+        };
+        let [good, bad] = ["good", "bad"].map(Cell::Word);
+        assert_eq!(written([good, bad, Cell::SameWord, good]).unwrap(), written([good, bad, bad, good]).unwrap());
+        assert!(written([Cell::SameWord, bad, bad, good]).is_err());
     }
 }

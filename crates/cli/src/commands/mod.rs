@@ -101,6 +101,8 @@ fn json_object<'a>(cells: impl IntoIterator<Item = (String, Cell<'a>)>) -> serde
         Cell::Number(number) => serde_json::Value::from(number),
         Cell::Whole(number) => serde_json::Value::from(number),
         Cell::Word(word) => serde_json::Value::from(word),
+        // An object has no row before it.
+        Cell::SameWord => serde_json::Value::Null,
     };
     cells.into_iter().map(|(name, cell)| (name, value(cell))).collect()
 }

@@ -23,6 +23,13 @@ const HOLE_S: f64 = 0.3;
 /// Points of which the middle one is taken.
 const MEDIAN: usize = 5;
 
+/// The middle one of ratios, of which each is a number. Least and greatest take no branches, which noise makes hard to predict.
+fn middle([a, b, c, d, e]: [f64; MEDIAN]) -> f64 {
+    // Of the greatest of two and two, the less, and of the least the greater: neither can be left out. The other two can.
+    let (low, high) = (a.min(b).max(c.min(d)), a.max(b).min(c.max(d)));
+    low.min(high).max(e.min(low.max(high)))
+}
+
 /// Ratio of turbine and output at one time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
@@ -144,9 +151,8 @@ impl RatioWatch {
                 self.raw.pop_front();
             }
             if self.raw.len() == MEDIAN {
-                let mut ratios: [f64; MEDIAN] = std::array::from_fn(|i| self.raw[i].ratio);
-                ratios.sort_by(f64::total_cmp);
-                self.take(Point { ratio: ratios[MEDIAN / 2], ..self.raw[MEDIAN / 2] });
+                let ratio = middle(std::array::from_fn(|i| self.raw[i].ratio));
+                self.take(Point { ratio, ..self.raw[MEDIAN / 2] });
             }
         }
     }
@@ -219,5 +225,22 @@ impl RatioWatch {
             .find(up(0.95))
             .map(|pair| crossing(pair, 0.95));
         [first.unwrap_or(before.last_s), last.unwrap_or(now.first_s)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_five_is_that_of_the_sorted_ones() {
+        // All orders of five values, some of them equal.
+        for code in 0..5_usize.pow(5) {
+            let ratios: [f64; MEDIAN] =
+                std::array::from_fn(|i| [0.5, 1.0, 2.5, 4.0, f64::INFINITY][code / 5_usize.pow(i as u32) % 5]);
+            let mut sorted = ratios;
+            sorted.sort_by(f64::total_cmp);
+            assert_eq!(middle(ratios), sorted[MEDIAN / 2], "{ratios:?}");
+        }
     }
 }

@@ -81,6 +81,106 @@ fn words_with_signs_of_the_format_are_quoted_and_a_row_has_a_cell_for_each_name(
 }
 
 #[test]
+fn cells_that_repeat_those_of_the_row_before_are_written_as_all_others() {
+    // Some hundred kilobytes: many times what is handed on at once.
+    let words = ["good", "", "a, b", "say \"x\""];
+    let numbers = [0.5, f64::NAN, -0.0, 0.0, 1.0 / 3.0];
+    let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = |below: usize| {
+        bits ^= bits << 13;
+        bits ^= bits >> 7;
+        bits ^= bits << 17;
+        (bits >> 33) as usize % below
+    };
+    let names = ["w0", "x", "w1", "w2", "n", "w3"];
+    let mut plain = CsvWriter::new(Vec::new(), names).unwrap();
+    let mut repeating = CsvWriter::new(Vec::new(), names).unwrap();
+    let mut before: Option<[usize; 4]> = None;
+    for row in 0..20_000_u32 {
+        let said = std::array::from_fn(|i| match before {
+            Some(before) if random(4) > 0 => before[i],
+            _ => random(words.len()),
+        });
+        let cells = |word: &dyn Fn(usize) -> Cell<'static>| {
+            let number = Cell::Number(numbers[row as usize / 7 % numbers.len()]);
+            [word(0), number, word(1), word(2), Cell::Whole(u64::from(row / 3)), word(3)]
+        };
+        let time_s = f64::from(row / 2);
+        plain.row(time_s, cells(&|i| Cell::Word(words[said[i]]))).unwrap();
+        let is_same = |i: usize| before.is_some_and(|before| before[i] == said[i]);
+        let word = |i: usize| if is_same(i) { Cell::SameWord } else { Cell::Word(words[said[i]]) };
+        repeating.row(time_s, cells(&word)).unwrap();
+        if row % 1000 == 7 {
+            repeating.flush().unwrap();
+        }
+        // A row that is refused leaves nothing; after it, nothing can be repeated.
+        before = (row % 500 != 3).then_some(said);
+        if before.is_none() {
+            assert!(repeating.row(0.0, [Cell::Number(9.0)]).is_err());
+        }
+    }
+    let [plain, repeating] = [plain, repeating].map(|writer| String::from_utf8(writer.finish().unwrap()).unwrap());
+    assert!(plain == repeating);
+}
+
+#[test]
+fn a_row_cannot_repeat_what_no_row_has() {
+    let mut writer = CsvWriter::new(Vec::new(), ["word", "x"]).unwrap();
+    assert!(writer.row(0.0, [Cell::SameWord, Cell::Number(1.0)]).is_err());
+    writer.row(1.0, [Cell::Word("good"), Cell::Number(1.0)]).unwrap();
+    // A number is no word.
+    assert!(writer.row(2.0, [Cell::SameWord, Cell::SameWord]).is_err());
+    // The row that was refused is not the row before, nor is the one before it any more.
+    assert!(writer.row(2.0, [Cell::SameWord, Cell::Number(1.0)]).is_err());
+    assert_eq!(String::from_utf8(writer.finish().unwrap()).unwrap(), "time_s,word,x\n1,good,1\n");
+    let mut alone = CsvWriter::without_time(Vec::new(), ["word"]).unwrap();
+    for cell in [Cell::Word(""), Cell::SameWord, Cell::Word("x"), Cell::SameWord] {
+        alone.cells([cell]).unwrap();
+    }
+    assert_eq!(alone.finish().unwrap(), b"word\n\"\"\n\"\"\nx\nx\n");
+}
+
+#[test]
+fn the_number_of_a_cell_is_the_one_nearest_to_its_text() {
+    let mut bits = 0x2545_f491_4f6c_dd1d_u64;
+    let mut random = move |below: u64| {
+        bits ^= bits << 13;
+        bits ^= bits >> 7;
+        bits ^= bits << 17;
+        (bits >> 20) % below
+    };
+    let expect = |text: &str| {
+        let (read, expected) = (number(text.as_bytes()), text.parse::<f64>().ok());
+        assert_eq!(read.map(f64::to_bits), expected.map(f64::to_bits), "{text}");
+    };
+    // Digits with a point anywhere, with some other signs among them.
+    for _ in 0..100_000 {
+        let length = 1 + random(20) as usize;
+        let mut text: Vec<u8> = (0..length).map(|_| b'0' + random(10) as u8).collect();
+        if random(4) > 0 {
+            text.insert(random(length as u64 + 1) as usize, b'.');
+        }
+        if random(3) == 0 {
+            text.insert(0, b'-');
+        }
+        if random(10) == 0 {
+            let at = random(text.len() as u64) as usize;
+            text[at] = b"x:/ e-+.\xb0"[random(9) as usize];
+        }
+        if let Ok(text) = std::str::from_utf8(&text)
+            && text.trim() == text
+        {
+            expect(text);
+        }
+    }
+    for text in
+        ["0", "-0", "-0.0", ".5", "5.", "-.5", ".", "-", "-.", "--1", "+1", "1e5", "1.5e-3", "inf", "0.00000000000001"]
+    {
+        expect(text);
+    }
+}
+
+#[test]
 fn other_units_are_converted_to_si() {
     let path = file("units", "time_ms, Turbine_Speed_rpm\n0, 300\n10, 600\n");
     let trace = read_csv(&path).unwrap();

@@ -13,16 +13,43 @@ pub enum Cell<'a> {
     Whole(u64),
     /// A word.
     Word(&'a str),
+    /// The word that stands in this column in the row before.
+    SameWord,
 }
 
 /// Writes a comma-separated file row by row. Numbers are written so that reading gives the very same ones, with as few digits as that
 /// needs and without exponents.
 pub struct CsvWriter<W: Write> {
     writer: W,
-    /// Rows that are not yet with the writer.
+    /// The row before, and the rows that are not yet with the writer.
     rows: Vec<u8>,
+    /// Bytes of these that are with the writer, and where the row before begins.
+    handed_on: usize,
+    before: usize,
+    /// The cells of the row before.
+    written: Vec<Written>,
     columns: usize,
 }
+
+/// A cell as it stands in a row.
+#[derive(Debug, Clone, Copy)]
+struct Written {
+    /// The bits of its number, or what else it is.
+    bits: u64,
+    /// Where its text begins and ends in the row.
+    begin: usize,
+    end: usize,
+}
+
+impl Written {
+    const NONE: Self = Self { bits: NOT_YET, begin: 0, end: 0 };
+}
+
+/// What stands for the bits of a cell that has no number. No number has these bits: each is a NaN, and of those only the first is used.
+const NO_NUMBER: u64 = u64::MAX;
+const WORD: u64 = u64::MAX - 1;
+const WHOLE: u64 = u64::MAX - 2;
+const NOT_YET: u64 = u64::MAX - 3;
 
 /// Bytes that are handed on at once.
 const WRITTEN_AT_ONCE: usize = 64 << 10;
@@ -51,13 +78,14 @@ impl<W: Write> CsvWriter<W> {
             columns += 1;
         }
         rows.push(b'\n');
-        Ok(Self { writer, rows, columns })
+        let (handed_on, before, written) = (0, 0, vec![Written::NONE; columns]);
+        Ok(Self { writer, rows, handed_on, before, written, columns })
     }
 
     /// Writes a row.
     ///
     /// # Errors
-    /// What the writer meets, or a row that has not one cell for each name.
+    /// What the writer meets, a row that has not one cell for each name, or one that repeats cells where there is none before it.
     pub fn row<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
         self.cells(std::iter::once(Cell::Number(time_s)).chain(cells))
     }
@@ -67,37 +95,33 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// As [`Self::row`].
     pub fn cells<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let Self { rows, .. } = self;
-        let begin = rows.len();
-        let mut count = 0;
+        let mut row = Row::behind(&mut self.rows, &mut self.written, self.before);
         // A chain of cells is faster from within.
-        cells.into_iter().for_each(|cell| {
-            if count > 0 {
-                rows.push(b',');
-            }
-            count += 1;
-            match cell {
-                Cell::Number(number) => push_number(rows, number),
-                Cell::Word(word) => push_word(rows, word),
-                Cell::Whole(number) => rows.extend_from_slice(number.to_string().as_bytes()),
-            }
-        });
-        if count != self.columns {
+        cells.into_iter().for_each(|cell| row.push(cell));
+        let (begin, count, is_whole) = row.finish();
+        if count != self.columns || !is_whole {
             self.rows.truncate(begin);
-            return Err(io::Error::other(format!("a row of {count} cells for {} columns", self.columns)));
+            self.written.fill(Written::NONE);
+            return Err(io::Error::other(match is_whole {
+                true => format!("a row of {count} cells for {} columns", self.columns),
+                false => "a cell repeats that of the row before, and there is none".to_owned(),
+            }));
         }
         if self.rows.len() == begin {
             // A row of one empty cell is no empty line.
             self.rows.extend_from_slice(b"\"\"");
         }
         self.rows.push(b'\n');
+        self.before = begin;
         if self.rows.len() >= WRITTEN_AT_ONCE { self.hand_on() } else { Ok(()) }
     }
 
+    /// Hands on all rows. The last one stays, as long as the next one may repeat its cells.
     fn hand_on(&mut self) -> io::Result<()> {
-        let written = self.writer.write_all(&self.rows);
-        self.rows.clear();
-        written
+        let handed = self.writer.write_all(&self.rows[self.handed_on..]);
+        self.rows.drain(..std::mem::take(&mut self.before));
+        self.handed_on = self.rows.len();
+        handed
     }
 
     /// Hands the rows so far to the writer below, and flushes it.
@@ -117,6 +141,91 @@ impl<W: Write> CsvWriter<W> {
         self.hand_on()?;
         self.writer.flush()?;
         Ok(self.writer)
+    }
+}
+
+/// A row while it is written. Cells one after the other that are those of the row before are copied together.
+struct Row<'a> {
+    rows: &'a mut Vec<u8>,
+    written: &'a mut [Written],
+    /// Where the row before begins, and this one.
+    before: usize,
+    begin: usize,
+    /// Cells so far, and how many of them are in the row; the others wait to be copied.
+    count: usize,
+    done: usize,
+    is_whole: bool,
+}
+
+impl<'a> Row<'a> {
+    fn behind(rows: &'a mut Vec<u8>, written: &'a mut [Written], before: usize) -> Self {
+        let begin = rows.len();
+        Self { rows, written, before, begin, count: 0, done: 0, is_whole: true }
+    }
+
+    #[inline]
+    fn push(&mut self, cell: Cell<'_>) {
+        let at = self.count;
+        self.count += 1;
+        let Some(before) = self.written.get(at) else { return };
+        let bits = match cell {
+            Cell::Number(number) if number.is_nan() => NO_NUMBER,
+            Cell::Number(number) => number.to_bits(),
+            Cell::Word(_) | Cell::SameWord => WORD,
+            Cell::Whole(_) => WHOLE,
+        };
+        match cell {
+            Cell::Number(_) if before.bits == bits => return,
+            Cell::SameWord => {
+                self.is_whole &= before.bits == bits;
+                return;
+            }
+            _ => {}
+        }
+        self.copy_until(at);
+        if at > 0 {
+            self.rows.push(b',');
+        }
+        let begin = self.rows.len() - self.begin;
+        match cell {
+            Cell::Number(number) => push_number(self.rows, number),
+            Cell::Word(word) => push_word(self.rows, word),
+            Cell::Whole(number) => self.rows.extend_from_slice(number.to_string().as_bytes()),
+            Cell::SameWord => {}
+        }
+        if let Some(written) = self.written.get_mut(at) {
+            *written = Written { bits, begin, end: self.rows.len() - self.begin };
+        }
+        self.done = at + 1;
+    }
+
+    /// Copies the cells that wait, all before this one.
+    #[inline]
+    fn copy_until(&mut self, end: usize) {
+        if self.done < end {
+            self.copy(end);
+        }
+    }
+
+    fn copy(&mut self, end: usize) {
+        let Some(cells) = self.written.get_mut(self.done..end) else { return };
+        let (Some(first), Some(last)) = (cells.first(), cells.last()) else { return };
+        let (from, to) = (first.begin, last.end);
+        if self.done > 0 {
+            self.rows.push(b',');
+        }
+        let begin = self.rows.len() - self.begin;
+        self.rows.extend_from_within(self.before + from..self.before + to);
+        for cell in cells {
+            cell.begin = cell.begin - from + begin;
+            cell.end = cell.end - from + begin;
+        }
+    }
+
+    /// Where it begins, how many cells it has, and whether all were there.
+    fn finish(mut self) -> (usize, usize, bool) {
+        self.copy_until(self.count);
+        (self.begin, self.count, self.is_whole)
     }
 }
 

@@ -89,6 +89,7 @@ impl<W: Write + Send> ParquetWriter<W> {
             (Some(Values::Numbers(_, absent)), Cell::Number(value)) if value.is_nan() => absent.push(rows),
             (Some(Values::Numbers(values, _)), Cell::Number(value)) => values.push(value),
             (Some(Values::Words(words)), Cell::Word(word)) => words.push(word),
+            (Some(Values::Words(words)), Cell::SameWord) => is_of_kind &= words.repeat(),
             (Some(Values::Whole(values)), Cell::Whole(value)) => values.push(value.cast_signed()),
             _ => is_of_kind = false,
         });
@@ -109,7 +110,7 @@ impl<W: Write + Send> ParquetWriter<W> {
             if let Values::Words(words) = values {
                 let (bytes, close) = words.encode(description.clone()).map_err(io::Error::other)?;
                 group.append_column(&bytes, close).map_err(io::Error::other)?;
-                words.clear();
+                words.begin_anew();
                 continue;
             }
             let Some(mut column) = group.next_column().map_err(io::Error::other)? else { break };
@@ -243,9 +244,12 @@ mod tests {
         ];
         let mut writer = ParquetWriter::new(Vec::new(), columns).unwrap();
         let rows = 2 * GROUP + 5;
+        let none = [Cell::Whole(0), Cell::SameWord, Cell::Number(0.0), Cell::Word("e")];
+        assert!(ParquetWriter::new(Vec::new(), columns).unwrap().row(none).is_err());
         for row in 0..rows {
             let x = if row % 5 == 2 { f64::NAN } else { row as f64 };
-            writer.row([Cell::Whole(row as u64), Cell::Word(&word(row)), Cell::Number(x), Cell::Word("e")]).unwrap();
+            let same = if row == 0 { Cell::Word("e") } else { Cell::SameWord };
+            writer.row([Cell::Whole(row as u64), Cell::Word(&word(row)), Cell::Number(x), same]).unwrap();
         }
         let reader = SerializedFileReader::new(Bytes::from(writer.finish().unwrap())).unwrap();
         let mut read = 0;

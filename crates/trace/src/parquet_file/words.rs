@@ -23,6 +23,8 @@ pub(super) struct Words {
     /// Numbers of words, and in how many rows each stands.
     runs: Vec<(u32, u32)>,
     rows: u32,
+    /// The word of the last row of the group before, until this one has a row.
+    last: Option<Box<str>>,
 }
 
 impl Words {
@@ -37,6 +39,20 @@ impl Words {
             return;
         }
         self.begin_run(word);
+    }
+
+    /// Takes the word of the row before once more; false if there is none.
+    #[inline]
+    pub(super) fn repeat(&mut self) -> bool {
+        let Some((_, rows)) = self.runs.last_mut() else { return self.repeat_last() };
+        *rows += 1;
+        self.rows += 1;
+        true
+    }
+
+    /// The word of the row before, where that is of the group before.
+    fn repeat_last(&mut self) -> bool {
+        self.last.take().map(|word| self.push(&word)).is_some()
     }
 
     fn begin_run(&mut self, word: &str) {
@@ -113,8 +129,9 @@ impl Words {
         page
     }
 
-    /// Forgets the rows, and the words if they are many.
-    pub(super) fn clear(&mut self) {
-        *self = Self::default();
+    /// Begins the next group: of the rows so far only the last word stays.
+    pub(super) fn begin_anew(&mut self) {
+        let last = self.runs.last().map(|(number, _)| self.words.swap_remove(*number as usize));
+        *self = Self { last, ..Self::default() };
     }
 }

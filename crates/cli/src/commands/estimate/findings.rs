@@ -88,10 +88,13 @@ impl Findings {
             Some((_, count)) => *count += 1,
             None => self.health.push((estimate.health, 1)),
         }
-        self.errors = self.errors.take().zip(row.truth).map(|(mut errors, truth)| {
-            errors.push(row.time_s, truth.phase, truth.pressure_pa, estimate.pressure_pa);
-            errors
-        });
+        match (&mut self.errors, row.truth) {
+            (Some(errors), Some(truth)) => {
+                errors.push(row.time_s, truth.phase, truth.pressure_pa, estimate.pressure_pa);
+            }
+            (_, None) => self.errors = None,
+            (None, _) => {}
+        }
     }
 
     /// Refuses a log of which a channel is unusable in most samples, or that does not belong to the vehicle.

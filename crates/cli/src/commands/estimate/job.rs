@@ -6,16 +6,17 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use ::observer::Estimate;
-use config::ObserverKind;
+use config::{ObserverKind, Vehicle};
 use drivetrain::CommandKind;
 use logs::{Log, Role, Shift};
 use report::log_page::{LogPage, shift_rows};
+use study::LogSample;
 use study::shift_estimates::no_estimate;
-use study::{LogSample, OutputColumn};
 
 use super::findings::Findings;
 use super::measured::{Measured, Step};
-use super::outputs::{Output, beside, chosen, remove_old};
+use super::observer::Chosen;
+use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
 use super::{Messages, Setup, observer};
 use crate::commands::write_text;
@@ -29,31 +30,75 @@ pub(super) fn estimate(
     output: Option<&Path>,
     say: &mut Messages,
 ) -> Result<(), Failure> {
-    let Setup { options, vehicle, map, .. } = setup;
-    let stop = options.follow.then(|| Arc::clone(&setup.stop));
+    let Setup { options, vehicle, .. } = setup;
     let mut opened = None;
-    let log = if map.channels.is_empty() {
-        Measured::rows(path, vehicle, stop)?
-    } else {
-        let is_followed = stop.is_some();
-        let log = match stop {
-            Some(stop) => Log::follow(path, &map.open, stop)?,
-            None => Log::open(path, &map.open)?,
-        };
-        Measured::channels(path, opened.insert(log), map, vehicle, is_followed)?
-    };
-    let chosen_observer = observer::choose(options, vehicle, &log, say)?;
-    let columns = chosen(chosen_observer.observer.columns(log.has_wheel_speed()), &options.columns)?;
-    let rows = RefCell::new(Rows {
-        table: Output::create(output, &columns)?,
-        columns: &columns,
+    let log = open(setup, path, &mut opened)?;
+    let observer = observer::choose(options, vehicle, &log, say)?;
+    let columns = chosen(observer.observer.columns(log.has_wheel_speed()), &options.columns)?;
+    let rows = Rows {
+        table: EstimateTable::create(output, columns)?,
         shifts: Shifts::new(options, vehicle, &log.ratios),
         findings: Findings::new(vehicle),
         written_s: f64::NEG_INFINITY,
         follow: options.follow,
-    });
-    let log = RefCell::new(log);
-    // The observer gets the steps in the gears of its shift; the others go by it.
+    };
+    let (log, mut rows) = pass(&observer, vehicle, log, rows)?;
+    if output.is_none() {
+        rows.table.flush()?;
+    }
+    log.finish(say)?;
+    if options.follow && !setup.stop.load(Ordering::Relaxed) && path.is_file() {
+        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
+    }
+    let Rows { table, shifts, findings, .. } = rows;
+    check_findings(&findings, vehicle, &log, observer.kind)?;
+    shifts.check()?;
+    table.finish()?;
+    let sentences = findings.sentences();
+    sentences.iter().for_each(|sentence| say.note(sentence));
+    report_shifts(&shifts, say);
+    say.note(&format!("observer: {}", observer.name));
+    let Some(output) = output else {
+        say.note("estimate: on standard output");
+        return Ok(());
+    };
+    say.note(&format!("estimate: {}", output.display()));
+    let page = LogPage {
+        log: path,
+        vehicle,
+        observer: &observer.name,
+        overview: &shifts.overview,
+        shifts: &shifts.found,
+        shifts_of_log: shifts.seen(),
+        findings: &sentences,
+    };
+    write_beside(output, &page, say)
+}
+
+/// Opens a log: a table with the names of the program, or channels by the map. `opened` keeps the latter.
+fn open<'a>(setup: &Setup<'_>, path: &Path, opened: &'a mut Option<Log>) -> Result<Measured<'a>, Failure> {
+    let Setup { options, vehicle, map, .. } = setup;
+    let stop = options.follow.then(|| Arc::clone(&setup.stop));
+    if map.channels.is_empty() {
+        return Measured::rows(path, vehicle, stop);
+    }
+    let is_followed = stop.is_some();
+    let log = match stop {
+        Some(stop) => Log::follow(path, &map.open, stop)?,
+        None => Log::open(path, &map.open)?,
+    };
+    Measured::channels(path, opened.insert(log), map, vehicle, is_followed)
+}
+
+/// Passes all steps of a log through the observer to the rows. The observer gets the steps in the gears of its shift; the others
+/// go by it.
+fn pass<'log, 'rows>(
+    observer: &Chosen,
+    vehicle: &Vehicle,
+    log: Measured<'log>,
+    rows: Rows<'rows>,
+) -> Result<(Measured<'log>, Rows<'rows>), Failure> {
+    let (log, rows) = (RefCell::new(log), RefCell::new(rows));
     let in_gears = std::iter::from_fn(|| {
         let mut log = log.borrow_mut();
         loop {
@@ -69,66 +114,48 @@ pub(super) fn estimate(
             }
         }
     });
-    chosen_observer.observer.run_over(Some(vehicle), in_gears, |(), estimate| {
+    observer.observer.run_over(Some(vehicle), in_gears, |(), estimate| {
         rows.borrow_mut().take(&mut log.borrow_mut().step, Some(&estimate))
     })?;
-    let mut log = log.into_inner();
-    let mut rows = rows.into_inner();
+    let (mut log, mut rows) = (log.into_inner(), rows.into_inner());
     for shift in log.last_shifts() {
         rows.shift(shift)?;
     }
-    let Rows { mut table, shifts, findings, .. } = rows;
-    if output.is_none() {
-        table.flush()?;
-    }
-    log.finish(say)?;
-    if options.follow && !setup.stop.load(Ordering::Relaxed) && path.is_file() {
-        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
-    }
+    Ok((log, rows))
+}
+
+/// Refuses a log that the observer cannot use, or that is of another car.
+fn check_findings(
+    findings: &Findings,
+    vehicle: &Vehicle,
+    log: &Measured<'_>,
+    observer: ObserverKind,
+) -> Result<(), Failure> {
     let commands = match vehicle.observer_valve.command_kind() {
         CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
         CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],
     };
     let without_wheel = [ObserverKind::Rigid, ObserverKind::OpenLoop, ObserverKind::OpenLoopMaps];
-    findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&chosen_observer.kind))?;
-    shifts.check()?;
-    table.finish()?;
-    let sentences = findings.sentences();
-    sentences.iter().for_each(|sentence| say.note(sentence));
-    report_shifts(&shifts, say);
-    say.note(&format!("observer: {}", chosen_observer.name));
-    let Some(output) = output else {
-        say.note("estimate: on standard output");
-        return Ok(());
-    };
-    say.note(&format!("estimate: {}", output.display()));
+    findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&observer))
+}
+
+/// Writes the shifts and the page beside the output, if there are shifts.
+fn write_beside(output: &Path, page: &LogPage<'_>, say: &mut Messages) -> Result<(), Failure> {
     let Some(places) = beside(output) else { return Ok(()) };
-    if shifts.found.is_empty() {
-        remove_old(&places, |note| say.note(note))?;
-    } else {
-        let [csv, json, page] = places;
-        shifts::write(&shifts.found, &csv, &json)?;
-        let html = LogPage {
-            log: path,
-            vehicle,
-            observer: &chosen_observer.name,
-            overview: &shifts.overview,
-            shifts: &shifts.found,
-            shifts_of_log: shifts.seen(),
-            findings: &sentences,
-        }
-        .html()?;
-        write_text(&page, &html)?;
-        say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
-        say.note(&format!("report: {}", page.display()));
+    if page.shifts.is_empty() {
+        return remove_old(&places, |note| say.note(note));
     }
+    let [csv, json, html] = places;
+    shifts::write(page.shifts, &csv, &json)?;
+    write_text(&html, &page.html()?)?;
+    say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
+    say.note(&format!("report: {}", html.display()));
     Ok(())
 }
 
 /// What becomes of the steps of a log.
 struct Rows<'a> {
-    table: Output,
-    columns: &'a [OutputColumn],
+    table: EstimateTable,
     shifts: Shifts<'a>,
     findings: Findings,
     /// Of shifts that lie close together, a row is written once: the last one that was, s.
@@ -151,8 +178,8 @@ impl Rows<'_> {
         }
         if !self.shifts.is_selective() {
             match estimate {
-                Some(estimate) => self.table.row(time_s, estimate, self.columns)?,
-                None => self.table.empty_row(time_s, self.columns)?,
+                Some(estimate) => self.table.row(time_s, estimate)?,
+                None => self.table.empty_row(time_s)?,
             }
             if self.follow {
                 self.table.flush()?;
@@ -163,16 +190,16 @@ impl Rows<'_> {
 
     /// Takes a shift that is known now.
     fn shift(&mut self, shift: Shift) -> Result<(), Failure> {
-        let Self { table, columns, written_s, follow, .. } = self;
+        let Self { table, written_s, follow, .. } = self;
         let is_selective = self.shifts.is_selective();
         self.shifts.take(shift, |samples| {
             for sample in samples.iter().filter(|_| is_selective) {
                 if sample.time_s > *written_s {
                     *written_s = sample.time_s;
                     if sample.is_estimated() {
-                        table.row(sample.time_s, &sample.estimate, columns)?;
+                        table.row(sample.time_s, &sample.estimate)?;
                     } else {
-                        table.empty_row(sample.time_s, columns)?;
+                        table.empty_row(sample.time_s)?;
                     }
                 }
             }

@@ -129,26 +129,35 @@ impl Step {
     }
 }
 
-/// Readings of a row of a table with the names of the program, for the shift finder.
-fn readings(input: &Input<f64>, row: &LogRow) -> impl Iterator<Item = Reading> + use<> {
-    let Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 } = row.beside;
-    let now = |value: f64| Some(Measurement::now(value)).filter(|_| !value.is_nan());
+/// Gives the readings of a row of a table with the names of the program to the shift finder.
+fn each_reading(input: &Input<f64>, row: &LogRow, mut see: impl FnMut(&Reading)) {
     let stamp_s = row.time_s;
-    let readings = [
+    let mut see = |role: Role, value: f64, age_s: f64| {
+        if value.is_finite() {
+            see(&Reading { role, time_s: stamp_s - age_s, stamp_s, value });
+        }
+    };
+    let speeds = [
         (Role::EngineSpeed, input.engine_rad_s),
         (Role::TurbineSpeed, input.turbine_rad_s),
         (Role::OutputSpeed, input.output_rad_s),
-        (Role::OncomingPressure, now(pressure_pa)),
-        (Role::OncomingTorque, now(torque_n_m)),
-        (Role::EngineTorque, now(engine_n_m)),
-        (Role::Throttle, now(throttle)),
-        (Role::VehicleSpeed, now(vehicle_m_s)),
-        (Role::VehicleAcceleration, now(vehicle_m_s2)),
     ];
-    readings.into_iter().filter_map(move |(role, reading)| {
-        let Measurement { value, age_s } = reading.filter(|reading| reading.value.is_finite())?;
-        Some(Reading { role, time_s: stamp_s - age_s, stamp_s, value })
-    })
+    for (role, reading) in speeds {
+        if let Some(Measurement { value, age_s }) = reading {
+            see(role, value, age_s);
+        }
+    }
+    let Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 } = row.beside;
+    for (role, value) in [
+        (Role::OncomingPressure, pressure_pa),
+        (Role::OncomingTorque, torque_n_m),
+        (Role::EngineTorque, engine_n_m),
+        (Role::Throttle, throttle),
+        (Role::VehicleSpeed, vehicle_m_s),
+        (Role::VehicleAcceleration, vehicle_m_s2),
+    ] {
+        see(role, value, 0.0);
+    }
 }
 
 impl<'a> Measured<'a> {
@@ -421,7 +430,7 @@ impl Rows {
             None => self.watched.push(values(&input)),
         }
         let resets = self.log.resets();
-        readings(&input, &row).for_each(|reading| see(resets, &reading));
+        each_reading(&input, &row, |reading| see(resets, reading));
         *step = Step::of_row(input, &row, resets);
         Ok(true)
     }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-use observer::Estimate;
+use observer::{ChannelHealth, Channels, Estimate, Health, Phase};
 use study::{EstimateColumns, OutputColumn};
 use trace::{Cell, ColumnKind, CsvWriter, TableFormat, TableWriter};
 
@@ -85,12 +85,7 @@ pub(super) enum Output {
 }
 
 impl Output {
-    /// Begins a file, or the table on standard output.
-    pub(super) fn create(path: Option<&Path>, columns: &[OutputColumn]) -> Result<Self, Failure> {
-        Self::named(path, columns.iter().map(|column| (column.name, column.kind())))
-    }
-
-    /// The same with these columns.
+    /// Begins a file with these columns, or the table on standard output.
     pub(super) fn named<'a>(
         path: Option<&Path>,
         named: impl Iterator<Item = (&'a str, ColumnKind)>,
@@ -105,26 +100,6 @@ impl Output {
                 Ok(Self::Standard(Box::new(CsvWriter::new(BufWriter::new(io::stdout()), names)?)))
             }
         }
-    }
-
-    pub(super) fn row(
-        &mut self,
-        time_s: f64,
-        estimate: &Estimate<f64>,
-        columns: &[OutputColumn],
-    ) -> Result<(), Failure> {
-        self.cells(time_s, columns.iter().map(|column| column.cell(estimate)))
-    }
-
-    /// A row without an estimate.
-    pub(super) fn empty_row(&mut self, time_s: f64, columns: &[OutputColumn]) -> Result<(), Failure> {
-        self.cells(
-            time_s,
-            columns.iter().map(|column| match column.kind() {
-                ColumnKind::Word => Cell::Word(""),
-                ColumnKind::Number | ColumnKind::Whole => Cell::Number(f64::NAN),
-            }),
-        )
     }
 
     pub(super) fn cells<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> Result<(), Failure> {
@@ -148,6 +123,52 @@ impl Output {
             Self::File(writer, path) => writer.finish().map_err(|error| Failure::writing(&path, &error)),
             Self::Standard(writer) => Ok(writer.finish()?.flush()?),
         }
+    }
+}
+
+/// The table of the estimates of one observer.
+pub(super) struct EstimateTable {
+    output: Output,
+    columns: Vec<OutputColumn>,
+    /// What the words of the row before say: they are mostly the same.
+    said: Option<(Phase, Health, Channels<ChannelHealth>)>,
+}
+
+impl EstimateTable {
+    /// Begins a file, or the table on standard output.
+    pub(super) fn create(path: Option<&Path>, columns: Vec<OutputColumn>) -> Result<Self, Failure> {
+        let output = Output::named(path, columns.iter().map(|column| (column.name, column.kind())))?;
+        Ok(Self { output, columns, said: None })
+    }
+
+    pub(super) fn row(&mut self, time_s: f64, estimate: &Estimate<f64>) -> Result<(), Failure> {
+        let says = Some((estimate.phase, estimate.health, estimate.channels));
+        let is_same = std::mem::replace(&mut self.said, says) == says;
+        let cells = self.columns.iter().map(|column| match column.kind() {
+            ColumnKind::Word if is_same => Cell::SameWord,
+            _ => column.cell(estimate),
+        });
+        self.output.cells(time_s, cells)
+    }
+
+    /// A row without an estimate.
+    pub(super) fn empty_row(&mut self, time_s: f64) -> Result<(), Failure> {
+        self.said = None;
+        let cells = self.columns.iter().map(|column| match column.kind() {
+            ColumnKind::Word => Cell::Word(""),
+            ColumnKind::Number | ColumnKind::Whole => Cell::Number(f64::NAN),
+        });
+        self.output.cells(time_s, cells)
+    }
+
+    /// Hands the rows so far to their reader.
+    pub(super) fn flush(&mut self) -> Result<(), Failure> {
+        self.output.flush()
+    }
+
+    /// Completes the table.
+    pub(super) fn finish(self) -> Result<(), Failure> {
+        self.output.finish()
     }
 }
 

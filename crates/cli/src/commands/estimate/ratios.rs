@@ -1,5 +1,7 @@
 //! Whether the speeds of a log are those of the vehicle file's car: ratios that a wrong scale changes.
 
+use std::ops::Range;
+
 use config::Vehicle;
 use observer::{Input, Reading};
 use study::swapped_speeds::SwappedSpeeds;
@@ -113,11 +115,14 @@ impl Ratios {
 /// Counts of ratios from 1/20 to 20 by their logarithm.
 struct Histogram {
     counts: Vec<u32>,
+    /// The bin of the ratio before, and ratios that are in it for certain: a car keeps its ratio for long.
+    last: usize,
+    within: Range<f64>,
 }
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: vec![0; Self::BINS] }
+        Self { counts: vec![0; Self::BINS], last: 0, within: 0.0..0.0 }
     }
 }
 
@@ -127,11 +132,22 @@ impl Histogram {
     const FINE: f64 = 100.0;
 
     fn push(&mut self, ratio: f64) {
-        let place = ratio.ln() * Self::FINE + 300.0;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
-        if (0.0..600.0).contains(&place) {
-            self.counts[place as usize] = self.counts[place as usize].saturating_add(1);
+        /// Share by which a ratio near the end of a bin may be taken for one in the next.
+        const ROUNDING: f64 = 1e-9;
+        if !self.within.contains(&ratio) {
+            let place = ratio.ln() * Self::FINE + 300.0;
+            if !(0.0..600.0).contains(&place) {
+                return;
+            }
+            // From the ratio to an end of the bin: of the exponential of less than a hundredth, these two powers stay within it.
+            let factor = |way: f64| 1.0 + way + 0.5 * way * way;
+            let [down, up] = [place.floor() - place, place.floor() + 1.0 - place].map(|way| factor(way / Self::FINE));
+            self.within = ratio * down * (1.0 + ROUNDING)..ratio * up * (1.0 - ROUNDING);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
+            let bin = place as usize;
+            self.last = bin;
         }
+        self.counts[self.last] = self.counts[self.last].saturating_add(1);
     }
 
     /// The middle ratio, to half a per cent; not a number without any.
@@ -145,5 +161,29 @@ impl Histogram {
             }
         }
         f64::NAN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ratio_is_counted_in_the_bin_of_its_logarithm_whatever_the_one_before_was() {
+        // Slow changes, jumps, and the ends of bins from both sides.
+        let slow = (0..100_000).map(|i| 0.9 + 2e-6 * f64::from(i));
+        let ends = (-310_i32..310).map(|bin| (f64::from(bin) / Histogram::FINE).exp());
+        let near = ends.flat_map(|end| [end, end * (1.0 - 1e-12), end * (1.0 + 1e-12), end * (1.0 - 1e-15), 2.5]);
+        let odd = [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300, 1e300];
+        let mut histogram = Histogram::default();
+        let mut expected = vec![0_u32; Histogram::BINS];
+        for ratio in slow.chain(near).chain(odd) {
+            histogram.push(ratio);
+            let place = ratio.ln() * Histogram::FINE + 300.0;
+            if (0.0..600.0).contains(&place) {
+                expected[place as usize] += 1;
+            }
+        }
+        assert_eq!(histogram.counts, expected);
     }
 }

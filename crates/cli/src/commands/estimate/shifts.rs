@@ -53,15 +53,19 @@ impl<'a> Shifts<'a> {
         self.recent.push(*sample);
     }
 
-    /// Takes a shift that is known now; `write` gets its samples if it is wanted.
+    /// Takes a shift that is known now; `write` gets its samples if only some shifts are wanted and this is one.
     pub(super) fn take<E>(&mut self, shift: Shift, write: impl FnOnce(&[LogSample]) -> Result<(), E>) -> Result<(), E> {
         if !self.selection.begins(&format!("{}-{}", shift.from, shift.to)) {
             return Ok(());
         }
         let of_vehicle = is_of_vehicle(&shift, &self.ratios, self.vehicle);
         let mut found = ShiftEstimate::of(self.selection.seen, shift, of_vehicle, &self.recent, self.vehicle);
-        write(&found.samples)?;
-        found.thin(if self.found.len() < MOST_DRAWN { KEPT } else { 0 });
+        let is_drawn = self.found.len() < MOST_DRAWN;
+        if is_drawn || self.is_selective() {
+            found.samples = self.recent.between(found.window_s);
+            write(&found.samples)?;
+            found.thin(if is_drawn { KEPT } else { 0 });
+        }
         self.found.push(found);
         Ok(())
     }
