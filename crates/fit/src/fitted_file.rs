@@ -2,19 +2,14 @@
 
 use config::{Source, Vehicle};
 
+use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
 use crate::parameters::HYSTERESIS_UNIT_PA;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{Fit, FitError, Map, Parameter, ReadingAges, parameters};
 
-/// Least error of the turbine torque, as a share \[chosen\].
-const CONVERTER_SHARE_MIN: f64 = 0.03;
-
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
-/// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
-/// of the cars\].
-const BUDGET_SIDES: f64 = 4.0;
 
 impl Fit {
     /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
@@ -145,56 +140,49 @@ impl Fit {
 
     /// The error budget: what the fit leaves open of each parameter.
     fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
-        let comment = "what the fit leaves open: 4 standard deviations, and no more than was known before";
-        let budget = |key: &str| keys(&["design", "error_bounds", key]);
-        let half = |parameters: &[Parameter]| {
-            BUDGET_SIDES * parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
+        let bound = |key: &str| keys(&["design", "error_bounds", key]);
+        let sd = |parameters: &[Parameter]| {
+            parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
         };
-        // What was known before is a range around the given value; the fitted one lies elsewhere in it. The 95 % interval stays.
+        let half = |parameters: &[Parameter]| BUDGET_SIDES * sd(parameters);
         let factors = |parameters: &[Parameter], given: [f64; 2]| {
-            // No wider than the whole of what was known before, however much the shapes leave open together.
-            let known = (given[1] / given[0]).ln();
-            let (half, value) = (half(parameters).min(known), self.value(parameters[0]).unwrap_or(1.0));
-            let [least, greatest] = given.map(|end| end / value);
-            let stated = half * SIDES / BUDGET_SIDES;
-            [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]
+            budget::factors(sd(parameters), self.value(parameters[0]).unwrap_or(1.0), given)
         };
         let mut set = |path: Vec<Step>, values: &[f64]| {
             // Keys that the file leaves at their defaults stay there.
-            if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
+            if text.has(&path) { text.set(&path, values, Some(BUDGET_COMMENT)) } else { Ok(()) }
         };
         let given = &vehicle.error_bounds;
         // The finer shape of the converter's maps is not fitted.
         let capacity = self.value(Parameter::Capacity).unwrap_or(1.0);
-        let known = given.turbine_torque_share + (capacity - 1.0).abs();
         let converter = [
             Parameter::Capacity,
             Parameter::TorqueRatio,
             Parameter::Shape(Map::Capacity, 0),
             Parameter::Shape(Map::Capacity, 1),
         ];
-        let share = half(&converter).clamp(CONVERTER_SHARE_MIN, known.max(CONVERTER_SHARE_MIN));
-        set(budget("turbine_torque_share"), &[share])?;
-        set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
+        let share = budget::share(sd(&converter), capacity, given.turbine_torque_share, CONVERTER_SHARE_MIN);
+        set(bound("turbine_torque_share"), &[share])?;
+        set(bound("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
         use Parameter as P;
         let with_shape = |map: Map, some: &[P]| [some, &map.parameters()].concat();
         let friction = with_shape(Map::Friction, &[P::Friction, P::FrictionAtRest, P::FrictionSlope]);
-        set(budget("friction_factor"), &factors(&friction, given.friction_factor))?;
-        set(budget("valve_gain_factor"), &factors(&with_shape(Map::Gain, &[P::Gain]), given.valve_gain_factor))?;
-        set(budget("valve_lag_factor"), &factors(&with_shape(Map::Lag, &[P::Lag]), given.valve_lag_factor))?;
-        set(budget("shaft_stiffness_factor"), &factors(&[Parameter::Stiffness], given.shaft_stiffness_factor))?;
+        set(bound("friction_factor"), &factors(&friction, given.friction_factor))?;
+        set(bound("valve_gain_factor"), &factors(&with_shape(Map::Gain, &[P::Gain]), given.valve_gain_factor))?;
+        set(bound("valve_lag_factor"), &factors(&with_shape(Map::Lag, &[P::Lag]), given.valve_lag_factor))?;
+        set(bound("shaft_stiffness_factor"), &factors(&[Parameter::Stiffness], given.shaft_stiffness_factor))?;
         let mass = self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg;
         let known_kg = given.mass_kg + (mass - vehicle.road.mass_kg).abs();
-        set(budget("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
+        set(bound("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
         if let Some(hysteresis_pa) = self.value(P::Hysteresis) {
             let most_pa = hysteresis_pa + HYSTERESIS_UNIT_PA * half(&[P::Hysteresis]);
-            set(budget("valve_hysteresis_pa"), &[most_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
+            set(bound("valve_hysteresis_pa"), &[most_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
         }
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
             let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
             let (one, other) = (delay(0.0), delay(vehicle.limits.command_max));
-            set(budget("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
+            set(bound("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
         }
         Ok(())
     }

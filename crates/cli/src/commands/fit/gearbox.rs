@@ -108,6 +108,7 @@ fn record_one(
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
         recorder.push(step.time_s, &step.input);
+        recorder.push_pressure(step.time_s, step.truth.map(|[pressure_pa, ..]| pressure_pa));
         count += 1;
         if count.is_multiple_of(STEPS) {
             bar.set_message(format!("reading {}, {:.0} s", log.display(), step.time_s));
