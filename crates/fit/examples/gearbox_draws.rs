@@ -36,7 +36,7 @@ fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
+fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let tables = drawn.tables();
     let (recorded, truth) = drawn.driven(drive);
     let number = recorded.shifts.len();
@@ -54,7 +54,7 @@ fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
     let checked = fit.validate((&drawn.file, &tables), (&file, &drawn::tables(&file)), &held_out).unwrap();
     println!(
         "car {}: {number} shifts, {} skipped, torque N m {:.2} -> {:.2} ({:.2}), turbine rad/s {:.2} -> {:.2} (better {}/{}), g {:.2}, misfit {:.2}, \
-         {iterations} iterations, {seconds:.1} s, converged {}",
+         {iterations} iterations, {seconds:.1} s, converged {}, given file possible {}, kept {}",
         drawn.seed,
         recorded.skipped.len(),
         torque_n_m[0],
@@ -66,7 +66,9 @@ fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
         checked.shifts,
         fit.scale_and_gain[1],
         fit.torque_misfit,
-        fit.is_converged
+        fit.is_converged,
+        fit.statements().iter().any(|line| line.contains("do not ask for another file")),
+        fit.reason_against(Some(&checked)).is_some()
     );
     let quantities = &fit.quantities;
     // The simulated drag is another in each element, the sensor's scale is none of the car, and a gain that is not measured is not fitted.
@@ -74,7 +76,7 @@ fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
         Quantity::Drag | Quantity::PressureScale | Quantity::InputDelay => false,
         Quantity::Gain(place) => quantities.measured[place],
         // Drawn delays are constant, those of the file depend on the command.
-        Quantity::Delay(_) => drawn.case != Case::WithTiming,
+        Quantity::Delay(_) => case != Case::WithTiming,
         _ => true,
     };
     let known = quantities.all.iter().enumerate().filter(|(_, quantity)| is_known(**quantity));
@@ -156,7 +158,7 @@ fn main() {
         Ok(other) => panic!("FIT_CASE={other}"),
     };
     let outcomes: Vec<Outcome> =
-        (first..first + cars).map(|seed| outcome(&Drawn::of(drawn::car(&vehicle), seed, case), &drive)).collect();
+        (first..first + cars).map(|seed| outcome(&Drawn::of(drawn::car(&vehicle), seed, case), case, &drive)).collect();
     print_quantities(&outcomes);
     print_estimates(&outcomes);
     let rms = [0, 1].map(|which| mean(outcomes.iter().map(|outcome| outcome.torque_n_m[which].powi(2))).sqrt());

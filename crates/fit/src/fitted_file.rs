@@ -52,7 +52,7 @@ impl Fit {
         let Some(value) = self.value(parameter) else { return Ok(()) };
         let words = self.comment(parameter);
         let comment = Some(words.as_str());
-        let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
+        let times = |text: &mut VehicleText, path: &[&str]| text.map(&keys(path), |number| value * number, comment);
         match parameter {
             Parameter::Capacity => {
                 let capacity = &fitted.converter.capacity_n_m_s2;
@@ -61,63 +61,16 @@ impl Fit {
             Parameter::TorqueRatio => {
                 text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
             }
-            Parameter::Friction => {
-                let friction = &fitted.clutch.friction;
-                set_axis(text, &of_clutch(&["friction", "slip_rad_s"]), friction.axis())?;
-                text.set(&of_clutch(&["friction", "coefficient"]), friction.values(), comment)?;
-                // A clutch that sticks holds at least what it carries as it begins to slip.
-                let at_rest = friction.values().first().copied().unwrap_or(0.0);
-                let more = "keeps its ratio to the fitted friction, and is not below it";
-                text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
+            Parameter::Friction | Parameter::Spring | Parameter::CommandDelay | Parameter::Hysteresis => {
+                write_clutch(text, fitted, clutch, (parameter, value), &words)
             }
-            Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
-            Parameter::Gain => match fitted.valve.maps() {
-                Some(maps) => {
-                    set_axis(text, &of_clutch(&["valve", "gain", "current_a"]), maps.gain_pa_a.axis())?;
-                    text.set(&of_clutch(&["valve", "gain", "gain_pa_a"]), maps.gain_pa_a.values(), comment)?;
-                    text.map(&keys(&["observer", "valve", "gain_pa_a"]), |gain| value * gain, comment)
-                }
-                None => {
-                    text.map(&of_clutch(&["valve", "line_pressure_pa"]), |pressure| value * pressure, comment)?;
-                    text.map(&keys(&["observer", "valve", "line_pressure_pa"]), |pressure| value * pressure, comment)
-                }
-            },
-            Parameter::Lag => match fitted.valve.maps() {
-                Some(maps) => {
-                    set_axis(text, &of_clutch(&["valve", "lag", "pressure_pa"]), maps.time_constant_s.axis())?;
-                    text.set(&of_clutch(&["valve", "lag", "time_constant_s"]), maps.time_constant_s.values(), comment)?;
-                    text.map(&keys(&["observer", "valve", "time_constant_s"]), |lag| value * lag, comment)
-                }
-                None => {
-                    text.map(&of_clutch(&["valve", "flow_sqrt_pa_s"]), |flow| flow / value, comment)?;
-                    text.map(&keys(&["observer", "valve", "flow_sqrt_pa_s"]), |flow| flow / value, comment)
-                }
-            },
-            Parameter::Hysteresis => {
-                let own = of_clutch(&["valve", "hysteresis_pa"]);
-                if text.has(&own) {
-                    text.set(&own, &[value], comment)
-                } else if value == 0.0 {
-                    Ok(())
-                } else {
-                    text.add_beside(&of_clutch(&["valve", "gain"]), "hysteresis_pa", value, &words)
-                }
-            }
-            Parameter::CommandDelay => {
-                text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
-            }
+            Parameter::Gain | Parameter::Lag => write_valve(text, fitted, clutch, (parameter, value), &words),
             Parameter::Inertia(shaft) => text.map(&shaft_inertia(shaft), |inertia| value * inertia, comment),
-            Parameter::Stiffness => {
-                text.map(&keys(&["driveline", "shaft_stiffness_n_m_rad"]), |stiffness| value * stiffness, comment)
-            }
-            Parameter::Damping => {
-                text.map(&keys(&["driveline", "shaft_damping_n_m_s_rad"]), |damping| value * damping, comment)
-            }
-            Parameter::Tyre => text.map(&keys(&["tyre", "slip_scale"]), |slip| value * slip, comment),
-            Parameter::Mass => text.map(&keys(&["vehicle", "mass_kg"]), |mass| value * mass, comment),
-            Parameter::EngineInertia => {
-                text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment)
-            }
+            Parameter::Stiffness => times(text, &["driveline", "shaft_stiffness_n_m_rad"]),
+            Parameter::Damping => times(text, &["driveline", "shaft_damping_n_m_s_rad"]),
+            Parameter::Tyre => times(text, &["tyre", "slip_scale"]),
+            Parameter::Mass => times(text, &["vehicle", "mass_kg"]),
+            Parameter::EngineInertia => times(text, &["engine", "inertia_kg_m2"]),
             // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
             _ => Ok(()),
         }
@@ -160,6 +113,8 @@ impl Fit {
             Parameter::TorqueRatio,
             Parameter::Shape(Map::Capacity, 0),
             Parameter::Shape(Map::Capacity, 1),
+            Parameter::Shape(Map::Capacity, 2),
+            Parameter::Shape(Map::Capacity, 3),
         ];
         let share = budget::share(sd(&converter), capacity, given.turbine_torque_share, CONVERTER_SHARE_MIN);
         set(bound("turbine_torque_share"), &[share])?;
@@ -186,6 +141,74 @@ impl Fit {
         }
         Ok(())
     }
+}
+
+/// Writes what is of the oncoming clutch itself.
+fn write_clutch(
+    text: &mut VehicleText,
+    fitted: &Car,
+    clutch: &str,
+    (parameter, value): (Parameter, f64),
+    words: &str,
+) -> Result<(), FitError> {
+    let comment = Some(words);
+    let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
+    match parameter {
+        Parameter::Friction => {
+            let friction = &fitted.clutch.friction;
+            set_axis(text, &of_clutch(&["friction", "slip_rad_s"]), friction.axis())?;
+            text.set(&of_clutch(&["friction", "coefficient"]), friction.values(), comment)?;
+            // A clutch that sticks holds at least what it carries as it begins to slip.
+            let at_rest = friction.values().first().copied().unwrap_or(0.0);
+            let more = "keeps its ratio to the fitted friction, and is not below it";
+            text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
+        }
+        Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
+        Parameter::CommandDelay => {
+            text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
+        }
+        _ => {
+            let own = of_clutch(&["valve", "hysteresis_pa"]);
+            match text.has(&own) {
+                true => text.set(&own, &[value], comment),
+                false if value == 0.0 => Ok(()),
+                false => text.add_beside(&of_clutch(&["valve", "gain"]), "hysteresis_pa", value, words),
+            }
+        }
+    }
+}
+
+/// Writes gain or lag of its valve, and of the observer's.
+fn write_valve(
+    text: &mut VehicleText,
+    fitted: &Car,
+    clutch: &str,
+    (parameter, value): (Parameter, f64),
+    words: &str,
+) -> Result<(), FitError> {
+    let comment = Some(words);
+    let of_valve = |key: &[&str]| keys(&[&["clutch", clutch, "valve"], key].concat());
+    let of_observer = |key: &str| keys(&["observer", "valve", key]);
+    let (map, axis, [table, axis_key, values_key], common) = match (parameter, fitted.valve.maps()) {
+        (Parameter::Gain, Some(maps)) => {
+            (maps.gain_pa_a.values(), maps.gain_pa_a.axis(), ["gain", "current_a", "gain_pa_a"], "gain_pa_a")
+        }
+        (_, Some(maps)) => {
+            let lag = &maps.time_constant_s;
+            (lag.values(), lag.axis(), ["lag", "pressure_pa", "time_constant_s"], "time_constant_s")
+        }
+        (_, None) => {
+            let (key, factor) = match parameter {
+                Parameter::Gain => ("line_pressure_pa", value),
+                _ => ("flow_sqrt_pa_s", value.recip()),
+            };
+            text.map(&of_valve(&[key]), |number| factor * number, comment)?;
+            return text.map(&of_observer(key), |number| factor * number, comment);
+        }
+    };
+    set_axis(text, &of_valve(&[table, axis_key]), axis)?;
+    text.set(&of_valve(&[table, values_key]), map, comment)?;
+    text.map(&of_observer(common), |number| value * number, comment)
 }
 
 /// Puts in the axis of a map that has more points than in the file; any other stays as it is written.

@@ -134,13 +134,7 @@ impl Car {
         let own_check = Check::of(&source);
         let valve = own.valve.as_ref().map_or((&check, &raw.valve), |valve| (&own_check, valve));
         let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
-        let elements = gearbox.elements.iter().zip(&clutches).map(|(element, clutch)| {
-            let own = raw.clutch.get(element.name.as_str()).and_then(|own| own.error_bounds.as_ref());
-            let Some(own) = own else { return Ok(ElementErrorBounds::default()) };
-            let table = format!("clutch.{}.error_bounds", element.name);
-            car_bounds::of_element(&check, &table, own, clutch.map_or(0.0, |clutch| clutch.hysteresis_pa))
-        });
-        let error_bounds = car_bounds::of_car(&check, &raw.error_bounds, elements.collect::<Result<_, _>>()?)?;
+        let error_bounds = error_bounds(&check, &raw, &gearbox, &clutches)?;
         Ok(Self {
             error_bounds,
             name: check.title("name", &raw.name)?,
@@ -267,6 +261,22 @@ struct RawElementClutch {
     valve: Option<Spanned<RawClutchValve>>,
     fill: Option<RawFill>,
     error_bounds: Option<RawElementErrorBounds>,
+}
+
+/// What the file has of the errors of the car and of its elements.
+fn error_bounds(
+    check: &Check<'_>,
+    raw: &RawCar,
+    gearbox: &Gearbox,
+    clutches: &[Option<ShiftClutch>],
+) -> Result<CarErrorBounds, ConfigError> {
+    let elements = gearbox.elements.iter().zip(clutches).map(|(element, clutch)| {
+        let own = raw.clutch.get(element.name.as_str()).and_then(|own| own.error_bounds.as_ref());
+        let Some(own) = own else { return Ok(ElementErrorBounds::default()) };
+        let table = format!("clutch.{}.error_bounds", element.name);
+        car_bounds::of_element(check, &table, own, clutch.map_or(0.0, |clutch| clutch.hysteresis_pa))
+    });
+    car_bounds::of_car(check, &raw.error_bounds, elements.collect::<Result<_, _>>()?)
 }
 
 fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) -> Result<LockUp, ConfigError> {

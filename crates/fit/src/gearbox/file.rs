@@ -43,18 +43,19 @@ impl GearboxFit {
             }
         }
         self.write_budget(&mut text, car)?;
-        let gearbox = gearbox_path(car)?;
-        text.set_gearbox(car, path, &gearbox)?;
         let logs = logs.replace(char::is_control, " ");
-        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
-        let source = Source { path: path.to_owned(), text: head + &text.finish() };
-        let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
-        Car::from_sources(source, gearbox).map_err(|error| {
-            FitError::Work(format!(
-                "the fitted values are not those of a possible car: {error}\n\
-                 hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
-            ))
-        })
+        let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
+        written(text, car, path, &head)
+    }
+
+    /// The given vehicle file as it is to stand at `path`, with the reason why its values are kept in a line at its head.
+    ///
+    /// # Errors
+    /// None that the given file does not have itself.
+    pub fn kept_file(&self, car: &Car, path: &Path, reason: &str) -> Result<Car, FitError> {
+        let reason = reason.replace(char::is_control, " ");
+        let text = Written::new(&car.source.text)?;
+        written(text, car, path, &format!("all values are those of the given file. {reason}"))
     }
 
     fn write_converter(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
@@ -183,6 +184,20 @@ impl GearboxFit {
             }
         }
     }
+}
+
+/// The file with a text, as it is to stand at `path`, with a line at its head.
+fn written(mut text: Written, car: &Car, path: &Path, head: &str) -> Result<Car, FitError> {
+    let gearbox = gearbox_path(car)?;
+    text.set_gearbox(car, path, &gearbox)?;
+    let source = Source { path: path.to_owned(), text: format!("{FITTED}{head}\n{}", text.finish()) };
+    let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
+    Car::from_sources(source, gearbox).map_err(|error| {
+        FitError::Work(format!(
+            "the fitted values are not those of a possible car: {error}\n\
+             hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
+        ))
+    })
 }
 
 /// What a fitted factor says of itself.

@@ -3,6 +3,7 @@
 use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use nalgebra::DMatrix;
+use observer::any_shift::AnyShiftFilter;
 
 use super::shift_log::{ShiftLog, named_pair};
 
@@ -74,75 +75,21 @@ pub struct Quantities {
 impl Quantities {
     /// Those of a car with these tables, with the pairs of neighbouring gears and of these shifts.
     pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Self {
-        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
-        let (known, rows) = (&filter.uncertainty, tables.tables());
-        let forward = car.gearbox.forward_gears();
-        let is_known =
-            |pair: &[usize; 2]| rows.shift(pair[0], pair[1]).is_some() || rows.shift(pair[1], pair[0]).is_some();
-        let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
-        // The lower gear first.
-        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);
-        let lower_first = |[a, b]: [usize; 2]| if ratio(a) > ratio(b) { [a, b] } else { [b, a] };
-        for pair in shifts.iter().map(|log| lower_first(log.gears)) {
-            if !pairs.contains(&pair) {
-                pairs.push(pair);
-            }
-        }
-        pairs.retain(is_known);
-        let mut all = vec![Quantity::Input];
+        let (pairs, measured) = (pairs(car, tables, shifts), measured(tables, shifts));
         let has_converter = car.converter.is_some();
-        all.push(if has_converter { Quantity::TorqueRatio } else { Quantity::InputDelay });
-        all.push(Quantity::Drag);
-        let elements = rows.elements.len();
-        let measured = measured(tables, shifts);
-        all.extend((0..elements).flat_map(|at| {
+        let input = if has_converter { Quantity::TorqueRatio } else { Quantity::InputDelay };
+        let mut all = vec![Quantity::Input, input, Quantity::Drag];
+        all.extend((0..measured.len()).flat_map(|at| {
             [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at), Quantity::Delay(at), Quantity::Gain(at)]
         }));
         all.extend((0..pairs.len()).map(Quantity::Inertia));
         if measured.contains(&true) {
             all.push(Quantity::PressureScale);
         }
-        // A kiss point by the gain of the file falls with the gain.
-        let kiss_by_gain = |at: usize| -known.valve_gain * rows.elements[at].clutch.kiss_pressure() / KISS_UNIT_PA;
-        let sd = |quantity: &Quantity| match quantity {
-            Quantity::Input if has_converter => filter.turbine.converter_share,
-            Quantity::Input => filter.turbine.engine_share,
-            Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
-            Quantity::InputDelay => INPUT_DELAY_S / DELAY_UNIT_S / 3.0_f64.sqrt(),
-            Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
-            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
-            Quantity::Torque(_) => known.torque_share,
-            Quantity::Kiss(at) => (known.kiss_point_pa / KISS_UNIT_PA).hypot(kiss_by_gain(*at)),
-            Quantity::Gain(_) => known.valve_gain,
-            Quantity::PressureScale => PRESSURE_SCALE,
-            Quantity::Lag(_) => known.valve_lag_share,
-            Quantity::Inertia(_) => known.inertia_share,
-        };
+        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
+        let known = Known { filter: &filter, has_converter, measured: &measured };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
-            let both = sd(&all[i]) * sd(&all[j]);
-            match (all[i], all[j]) {
-                _ if i == j => both,
-                (Quantity::Torque(_), Quantity::Torque(_))
-                | (Quantity::Delay(_), Quantity::Delay(_))
-                | (Quantity::Inertia(_), Quantity::Inertia(_)) => COMMON * both,
-                // The gain of one whose pressure is not measured stays that of the file.
-                (Quantity::Torque(at), Quantity::Gain(of)) | (Quantity::Gain(of), Quantity::Torque(at))
-                    if at == of && measured[at] =>
-                {
-                    known.valve_gain.powi(2)
-                }
-                (Quantity::Kiss(at), Quantity::Gain(of)) | (Quantity::Gain(of), Quantity::Kiss(at))
-                    if at == of && measured[at] =>
-                {
-                    known.valve_gain * kiss_by_gain(at)
-                }
-                (Quantity::Torque(at), Quantity::Kiss(of)) | (Quantity::Kiss(of), Quantity::Torque(at))
-                    if at == of && measured[at] =>
-                {
-                    known.valve_gain * kiss_by_gain(at)
-                }
-                _ => 0.0,
-            }
+            if i == j { known.sd(all[i]).powi(2) } else { known.covariance(all[i], all[j]) }
         });
         let names = car.gearbox.elements.iter().enumerate();
         let mut named: Vec<(usize, String)> =
@@ -202,6 +149,80 @@ impl Quantities {
         let power = |quantity: &Quantity| f64::from(u8::from(quantity.has_torque_scale()));
         self.all.iter().map(power).collect()
     }
+}
+
+/// What is known before a fit: what the filter of the car does not know.
+struct Known<'a> {
+    filter: &'a AnyShiftFilter<'a, f64>,
+    has_converter: bool,
+    measured: &'a [bool],
+}
+
+impl Known<'_> {
+    /// Standard deviation of a quantity.
+    fn sd(&self, quantity: Quantity) -> f64 {
+        let known = &self.filter.uncertainty;
+        match quantity {
+            Quantity::Input if self.has_converter => self.filter.turbine.converter_share,
+            Quantity::Input => self.filter.turbine.engine_share,
+            Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
+            Quantity::InputDelay => INPUT_DELAY_S / DELAY_UNIT_S / 3.0_f64.sqrt(),
+            Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
+            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
+            Quantity::Torque(_) => known.torque_share,
+            Quantity::Kiss(at) => (known.kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
+            Quantity::Gain(_) => known.valve_gain,
+            Quantity::PressureScale => PRESSURE_SCALE,
+            Quantity::Lag(_) => known.valve_lag_share,
+            Quantity::Inertia(_) => known.inertia_share,
+        }
+    }
+
+    /// What a deviation of the gain does to a kiss point by the gain of the file.
+    fn kiss_by_gain(&self, at: usize) -> f64 {
+        let kiss_pa = self.filter.tables.elements[at].clutch.kiss_pressure();
+        -self.filter.uncertainty.valve_gain * kiss_pa / KISS_UNIT_PA
+    }
+
+    /// The element of a quantity that the gain of its valve is part of, and what a deviation of the gain does to it.
+    fn by_gain(&self, quantity: Quantity) -> Option<(usize, f64)> {
+        match quantity {
+            Quantity::Torque(at) | Quantity::Gain(at) => Some((at, self.filter.uncertainty.valve_gain)),
+            Quantity::Kiss(at) => Some((at, self.kiss_by_gain(at))),
+            _ => None,
+        }
+    }
+
+    /// Covariance of two different quantities.
+    fn covariance(&self, one: Quantity, other: Quantity) -> f64 {
+        use Quantity as Q;
+        match (one, other) {
+            (Q::Torque(_), Q::Torque(_)) | (Q::Delay(_), Q::Delay(_)) | (Q::Inertia(_), Q::Inertia(_)) => {
+                COMMON * self.sd(one) * self.sd(other)
+            }
+            _ => match (self.by_gain(one), self.by_gain(other)) {
+                // The gain of one whose pressure is not measured stays that of the file.
+                (Some((at, of_one)), Some((of, of_other))) if at == of && self.measured[at] => of_one * of_other,
+                _ => 0.0,
+            },
+        }
+    }
+}
+
+/// The pairs of neighbouring gears and of these shifts with a shift from one clutch to another, the lower gear first.
+fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usize; 2]> {
+    let rows = tables.tables();
+    let forward = car.gearbox.forward_gears();
+    let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+    let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);
+    let lower_first = |[a, b]: [usize; 2]| if ratio(a) > ratio(b) { [a, b] } else { [b, a] };
+    for pair in shifts.iter().map(|log| lower_first(log.gears)) {
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    pairs.retain(|[low, high]| rows.shift(*low, *high).is_some() || rows.shift(*high, *low).is_some());
+    pairs
 }
 
 /// Which elements have a measured pressure, by their places in the tables.

@@ -10,8 +10,13 @@ use crate::{ReportRow, Verdict};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
-/// Standard deviations on either side that 99.9 % lie within: 5 % over some 30 quantities.
+/// Standard deviations on either side that 99.9 % lie within: 5 % over some 40 quantities.
 const SIDES_OF_ALL: f64 = 3.3;
+
+/// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
+const NOT_FITTED: &str = "not fitted, and as in the given file: mass, road load, wheel radius, drive shafts, backlash, hysteresis of the valves and the shapes \
+     of all maps. Weighing the car would tell its mass; coasting down in neutral on a level road, both ways, rolling resistance and air drag; pressing \
+     and releasing the pedal in one gear, shafts and backlash; a fit does not read such drives";
 
 impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
@@ -76,6 +81,7 @@ impl GearboxFit {
         }));
         lines.extend(self.warnings());
         lines.extend(self.proposals());
+        lines.push(NOT_FITTED.to_owned());
         lines
     }
 
@@ -105,8 +111,9 @@ impl GearboxFit {
     /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni; those with the common factor of all
     /// torques also beside it.
     fn given_is_possible(&self) -> bool {
+        let is_of_car = |quantity| !matches!(quantity, Quantity::Drag | Quantity::InputDelay | Quantity::PressureScale);
         let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
-        let mut car = seen().filter(|quantity| *quantity != Quantity::Drag);
+        let mut car = seen().filter(|quantity| is_of_car(*quantity));
         let mut torques = seen().filter(|quantity| quantity.has_torque_scale());
         let scale = self.torque_scale();
         car.all(|quantity| self.unknown(quantity).abs() <= SIDES_OF_ALL * self.sd(quantity))

@@ -74,8 +74,35 @@ pub(crate) struct Linearised {
     pub(crate) residuals: DVector<f64>,
     pub(crate) by_parameter: DMatrix<f64>,
     pub(crate) by_own: DMatrix<f64>,
-    /// Of the measured pressure of a clutch, Pa: residuals, and derivatives of the prediction.
-    pub(crate) pressure: Vec<(DVector<f64>, DMatrix<f64>)>,
+    /// Of the clutches whose pressure is measured.
+    pub(crate) pressure: Vec<MeasuredPressure>,
+}
+
+/// The measured pressure of a clutch about unknowns, Pa: residuals, and derivatives of the prediction.
+pub(crate) struct MeasuredPressure {
+    pub(crate) residuals: DVector<f64>,
+    pub(crate) by_parameter: DMatrix<f64>,
+}
+
+/// The unknowns of a fit, and the derivatives of a shift's angular momentum by them.
+struct Unknowns<'a> {
+    quantities: &'a Quantities,
+    at: &'a [f64],
+    by_momentum: DMatrix<f64>,
+}
+
+impl Unknowns<'_> {
+    fn of(&self, quantity: Quantity) -> f64 {
+        self.quantities.place(quantity).map_or(0.0, |place| self.at[place])
+    }
+
+    /// Adds to the derivative by a quantity.
+    fn put(&mut self, quantity: Quantity, momentum: &[f64]) {
+        if let Some(place) = self.quantities.place(quantity) {
+            let mut column = self.by_momentum.column_mut(place);
+            column.iter_mut().zip(momentum).for_each(|(cell, value)| *cell += value);
+        }
+    }
 }
 
 impl ShiftModel {
@@ -125,70 +152,86 @@ impl ShiftModel {
 
     /// Residuals and derivatives at unknowns.
     pub(crate) fn linearised(&self, quantities: &Quantities, at: &[f64]) -> Linearised {
-        let of = |quantity: Quantity| quantities.place(quantity).map_or(0.0, |place| at[place]);
-        let inertia = self.inertia_kg_m2 * of(Quantity::Inertia(self.pair)).exp();
         let rows = self.reading.len();
-        let mut by_parameter = DMatrix::zeros(rows, at.len());
-        let mut put = |quantity: Quantity, momentum: &[f64]| {
-            if let Some(place) = quantities.place(quantity) {
-                let mut column = by_parameter.column_mut(place);
-                column.iter_mut().zip(momentum).for_each(|(cell, value)| *cell += value / inertia);
-            }
-        };
-        let capacity = of(Quantity::Input).exp();
-        let ratio = of(Quantity::TorqueRatio).exp();
-        let late_n_m = self.reported_n_m(of(Quantity::InputDelay));
-        let torques = late_n_m.as_ref().unwrap_or(&self.input_n_m).iter().zip(&self.above_one_n_m);
-        let input: Vec<f64> = torques.map(|(all, above)| capacity * (all + (ratio - 1.0) * above)).collect();
-        let mut momentum = self.integral(&input);
-        put(Quantity::Input, &momentum);
-        if let (Some(now), Some(later)) = (&late_n_m, self.reported_n_m(of(Quantity::InputDelay) + DELAY_STEP)) {
-            let change = later.iter().zip(now).map(|(later, now)| capacity * (later - now) / DELAY_STEP);
-            put(Quantity::InputDelay, &self.integral(&change.collect::<Vec<_>>()));
-        }
-        let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
-        put(Quantity::TorqueRatio, &self.integral(&above));
-        let more: Vec<f64> = self.drag_of_one_n_m.iter().map(|drag| DRAG_UNIT_N_M * drag).collect();
-        put(Quantity::Drag, &self.integral(&more));
-        let drag: Vec<f64> =
-            self.drag_n_m.iter().zip(&more).map(|(file, more)| file + of(Quantity::Drag) * more).collect();
-        momentum.iter_mut().zip(self.integral(&drag)).for_each(|(sum, more)| *sum += more);
-        let mut pressures = Vec::new();
+        let mut unknowns = Unknowns { quantities, at, by_momentum: DMatrix::zeros(rows, at.len()) };
+        let mut momentum = self.input_momentum(&mut unknowns);
+        let mut pressure = Vec::new();
         for clutch in &self.clutches {
-            let (torque, kiss) = (Quantity::Torque(clutch.place), Quantity::Kiss(clutch.place));
-            let (lag, gain) = (Quantity::Lag(clutch.place), Quantity::Gain(clutch.place));
-            let delay = Quantity::Delay(clutch.place);
-            let late = of(delay);
-            let (factor, kiss_pa) = (of(torque).exp(), clutch.kiss_pa + KISS_UNIT_PA * of(kiss));
-            let pressure = clutch.pressures(self.grid, of(lag), of(gain), late);
-            let slope = |i: usize| if pressure[i] > kiss_pa { -factor * clutch.per_pa[i] } else { 0.0 };
-            let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<f64> {
-                self.integral(&(0..pressure.len()).map(|i| slope(i) * by(i)).collect::<Vec<_>>())
-            };
-            let of_clutch = scaled(&|i| pressure[i] - kiss_pa);
-            put(torque, &of_clutch);
-            put(kiss, &scaled(&|_| -KISS_UNIT_PA));
-            let change = |other: Vec<f64>, step: f64| -> Vec<f64> {
-                other.iter().zip(&pressure).map(|(other, pressure)| (other - pressure) / step).collect()
-            };
-            let by = [
-                (lag, change(clutch.pressures(self.grid, of(lag) + LAG_STEP, of(gain), late), LAG_STEP)),
-                (gain, change(clutch.pressures(self.grid, of(lag), of(gain) + GAIN_STEP, late), GAIN_STEP)),
-                (delay, change(clutch.pressures(self.grid, of(lag), of(gain), late + DELAY_STEP), DELAY_STEP)),
-            ];
-            by.iter().for_each(|(quantity, change)| put(*quantity, &scaled(&|i| change[i])));
-            pressures.extend(clutch.measured(self.grid, quantities, at, &pressure, &by));
+            let (of_clutch, measured) = self.clutch_momentum(clutch, &mut unknowns);
             momentum.iter_mut().zip(of_clutch).for_each(|(sum, more)| *sum += more);
+            pressure.extend(measured);
         }
         let less: Vec<f64> = momentum.iter().map(|momentum| -momentum).collect();
-        put(Quantity::Inertia(self.pair), &less);
+        unknowns.put(Quantity::Inertia(self.pair), &less);
+        let inertia = self.inertia_kg_m2 * unknowns.of(Quantity::Inertia(self.pair)).exp();
         let speeds = momentum.iter().zip(&self.by_output).map(|(momentum, output)| momentum / inertia - output);
         let residuals = self.reading.iter().zip(speeds).map(|(reading, speed)| reading - speed);
         let by_own = DMatrix::from_fn(rows, OWN, |row, own| match own {
             0 => 1.0,
             _ => (self.time_s[row] - self.grid.begin_s) / inertia,
         });
-        Linearised { residuals: DVector::from_iterator(rows, residuals), by_parameter, by_own, pressure: pressures }
+        Linearised {
+            residuals: DVector::from_iterator(rows, residuals),
+            by_parameter: unknowns.by_momentum / inertia,
+            by_own,
+            pressure,
+        }
+    }
+
+    /// Angular momentum of the turbine by the torque at the input and the drag, at the readings.
+    fn input_momentum(&self, unknowns: &mut Unknowns<'_>) -> Vec<f64> {
+        let [capacity, ratio] = [Quantity::Input, Quantity::TorqueRatio].map(|quantity| unknowns.of(quantity).exp());
+        let late = unknowns.of(Quantity::InputDelay);
+        let late_n_m = self.reported_n_m(late);
+        let torques = late_n_m.as_ref().unwrap_or(&self.input_n_m).iter().zip(&self.above_one_n_m);
+        let input: Vec<f64> = torques.map(|(all, above)| capacity * (all + (ratio - 1.0) * above)).collect();
+        let mut momentum = self.integral(&input);
+        unknowns.put(Quantity::Input, &momentum);
+        if let (Some(now), Some(later)) = (&late_n_m, self.reported_n_m(late + DELAY_STEP)) {
+            let change = later.iter().zip(now).map(|(later, now)| capacity * (later - now) / DELAY_STEP);
+            unknowns.put(Quantity::InputDelay, &self.integral(&change.collect::<Vec<_>>()));
+        }
+        let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
+        unknowns.put(Quantity::TorqueRatio, &self.integral(&above));
+        let more: Vec<f64> = self.drag_of_one_n_m.iter().map(|drag| DRAG_UNIT_N_M * drag).collect();
+        unknowns.put(Quantity::Drag, &self.integral(&more));
+        let peak = unknowns.of(Quantity::Drag);
+        let drag: Vec<f64> = self.drag_n_m.iter().zip(&more).map(|(file, more)| file + peak * more).collect();
+        momentum.iter_mut().zip(self.integral(&drag)).for_each(|(sum, more)| *sum += more);
+        momentum
+    }
+
+    /// The same by a clutch, and residuals of its measured pressure.
+    fn clutch_momentum(
+        &self,
+        clutch: &ClutchModel,
+        unknowns: &mut Unknowns<'_>,
+    ) -> (Vec<f64>, Option<MeasuredPressure>) {
+        let place = clutch.place;
+        let quantities = [Quantity::Lag(place), Quantity::Gain(place), Quantity::Delay(place)];
+        let [lag, gain, late] = quantities.map(|quantity| unknowns.of(quantity));
+        let kiss_pa = clutch.kiss_pa + KISS_UNIT_PA * unknowns.of(Quantity::Kiss(place));
+        let factor = unknowns.of(Quantity::Torque(place)).exp();
+        let pressure = clutch.pressures(self.grid, lag, gain, late);
+        let slope = |i: usize| if pressure[i] > kiss_pa { -factor * clutch.per_pa[i] } else { 0.0 };
+        let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            self.integral(&(0..pressure.len()).map(|i| slope(i) * by(i)).collect::<Vec<_>>())
+        };
+        let momentum = scaled(&|i| pressure[i] - kiss_pa);
+        unknowns.put(Quantity::Torque(place), &momentum);
+        unknowns.put(Quantity::Kiss(place), &scaled(&|_| -KISS_UNIT_PA));
+        let change = |other: Vec<f64>, step: f64| -> Vec<f64> {
+            other.iter().zip(&pressure).map(|(other, pressure)| (other - pressure) / step).collect()
+        };
+        let changes = [
+            change(clutch.pressures(self.grid, lag + LAG_STEP, gain, late), LAG_STEP),
+            change(clutch.pressures(self.grid, lag, gain + GAIN_STEP, late), GAIN_STEP),
+            change(clutch.pressures(self.grid, lag, gain, late + DELAY_STEP), DELAY_STEP),
+        ];
+        let by: Vec<(Quantity, Vec<f64>)> = quantities.into_iter().zip(changes).collect();
+        by.iter().for_each(|(quantity, change)| unknowns.put(*quantity, &scaled(&|i| change[i])));
+        let measured = clutch.measured(self.grid, unknowns, &pressure, &by);
+        (momentum, measured)
     }
 
     /// The reported engine torque at the points of the grid with this unknown of its delay.
@@ -223,11 +266,10 @@ impl ClutchModel {
     fn measured(
         &self,
         grid: Grid,
-        quantities: &Quantities,
-        at: &[f64],
+        Unknowns { quantities, at, .. }: &Unknowns<'_>,
         pressure: &[f64],
         by: &[(Quantity, Vec<f64>)],
-    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    ) -> Option<MeasuredPressure> {
         let rows = self.measured.len();
         let scale = quantities.place(Quantity::PressureScale).filter(|_| rows > 0)?;
         let gain = quantities.place(Quantity::Gain(self.place))?;
@@ -246,7 +288,8 @@ impl ClutchModel {
                 column += predicted(change);
             }
         }
-        Some((DVector::from_column_slice(&self.measured.value) - all, by_parameter))
+        let residuals = DVector::from_column_slice(&self.measured.value) - all;
+        Some(MeasuredPressure { residuals, by_parameter })
     }
 }
 
@@ -326,7 +369,7 @@ fn clutch(
 pub struct OpenLoop {
     /// Time in the log, s.
     pub time_s: f64,
-    /// Size of the torque of offgoing and oncoming clutch at the clutch, N m.
+    /// Size of the torque of offgoing and oncoming clutch at the clutch by pressure and friction, N m.
     pub torque_n_m: [f64; 2],
     /// Their pressures, Pa.
     pub pressure_pa: [f64; 2],

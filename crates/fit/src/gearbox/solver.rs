@@ -6,7 +6,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 
 use super::quantities::Quantities;
-use super::shift::{Linearised, OWN, ShiftModel};
+use super::shift::{Linearised, MeasuredPressure, OWN, ShiftModel};
 use crate::FitError;
 use crate::weights::{FACTOR, HUBER, correlation, gain_and_scale, one_step};
 
@@ -98,7 +98,7 @@ pub(crate) struct Solved {
 /// A shift with its own unknowns at their best for these parameters.
 fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights) -> Profiled {
     let mut profiled = profiled_turbine(shift, lines, weights.turbine);
-    for (residuals, by_parameter) in &lines.pressure {
+    for MeasuredPressure { residuals, by_parameter } in &lines.pressure {
         let mut errors = residuals.clone();
         let mut whitened = by_parameter.clone();
         weights.pressure.in_scales(errors.as_mut_slice());

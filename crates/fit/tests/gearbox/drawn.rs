@@ -63,7 +63,6 @@ pub(crate) struct Drawn {
     pub(crate) file: Car,
     pub(crate) truth: Car,
     pub(crate) seed: u64,
-    pub(crate) case: Case,
     draw: ShiftDraw,
     kiss_pa: Vec<f64>,
     /// What the file's inertias are multiplied with to be true, by pairs of gears.
@@ -86,7 +85,7 @@ impl Drawn {
         // Streams of their own: the other draws do not depend on them.
         let (mut timings, mut drags) = (Random(seed ^ TIMING_STREAM), Random(!seed));
         let draw = match case {
-            Case::WithTiming => draw.with_timing(&ShiftErrors::STANDARD, || timings.uniform()),
+            Case::WithTiming => draw.with_timing(&file, &ShiftErrors::STANDARD, || timings.uniform()),
             _ => draw,
         };
         let mut truth = draw.car(&file);
@@ -112,7 +111,7 @@ impl Drawn {
                 reduced.mass_kg_m2[0][0] /= factor;
             }
         }
-        Self { file, truth, seed, case, draw, kiss_pa, inertia }
+        Self { file, truth, seed, draw, kiss_pa, inertia }
     }
 
     pub(crate) fn tables(&self) -> ShiftTables<f64> {
