@@ -113,8 +113,6 @@ impl Fit {
             Parameter::TorqueRatio,
             Parameter::Shape(Map::Capacity, 0),
             Parameter::Shape(Map::Capacity, 1),
-            Parameter::Shape(Map::Capacity, 2),
-            Parameter::Shape(Map::Capacity, 3),
         ];
         let share = budget::share(sd(&converter), capacity, given.turbine_torque_share, CONVERTER_SHARE_MIN);
         set(bound("turbine_torque_share"), &[share])?;
