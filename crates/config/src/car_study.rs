@@ -8,7 +8,7 @@ use toml::Spanned;
 use crate::check::{Check, Number, Word};
 use crate::experiment::raw::RawSensors;
 use crate::experiment::sensors::sensors;
-use crate::{Car, ConfigError, Drive, Sensors, Source};
+use crate::{Car, ConfigError, Drive, Kind, Sensors, Source};
 
 /// Most cars of a study.
 const MOST_RUNS: f64 = 1e6;
@@ -97,7 +97,7 @@ impl CarStudy {
     /// A file cannot be read, or something in it is wrong.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let source = Source::read(path)?;
-        let raw: RawCarStudy = source.parse()?;
+        let raw: RawCarStudy = source.parse_as(Kind::CarStudy)?;
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
         let of_file = |key: &str, word: &Word| (beside(word.get_ref()), key.to_owned(), word.span().start);
         let (path, key, at) = of_file("vehicle", &raw.vehicle);

@@ -9,7 +9,7 @@ use toml::Spanned;
 use crate::check::{Check, Number, Numbers, Word};
 use crate::experiment::raw::RawSensors;
 use crate::experiment::sensors::sensors;
-use crate::{Car, ConfigError, Sensors, Source, SpeedTrace};
+use crate::{Car, ConfigError, Kind, Sensors, Source, SpeedTrace};
 
 /// Most repetitions of the segments.
 const MOST_REPETITIONS: f64 = 1e6;
@@ -116,7 +116,7 @@ impl Drive {
     /// # Errors
     /// What is wrong, with its line and a hint.
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
-        let raw: RawDrive = source.parse()?;
+        let raw: RawDrive = source.parse_as(Kind::Drive)?;
         let check = Check::of(&source);
         let (segments, trace) = match (&raw.segment, &raw.trace) {
             (Some(segments), None) => (check_segments(&check, segments)?, None),

@@ -1,5 +1,6 @@
 //! The text of a configuration file.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -30,6 +31,37 @@ pub enum Kind {
     Sensors,
     /// A gearbox.
     Gearbox,
+}
+
+impl Kind {
+    /// A file of this kind, in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Vehicle => "a vehicle file of one shift",
+            Self::Car => "a vehicle file of a car with a gearbox",
+            Self::Experiment => "an experiment file",
+            Self::Drive => "a drive file",
+            Self::Study => "a study file",
+            Self::CarStudy => "a study file of a car with a gearbox",
+            Self::Overlay => "a file with a part of a vehicle file, such as bounds",
+            Self::Sensors => "a sensors file",
+            Self::Gearbox => "a gearbox file",
+        }
+    }
+
+    /// What takes a file of this kind.
+    fn taken_by(self) -> &'static str {
+        match self {
+            Self::Vehicle | Self::Car => {
+                "a vehicle file goes after --vehicle, or is named by an experiment, drive or study file"
+            }
+            Self::Experiment | Self::Drive => "`wetclutch simulate` takes it",
+            Self::Study | Self::CarStudy => "`wetclutch study` takes it",
+            Self::Overlay => "`wetclutch design VEHICLE` takes it after --bounds",
+            Self::Sensors => "`wetclutch estimate` takes it after --sensors",
+            Self::Gearbox => "a vehicle file names it as `gearbox`; `wetclutch check` describes it",
+        }
+    }
 }
 
 /// A text as a TOML file holds it: in double quotes, on one line, with everything else escaped.
@@ -79,8 +111,16 @@ impl Source {
     /// # Errors
     /// The file cannot be read as UTF-8 text.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| {
+            let source = match source.kind() {
+                io::ErrorKind::InvalidData => io::Error::new(
+                    source.kind(),
+                    "this is no text file, expected TOML\nhint: check the order of the files",
+                ),
+                _ => source,
+            };
+            ConfigError::Read { path: path.to_owned(), source }
+        })?;
         Ok(Self { path: path.to_owned(), text })
     }
 
@@ -117,6 +157,12 @@ impl Source {
             (false, false, false) if has("gear") => Ok(Kind::Gearbox),
             (false, false, false) if has("sensors") => Ok(Kind::Sensors),
             (false, false, false) if !tables.is_empty() && tables.iter().all(of_a_vehicle) => Ok(Kind::Overlay),
+            _ if has("channel") => Err(ConfigError::Syntax {
+                path: self.path.clone(),
+                line: 1,
+                message: "this looks like a channel map\nhint: `wetclutch estimate` and `inspect` take it after --map"
+                    .to_owned(),
+            }),
             _ => Err(ConfigError::Syntax {
                 path: self.path.clone(),
                 line: 1,
@@ -134,9 +180,41 @@ impl Source {
         Layers { source: self, over: None }.parse()
     }
 
+    /// Reads the text of a file of this kind into raw types. An error in a file of another kind says which it is.
+    pub(crate) fn parse_as<T: DeserializeOwned>(&self, wanted: Kind) -> Result<T, ConfigError> {
+        self.parse().map_err(|error| self.unless_other(wanted, error))
+    }
+
+    /// The error, or that the file is of another kind than this one.
+    pub(crate) fn unless_other(&self, wanted: Kind, error: ConfigError) -> ConfigError {
+        match self.kind() {
+            Ok(kind) if kind != wanted => ConfigError::Syntax {
+                path: self.path.clone(),
+                line: 1,
+                message: format!(
+                    "this looks like {}, expected {}\nhint: {}",
+                    kind.words(),
+                    match wanted {
+                        // Most commands take both.
+                        Kind::Vehicle | Kind::Car => "a vehicle file",
+                        other => other.words(),
+                    },
+                    kind.taken_by()
+                ),
+            },
+            _ => error,
+        }
+    }
+
     /// The text as a table.
     pub(crate) fn table(&self) -> Result<Spanned<DeTable<'_>>, ConfigError> {
-        DeTable::parse(&self.text).map_err(|error| Layers { source: self, over: None }.syntax(&error))
+        DeTable::parse(&self.text).map_err(|error| match self.text.lines().next() {
+            Some(first) if first.matches([',', ';', '\t']).count() > 1 && !first.contains(['=', '[', '#']) => {
+                let message = "this looks like a table, expected TOML\nhint: check the order of the files";
+                ConfigError::Syntax { path: self.path.clone(), line: 1, message: message.to_owned() }
+            }
+            _ => Layers { source: self, over: None }.syntax(&error),
+        })
     }
 }
 

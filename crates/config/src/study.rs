@@ -11,7 +11,7 @@ use toml::Spanned;
 
 use crate::check::{Check, Number, Numbers};
 use crate::tree::Tree;
-use crate::{ConfigError, Experiment, ObserverEntry, Source, Vehicle};
+use crate::{ConfigError, Experiment, Kind, ObserverEntry, Source, Vehicle};
 use experiments::{changed_experiment, experiment_tree};
 
 pub use values::{Sometimes, Values};
@@ -188,7 +188,7 @@ impl Study {
     /// A file cannot be read, is no study file, or holds a value that cannot be right.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let source = Source::read(path)?;
-        let raw: RawStudy = source.parse()?;
+        let raw: RawStudy = source.parse_as(Kind::Study)?;
         let beside = |name: &str| source.path.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
         let experiment = Experiment::read(&beside(raw.experiment.get_ref()))
             .map_err(|error| error.named_by(&source, "experiment", raw.experiment.span().start))?;

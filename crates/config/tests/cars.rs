@@ -1,5 +1,7 @@
 //! Vehicle files with a gearbox file, and drive files.
 
+use config::gearbox::SHIPPED;
+use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
 use config::{Car, Drive, ShiftPlan, Source};
 
 const GEARBOX: &str = include_str!("../../../gearboxes/8hp.toml");
@@ -19,8 +21,91 @@ fn a_name_and_a_gearbox_are_a_complete_vehicle_file() {
     let (short, whole) = (car("").unwrap(), Car::eight_speed().unwrap());
     assert_eq!(short.clutches, whole.clutches);
     assert_eq!((short.engine, short.converter, short.road), (whole.engine, whole.converter, whole.road));
-    assert_eq!(short.defaults_taken.len(), 10);
+    let named = |key: &str| short.defaults_taken.iter().any(|taken| taken.key == key);
+    assert!(
+        short.defaults_taken.len() > 30 && named("valve.gain.gain_pa_a") && named("vehicle.mass_kg") && !named("name")
+    );
     assert!(whole.defaults_taken.is_empty(), "{:?}", whole.defaults_taken);
+}
+
+#[test]
+fn the_greatest_engine_torque_scales_what_depends_on_the_size_of_a_car() {
+    let shipped = Car::eight_speed().unwrap();
+    let same = car("[engine]\nmax_torque_n_m = 190\n").unwrap();
+    assert_eq!((same.engine, same.converter, same.driveline), (shipped.engine, shipped.converter, shipped.driveline));
+    assert_eq!((same.road, same.tyre, &same.clutches), (shipped.road, shipped.tyre, &shipped.clutches));
+    let numbers = "[engine]\nmax_torque_n_m = 380\n[driveline]\nfinal_ratio = 1.5\n[vehicle]\nmass_kg = 3000\nwheel_radius_m = 0.6\n";
+    let large = car(numbers).unwrap();
+    let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+    close(large.engine.torque(500.0, 1.0), 2.0 * shipped.engine.torque(500.0, 1.0));
+    close(large.engine.inertia_kg_m2, 2.0 * shipped.engine.inertia_kg_m2);
+    let capacity = |car: &Car| car.converter.unwrap().capacity_n_m_s2.at(0.5);
+    close(capacity(&large), 2.0 * capacity(&shipped));
+    // Twice the torque through half the ratio.
+    close(large.driveline.shaft_stiffness_n_m_rad, shipped.driveline.shaft_stiffness_n_m_rad);
+    close(large.driveline.wheel_inertia_kg_m2, 8.0 * shipped.driveline.wheel_inertia_kg_m2);
+    close(large.tyre.max_force_n, 2.0 * shipped.tyre.max_force_n);
+    close(large.road.rolling_moment_n_m, 4.0 * shipped.road.rolling_moment_n_m);
+    // What the file has is as it has it.
+    let own = car(&format!("{numbers}[tyre]\nmax_force_n = 9000\n")).unwrap();
+    assert_eq!(own.tyre.max_force_n, 9000.0);
+    for wrong in ["1e9", "-3", "nan", "\"much\"", "[400]"] {
+        let message = car(&format!("[engine]\nmax_torque_n_m = {wrong}\n")).unwrap_err();
+        assert!(message.contains("car.toml:4"), "{wrong}: {message}");
+    }
+}
+
+#[test]
+fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
+    for (name, text) in SHIPPED {
+        for engine_torque_n_m in [20.0, 190.0, 2000.0] {
+            let sized = sized_gearbox(&Source::built_in("g.toml", text), engine_torque_n_m).unwrap();
+            let gearbox = Source::built_in("g.toml", &sized);
+            let facts = CarFacts {
+                name: "car \"x\"".to_owned(),
+                gearbox: "g.toml".to_owned(),
+                has_converter: name != "dual_clutch_7",
+                has_stroke: engine_torque_n_m > 1000.0,
+                mass_kg: 5.0 * engine_torque_n_m + 500.0,
+                wheel_radius_m: 0.35,
+                final_ratio: if name == "dual_clutch_7" { 1.0 } else { 2.9 },
+                engine_torque_n_m,
+            };
+            let twice = CarFacts { final_ratio: 10.0, ..facts.clone() };
+            if name != "ravigneaux_4" {
+                let message = short_car_file(&twice, &gearbox).unwrap_err().to_string();
+                assert!(message.contains("may contain the final ratio"), "{message}");
+            }
+            let file = short_car_file(&facts, &gearbox).unwrap();
+            let keys = file.lines().filter(|line| line.contains(" = ")).count();
+            assert!((15..=30).contains(&keys), "{name}: {keys}");
+            let made = Car::from_sources(Source::built_in("car.toml", &file), gearbox.clone()).unwrap();
+            assert_eq!((made.name.as_str(), made.road.mass_kg), ("car \"x\"", facts.mass_kg));
+            assert_eq!(made.converter.is_some(), facts.has_converter);
+            // The comments hold the defaults: with all of them as keys it is the same car.
+            let given = file.replace("\n# [valve]", "\n[valve]").replace("\n# ", "\n");
+            let given: String = given
+                .lines()
+                .filter(|line| line.contains(" = ") || line.starts_with('['))
+                .map(|line| format!("{line}\n"))
+                .collect();
+            let given = Car::from_sources(Source::built_in("car.toml", &given), gearbox.clone()).unwrap();
+            assert!(given.defaults_taken.len() + 10 < made.defaults_taken.len());
+            let source = (made.source.clone(), made.defaults_taken.clone());
+            assert_eq!(Car { source: source.0, defaults_taken: source.1, ..given }, made, "{name}");
+            // Pistons are as large as the engine is strong, and touch at the same pressure.
+            let shipped = Car::from_sources(
+                Source::built_in("car.toml", "name = \"x\"\ngearbox = \"g.toml\"\n"),
+                Source::built_in("g.toml", text),
+            )
+            .unwrap();
+            for (made, shipped) in made.clutches.iter().flatten().zip(shipped.clutches.iter().flatten()) {
+                let ratio = made.clutch.static_capacity(1e6) / shipped.clutch.static_capacity(1e6);
+                assert!((ratio / (engine_torque_n_m / 190.0) - 1.0).abs() < 2e-4, "{name}: {ratio}");
+                assert!((made.clutch.kiss_pressure() / shipped.clutch.kiss_pressure() - 1.0).abs() < 2e-4);
+            }
+        }
+    }
 }
 
 #[test]

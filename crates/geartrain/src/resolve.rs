@@ -96,37 +96,8 @@ pub(crate) fn train(diagram: &StickDiagram) -> Result<(GearTrain, Vec<Finding>),
             return Err(Finding { part: Part::Gearbox, key: list, fault: Fault::TooMany { count, most: MOST } });
         }
     }
-    let mut unusual = Vec::new();
-    let mut sets = Vec::new();
-    for (at, set) in diagram.sets.iter().enumerate() {
-        let part = Part::Set(at);
-        let of = |key: &'static str, name: &str| member(part, key, name);
-        sets.push(checked_set(
-            set,
-            part,
-            [of("sun", &set.sun)?, of("carrier", &set.carrier)?, of("ring", &set.ring)?],
-        )?);
-        let findings = teeth::check(set).map_err(|(key, fault)| Finding { part, key, fault })?;
-        unusual.extend(findings.into_iter().map(|(key, fault)| Finding { part, key, fault }));
-    }
-    let mut pairs = Vec::new();
-    for (at, pair) in diagram.pairs.iter().enumerate() {
-        let part = Part::Pair(at);
-        let (driver, driven) = (shaft(part, "driver", &pair.driver)?, shaft(part, "driven", &pair.driven)?);
-        teeth_in_range(part, "driver_teeth", pair.driver_teeth)?;
-        teeth_in_range(part, "driven_teeth", pair.driven_teeth)?;
-        if driver == driven {
-            return Err(Finding { part, key: "driven", fault: Fault::SameSides(pair.driven.clone()) });
-        }
-        pairs.push(GearPair {
-            driver,
-            driven,
-            driver_teeth: pair.driver_teeth,
-            driven_teeth: pair.driven_teeth,
-            idler: pair.idler,
-            dog: pair.dog.clone(),
-        });
-    }
+    let (sets, unusual) = sets(diagram, &member)?;
+    let pairs = pairs(diagram, &shaft)?;
     let elements = elements(diagram, member)?;
     let (input, output) =
         (shaft(Part::Gearbox, "input", &diagram.input)?, shaft(Part::Gearbox, "output", &diagram.output)?);
@@ -146,6 +117,48 @@ pub(crate) fn train(diagram: &StickDiagram) -> Result<(GearTrain, Vec<Finding>),
         Ok(motion) => Err(Finding { part: Part::Gearbox, key: "output", fault: Fault::NoNeutral(motion.ratio) }),
         Err(_) => Ok((train, unusual)),
     }
+}
+
+/// The planetary sets, and what is unusual about their teeth.
+fn sets(
+    diagram: &StickDiagram,
+    member: impl Fn(Part, &'static str, &str) -> Result<Member, Finding>,
+) -> Result<(Vec<PlanetarySet<Member>>, Vec<Finding>), Finding> {
+    let (mut sets, mut unusual) = (Vec::new(), Vec::new());
+    for (at, set) in diagram.sets.iter().enumerate() {
+        let part = Part::Set(at);
+        let of = |key: &'static str, name: &str| member(part, key, name);
+        let members = [of("sun", &set.sun)?, of("carrier", &set.carrier)?, of("ring", &set.ring)?];
+        sets.push(checked_set(set, part, members)?);
+        let findings = teeth::check(set).map_err(|(key, fault)| Finding { part, key, fault })?;
+        unusual.extend(findings.into_iter().map(|(key, fault)| Finding { part, key, fault }));
+    }
+    Ok((sets, unusual))
+}
+
+/// The gear pairs.
+fn pairs(
+    diagram: &StickDiagram,
+    shaft: impl Fn(Part, &'static str, &str) -> Result<usize, Finding>,
+) -> Result<Vec<GearPair<usize>>, Finding> {
+    let pair = |(at, pair): (usize, &GearPair<String>)| {
+        let part = Part::Pair(at);
+        let (driver, driven) = (shaft(part, "driver", &pair.driver)?, shaft(part, "driven", &pair.driven)?);
+        teeth_in_range(part, "driver_teeth", pair.driver_teeth)?;
+        teeth_in_range(part, "driven_teeth", pair.driven_teeth)?;
+        if driver == driven {
+            return Err(Finding { part, key: "driven", fault: Fault::SameSides(pair.driven.clone()) });
+        }
+        Ok(GearPair {
+            driver,
+            driven,
+            driver_teeth: pair.driver_teeth,
+            driven_teeth: pair.driven_teeth,
+            idler: pair.idler,
+            dog: pair.dog.clone(),
+        })
+    };
+    diagram.pairs.iter().enumerate().map(pair).collect()
 }
 
 fn teeth_in_range(part: Part, key: &'static str, teeth: u32) -> Result<(), Finding> {

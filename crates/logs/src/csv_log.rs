@@ -398,6 +398,18 @@ pub(crate) fn is_time_name(name: &str) -> bool {
         "zeit_ms",
         "t_s",
         "t_ms",
+        "t_us",
+        "t_ns",
+        "epoch",
+        "epoch_s",
+        "epoch_ms",
+        "epoch_us",
+        "epoch_ns",
+        "unix_time",
+        "timestamp_s",
+        "timestamp_ms",
+        "timestamp_us",
+        "timestamp_ns",
     ];
     NAMES.contains(&name.to_lowercase().replace([' ', '-'], "_").as_str())
 }

@@ -200,18 +200,26 @@ impl Log {
                 group.map_or(String::new(), |group| format!(" in group `{}`", error::shown(group))),
                 self.nearest(name)
             ))),
-            _ => {
-                let groups: Vec<String> =
-                    found.iter().take(8).map(|&i| format!("`{}`", error::shown(&self.channels[i].group))).collect();
-                Err(LogError::map(format!(
-                    "{}: there are {} channels `{}`\nhint: choose one by its `group`: {}",
-                    self.path.display(),
-                    found.len(),
-                    error::shown(name),
-                    groups.join(", ")
-                )))
-            }
+            _ => Err(LogError::map(format!(
+                "{}: there are {} channels `{}`\nhint: {}",
+                self.path.display(),
+                found.len(),
+                error::shown(name),
+                self.told_apart(&found)
+            ))),
         }
+    }
+
+    /// How channels with the same name are told apart.
+    fn told_apart(&self, found: &[usize]) -> String {
+        let group = |i: &usize| self.channels[*i].group.as_str();
+        let is_alone = |i: &&usize| found.iter().filter(|other| group(other) == group(i)).count() == 1;
+        let groups: Vec<String> =
+            found.iter().filter(is_alone).take(8).map(|i| format!("group = \"{}\"", error::shown(group(i)))).collect();
+        if groups.is_empty() {
+            return "nothing in the log tells them apart: rename one of them".to_owned();
+        }
+        format!("choose one by its group in the channel map: {}", groups.join(" or "))
     }
 
     /// Names a channel with a similar name, or some channels.

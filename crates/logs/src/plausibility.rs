@@ -122,6 +122,13 @@ pub enum Seen {
     All,
 }
 
+/// The unit that a time is in by all appearances, where it was taken as s and this is the time between two rows: rows of a car's
+/// log are 0.1 ms to 1 s apart.
+pub fn likely_time_unit(step_s: f64) -> Option<&'static str> {
+    let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+    units.into_iter().find(|(_, size)| step_s >= 1.0 && (1e-4..1.0).contains(&(step_s * size))).map(|(unit, _)| unit)
+}
+
 /// What cannot be right.
 pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
     let turning =

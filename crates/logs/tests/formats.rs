@@ -192,6 +192,29 @@ fn csv_of_every_dialect_gives_the_same_values() {
 }
 
 #[test]
+fn a_time_since_1970_has_the_unit_of_its_name() {
+    let folder = Folder::new("epoch");
+    for (name, per_s) in [("epoch_ns", 1e9), ("t_us", 1e6), ("timestamp_ms", 1e3), ("epoch_s", 1.0)] {
+        let row = |i: i32| format!("{:.2},{}\n", (1.7e9 + 0.25 * f64::from(i)) * per_s, 100 + i);
+        let text = format!("{name},a_rpm\n{}", (0..4).map(row).collect::<String>());
+        let (log, samples, _) = read(&folder.write("log.csv", text), &OpenOptions::default()).unwrap();
+        let expected = (0..4).map(|i| good(1.7e9 + 0.25 * f64::from(i), f64::from(100 + i)));
+        check(&channel(&log, &samples, "a_rpm"), expected, name);
+    }
+}
+
+#[test]
+fn channels_with_one_name_are_told_apart_or_not() {
+    let folder = Folder::new("twins");
+    let log = Log::open(&folder.write("log.csv", "time_s,n,n,m\n0,1,2,3\n1,1,2,3\n"), &OpenOptions::default()).unwrap();
+    let error = log.find("n", None).unwrap_err().to_string();
+    assert!(
+        error.ends_with("there are 2 channels `n`\nhint: nothing in the log tells them apart: rename one of them"),
+        "{error}"
+    );
+}
+
+#[test]
 fn csv_that_is_not_clean_says_so() {
     let folder = Folder::new("unclean");
     let text = "time_ms,a_rpm,b\n0,1,2\n10,,n/a\n,3,3\n20,nan,x\n30,5,6\n40,7";

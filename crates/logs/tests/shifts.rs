@@ -148,6 +148,40 @@ fn speeds_alone_give_every_shift_and_its_inertia_phase() {
 }
 
 #[test]
+fn ratios_that_contradict_the_gear_signal_are_named() {
+    let drive = Drive::new(1, &[(8.0, 2), (16.0, 3), (24.0, 4), (32.0, 2)]);
+    let roles = [Role::TurbineSpeed, Role::OutputSpeed, Role::Gear];
+    let contradiction = |ratios: &[f64], readings: &[Reading]| {
+        let gearbox = Gearbox { ratios: ratios.to_vec(), ..Gearbox::default() };
+        let mut finder = ShiftFinder::new(&gearbox, |role| roles.contains(&role)).unwrap();
+        readings.iter().for_each(|reading| finder.push(reading));
+        finder.contradiction()
+    };
+    let readings = drive.readings(&roles);
+    assert_eq!(contradiction(&RATIOS, &readings), None);
+    let mut other = RATIOS;
+    other[1] = 3.5;
+    let said = contradiction(&other, &readings).unwrap();
+    assert!(said.contains("in gear 2 the speeds have 3.130 and 3.500 is given\nhint: "), "{said}");
+    assert!(!said.contains("gear 3"), "{said}");
+    // A gear signal that changes two seconds after the shift, and one that changes before it.
+    for late_s in [1.9, -0.9] {
+        let moved = |reading: &Reading| match reading.role {
+            Role::Gear => Reading { time_s: reading.time_s + late_s, stamp_s: reading.stamp_s + late_s, ..*reading },
+            _ => *reading,
+        };
+        let mut late: Vec<Reading> = readings.iter().map(moved).collect();
+        late.sort_by(|one, other| one.stamp_s.total_cmp(&other.stamp_s));
+        assert_eq!(contradiction(&RATIOS, &late), None, "{late_s}");
+        // A short stay in each gear.
+        let hasty = Drive::new(1, &[(2.0, 2), (4.0, 3), (6.0, 4), (8.0, 5), (10.0, 6)]);
+        let mut late: Vec<Reading> = hasty.readings(&roles).iter().map(moved).collect();
+        late.sort_by(|one, other| one.stamp_s.total_cmp(&other.stamp_s));
+        assert_eq!(contradiction(&RATIOS, &late), None, "{late_s}");
+    }
+}
+
+#[test]
 fn a_car_that_drives_its_engine_shifts_power_off() {
     let mut drive = Drive::new(4, &[(2.0, 3), (5.0, 2)]);
     drive.power_on = false;

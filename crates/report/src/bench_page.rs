@@ -4,7 +4,7 @@ use config::{Experiment, Vehicle};
 use minijinja::{Value, context};
 use observer::Phase;
 use study::Bench;
-use study::bench::BenchCell;
+use study::bench::{BenchCell, BenchConsistency, BenchSummary};
 use study::campaign::PHASES;
 use trace::units::mpa;
 
@@ -16,37 +16,6 @@ use crate::tables::{coverage, number, phase_name};
 /// # Errors
 /// None in a released program; the tests render the template.
 pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> Result<String, PageError> {
-    let pressure = |pascal: f64| number(mpa(pascal), 3);
-    let ratio = |value: f64| number(value, 2);
-    let optional = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
-    let ranking = bench.ranking.iter().map(|s| {
-        context! {
-            observer => &s.observer,
-            diverged => s.diverged,
-            shift => ratio(s.shift_median_ratio),
-            torque => [s.torque_phase_median_ratio, s.torque_phase_worst_ratio].map(ratio),
-            inertia => [s.inertia_phase_median_ratio, s.inertia_phase_worst_ratio].map(ratio),
-            chatter => pressure(s.chatter_median_pa),
-            shaft => [s.shaft_median_rms_n_m, s.shaft_worst_rms_n_m].map(|n_m| optional(n_m, 0)),
-            coverage => s.range_least_coverage.map_or_else(|| "–".to_owned(), coverage),
-            over_errors => optional(s.range_over_errors, 1),
-            step => [s.step_ns, s.step_with_range_ns].map(|ns| number(ns, 0)),
-        }
-    });
-    let phases = PHASES.map(|phase| {
-        let rms = |cell: &BenchCell| match phase {
-            Phase::InertiaPhase => cell.inertia_phase_rms_pa,
-            _ => cell.torque_phase_rms_pa,
-        };
-        let rows = bench.rows.iter().map(|row| {
-            let lowest = row.cells.iter().map(rms).fold(f64::INFINITY, f64::min);
-            let cells = row.cells.iter().filter(|_| row.completed);
-            let cells: Vec<Value> =
-                cells.map(|c| context! { rms => pressure(rms(c)), best => !c.diverged && rms(c) <= lowest }).collect();
-            context! { scenario => &row.scenario, cells }
-        });
-        context! { name => phase_name(phase), rows => rows.collect::<Vec<_>>() }
-    });
     // The order of the ranking; without one, that of the experiment.
     let observers: Vec<String> =
         bench.rows.first().map_or_else(Vec::new, |row| row.cells.iter().map(|cell| cell.observer.clone()).collect());
@@ -58,21 +27,6 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
             number(s.shaft_range_median_width_n_m?, 0),
         ])
     });
-    let consistency = bench.consistency.as_ref().map(|filter| {
-        let (all, (scenario, least)) = (&filter.all, &filter.least);
-        context! {
-            observer => &filter.observer,
-            inside => coverage(all.inside_share()),
-            least => coverage(*least),
-            scenario,
-            nees => ratio(all.nees()),
-            nis => all.nis().map(ratio),
-            same => coverage(all.same_share()),
-            largest_kpa => number(1e-3 * all.largest_pa, 2),
-            excess_percent => number(100.0 * all.excess_in_single(), 2),
-            restarts => all.restarts,
-        }
-    });
     Ok(templates()?.get_template("bench.html")?.render(context! {
         name => &experiment.name,
         title => &experiment.title,
@@ -80,11 +34,69 @@ pub fn bench_page(bench: &Bench, vehicle: &Vehicle, experiment: &Experiment) -> 
         version => env!("CARGO_PKG_VERSION"),
         seed => experiment.sensors.map(|sensors| sensors.seed),
         observers,
-        ranking => ranking.collect::<Vec<_>>(),
-        phases,
+        ranking => bench.ranking.iter().map(ranked).collect::<Vec<_>>(),
+        phases => PHASES.map(|phase| scenarios(bench, phase)),
         rows => bench.rows.len(),
         widths,
-        consistency,
+        consistency => bench.consistency.as_ref().map(consistency),
         inputs => origin(&[&vehicle.source, &experiment.source]),
     })?)
+}
+
+fn pressure(pascal: f64) -> String {
+    number(mpa(pascal), 3)
+}
+
+fn ratio(value: f64) -> String {
+    number(value, 2)
+}
+
+/// A row of the ranking.
+fn ranked(s: &BenchSummary) -> Value {
+    let optional = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
+    context! {
+        observer => &s.observer,
+        diverged => s.diverged,
+        shift => ratio(s.shift_median_ratio),
+        torque => [s.torque_phase_median_ratio, s.torque_phase_worst_ratio].map(ratio),
+        inertia => [s.inertia_phase_median_ratio, s.inertia_phase_worst_ratio].map(ratio),
+        chatter => pressure(s.chatter_median_pa),
+        shaft => [s.shaft_median_rms_n_m, s.shaft_worst_rms_n_m].map(|n_m| optional(n_m, 0)),
+        coverage => s.range_least_coverage.map_or_else(|| "–".to_owned(), coverage),
+        over_errors => optional(s.range_over_errors, 1),
+        step => [s.step_ns, s.step_with_range_ns].map(|ns| number(ns, 0)),
+    }
+}
+
+/// The errors of all observers in a phase, scenario by scenario.
+fn scenarios(bench: &Bench, phase: Phase) -> Value {
+    let rms = |cell: &BenchCell| match phase {
+        Phase::InertiaPhase => cell.inertia_phase_rms_pa,
+        _ => cell.torque_phase_rms_pa,
+    };
+    let rows = bench.rows.iter().map(|row| {
+        let lowest = row.cells.iter().map(rms).fold(f64::INFINITY, f64::min);
+        let cells = row.cells.iter().filter(|_| row.completed);
+        let cells: Vec<Value> =
+            cells.map(|c| context! { rms => pressure(rms(c)), best => !c.diverged && rms(c) <= lowest }).collect();
+        context! { scenario => &row.scenario, cells }
+    });
+    context! { name => phase_name(phase), rows => rows.collect::<Vec<_>>() }
+}
+
+/// How sure the filter is.
+fn consistency(filter: &BenchConsistency) -> Value {
+    let (all, (scenario, least)) = (&filter.all, &filter.least);
+    context! {
+        observer => &filter.observer,
+        inside => coverage(all.inside_share()),
+        least => coverage(*least),
+        scenario,
+        nees => ratio(all.nees()),
+        nis => all.nis().map(ratio),
+        same => coverage(all.same_share()),
+        largest_kpa => number(1e-3 * all.largest_pa, 2),
+        excess_percent => number(100.0 * all.excess_in_single(), 2),
+        restarts => all.restarts,
+    }
 }

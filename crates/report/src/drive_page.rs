@@ -15,7 +15,7 @@ use crate::matrix_page::{kind_rows, ratio, torques};
 use crate::page::{PageError, inline, origin, templates};
 use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
-use crate::tables::{coverage, number};
+use crate::tables::{coverage, health_meaning, number};
 
 /// Shifts that are drawn; of a drive with more, the worst.
 pub const MOST_DRAWN: usize = 60;
@@ -59,7 +59,7 @@ impl DrivePage<'_> {
         let mut drawn: Vec<&ScoredShift> = worst.iter().take(MOST_DRAWN).copied().collect();
         drawn.sort_by_key(|shift| shift.number);
         let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
-        let (titles, rows) = shift_rows(drive, car);
+        let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
         let rows = rows.into_iter().zip(&drive.shifts);
         let rows: Vec<Value> = rows.map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
         let (kind_titles, kinds) = kind_rows(&drive.matrix(car));
@@ -85,8 +85,9 @@ impl DrivePage<'_> {
             findings => findings(drive),
             kind_titles,
             kinds,
-            titles,
+            columns => columns.iter().map(|column| context! { title => column.title, meaning => column.meaning }).collect::<Vec<_>>(),
             rows,
+            healths => healths(drive),
             figures => figures.collect::<Vec<_>>(),
             worst => named.collect::<Vec<_>>(),
             undrawn => drive.shifts.len() - drawn.len(),
@@ -97,6 +98,17 @@ impl DrivePage<'_> {
             inputs => origin(self.sources),
         })?)
     }
+}
+
+/// The healths of the drive, each with its meaning.
+fn healths(drive: &ScoredDrive) -> Vec<Value> {
+    let there = |health: &Health| {
+        let in_states = drive.states.iter().any(|state| state.health == *health);
+        in_states || drive.shifts.iter().flat_map(|shift| &shift.rows).any(|row| row.health == *health)
+    };
+    let value =
+        |health: Health| context! { name => health.name().replace('_', " "), meaning => health_meaning(health) };
+    Health::ALL.into_iter().filter(|health| *health != Health::Good).filter(there).map(value).collect()
 }
 
 fn name(car: &Car, gear: usize) -> &str {
@@ -144,7 +156,8 @@ fn draw_rows(draw: &ShiftDraw, car: &Car) -> Vec<Value> {
 pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     let shifts = &drive.shifts;
     if shifts.is_empty() {
-        return vec!["The drive has no shift.".to_owned()];
+        let none = "The drive has no shift.".to_owned();
+        return drive.warnings.iter().cloned().chain([none]).collect();
     }
     let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
     let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
@@ -152,7 +165,8 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     let (all, inside) = (2 * clutches().count(), 2 * clutches().filter(|clutch| clutch.in_range).count());
     let rows = || shifts.iter().flat_map(|shift| &shift.rows);
     let good = rows().filter(|row| row.health == Health::Good).count();
-    let mut sentences = vec![
+    let mut sentences = drive.warnings.clone();
+    sentences.extend([
         format!(
             "{completed} of {} shifts were completed; the longest took {} s.",
             shifts.len(),
@@ -164,7 +178,7 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
             number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
         ),
         format!("Health is good in {good} of {} samples of the shifts.", rows().count()),
-    ];
+    ]);
     if drive.has_truth() {
         sentences.push(format!(
             "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
@@ -177,43 +191,108 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     sentences
 }
 
+/// A column of the table of shifts.
+struct Column {
+    title: &'static str,
+    /// What it holds, for those who have not met it.
+    meaning: &'static str,
+    cell: fn(&ScoredShift, &Car) -> String,
+}
+
+const fn column(title: &'static str, meaning: &'static str, cell: fn(&ScoredShift, &Car) -> String) -> Column {
+    Column { title, meaning, cell }
+}
+
+/// RMS errors of filter and open loop.
+const ERRORS: &str = "RMS errors of filter / open loop";
+const COLUMNS: &[Column] = &[
+    column("#", "number of the shift", |s, _| s.number.to_string()),
+    column("shift", "old and new gear", gears),
+    column("kind", "direction, and who drives: with power the engine, coasting the car", |s, _| {
+        s.kind.map_or("–", |kind| kind.name()).to_owned()
+    }),
+    column("begin s", "time of the request", |s, _| number(s.time_s[0], 2)),
+    column("time s", "from the request until the shift is complete", |s, _| {
+        number(s.quality.complete_s.unwrap_or(f64::NAN), 2)
+    }),
+    column("torque phase s", "one clutch holds and the other carries torque while it slips", |s, _| {
+        number(s.length_s(TruePhase::Torque), 2)
+    }),
+    column("inertia phase s", "both clutches slip", |s, _| number(s.length_s(TruePhase::Inertia), 2)),
+    column("flare rad/s", "largest slip of the old gear in the wrong direction, at the turbine", |s, _| {
+        number(s.quality.flare_rad_s, 1)
+    }),
+    column("past new gear rad/s", "largest slip of the turbine beyond the speed of the new gear", |s, _| {
+        number(s.quality.past_synchronous_rad_s, 1)
+    }),
+    column("jerk m/s^3", "greatest jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
+        if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 1) }
+    }),
+    column("inertia phase", "error of the controlling clutch's torque over that of the open loop", |s, _| {
+        scored(s, |[_, [inertia, _]]| ratio(&inertia.torque))
+    }),
+    column("N m", ERRORS, |s, _| scored(s, |[_, [inertia, _]]| torques(&inertia.torque))),
+    column("torque phase", "error of the controlling clutch's torque over that of the open loop", |s, _| {
+        scored(s, |[[torque, _], _]| ratio(&torque.torque))
+    }),
+    column("N m", ERRORS, |s, _| scored(s, |[[torque, _], _]| torques(&torque.torque))),
+    column("other, inertia", "the same of the other clutch in the inertia phase", |s, _| {
+        scored(s, |[_, [_, other]]| ratio(&other.torque))
+    }),
+    column(
+        "in range",
+        "share of the true pressures and torques of both clutches within their guaranteed ranges",
+        |s, _| {
+            if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }
+        },
+    ),
+    column("controlling", "the clutch that drives the inertia phase", |s, car| {
+        unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))
+    }),
+    column(
+        "pressure MPa",
+        "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
+        |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3))),
+    ),
+    column(
+        "torque N m",
+        "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
+        |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0))),
+    ),
+    column(
+        "not seen",
+        "share of both phases in which the speeds show nothing of the controlling clutch's torque",
+        |s, _| s.hidden().map_or("–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
+    ),
+    column("health", "the worst health of the shift and its share of the samples", |s, _| {
+        s.worst_health().map_or("no tables".to_owned(), health)
+    }),
+];
+
+/// The columns that a shift of the drive fills.
+fn filled_columns(drive: &ScoredDrive, car: &Car) -> Vec<&'static Column> {
+    let is_filled = |column: &&Column| drive.shifts.iter().any(|shift| !(column.cell)(shift, car).is_empty());
+    COLUMNS.iter().filter(is_filled).collect()
+}
+
 /// Titles and rows of the table of shifts. Errors of the clutch torque where the truth is known, else means of the estimates; columns
 /// that no shift fills are left out.
 pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
-    /// A title and its cell.
-    type Column = (&'static str, fn(&ScoredShift, &Car) -> String);
-    const COLUMNS: &[Column] = &[
-        ("#", |s, _| s.number.to_string()),
-        ("shift", gears),
-        ("kind", |s, _| s.kind.map_or("–", |kind| kind.name()).to_owned()),
-        ("begin s", |s, _| number(s.time_s[0], 2)),
-        ("time s", |s, _| number(s.quality.complete_s.unwrap_or(f64::NAN), 2)),
-        ("torque phase s", |s, _| number(s.length_s(TruePhase::Torque), 2)),
-        ("inertia phase s", |s, _| number(s.length_s(TruePhase::Inertia), 2)),
-        ("flare rad/s", |s, _| number(s.quality.flare_rad_s, 1)),
-        ("beyond rad/s", |s, _| number(s.quality.past_synchronous_rad_s, 1)),
-        (
-            "jerk m/s^3",
-            |s, _| if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 0) },
-        ),
-        ("inertia phase", |s, _| scored(s, |[_, [inertia, _]]| ratio(&inertia.torque))),
-        ("N m", |s, _| scored(s, |[_, [inertia, _]]| torques(&inertia.torque))),
-        ("torque phase", |s, _| scored(s, |[[torque, _], _]| ratio(&torque.torque))),
-        ("N m", |s, _| scored(s, |[[torque, _], _]| torques(&torque.torque))),
-        ("other, inertia", |s, _| scored(s, |[_, [_, other]]| ratio(&other.torque))),
-        ("in range", |s, _| if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }),
-        ("controlling", |s, car| unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))),
-        ("pressure MPa", |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3)))),
-        ("torque N m", |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0)))),
-        ("hidden", |s, _| s.hidden().map_or("–".to_owned(), |share| format!("{:.0} %", 100.0 * share))),
-        ("health", |s, _| s.worst_health().map_or("no tables".to_owned(), health)),
-    ];
-    let cells: Vec<Vec<String>> =
-        drive.shifts.iter().map(|shift| COLUMNS.iter().map(|(_, cell)| cell(shift, car)).collect()).collect();
-    let filled = |column: &usize| cells.iter().any(|row| !row[*column].is_empty());
-    let columns: Vec<usize> = (0..COLUMNS.len()).filter(filled).collect();
-    let titles = columns.iter().map(|column| COLUMNS[*column].0).collect();
-    (titles, cells.iter().map(|row| columns.iter().map(|column| row[*column].clone()).collect()).collect())
+    let columns = filled_columns(drive, car);
+    let row = |shift: &ScoredShift| columns.iter().map(|column| (column.cell)(shift, car)).collect();
+    (columns.iter().map(|column| column.title).collect(), drive.shifts.iter().map(row).collect())
+}
+
+/// What the words of the table of shifts say that a reader may not have met, and the healths in it: word and meaning.
+pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)> {
+    const EXPLAINED: [&str; 5] = ["flare rad/s", "past new gear rad/s", "controlling", "not seen", "health"];
+    let columns = filled_columns(drive, car).into_iter().filter(|column| EXPLAINED.contains(&column.title));
+    let word = |title: &str| title.trim_end_matches(" rad/s").to_owned();
+    let columns = columns.map(|column| (word(column.title), column.meaning));
+    let worst =
+        |health: &Health| drive.shifts.iter().any(|shift| shift.worst_health().is_some_and(|(it, _)| it == *health));
+    let healths = Health::ALL.into_iter().filter(|health| *health != Health::Good).filter(worst);
+    columns.chain(healths.map(|health| (health.name().replace('_', " "), health_meaning(health)))).collect()
 }
 
 /// A cell of a shift whose truth is known.

@@ -2,6 +2,7 @@
 
 mod axis;
 pub mod bench_page;
+pub mod car_sensitivity_page;
 pub mod drive_page;
 pub mod error_bound_page;
 pub mod figure;

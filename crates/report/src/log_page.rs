@@ -439,16 +439,38 @@ pub(crate) fn health_panel(healths: &[(f64, [bool; HEALTHS])]) -> Option<Panel> 
     Some(Panel { y_label: "health".to_owned(), height: 18.0 * lines + 8.0, series, band: None, axis })
 }
 
-/// A line at this height where a health holds. One sample of it is drawn until the next.
+/// A line at this height where a health holds. One sample of it is drawn until the next, and so wide that it is seen.
 fn held(healths: &[(f64, [bool; HEALTHS])], wanted: Health, height: f64) -> Vec<(f64, f64)> {
-    let is = |at: usize| healths[at].1[wanted as usize];
-    let shown = |at: usize| is(at) || at > 0 && is(at - 1);
-    (0..healths.len()).map(|at| (healths[at].0, if shown(at) { height } else { f64::NAN })).collect()
+    /// Least part of the axis: two or three pixels.
+    const LEAST: f64 = 1.0 / 300.0;
+    let [first_s, last_s] = [healths.first(), healths.last()].map(|sample| sample.map_or(0.0, |(time_s, _)| *time_s));
+    let mut until_s = f64::NEG_INFINITY;
+    let point = |(at, (time_s, healths_then)): (usize, &(f64, [bool; HEALTHS]))| {
+        if healths_then[wanted as usize] {
+            let next_s = healths.get(at + 1).map_or(*time_s, |(next_s, _)| *next_s);
+            until_s = next_s.max(time_s + LEAST * (last_s - first_s));
+        }
+        (*time_s, if *time_s <= until_s { height } else { f64::NAN })
+    };
+    healths.iter().enumerate().map(point).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sample_of_a_health_is_wide_enough_to_be_seen() {
+        let one = |count: u32, at: u32| -> Vec<(f64, [bool; HEALTHS])> {
+            let is = |i: u32| Health::ALL.map(|health| (health == Health::Flare) == (i == at));
+            (0..count).map(|i| (f64::from(i) * 0.01, is(i))).collect()
+        };
+        let drawn = |count: u32, at: u32| {
+            held(&one(count, at), Health::Flare, 1.0).iter().filter(|(_, height)| !height.is_nan()).count()
+        };
+        // Until the next sample, and of a long drive for a part of it.
+        assert_eq!((drawn(100, 50), drawn(30_000, 50), drawn(100, 99)), (2, 101, 1));
+    }
 
     #[test]
     fn a_page_takes_as_many_figures_as_it_has_room_for() {

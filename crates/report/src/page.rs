@@ -36,6 +36,7 @@ pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
     environment.add_template("error_bound.html", include_str!("../templates/error_bound.html"))?;
     environment.add_template("log.html", include_str!("../templates/log.html"))?;
     environment.add_template("matrix.html", include_str!("../templates/matrix.html"))?;
+    environment.add_template("car_sensitivity.html", include_str!("../templates/car_sensitivity.html"))?;
     environment.add_template("sensitivity.html", include_str!("../templates/sensitivity.html"))?;
     environment.add_template("speeds.html", include_str!("../templates/speeds.html"))?;
     environment.add_template("study.html", include_str!("../templates/study.html"))?;
@@ -74,7 +75,7 @@ impl Page {
             range_mpa => format!("{:.1}", mpa(experiment.shift.line_pressure_pa)),
             certificates => rigid_certificates(comparison),
             compliant => compliant_certificates(comparison),
-            quality => quality_rows(comparison),
+            quality => comparison.quality.as_ref().map(quality_rows),
             inputs => origin(&[&vehicle.source, &experiment.source]),
             seed => experiment.sensors.map(|sensors| sensors.seed),
             certified => comparison.runs.first().filter(|_| !comparison.bound_pa.is_empty()).map(|run| &run.entry.name),

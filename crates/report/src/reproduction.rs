@@ -48,7 +48,7 @@ impl Reproduction {
                     title => &comparison.experiment.title,
                     figure => inline(svg),
                     scores => score_rows(comparison),
-                    quality => quality_rows(comparison),
+                    quality => comparison.quality.as_ref().map(quality_rows),
                     seed => comparison.experiment.sensors.map(|sensors| sensors.seed),
                     source => comparison.experiment.source.path.display().to_string(),
                     sha256 => comparison.experiment.source.sha256(),

@@ -2,9 +2,9 @@
 
 use design::{Certificate, CompliantCertificate};
 use minijinja::{Value, context};
-use observer::Phase;
+use observer::{Health, Phase};
 use study::campaign::COMPARED;
-use study::{Comparison, PhaseScore};
+use study::{Comparison, PhaseScore, ShiftQuality};
 use trace::units::mpa;
 
 /// A number with these decimals; with an exponent where it is that of a diverged observer, a dash where there is none.
@@ -14,6 +14,30 @@ pub fn number(value: f64, decimals: usize) -> String {
         size if size.is_nan() => "–".to_owned(),
         f64::INFINITY => "∞".to_owned(),
         _ => format!("{value:.1e}"),
+    }
+}
+
+/// What a health says of a sample.
+pub fn health_meaning(health: Health) -> &'static str {
+    match health {
+        Health::Good => "nothing to remark",
+        Health::ReadingRefused => "a reading that was refused: it is impossible, or it contradicts all others",
+        Health::ChannelLost => "a channel without usable readings: the estimate is less certain",
+        Health::HeldClutchSlips => "a slip of a clutch that should hold: the estimate is less certain",
+        Health::Flare => {
+            "a flare: both clutches slip and the turbine runs away; the oncoming clutch carries too little"
+        }
+        Health::OutsideRange => {
+            "an estimate outside its range: the observer has a large error, or the car is outside its error budget"
+        }
+        Health::LimitedToRange => {
+            "an estimate outside its guaranteed range, replaced by the nearest end: the observer has a large error, or the car is outside its error budget"
+        }
+        Health::CommandRejected => "an unusable valve command: the last usable command is used",
+        Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
+        Health::SpeedsRejected => "an unusable speed: the estimate is from the valve model alone",
+        Health::Restarted => "a restart: the observer lost its state and starts again",
+        Health::TimeRejected => "an unusable time step: the estimate is that of the sample before",
     }
 }
 
@@ -134,17 +158,16 @@ fn margin(per_s: f64) -> String {
 }
 
 /// How good the shift was.
-pub(crate) fn quality_rows(comparison: &Comparison) -> Option<Vec<(&'static str, String)>> {
-    let q = comparison.quality.as_ref()?;
-    Some(vec![
+pub fn quality_rows(q: &ShiftQuality) -> Vec<(&'static str, String)> {
+    vec![
         ("torque phase", format!("{:.3} s", q.inertia_phase_start_s - q.torque_phase_start_s)),
         ("inertia phase", format!("{:.3} s", q.lock_up_s - q.inertia_phase_start_s)),
         ("turbine speed flare", format!("{:.2} rad/s", q.flare_rad_s)),
         ("lowest drive-shaft torque", format!("{:.0} N m", q.least_shaft_torque_n_m)),
-        ("peak jerk over 20 ms", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
+        ("jerk over 0.3 s", format!("{:.1} m/s³", q.jerk_peak_m_s3)),
         ("vibration dose value above 0.4 Hz", format!("{:.2} m/s^1.75", q.vibration_dose_m_s175)),
         ("friction work of the oncoming clutch", format!("{:.1} kJ", 1e-3 * q.friction_work_j)),
-    ])
+    ]
 }
 
 #[cfg(test)]

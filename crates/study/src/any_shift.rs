@@ -6,11 +6,15 @@
 
 pub mod campaign;
 pub mod channels;
+mod contradictions;
 pub mod drive;
+pub mod influence;
 pub mod logged;
 pub mod matrix;
 pub mod measured;
+mod nominal;
 pub mod recording;
+pub mod sensitivity;
 pub mod tour;
 
 use config::{Car, ElementErrorBounds, Sensors};

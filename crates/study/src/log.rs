@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use config::Vehicle;
-use logs::{Clock, FrozenSpeed, Role, Speeds};
-use observer::{Input, Phase, Reading};
+use observer::{Input, Phase};
 use trace::{CsvRows, TraceError, signal};
 
 use crate::Signals;
+use crate::frozen_rows::FrozenRows;
+use crate::row_clock::{RowClock, RowTime};
 
 /// Rows that are looked at before the first estimate: gains are designed for the median time between them.
 pub const FIRST_LOOK: usize = 10_000;
@@ -19,12 +20,8 @@ pub struct Log {
     signals: Signals<usize>,
     truth: Option<TruthColumns>,
     beside: [Option<usize>; BESIDE.len()],
-    last_s: Option<f64>,
-    clock: Clock,
-    rows_read: u64,
-    repeated: u64,
-    backward: u64,
-    frozen: Frozen,
+    clock: RowClock,
+    frozen: FrozenRows,
     looked_at: VecDeque<(Input<f64>, LogRow)>,
     median_step_s: f64,
 }
@@ -63,54 +60,6 @@ pub struct Beside {
     /// Acceleration of the car, m/s^2.
     pub vehicle_m_s2: f64,
 }
-
-/// The speeds of the rows, of which frozen ones are taken out by the rules of [`logs::frozen`].
-struct Frozen {
-    watched: [FrozenSpeed; WATCHED.len()],
-    newest: Speeds,
-    /// The time at which the newest reading of each was measured, s, and whether it is frozen.
-    newest_s: [(f64, bool); WATCHED.len()],
-    /// Readings of each, and how many of them were frozen.
-    counts: [(u64, u64); WATCHED.len()],
-}
-
-const WATCHED: [Role; 4] = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, Role::WheelSpeed];
-
-impl Frozen {
-    fn new() -> Self {
-        Self {
-            watched: WATCHED.map(FrozenSpeed::new),
-            newest: Speeds::default(),
-            newest_s: [(f64::NEG_INFINITY, false); WATCHED.len()],
-            counts: [(0, 0); WATCHED.len()],
-        }
-    }
-
-    /// Takes the readings out of a row that are frozen.
-    fn take_out(&mut self, input: &mut Input<f64>, time_s: f64) {
-        let speeds =
-            [&mut input.engine_rad_s, &mut input.turbine_rad_s, &mut input.output_rad_s, &mut input.wheel_rad_s];
-        for (i, speed) in speeds.into_iter().enumerate() {
-            let Some(Reading { value, age_s }) = *speed else { continue };
-            let measured_s = time_s - age_s;
-            let (newest_s, was_frozen) = self.newest_s[i];
-            // A reading that a table holds until the next one comes is one reading.
-            let is_held = age_s > 0.0 && (measured_s - newest_s).abs() <= SAME_S;
-            let frozen = if is_held { was_frozen } else { self.watched[i].is_frozen(value, measured_s, &self.newest) };
-            self.newest_s[i] = (measured_s, frozen);
-            self.counts[i].0 += 1;
-            if frozen {
-                self.counts[i].1 += 1;
-                *speed = None;
-            } else {
-                self.newest[WATCHED[i] as usize] = Some(value);
-            }
-        }
-    }
-}
-
-/// Times that differ by less are those of one reading, s: decimals of a table.
-const SAME_S: f64 = 1e-6;
 
 /// The columns of [`Beside`].
 const BESIDE: [&str; 6] = [
@@ -155,12 +104,8 @@ impl Log {
             signals,
             truth,
             beside,
-            last_s: None,
-            clock: Clock::default(),
-            rows_read: 0,
-            repeated: 0,
-            backward: 0,
-            frozen: Frozen::new(),
+            clock: RowClock::default(),
+            frozen: FrozenRows::new(),
             looked_at,
             median_step_s: f64::NAN,
         };
@@ -204,7 +149,7 @@ impl Log {
 
     /// How often the clock did not simply go on: resets, and stamps that were far too late.
     pub fn resets(&self) -> u32 {
-        self.clock.resets() + self.clock.wrong_jumps()
+        self.clock.resets()
     }
 
     /// What was met in the time stamps and of frozen speeds, in sentences.
@@ -212,64 +157,18 @@ impl Log {
     /// # Errors
     /// Most rows, or most readings of a speed, could not be used.
     pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
-        let unused = self.repeated + self.backward;
-        let count = |count: u64, what: &str| {
-            (count > 0).then(|| format!("{count} of {} rows {what} and are not used", self.rows_read))
-        };
-        let notes = [
-            count(self.repeated, "have the time of the row before"),
-            count(self.backward, "have a time before that of the row before"),
-        ];
-        let notes: Vec<String> = notes.into_iter().flatten().collect();
-        if 2 * unused > self.rows_read {
-            return Err(self.rows.refused(format!(
-                "{}\nhint: the time has too few digits, or is not in `{}`",
-                notes.join(", "),
-                signal::TIME
-            )));
-        }
-        let mut notes: Vec<String> = notes.into_iter().chain(self.clock.notes()).collect();
-        for (role, (readings, frozen)) in WATCHED.iter().zip(self.frozen.counts).filter(|(_, (_, frozen))| *frozen > 0)
-        {
-            let name = role.name();
-            notes.push(format!(
-                "{frozen} of {readings} readings of {name} stand still while the car does not, and are not used"
-            ));
-            if 2 * frozen > readings {
-                return Err(self
-                    .rows
-                    .refused(format!("{}\nhint: check the sensor of {name} and its column", notes.join(", "))));
-            }
-        }
+        let mut notes = self.clock.notes(&self.rows)?;
+        notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
         Ok(notes)
-    }
-
-    /// Goes on to the next row whose time is after that of the row before, by the rules of [`Clock`]; its time.
-    fn next_time(&mut self) -> Result<Option<f64>, TraceError> {
-        while self.rows.advance_in_any_order()? {
-            self.rows_read += 1;
-            let wrong_jumps = self.clock.wrong_jumps();
-            let time_s = self.clock.time(self.rows.time_s());
-            if self.clock.wrong_jumps() > wrong_jumps {
-                // The row before was the one with the wrong time.
-                self.last_s = None;
-            }
-            match time_s {
-                Some(time_s) if self.last_s.is_none_or(|last_s| time_s > last_s) => return Ok(Some(time_s)),
-                Some(time_s) if self.last_s == Some(time_s) => self.repeated += 1,
-                _ => self.backward += 1,
-            }
-        }
-        Ok(None)
     }
 
     /// The next row of the file.
     fn read(&mut self) -> Result<Option<(Input<f64>, LogRow)>, TraceError> {
-        let Some(time_s) = self.next_time()? else { return Ok(None) };
+        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         let rows = &self.rows;
-        let dt_s = self.last_s.replace(time_s).map_or(0.0, |last_s| time_s - last_s);
         let mut input = self.signals.input(dt_s, |column| rows.number(column))?;
-        self.frozen.take_out(&mut input, time_s);
+        let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
+        self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
         let truth = self.truth.and_then(|columns| {
             let word = rows.text(columns.phase);
             let phase = Phase::ALL.into_iter().find(|phase| phase.name() == word)?;

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use drivetrain::ReducedShift;
+use drivetrain::{PeakJerk, ReducedShift};
 use observer::{Bounds, Phase};
 use trace::{Trace, signal};
 
@@ -209,7 +209,7 @@ pub struct ShiftQuality {
     pub flare_rad_s: f64,
     /// Tie-up: the least drive-shaft torque from the request to lock-up, N m. Negative brakes the car.
     pub least_shaft_torque_n_m: f64,
-    /// Largest size of the jerk, averaged over 20 ms, m/s^3.
+    /// Jerk of the car, m/s^3, as [`drivetrain::jerk`] defines it.
     pub jerk_peak_m_s3: f64,
     /// Vibration dose value of the longitudinal acceleration, m/s^1.75: the fourth root of the integral of
     /// its fourth power, above 0.4 Hz, the lower limit of the weighting of ISO 2631-1.
@@ -218,9 +218,6 @@ pub struct ShiftQuality {
     pub friction_work_j: f64,
 }
 
-/// Window over which the acceleration is averaged before it is differentiated, s: what a seated person
-/// can still feel, and what accelerometers for shift rating are filtered to.
-const JERK_WINDOW_S: f64 = 0.02;
 /// Lower limit of the band that the vibration dose counts, Hz.
 const VIBRATION_FROM_HZ: f64 = 0.4;
 /// How long before the load transfer and after lock-up a shift is felt, s.
@@ -338,7 +335,7 @@ impl ShiftRating {
 
     fn felt(&mut self, time_s: f64, acceleration: f64) {
         if self.lock_up_s.is_none_or(|lock_up_s| time_s <= lock_up_s + FELT_AFTER_S) {
-            self.jerk.push(time_s, acceleration);
+            self.jerk.acceleration(time_s, acceleration);
             self.vibration.push(time_s, acceleration);
         }
     }
@@ -352,7 +349,7 @@ impl ShiftRating {
             lock_up_s,
             flare_rad_s: self.flare_rad_s,
             least_shaft_torque_n_m: self.least_shaft_torque_n_m,
-            jerk_peak_m_s3: self.jerk.peak,
+            jerk_peak_m_s3: self.jerk.peak_m_s3().unwrap_or(0.0),
             vibration_dose_m_s175: self.vibration.dose.powf(0.25),
             friction_work_j: self.friction_work_j,
         })
@@ -380,30 +377,6 @@ impl ShiftQuality {
             });
         }
         rating.finish()
-    }
-}
-
-/// Largest change of the acceleration over a window, per time.
-#[derive(Debug, Clone, Default)]
-struct PeakJerk {
-    peak: f64,
-    /// Times and accelerations for which the end of the window has not come.
-    open: VecDeque<(f64, f64)>,
-}
-
-impl PeakJerk {
-    fn is_unused(&self) -> bool {
-        self.open.is_empty()
-    }
-
-    fn push(&mut self, time_s: f64, acceleration: f64) {
-        while let Some(&(from_s, from)) = self.open.front()
-            && time_s >= from_s + JERK_WINDOW_S - 1e-9
-        {
-            self.peak = self.peak.max(((acceleration - from) / (time_s - from_s)).abs());
-            self.open.pop_front();
-        }
-        self.open.push_back((time_s, acceleration));
     }
 }
 
@@ -473,16 +446,6 @@ mod tests {
     }
 
     #[test]
-    fn the_jerk_of_a_ramp_is_its_slope() {
-        let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 1e-3).collect();
-        let mut jerk = PeakJerk::default();
-        time.iter().for_each(|&t| jerk.push(t, 5.0 * t));
-        assert!((jerk.peak - 5.0).abs() < 1e-9);
-        // Only the window is remembered.
-        assert_eq!(jerk.open.len(), 20);
-    }
-
-    #[test]
     fn a_steady_acceleration_gives_no_vibration_dose() {
         let dose = |acceleration: &dyn Fn(f64) -> f64| {
             let mut dose = VibrationDose::default();
@@ -533,8 +496,8 @@ mod tests {
         for i in 0..10_000 {
             let phase = if i < 5000 { Phase::BeforeShift } else { Phase::TorquePhase };
             rating.push(&sample(f64::from(i) * 1e-3, phase));
-            // 0.3 s before the shift, or a window of 20 ms, at a millisecond; and one more, as times are rounded.
-            assert!(rating.before.len() <= 302 && rating.jerk.open.len() <= 21);
+            // 0.3 s before the shift at a millisecond; and one more, as times are rounded.
+            assert!(rating.before.len() <= 302);
         }
     }
 }

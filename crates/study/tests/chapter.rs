@@ -113,8 +113,9 @@ fn every_experiment_completes_its_shift_without_flare_or_tie_up() {
         assert!((0.2..0.3).contains(&(quality.inertia_phase_start_s - quality.torque_phase_start_s)), "{name}");
         assert!((0.3..0.4).contains(&(quality.lock_up_s - quality.inertia_phase_start_s)), "{name}");
         assert!(quality.flare_rad_s < 3.0 && quality.least_shaft_torque_n_m > 0.0, "{name}");
-        // Rated comfortable below about 10 m/s^3; E2 has half again the torque.
-        assert!(quality.jerk_peak_m_s3 < 12.0, "{name}: {}", quality.jerk_peak_m_s3);
+        // Rated comfortable below about 10 m/s^3 over 20 ms, where E2 with half again the torque has 10.0; over 0.3 s it has 5.3. The limit is
+        // that of 12 over 20 ms in this proportion.
+        assert!(quality.jerk_peak_m_s3 < 6.4, "{name}: {}", quality.jerk_peak_m_s3);
     }
 }
 

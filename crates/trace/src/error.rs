@@ -86,7 +86,8 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
     // What a name is about: without its unit, and without a word that many names have.
     let about = |name: &str| -> Vec<String> {
         let (name, _) = units::to_si(name);
-        let plain = |word: &&str| !["rad", "s", "a", "pa", "percent", "n", "m", "speed", "current"].contains(word);
+        const PLAIN: [&str; 11] = ["rad", "s", "a", "pa", "percent", "n", "m", "speed", "current", "duty", "element"];
+        let plain = |word: &&str| !PLAIN.contains(word);
         name.split('_').filter(plain).map(str::to_owned).collect()
     };
     let known = |name: &str| signal::MEASURABLE.contains(&units::to_si(name).0.as_str());
@@ -100,5 +101,17 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
     match present.len() {
         more if more > MOST => format!("the columns are {} and {} more", names.join(", "), more - MOST),
         _ => format!("the columns are {}", names.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_another_element_is_no_similar_name() {
+        let present = ["time_s", "element_d_current_a", "turbine_n"].map(str::to_owned);
+        assert!(column_hint("element_e_current_a", &present).starts_with("the columns are "));
+        assert!(column_hint("turbine_speed_rad_s", &present).starts_with("`turbine_n` has a similar name"));
     }
 }

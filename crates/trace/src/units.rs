@@ -105,6 +105,8 @@ impl Unit {
             ("_mpa", "MPa"),
             ("_kpa", "kPa"),
             ("_ms", "ms"),
+            ("_us", "us"),
+            ("_ns", "ns"),
             ("_ma", "mA"),
             ("_km_h", "km/h"),
             ("_kmh", "km/h"),

@@ -158,19 +158,25 @@ pub(crate) struct Init {
     #[arg(long, default_value = "my car")]
     pub(crate) name: String,
     /// Mass with driver, kg
-    #[arg(long, value_name = "KG", value_parser = within(200.0..=60e3))]
+    #[arg(long, value_name = "KG", allow_negative_numbers = true, value_parser = within(200.0..=60e3))]
     pub(crate) mass_kg: f64,
     /// Rolling radius of the driven wheels, m
-    #[arg(long, value_name = "M", value_parser = within(0.1..=1.0))]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = within(0.1..=1.0))]
     pub(crate) wheel_radius_m: f64,
-    /// Ratios of the gears before and after the shift, such as 4.17,2.34
-    #[arg(long, required = true, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, value_parser = within(0.6..=20.0))]
+    /// The gearbox: 8hp, 10_speed, dual_clutch_7, lepelletier_6, ravigneaux_4, or a gearbox file
+    #[arg(long, value_name = "NAME|FILE", required_unless_present = "ratios", conflicts_with_all = ["ratios", "valve", "complete"])]
+    pub(crate) gearbox: Option<String>,
+    /// What connects engine and gearbox [default: clutch for dual_clutch_7, else converter]
+    #[arg(long, value_enum, requires = "gearbox")]
+    pub(crate) launch: Option<LaunchChoice>,
+    /// For one upshift: ratios of the gears before and after it, such as 4.17,2.34
+    #[arg(long, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, allow_negative_numbers = true, value_parser = within(0.6..=20.0))]
     pub(crate) ratios: Vec<f64>,
-    /// Ratio from gearbox output to wheels
-    #[arg(long, value_name = "RATIO", value_parser = within(0.5..=10.0))]
+    /// Ratio from gearbox output to wheels; 1 for dual_clutch_7, whose ratios contain it
+    #[arg(long, value_name = "RATIO", allow_negative_numbers = true, value_parser = within(0.5..=10.0))]
     pub(crate) final_ratio: f64,
     /// Greatest engine torque, N m
-    #[arg(long, value_name = "N_M", value_parser = within(20.0..=2000.0))]
+    #[arg(long, value_name = "N_M", allow_negative_numbers = true, value_parser = within(20.0..=2000.0))]
     pub(crate) engine_torque_n_m: f64,
     /// Kind of the clutches' valves
     #[arg(long, value_enum, default_value_t)]
@@ -184,6 +190,15 @@ pub(crate) struct Init {
     /// The vehicle file
     #[arg(short, long, value_name = "CAR.toml")]
     pub(crate) output: PathBuf,
+}
+
+/// What connects the engine with the gearbox.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LaunchChoice {
+    /// A torque converter
+    Converter,
+    /// A clutch of the gearbox, which slips at a launch
+    Clutch,
 }
 
 /// Kind of a clutch's valve.

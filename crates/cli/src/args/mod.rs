@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
-pub(crate) use logs::{Estimate, Fit, FormatChoice, GearPair, Init, Inspect, Mapping};
+pub(crate) use logs::{Estimate, Fit, FormatChoice, GearPair, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
     WorstCaseOptions,
@@ -162,11 +162,15 @@ pub(crate) enum Command {
     Fit(Fit),
     /// Write a first vehicle file for a car from a few numbers
     ///
-    /// Writes a short vehicle file for one upshift. What is not in it is a default, scaled to the car where it depends on its size.
-    /// What an estimate uses and somebody may know stands in it as comments. `check` lists the defaults, and says which of them matter
-    /// most for the estimate; `fit` finds the values from logs. With --complete, the file has every key, and each says where its value is from.
+    /// Writes a short vehicle file: with --gearbox for all gears of an automatic, with --ratios for one upshift. What is not in it is
+    /// a default, scaled to the car where it depends on its size. What an estimate uses and somebody may know stands in it as comments.
+    /// `check` lists the defaults, and says which values matter most for the estimate; `fit` finds them from logs.
     ///
-    ///   wetclutch init --mass-kg 1650 --wheel-radius-m 0.32 --ratios 4.17,2.34 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
+    ///   wetclutch init --gearbox 8hp --mass-kg 1900 --wheel-radius-m 0.33 --final-ratio 2.8 --engine-torque-n-m 400 -o car.toml
+    ///   wetclutch init --ratios 4.17,2.34 --mass-kg 1650 --wheel-radius-m 0.32 --final-ratio 3.2 --engine-torque-n-m 250 -o car.toml
+    ///
+    /// A shipped gearbox is written beside the vehicle file, with pistons and springs for the engine torque. With --ratios and
+    /// --complete, the file has every key, and each says where its value is from.
     #[command(verbatim_doc_comment)]
     Init(Init),
     /// Run the source chapter's experiments and compare the results with its statements
@@ -229,6 +233,9 @@ pub(crate) enum Command {
     ///
     /// Reads the error bounds of a vehicle file. For each phase it prints the equivalent pressure error of each of them,
     /// and whether an observer can distinguish the error from a pressure.
+    ///
+    /// With the vehicle file of a car with a gearbox: what each error does to the estimate of every shift between neighbouring gears, and
+    /// in which of them the speeds show nothing of the clutch torque, so that the valve model serves.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
     /// Check a vehicle, gearbox, experiment or study file

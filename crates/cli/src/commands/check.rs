@@ -5,7 +5,7 @@ use design::{longest_step_of, unstable_corners};
 
 use report::tables::phase_name;
 
-use super::check_defaults::describe_defaults;
+use super::check_defaults::{describe_car_values, describe_defaults};
 use super::gearbox;
 use super::simulate_drive::{describe_car, describe_drive};
 use crate::args::Check;
@@ -21,7 +21,11 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     }
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
-        Kind::Car => describe_car(&Car::read(&options.file)?),
+        Kind::Car => {
+            let car = Car::read(&options.file)?;
+            describe_car(&car)?;
+            describe_car_values(&car, options.all)
+        }
         Kind::CarStudy => super::study::describe_cars(&options.file),
         Kind::Drive => describe_drive(&Drive::from_source(source)?, &options.file),
         Kind::Vehicle => {

@@ -1,9 +1,11 @@
 //! What `wetclutch check` says about the defaults of a vehicle file.
 
-use config::{Change, Vehicle};
+use config::{Car, Change, DefaultTaken, Vehicle};
+use study::any_shift::influence::{CarInfluence, ErrorOfEstimate, ValueFrom, car_influences};
 use study::{Influence, default_influences};
 use trace::units;
 
+use super::matrix::bench_sensors;
 use crate::failure::Failure;
 use crate::output;
 
@@ -21,7 +23,7 @@ pub(super) fn describe_defaults(vehicle: &Vehicle, all: bool) -> Result<(), Fail
     output::line(&format!("\n{} values are not in the file and are defaults", taken.len()))?;
     let Some(influences) = default_influences(vehicle)? else {
         output::line("the simulated car makes no whole upshift, so it cannot be said which of them matter")?;
-        return all_names(vehicle, &[], true);
+        return all_names(&vehicle.defaults_taken, &[], true);
     };
     output::line(
         "which matter most: RMS change of pressure (kPa) and torque (N m) of the oncoming clutch, in the torque and inertia phase of a\n\
@@ -32,13 +34,13 @@ pub(super) fn describe_defaults(vehicle: &Vehicle, all: bool) -> Result<(), Fail
     let rows = influences[..shown].iter().map(row);
     output::table(3, &std::iter::once(titles.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>())?;
     output::line("")?;
-    all_names(vehicle, &influences[..shown], all)
+    let shown: Vec<&str> = influences[..shown].iter().map(|influence| influence.taken.key.as_str()).collect();
+    all_names(taken, &shown, all)
 }
 
 fn row(influence: &Influence) -> Vec<String> {
-    let value = &influence.taken.value;
-    let value = if value.len() > LONGEST { "a map".to_owned() } else { value.clone() };
-    let mut row = vec![influence.taken.key.clone(), value, off(influence)];
+    let mut row =
+        vec![influence.taken.key.clone(), short_value(&influence.taken), off(influence.change, &influence.limits)];
     for change in influence.changes {
         row.push(format!("{:.2}", 1e3 * units::mpa(change.pressure_pa)));
         row.push(format!("{:.2}", change.torque_n_m));
@@ -46,24 +48,70 @@ fn row(influence: &Influence) -> Vec<String> {
     row
 }
 
+fn short_value(taken: &DefaultTaken) -> String {
+    if taken.value.len() > LONGEST { "a map".to_owned() } else { taken.value.clone() }
+}
+
+/// Lists the defaults of a vehicle file with a gearbox, and the values that matter most to an estimate.
+pub(super) fn describe_car_values(car: &Car, all: bool) -> Result<(), Failure> {
+    let taken = &car.defaults_taken;
+    if taken.is_empty() && !all {
+        return Ok(());
+    }
+    output::line(&format!("\n{} values are not in the file and are defaults", taken.len()))?;
+    let Some(influences) = car_influences(car, &bench_sensors()?)? else {
+        output::line("the filter has tables for no shift of this gearbox, so it cannot be said which of them matter")?;
+        return all_names(taken, &[], true);
+    };
+    output::line(&format!(
+        "which values matter most: RMS error of torque (N m) and pressure (kPa) of the clutch that drives the inertia phase, while it\n\
+         slips, over {} simulated shifts between neighbouring gears, where one value of all elements is off, by the default filter and\n\
+         by the open loop\n",
+        influences.shifts
+    ))?;
+    let titles = ["value", "stands in", "off by", "filter N m", "open N m", "filter kPa", "open kPa"]
+        .map(str::to_owned)
+        .to_vec();
+    let as_it_is = car_row(["as it is".to_owned(), String::new(), String::new()], &influences.as_it_is);
+    let rows = influences.values.iter().map(value_row);
+    output::table(3, &[titles, as_it_is].into_iter().chain(rows).collect::<Vec<_>>())?;
+    output::line("")?;
+    let shown: Vec<&str> = influences.values.iter().map(|value| value.key).collect();
+    all_names(taken, &shown, all)
+}
+
+fn value_row(value: &CarInfluence) -> Vec<String> {
+    let from = match value.from {
+        ValueFrom::File => "the file",
+        ValueFrom::Default => "default",
+        ValueFrom::Gearbox => "gearbox file",
+    };
+    car_row([value.key.to_owned(), from.to_owned(), off(Change::Scale, &value.limits)], &value.errors)
+}
+
+fn car_row(names: [String; 3], errors: &ErrorOfEstimate) -> Vec<String> {
+    let torques = errors.torque_n_m.map(|torque_n_m| format!("{torque_n_m:.2}"));
+    let pressures = errors.pressure_pa.map(|pressure_pa| format!("{:.2}", 1e3 * units::mpa(pressure_pa)));
+    names.into_iter().chain(torques).chain(pressures).collect()
+}
+
 /// The limits in words: `-20 to +20 %`, `x0.5 to x2`, `-0.015 to +0.015`.
-fn off(influence: &Influence) -> String {
-    let limit = |limit: &f64| match influence.change {
+fn off(change: Change, limits: &[f64]) -> String {
+    let limit = |limit: &f64| match change {
         Change::Scale if (0.5..1.5).contains(limit) && *limit != 0.5 => format!("{:+.0} %", 100.0 * (limit - 1.0)),
         Change::Scale => format!("x {limit}"),
         Change::Add => format!("{limit:+}"),
         Change::Set => format!("{limit}"),
     };
-    influence.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
+    limits.iter().map(limit).collect::<Vec<_>>().join(", ")
 }
 
 /// The defaults that are not in the table.
-fn all_names(vehicle: &Vehicle, shown: &[Influence], all: bool) -> Result<(), Failure> {
-    let is_shown = |key: &str| shown.iter().any(|influence| influence.taken.key == key);
-    let others: Vec<_> = vehicle.defaults_taken.iter().filter(|taken| !is_shown(&taken.key)).collect();
+fn all_names(taken: &[DefaultTaken], shown: &[&str], all: bool) -> Result<(), Failure> {
+    let others: Vec<_> = taken.iter().filter(|taken| !shown.contains(&taken.key.as_str())).collect();
     if !all {
         let count = others.len();
-        output::line(&format!("{count} others matter less, or to no estimate: --all shows them"))?;
+        output::line(&format!("{count} other defaults matter less, or to no estimate: --all shows them"))?;
         return Ok(());
     }
     output::line("defaults on which no estimate depends, or of which nothing is known:")?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use config::{Car, Drive, Source};
 use design::ShiftErrors;
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
-use report::drive_page::{DrivePage, findings, shift_cells, shift_rows};
+use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use report::matrix_page::kind_rows;
 use study::any_shift::drive::{ScoredDrive, score_drive};
 use study::any_shift::matrix::Random;
@@ -79,6 +79,10 @@ fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {
         output::table(left, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
         output::line("")?;
     }
+    for (word, meaning) in shift_words(drive, car) {
+        output::line(&format!("{word}: {meaning}"))?;
+    }
+    output::line("")?;
     for sentence in findings(drive) {
         output::line(&sentence)?;
     }

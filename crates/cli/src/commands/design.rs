@@ -1,6 +1,8 @@
 //! `wetclutch design`.
 
-use config::{GainMethod, Vehicle};
+use std::path::Path;
+
+use config::{GainMethod, Kind, Source, Vehicle};
 use design::compliant::{CompliantRequirement, best_compliant_phase, compliant_requirement, physical_gains};
 use design::open_loop::is_open_loop;
 use design::rigid::best_phase;
@@ -14,10 +16,12 @@ use serde_json::{Map, Value, json};
 use trace::units;
 
 use crate::args::{Design, DesignChoice, MethodChoice, PhaseChoice};
+use crate::commands::shell_quoted;
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn design(options: &Design) -> Result<(), Failure> {
+    refuse_a_gearbox(&options.vehicle)?;
     let vehicle = match &options.bounds {
         Some(bounds) => Vehicle::read_with(&options.vehicle, bounds)?,
         None => Vehicle::read(&options.vehicle)?,
@@ -28,35 +32,11 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
         PhaseChoice::Inertia => &[Phase::InertiaPhase],
     };
     options_apply(options)?;
-    let sample_time_s = options.sample_time.unwrap_or(SAMPLE_TIME_S);
     let mut object = Map::new();
     let mut text = Vec::new();
     let mut all_missed = Vec::new();
     for &phase in phases {
-        let (json, lines) = match (options.observer, options.method) {
-            (DesignChoice::Rigid, MethodChoice::Iss) => {
-                let required = replaced(requirement(&vehicle, phase).into(), options);
-                let (certificate, missed) = best_phase(&vehicle, phase, &required)?;
-                all_missed.extend(missed);
-                let use_of = UseOf::rigid(&vehicle, phase, &certificate);
-                (use_of.added_to(serde_json::to_value(&certificate)?), rigid_lines(phase, &certificate, &use_of))
-            }
-            (DesignChoice::Compliant, MethodChoice::Iss) => {
-                let required = replaced_compliant(compliant_requirement(&vehicle, phase), options);
-                let (certificate, missed) = best_compliant_phase(&vehicle, phase, &required)?;
-                all_missed.extend(missed);
-                let use_of = UseOf::compliant(&vehicle, phase, &certificate);
-                (use_of.added_to(serde_json::to_value(&certificate)?), compliant_lines(phase, &certificate, &use_of))
-            }
-            (DesignChoice::Rigid | DesignChoice::Compliant, method) => {
-                let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
-                let quantity = options.bound_on.map_or(Quantity::ClutchTorque, Quantity::from);
-                let certificate =
-                    design_discrete_phase(&vehicle, model, method.into(), quantity, phase, sample_time_s)?;
-                (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
-            }
-            (DesignChoice::Sliding, _) => sliding(&vehicle, phase),
-        };
+        let (json, lines) = of_phase(&vehicle, phase, options, &mut all_missed)?;
         object.insert(phase.name().to_owned(), json);
         text.extend(lines);
     }
@@ -79,6 +59,54 @@ pub(crate) fn design(options: &Design) -> Result<(), Failure> {
     };
     let messages = all_missed.into_iter().map(|missed| of_the_option(missed).to_string());
     Err(Failure::Work(messages.collect::<Vec<_>>().join("\n")))
+}
+
+/// The design for a phase, as JSON and as text; adds the requirements that it does not meet.
+fn of_phase(
+    vehicle: &Vehicle,
+    phase: Phase,
+    options: &Design,
+    missed_requirements: &mut Vec<OffsetMissed>,
+) -> Result<(Value, Vec<String>), Failure> {
+    let sample_time_s = options.sample_time.unwrap_or(SAMPLE_TIME_S);
+    Ok(match (options.observer, options.method) {
+        (DesignChoice::Rigid, MethodChoice::Iss) => {
+            let required = replaced(requirement(vehicle, phase).into(), options);
+            let (certificate, missed) = best_phase(vehicle, phase, &required)?;
+            missed_requirements.extend(missed);
+            let use_of = UseOf::rigid(vehicle, phase, &certificate);
+            (use_of.added_to(serde_json::to_value(&certificate)?), rigid_lines(phase, &certificate, &use_of))
+        }
+        (DesignChoice::Compliant, MethodChoice::Iss) => {
+            let required = replaced_compliant(compliant_requirement(vehicle, phase), options);
+            let (certificate, missed) = best_compliant_phase(vehicle, phase, &required)?;
+            missed_requirements.extend(missed);
+            let use_of = UseOf::compliant(vehicle, phase, &certificate);
+            (use_of.added_to(serde_json::to_value(&certificate)?), compliant_lines(phase, &certificate, &use_of))
+        }
+        (DesignChoice::Rigid | DesignChoice::Compliant, method) => {
+            let model = if options.observer == DesignChoice::Rigid { Model::Rigid } else { Model::Compliant };
+            let quantity = options.bound_on.map_or(Quantity::ClutchTorque, Quantity::from);
+            let certificate = design_discrete_phase(vehicle, model, method.into(), quantity, phase, sample_time_s)?;
+            (serde_json::to_value(&certificate)?, discrete_lines(phase, &certificate))
+        }
+        (DesignChoice::Sliding, _) => sliding(vehicle, phase),
+    })
+}
+
+/// A car with a whole gearbox has nothing to design.
+fn refuse_a_gearbox(path: &Path) -> Result<(), Failure> {
+    if !Source::read(path)?.kind().is_ok_and(|kind| kind == Kind::Car) {
+        return Ok(());
+    }
+    let vehicle = shell_quoted(path);
+    Err(Failure::Input(format!(
+        "{}: this is a vehicle file of a car with a gearbox, and gains are designed for the one shift of a file with [gear_train]\n\
+         hint: the filter for any shift needs no design: its gains follow from the variances of the readings and the car's errors in each \
+         step, and its guaranteed ranges from the bounds of these errors. `wetclutch bench --vehicle {vehicle} -o DIR` gives its errors by shift \
+         beside those of the valve model alone, and `wetclutch estimate LOG --vehicle {vehicle}` uses it",
+        path.display()
+    )))
 }
 
 /// Default sample time of a design, s: the usual period of a transmission controller.
@@ -281,12 +309,6 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
         }
         Quantity::Pressure => format!("{:.4} MPa", units::mpa(pascal)),
     };
-    let of = match (phase, certificate.model) {
-        (Phase::InertiaPhase, Model::Compliant) => "rows (T_s, p) on turbine, slip and wheel speed",
-        (_, Model::Compliant) => "rows (T_s, p) on turbine and wheel speed",
-        (Phase::InertiaPhase, Model::Rigid) => "on turbine speed and slip",
-        (_, Model::Rigid) => "on turbine speed",
-    };
     let name = phase_name(phase);
     let mut lines = Vec::new();
     if certificate.uses_open_loop {
@@ -297,13 +319,7 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
             size(certificate.best_gain_bound_pa)
         ));
     } else {
-        lines.push(format!("{name}: L normalised by 1000 N m, 0.1 MPa, 100 rad/s and 10 rad/s (wheel), {of}"));
-        for gain in &certificate.gains {
-            let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>().join(", ");
-            let rows = gain.normalised.iter().map(row).collect::<Vec<_>>().join("; ");
-            let at = gain.friction.map(|friction| format!(" at friction {friction}")).unwrap_or_default();
-            lines.push(format!("  L = [{rows}]{at}"));
-        }
+        lines.extend(gain_lines(phase, certificate));
         lines.push(format!(
             "  steady-state bound on the error of the {what}: {}; open loop: {}",
             size(certificate.bound_pa),
@@ -334,5 +350,24 @@ fn discrete_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String
     ));
     lines.extend(certificate.margins.iter().map(|margin| format!("    {}: {of} {:.1e}", margin.label, margin.least)));
     lines.push(String::new());
+    lines
+}
+
+/// The gains of a discrete-time design.
+fn gain_lines(phase: Phase, certificate: &DiscreteCertificate) -> Vec<String> {
+    let of = match (phase, certificate.model) {
+        (Phase::InertiaPhase, Model::Compliant) => "rows (T_s, p) on turbine, slip and wheel speed",
+        (_, Model::Compliant) => "rows (T_s, p) on turbine and wheel speed",
+        (Phase::InertiaPhase, Model::Rigid) => "on turbine speed and slip",
+        (_, Model::Rigid) => "on turbine speed",
+    };
+    let name = phase_name(phase);
+    let mut lines = vec![format!("{name}: L normalised by 1000 N m, 0.1 MPa, 100 rad/s and 10 rad/s (wheel), {of}")];
+    for gain in &certificate.gains {
+        let row = |row: &Vec<f64>| row.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>().join(", ");
+        let rows = gain.normalised.iter().map(row).collect::<Vec<_>>().join("; ");
+        let at = gain.friction.map(|friction| format!(" at friction {friction}")).unwrap_or_default();
+        lines.push(format!("  L = [{rows}]{at}"));
+    }
     lines
 }

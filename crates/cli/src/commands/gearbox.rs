@@ -166,6 +166,11 @@ fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
         };
         output::line(&format!("{what}: {}", labels.join(" ")))?;
     }
+    order_of_phases()
+}
+
+/// Which phase comes first in each kind of shift.
+fn order_of_phases() -> Result<(), Failure> {
     output::line("\norder of the phases")?;
     let order = |kind: ShiftKind| {
         let phases = match kind.order() {

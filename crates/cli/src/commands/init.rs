@@ -1,8 +1,12 @@
 //! `wetclutch init`.
 
-use config::vehicle::short::{Facts, complete_file, short_file};
+use std::path::Path;
 
-use crate::args::Init;
+use config::Source;
+use config::gearbox::SHIPPED;
+use config::vehicle::short::{CarFacts, Facts, complete_file, short_car_file, short_file, sized_gearbox};
+
+use crate::args::{Init, LaunchChoice};
 use crate::commands::{check_output, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -15,6 +19,14 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
             format!("{}: the file is there already\nhint: choose another name after -o", options.output.display());
         return Err(Failure::Input(message));
     }
+    match &options.gearbox {
+        Some(gearbox) => car(options, gearbox),
+        None => one_shift(options),
+    }
+}
+
+/// A vehicle file of one upshift.
+fn one_shift(options: &Init) -> Result<(), Failure> {
     let [ratio_before, ratio_after] = options.ratios[..] else {
         let message = "--ratios needs two ratios, those of the gears before and after the shift\nhint: for example --ratios 4.17,2.34";
         return Err(Failure::Input(message.to_owned()));
@@ -31,11 +43,88 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     };
     let text = if options.complete { complete_file } else { short_file }(&facts, options.stroke)?;
     write_text(&options.output, &text)?;
+    say_what_is_next(options);
+    Ok(())
+}
+
+/// A vehicle file with a gearbox, and the gearbox file beside it if it is one of the program's.
+fn car(options: &Init, gearbox: &str) -> Result<(), Failure> {
+    let torque_n_m = options.engine_torque_n_m;
+    let shipped = SHIPPED.iter().find(|(name, _)| *name == gearbox);
+    let (source, named, beside) = match shipped {
+        Some((name, text)) => {
+            let file = format!("{name}.toml");
+            let path = options.output.with_file_name(&file);
+            let text = sized_gearbox(&Source::built_in(&file, text), torque_n_m)?;
+            refuse_existing(&path, &text)?;
+            (Source { path: path.clone(), text }, file, Some(path))
+        }
+        None => (read_gearbox(gearbox)?, from_folder_of(&options.output, gearbox)?, None),
+    };
+    let launch = match options.launch {
+        Some(launch) => launch,
+        None if gearbox == "dual_clutch_7" => LaunchChoice::Clutch,
+        None => LaunchChoice::Converter,
+    };
+    let facts = CarFacts {
+        name: options.name.clone(),
+        gearbox: named,
+        has_converter: launch == LaunchChoice::Converter,
+        has_stroke: options.stroke,
+        mass_kg: options.mass_kg,
+        wheel_radius_m: options.wheel_radius_m,
+        final_ratio: options.final_ratio,
+        engine_torque_n_m: torque_n_m,
+    };
+    let text = short_car_file(&facts, &source)?;
+    if let Some(path) = &beside {
+        write_text(path, &source.text)?;
+        output::note(&format!("gearbox file: {}", path.display()));
+    }
+    write_text(&options.output, &text)?;
+    say_what_is_next(options);
+    Ok(())
+}
+
+/// The gearbox file of a car, and what may be given where there is none.
+fn read_gearbox(named: &str) -> Result<Source, Failure> {
+    let path = Path::new(named);
+    if path.exists() {
+        return Ok(Source::read(path)?);
+    }
+    let names = SHIPPED.map(|(name, _)| name).join(", ");
+    Err(Failure::Input(format!("--gearbox {named}: no such file\nhint: give a gearbox file, or one of {names}")))
+}
+
+/// A path as a file in the folder of `output` names it.
+fn from_folder_of(output: &Path, named: &str) -> Result<String, Failure> {
+    let folder = output.parent().unwrap_or(Path::new(""));
+    if folder.as_os_str().is_empty() || Path::new(named).is_absolute() {
+        return Ok(named.to_owned());
+    }
+    let whole = Path::new(named).canonicalize();
+    let whole = whole.map_err(|error| Failure::Input(format!("--gearbox {named}: {error}")))?;
+    Ok(whole.display().to_string())
+}
+
+/// Refuses to write over a gearbox file that somebody has changed.
+fn refuse_existing(path: &Path, text: &str) -> Result<(), Failure> {
+    match std::fs::read_to_string(path) {
+        Ok(there) if there == text => Ok(()),
+        _ if !path.exists() => Ok(()),
+        _ => Err(Failure::Input(format!(
+            "{0}: the file is there already, and is another gearbox\nhint: use it by `--gearbox {1}`, or write into another folder",
+            path.display(),
+            shell_quoted(path),
+        ))),
+    }
+}
+
+fn say_what_is_next(options: &Init) {
     let file = shell_quoted(&options.output);
     output::note(&format!(
-        "vehicle file: {}\nnext: `wetclutch check {file}` says which of its defaults matter most; `wetclutch fit LOG --vehicle {file} -o fitted.toml`, \
+        "vehicle file: {}\nnext: `wetclutch check {file}` says which of its values matter most; `wetclutch fit LOG --vehicle {file} -o fitted.toml`, \
          or `wetclutch estimate LOG --vehicle {file}`",
         options.output.display()
     ));
-    Ok(())
 }

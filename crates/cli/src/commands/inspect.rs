@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use fit::drive::{DriveRecord, fit_converter};
+use logs::plausibility::likely_time_unit;
 use logs::{ChannelMap, Direction, Inspection, Load, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder};
 use report::SpeedsPage;
 use trace::units::rpm;
@@ -40,6 +41,13 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     output::line(&format!("{}: {}, {} channels", options.log.display(), log.format(), log.channels().len()))?;
     channels(&inspection)?;
     remarks(&inspection.notes);
+    let steps_s = inspection.channels.iter().filter_map(|summary| summary.period_s);
+    if let Some(unit) = likely_time_unit(steps_s.fold(f64::INFINITY, f64::min)) {
+        output::note(&format!(
+            "warning: no channel has a sample more often than once in a second: the time looks like {unit}\n\
+             hint: set its `name` and `unit = \"{unit}\"` under [time] in the channel map"
+        ));
+    }
     if !map.channels.is_empty() {
         map.resolve(&log)?;
         output::note("the channel map fits the log");
@@ -154,8 +162,10 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
     }
     readings.check()?;
     let origin_s = origin(first_s);
+    let contradiction = finder.contradiction();
     let found: Vec<Shift> = finder.finish().iter().map(|shift| shift.earlier_by(origin_s)).collect();
-    let notes = notes(&readings);
+    let mut notes = notes(&readings);
+    notes.extend(contradiction);
     for note in &notes {
         output::note(&format!("warning: {note}"));
     }

@@ -129,7 +129,17 @@ fn not_an_input<'a>(output: Option<&PathBuf>, inputs: impl IntoIterator<Item = &
 
 /// The channel map of these options.
 fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
-    let mut map = options.map.as_deref().map_or_else(|| Ok(ChannelMap::default()), ChannelMap::read)?;
+    let mut map = match options.map.as_deref() {
+        Some(path) => ChannelMap::read(path).map_err(|error| match Source::read(path).and_then(|source| source.kind()) {
+            Ok(kind) => Failure::Input(format!(
+                "{}: this looks like {}, expected a channel map\nhint: `wetclutch inspect LOG --suggest` writes a first one",
+                path.display(),
+                kind.words()
+            )),
+            Err(_) => error.into(),
+        })?,
+        None => ChannelMap::default(),
+    };
     for channel in &options.channel {
         map.set(channel)?;
     }

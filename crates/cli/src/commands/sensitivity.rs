@@ -1,11 +1,16 @@
 //! `wetclutch sensitivity`.
 
-use config::Vehicle;
+use std::path::Path;
+
+use config::{Car, Kind, Source, Vehicle};
+use report::car_sensitivity_page::{car_sensitivity_page, hidden_phases, sensitivity_rows};
 use report::sensitivity_page;
 use serde_json::json;
+use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
 use study::sensitivity as find;
 use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 
+use super::matrix::bench_sensors;
 use crate::args::SensitivityOptions;
 use crate::commands::write_text;
 use crate::failure::Failure;
@@ -13,6 +18,7 @@ use crate::output;
 
 pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     let vehicle = match &options.vehicle {
+        Some(path) if Source::read(path)?.kind()? == Kind::Car => return of_car(options, path),
         Some(path) => Vehicle::read(path)?,
         None => Vehicle::two_speed_at()?,
     };
@@ -69,4 +75,67 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
     }
     Ok(())
+}
+
+/// The same for every shift of a car with a gearbox.
+fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
+    let car = Car::read(path)?;
+    let shifts = car_sensitivity(&car, &bench_sensors()?)?;
+    if shifts.is_empty() {
+        let message = format!(
+            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; the elements need plates (`pack`) and valves",
+            path.display()
+        );
+        return Err(Failure::Input(message));
+    }
+    if let Some(folder) = &options.output {
+        write_text(&folder.join("sensitivity.html"), &car_sensitivity_page(&shifts, &car)?)?;
+    }
+    if options.json {
+        let objects: Vec<_> = shifts.iter().map(|shift| json_of(shift, &car)).collect();
+        output::line(&serde_json::to_string_pretty(&objects)?)?;
+        return Ok(());
+    }
+    output::line(
+        "deviation of the estimated torque of the clutch that drives the inertia phase, N m: filter / valve model alone, and their ratio,\n\
+         where each error is anywhere within its bound, independent of the others; hidden: the ratio is above 0.9, the speeds show nothing of\n\
+         this torque, and the valve model serves\n",
+    )?;
+    let (titles, rows) = sensitivity_rows(&shifts, &car);
+    let titles = titles.into_iter().map(str::to_owned).collect();
+    output::table(3, &std::iter::once(titles).chain(rows).collect::<Vec<_>>())?;
+    let bound = |error: ShiftErrorKind| format!("{} {}", error.name(), error.bound());
+    let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(&car)).map(bound).collect();
+    let [hidden, all] = hidden_phases(&shifts);
+    output::line(&format!("\nbounds, either way: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;
+    if let Some(folder) = &options.output {
+        output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
+    }
+    Ok(())
+}
+
+/// One shift with its phases, in SI units.
+fn json_of(shift: &ShiftSensitivity, car: &Car) -> serde_json::Value {
+    let gear = |gear: usize| car.gearbox.gears[gear].name.as_str();
+    let phase = |phase: &Option<PhaseOfShift>| {
+        phase.as_ref().map(|phase| {
+            json!({
+                "mean_torque_n_m": phase.torque_n_m,
+                "deviation_n_m": phase.deviation_n_m(),
+                "deviation_pa": phase.deviation_pa(),
+                "hidden": phase.is_hidden(),
+                "effects": phase.effects,
+            })
+        })
+    };
+    let [torque, inertia] = &shift.phases;
+    json!({
+        "from_gear": gear(shift.shift.from),
+        "to_gear": gear(shift.shift.to),
+        "kind": shift.shift.kind.name(),
+        "element": car.gearbox.elements[shift.element].name,
+        "ratio_gain": shift.shift.gain,
+        "torque_phase": phase(torque),
+        "inertia_phase": phase(inertia),
+    })
 }

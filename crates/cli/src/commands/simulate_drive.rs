@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use config::{Car, Drive, Sensors};
 use drivetrain::CommandKind;
-use plant::car::{CarCalibration, CarError, CarModel, CarSample, ShiftStage, ShiftUnderWay, simulate_car_drive};
+use plant::car::{
+    CarCalibration, CarError, CarModel, CarSample, OverSpeed, ShiftStage, ShiftUnderWay, simulate_car_drive,
+};
 use study::any_shift::logged::{command_age, element_commands};
 use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
 use study::any_shift::recording::{lock_up_is_applied, reported_engine_n_m};
-use trace::units::km_h;
+use trace::units::{km_h, rpm};
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
 use super::simulate::size_note;
@@ -69,10 +71,26 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
             100.0 * error.beyond,
         ));
     }
+    if let Some(over) = &summary.over_speed {
+        output::note(&over_speed(over, &car));
+    }
     for path in paths {
         output::line(&path.display().to_string())?;
     }
     Ok(())
+}
+
+/// What a drive asks of the engine that it cannot do.
+fn over_speed(over: &OverSpeed, car: &Car) -> String {
+    let OverSpeed { time_s, engine_rad_s, map_rad_s, gears } = *over;
+    let [from, to] = gears.map(|gear| car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str()));
+    let in_gear = if from == to { format!("in gear {from}") } else { format!("in the shift {from}-{to}") };
+    format!(
+        "warning: the engine turns at {:.0} rpm {in_gear} at {time_s:.2} s, and its torque map ends at {:.0} rpm: beyond, the last torque of the \
+         map is used\nhint: a gearbox controller would refuse such a shift; check [[shift]], the schedule and the grade",
+        rpm(engine_rad_s),
+        rpm(map_rad_s)
+    )
 }
 
 /// The two files of a drive: every signal, and those that a car measures or commands.
@@ -307,9 +325,6 @@ pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
                 if clutch.has_stroke { ", with stroke" } else { "" },
             ))?;
         }
-    }
-    if !car.defaults_taken.is_empty() {
-        output::line(&format!("left out, as in vehicles/eight_speed.toml: {}", car.defaults_taken.join(", ")))?;
     }
     Ok(())
 }

@@ -265,3 +265,74 @@ fn a_log_may_be_in_neutral() {
     assert!(health[2300..].iter().all(|health| health != "good") && phase[2300..].iter().all(String::is_empty));
     assert!(health[2200..2300].iter().any(|health| health == "good"));
 }
+
+/// A log with the names of two columns swapped.
+fn swapped(text: &str, [one, other]: [&str; 2]) -> String {
+    let (names, rows) = text.split_once('\n').unwrap();
+    let names = names.split(',').map(|name| match name {
+        _ if name == one => other,
+        _ if name == other => one,
+        _ => name,
+    });
+    names.collect::<Vec<_>>().join(",") + "\n" + rows
+}
+
+#[test]
+fn channels_that_contradict_the_gear_are_named() {
+    let folder = simulated("swapped-car");
+    let text = folder.read("sim/short_measured.csv");
+    let warnings = |log: &str| {
+        folder.write("log.csv", log);
+        let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        said.lines().filter(|line| line.starts_with("warning")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(&text), Vec::<String>::new());
+    // INT holds the second gear, DIR the third.
+    let commands = warnings(&swapped(&text, ["element_int_current_a", "element_dir_current_a"]));
+    assert!(commands.iter().any(|line| line.contains("the channels of INT and DIR may be swapped")), "{commands:?}");
+    assert!(folder.read("out_report.html").contains("the channels of INT and DIR may be swapped"));
+    folder.write("log.csv", swapped(&text, ["engine_speed_rad_s", "turbine_speed_rad_s"]));
+    let speeds = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(speeds.contains("warning: engine_speed and turbine_speed may be swapped"), "{speeds}");
+}
+
+#[test]
+fn a_hole_in_a_shift_ends_it_and_is_said() {
+    let folder = simulated("hole-car");
+    let text = folder.read("sim/short_measured.csv");
+    let [time, gear, target] = ["time_s", "gear", "target_gear"].map(|name| column(&text, name));
+    let begin = (0..gear.len()).find(|&row| gear[row] != target[row]).unwrap();
+    let end = (begin..gear.len()).find(|&row| gear[row] == target[row]).unwrap();
+    // From the middle of the first shift on, everything is a minute later.
+    let from = time[(begin + end) / 2].parse::<f64>().unwrap();
+    let later = with_column(&text, "time_s", |value| {
+        let time_s: f64 = value.parse().unwrap();
+        if time_s > from { format!("{}", time_s + 60.0) } else { value.to_owned() }
+    });
+    folder.write("log.csv", later);
+    let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(said.contains("warning: 1 shifts have a hole of more than 0.5 s in the recording"), "{said}");
+    let shifts = folder.read("out_shifts.csv");
+    assert_eq!(column(&shifts, "complete_s")[0], "");
+    assert!(numbers(&shifts, "complete_s")[1..].iter().all(|time_s| *time_s < 3.0), "{shifts}");
+    // The rest of the shift after the hole is no other shift.
+    assert_eq!(column(&shifts, "from_gear"), ["1", "2", "3", "4", "3"]);
+}
+
+#[test]
+fn rows_of_a_drive_out_of_their_order_are_left_out_and_counted() {
+    let folder = simulated("order-car");
+    let text = folder.read("sim/short_measured.csv");
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.insert(500, lines[499]);
+    lines.swap(800, 801);
+    folder.write("log.csv", lines.join("\n") + "\n");
+    let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(said.contains("1 of 2401 rows have the time of the row before and are not used"), "{said}");
+    assert!(said.contains("1 of 2401 rows have a time before that of the row before"), "{said}");
+    // A time in ns since 1970 is not one in seconds.
+    let late = with_column(&text, "time_s", |value| format!("{:.0}", 1.7e18 + 1e9 * value.parse::<f64>().unwrap()));
+    folder.write("log.csv", late);
+    let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("ns.csv")]));
+    assert!(error.contains("if the time is in ns, ") && error.contains("`unit = \"ns\"` under [time]"), "{error}");
+}

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::support::{EXPERIMENT, Folder, VEHICLE, stderr, stdout, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, stderr, stdout, wetclutch};
 
 fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(path).unwrap()
@@ -427,6 +427,25 @@ fn a_discrete_design_says_when_the_open_loop_serves() {
     assert!(stdout(&output).contains("at friction 0.16") && stdout(&output).contains("of the clutch torque"));
     let output = wetclutch(&["design", VEHICLE, "--method", "interval"]);
     assert!(stdout(&output).contains("smallest entry"), "{}", stdout(&output));
+}
+
+#[test]
+fn sensitivity_of_a_car_with_a_gearbox_says_which_shifts_hide_their_torque() {
+    let folder = Folder::new("car-sensitivity");
+    let car = format!("{ROOT}vehicles/four_speed.toml");
+    let output = wetclutch(&["sensitivity", &car, "-o", &folder.path("out")]);
+    let text = printed(&output);
+    assert!(text.contains("hidden: ") && text.contains("converter capacity 10 %"), "{text}");
+    assert_eq!(
+        text.lines().filter(|line| line.contains("upshift") || line.contains("downshift")).count(),
+        12,
+        "{text}"
+    );
+    let page = read(folder.path("out/sensitivity.html"));
+    assert!(page.contains("Torque phase") && page.contains("AODE") && page.contains("bound, either way"));
+    let json: serde_json::Value = serde_json::from_str(&printed(&wetclutch(&["sensitivity", &car, "--json"]))).unwrap();
+    assert_eq!(json.as_array().unwrap().len(), 12);
+    assert!(json[0]["inertia_phase"]["deviation_n_m"][0].as_f64().unwrap() > 0.0, "{json}");
 }
 
 #[test]

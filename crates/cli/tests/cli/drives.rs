@@ -69,3 +69,51 @@ fn check_describes_a_car_and_a_drive() {
         assert!(printed.contains(part), "{part}: {printed}");
     }
 }
+
+#[test]
+fn an_engine_beyond_its_map_is_said() {
+    let drive = |gear: &str| {
+        format!(
+            "name = \"d\"\nstart = {{ gear = \"6\", vehicle_m_s = 50 }}\nshift = [{{ time_s = 1, gear = \"{gear}\" }}]\n[[segment]]\nduration_s = 4\nthrottle = 0\n"
+        )
+    };
+    let vehicle = format!("{ROOT}vehicles/six_speed.toml");
+    let folder = with_drive("fast", &drive("2"));
+    let text = said(&simulate(&folder, &["--vehicle", &vehicle]));
+    assert!(text.contains("warning: the engine turns at ") && text.contains("its torque map ends at"), "{text}");
+    let folder = with_drive("slow", &drive("5"));
+    let text = said(&simulate(&folder, &["--vehicle", &vehicle]));
+    assert!(!text.contains("warning"), "{text}");
+}
+
+#[test]
+fn a_file_of_another_kind_is_named() {
+    let folder = Folder::new("kinds");
+    let (study, car_study) =
+        (format!("{ROOT}experiments/combined.toml"), format!("{ROOT}experiments/eight_speed_ftp_75.toml"));
+    let (drive, car) = (format!("{ROOT}drives/city.toml"), format!("{ROOT}vehicles/eight_speed.toml"));
+    let (gearbox, map) = (format!("{ROOT}gearboxes/8hp.toml"), format!("{ROOT}maps/genesis_at8.toml"));
+    let (out, table) = (folder.path("out"), folder.write("log.csv", "time_s,engine_speed_rad_s,turbine_speed_rad_s\n"));
+    let cases: [(&[&str], &str); 13] = [
+        (&["simulate", &study, "-o", &out], "this looks like a study file, expected an experiment file"),
+        (&["simulate", &car_study, "-o", &out], "this looks like a study file of a car with a gearbox"),
+        (&["simulate", &car, "-o", &out], "this looks like a vehicle file of a car with a gearbox"),
+        (&["simulate", &drive, "--vehicle", &gearbox, "-o", &out], "this looks like a gearbox file"),
+        (&["simulate", &drive, "--vehicle", &study, "-o", &out], "this looks like a study file"),
+        (&["study", EXPERIMENT, "-o", &out], "this looks like an experiment file, expected a study file"),
+        (&["estimate", &table, "--vehicle", &drive], "this looks like a drive file, expected a vehicle file"),
+        (&["estimate", &table, "--vehicle", &map], "this looks like a channel map\nhint: "),
+        (&["estimate", &table, "--vehicle", &table], "this looks like a table, expected TOML"),
+        (&["estimate", &car, "--vehicle", &car], "this is a TOML file, expected a log"),
+        (&["estimate", &table, "--vehicle", VEHICLE, "--map", &car], "a gearbox, expected a channel map\nhint: "),
+        (&["check", env!("CARGO_BIN_EXE_wetclutch")], "this is no text file, expected TOML"),
+        (
+            &["design", &car],
+            "gains are designed for the one shift of a file with [gear_train]\nhint: the filter for any shift",
+        ),
+    ];
+    for (arguments, words) in cases {
+        let text = refused(&wetclutch(arguments));
+        assert!(text.contains(words), "{arguments:?}: {text}");
+    }
+}

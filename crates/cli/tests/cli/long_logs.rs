@@ -196,6 +196,19 @@ fn a_signal_in_another_unit_than_its_name_says_is_an_error_with_the_likely_one()
 }
 
 #[test]
+fn swapped_speeds_of_a_two_speed_car_are_said() {
+    let folder = Folder::new("swapped");
+    let log = folder.drives("log.csv", 1, None);
+    assert!(!said(&estimate(&log, &["-o", &folder.path("out.csv")])).contains("warning"));
+    let text = folder.read("log.csv").replacen("engine_speed_rad_s", "x", 1);
+    let text =
+        text.replacen("turbine_speed_rad_s", "engine_speed_rad_s", 1).replacen(",x,", ",turbine_speed_rad_s,", 1);
+    let log = folder.write("swapped.csv", text);
+    let said = said(&estimate(&log, &["-o", &folder.path("out.csv")]));
+    assert!(said.contains("warning: engine_speed and turbine_speed may be swapped"), "{said}");
+}
+
+#[test]
 fn a_shift_without_its_command_is_said() {
     let folder = Folder::new("command");
     let log = folder.drives("log.csv", 1, Some(("oncoming_current_a", 0.001)));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::Vehicle;
+use config::{Car, Vehicle};
 
 use crate::support::{EXPERIMENT, Folder, ROOT, printed, refused, said, wetclutch};
 
@@ -156,4 +156,66 @@ fn what_is_wrong_with_a_short_file_is_said_with_its_line() {
     let text = whole.replacen("[engine]\n", "[engine]\nmax_torque_n_m = 190\n", 1);
     let text = refused(&wetclutch(&["check", &folder.write("whole.toml", text)]));
     assert!(text.contains("`engine.max_torque_n_m`: scales the defaults of a file with `gear_train.ratios`"), "{text}");
+}
+
+#[test]
+fn a_negative_number_is_outside_its_range_and_no_option() {
+    let folder = Folder::new("negative");
+    let mut numbers = NUMBERS;
+    numbers[1] = "-5";
+    let error = refused(&wetclutch(&[&["init"], &numbers[..], &["-o", &folder.path("car.toml")]].concat()));
+    assert!(error.contains("invalid value '-5' for '--mass-kg <KG>': expected a number from 200 to 60000"), "{error}");
+}
+
+/// The numbers of a large car with a gearbox.
+const CAR: [&str; 8] =
+    ["--mass-kg", "1900", "--wheel-radius-m", "0.33", "--final-ratio", "2.8", "--engine-torque-n-m", "400"];
+
+fn init_car(folder: &Folder, name: &str, more: &[&str]) -> std::process::Output {
+    wetclutch(&[&["init"], &CAR[..], more, &["-o", &folder.path(name)]].concat())
+}
+
+#[test]
+fn a_first_file_of_a_whole_gearbox_goes_through_check_and_loses_nothing() {
+    let folder = Folder::new("own-gearbox");
+    let text = said(&init_car(&folder, "car.toml", &["--gearbox", "ravigneaux_4", "--name", "large"]));
+    assert!(text.contains("gearbox file: ") && text.contains("next: "), "{text}");
+    assert!(folder.read("ravigneaux_4.toml").starts_with("# `turbine_max_n_m`"));
+    let car = folder.path("car.toml");
+    let table = printed(&wetclutch(&["check", &car, "--all"]));
+    let cells = |key: &str| -> Vec<f64> {
+        let row = table.lines().find(|line| line.starts_with(key)).unwrap_or_else(|| panic!("{key}: {table}"));
+        let words: Vec<&str> = row.split_whitespace().collect();
+        words[words.len() - 4..].iter().map(|word| word.parse().unwrap()).collect()
+    };
+    let [as_it_is, gain, stiffness] =
+        ["as it is", "valve.gain.gain_pa_a", "driveline.shaft_stiffness_n_m_rad"].map(cells);
+    // The valve model alone knows nothing of the driveline; the speeds correct a wrong gain.
+    assert!(gain[1] > as_it_is[1] && gain[0] > as_it_is[0] && gain[0] < gain[1], "{table}");
+    assert!(stiffness[0] > as_it_is[0] && stiffness[1] == as_it_is[1], "{table}");
+    assert!(table.contains("\n  oil.temperature_degc = 80\n"), "{table}");
+    // A second call loses nothing that was filled in.
+    assert!(refused(&init_car(&folder, "car.toml", &["--gearbox", "ravigneaux_4"])).contains("there already"));
+    said(&init_car(&folder, "second.toml", &["--gearbox", "ravigneaux_4"]));
+    folder.write("ravigneaux_4.toml", folder.read("ravigneaux_4.toml") + "\n# mine\n");
+    assert!(refused(&init_car(&folder, "third.toml", &["--gearbox", "ravigneaux_4"])).contains("another gearbox"));
+    assert!(folder.read("ravigneaux_4.toml").ends_with("# mine\n"));
+    let own = folder.path("ravigneaux_4.toml");
+    said(&init_car(&folder, "third.toml", &["--gearbox", &own, "--stroke"]));
+    let third = Car::read(Path::new(&folder.path("third.toml"))).unwrap();
+    assert!(third.clutches.iter().flatten().all(|clutch| clutch.has_stroke));
+}
+
+#[test]
+fn a_first_file_of_a_gearbox_that_is_none_is_refused() {
+    let folder = Folder::new("own-no-gearbox");
+    let message = refused(&init_car(&folder, "car.toml", &["--gearbox", "9hp"]));
+    assert!(message.contains("no such file") && message.contains("lepelletier_6"), "{message}");
+    let vehicle = format!("{ROOT}vehicles/eight_speed.toml");
+    refused(&init_car(&folder, "car.toml", &["--gearbox", &vehicle]));
+    refused(&init_car(&folder, "car.toml", &["--gearbox", "8hp", "--ratios", "4,2"]));
+    refused(&init_car(&folder, "car.toml", &[]));
+    refused(&init_car(&folder, "car.toml", &["--ratios", "4,2", "--launch", "clutch"]));
+    assert!(!std::path::Path::new(&folder.path("car.toml")).exists());
+    assert!(!std::path::Path::new(&folder.path("8hp.toml")).exists());
 }

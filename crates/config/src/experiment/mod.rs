@@ -12,7 +12,7 @@ use observer::Discretisation;
 
 use crate::check::{Check, Number};
 use crate::tree::Tree;
-use crate::{ConfigError, Source, Vehicle};
+use crate::{ConfigError, Kind, Source, Vehicle};
 use off_nominal::off_nominal;
 use raw::{RawExperiment, RawFill, RawScenario, RawShift};
 
@@ -210,7 +210,7 @@ impl Experiment {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
-        let experiment = Self::checked(&Check::of(&source), &source.parse()?)?;
+        let experiment = Self::checked(&Check::of(&source), &source.parse_as(Kind::Experiment)?)?;
         Ok(Self { source, ..experiment })
     }
 

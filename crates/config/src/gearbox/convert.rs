@@ -247,7 +247,7 @@ fn pack(check: &Check<'_>, element: &str, raw: &RawPack) -> Result<Clutch<f64>, 
     Ok(Clutch {
         mean_radius_m: number("mean_radius_m", &raw.mean_radius_m, 0.02..=0.5)?,
         friction_faces: check.count(key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
-        piston_area_m2: number("piston_area_m2", &raw.piston_area_m2, 0.001..=0.05)?,
+        piston_area_m2: number("piston_area_m2", &raw.piston_area_m2, 0.001..=0.1)?,
         return_spring_n: number("return_spring_n", &raw.return_spring_n, 0.0..=10e3)?,
         static_friction: friction,
         friction: flat,

@@ -8,13 +8,22 @@ use std::path::Path;
 use geartrain::{Finding, Gearbox, Part};
 
 use crate::check::Check;
-use crate::{ConfigError, Source};
+use crate::{ConfigError, Kind, Source};
 use convert::{Read, Spans};
 use raw::{RawHead, RawRatios, RawShares, RawStickDiagram};
 
 /// The levels of a gearbox file.
 const LEVELS: &str = "the levels are \"stick-diagram\" (shafts, sets, elements), \"shares\" (ratios and holding torques) and \
                       \"ratios\" (ratios alone)";
+
+/// The gearbox files of the program, each by its name, for the gasoline engine of `vehicles/eight_speed.toml`.
+pub const SHIPPED: [(&str, &str); 5] = [
+    ("8hp", include_str!("../../../../gearboxes/8hp.toml")),
+    ("10_speed", include_str!("../../../../gearboxes/10_speed.toml")),
+    ("dual_clutch_7", include_str!("../../../../gearboxes/dual_clutch_7.toml")),
+    ("lepelletier_6", include_str!("../../../../gearboxes/lepelletier_6.toml")),
+    ("ravigneaux_4", include_str!("../../../../gearboxes/ravigneaux_4.toml")),
+];
 
 /// A checked gearbox file.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +60,8 @@ impl GearboxFile {
             _ => {
                 let at = head.level.as_ref().map_or(0, |level| level.span().start);
                 let message = if head.level.is_some() { "there is no such level" } else { "missing `level`" };
-                return Err(check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned())));
+                let error = check.meaning("level", at, message.to_owned(), Some(LEVELS.to_owned()));
+                return Err(source.unless_other(Kind::Gearbox, error));
             }
         };
         let Read { description, spans } = read;

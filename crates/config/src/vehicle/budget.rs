@@ -127,18 +127,7 @@ pub(super) fn error_bounds(
         |key: &str, value: &Number, range| check.number(format_args!("design.error_bounds.{key}"), value, range);
     let range =
         |key: &str, values: &Numbers, allowed| check.pair(format_args!("design.error_bounds.{key}"), values, allowed);
-    let factor = |key: &str, values: &Numbers, allowed| {
-        let factors = range(key, values, allowed)?;
-        if (factors[0]..=factors[1]).contains(&1.0) {
-            return Ok(factors);
-        }
-        let key = format!("design.error_bounds.{key}");
-        let [least, greatest] = factors;
-        let message = format!(
-            "{least} to {greatest} does not contain 1: the car of this file would be outside its own error budget"
-        );
-        Err(check.meaning(&key, values.span().start, message, Some("an error of 10 % is [0.9, 1.1]".to_owned())))
-    };
+    let factor = |key: &str, values: &Numbers, allowed| factors(check, key, values, allowed);
     let optional = |key: &str, value: &Option<Number>, range: RangeInclusive<f64>, default: f64| match value {
         Some(value) => number(key, value, range),
         None => Ok(default),
@@ -193,4 +182,21 @@ pub(super) fn error_bounds(
         slip_rad_s: number("slip_rad_s", &raw.slip_rad_s, 0.0..=200.0)?,
         pressure_max_pa,
     })
+}
+
+/// Least and greatest of a factor on a value of the file.
+fn factors(
+    check: &Check<'_>,
+    key: &str,
+    values: &Numbers,
+    allowed: RangeInclusive<f64>,
+) -> Result<[f64; 2], ConfigError> {
+    let key = format!("design.error_bounds.{key}");
+    let [least, greatest] = check.pair(&key, values, allowed)?;
+    if (least..=greatest).contains(&1.0) {
+        return Ok([least, greatest]);
+    }
+    let message =
+        format!("{least} to {greatest} does not contain 1: the car of this file would be outside its own error budget");
+    Err(check.meaning(&key, values.span().start, message, Some("an error of 10 % is [0.9, 1.1]".to_owned())))
 }

@@ -1,30 +1,31 @@
 //! Vehicle files with a whole gearbox: a car that shifts through all of its gears.
 //!
-//! The gearbox is a file of its own. What a vehicle file leaves out it takes from `vehicles/eight_speed.toml`, key by key.
+//! The gearbox is a file of its own. What a vehicle file leaves out it takes from `vehicles/eight_speed.toml`, key by key; scaled to
+//! the size of the car, if the file has `engine.max_torque_n_m`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use drivetrain::{Clutch, ClutchValve, Converter, Driveline, Engine, RoadLoad, Table1, Tyre};
-use geartrain::{ElementKind, Gearbox};
+use geartrain::{ElementKind, Gearbox, GearboxElement};
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::car_bounds::{self, CarErrorBounds, ElementErrorBounds, RawCarErrorBounds, RawElementErrorBounds};
 use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
-use super::{HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre, valves};
+use super::short::{car_defaults, car_defaults_taken};
+use super::{
+    DefaultTaken, HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre,
+    valves,
+};
 use crate::check::{Check, Number, Word};
 use crate::source::Layers;
-use crate::{ConfigError, GearboxFile, Source};
+use crate::{ConfigError, GearboxFile, Kind, Source};
 
 /// What a vehicle file leaves out.
 const DEFAULTS: (&str, &str) = ("vehicles/eight_speed.toml", include_str!("../../../../vehicles/eight_speed.toml"));
 const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../gearboxes/8hp.toml"));
-
-/// Tables and keys that a vehicle file may leave out.
-const OPTIONAL: [&str; 10] =
-    ["launch", "engine", "converter", "hydraulics", "friction", "valve", "driveline", "tyre", "vehicle", "oil"];
 
 /// The lock-up clutch of the converter, and when it is closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,8 +75,8 @@ pub struct Car {
     pub oil_temperature_degc: f64,
     /// Bounds on the errors of these values that the file has.
     pub error_bounds: CarErrorBounds,
-    /// Tables that the file leaves out, so that they are those of `vehicles/eight_speed.toml`.
-    pub defaults_taken: Vec<&'static str>,
+    /// What the file leaves out, so that it is as in `vehicles/eight_speed.toml`, scaled if the file has `engine.max_torque_n_m`.
+    pub defaults_taken: Vec<DefaultTaken>,
 }
 
 impl Car {
@@ -95,7 +96,7 @@ impl Car {
         let source = Source::read(path)?;
         let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
         let layers = Layers { source: &defaults, over: Some(&source) };
-        let raw: RawCar = layers.parse()?;
+        let raw: RawCar = layers.parse().map_err(|error| source.unless_other(Kind::Car, error))?;
         let own = source.parse::<toml::Table>()?.contains_key("gearbox");
         if !own {
             let hint = "gearbox = \"../gearboxes/8hp.toml\", a path from the folder of this file".to_owned();
@@ -114,11 +115,10 @@ impl Car {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_sources(source: Source, gearbox: Source) -> Result<Self, ConfigError> {
-        let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
-        let given: toml::Table = source.parse()?;
+        let mut gearbox = GearboxFile::from_source(gearbox)?.gearbox;
+        let defaults = car_defaults(&source, Source::built_in(DEFAULTS.0, DEFAULTS.1), &gearbox)?;
         let raw: RawCar = Layers { source: &defaults, over: Some(&source) }.parse()?;
         let check = Check { layers: Layers { source: &defaults, over: Some(&source) } };
-        let mut gearbox = GearboxFile::from_source(gearbox)?.gearbox;
         let at = raw.gearbox.span().start;
         if gearbox.train.is_none() {
             let message = format!("\"{}\" has no stick diagram", raw.gearbox.get_ref());
@@ -140,13 +140,7 @@ impl Car {
             name: check.title("name", &raw.name)?,
             clutches,
             line_pressure_pa,
-            engine: match &raw.engine.max_torque_n_m {
-                None => engine(&check, &raw.engine)?,
-                Some(value) => {
-                    let message = "is for vehicle files with `gear_train.ratios`".to_owned();
-                    return Err(check.meaning("engine.max_torque_n_m", value.span().start, message, None));
-                }
-            },
+            engine: engine(&check, &raw.engine)?,
             converter: match raw.launch {
                 RawLaunch::Converter => Some(converter(&check, &raw.converter)?),
                 RawLaunch::Clutch => None,
@@ -162,11 +156,7 @@ impl Car {
             tyre: tyre(&check, &raw.tyre)?,
             road: road(&check, &raw.vehicle)?,
             oil_temperature_degc,
-            defaults_taken: OPTIONAL
-                .into_iter()
-                .filter(|key| !given.contains_key(*key))
-                .filter(|&key| key != "converter" || matches!(raw.launch, RawLaunch::Converter))
-                .collect(),
+            defaults_taken: car_defaults_taken(&source, &defaults, matches!(raw.launch, RawLaunch::Converter))?,
             source,
         })
     }
@@ -336,6 +326,11 @@ fn turbine_inertias(check: &Check<'_>, raw: &RawCar, gearbox: &mut Gearbox) -> R
     Ok(())
 }
 
+/// Whether an element has plates.
+fn is_friction(kind: ElementKind) -> bool {
+    matches!(kind, ElementKind::Clutch | ElementKind::Brake)
+}
+
 /// The friction elements: plates of the gearbox file, friction over slip, drag and valve of the vehicle file.
 fn clutches(
     check: &Check<'_>,
@@ -345,42 +340,100 @@ fn clutches(
     line_pressure_pa: f64,
     oil_degc: f64,
 ) -> Result<Vec<Option<ShiftClutch>>, ConfigError> {
-    let is_friction = |kind: ElementKind| matches!(kind, ElementKind::Clutch | ElementKind::Brake);
-    for name in raw.clutch.keys() {
-        let element = gearbox.elements.iter().find(|element| element.name == *name.get_ref());
-        if !element.is_some_and(|element| is_friction(element.kind)) {
-            let names = gearbox.elements.iter().filter(|element| is_friction(element.kind));
-            let names = names.map(|element| element.name.as_str()).collect::<Vec<_>>().join(", ");
-            let message = format!("the gearbox has no clutch or brake \"{}\"", name.get_ref());
-            let hint = format!("it has {names}");
-            return Err(check.meaning("clutch", name.span().start, message, Some(hint)));
+    known_clutches(check, raw, gearbox)?;
+    let common = CommonClutch {
+        check,
+        raw,
+        shape: FrictionShape::of(check, &raw.friction)?,
+        valve: common_valve,
+        line_pressure_pa,
+        oil_degc,
+    };
+    let of = |element: &GearboxElement| is_friction(element.kind).then(|| common.clutch(element)).transpose();
+    gearbox.elements.iter().map(of).collect()
+}
+
+/// Refuses a table of an element that the gearbox does not have.
+fn known_clutches(check: &Check<'_>, raw: &RawCar, gearbox: &Gearbox) -> Result<(), ConfigError> {
+    let with_plates = || gearbox.elements.iter().filter(|element| is_friction(element.kind));
+    let unknown = raw.clutch.keys().find(|name| with_plates().all(|element| element.name != *name.get_ref()));
+    let Some(name) = unknown else { return Ok(()) };
+    let names = with_plates().map(|element| element.name.as_str()).collect::<Vec<_>>().join(", ");
+    let message = format!("the gearbox has no clutch or brake \"{}\"", name.get_ref());
+    Err(check.meaning("clutch", name.span().start, message, Some(format!("it has {names}"))))
+}
+
+/// Friction over slip, over that of the gearbox file, and the drag of an open clutch.
+struct FrictionShape {
+    factor: Table1<f64>,
+    static_factor: f64,
+    drag_n_m: f64,
+}
+
+impl FrictionShape {
+    fn of(check: &Check<'_>, raw: &RawShape) -> Result<Self, ConfigError> {
+        let factor = check
+            .table(("friction.slip_rad_s", &raw.slip_rad_s, 0.0..=2e3), ("friction.factor", &raw.factor, 0.2..=5.0))?;
+        let static_factor = check.number("friction.static_factor", &raw.static_factor, 0.2..=5.0)?;
+        if static_factor < factor.at(0.0) {
+            let message = format!("is {static_factor}, less than `factor` at zero slip, {}", factor.at(0.0));
+            let hint = "with a smaller static friction a clutch could neither stick nor slip".to_owned();
+            return Err(check.meaning("friction.static_factor", raw.static_factor.span().start, message, Some(hint)));
         }
+        let drag_n_m = check.number("friction.drag_n_m", &raw.drag_n_m, 0.0..=100.0)?;
+        Ok(Self { factor, static_factor, drag_n_m })
     }
-    let shape = &raw.friction;
-    let factor = check
-        .table(("friction.slip_rad_s", &shape.slip_rad_s, 0.0..=2e3), ("friction.factor", &shape.factor, 0.2..=5.0))?;
-    let static_factor = check.number("friction.static_factor", &shape.static_factor, 0.2..=5.0)?;
-    if static_factor < factor.at(0.0) {
-        let message = format!("is {static_factor}, less than `factor` at zero slip, {}", factor.at(0.0));
-        let hint = "with a smaller static friction a clutch could neither stick nor slip".to_owned();
-        return Err(check.meaning("friction.static_factor", shape.static_factor.span().start, message, Some(hint)));
-    }
-    let drag_n_m = check.number("friction.drag_n_m", &shape.drag_n_m, 0.0..=100.0)?;
-    let element = |element: &geartrain::GearboxElement| -> Result<Option<ShiftClutch>, ConfigError> {
-        if !is_friction(element.kind) {
-            return Ok(None);
-        }
-        let name = &element.name;
+}
+
+/// What the clutches of a car have in common, unless a table of their own says otherwise.
+struct CommonClutch<'c> {
+    check: &'c Check<'c>,
+    raw: &'c RawCar,
+    shape: FrictionShape,
+    valve: (&'c Check<'c>, &'c Spanned<RawClutchValve>),
+    line_pressure_pa: f64,
+    oil_degc: f64,
+}
+
+impl CommonClutch<'_> {
+    fn clutch(&self, element: &GearboxElement) -> Result<ShiftClutch, ConfigError> {
+        let Self { check, raw, oil_degc, .. } = *self;
+        let name = element.name.as_str();
         let Some(pack) = element.pack else {
             let message = format!("element {name} of \"{}\" has no `pack`", raw.gearbox.get_ref());
             let hint = "a simulated clutch needs faces, radius, friction, piston and spring".to_owned();
             return Err(check.meaning("gearbox", raw.gearbox.span().start, message, Some(hint)));
         };
-        let own = raw.clutch.get(name.as_str());
+        let own = raw.clutch.get(name);
+        let key = |field: &str| format!("clutch.{name}.{field}");
+        let clutch = self.plates(name, pack, own)?;
+        let drag_n_m = match own.and_then(|own| own.drag_n_m.as_ref()) {
+            Some(drag) => check.number(key("drag_n_m"), drag, 0.0..=100.0)?,
+            None => self.shape.drag_n_m,
+        };
+        let (valve, hysteresis_pa) = self.valve(name, own)?;
+        self.can_slip(name, &clutch)?;
+        let (table, fills) = match own.and_then(|own| own.fill.as_ref()) {
+            Some(own) => (key("fill"), Some(own)),
+            None => ("fill".to_owned(), raw.fill.as_ref()),
+        };
+        let (cylinder, has_stroke) = fill::cylinder(check, &table, fills, &clutch, oil_degc)?;
+        let has_stroke = has_stroke && fills.is_some();
+        Ok(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke, drag_n_m })
+    }
+
+    /// Plates and piston with their friction.
+    fn plates(
+        &self,
+        name: &str,
+        pack: Clutch<f64>,
+        own: Option<&RawElementClutch>,
+    ) -> Result<Clutch<f64>, ConfigError> {
+        let (check, shape) = (self.check, &self.shape);
         let key = |field: &str| format!("clutch.{name}.{field}");
         let mut clutch = Clutch {
-            friction: factor.scaled(pack.static_friction),
-            static_friction: static_factor * pack.static_friction,
+            friction: shape.factor.scaled(pack.static_friction),
+            static_friction: shape.static_factor * pack.static_friction,
             ..pack
         };
         if let Some(value) = own.and_then(|own| own.return_spring_n.as_ref()) {
@@ -398,37 +451,37 @@ fn clutches(
                 return Err(check.meaning(key("static_friction"), value.span().start, message, None));
             }
         }
-        let drag_n_m = match own.and_then(|own| own.drag_n_m.as_ref()) {
-            Some(drag) => check.number(key("drag_n_m"), drag, 0.0..=100.0)?,
-            None => drag_n_m,
+        Ok(clutch)
+    }
+
+    /// The valve and the half-width of its hysteresis, Pa.
+    fn valve(&self, name: &str, own: Option<&RawElementClutch>) -> Result<(ClutchValve<f64>, f64), ConfigError> {
+        let (table, (check, spanned)) = match own.and_then(|own| own.valve.as_ref()) {
+            Some(valve) => (format!("clutch.{name}.valve"), (self.check, valve)),
+            None => ("valve".to_owned(), self.valve),
         };
-        let (table, (valve_check, spanned)) = match own.and_then(|own| own.valve.as_ref()) {
-            Some(valve) => (key("valve"), (check, valve)),
-            None => ("valve".to_owned(), common_valve),
-        };
-        let valve = valves::clutch_valve(valve_check, &table, spanned)?;
-        reaches(valve_check, &table, &valve, spanned, line_pressure_pa)?;
+        let valve = valves::clutch_valve(check, &table, spanned)?;
+        reaches(check, &table, &valve, spanned, self.line_pressure_pa)?;
         let hysteresis_pa = match &spanned.get_ref().hysteresis_pa {
-            Some(half_width) => valve_check.number(format_args!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
+            Some(half_width) => check.number(format_args!("{table}.hysteresis_pa"), half_width, HYSTERESES_PA)?,
             None => 0.0,
         };
-        if clutch.kiss_pressure() >= line_pressure_pa {
-            let message = format!(
-                "is {line_pressure_pa} Pa, and the return spring of {name} holds up to {:.4e} Pa",
-                clutch.kiss_pressure()
-            );
-            let at = raw.hydraulics.line_pressure_pa.span().start;
-            return Err(check.meaning("hydraulics.line_pressure_pa", at, message, None));
+        Ok((valve, hysteresis_pa))
+    }
+
+    /// Refuses a return spring that the line pressure does not overcome.
+    fn can_slip(&self, name: &str, clutch: &Clutch<f64>) -> Result<(), ConfigError> {
+        if clutch.kiss_pressure() < self.line_pressure_pa {
+            return Ok(());
         }
-        let (table, fills) = match own.and_then(|own| own.fill.as_ref()) {
-            Some(own) => (key("fill"), Some(own)),
-            None => ("fill".to_owned(), raw.fill.as_ref()),
-        };
-        let (cylinder, has_stroke) = fill::cylinder(check, &table, fills, &clutch, oil_degc)?;
-        let has_stroke = has_stroke && fills.is_some();
-        Ok(Some(ShiftClutch { clutch, valve, hysteresis_pa, cylinder, has_stroke, drag_n_m }))
-    };
-    gearbox.elements.iter().map(element).collect()
+        let message = format!(
+            "is {} Pa, and the return spring of {name} holds up to {:.4e} Pa",
+            self.line_pressure_pa,
+            clutch.kiss_pressure()
+        );
+        let at = self.raw.hydraulics.line_pressure_pa.span().start;
+        Err(self.check.meaning("hydraulics.line_pressure_pa", at, message, None))
+    }
 }
 
 fn own_friction(check: &Check<'_>, key: &str, raw: &RawFriction) -> Result<Table1<f64>, ConfigError> {

@@ -16,67 +16,27 @@ pub(super) struct CheckedGearTrain {
     pub(super) oncoming: String,
 }
 
-pub(super) fn check<'r>(check: &Check<'_>, raw: &'r RawVehicleFile) -> Result<CheckedGearTrain, ConfigError> {
+pub(super) fn check(check: &Check<'_>, raw: &RawVehicleFile) -> Result<CheckedGearTrain, ConfigError> {
     let train = &raw.gear_train;
-    let shafts = train.shaft.get_ref();
-    let name = |shaft: &'r RawShaft| {
-        let name = check.name("gear_train.shaft.name", shaft.name.get_ref(), shaft.name.span().start)?;
-        if name == HOUSING {
-            let message = format!("\"{HOUSING}\" is the gearbox housing, which does not rotate");
-            return Err(check.meaning("gear_train.shaft.name", shaft.name.span().start, message, None));
-        }
-        Ok(name)
-    };
-    let names = shafts.iter().map(name).collect::<Result<Vec<String>, _>>()?;
-    check.distinct("gear_train.shaft.name", shafts.iter().map(|shaft| &shaft.name))?;
-    let inertias = (shafts.iter())
-        .map(|shaft| {
-            let key = format!("gear_train.shaft.{}.inertia_kg_m2", shaft.name.get_ref());
-            check.number(&key, &shaft.inertia_kg_m2, 1e-4..=50.0)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let shaft = |key: &str, name: &Word| {
-        names.iter().position(|known| known == name.get_ref()).ok_or_else(|| {
-            let message = format!("there is no shaft \"{}\"", name.get_ref());
-            check.meaning(key, name.span().start, message, Some(format!("the shafts are {}", names.join(", "))))
-        })
-    };
-    let member = |key: &str, name: &Word| {
-        if name.get_ref() == HOUSING { Ok(Member::Housing) } else { shaft(key, name).map(Member::Shaft) }
-    };
-
-    let sets = (train.planetary_set.iter())
-        .map(|set| {
-            let key = |field: &str| format!("gear_train.planetary_set.{field}");
-            let (sun_teeth, ring_teeth) = teeth(check, set)?;
-            Ok(PlanetarySet {
-                sun: shaft(&key("sun"), &set.sun)?,
-                ring: shaft(&key("ring"), &set.ring)?,
-                carrier: shaft(&key("carrier"), &set.carrier)?,
-                sun_teeth,
-                ring_teeth,
-            })
-        })
-        .collect::<Result<Vec<_>, ConfigError>>()?;
-    let held = (train.held.iter())
-        .map(|held| {
-            Ok((member("gear_train.held.input", &held.input)?, member("gear_train.held.output", &held.output)?))
-        })
-        .collect::<Result<Vec<_>, ConfigError>>()?;
+    let shafts = Shafts::of(check, train.shaft.get_ref())?;
+    let sets = train.planetary_set.iter().map(|set| shafts.set(set)).collect::<Result<Vec<_>, _>>()?;
+    let held = train.held.iter();
+    let held = held.map(|held| shafts.sides("gear_train.held", &held.input, &held.output));
+    let held = held.collect::<Result<Vec<_>, _>>()?;
     let clutch = |key: &str, name: &Word| {
         let raw = raw.clutch.get(name.get_ref()).ok_or_else(|| {
             let known: Vec<_> = raw.clutch.keys().map(String::as_str).collect();
             let message = format!("there is no [clutch.{}]", name.get_ref());
             check.meaning(key, name.span().start, message, Some(format!("the clutches are {}", known.join(", "))))
         })?;
-        let field = |field: &str| format!("clutch.{}.{field}", name.get_ref());
-        Ok((member(&field("input"), &raw.input)?, member(&field("output"), &raw.output)?))
+        shafts.sides(&format!("clutch.{}", name.get_ref()), &raw.input, &raw.output)
     };
     let offgoing = clutch("gear_train.offgoing", &train.offgoing)?;
     let oncoming = clutch("gear_train.oncoming", &train.oncoming)?;
-    let (input, output) = (shaft("gear_train.input", &train.input)?, shaft("gear_train.output", &train.output)?);
-
-    let reduced = GearTrain { inertias_kg_m2: &inertias, sets: &sets, held: &held, input, output }
+    let input = shafts.shaft("gear_train.input", &train.input)?;
+    let output = shafts.shaft("gear_train.output", &train.output)?;
+    let inertias_kg_m2 = &shafts.inertias_kg_m2;
+    let reduced = GearTrain { inertias_kg_m2, sets: &sets, held: &held, input, output }
         .reduce(offgoing, oncoming)
         .map_err(|error| check.meaning("gear_train", train.shaft.span().start, error.to_string(), None))?;
     let (before, after) = (reduced.ratio_offgoing(), reduced.ratio_oncoming());
@@ -87,10 +47,68 @@ pub(super) fn check<'r>(check: &Check<'_>, raw: &'r RawVehicleFile) -> Result<Ch
     }
     Ok(CheckedGearTrain {
         reduced,
-        output_inertia_kg_m2: inertias[output],
+        output_inertia_kg_m2: inertias_kg_m2[output],
         offgoing: train.offgoing.get_ref().clone(),
         oncoming: train.oncoming.get_ref().clone(),
     })
+}
+
+/// The shafts by their names, and their inertias.
+struct Shafts<'c> {
+    check: &'c Check<'c>,
+    names: Vec<String>,
+    inertias_kg_m2: Vec<f64>,
+}
+
+impl<'c> Shafts<'c> {
+    fn of(check: &'c Check<'c>, shafts: &[RawShaft]) -> Result<Self, ConfigError> {
+        let name = |shaft: &RawShaft| {
+            let name = check.name("gear_train.shaft.name", shaft.name.get_ref(), shaft.name.span().start)?;
+            if name == HOUSING {
+                let message = format!("\"{HOUSING}\" is the gearbox housing, which does not rotate");
+                return Err(check.meaning("gear_train.shaft.name", shaft.name.span().start, message, None));
+            }
+            Ok(name)
+        };
+        let inertia = |shaft: &RawShaft| {
+            let key = format!("gear_train.shaft.{}.inertia_kg_m2", shaft.name.get_ref());
+            check.number(&key, &shaft.inertia_kg_m2, 1e-4..=50.0)
+        };
+        let names = shafts.iter().map(name).collect::<Result<_, _>>()?;
+        check.distinct("gear_train.shaft.name", shafts.iter().map(|shaft| &shaft.name))?;
+        let inertias_kg_m2 = shafts.iter().map(inertia).collect::<Result<_, _>>()?;
+        Ok(Self { check, names, inertias_kg_m2 })
+    }
+
+    /// Place of a shaft.
+    fn shaft(&self, key: &str, name: &Word) -> Result<usize, ConfigError> {
+        self.names.iter().position(|known| known == name.get_ref()).ok_or_else(|| {
+            let message = format!("there is no shaft \"{}\"", name.get_ref());
+            let hint = format!("the shafts are {}", self.names.join(", "));
+            self.check.meaning(key, name.span().start, message, Some(hint))
+        })
+    }
+
+    /// What a clutch joins: shafts or the housing.
+    fn sides(&self, table: &str, input: &Word, output: &Word) -> Result<(Member, Member), ConfigError> {
+        let member = |field: &str, name: &Word| match name.get_ref().as_str() {
+            HOUSING => Ok(Member::Housing),
+            _ => self.shaft(&format!("{table}.{field}"), name).map(Member::Shaft),
+        };
+        Ok((member("input", input)?, member("output", output)?))
+    }
+
+    fn set(&self, set: &RawPlanetarySet) -> Result<PlanetarySet, ConfigError> {
+        let shaft = |field: &str, name: &Word| self.shaft(&format!("gear_train.planetary_set.{field}"), name);
+        let (sun_teeth, ring_teeth) = teeth(self.check, set)?;
+        Ok(PlanetarySet {
+            sun: shaft("sun", &set.sun)?,
+            ring: shaft("ring", &set.ring)?,
+            carrier: shaft("carrier", &set.carrier)?,
+            sun_teeth,
+            ring_teeth,
+        })
+    }
 }
 
 /// Teeth of sun and ring. Between them there must be room for the planets: `Z_r = Z_s + 2 Z_p`.

@@ -230,7 +230,7 @@ impl Vehicle {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         if source.kind().is_ok_and(|kind| kind == Kind::Car) {
             let message = "is a vehicle with a whole gearbox, not one with a single shift".to_owned();
-            let hint = "`simulate`, `demo`, `bench`, `estimate` and `check` take it; designs, studies and fits need a file with [gear_train]";
+            let hint = "`simulate`, `demo`, `bench`, `estimate`, `fit` and `check` take it; what designs gains or searches one shift needs a file with [gear_train]";
             return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
         }
         if let Some(short) = Short::of(&source)? {
@@ -239,7 +239,7 @@ impl Vehicle {
             let (source, defaults_taken) = short.complete(&source)?;
             return Ok(Self { source, defaults_taken, ..vehicle });
         }
-        let vehicle = Self::checked(&Check::of(&source), &source.parse()?)?;
+        let vehicle = Self::checked(&Check::of(&source), &source.parse_as(Kind::Vehicle)?)?;
         Ok(Self { defaults_taken: short::left_out(&source)?, source, ..vehicle })
     }
 
@@ -277,12 +277,8 @@ impl Vehicle {
             budget::error_bounds(check, &raw.design.error_bounds, &oncoming, oil_temperature(check, &raw.oil)?)?;
         let road = road(check, &raw.vehicle)?;
         let kiss_pressure_pa = oncoming.clutch.kiss_pressure();
-        let limits = InputLimits {
-            speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.observer.speed_max_rad_s, 100.0..=5e3)?,
-            command_max: check.number("observer.command_max", &raw.observer.command_max, 0.1..=100.0)?,
-            pressure_max_pa: error_bounds.pressure_max_pa,
-            shaft_torque_max_n_m: SHAFT_OVER_TYRES * tyre.max_force_n * road.wheel_radius_m,
-        };
+        let limits =
+            limits(check, &raw.observer, &error_bounds, SHAFT_OVER_TYRES * tyre.max_force_n * road.wheel_radius_m)?;
         let command_max = limits.command_max + error_bounds.command;
         valves::clutch_can_engage(check, &oncoming, &limits, raw.observer.command_max.span().start)?;
         for (name, clutch) in [(&gear.offgoing, &offgoing), (&gear.oncoming, &oncoming)] {
@@ -325,6 +321,21 @@ impl Vehicle {
             defaults_taken: Vec::new(),
         })
     }
+}
+
+/// What a reading or an estimate of this car can be.
+fn limits(
+    check: &Check<'_>,
+    raw: &RawObserver,
+    bounds: &ErrorBounds,
+    shaft_torque_max_n_m: f64,
+) -> Result<InputLimits<f64>, ConfigError> {
+    Ok(InputLimits {
+        speed_max_rad_s: check.number("observer.speed_max_rad_s", &raw.speed_max_rad_s, 100.0..=5e3)?,
+        command_max: check.number("observer.command_max", &raw.command_max, 0.1..=100.0)?,
+        pressure_max_pa: bounds.pressure_max_pa,
+        shaft_torque_max_n_m,
+    })
 }
 
 fn engine(check: &Check<'_>, raw: &RawEngine) -> Result<Engine<f64>, ConfigError> {

@@ -21,6 +21,11 @@ pub(super) struct Steady {
 }
 
 impl Steady {
+    /// The value that counts; none before there is one.
+    pub(super) fn value(&self) -> Option<Option<u32>> {
+        self.steady
+    }
+
     /// Takes a value; the change to it, once it is steady.
     pub(super) fn push(&mut self, time_s: f64, value: Option<u32>) -> Option<Change> {
         if self.steady == Some(value) {

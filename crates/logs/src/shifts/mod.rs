@@ -5,6 +5,7 @@
 //!
 //! Readings go in one by one; some seconds of them are held in memory.
 
+mod contradiction;
 mod gears;
 mod held;
 mod inside;
@@ -14,6 +15,7 @@ mod track;
 
 use crate::map::check_ratios;
 use crate::{Gearbox, LogError, Reading, Role};
+use contradiction::SeenRatios;
 use gears::{Change, Steady};
 pub use held::Held;
 pub use inside::GearsOfShift;
@@ -46,7 +48,7 @@ pub struct ShiftQuality {
     /// Turbine speed above that of the old gear before an upshift's inertia phase, or above that of the new gear after a
     /// downshift's, rad/s; not below zero.
     pub flare_rad_s: Option<f64>,
-    /// Greatest size of the jerk of the car, m/s^3, of parabolas over 0.3 s of its speed.
+    /// Jerk of the car, m/s^3, as [`drivetrain::jerk`] defines it.
     pub jerk_m_s3: Option<f64>,
 }
 
@@ -174,6 +176,7 @@ pub struct ShiftFinder {
     gear: Steady,
     target: Steady,
     active: Steady,
+    seen_ratios: SeenRatios,
     /// Commands so far: time and gear.
     commands: Vec<(f64, Option<u32>)>,
     waiting: Vec<Shift>,
@@ -209,6 +212,7 @@ impl ShiftFinder {
             gear: Steady::default(),
             target: Steady::default(),
             active: Steady::default(),
+            seen_ratios: SeenRatios::default(),
             commands: Vec::new(),
             waiting: Vec::new(),
             found: Vec::new(),
@@ -225,8 +229,12 @@ impl ShiftFinder {
         }
         match role {
             Role::Gear => {
-                if let Some(change) = self.gear.push(time_s, self.gear_number(value)) {
+                let number = self.gear_number(value);
+                if let Some(change) = self.gear.push(time_s, number) {
                     self.gear_changed(change);
+                }
+                if let Some(gear) = self.gear.value() {
+                    self.seen_ratios.gear(time_s, gear);
                 }
             }
             Role::TargetGear => {
@@ -257,7 +265,15 @@ impl ShiftFinder {
             let command_s = self.command(change.to, change.inertia_s[0] - COMMAND_S, change.inertia_s[1]);
             self.wait(change.from, change.to, command_s, Some(change.inertia_s), None);
         }
+        if let Some(point) = self.ratio.newest().filter(|_| !self.by_engine) {
+            self.seen_ratios.ratio(point.time_s, point.ratio);
+        }
         self.settle(time_s - AFTER_S);
+    }
+
+    /// The gears whose given ratio is not that of the speeds while the gear signal says them, in a sentence with a hint.
+    pub fn contradiction(&self) -> Option<String> {
+        self.seen_ratios.contradiction(&self.ratios)
     }
 
     /// Forgets what came before, as after a reset of the clock. The shifts so far stay.

@@ -1,5 +1,7 @@
 //! Load and quality of a shift.
 
+use drivetrain::jerk::{PeakJerk, WINDOW_S};
+
 use super::ratio::RatioWatch;
 use super::track::Track;
 use super::{Direction, Load, Shift, ShiftQuality};
@@ -56,86 +58,29 @@ fn flare(shift: &Shift, ratios: &[f64], points: &RatioWatch) -> Option<f64> {
     above.reduce(f64::max).map(|most| most.max(0.0))
 }
 
-/// The greatest size of the jerk around a shift.
+/// The jerk of a shift, by the definition of [`drivetrain::jerk`].
 fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Option<f64> {
-    /// Half the time over which a parabola is laid, s.
-    const HALF_S: f64 = 0.15;
     /// Time around the shift, s.
     const AROUND_S: f64 = 0.3;
     let track = |role: Role| Some(&tracks[role as usize]).filter(|track| !track.is_empty());
-    // What the derivatives are taken of, in m/s or m/s^2: its factor and which coefficient of the parabola is the jerk.
-    let (track, factor, of_speed) =
-        match (track(Role::VehicleAcceleration), track(Role::VehicleSpeed), track(Role::OutputSpeed)) {
-            (Some(acceleration), ..) => (acceleration, 1.0, false),
-            (_, Some(speed), _) => (speed, 1.0, true),
-            (.., Some(output)) => (output, 1.0 / output_rad_per_m?, true),
-            _ => return None,
-        };
-    let (from_s, to_s) = (shift.start_s() - AROUND_S, shift.end_s() + AROUND_S);
-    let centres: Vec<f64> = track.between(from_s, to_s).map(|(time_s, _)| time_s).collect();
-    let mut most: Option<f64> = None;
-    for centre_s in centres {
-        // A hole in the middle would leave the parabola free.
-        track.at(centre_s, APART_S)?;
-        let points: Vec<(f64, f64)> = track
-            .between(centre_s - HALF_S, centre_s + HALF_S)
-            .map(|(time_s, value)| (time_s - centre_s, value))
-            .collect();
-        let spread = points.first().zip(points.last()).map_or(0.0, |(first, last)| last.0 - first.0);
-        if points.len() < 7 || spread < 1.5 * HALF_S {
-            continue;
-        }
-        let Some([_, linear, quadratic]) = parabola(&points) else { continue };
-        let jerk = factor * if of_speed { 2.0 * quadratic } else { linear };
-        most = Some(most.map_or(jerk.abs(), |most| most.max(jerk.abs())));
-    }
-    most
-}
-
-/// Coefficients of the parabola with the least squares of distances.
-fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
-    // Normal equations; times are within a fraction of a second, so they are scaled to 1.
-    let scale = points.iter().map(|(time_s, _)| time_s.abs()).fold(0.0, f64::max);
-    let mut sums = [[0.0; 4]; 3];
-    for (time_s, value) in points {
-        let powers = [1.0, time_s / scale, (time_s / scale).powi(2)];
-        for (row, power) in sums.iter_mut().zip(powers) {
-            for (sum, factor) in row.iter_mut().zip([powers[0], powers[1], powers[2], *value]) {
-                *sum += power * factor;
-            }
-        }
-    }
-    // The matrix is symmetric and positive definite: no pivots are needed.
-    for i in 0..3 {
-        let pivot = sums[i];
-        if pivot[i].abs() <= 1e-9 || pivot[i].is_nan() {
+    let acceleration = track(Role::VehicleAcceleration);
+    let (track, factor) = match (acceleration, track(Role::VehicleSpeed), track(Role::OutputSpeed)) {
+        (Some(acceleration), ..) => (acceleration, 1.0),
+        (_, Some(speed), _) => (speed, 1.0),
+        (.., Some(output)) => (output, 1.0 / output_rad_per_m?),
+        _ => return None,
+    };
+    let around_s = AROUND_S + 0.5 * WINDOW_S;
+    let (mut jerk, mut before_s) = (PeakJerk::default(), None);
+    for (time_s, value) in track.between(shift.start_s() - around_s, shift.end_s() + around_s) {
+        // A hole would leave the parabola free.
+        if before_s.replace(time_s).is_some_and(|before_s| time_s - before_s > APART_S) {
             return None;
         }
-        for row in sums.iter_mut().skip(i + 1) {
-            let factor = row[i] / pivot[i];
-            for (cell, above) in row.iter_mut().zip(pivot) {
-                *cell -= factor * above;
-            }
+        match acceleration {
+            Some(_) => jerk.acceleration(time_s, value),
+            None => jerk.speed(time_s, factor * value),
         }
     }
-    let quadratic = sums[2][3] / sums[2][2];
-    let linear = (sums[1][3] - sums[1][2] * quadratic) / sums[1][1];
-    let constant = (sums[0][3] - sums[0][1] * linear - sums[0][2] * quadratic) / sums[0][0];
-    Some([constant, linear / scale, quadratic / (scale * scale)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_parabola_through_its_own_points_is_found() {
-        let points: Vec<(f64, f64)> =
-            (0_i32..11).map(|i| f64::from(i - 4) * 0.02).map(|t| (t, 3.0 - 2.0 * t + 7.0 * t * t)).collect();
-        let found = parabola(&points).unwrap();
-        for (found, expected) in found.into_iter().zip([3.0, -2.0, 7.0]) {
-            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-        }
-        assert!(parabola(&[(0.0, 1.0); 9]).is_none());
-    }
+    jerk.peak_m_s3()
 }

@@ -110,6 +110,11 @@ impl RatioWatch {
         self.changes.pop_front()
     }
 
+    /// The newest point.
+    pub(super) fn newest(&self) -> Option<&Point> {
+        self.points.back()
+    }
+
     /// The points from one time to another.
     pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Point> {
         self.points.iter().filter(move |point| (from_s..=to_s).contains(&point.time_s))

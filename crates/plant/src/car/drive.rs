@@ -31,6 +31,22 @@ pub struct CarDriveSummary {
     pub fastest_m_s: f64,
     /// How well the speed was followed, where the drive gives one.
     pub speed_error: Option<SpeedError>,
+    /// Where the engine turned fastest, if that is beyond its torque map.
+    pub over_speed: Option<OverSpeed>,
+}
+
+/// An engine that turns faster than its torque map is given: a shift was asked for that a gearbox controller refuses, or the car
+/// pushes the engine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OverSpeed {
+    /// When it turned fastest, s.
+    pub time_s: f64,
+    /// How fast, rad/s.
+    pub engine_rad_s: f64,
+    /// The end of the torque map, rad/s.
+    pub map_rad_s: f64,
+    /// The gear, and the gear that is asked for.
+    pub gears: [usize; 2],
 }
 
 /// Simulates a drive and shows every sample to `record`. `nominal` is the car of the shift controller's model.
@@ -62,6 +78,12 @@ pub fn simulate_car_drive(
         if engine_rad_s < STALLED_RAD_S {
             let message = format!("the engine stalls at {now_s:.2} s ({engine_rad_s:.0} rad/s): the load is too large");
             return Err(CarError::Request(message));
+        }
+        let map_rad_s = model.car.engine.torque_n_m.rows().last().copied().unwrap_or(f64::INFINITY);
+        if engine_rad_s > summary.over_speed.map_or(map_rad_s, |over| over.engine_rad_s) {
+            let gear = run.controller().gear();
+            let gears = [gear, run.controller().shift().map_or(gear, |shift| shift.to)];
+            summary.over_speed = Some(OverSpeed { time_s: now_s, engine_rad_s, map_rad_s, gears });
         }
         shifting.step(&mut run, &driver)?;
         run.advance(driver, |_| {}, &mut record)?;

@@ -34,7 +34,7 @@ mod valves;
 
 pub use contacts::{ContactState, Contacts};
 pub use controller::{CarCalibration, CarCommands, CarMeasured, CarShiftController, ShiftProgress, ShiftStage};
-pub use drive::{CarDriveSummary, simulate_car_drive};
+pub use drive::{CarDriveSummary, OverSpeed, simulate_car_drive};
 pub use energy::{CarPowers, stored_car_energy};
 pub use follow::SpeedError;
 pub use integrate::{CarError, CarIntegrator, CarStep};

@@ -1,6 +1,7 @@
 //! One shift of a car.
 
 use config::Car;
+use drivetrain::PeakJerk;
 use geartrain::Change;
 
 use super::controller::{CarCalibration, ShiftStage};
@@ -56,7 +57,7 @@ pub struct CarShiftQuality {
     pub tie_up_n_m: f64,
     /// Largest slip of a clutch that is held through the shift, rad/s.
     pub held_slip_rad_s: f64,
-    /// Largest change of the vehicle's acceleration within 20 ms, per second, m/s^3.
+    /// Jerk of the car, m/s^3, as [`drivetrain::jerk`] defines it.
     pub jerk_m_s3: f64,
     /// Turbine torque at the request, N m.
     pub turbine_n_m: f64,
@@ -107,7 +108,7 @@ pub struct CarShiftRating {
     alphas: [f64; 2],
     held: Vec<usize>,
     quality: CarShiftQuality,
-    before: Option<(f64, f64)>,
+    jerk: PeakJerk,
     was_requested: bool,
 }
 
@@ -128,7 +129,7 @@ impl CarShiftRating {
             alphas,
             held,
             quality: CarShiftQuality::default(),
-            before: None,
+            jerk: PeakJerk::default(),
             was_requested: false,
         }
     }
@@ -146,15 +147,11 @@ impl CarShiftRating {
         if since_complete_s > RATED_AFTER_S {
             return;
         }
-        let before = self.before.replace((sample.time_s, sample.vehicle_m_s2));
         if !after {
             return;
         }
-        if let Some((time_s, m_s2)) = before
-            && sample.time_s > time_s
-        {
-            q.jerk_m_s3 = q.jerk_m_s3.max(((sample.vehicle_m_s2 - m_s2) / (sample.time_s - time_s)).abs());
-        }
+        self.jerk.acceleration(sample.time_s, sample.vehicle_m_s2);
+        q.jerk_m_s3 = self.jerk.peak_m_s3().unwrap_or(0.0);
         if !self.was_requested {
             q.turbine_n_m = sample.turbine_n_m;
             self.was_requested = true;

@@ -1,5 +1,7 @@
 //! A car that runs in a gear, as a shift or a drive begins.
 
+use geartrain::Holding;
+
 use super::integrate::CarError;
 use super::model::{CarModel, CarState, MAX_PACKS};
 
@@ -74,20 +76,21 @@ impl CarModel {
         };
         // A standing car has been held by its brake.
         let shaft_n_m = turbine_n_m * of_gear.ratio * car.driveline.final_ratio;
-        let mut valves_pa = [0.0; MAX_PACKS];
-        for holding in &of_gear.holding {
-            if let Some((slot, _)) = self.friction(holding.element)
-                && !idles
-            {
-                valves_pa[slot] = car.line_pressure_pa;
-            }
+        let [valves_pa, volumes_m3] = self.cylinders(if idles { &[] } else { &of_gear.holding });
+        let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad + 0.5 * car.backlash_rad * shaft_n_m.signum();
+        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, valves_pa, volumes_m3 })
+    }
+
+    /// Pressures, Pa, and volumes, m^3, of the cylinders where these elements are held with the line pressure.
+    fn cylinders(&self, held: &[Holding]) -> [[f64; MAX_PACKS]; 2] {
+        let [mut valves_pa, mut volumes_m3] = [[0.0; MAX_PACKS]; 2];
+        for (slot, _) in held.iter().filter_map(|holding| self.friction(holding.element)) {
+            valves_pa[slot] = self.car.line_pressure_pa;
         }
-        let mut volumes_m3 = [0.0; MAX_PACKS];
         for (slot, clutch) in (0..self.lock_up()).filter_map(|element| self.friction(element)) {
             volumes_m3[slot] = clutch.cylinder.volume(valves_pa[slot]);
         }
-        let twist_rad = shaft_n_m / car.driveline.shaft_stiffness_n_m_rad + 0.5 * car.backlash_rad * shaft_n_m.signum();
-        Ok(CarState { twist_rad, wheel_rad_s, vehicle_m_s, motion, valves_pa, volumes_m3 })
+        [valves_pa, volumes_m3]
     }
 
     /// The highest speed at which engine and pump are in balance, rad/s, at least idle speed; without a converter that of the gearbox input.

@@ -129,6 +129,8 @@ pub struct ScoredDrive {
     pub states: Vec<DriveState>,
     /// Its shifts.
     pub shifts: Vec<ScoredShift>,
+    /// What in a log contradicts its channels or makes a shift incomplete, in sentences.
+    pub warnings: Vec<String>,
 }
 
 impl ScoredDrive {

@@ -14,8 +14,12 @@ use observer::any_shift::{
 use plant::car::CarShiftQuality;
 use trace::{CsvRows, TraceError, signal};
 
+use super::contradictions::CommandCheck;
 use super::drive::{DriveState, PassingShifts, ScoredDrive};
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
+use crate::frozen_rows::FrozenRows;
+use crate::row_clock::{RowClock, RowTime};
+use crate::swapped_speeds::SwappedSpeeds;
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
@@ -23,6 +27,9 @@ const STICKS_RAD_S: f64 = 0.05;
 /// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
 const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_SHARE: f64 = 0.1;
+
+/// Rows further apart are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
+const HOLE_S: f64 = 0.5;
 
 /// Names for neither a forward gear nor reverse, and their place: that of no gear.
 const NEUTRAL: [&str; 2] = ["N", "P"];
@@ -152,7 +159,8 @@ pub struct CarLog<'c> {
     car: &'c Car,
     rows: CsvRows,
     columns: Columns,
-    last_s: Option<f64>,
+    clock: RowClock,
+    frozen: FrozenRows,
     gear: Option<usize>,
 }
 
@@ -162,7 +170,18 @@ impl<'c> CarLog<'c> {
     /// # Errors
     /// One that is needed is missing.
     pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
-        Ok(Self { car, columns: Columns::of(&rows, car, tables)?, rows, last_s: None, gear: None })
+        let columns = Columns::of(&rows, car, tables)?;
+        Ok(Self { car, columns, rows, clock: RowClock::default(), frozen: FrozenRows::new(), gear: None })
+    }
+
+    /// What was met in the time stamps and of frozen speeds, in sentences.
+    ///
+    /// # Errors
+    /// Most rows, or most readings of a speed, could not be used.
+    pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
+        let mut notes = self.clock.notes(&self.rows)?;
+        notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
+        Ok(notes)
     }
 
     /// Whether the table has a signal, of this name in SI, in its SI unit.
@@ -175,11 +194,7 @@ impl<'c> CarLog<'c> {
     /// # Errors
     /// The file cannot be read, a cell is no number, or a gear is none of the gearbox.
     pub fn next_step(&mut self) -> Result<Option<LogStep>, TraceError> {
-        if !self.rows.advance()? {
-            return Ok(None);
-        }
-        let time_s = self.rows.time_s();
-        let dt_s = self.last_s.replace(time_s).map_or(0.0, |last_s| time_s - last_s);
+        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
         let gear = self.gear_at(self.columns.gear, self.gear)?;
         let to = self.gear_at(self.columns.target, Some(gear))?;
         self.gear = Some(gear);
@@ -199,7 +214,7 @@ impl<'c> CarLog<'c> {
         }
         let lock_up_applied = number(columns.lock_up)? > 0.5;
         // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
-        let input = ShiftInput {
+        let mut input = ShiftInput {
             dt_s,
             engine_rad_s: reading(columns.engine)?,
             turbine_rad_s: reading(Some(columns.turbine))?,
@@ -211,6 +226,8 @@ impl<'c> CarLog<'c> {
             gear: GearCommand { from: gear, to },
         };
         let pedals = [number(columns.pedals[0])?, number(columns.pedals[1])?];
+        let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
+        self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
         Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, truth }))
     }
 
@@ -245,6 +262,17 @@ pub struct LoggedDrive<'c> {
     begun_s: f64,
     /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
     in_gear: [u64; 2],
+    swapped: SwappedSpeeds,
+    commands: CommandCheck<'c>,
+    holes: Holes,
+}
+
+/// Holes of the recording within shifts.
+#[derive(Default)]
+struct Holes {
+    count: u64,
+    /// The shift that the last one cut, as long as the log goes on in it: the rest is no other shift.
+    cut: Option<[usize; 2]>,
 }
 
 impl<'c> LoggedDrive<'c> {
@@ -252,8 +280,19 @@ impl<'c> LoggedDrive<'c> {
     pub fn new(car: &'c Car, tables: &'c ShiftTables<f64>, sensors: Option<&Sensors>) -> Self {
         let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, sensors);
         let state = filter.start();
-        let (passing, speeds_rad_s) = (PassingShifts::default(), [f64::NAN; 3]);
-        Self { car, tables, filter, state, passing, speeds_rad_s, begun_s: f64::NAN, in_gear: [0; 2] }
+        Self {
+            car,
+            tables,
+            filter,
+            state,
+            passing: PassingShifts::default(),
+            speeds_rad_s: [f64::NAN; 3],
+            begun_s: f64::NAN,
+            in_gear: [0; 2],
+            swapped: SwappedSpeeds::default(),
+            commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
+            holes: Holes::default(),
+        }
     }
 
     /// The tables of a car.
@@ -283,20 +322,33 @@ impl<'c> LoggedDrive<'c> {
             health: estimate.health,
         });
         let gears = (from != to).then_some([from, to]);
-        if self.passing.ends(gears) {
+        if gears != self.holes.cut {
+            self.holes.cut = None;
+        }
+        if let Some(open) = &self.passing.open
+            && input.dt_s > HOLE_S
+        {
+            self.holes.count += 1;
+            self.holes.cut = gears.filter(|gears| *gears == [open.from, open.to]);
+            self.end(f64::NAN, usize::MAX);
+        } else if self.passing.ends(gears) {
             self.end(step.time_s, from);
         }
         match gears {
+            Some(_) if self.holes.cut.is_some() => {}
             Some(_) => self.during(step, &estimate),
             None => self.compare_ratio(from),
         }
+        let [_, turbine, output] = self.speeds_rad_s;
+        self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         estimate
     }
 
     fn compare_ratio(&mut self, gear: usize) {
-        let [_, turbine, output] = self.speeds_rad_s;
+        let [engine, turbine, output] = self.speeds_rad_s;
         let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output;
         if output > RATIO_FROM_RAD_S {
+            self.swapped.push(engine, turbine, &[by_output]);
             self.in_gear[0] += 1;
             self.in_gear[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
         }
@@ -305,6 +357,11 @@ impl<'c> LoggedDrive<'c> {
     /// Rows in a gear at speed, and those whose turbine and output speed do not fit the ratio of that gear.
     pub fn rows_in_gear(&self) -> [u64; 2] {
         self.in_gear
+    }
+
+    /// What contradicts the channels of engine and turbine speed, in a sentence.
+    pub fn swapped_speeds(&self) -> Option<String> {
+        self.swapped.warning()
     }
 
     fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {
@@ -354,7 +411,14 @@ impl<'c> LoggedDrive<'c> {
     pub fn finish(mut self) -> ScoredDrive {
         // A shift that the log cuts off is not complete.
         self.end(f64::NAN, usize::MAX);
-        self.passing.drive
+        let mut warnings: Vec<String> = self.swapped.warning().into_iter().chain(self.commands.warnings()).collect();
+        if self.holes.count > 0 {
+            warnings.push(format!(
+                "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",
+                self.holes.count
+            ));
+        }
+        ScoredDrive { warnings, ..self.passing.drive }
     }
 }
 

@@ -53,6 +53,16 @@ fn every_car_drives_through_all_its_gears_and_every_shift_is_estimated() {
     assert!(inertia.ratio().unwrap() < 0.55, "{inertia:?}");
 }
 
+/// A car that cannot drive as fast as a shift is usually made shifts at the speed that it reaches.
+#[test]
+fn a_weak_car_drives_through_all_its_gears_too() {
+    let mut weak = Car::eight_speed().unwrap();
+    weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.5);
+    let drive = driven(&weak, 1);
+    assert_eq!(drive.shifts.len(), 28);
+    assert!(drive.shifts.iter().all(|shift| shift.quality.complete_s.is_some()));
+}
+
 /// The budget of a car whose pistons have a stroke has limits of the stroke, too.
 #[test]
 fn the_ranges_hold_while_pistons_move() {

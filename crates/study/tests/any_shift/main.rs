@@ -7,6 +7,7 @@ mod attacks;
 mod cars;
 mod drives;
 mod learning;
+mod sensitivity;
 
 use cars::{cars, sensors};
 use config::Car;

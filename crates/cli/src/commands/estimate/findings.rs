@@ -3,7 +3,7 @@
 use config::Vehicle;
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
-use report::tables::phase_name;
+use report::tables::{health_meaning, phase_name};
 use study::{ErrorScore, Passages};
 use trace::units;
 
@@ -164,31 +164,14 @@ impl Findings {
 
     /// What was found, in sentences.
     pub(super) fn sentences(&self) -> Vec<String> {
-        let mut said = Vec::new();
+        let mut said: Vec<String> = self.ratios.warning().into_iter().collect();
         for (health, count) in &self.health {
-            let meaning = match health {
-                Health::Good => continue,
-                Health::ReadingRefused => "a reading that was refused: it is impossible, or it contradicts all others",
-                Health::ChannelLost => "a channel without usable readings: the estimate is less certain",
-                Health::HeldClutchSlips => "a slip of a clutch that should hold: the estimate is less certain",
-                Health::Flare => {
-                    "a flare: both clutches slip and the turbine runs away; the oncoming clutch carries too little"
-                }
-                // A few are normal while the cylinder fills: there the observers' valve model is faster than the
-                // valve maps.
-                Health::OutsideRange | Health::LimitedToRange if 100 * count <= self.rows => continue,
-                Health::OutsideRange => {
-                    "an estimate outside its range: the observer has a large error, or the car is outside its error budget"
-                }
-                Health::LimitedToRange => {
-                    "an estimate outside its guaranteed range, replaced by the nearest end: the observer has a large error, or the car is outside its error budget"
-                }
-                Health::CommandRejected => "an unusable valve command: the last usable command is used",
-                Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
-                Health::SpeedsRejected => "an unusable speed: the estimate is from the valve model alone",
-                Health::Restarted => "a restart: the observer lost its state and starts again",
-                Health::TimeRejected => "an unusable time step: the estimate is that of the sample before",
-            };
+            // A few are normal while the cylinder fills: there the observers' valve model is faster than the valve maps.
+            let few = matches!(health, Health::OutsideRange | Health::LimitedToRange) && 100 * count <= self.rows;
+            if *health == Health::Good || few {
+                continue;
+            }
+            let meaning = health_meaning(*health);
             said.push(format!("{} of {} samples have {meaning}", output::grouped(*count), output::grouped(self.rows)));
         }
         let scores = self.errors.as_ref().map(ErrorScore::finish).unwrap_or_default();

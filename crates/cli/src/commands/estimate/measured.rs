@@ -9,16 +9,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::plausibility::{Extremes, Likely, Seen, findings};
+use logs::plausibility::{Seen, likely_time_unit};
 use logs::{
-    ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, QualityCounts, Reading, Readings, Role, RoleSummary,
-    Shift, ShiftFinder, Steps,
+    ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
 };
 use observer::{Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use trace::{CsvRows, Following, LastLine, TraceError, signal};
 
 use super::Messages;
+use super::watched::{WatchedColumn, WatchedColumns};
 use crate::failure::Failure;
 use crate::output;
 
@@ -49,10 +49,9 @@ enum Source<'a> {
 struct Rows {
     log: study::log::Log,
     /// Values of the signals in their columns, to tell wrong units.
-    summary: Vec<RoleSummary>,
-    rows: u64,
-    /// Rows that were looked at before the first estimate.
-    look: u64,
+    watched: WatchedColumns,
+    /// Rows that were looked at before the first estimate and not read since.
+    ahead: u64,
     /// Whether the last line has no end.
     was_cut: Arc<AtomicBool>,
 }
@@ -171,17 +170,16 @@ impl<'a> Measured<'a> {
         };
         let (input, was_cut) = LastLine::new(input);
         let rows = CsvRows::of(path, Box::new(input)).map_err(|error| other_delimiter(path, error))?;
-        let summary = summary(&rows, vehicle);
+        let mut watched = watched(&rows, vehicle, look);
         let log = study::log::Log::of(rows, vehicle, look)?;
-        let mut rows = Rows { log, summary, rows: 0, look: look as u64, was_cut };
-        let looked_at: Vec<Input<f64>> = rows.log.looked_at().map(|(input, _)| *input).collect();
-        looked_at.iter().for_each(|input| watch(&mut rows.summary, input));
-        check_step(path, rows.log.median_step_s(), "divide it by 1000")?;
-        rows.check_units(Seen::Beginning)?;
+        log.looked_at().for_each(|(input, _)| watched.push(values(input)));
+        check_step(path, log.median_step_s(), false)?;
+        watched.check(Seen::Beginning)?;
         let gearbox = of_vehicle(vehicle);
         // Turbine and output speed are there, and tell shifts.
-        let finder = ShiftFinder::new(&gearbox, |role| has(&rows.log, role))?;
-        let source = Source::Rows(Box::new(rows));
+        let finder = ShiftFinder::new(&gearbox, |role| has(&log, role))?;
+        let ahead = watched.rows();
+        let source = Source::Rows(Box::new(Rows { log, watched, ahead, was_cut }));
         Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
     }
 
@@ -240,7 +238,7 @@ impl<'a> Measured<'a> {
         channels.steps.readings().check_first_units()?;
         let steps_s = channels.looked_at.iter().skip(1).map(|(step, _)| step.input.dt_s);
         channels.median_step_s = trace::median_step_s(steps_s.collect());
-        check_step(path, channels.median_step_s, "set `unit = \"ms\"` under [time] in the channel map")?;
+        check_step(path, channels.median_step_s, true)?;
         let shift = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
         let gears = GearsOfShift::new(&gearbox, shift);
         let source = Source::Channels(Box::new(channels));
@@ -292,10 +290,13 @@ impl<'a> Measured<'a> {
                 if rows.was_cut.load(Ordering::Relaxed) {
                     say.note("warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells");
                 }
-                return rows.check_units(Seen::All);
+                return rows.watched.check(Seen::All);
             }
             Source::Channels(channels) => channels,
         };
+        if let Some(contradiction) = self.finder.contradiction() {
+            say.note(&format!("warning: {contradiction}"));
+        }
         report_readings(channels.steps.readings(), say)
     }
 }
@@ -319,14 +320,20 @@ fn other_delimiter(path: &Path, error: TraceError) -> Failure {
 }
 
 /// Refuses a log with so much time between its rows that it has no shifts: the time is in another unit by all appearances.
-fn check_step(path: &Path, median_s: f64, hint: &str) -> Result<(), Failure> {
+pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<(), Failure> {
     const LONGEST_S: f64 = 1.0;
     if median_s < LONGEST_S || median_s.is_nan() {
         return Ok(());
     }
+    let unit = likely_time_unit(median_s).unwrap_or("ms");
+    let hint = match (is_mapped, unit) {
+        (true, unit) => format!("set `unit = \"{unit}\"` under [time] in the channel map"),
+        (false, "ms") => format!("call its column `time_ms` in place of `{}`", signal::TIME),
+        (false, _) => format!("convert it to s, or let a channel map read it, with `unit = \"{unit}\"` under [time]"),
+    };
     Err(Failure::Input(format!(
         "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
-         hint: if the time is in ms, {hint}",
+         hint: if the time is in {unit}, {hint}",
         path.display()
     )))
 }
@@ -375,79 +382,43 @@ fn has(log: &study::log::Log, role: Role) -> bool {
     }
 }
 
-/// The signals that observers read, as roles with the units of their columns; no values yet.
-fn summary(rows: &CsvRows, vehicle: &Vehicle) -> Vec<RoleSummary> {
+/// The signals that observers read, in the columns of a table.
+fn watched(rows: &CsvRows, vehicle: &Vehicle, look: usize) -> WatchedColumns {
     let command = match vehicle.observer_valve.command_kind() {
         CommandKind::Current => (Role::OncomingCurrent, signal::ONCOMING_CURRENT),
         CommandKind::DutyCycle => (Role::OncomingDuty, signal::ONCOMING_DUTY),
     };
-    let speeds = [
+    let columns = [
         (Role::EngineSpeed, signal::ENGINE_SPEED),
         (Role::TurbineSpeed, signal::TURBINE_SPEED),
         (Role::OutputSpeed, signal::OUTPUT_SPEED),
         (Role::WheelSpeed, signal::WHEEL_SPEED),
+        command,
     ];
-    let entry = |(role, name): (Role, &str)| {
-        let in_si = rows.find(name).is_none_or(|column| rows.factor(column) == 1.0);
-        let unit_name = match role {
-            _ if in_si => role.unit(),
-            Role::OncomingCurrent => "mA",
-            _ => "rpm",
-        };
-        let (counts, extremes) = (QualityCounts::default(), Extremes::default());
-        RoleSummary { role, name: role.name().to_owned(), counts, extremes, unit_name: unit_name.to_owned() }
-    };
-    speeds.into_iter().chain([command]).map(entry).collect()
+    let columns = columns.map(|(role, column)| WatchedColumn {
+        role,
+        name: role.name().to_owned(),
+        is_in_si: rows.find(column).is_none_or(|column| rows.factor(column) == 1.0),
+        // A signal without values shows in the health of the estimate.
+        is_needed: false,
+    });
+    WatchedColumns::new(look, columns)
 }
 
-/// Takes the values of a row; the entries are those of [`summary`].
-fn watch(summary: &mut [RoleSummary], input: &Input<f64>) {
+/// The values of a row in the columns of [`watched`].
+fn values(input: &Input<f64>) -> [Option<f64>; 5] {
     let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.command];
-    for (entry, reading) in summary.iter_mut().zip(readings) {
-        if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
-            entry.extremes.push(reading.value);
-        }
-    }
+    readings.map(|reading| reading.map(|reading| reading.value))
 }
 
 impl Rows {
-    /// Refuses a unit that cannot be right.
-    fn check_units(&self, seen: Seen) -> Result<(), Failure> {
-        let Some(finding) = findings(&self.summary, seen).into_iter().next() else { return Ok(()) };
-        let (message, name) = (finding.message, finding.name);
-        let ending = match finding.likely {
-            Likely::Unit("rpm") => "rpm",
-            Likely::Unit("rad/s") => "rad_s",
-            Likely::Unit("mA") => "ma",
-            Likely::Unit("A") => "a",
-            Likely::Unit("%") => "percent",
-            Likely::Unit(_) => {
-                let hint = "give the unit and the scale in a channel map, see `wetclutch inspect --suggest`";
-                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
-            }
-            Likely::OtherChannel => {
-                let hint = "another signal may stand in its column, or its sensor has failed";
-                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
-            }
-            Likely::OtherSign => {
-                let hint = "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`";
-                return Err(Failure::Input(format!("{message}\nhint: {hint}")));
-            }
-        };
-        Err(Failure::Input(format!(
-            "{message}\nhint: the end of the column's name says the unit: call it `{name}_{ending}`"
-        )))
-    }
-
     /// Reads the next step; `see` gets its readings, with the resets of the clock so far. False at the end.
     fn read(&mut self, step: &mut Step, mut see: impl FnMut(u32, &Reading)) -> Result<bool, Failure> {
-        /// Rows after the first look of which one is watched for its units.
-        const EVERY: u64 = 32;
         let Some(row) = self.log.next() else { return Ok(false) };
         let (input, row) = row?;
-        self.rows += 1;
-        if self.rows > self.look && self.rows.is_multiple_of(EVERY) {
-            watch(&mut self.summary, &input);
+        match self.ahead.checked_sub(1) {
+            Some(ahead) => self.ahead = ahead,
+            None => self.watched.push(values(&input)),
         }
         let resets = self.log.resets();
         readings(&input, &row).for_each(|reading| see(resets, &reading));

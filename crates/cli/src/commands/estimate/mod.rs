@@ -9,6 +9,7 @@ mod outputs;
 mod ratios;
 mod selection;
 mod shifts;
+mod watched;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -58,6 +59,11 @@ impl Messages {
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     not_an_input(options.output.as_ref(), inputs(options))?;
     outputs::check_name(options)?;
+    if let Some(toml) = options.logs.iter().find(|log| log.extension().is_some_and(|ending| ending == "toml")) {
+        let message =
+            format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.display());
+        return Err(Failure::Input(message));
+    }
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
         any_car::check_options(options)?;
         let prepare = || any_car::CarSetup::new(options);

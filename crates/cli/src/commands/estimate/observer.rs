@@ -96,22 +96,28 @@ pub(super) fn choose(
             1e3 * observer.sample_max_s(),
         ));
     }
-    let open_loop = match &observer {
+    open_loop_phases(vehicle, (&observer, kind, method), step_s).iter().for_each(|line| say.note(line));
+    Ok(Chosen { observer, kind, name: name_of(choice, method) })
+}
+
+/// The phases in which the observer is the open loop, each with the reason.
+fn open_loop_phases(
+    vehicle: &Vehicle,
+    (observer, kind, method): (&AnyObserver, ObserverKind, MethodChoice),
+    step_s: f64,
+) -> Vec<String> {
+    let phases = match observer {
         AnyObserver::Rigid(rigid) if kind == ObserverKind::Rigid => {
             rigid_open_loop_phases(vehicle, &rigid.gains, step_s)
         }
         AnyObserver::Compliant(compliant) => compliant_open_loop_phases(vehicle, &compliant.gains, step_s),
         _ => Vec::new(),
     };
-    for phase in open_loop {
-        say.note(&match method {
-            MethodChoice::Iss => {
-                format!("{}: the gain is the open loop: the valve alone has the required decay", phase_name(phase))
-            }
-            _ => format!("{}: the gain is the open loop: no gain reduces the bound", phase_name(phase)),
-        });
-    }
-    Ok(Chosen { observer, kind, name: name_of(choice, method) })
+    let why = match method {
+        MethodChoice::Iss => "the valve alone has the required decay",
+        _ => "no gain reduces the bound",
+    };
+    phases.into_iter().map(|phase| format!("{}: the gain is the open loop: {why}", phase_name(phase))).collect()
 }
 
 /// The observer for a log, if the user names none.

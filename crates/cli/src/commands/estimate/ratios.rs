@@ -2,6 +2,7 @@
 
 use config::Vehicle;
 use observer::{Input, Reading};
+use study::swapped_speeds::SwappedSpeeds;
 
 use crate::failure::Failure;
 
@@ -28,6 +29,9 @@ pub(super) struct Ratios {
     in_gear: u64,
     turbine_over_output: Histogram,
     output_over_wheel: Histogram,
+    /// Newest engine speed, rad/s.
+    engine_rad_s: f64,
+    swapped: SwappedSpeeds,
 }
 
 impl Ratios {
@@ -41,7 +45,14 @@ impl Ratios {
             in_gear: 0,
             turbine_over_output: Histogram::default(),
             output_over_wheel: Histogram::default(),
+            engine_rad_s: f64::NAN,
+            swapped: SwappedSpeeds::default(),
         }
+    }
+
+    /// What contradicts the channels of the speeds, in a sentence.
+    pub(super) fn warning(&self) -> Option<String> {
+        self.swapped.warning()
     }
 
     pub(super) fn push(&mut self, input: &Input<f64>) {
@@ -51,10 +62,14 @@ impl Ratios {
                 *newest = value;
             }
         }
+        if let Some(Reading { value, .. }) = input.engine_rad_s.filter(|reading| reading.value.is_finite()) {
+            self.engine_rad_s = value;
+        }
         let [turbine, output, wheel] = self.newest_rad_s;
         if output > OUTPUT_MIN_RAD_S && turbine.is_finite() {
             self.moving += 1;
             self.moving_s += input.dt_s.clamp(0.0, 1.0);
+            self.swapped.push(self.engine_rad_s, turbine, &self.gears.map(|gear| gear * output));
             let ratio = turbine / output;
             self.in_gear += u64::from(self.gears.iter().any(|gear| (ratio / gear - 1.0).abs() < IN_GEAR));
             self.turbine_over_output.push(ratio);
@@ -74,8 +89,9 @@ impl Ratios {
         let share = self.in_gear as f64 / self.moving as f64;
         if share < IN_GEAR_SHARE {
             let [offgoing, oncoming] = self.gears;
+            let swapped = self.warning().map_or(String::new(), |warning| warning + "\n");
             return Err(Failure::Input(format!(
-                "turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
+                "{swapped}turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
                  {oncoming:.3}: the car is in them for {:.0} % of the time\nhint: check unit and scale of turbine_speed and output_speed, and \
                  whether the vehicle file is of this car; for a log of more gears, a channel map with `gearbox.ratios` tells them apart",
                 self.turbine_over_output.middle(),

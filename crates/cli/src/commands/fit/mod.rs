@@ -64,14 +64,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     };
     // Nobody has to read the report to its end.
     write_text(&options.output, &written.source.text)?;
-    table(&found.report())?;
-    for (channel, scale, gain) in &found.channels {
-        let (scale, unit) = if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
-        output::line(&format!("{}: one-step error {scale:.3} {unit}, g {gain:.2}", channel.name()))?;
-    }
-    for statement in found.statements() {
-        output::line(&statement)?;
-    }
+    print(&found)?;
     output::line(&said_of(checked.as_ref()))?;
     said_of_file(options, found.shifts, against);
     Ok(())
@@ -88,6 +81,19 @@ fn said_of_file(options: &Fit, shifts: usize, against: Option<String>) {
              known"
         ),
     });
+}
+
+/// The fitted values, the scatter of each channel, and what these logs tell.
+fn print(found: &fit::Fit) -> Result<(), Failure> {
+    table(&found.report())?;
+    for (channel, scale, gain) in &found.channels {
+        let (scale, unit) = if *channel == fit::Channel::Pressure { (1e-3 * scale, "kPa") } else { (*scale, "rad/s") };
+        output::line(&format!("{}: one-step error {scale:.3} {unit}, g {gain:.2}", channel.name()))?;
+    }
+    for statement in found.statements() {
+        output::line(&statement)?;
+    }
+    Ok(())
 }
 
 /// Refuses an output that is there and no vehicle file: it may be a measurement.

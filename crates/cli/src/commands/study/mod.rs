@@ -1,23 +1,24 @@
 //! `wetclutch study` and `wetclutch merge`.
 
 mod cars;
+mod one_run;
 mod part;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use config::{Kind, Source, Study};
 use report::StudyPage;
-use report::shift_figure::observers_of;
 use report::study_page::diverged;
 use report::tables::{COMPARED_NAMES, number, phase_name};
 use study::campaign::PHASES;
-use study::{Campaign, Row, StudyError, Summary, estimates_trace};
+use study::{Campaign, Row, StudyError, Summary};
 use trace::units;
 
 pub(super) use self::cars::describe as describe_cars;
+use self::one_run::one_run;
 use self::part::{Part, Runs, lock, merged};
 use crate::args::{Merge, StudyOptions};
-use crate::commands::{shell_quoted, writable, write_text, write_trace};
+use crate::commands::{shell_quoted, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -152,32 +153,5 @@ fn print_relative(summary: &Summary) -> Result<(), Failure> {
             output::table(2, &table)?;
         }
     }
-    Ok(())
-}
-
-/// Makes one run again, with every signal.
-fn one_run(campaign: &Campaign, number: u64, options: &StudyOptions) -> Result<(), Failure> {
-    if number >= campaign.study.runs {
-        return Err(Failure::Input(format!(
-            "the study has no run {number}; its runs are 0 to {}",
-            campaign.study.runs - 1
-        )));
-    }
-    let run = campaign.run_in_full(number)?;
-    let at = |name: &str| -> PathBuf { options.output.join(format!("run_{number}{name}")) };
-    write_trace(&at(".csv"), &run.trace)?;
-    for observer in &run.observers {
-        let name = observer.entry.column();
-        write_trace(&at(&format!("_{name}.csv")), &estimates_trace(&observer.time_s, &observer.estimates))?;
-    }
-    let figure = at(".svg");
-    write_text(&figure, &observers_of(&run.observers, &run.trace, run.quality.as_ref()).svg())?;
-    let row = campaign.row(number)?;
-    let names = campaign.layout.header();
-    let cells = row.line(&campaign.layout);
-    for (name, cell) in names.iter().zip(cells.split(',')).filter(|(_, cell)| !cell.is_empty()) {
-        output::line(&format!("{name} {cell}"))?;
-    }
-    output::line(&format!("figure: {}", figure.display()))?;
     Ok(())
 }

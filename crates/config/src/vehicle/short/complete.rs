@@ -33,10 +33,10 @@ const TOGETHER: [(&str, &[&str]); 6] = [
 ];
 
 /// A value with its key and its place in the text.
-struct Leaf<'t, 'd> {
-    key: String,
-    place: Range<usize>,
-    value: &'t DeValue<'d>,
+pub(super) struct Leaf<'t, 'd> {
+    pub(super) key: String,
+    pub(super) place: Range<usize>,
+    pub(super) value: &'t DeValue<'d>,
 }
 
 /// The value at a path of tables.
@@ -129,7 +129,7 @@ pub(super) fn complete(defaults: &Source, own: &Source) -> Result<(String, Vec<D
 }
 
 /// A default with numbers; none where it is a name.
-fn taken_of(leaf: &Leaf<'_, '_>, text: &str) -> Option<DefaultTaken> {
+pub(super) fn taken_of(leaf: &Leaf<'_, '_>, text: &str) -> Option<DefaultTaken> {
     let numbers = match leaf.value {
         DeValue::Array(rows) => {
             rows.iter().map(|row| number_of(row.get_ref())).collect::<Option<_>>().unwrap_or_default()
@@ -141,7 +141,7 @@ fn taken_of(leaf: &Leaf<'_, '_>, text: &str) -> Option<DefaultTaken> {
 }
 
 /// All values that are no tables; an item of a list of tables is called by its name, or counted.
-fn leaves<'t, 'd>(table: &'t DeTable<'d>) -> Vec<Leaf<'t, 'd>> {
+pub(super) fn leaves<'t, 'd>(table: &'t DeTable<'d>) -> Vec<Leaf<'t, 'd>> {
     let mut found = Vec::new();
     collect(table, "", &mut found);
     found

@@ -41,7 +41,7 @@ pub enum ValveKind {
 }
 
 /// Greatest torques of engines, N m.
-const ENGINE_TORQUES_N_M: std::ops::RangeInclusive<f64> = 20.0..=2000.0;
+pub(super) const ENGINE_TORQUES_N_M: std::ops::RangeInclusive<f64> = 20.0..=2000.0;
 /// Ratios of gears.
 const RATIOS: std::ops::RangeInclusive<f64> = 0.6..=20.0;
 /// A shift changes the ratio by more than this factor.
@@ -149,7 +149,7 @@ fn train_hint() -> String {
 }
 
 /// A value with its place.
-fn located<'t, 'd>(table: &'t toml::de::DeTable<'d>, path: &[&str]) -> Option<(usize, &'t DeValue<'d>)> {
+pub(super) fn located<'t, 'd>(table: &'t toml::de::DeTable<'d>, path: &[&str]) -> Option<(usize, &'t DeValue<'d>)> {
     let (last, above) = path.split_last()?;
     let table = match find(table, above) {
         Some(DeValue::Table(table)) => table,

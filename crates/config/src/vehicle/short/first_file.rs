@@ -101,7 +101,7 @@ pub fn short_file(facts: &Facts, has_stroke: bool) -> Result<String, ConfigError
 }
 
 /// A number as it was given.
-fn exact(value: f64) -> String {
+pub(super) fn exact(value: f64) -> String {
     let short = toml_number(value);
     if short.parse() == Ok(value) { short } else { format!("{value:?}") }
 }

@@ -3,6 +3,7 @@
 //! A file with `gear_train.ratios` is short. Its defaults are those of `defaults.toml`, scaled to its numbers, and any key of a
 //! vehicle file may stand in it in place of a default.
 
+mod car;
 mod complete;
 mod facts;
 mod first_file;
@@ -14,6 +15,8 @@ use toml::de::DeValue;
 use super::budget;
 use crate::source::{Layers, toml_number};
 use crate::{ConfigError, Source, Vehicle};
+pub use car::{CarFacts, short_car_file, sized_gearbox};
+pub(super) use car::{car_defaults, car_defaults_taken};
 pub use complete::DefaultTaken;
 pub(super) use facts::refuse_facts;
 pub use facts::{Facts, ValveKind};

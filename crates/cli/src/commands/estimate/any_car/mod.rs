@@ -12,15 +12,17 @@ use std::sync::atomic::AtomicBool;
 use config::{Car, Sensors};
 use design::ShiftTables;
 use logs::ChannelMap;
-use report::drive_page::{DrivePage, findings, shift_cells, shift_rows};
+use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
+use study::log::FIRST_LOOK;
 use trace::Cell;
 
 use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
 use super::Messages;
+use super::measured::check_step;
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::selection::Selection;
@@ -86,7 +88,11 @@ pub(super) fn estimate(
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
     let mut checks = log.columns(car, tables);
+    let mut steps_s = Vec::new();
     while let Some(step) = log.next_step()? {
+        if steps_s.len() < FIRST_LOOK {
+            steps_s.push(step.input.dt_s);
+        }
         if let Some(checks) = &mut checks {
             checks.push(&step);
         }
@@ -100,8 +106,12 @@ pub(super) fn estimate(
             table.flush()?;
         }
     }
+    check_step(path, trace::median_step_s(steps_s), !setup.map.channels.is_empty())?;
     log.finish(say)?;
     checks.map_or(Ok(()), |checks| checks.check())?;
+    if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
+        say.note(&swapped);
+    }
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
     let mut drive = drive.finish();
     passing.check()?;
@@ -116,11 +126,17 @@ pub(super) fn estimate(
     write_beside(&drive, car, path, output, say)
 }
 
+/// Whether the speeds of most rows in a gear are not those of that gear.
+fn does_not_fit([all, unfit]: [u64; 2]) -> bool {
+    2 * unfit > all
+}
+
 /// Refuses a log whose speeds are not those of the gearbox in most rows.
-pub(in crate::commands) fn check_ratios([all, unfit]: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
-    if 2 * unfit <= all {
+pub(in crate::commands) fn check_ratios(rows: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
+    if !does_not_fit(rows) {
         return Ok(());
     }
+    let [all, unfit] = rows;
     Err(Failure::Input(format!(
         "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\n         hint: check the units of both speeds, the gear, and whether this is the vehicle file of the car",
         log.display(),
@@ -158,5 +174,6 @@ fn report(drive: &ScoredDrive, car: &Car, say: &mut Messages) {
     if more > 0 {
         say.note(&format!("and {more} more shifts"));
     }
+    shift_words(drive, car).iter().for_each(|(word, meaning)| say.note(&format!("{word}: {meaning}")));
     findings(drive).iter().for_each(|sentence| say.note(sentence));
 }

@@ -92,7 +92,10 @@ impl<'a> CarSource<'a> {
     /// Says what was met in the log, after its last step.
     pub(in crate::commands) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
         match self {
-            Self::Rows(_) => Ok(()),
+            Self::Rows(rows) => {
+                rows.check_readings()?.iter().for_each(|note| say.note(&format!("warning: {note}")));
+                Ok(())
+            }
             Self::Channels(channels) => report_readings(channels.readings(), say),
         }
     }

@@ -1,0 +1,98 @@
+//! The values of a table's columns while it is read: wrong units, signs and columns are refused.
+
+use logs::plausibility::{Extremes, Finding, Likely, Seen, findings};
+use logs::{QualityCounts, Role, RoleSummary};
+
+use crate::failure::Failure;
+use crate::output;
+
+/// Later rows of which one is looked at.
+const EVERY: u64 = 32;
+
+/// Endings of column names that say a unit.
+const ENDINGS: [(&str, &str); 5] = [("rpm", "rpm"), ("rad/s", "rad_s"), ("mA", "ma"), ("A", "a"), ("%", "percent")];
+
+/// A column that is watched.
+pub(super) struct WatchedColumn {
+    /// What it is.
+    pub(super) role: Role,
+    /// Its name without a unit.
+    pub(super) name: String,
+    /// Whether its name says the SI unit.
+    pub(super) is_in_si: bool,
+    /// Whether an estimate without a value of it is refused here.
+    pub(super) is_needed: bool,
+}
+
+/// The columns of a table that are watched.
+pub(super) struct WatchedColumns {
+    /// Rows at the beginning of which all are looked at.
+    first: u64,
+    rows: u64,
+    summaries: Vec<RoleSummary>,
+    /// Whether each is needed, and how many values it has.
+    needs: Vec<(bool, u64)>,
+}
+
+impl WatchedColumns {
+    /// Looks at all of the `first` rows, and later at one of [`EVERY`].
+    pub(super) fn new(first: usize, columns: impl IntoIterator<Item = WatchedColumn>) -> Self {
+        let (mut summaries, mut needs) = (Vec::new(), Vec::new());
+        for WatchedColumn { role, name, is_in_si, is_needed } in columns {
+            let unit_name = match role {
+                _ if is_in_si => role.unit(),
+                Role::OncomingCurrent | Role::ElementCurrent => "mA",
+                _ => "rpm",
+            };
+            let (counts, extremes) = (QualityCounts::default(), Extremes::default());
+            summaries.push(RoleSummary { role, name, counts, extremes, unit_name: unit_name.to_owned() });
+            needs.push((is_needed, 0));
+        }
+        Self { first: first as u64, rows: 0, summaries, needs }
+    }
+
+    /// Takes a row; the values are those of the columns, in their order.
+    pub(super) fn push(&mut self, values: impl IntoIterator<Item = Option<f64>>) {
+        self.rows += 1;
+        let is_looked_at = self.rows <= self.first || self.rows.is_multiple_of(EVERY);
+        for ((entry, (_, count)), value) in self.summaries.iter_mut().zip(&mut self.needs).zip(values) {
+            if let Some(value) = value.filter(|value| value.is_finite()) {
+                *count += 1;
+                if is_looked_at {
+                    entry.extremes.push(value);
+                }
+            }
+        }
+    }
+
+    /// Rows so far.
+    pub(super) fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Refuses a table in which a column that is needed has no value, or whose values cannot be right.
+    pub(super) fn check(&self, seen: Seen) -> Result<(), Failure> {
+        let mut with_needs = self.summaries.iter().zip(&self.needs);
+        if let Some((entry, _)) = with_needs.find(|(_, need)| **need == (true, 0)).filter(|_| self.rows > 0) {
+            return Err(Failure::Input(format!(
+                "{} has no value in any of {} rows\nhint: an estimate of this car needs it; look at the log with `wetclutch inspect`",
+                entry.name,
+                output::grouped(self.rows)
+            )));
+        }
+        let Some(Finding { name, message, likely, .. }) = findings(&self.summaries, seen).into_iter().next() else {
+            return Ok(());
+        };
+        let hint = match likely {
+            Likely::Unit(unit) => match ENDINGS.iter().find(|(name, _)| *name == unit) {
+                Some((_, ending)) => format!("the end of the column's name says the unit: call it `{name}_{ending}`"),
+                None => "give the unit and the scale in a channel map, see `wetclutch inspect --suggest`".to_owned(),
+            },
+            Likely::OtherChannel => "another signal may stand in its column, or its sensor has failed".to_owned(),
+            Likely::OtherSign => {
+                "`wetclutch inspect --suggest` writes a channel map, in which the channel gets `scale = -1`".to_owned()
+            }
+        };
+        Err(Failure::Input(format!("{message}\nhint: {hint}")))
+    }
+}

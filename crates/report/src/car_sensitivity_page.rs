@@ -1,0 +1,121 @@
+//! How errors act on the estimates of every shift of a car: rows of tables, and a page.
+
+use config::Car;
+use minijinja::{Value, context};
+use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
+
+use crate::page::{PageError, origin, templates};
+use crate::tables::number;
+
+/// Names of the phases, in the order of [`ShiftSensitivity::phases`].
+const PHASES: [&str; 2] = ["torque phase", "inertia phase"];
+
+/// A word where the speeds are of no use.
+const HIDDEN: &str = "hidden";
+
+/// Titles and rows of the summary: a row for each shift.
+pub fn sensitivity_rows(shifts: &[ShiftSensitivity], car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    let titles = vec![
+        "shift",
+        "kind",
+        "clutch",
+        "1/|i_off - i_on|",
+        "torque phase",
+        "N m",
+        "largest error",
+        "inertia phase",
+        "N m",
+        "largest error",
+    ];
+    let row = |shift: &ShiftSensitivity| {
+        let mut row = names(shift, car);
+        for phase in &shift.phases {
+            row.extend(match phase {
+                Some(phase) => [ratio(phase), deviations(phase), largest(phase)],
+                None => ["–", "–", "–"].map(str::to_owned),
+            });
+        }
+        row
+    };
+    (titles, shifts.iter().map(row).collect())
+}
+
+/// Shift, kind, clutch and `1/|i_off - i_on|`.
+fn names(shift: &ShiftSensitivity, car: &Car) -> Vec<String> {
+    let gear = |gear: usize| car.gearbox.gears.get(gear).map_or("?", |gear| gear.name.as_str());
+    let element = car.gearbox.elements.get(shift.element).map_or("?", |element| element.name.as_str());
+    let of = shift.shift;
+    vec![
+        format!("{}-{}", gear(of.from), gear(of.to)),
+        of.kind.name().to_owned(),
+        element.to_owned(),
+        number(of.gain, 2),
+    ]
+}
+
+/// Deviation by the filter over that by the valve model alone, or that the speeds show nothing.
+fn ratio(phase: &PhaseOfShift) -> String {
+    if phase.is_hidden() { HIDDEN.to_owned() } else { number(phase.ratio(), 2) }
+}
+
+/// Both deviations of the torque: filter / valve model alone.
+fn deviations(phase: &PhaseOfShift) -> String {
+    let [filter, alone] = phase.deviation_n_m().map(|n_m| number(n_m, 1));
+    format!("{filter} / {alone}")
+}
+
+fn largest(phase: &PhaseOfShift) -> String {
+    phase.largest().map_or_else(String::new, |effect| effect.error.name().to_owned())
+}
+
+/// Number of phases of shifts in which the speeds are of no use, and of all phases.
+pub fn hidden_phases(shifts: &[ShiftSensitivity]) -> [usize; 2] {
+    let phases = || shifts.iter().flat_map(|shift| shift.phases.iter().flatten());
+    [phases().filter(|phase| phase.is_hidden()).count(), phases().count()]
+}
+
+/// The page; it needs nothing but itself.
+///
+/// # Errors
+/// None in a released program; the tests render the template.
+pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &Car) -> Result<String, PageError> {
+    let errors: Vec<ShiftErrorKind> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)).collect();
+    let bounds = errors.iter().map(|error| context! { error => error.name(), bound => error.bound() });
+    let phases = PHASES.iter().enumerate().map(|(at, name)| {
+        let rows = shifts.iter().filter_map(|shift| Some(detail(shift, shift.phases[at].as_ref()?, &errors, car)));
+        context! { name => *name, rows => rows.collect::<Vec<_>>() }
+    });
+    let [hidden, all] = hidden_phases(shifts);
+    Ok(templates()?.get_template("car_sensitivity.html")?.render(context! {
+        name => "Sensitivity",
+        title => "Sensitivity of the estimated torques to errors",
+        version => env!("CARGO_PKG_VERSION"),
+        vehicle_name => &car.name,
+        gearbox_name => &car.gearbox.name,
+        bounds => bounds.collect::<Vec<_>>(),
+        errors => errors.iter().map(|error| error.name()).collect::<Vec<_>>(),
+        phases => phases.collect::<Vec<_>>(),
+        hidden,
+        all,
+        inputs => origin(&[&car.source]),
+    })?)
+}
+
+/// One shift in one phase, with every error.
+fn detail(shift: &ShiftSensitivity, phase: &PhaseOfShift, errors: &[ShiftErrorKind], car: &Car) -> Value {
+    let most = phase.deviation_n_m().into_iter().fold(1e-9, f64::max);
+    let cell = |error: &ShiftErrorKind| {
+        let effect = phase.effects.iter().find(|effect| effect.error == *error).map_or(0.0, |e| e.torque_n_m[0]);
+        context! { text => number(effect, 1), shade => format!("{:.2}", (0.35 * effect / most).min(0.6)) }
+    };
+    let [filter_pa, alone_pa] = phase.deviation_pa().map(|pa| number(1e-3 * pa, 0));
+    context! {
+        names => names(shift, car),
+        torque => number(phase.torque_n_m, 0),
+        ratio => ratio(phase),
+        is_hidden => phase.is_hidden(),
+        torques => deviations(phase),
+        pressures => format!("{filter_pa} / {alone_pa}"),
+        effects => errors.iter().map(cell).collect::<Vec<_>>(),
+    }
+}

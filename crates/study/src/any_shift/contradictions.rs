@@ -1,0 +1,119 @@
+//! Commands of a log that contradict the gear: channels that stand in each other's place.
+//!
+//! In a gear that the speeds confirm, each clutch and brake that holds it presses its plates. A command below the kiss point of such an
+//! element, with all errors of the valve in its favour, can hold nothing: then the channel is another signal. Which one, an element tells
+//! that is open in that gear and whose command presses.
+
+use config::Car;
+use design::{ShiftErrors, ShiftTables};
+use observer::any_shift::MAX_ELEMENTS;
+
+/// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
+const STEADY_S: f64 = 1.0;
+/// The turbine fits the gear within this share \[chosen\]: readings that are 20 ms apart differ by 1 % while the car accelerates.
+const FITS: f64 = 0.02;
+/// Output speed below which an element may be left open, as in idle, rad/s.
+const OUTPUT_LEAST_RAD_S: f64 = 20.0;
+/// Rows in a gear that are needed to judge \[chosen\]: a second at 100 Hz. More than half of them have to contradict.
+const ENOUGH: u64 = 100;
+
+/// What the commands of a log say of each gear.
+pub(super) struct CommandCheck<'c> {
+    car: &'c Car,
+    /// Element of the gearbox and place in the filter's tables.
+    places: Vec<(usize, usize)>,
+    /// Pressures by the valve model, Pa, below which an element presses by no means, and above which it does, by their place.
+    limits_pa: Vec<[f64; 2]>,
+    gear: usize,
+    since_s: f64,
+    of_gears: Vec<OfGear>,
+}
+
+/// Rows of a steady gear.
+#[derive(Clone, Default)]
+struct OfGear {
+    rows: u64,
+    /// Rows in which the element of each place does not press, and in which it does.
+    opens: [u64; MAX_ELEMENTS],
+    presses: [u64; MAX_ELEMENTS],
+}
+
+impl<'c> CommandCheck<'c> {
+    pub(super) fn new(car: &'c Car, tables: &ShiftTables<f64>, errors: &ShiftErrors) -> Self {
+        let places = (0..car.gearbox.elements.len()).filter_map(|element| Some((element, tables.place(element)?)));
+        let limits_pa = tables.tables().elements.iter().map(|element| {
+            let kiss_pa = element.clutch.kiss_pressure();
+            [
+                (kiss_pa - errors.hysteresis_pa) / (1.0 + errors.valve_gain),
+                (kiss_pa + errors.hysteresis_pa) / (1.0 - errors.valve_gain),
+            ]
+        });
+        let of_gears = vec![OfGear::default(); car.gearbox.gears.len()];
+        let (places, limits_pa) = (places.collect(), limits_pa.collect());
+        Self { car, places, limits_pa, gear: usize::MAX, since_s: f64::NAN, of_gears }
+    }
+
+    /// Takes a row: the gear, none while the gearbox shifts, turbine and output speed, and the pressures by the valve models.
+    pub(super) fn push(
+        &mut self,
+        time_s: f64,
+        gear: Option<usize>,
+        [turbine, output]: [f64; 2],
+        valve_pa: &[f64; MAX_ELEMENTS],
+    ) {
+        let gear = gear.unwrap_or(usize::MAX);
+        let ratio = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
+        let in_gear = ratio * output;
+        let fits = output > OUTPUT_LEAST_RAD_S && (turbine - in_gear).abs() <= FITS * in_gear.abs();
+        if gear != self.gear || !fits {
+            (self.gear, self.since_s) = (gear, time_s);
+        }
+        let Some(of_gear) = self.of_gears.get_mut(gear).filter(|_| fits && time_s - self.since_s >= STEADY_S) else {
+            return;
+        };
+        of_gear.rows += 1;
+        for (place, ([opens_pa, presses_pa], valve_pa)) in self.limits_pa.iter().zip(valve_pa).enumerate() {
+            of_gear.opens[place] += u64::from(valve_pa < opens_pa);
+            of_gear.presses[place] += u64::from(valve_pa > presses_pa);
+        }
+    }
+
+    /// What the log shows against the channels of the commands: a sentence for each element.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.places.iter().filter_map(|&(element, place)| self.warning(element, place)).collect()
+    }
+
+    /// The gear in which the most rows contradict the command of this element, in a sentence.
+    fn warning(&self, element: usize, place: usize) -> Option<String> {
+        let holds = |gear: usize, element: usize| {
+            self.car.gearbox.gears[gear].holding.iter().any(|holding| holding.element == element)
+        };
+        let contradicts = |gear: &usize| {
+            let OfGear { rows, opens, .. } = &self.of_gears[*gear];
+            *rows >= ENOUGH && 2 * opens[place] > *rows && holds(*gear, element)
+        };
+        let gears = (0..self.of_gears.len()).filter(contradicts);
+        let gear = gears.max_by_key(|gear| self.of_gears[*gear].opens[place])?;
+        let OfGear { rows, opens, presses } = &self.of_gears[gear];
+        let name = |element: usize| self.car.gearbox.elements[element].name.as_str();
+        let others = self.places.iter().filter(|(other, at)| !holds(gear, *other) && 2 * presses[*at] > *rows);
+        let others: Vec<&str> = others.map(|(other, _)| name(*other)).collect();
+        let what = match others.as_slice() {
+            [] => "; its channel may be another signal, or its valve may work the other way round".to_owned(),
+            others => {
+                let others = others.join(", ");
+                format!(
+                    ", while that of {others}, open in this gear, is above: the channels of {} and {others} may be swapped",
+                    name(element)
+                )
+            }
+        };
+        Some(format!(
+            "warning: in gear {} the turbine follows the ratio of the gear, which {} holds, but the command of {1} is below its kiss point in {} of \
+             {rows} samples{what}",
+            self.car.gearbox.gears[gear].name,
+            name(element),
+            opens[place],
+        ))
+    }
+}

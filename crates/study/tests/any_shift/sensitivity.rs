@@ -1,0 +1,78 @@
+//! What each error does to the estimates of a shift.
+
+use config::Car;
+use study::any_shift::influence::{ValueFrom, car_influences};
+use study::any_shift::sensitivity::{EffectInShift, PhaseOfShift, ShiftErrorKind, car_sensitivity};
+
+use crate::cars::{cars, sensors};
+
+fn effect(phase: &PhaseOfShift, error: ShiftErrorKind) -> Option<&EffectInShift> {
+    phase.effects.iter().find(|effect| effect.error == error)
+}
+
+fn car(name: &str) -> Car {
+    cars().into_iter().find(|car| car.gearbox.name.contains(name)).unwrap()
+}
+
+/// What is known without a filter: the valve model alone has the whole error of friction, and none of the driveline.
+#[test]
+fn the_valve_model_alone_has_its_own_errors_and_no_other() {
+    let car = car("AODE");
+    let shifts = car_sensitivity(&car, &sensors()).unwrap();
+    assert_eq!(shifts.len(), 12);
+    for shift in &shifts {
+        assert!(car.clutches[shift.element].is_some());
+        for phase in shift.phases.iter().flatten() {
+            let alone = |error| effect(phase, error).unwrap().torque_n_m[1];
+            for error in [
+                ShiftErrorKind::Converter,
+                ShiftErrorKind::Inertia,
+                ShiftErrorKind::Stiffness,
+                ShiftErrorKind::OtherFriction,
+            ] {
+                assert_eq!(alone(error), 0.0, "{error:?}");
+            }
+            assert!(effect(phase, ShiftErrorKind::EngineTorque).is_none());
+            // The torque by the valve model with exact timing is near the true one, and friction is 15 % of it.
+            assert!(alone(ShiftErrorKind::Friction) <= 0.15 * 2.0 * phase.torque_n_m.max(10.0), "{phase:?}");
+            let pressure = effect(phase, ShiftErrorKind::Friction).unwrap().pressure_pa;
+            assert_eq!(pressure[1], 0.0, "friction is no error of the valve's pressure");
+            let [filter, alone] = phase.deviation_n_m();
+            assert!(filter > 0.0 && alone > 0.0 && (phase.ratio() - filter / alone).abs() < 1e-12);
+            assert!(phase.largest().unwrap().torque_n_m[0] <= 3.0_f64.sqrt() * filter);
+        }
+    }
+    // In the inertia phase under power the speeds show the clutch torque, but for the turbine torque.
+    let up = shifts.iter().find(|shift| shift.shift.kind.name() == "power-on upshift").unwrap();
+    let inertia = up.phases[1].as_ref().unwrap();
+    assert!(inertia.ratio() < 0.6 && effect(inertia, ShiftErrorKind::Converter).unwrap().torque_n_m[0] > 1.0);
+}
+
+#[test]
+fn a_car_without_converter_has_the_error_of_the_reported_engine_torque() {
+    let car = car("dual clutch");
+    let shifts = car_sensitivity(&car, &sensors()).unwrap();
+    let phases = || shifts.iter().flat_map(|shift| shift.phases.iter().flatten());
+    assert!(phases().all(|phase| effect(phase, ShiftErrorKind::Converter).is_none()));
+    assert!(phases().any(|phase| effect(phase, ShiftErrorKind::EngineTorque).unwrap().torque_n_m[0] > 2.0));
+    // Where the speeds show nothing, the page says so.
+    assert!(phases().any(PhaseOfShift::is_hidden) && !phases().all(PhaseOfShift::is_hidden));
+}
+
+#[test]
+fn values_of_the_file_of_the_gearbox_and_defaults_are_told_apart() {
+    let car = car("AODE");
+    let found = car_influences(&car, &sensors()).unwrap().unwrap();
+    assert_eq!(found.shifts, 12);
+    let of = |key: &str| found.values.iter().find(|value| value.key == key).unwrap();
+    assert_eq!(of("element.pack.piston_area_m2").from, ValueFrom::Gearbox);
+    assert_eq!(of("valve.gain.gain_pa_a").from, ValueFrom::Default);
+    // A wrong gain spoils both, the filter less; the valve model alone does not know the shafts.
+    let (gain, shafts) = (of("valve.gain.gain_pa_a").errors, of("driveline.shaft_stiffness_n_m_rad").errors);
+    assert!(gain.torque_n_m[0] < gain.torque_n_m[1] && gain.torque_n_m[1] > found.as_it_is.torque_n_m[1], "{gain:?}");
+    assert_eq!(shafts.torque_n_m[1], found.as_it_is.torque_n_m[1]);
+    let order = |pair: &[study::any_shift::influence::CarInfluence]| {
+        pair[0].errors.torque_n_m[0] >= pair[1].errors.torque_n_m[0]
+    };
+    assert!(found.values.windows(2).all(order));
+}
