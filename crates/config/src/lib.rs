@@ -30,6 +30,6 @@ pub use source::{Kind, Source, toml_number, toml_string};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CompliantRequirement, DefaultTaken, DesignRequirement, ErrorBounds, FilterSettings, LockUp, ShiftClutch,
-    Uncertainty, ValveUncertainty, Vehicle,
+    Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ErrorBounds,
+    FilterSettings, LockUp, ShiftClutch, Uncertainty, ValveUncertainty, Vehicle,
 };

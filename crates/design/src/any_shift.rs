@@ -1,6 +1,6 @@
 //! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
 
-use config::{Car, Sensors};
+use config::{Car, ElementErrorBounds, Sensors};
 use drivetrain::{CommandKind, Real};
 use geartrain::{Change, Gearbox};
 use observer::any_shift::{
@@ -107,7 +107,7 @@ impl<T: Real> ShiftTables<T> {
     }
 }
 
-/// Bounds of what the filter may not know of a car, each as a share.
+/// Bounds of what the filter may not know of a car, each as a share. What the vehicle file has of its own comes before them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftErrors {
     /// Of the friction of a clutch.
@@ -145,6 +145,64 @@ impl ShiftErrors {
     };
 }
 
+/// Bounds of what is not known of an element and its valve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElementErrors {
+    /// Least and greatest factor on the friction.
+    pub friction_factor: [f64; 2],
+    /// The same on the gain of the valve.
+    pub valve_gain_factor: [f64; 2],
+    /// The same on its lag.
+    pub valve_lag_factor: [f64; 2],
+    /// Least and greatest delay, s.
+    pub valve_delay_s: [f64; 2],
+    /// Greatest half-width of its hysteresis, Pa.
+    pub valve_hysteresis_pa: f64,
+}
+
+impl ShiftErrors {
+    /// The bounds of an element of a car, by its place in the gearbox.
+    pub fn of_element(&self, car: &Car, element: usize) -> ElementErrors {
+        let around = |share: f64| [1.0 - share, 1.0 + share];
+        let own = car.error_bounds.elements.get(element).copied().unwrap_or_default();
+        ElementErrors {
+            friction_factor: own.friction_factor.unwrap_or(around(self.friction)),
+            valve_gain_factor: own.valve_gain_factor.unwrap_or(around(self.valve_gain)),
+            valve_lag_factor: own.valve_lag_factor.unwrap_or(around(self.valve_lag)),
+            valve_delay_s: own.valve_delay_s.unwrap_or(self.valve_delay_s),
+            valve_hysteresis_pa: own.valve_hysteresis_pa.unwrap_or(self.hysteresis_pa),
+        }
+    }
+
+    /// With what the vehicle file has of its own; of the elements the widest.
+    #[must_use]
+    pub fn of_car(&self, car: &Car) -> Self {
+        let own = &car.error_bounds;
+        let elements: Vec<&ElementErrorBounds> =
+            own.elements.iter().zip(&car.clutches).filter_map(|(own, clutch)| clutch.as_ref().map(|_| own)).collect();
+        let widest = |of: fn(&ElementErrorBounds) -> Option<[f64; 2]>, share: f64| {
+            let half = |own: &&ElementErrorBounds| of(own).map_or(share, |[least, most]| 0.5 * (most - least));
+            elements.iter().map(half).reduce(f64::max).unwrap_or(share)
+        };
+        let delays = || elements.iter().map(|own| own.valve_delay_s.unwrap_or(self.valve_delay_s));
+        let [least_s, most_s] = self.valve_delay_s;
+        Self {
+            friction: widest(|element| element.friction_factor, self.friction),
+            valve_gain: widest(|element| element.valve_gain_factor, self.valve_gain),
+            valve_lag: widest(|element| element.valve_lag_factor, self.valve_lag),
+            converter: own.converter_share.unwrap_or(self.converter),
+            engine: own.engine_torque_share.unwrap_or(self.engine),
+            inertia: own.inertia_share.unwrap_or(self.inertia),
+            stiffness: own.shaft_stiffness_share.unwrap_or(self.stiffness),
+            hysteresis_pa: self.hysteresis_pa,
+            valve_delay_s: [
+                delays().map(|[least_s, _]| least_s).reduce(f64::min).unwrap_or(least_s),
+                delays().map(|[_, most_s]| most_s).reduce(f64::max).unwrap_or(most_s),
+            ],
+        }
+    }
+}
+
 /// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen\].
 const OUTPUT_LEAST_RAD_S: f64 = 15.0;
 /// Largest speed, rad/s: a larger reading is none of a gearbox \[chosen\].
@@ -159,25 +217,25 @@ impl ShiftTables<f64> {
     /// More clutches and brakes than the filter has room for; holds their number.
     pub fn of_car(car: &Car, errors: &ShiftErrors) -> Result<Self, usize> {
         let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
-        let [least_s, most_s] = errors.valve_delay_s;
-        let around = |share: f64| [1.0 - share, 1.0 + share];
         let mut tables = Self::new(
             &car.gearbox,
             |element| {
                 let clutch = car.clutches.get(element)?.as_ref()?;
                 let pressure_max_pa = pressure_max_pa(car, errors);
+                let own = errors.of_element(car, element);
+                let [least_s, most_s] = own.valve_delay_s;
                 let budget = Budget {
                     valve: clutch.valve,
-                    lag_factor: around(errors.valve_lag),
-                    gain_factor: around(errors.valve_gain),
-                    delay_s: errors.valve_delay_s,
-                    hysteresis_pa: errors.hysteresis_pa,
+                    lag_factor: own.valve_lag_factor,
+                    gain_factor: own.valve_gain_factor,
+                    delay_s: own.valve_delay_s,
+                    hysteresis_pa: own.valve_hysteresis_pa,
                     command: COMMAND_SHARE * command_max(car, errors),
                     command_age_s: 0.0,
                     line_pressure_pa: [pressure_max_pa; 2],
                     pressure_max_pa,
                     fill: clutch.standard_fill_budget(car.oil_temperature_degc),
-                    friction_factor: around(errors.friction),
+                    friction_factor: own.friction_factor,
                     slip_rad_s: 0.0,
                 };
                 Some((ValveModel { valve: clutch.valve, delay_s: 0.5 * (least_s + most_s) }, Some(budget)))
@@ -223,6 +281,7 @@ pub fn any_shift_filter<'a>(
     sensors: Option<&Sensors>,
 ) -> AnyShiftFilter<'a, f64> {
     let inertia = car.engine.inertia_kg_m2;
+    let own = errors.of_car(car);
     AnyShiftFilter {
         tables: tables.tables(),
         driveline: car.driveline,
@@ -230,10 +289,10 @@ pub fn any_shift_filter<'a>(
         turbine: TurbineTorque {
             converter: car.converter,
             engine_inertia_kg_m2: inertia,
-            converter_share: deviation_of(errors.converter),
-            engine_share: deviation_of(errors.engine),
+            converter_share: deviation_of(own.converter),
+            engine_share: deviation_of(own.engine),
         },
-        uncertainty: uncertainty(errors),
+        uncertainty: uncertainty(&own),
         readings: [
             speed_reading(sensors.map(|sensors| &sensors.turbine), SPEED_QUANTUM_RAD_S),
             speed_reading(sensors.map(|sensors| &sensors.output), SPEED_QUANTUM_RAD_S),

@@ -1,14 +1,19 @@
 //! Cars with a whole gearbox whose parameters are off, fitted to a drive in town behind sensors: prints the statistics of many of them.
 //!
 //! `FIT_CARS=20 cargo run --release -p fit --example gearbox_draws`; `FIT_FIRST` is the first seed, `FIT_DRIVES` how often the drive of
-//! three minutes is driven (5), `FIT_VEHICLE` the vehicle file (`eight_speed.toml`).
+//! three minutes is driven (5), `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
+//! sensor; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
+//! the WLTC with the given file, with the fitted one without its error bounds, and with it.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
 #[path = "../tests/gearbox/drawn.rs"]
 mod drawn;
+#[path = "../tests/gearbox/estimated.rs"]
+mod estimated;
 
-use config::Drive;
-use drawn::{Drawn, every_fifth};
+use config::{Car, Drive};
+use drawn::{Case, Drawn, every_fifth};
+use estimated::{Estimated, estimated};
 use fit::gearbox::Quantity;
 
 /// Of a quantity the error of the fit, and the standard deviations stated and before, in its unknown.
@@ -24,17 +29,22 @@ struct Outcome {
     /// RMS error of the torques by the valve models on held-out shifts, N m: given file, fitted file.
     torque_n_m: [f64; 2],
     told: Vec<Told>,
+    estimates: Vec<Estimated>,
 }
 
 fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
+fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let tables = drawn.tables();
     let (recorded, truth) = drawn.driven(drive);
     let number = recorded.shifts.len();
-    let [fitted, held_out] = every_fifth(recorded.shifts);
+    let [mut fitted, held_out] = every_fifth(recorded.shifts);
+    if let Ok(name) = std::env::var("FIT_PRESSURE") {
+        let at = drawn.file.gearbox.elements.iter().position(|element| element.name == name).unwrap();
+        truth.measure(&mut fitted, &tables, tables.place(at).unwrap(), !drawn.seed);
+    }
     let begin = std::time::Instant::now();
     let mut iterations = 0;
     let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &mut |_| iterations += 1).unwrap();
@@ -44,7 +54,7 @@ fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
     let checked = fit.validate((&drawn.file, &tables), (&file, &drawn::tables(&file)), &held_out).unwrap();
     println!(
         "car {}: {number} shifts, {} skipped, torque N m {:.2} -> {:.2} ({:.2}), turbine rad/s {:.2} -> {:.2} (better {}/{}), g {:.2}, misfit {:.2}, \
-         {iterations} iterations, {seconds:.1} s, converged {}",
+         {iterations} iterations, {seconds:.1} s, converged {}, given file possible {}, kept {}",
         drawn.seed,
         recorded.skipped.len(),
         torque_n_m[0],
@@ -56,18 +66,36 @@ fn outcome(drawn: &Drawn, drive: &Drive) -> Outcome {
         checked.shifts,
         fit.scale_and_gain[1],
         fit.torque_misfit,
-        fit.is_converged
+        fit.is_converged,
+        fit.statements().iter().any(|line| line.contains("do not ask for another file")),
+        fit.reason_against(Some(&checked)).is_some()
     );
     let quantities = &fit.quantities;
-    // The simulated drag is another in each shift.
-    let known = quantities.all.iter().enumerate().filter(|(_, quantity)| **quantity != Quantity::Drag);
+    // The simulated drag is another in each element, the sensor's scale is none of the car, and a gain that is not measured is not fitted.
+    let is_known = |quantity: Quantity| match quantity {
+        Quantity::Drag | Quantity::PressureScale | Quantity::InputDelay => false,
+        Quantity::Gain(place) => quantities.measured[place],
+        // Drawn delays are constant, those of the file depend on the command.
+        Quantity::Delay(_) => case != Case::WithTiming,
+        _ => true,
+    };
+    let known = quantities.all.iter().enumerate().filter(|(_, quantity)| is_known(**quantity));
     let told = known.map(|(place, quantity)| Told {
         name: quantities.name(*quantity),
         error: fit.unknowns[place] - drawn.true_unknown(&tables, quantities, *quantity),
         stated: fit.sd(*quantity),
         before: quantities.sd_before(place),
     });
-    Outcome { torque_n_m, told: told.collect() }
+    let told = told.collect();
+    let estimates = match std::env::var("FIT_ESTIMATE") {
+        Ok(_) => {
+            let without = Car { error_bounds: drawn.file.error_bounds.clone(), ..file.clone() };
+            let cycle = Drive::read(&drawn::root().join("drives/wltc_3b.toml")).unwrap();
+            estimated(drawn, &cycle, &[drawn.file.clone(), without, file])
+        }
+        Err(_) => Vec::new(),
+    };
+    Outcome { torque_n_m, told, estimates }
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -100,13 +128,39 @@ fn print_quantities(outcomes: &[Outcome]) {
     println!("all held {:.3}", all().filter(is_inside).count() as f64 / all().count() as f64);
 }
 
+fn print_estimates(outcomes: &[Outcome]) {
+    for (at, name) in ["given file", "fitted file, bounds of the given one", "fitted file"].into_iter().enumerate() {
+        let of = |value: fn(&Estimated) -> f64| -> f64 {
+            outcomes.iter().filter_map(|outcome| outcome.estimates.get(at)).map(value).sum()
+        };
+        let rows = of(|sum| sum.rows);
+        if rows > 0.0 {
+            println!(
+                "{name}: torque estimated {:.2} N m RMS, range {:.1} N m and {:.1} kPa wide, pressure outside in {} and torque in {} of {rows} rows",
+                (of(|sum| sum.square) / rows).sqrt(),
+                of(|sum| sum.width_n_m) / rows,
+                1e-3 * of(|sum| sum.width_pa) / rows,
+                of(|sum| sum.outside[0]),
+                of(|sum| sum.outside[1])
+            );
+        }
+    }
+}
+
 fn main() {
     let vehicle = std::env::var("FIT_VEHICLE").unwrap_or("eight_speed.toml".to_owned());
     let (first, cars) = (number("FIT_FIRST", 0), number("FIT_CARS", 3));
     let drive = drawn::city(number("FIT_DRIVES", 5).try_into().unwrap());
+    let case = match std::env::var("FIT_CASE").as_deref() {
+        Err(_) => Case::Usual,
+        Ok("timing") => Case::WithTiming,
+        Ok("right") => Case::Right,
+        Ok(other) => panic!("FIT_CASE={other}"),
+    };
     let outcomes: Vec<Outcome> =
-        (first..first + cars).map(|seed| outcome(&Drawn::of(drawn::car(&vehicle), seed), &drive)).collect();
+        (first..first + cars).map(|seed| outcome(&Drawn::of(drawn::car(&vehicle), seed, case), case, &drive)).collect();
     print_quantities(&outcomes);
+    print_estimates(&outcomes);
     let rms = [0, 1].map(|which| mean(outcomes.iter().map(|outcome| outcome.torque_n_m[which].powi(2))).sqrt());
     let mut ratios: Vec<f64> = outcomes.iter().map(|outcome| outcome.torque_n_m[1] / outcome.torque_n_m[0]).collect();
     ratios.sort_by(f64::total_cmp);

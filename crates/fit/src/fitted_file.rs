@@ -2,19 +2,14 @@
 
 use config::{Source, Vehicle};
 
+use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
 use crate::parameters::HYSTERESIS_UNIT_PA;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{Fit, FitError, Map, Parameter, ReadingAges, parameters};
 
-/// Least error of the turbine torque, as a share \[chosen\].
-const CONVERTER_SHARE_MIN: f64 = 0.03;
-
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
-/// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
-/// of the cars\].
-const BUDGET_SIDES: f64 = 4.0;
 
 impl Fit {
     /// The vehicle file with the fitted values. Every value that changes has a comment on the line above with its interval; the
@@ -57,7 +52,7 @@ impl Fit {
         let Some(value) = self.value(parameter) else { return Ok(()) };
         let words = self.comment(parameter);
         let comment = Some(words.as_str());
-        let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
+        let times = |text: &mut VehicleText, path: &[&str]| text.map(&keys(path), |number| value * number, comment);
         match parameter {
             Parameter::Capacity => {
                 let capacity = &fitted.converter.capacity_n_m_s2;
@@ -66,63 +61,16 @@ impl Fit {
             Parameter::TorqueRatio => {
                 text.map(&keys(&["converter", "torque_ratio"]), |t| 1.0 + value * (t - 1.0), comment)
             }
-            Parameter::Friction => {
-                let friction = &fitted.clutch.friction;
-                set_axis(text, &of_clutch(&["friction", "slip_rad_s"]), friction.axis())?;
-                text.set(&of_clutch(&["friction", "coefficient"]), friction.values(), comment)?;
-                // A clutch that sticks holds at least what it carries as it begins to slip.
-                let at_rest = friction.values().first().copied().unwrap_or(0.0);
-                let more = "keeps its ratio to the fitted friction, and is not below it";
-                text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
+            Parameter::Friction | Parameter::Spring | Parameter::CommandDelay | Parameter::Hysteresis => {
+                write_clutch(text, fitted, clutch, (parameter, value), &words)
             }
-            Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
-            Parameter::Gain => match fitted.valve.maps() {
-                Some(maps) => {
-                    set_axis(text, &of_clutch(&["valve", "gain", "current_a"]), maps.gain_pa_a.axis())?;
-                    text.set(&of_clutch(&["valve", "gain", "gain_pa_a"]), maps.gain_pa_a.values(), comment)?;
-                    text.map(&keys(&["observer", "valve", "gain_pa_a"]), |gain| value * gain, comment)
-                }
-                None => {
-                    text.map(&of_clutch(&["valve", "line_pressure_pa"]), |pressure| value * pressure, comment)?;
-                    text.map(&keys(&["observer", "valve", "line_pressure_pa"]), |pressure| value * pressure, comment)
-                }
-            },
-            Parameter::Lag => match fitted.valve.maps() {
-                Some(maps) => {
-                    set_axis(text, &of_clutch(&["valve", "lag", "pressure_pa"]), maps.time_constant_s.axis())?;
-                    text.set(&of_clutch(&["valve", "lag", "time_constant_s"]), maps.time_constant_s.values(), comment)?;
-                    text.map(&keys(&["observer", "valve", "time_constant_s"]), |lag| value * lag, comment)
-                }
-                None => {
-                    text.map(&of_clutch(&["valve", "flow_sqrt_pa_s"]), |flow| flow / value, comment)?;
-                    text.map(&keys(&["observer", "valve", "flow_sqrt_pa_s"]), |flow| flow / value, comment)
-                }
-            },
-            Parameter::Hysteresis => {
-                let own = of_clutch(&["valve", "hysteresis_pa"]);
-                if text.has(&own) {
-                    text.set(&own, &[value], comment)
-                } else if value == 0.0 {
-                    Ok(())
-                } else {
-                    text.add_beside(&of_clutch(&["valve", "gain"]), "hysteresis_pa", value, &words)
-                }
-            }
-            Parameter::CommandDelay => {
-                text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
-            }
+            Parameter::Gain | Parameter::Lag => write_valve(text, fitted, clutch, (parameter, value), &words),
             Parameter::Inertia(shaft) => text.map(&shaft_inertia(shaft), |inertia| value * inertia, comment),
-            Parameter::Stiffness => {
-                text.map(&keys(&["driveline", "shaft_stiffness_n_m_rad"]), |stiffness| value * stiffness, comment)
-            }
-            Parameter::Damping => {
-                text.map(&keys(&["driveline", "shaft_damping_n_m_s_rad"]), |damping| value * damping, comment)
-            }
-            Parameter::Tyre => text.map(&keys(&["tyre", "slip_scale"]), |slip| value * slip, comment),
-            Parameter::Mass => text.map(&keys(&["vehicle", "mass_kg"]), |mass| value * mass, comment),
-            Parameter::EngineInertia => {
-                text.map(&keys(&["engine", "inertia_kg_m2"]), |inertia| value * inertia, comment)
-            }
+            Parameter::Stiffness => times(text, &["driveline", "shaft_stiffness_n_m_rad"]),
+            Parameter::Damping => times(text, &["driveline", "shaft_damping_n_m_s_rad"]),
+            Parameter::Tyre => times(text, &["tyre", "slip_scale"]),
+            Parameter::Mass => times(text, &["vehicle", "mass_kg"]),
+            Parameter::EngineInertia => times(text, &["engine", "inertia_kg_m2"]),
             // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
             _ => Ok(()),
         }
@@ -145,59 +93,120 @@ impl Fit {
 
     /// The error budget: what the fit leaves open of each parameter.
     fn write_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
-        let comment = "what the fit leaves open: 4 standard deviations, and no more than was known before";
-        let budget = |key: &str| keys(&["design", "error_bounds", key]);
-        let half = |parameters: &[Parameter]| {
-            BUDGET_SIDES * parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
+        let bound = |key: &str| keys(&["design", "error_bounds", key]);
+        let sd = |parameters: &[Parameter]| {
+            parameters.iter().map(|p| self.sd(*p).unwrap_or(0.0).powi(2)).sum::<f64>().sqrt()
         };
-        // What was known before is a range around the given value; the fitted one lies elsewhere in it. The 95 % interval stays.
+        let half = |parameters: &[Parameter]| BUDGET_SIDES * sd(parameters);
         let factors = |parameters: &[Parameter], given: [f64; 2]| {
-            // No wider than the whole of what was known before, however much the shapes leave open together.
-            let known = (given[1] / given[0]).ln();
-            let (half, value) = (half(parameters).min(known), self.value(parameters[0]).unwrap_or(1.0));
-            let [least, greatest] = given.map(|end| end / value);
-            let stated = half * SIDES / BUDGET_SIDES;
-            [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]
+            budget::factors(sd(parameters), self.value(parameters[0]).unwrap_or(1.0), given)
         };
         let mut set = |path: Vec<Step>, values: &[f64]| {
             // Keys that the file leaves at their defaults stay there.
-            if text.has(&path) { text.set(&path, values, Some(comment)) } else { Ok(()) }
+            if text.has(&path) { text.set(&path, values, Some(BUDGET_COMMENT)) } else { Ok(()) }
         };
         let given = &vehicle.error_bounds;
         // The finer shape of the converter's maps is not fitted.
         let capacity = self.value(Parameter::Capacity).unwrap_or(1.0);
-        let known = given.turbine_torque_share + (capacity - 1.0).abs();
         let converter = [
             Parameter::Capacity,
             Parameter::TorqueRatio,
             Parameter::Shape(Map::Capacity, 0),
             Parameter::Shape(Map::Capacity, 1),
         ];
-        let share = half(&converter).clamp(CONVERTER_SHARE_MIN, known.max(CONVERTER_SHARE_MIN));
-        set(budget("turbine_torque_share"), &[share])?;
-        set(budget("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
+        let share = budget::share(sd(&converter), capacity, given.turbine_torque_share, CONVERTER_SHARE_MIN);
+        set(bound("turbine_torque_share"), &[share])?;
+        set(bound("turbine_torque_n_m"), &[given.turbine_torque_n_m * share / given.turbine_torque_share.max(share)])?;
         use Parameter as P;
         let with_shape = |map: Map, some: &[P]| [some, &map.parameters()].concat();
         let friction = with_shape(Map::Friction, &[P::Friction, P::FrictionAtRest, P::FrictionSlope]);
-        set(budget("friction_factor"), &factors(&friction, given.friction_factor))?;
-        set(budget("valve_gain_factor"), &factors(&with_shape(Map::Gain, &[P::Gain]), given.valve_gain_factor))?;
-        set(budget("valve_lag_factor"), &factors(&with_shape(Map::Lag, &[P::Lag]), given.valve_lag_factor))?;
-        set(budget("shaft_stiffness_factor"), &factors(&[Parameter::Stiffness], given.shaft_stiffness_factor))?;
+        set(bound("friction_factor"), &factors(&friction, given.friction_factor))?;
+        set(bound("valve_gain_factor"), &factors(&with_shape(Map::Gain, &[P::Gain]), given.valve_gain_factor))?;
+        set(bound("valve_lag_factor"), &factors(&with_shape(Map::Lag, &[P::Lag]), given.valve_lag_factor))?;
+        set(bound("shaft_stiffness_factor"), &factors(&[Parameter::Stiffness], given.shaft_stiffness_factor))?;
         let mass = self.value(Parameter::Mass).unwrap_or(1.0) * vehicle.road.mass_kg;
         let known_kg = given.mass_kg + (mass - vehicle.road.mass_kg).abs();
-        set(budget("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
+        set(bound("mass_kg"), &[(half(&[Parameter::Mass]) * mass).min(known_kg)])?;
         if let Some(hysteresis_pa) = self.value(P::Hysteresis) {
             let most_pa = hysteresis_pa + HYSTERESIS_UNIT_PA * half(&[P::Hysteresis]);
-            set(budget("valve_hysteresis_pa"), &[most_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
+            set(bound("valve_hysteresis_pa"), &[most_pa.min(given.valve_hysteresis_pa.max(hysteresis_pa))])?;
         }
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
             let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
             let (one, other) = (delay(0.0), delay(vehicle.limits.command_max));
-            set(budget("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
+            set(bound("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
         }
         Ok(())
     }
+}
+
+/// Writes what is of the oncoming clutch itself.
+fn write_clutch(
+    text: &mut VehicleText,
+    fitted: &Car,
+    clutch: &str,
+    (parameter, value): (Parameter, f64),
+    words: &str,
+) -> Result<(), FitError> {
+    let comment = Some(words);
+    let of_clutch = |key: &[&str]| keys(&[&["clutch", clutch], key].concat());
+    match parameter {
+        Parameter::Friction => {
+            let friction = &fitted.clutch.friction;
+            set_axis(text, &of_clutch(&["friction", "slip_rad_s"]), friction.axis())?;
+            text.set(&of_clutch(&["friction", "coefficient"]), friction.values(), comment)?;
+            // A clutch that sticks holds at least what it carries as it begins to slip.
+            let at_rest = friction.values().first().copied().unwrap_or(0.0);
+            let more = "keeps its ratio to the fitted friction, and is not below it";
+            text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
+        }
+        Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
+        Parameter::CommandDelay => {
+            text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
+        }
+        _ => {
+            let own = of_clutch(&["valve", "hysteresis_pa"]);
+            match text.has(&own) {
+                true => text.set(&own, &[value], comment),
+                false if value == 0.0 => Ok(()),
+                false => text.add_beside(&of_clutch(&["valve", "gain"]), "hysteresis_pa", value, words),
+            }
+        }
+    }
+}
+
+/// Writes gain or lag of its valve, and of the observer's.
+fn write_valve(
+    text: &mut VehicleText,
+    fitted: &Car,
+    clutch: &str,
+    (parameter, value): (Parameter, f64),
+    words: &str,
+) -> Result<(), FitError> {
+    let comment = Some(words);
+    let of_valve = |key: &[&str]| keys(&[&["clutch", clutch, "valve"], key].concat());
+    let of_observer = |key: &str| keys(&["observer", "valve", key]);
+    let (map, axis, [table, axis_key, values_key], common) = match (parameter, fitted.valve.maps()) {
+        (Parameter::Gain, Some(maps)) => {
+            (maps.gain_pa_a.values(), maps.gain_pa_a.axis(), ["gain", "current_a", "gain_pa_a"], "gain_pa_a")
+        }
+        (_, Some(maps)) => {
+            let lag = &maps.time_constant_s;
+            (lag.values(), lag.axis(), ["lag", "pressure_pa", "time_constant_s"], "time_constant_s")
+        }
+        (_, None) => {
+            let (key, factor) = match parameter {
+                Parameter::Gain => ("line_pressure_pa", value),
+                _ => ("flow_sqrt_pa_s", value.recip()),
+            };
+            text.map(&of_valve(&[key]), |number| factor * number, comment)?;
+            return text.map(&of_observer(key), |number| factor * number, comment);
+        }
+    };
+    set_axis(text, &of_valve(&[table, axis_key]), axis)?;
+    text.set(&of_valve(&[table, values_key]), map, comment)?;
+    text.map(&of_observer(common), |number| value * number, comment)
 }
 
 /// Puts in the axis of a map that has more points than in the file; any other stays as it is written.

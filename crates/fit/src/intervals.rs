@@ -119,7 +119,7 @@ pub(crate) fn torque_scale(priors: &[Prior]) -> (DVector<f64>, f64) {
 }
 
 /// Gives a combination of unknowns at least this variance; what is known of the others when it is known stays as it is.
-fn forget(covariance: &mut DMatrix<f64>, weights: &DVector<f64>, variance: f64) {
+pub(crate) fn forget(covariance: &mut DMatrix<f64>, weights: &DVector<f64>, variance: f64) {
     let with = &*covariance * weights;
     let now = weights.dot(&with);
     if now < variance {
@@ -127,8 +127,8 @@ fn forget(covariance: &mut DMatrix<f64>, weights: &DVector<f64>, variance: f64) 
     }
 }
 
-/// The sandwich over shifts: how much the shifts disagree.
-fn cluster(covariance: &DMatrix<f64>, scores: &[DVector<f64>], prior: &DMatrix<f64>) -> DMatrix<f64> {
+/// The sandwich over shifts, or groups of them: how much they disagree.
+pub(crate) fn cluster(covariance: &DMatrix<f64>, scores: &[DVector<f64>], prior: &DMatrix<f64>) -> DMatrix<f64> {
     let count = scores.len() as f64;
     if scores.len() < 2 {
         return covariance.clone();

@@ -5,6 +5,7 @@
 //! readings. [`fit`] finds the parameters of the car that are the same in all shifts, with intervals
 //! ([`Precision`]); what the readings cannot tell keeps what was known before, and the report says so.
 
+mod budget;
 mod car;
 pub mod collect;
 pub mod drive;

@@ -105,7 +105,7 @@ fn spread(blocks: &[&[f64]], gain: f64) -> (f64, f64) {
 }
 
 /// Correlation factor of the one-step errors, at least 1.
-fn correlation(blocks: &[&[f64]], gain: f64, scale: f64) -> f64 {
+pub(crate) fn correlation(blocks: &[&[f64]], gain: f64, scale: f64) -> f64 {
     let errors: Vec<Vec<f64>> = (blocks.iter())
         .map(|block| {
             let mut errors = block.to_vec();
@@ -118,7 +118,7 @@ fn correlation(blocks: &[&[f64]], gain: f64, scale: f64) -> f64 {
 }
 
 /// Factor by which the variance of a mean of errors that are alike in sequence exceeds that of independent ones.
-pub(crate) fn correlation_factor(blocks: &[&[f64]]) -> f64 {
+fn correlation_factor(blocks: &[&[f64]]) -> f64 {
     const LAGS: usize = 30;
     let limited = |error: f64| error.clamp(-HUBER, HUBER);
     let variance: f64 = blocks.iter().copied().flatten().map(|error| limited(*error).powi(2)).sum();

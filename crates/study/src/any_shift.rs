@@ -17,7 +17,7 @@ pub mod recording;
 pub mod sensitivity;
 pub mod tour;
 
-use config::{Car, Sensors};
+use config::{Car, ElementErrorBounds, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
@@ -85,23 +85,27 @@ impl ShiftDraw {
         Self { timing: vec![None; ones.len()], friction: ones.clone(), valve_gain: ones, converter: 1.0 }
     }
 
-    /// Friction, gain and converter within the bounds, each factor by a number from 0 to 1.
+    /// Friction, gain and converter within the bounds, those of the vehicle file first, each factor by a number from 0 to 1.
     pub fn within(car: &Car, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
-        let mut factor = |share: f64| 1.0 + share * (2.0 * uniform() - 1.0);
-        let friction = car.clutches.iter().map(|_| factor(errors.friction)).collect();
-        let valve_gain = car.clutches.iter().map(|_| factor(errors.valve_gain)).collect();
-        Self { friction, valve_gain, converter: factor(errors.converter), ..Self::none(car) }
+        let mut factor = |own: Option<[f64; 2]>, share: f64| drawn_factor(own, share, uniform());
+        let (own, none) = (&car.error_bounds, ElementErrorBounds::default());
+        let elements = || (0..car.clutches.len()).map(|at| own.elements.get(at).unwrap_or(&none));
+        let friction = elements().map(|own| factor(own.friction_factor, errors.friction)).collect();
+        let valve_gain = elements().map(|own| factor(own.valve_gain_factor, errors.valve_gain)).collect();
+        let converter = factor(None, own.converter_share.unwrap_or(errors.converter));
+        Self { friction, valve_gain, converter, ..Self::none(car) }
     }
 
-    /// The same with lag, delay and hysteresis of the valves within the bounds too.
+    /// The same with lag, delay and hysteresis of the valves of `car` within the bounds too.
     #[must_use]
-    pub fn with_timing(mut self, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
-        for timing in &mut self.timing {
-            let [least_s, most_s] = errors.valve_delay_s;
+    pub fn with_timing(mut self, car: &Car, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
+        for (at, timing) in self.timing.iter_mut().enumerate() {
+            let own = car.error_bounds.elements.get(at).copied().unwrap_or_default();
+            let [least_s, most_s] = own.valve_delay_s.unwrap_or(errors.valve_delay_s);
             *timing = Some(ValveTiming {
-                lag: 1.0 + errors.valve_lag * (2.0 * uniform() - 1.0),
+                lag: drawn_factor(own.valve_lag_factor, errors.valve_lag, uniform()),
                 delay_s: least_s + uniform() * (most_s - least_s),
-                hysteresis_pa: uniform() * errors.hysteresis_pa,
+                hysteresis_pa: uniform() * own.valve_hysteresis_pa.unwrap_or(errors.hysteresis_pa),
             });
         }
         self
@@ -128,6 +132,14 @@ impl ShiftDraw {
             converter.capacity_n_m_s2 = converter.capacity_n_m_s2.scaled(self.converter);
         }
         car
+    }
+}
+
+/// A factor by a number from 0 to 1, within a range or within a share of 1.
+fn drawn_factor(range: Option<[f64; 2]>, share: f64, uniform: f64) -> f64 {
+    match range {
+        Some([least, most]) => least + uniform * (most - least),
+        None => 1.0 + share * (2.0 * uniform - 1.0),
     }
 }
 

@@ -11,6 +11,7 @@ use geartrain::{ElementKind, Gearbox, GearboxElement};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::car_bounds::{self, CarErrorBounds, ElementErrorBounds, RawCarErrorBounds, RawElementErrorBounds};
 use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
 use super::short::{car_defaults, car_defaults_taken};
@@ -72,6 +73,8 @@ pub struct Car {
     pub road: RoadLoad<f64>,
     /// Temperature of the oil, degC.
     pub oil_temperature_degc: f64,
+    /// Bounds on the errors of these values that the file has.
+    pub error_bounds: CarErrorBounds,
     /// What the file leaves out, so that it is as in `vehicles/eight_speed.toml`, scaled if the file has `engine.max_torque_n_m`.
     pub defaults_taken: Vec<DefaultTaken>,
 }
@@ -131,7 +134,9 @@ impl Car {
         let own_check = Check::of(&source);
         let valve = own.valve.as_ref().map_or((&check, &raw.valve), |valve| (&own_check, valve));
         let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
+        let error_bounds = error_bounds(&check, &raw, &gearbox, &clutches)?;
         Ok(Self {
+            error_bounds,
             name: check.title("name", &raw.name)?,
             clutches,
             line_pressure_pa,
@@ -190,6 +195,8 @@ struct RawCar {
     vehicle: RawRoad,
     #[serde(default)]
     oil: RawOil,
+    #[serde(default)]
+    error_bounds: RawCarErrorBounds,
 }
 
 /// The valve as the file itself has it.
@@ -243,6 +250,23 @@ struct RawElementClutch {
     return_spring_n: Option<Number>,
     valve: Option<Spanned<RawClutchValve>>,
     fill: Option<RawFill>,
+    error_bounds: Option<RawElementErrorBounds>,
+}
+
+/// What the file has of the errors of the car and of its elements.
+fn error_bounds(
+    check: &Check<'_>,
+    raw: &RawCar,
+    gearbox: &Gearbox,
+    clutches: &[Option<ShiftClutch>],
+) -> Result<CarErrorBounds, ConfigError> {
+    let elements = gearbox.elements.iter().zip(clutches).map(|(element, clutch)| {
+        let own = raw.clutch.get(element.name.as_str()).and_then(|own| own.error_bounds.as_ref());
+        let Some(own) = own else { return Ok(ElementErrorBounds::default()) };
+        let table = format!("clutch.{}.error_bounds", element.name);
+        car_bounds::of_element(check, &table, own, clutch.map_or(0.0, |clutch| clutch.hysteresis_pa))
+    });
+    car_bounds::of_car(check, &raw.error_bounds, elements.collect::<Result<_, _>>()?)
 }
 
 fn lock_up(check: &Check<'_>, raw: &RawLockUp, car: &RawCar, gearbox: &Gearbox) -> Result<LockUp, ConfigError> {

@@ -2,6 +2,7 @@
 
 mod budget;
 mod car;
+mod car_bounds;
 mod clutch;
 mod fill;
 mod fill_bounds;
@@ -26,6 +27,7 @@ use crate::tree::Tree;
 use crate::{ConfigError, Kind, Source};
 pub use budget::ErrorBounds;
 pub use car::{Car, LockUp};
+pub use car_bounds::{CarErrorBounds, ElementErrorBounds};
 pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
 use raw::{

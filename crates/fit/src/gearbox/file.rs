@@ -6,10 +6,10 @@ use config::{Car, Source, toml_string};
 use drivetrain::{ClutchValve, Table1};
 
 use super::fitting::GearboxFit;
-use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
-use crate::FitError;
+use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
 use crate::fitted_file::SIDES;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
+use crate::{FitError, Verdict};
 
 /// A clutch that sticks holds at least so much more than it carries as it begins to slip, as a factor.
 const STATIC_OVER_SLIDING: f64 = 1.0001;
@@ -24,6 +24,7 @@ impl GearboxFit {
     pub fn vehicle_file(&self, car: &Car, path: &Path, logs: &str) -> Result<Car, FitError> {
         let mut text = Written::new(&car.source.text)?;
         self.write_converter(&mut text, car)?;
+        self.write_drag(&mut text, car)?;
         for (place, name) in self.quantities.elements.iter().enumerate() {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             if let Some(element) = element.filter(|_| self.elements_seen[place]) {
@@ -41,18 +42,20 @@ impl GearboxFit {
                 text.put(&["turbine_inertia_kg_m2"], &self.quantities.pair_names[at], &number(value), &comment)?;
             }
         }
-        let gearbox = gearbox_path(car)?;
-        text.set_gearbox(car, path, &gearbox)?;
+        self.write_budget(&mut text, car)?;
         let logs = logs.replace(char::is_control, " ");
-        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
-        let source = Source { path: path.to_owned(), text: head + &text.finish() };
-        let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
-        Car::from_sources(source, gearbox).map_err(|error| {
-            FitError::Work(format!(
-                "the fitted values are not those of a possible car: {error}\n\
-                 hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
-            ))
-        })
+        let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
+        written(text, car, path, &head)
+    }
+
+    /// The given vehicle file as it is to stand at `path`, with the reason why its values are kept in a line at its head.
+    ///
+    /// # Errors
+    /// None that the given file does not have itself.
+    pub fn kept_file(&self, car: &Car, path: &Path, reason: &str) -> Result<Car, FitError> {
+        let reason = reason.replace(char::is_control, " ");
+        let text = Written::new(&car.source.text)?;
+        written(text, car, path, &format!("all values are those of the given file. {reason}"))
     }
 
     fn write_converter(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
@@ -64,19 +67,43 @@ impl GearboxFit {
         text.put(&["converter"], "torque_ratio", &list(&ratios), &self.comment(Quantity::TorqueRatio))
     }
 
+    /// The drag of all elements, and of those that have one of their own.
+    fn write_drag(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+        let (more_n_m, comment) = (DRAG_UNIT_N_M * self.unknown(Quantity::Drag), self.comment(Quantity::Drag));
+        let with = |drag_n_m: f64| number((drag_n_m + more_n_m).max(0.0));
+        let (mut own, mut common) = (Vec::new(), None);
+        for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
+            let Some(clutch) = clutch else { continue };
+            match text.has(&["clutch", &element.name], "drag_n_m") {
+                true => own.push((element.name.as_str(), clutch.drag_n_m)),
+                false => common = Some(clutch.drag_n_m),
+            }
+        }
+        if let Some(drag_n_m) = common {
+            text.put(&["friction"], "drag_n_m", &with(drag_n_m), &comment)?;
+        }
+        for (name, drag_n_m) in own {
+            text.put(&["clutch", name], "drag_n_m", &with(drag_n_m), &comment)?;
+        }
+        Ok(())
+    }
+
     fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {
         let Some(Some(known)) = car.clutches.get(element) else { return Ok(()) };
         let name = car.gearbox.elements[element].name.as_str();
         let table = ["clutch", name];
-        let factor = self.unknown(Quantity::Torque(place)).exp();
+        let factor = self.friction_factor(place);
         let friction = known.clutch.friction.scaled(factor);
-        let comment = self.comment(Quantity::Torque(place));
+        let comment = match self.quantities.measured[place] {
+            true => factor_comment(factor, self.friction_sd(place), self.friction_verdict(place)),
+            false => self.comment(Quantity::Torque(place)),
+        };
         text.put_map(&table, "friction", ["slip_rad_s", "coefficient"], &friction, &comment)?;
         let held = (factor * known.clutch.static_friction).max(STATIC_OVER_SLIDING * friction.at(0.0));
         let comment = "keeps its ratio to the fitted friction, and is not below it";
         text.put(&table, "static_friction", &number(held), comment)?;
         let kiss_pa = known.clutch.kiss_pressure() + KISS_UNIT_PA * self.unknown(Quantity::Kiss(place));
-        let spring_n = (kiss_pa * known.clutch.piston_area_m2).max(0.0);
+        let spring_n = (kiss_pa * self.gain_factor(place) * known.clutch.piston_area_m2).max(0.0);
         text.put(&table, "return_spring_n", &number(spring_n), &self.comment(Quantity::Kiss(place)))?;
         self.write_valve(text, name, known, place)
     }
@@ -89,20 +116,22 @@ impl GearboxFit {
         known: &config::ShiftClutch,
         place: usize,
     ) -> Result<(), FitError> {
-        let valve = known.valve.changed(self.unknown(Quantity::Lag(place)).exp(), 1.0, None);
-        let late_s = DELAY_UNIT_S * self.unknown(Quantity::Delay);
+        let valve = known.valve.changed(self.unknown(Quantity::Lag(place)).exp(), self.gain_factor(place), None);
+        let late_s = DELAY_UNIT_S * self.unknown(Quantity::Delay(place));
         let later = |delay: &Table1<f64>| {
             let values: Vec<f64> = delay.values().iter().map(|delay_s| (delay_s + late_s).max(0.0)).collect();
             Table1::new(delay.axis(), &values).unwrap_or(*delay)
         };
-        let (lag, delay) = (self.comment(Quantity::Lag(place)), self.comment(Quantity::Delay));
+        let (lag, delay) = (self.comment(Quantity::Lag(place)), self.comment(Quantity::Delay(place)));
         let table = ["clutch", name, "valve"];
         // A valve of its own has nothing of the common one.
         let same = "as in the given file";
+        let gain = self.comment(Quantity::Gain(place));
+        let gain = if self.quantities.measured[place] { gain.as_str() } else { same };
         match &valve {
             ClutchValve::Proportional(maps) | ClutchValve::NormallyHigh { maps, .. } => {
                 text.put_map(&table, "lag", ["pressure_pa", "time_constant_s"], &maps.time_constant_s, &lag)?;
-                text.put_map(&table, "gain", ["current_a", "gain_pa_a"], &maps.gain_pa_a, same)?;
+                text.put_map(&table, "gain", ["current_a", "gain_pa_a"], &maps.gain_pa_a, gain)?;
                 text.put_map(&table, "delay", ["current_a", "delay_s"], &later(&maps.delay_s), &delay)?;
                 if let ClutchValve::NormallyHigh { zero_pressure_a, .. } = &valve {
                     text.put(&table, "zero_pressure_a", &number(*zero_pressure_a), same)?;
@@ -111,7 +140,7 @@ impl GearboxFit {
             ClutchValve::PulseWidth { law, delay_s } => {
                 text.put(&table, "kind", "\"pulse-width\"", same)?;
                 text.put(&table, "flow_sqrt_pa_s", &number(law.flow_sqrt_pa_s), &lag)?;
-                text.put(&table, "line_pressure_pa", &number(law.line_pressure_pa), same)?;
+                text.put(&table, "line_pressure_pa", &number(law.line_pressure_pa), gain)?;
                 text.put_map(&table, "delay", ["duty_percent", "delay_s"], &later(delay_s), &delay)?;
             }
         }
@@ -126,7 +155,7 @@ impl GearboxFit {
         let (value, half) = (self.unknown(quantity), SIDES * self.sd(quantity));
         let told = self.verdict(quantity).name();
         match quantity {
-            Quantity::Delay => {
+            Quantity::Delay(_) | Quantity::InputDelay => {
                 let ms = 1e3 * DELAY_UNIT_S;
                 format!("delays {:+.1} ms, 95 % within {:.1} ms, {told}", ms * value, ms * half)
             }
@@ -138,20 +167,47 @@ impl GearboxFit {
                     kpa * half
                 )
             }
+            Quantity::Drag => {
+                let n_m = DRAG_UNIT_N_M;
+                format!(
+                    "drag {:+.2} N m, 95 % within {:.2} N m, {told}; in the mean of all elements",
+                    n_m * value,
+                    n_m * half
+                )
+            }
             _ => {
                 let more = match quantity {
                     Quantity::Torque(_) => "; friction and valve gain show as one, and stand here as friction",
                     _ => "",
                 };
-                let [least, most] = [(value - half).exp(), (value + half).exp()];
-                format!("x {:.3}, 95 % {least:.3} to {most:.3}, {told}{more}", value.exp())
+                factor_comment(value.exp(), self.sd(quantity), self.verdict(quantity)) + more
             }
         }
     }
 }
 
+/// The file with a text, as it is to stand at `path`, with a line at its head.
+fn written(mut text: Written, car: &Car, path: &Path, head: &str) -> Result<Car, FitError> {
+    let gearbox = gearbox_path(car)?;
+    text.set_gearbox(car, path, &gearbox)?;
+    let source = Source { path: path.to_owned(), text: format!("{FITTED}{head}\n{}", text.finish()) };
+    let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
+    Car::from_sources(source, gearbox).map_err(|error| {
+        FitError::Work(format!(
+            "the fitted values are not those of a possible car: {error}\n\
+             hint: check units and signs of the channels, and the map, with `wetclutch inspect`"
+        ))
+    })
+}
+
+/// What a fitted factor says of itself.
+fn factor_comment(factor: f64, sd: f64, verdict: Verdict) -> String {
+    let [least, most] = [-SIDES * sd, SIDES * sd].map(|half| factor * half.exp());
+    format!("x {factor:.3}, 95 % {least:.3} to {most:.3}, {}", verdict.name())
+}
+
 /// The text of a vehicle file on its way to another: values that it has are replaced, others are added.
-struct Written {
+pub(super) struct Written {
     text: VehicleText,
     /// Tables that the file does not have, with their lines.
     added: Vec<(String, Vec<String>)>,
@@ -162,8 +218,12 @@ impl Written {
         Ok(Self { text: VehicleText::new(text)?, added: Vec::new() })
     }
 
+    fn has(&self, table: &[&str], key: &str) -> bool {
+        self.text.has(&keys(&[table, &[key]].concat()))
+    }
+
     /// Puts a value in TOML into a table.
-    fn put(&mut self, table: &[&str], key: &str, value: &str, comment: &str) -> Result<(), FitError> {
+    pub(super) fn put(&mut self, table: &[&str], key: &str, value: &str, comment: &str) -> Result<(), FitError> {
         let path = keys(&[table, &[key]].concat());
         if self.text.has(&path) {
             return self.text.set_text(&path, value, comment);
@@ -231,7 +291,7 @@ fn bare_or_quoted(key: &str) -> String {
     if is_bare { key.to_owned() } else { toml_string(key) }
 }
 
-fn list(values: &[f64]) -> String {
+pub(super) fn list(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }
 

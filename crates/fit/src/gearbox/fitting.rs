@@ -81,7 +81,7 @@ pub fn fit(
         shifts: models.len(),
         by_pair,
         elements_seen,
-        scale_and_gain: [solved.weights.scale, solved.weights.gain],
+        scale_and_gain: [solved.weights.turbine.scale, solved.weights.turbine.gain],
         is_converged: solved.is_converged,
         quantities,
     })
@@ -102,6 +102,33 @@ impl GearboxFit {
     pub fn verdict(&self, quantity: Quantity) -> Verdict {
         let Some(place) = self.quantities.place(quantity) else { return Verdict::NotTold };
         Verdict::of(self.sd(quantity), self.quantities.sd_before(place))
+    }
+
+    /// Factor on the gain of an element's valve in the fitted file: that of the given file where no pressure shows another.
+    pub(crate) fn gain_factor(&self, place: usize) -> f64 {
+        if self.quantities.measured[place] { self.unknown(Quantity::Gain(place)).exp() } else { 1.0 }
+    }
+
+    /// Factor on the friction of an element in the fitted file.
+    pub(crate) fn friction_factor(&self, place: usize) -> f64 {
+        self.unknown(Quantity::Torque(place)).exp() / self.gain_factor(place)
+    }
+
+    /// Standard deviation of the logarithm of the friction of an element whose pressure is measured.
+    pub(crate) fn friction_sd(&self, place: usize) -> f64 {
+        self.friction_sd_of(place, &self.stated)
+    }
+
+    fn friction_sd_of(&self, place: usize, covariance: &DMatrix<f64>) -> f64 {
+        let both = [Quantity::Torque(place), Quantity::Gain(place)].map(|quantity| self.quantities.place(quantity));
+        let [Some(torque), Some(gain)] = both else { return f64::INFINITY };
+        let of = |i: usize, j: usize| covariance[(i, j)];
+        (of(torque, torque) + of(gain, gain) - 2.0 * of(torque, gain)).max(0.0).sqrt()
+    }
+
+    /// What the logs tell of it.
+    pub(crate) fn friction_verdict(&self, place: usize) -> Verdict {
+        Verdict::of(self.friction_sd(place), self.friction_sd_of(place, &self.quantities.before))
     }
 
     /// The weights with which the quantities make the logarithm of the factor that all torques have in common.

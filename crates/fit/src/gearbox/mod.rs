@@ -10,6 +10,7 @@
 //! valve's model. The output speed is measured and is no unknown. [`Recorder`] takes the steps of a log and keeps what belongs to
 //! its shifts; [`fit`] finds the parameters that all shifts have in common ([`Quantity`]).
 
+mod budget;
 mod file;
 mod fitting;
 mod precision;

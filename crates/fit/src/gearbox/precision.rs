@@ -8,33 +8,31 @@ use nalgebra::{DMatrix, DVector};
 
 use super::shift::ShiftModel;
 use super::solver::{Problem, Solved};
-use crate::FitError;
-use crate::weights::{FACTOR, correlation_factor};
+use crate::{FitError, intervals};
 
 /// Covariance of the unknowns as it is stated.
 pub(crate) fn stated(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved) -> Result<DMatrix<f64>, FitError> {
     let count = solved.at.len();
     let information = solved.shifts.iter().fold(DMatrix::zeros(count, count), |sum, shift| sum + &shift.information);
-    let errors: Vec<&[f64]> = solved.shifts.iter().map(|shift| shift.errors.as_slice()).collect();
-    let inflation = correlation_factor(&errors).max(1.0);
-    let inverse = |matrix: DMatrix<f64>| {
-        let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
-        Ok::<_, FitError>(matrix.cholesky().ok_or_else(singular)?.inverse())
-    };
-    let plain = inverse(&information + &problem.precision)?;
-    let auto = inverse(information / inflation + &problem.precision)?;
-    let cluster = cluster(problem, models, solved, &plain);
+    let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
+    let auto = (information + &problem.precision).cholesky().ok_or_else(singular)?.inverse();
+    let cluster = intervals::cluster(&auto, &scores(models, solved), &problem.precision);
     let scale = DVector::from_fn(count, |j, _| {
-        let found = FACTOR * auto[(j, j)].max(cluster[(j, j)]).sqrt();
+        let found = auto[(j, j)].max(cluster[(j, j)]).sqrt();
         // No fit knows less than was known before.
         let sd = found.hypot(problem.quantities.all[j].floor()).min(problem.quantities.sd_before(j));
         sd / auto[(j, j)].sqrt()
     });
-    Ok(DMatrix::from_fn(count, count, |i, j| scale[i] * scale[j] * auto[(i, j)]))
+    let mut stated = DMatrix::from_fn(count, count, |i, j| scale[i] * scale[j] * auto[(i, j)]);
+    for place in problem.quantities.held() {
+        let only = DVector::from_fn(count, |j, _| f64::from(u8::from(j == place)));
+        intervals::forget(&mut stated, &only, problem.quantities.before[(place, place)]);
+    }
+    Ok(stated)
 }
 
-/// The sandwich over groups of shifts: how much they disagree.
-fn cluster(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved, plain: &DMatrix<f64>) -> DMatrix<f64> {
+/// The gradients of the groups of shifts.
+fn scores(models: &[ShiftModel], solved: &Solved) -> Vec<DVector<f64>> {
     let mut groups: Vec<(&ShiftModel, DVector<f64>)> = Vec::new();
     for (model, shift) in models.iter().zip(&solved.shifts) {
         let is_same = |other: &ShiftModel| (other.pair, other.kind) == (model.pair, model.kind);
@@ -43,13 +41,5 @@ fn cluster(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved, plain:
             None => groups.push((model, shift.score.clone())),
         }
     }
-    if groups.len() < 2 {
-        return plain.clone();
-    }
-    let count = groups.len() as f64;
-    let mut middle = problem.precision.clone();
-    for (_, score) in &groups {
-        middle += score * score.transpose() * (count / (count - 1.0));
-    }
-    plain * middle * plain
+    groups.into_iter().map(|(_, score)| score).collect()
 }

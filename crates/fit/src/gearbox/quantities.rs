@@ -3,6 +3,7 @@
 use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use nalgebra::DMatrix;
+use observer::any_shift::AnyShiftFilter;
 
 use super::shift_log::{ShiftLog, named_pair};
 
@@ -10,13 +11,19 @@ use super::shift_log::{ShiftLog, named_pair};
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
 /// Unit of the unknown of a kiss point, Pa.
 pub(crate) const KISS_UNIT_PA: f64 = 1e4;
-/// Unit of the unknown of the drag, N m, and its standard deviation before \[chosen: that of one or two open elements\].
+/// Unit of the unknown of the drag, N m, and its standard deviation before \[chosen: the drag of an element with hot oil\].
 pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
-const DRAG_N_M: f64 = 1.5;
-/// Part of the variance that friction elements, or inertias, have in common \[chosen\]: oil, temperature, the shaft at the input.
+const DRAG_N_M: f64 = 1.0;
+/// Part of the variance that friction elements, valves or inertias have in common \[chosen\]: oil, temperature, the shaft at the input, the
+/// channel of the currents.
 const COMMON: f64 = 1.0 / 3.0;
 /// Bound of the torque ratio above 1, as a share \[chosen\].
 const TORQUE_RATIO: f64 = 0.10;
+
+/// Bound of the delay of the reported engine torque, s: one cycle of a bus, and whether it is held or interpolated.
+const INPUT_DELAY_S: f64 = 0.01;
+/// Error of the scale of a pressure sensor, as a standard deviation.
+const PRESSURE_SCALE: f64 = 0.005;
 
 /// A quantity of a car.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,18 +32,24 @@ pub enum Quantity {
     Input,
     /// Torque ratio of the converter above 1.
     TorqueRatio,
-    /// Delay of all commands against the turbine speed, beside that of the file.
-    Delay,
-    /// Drag of the open elements at the turbine, in the mean over all shifts.
+    /// Without a converter the delay of the reported engine torque against the turbine speed.
+    InputDelay,
+    /// Peak of the drag of each element that slips, in the mean over all.
     Drag,
     /// Torque of an element: friction times valve gain.
     Torque(usize),
-    /// Kiss point of an element.
+    /// Kiss point of an element, as a pressure by the gain of the file.
     Kiss(usize),
+    /// Gain of the valve of an element: the speeds see it only where the lag depends on the pressure.
+    Gain(usize),
     /// Lag of the valve of an element.
     Lag(usize),
+    /// Delay of its command against the turbine speed, beside that of the file.
+    Delay(usize),
     /// Turbine-side inertia of the shifts between two gears.
     Inertia(usize),
+    /// Scale of the pressure sensor.
+    PressureScale,
 }
 
 /// The quantities of a car, in the order of the unknowns.
@@ -54,58 +67,29 @@ pub struct Quantities {
     pub pair_names: Vec<String>,
     /// Covariance of the unknowns before the fit.
     pub before: DMatrix<f64>,
+    /// Elements whose pressure is measured in a shift.
+    pub measured: Vec<bool>,
     pub(crate) has_converter: bool,
 }
 
 impl Quantities {
     /// Those of a car with these tables, with the pairs of neighbouring gears and of these shifts.
     pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Self {
-        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
-        let (known, rows) = (&filter.uncertainty, tables.tables());
-        let forward = car.gearbox.forward_gears();
-        let is_known =
-            |pair: &[usize; 2]| rows.shift(pair[0], pair[1]).is_some() || rows.shift(pair[1], pair[0]).is_some();
-        let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
-        // The lower gear first.
-        let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);
-        let lower_first = |[a, b]: [usize; 2]| if ratio(a) > ratio(b) { [a, b] } else { [b, a] };
-        for pair in shifts.iter().map(|log| lower_first(log.gears)) {
-            if !pairs.contains(&pair) {
-                pairs.push(pair);
-            }
-        }
-        pairs.retain(is_known);
-        let mut all = vec![Quantity::Input];
+        let (pairs, measured) = (pairs(car, tables, shifts), measured(tables, shifts));
         let has_converter = car.converter.is_some();
-        if has_converter {
-            all.push(Quantity::TorqueRatio);
-        }
-        all.extend([Quantity::Delay, Quantity::Drag]);
-        let elements = rows.elements.len();
-        all.extend((0..elements).flat_map(|at| [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at)]));
+        let input = if has_converter { Quantity::TorqueRatio } else { Quantity::InputDelay };
+        let mut all = vec![Quantity::Input, input, Quantity::Drag];
+        all.extend((0..measured.len()).flat_map(|at| {
+            [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at), Quantity::Delay(at), Quantity::Gain(at)]
+        }));
         all.extend((0..pairs.len()).map(Quantity::Inertia));
-        let sd = |quantity: &Quantity| match quantity {
-            Quantity::Input if has_converter => filter.turbine.converter_share,
-            Quantity::Input => filter.turbine.engine_share,
-            Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
-            Quantity::Delay => known.valve_delay_s / DELAY_UNIT_S,
-            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
-            Quantity::Torque(_) => known.torque_share,
-            Quantity::Kiss(at) => {
-                known.kiss_point_pa.hypot(known.valve_gain * rows.elements[*at].clutch.kiss_pressure()) / KISS_UNIT_PA
-            }
-            Quantity::Lag(_) => known.valve_lag_share,
-            Quantity::Inertia(_) => known.inertia_share,
-        };
+        if measured.contains(&true) {
+            all.push(Quantity::PressureScale);
+        }
+        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
+        let known = Known { filter: &filter, has_converter, measured: &measured };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
-            let both = sd(&all[i]) * sd(&all[j]);
-            match (all[i], all[j]) {
-                _ if i == j => both,
-                (Quantity::Torque(_), Quantity::Torque(_)) | (Quantity::Inertia(_), Quantity::Inertia(_)) => {
-                    COMMON * both
-                }
-                _ => 0.0,
-            }
+            if i == j { known.sd(all[i]).powi(2) } else { known.covariance(all[i], all[j]) }
         });
         let names = car.gearbox.elements.iter().enumerate();
         let mut named: Vec<(usize, String)> =
@@ -113,7 +97,7 @@ impl Quantities {
         named.sort_by_key(|(place, _)| *place);
         let pair_names = pairs.iter().map(|pair| named_pair(car, *pair)).collect();
         let elements = named.into_iter().map(|(_, name)| name).collect();
-        Self { all, elements, pairs, pair_names, before, has_converter }
+        Self { all, elements, pairs, pair_names, before, measured, has_converter }
     }
 
     /// Place of a quantity among the unknowns.
@@ -133,9 +117,12 @@ impl Quantities {
             Quantity::Input if self.has_converter => "converter capacity".to_owned(),
             Quantity::Input => "reported engine torque".to_owned(),
             Quantity::TorqueRatio => "converter torque ratio above 1".to_owned(),
-            Quantity::Delay => "delay of the valves".to_owned(),
-            Quantity::Drag => "drag of open elements".to_owned(),
+            Quantity::InputDelay => "reported engine torque, delay".to_owned(),
+            Quantity::Delay(at) => format!("{}: valve delay", element(at)),
+            Quantity::Drag => "drag of each open element".to_owned(),
             Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
+            Quantity::Gain(at) => format!("{}: valve gain", element(at)),
+            Quantity::PressureScale => "pressure sensor, scale".to_owned(),
             Quantity::Kiss(at) => format!("{}: kiss point", element(at)),
             Quantity::Lag(at) => format!("{}: valve lag", element(at)),
             Quantity::Inertia(at) => {
@@ -149,12 +136,106 @@ impl Quantities {
         self.before[(at, at)].sqrt()
     }
 
+    /// Places of the gains that no pressure shows. They are held near those of the file: what speeds seem to say of them comes from the
+    /// shape of the lag over pressure.
+    pub(crate) fn held(&self) -> impl Iterator<Item = usize> + '_ {
+        let is_held = |quantity: &Quantity| matches!(quantity, Quantity::Gain(at) if !self.measured[*at]);
+        self.all.iter().enumerate().filter(move |(_, quantity)| is_held(quantity)).map(|(place, _)| place)
+    }
+
     /// Power of each quantity in the factor that all torques have in common: with all of them multiplied by one number the speeds
     /// stay the same.
     pub(crate) fn powers_of_torque(&self) -> Vec<f64> {
         let power = |quantity: &Quantity| f64::from(u8::from(quantity.has_torque_scale()));
         self.all.iter().map(power).collect()
     }
+}
+
+/// What is known before a fit: what the filter of the car does not know.
+struct Known<'a> {
+    filter: &'a AnyShiftFilter<'a, f64>,
+    has_converter: bool,
+    measured: &'a [bool],
+}
+
+impl Known<'_> {
+    /// Standard deviation of a quantity.
+    fn sd(&self, quantity: Quantity) -> f64 {
+        let known = &self.filter.uncertainty;
+        match quantity {
+            Quantity::Input if self.has_converter => self.filter.turbine.converter_share,
+            Quantity::Input => self.filter.turbine.engine_share,
+            Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
+            Quantity::InputDelay => INPUT_DELAY_S / DELAY_UNIT_S / 3.0_f64.sqrt(),
+            Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
+            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
+            Quantity::Torque(_) => known.torque_share,
+            Quantity::Kiss(at) => (known.kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
+            Quantity::Gain(_) => known.valve_gain,
+            Quantity::PressureScale => PRESSURE_SCALE,
+            Quantity::Lag(_) => known.valve_lag_share,
+            Quantity::Inertia(_) => known.inertia_share,
+        }
+    }
+
+    /// What a deviation of the gain does to a kiss point by the gain of the file.
+    fn kiss_by_gain(&self, at: usize) -> f64 {
+        let kiss_pa = self.filter.tables.elements[at].clutch.kiss_pressure();
+        -self.filter.uncertainty.valve_gain * kiss_pa / KISS_UNIT_PA
+    }
+
+    /// The element of a quantity that the gain of its valve is part of, and what a deviation of the gain does to it.
+    fn by_gain(&self, quantity: Quantity) -> Option<(usize, f64)> {
+        match quantity {
+            Quantity::Torque(at) | Quantity::Gain(at) => Some((at, self.filter.uncertainty.valve_gain)),
+            Quantity::Kiss(at) => Some((at, self.kiss_by_gain(at))),
+            _ => None,
+        }
+    }
+
+    /// Covariance of two different quantities.
+    fn covariance(&self, one: Quantity, other: Quantity) -> f64 {
+        use Quantity as Q;
+        match (one, other) {
+            (Q::Torque(_), Q::Torque(_)) | (Q::Delay(_), Q::Delay(_)) | (Q::Inertia(_), Q::Inertia(_)) => {
+                COMMON * self.sd(one) * self.sd(other)
+            }
+            _ => match (self.by_gain(one), self.by_gain(other)) {
+                // The gain of one whose pressure is not measured stays that of the file.
+                (Some((at, of_one)), Some((of, of_other))) if at == of && self.measured[at] => of_one * of_other,
+                _ => 0.0,
+            },
+        }
+    }
+}
+
+/// The pairs of neighbouring gears and of these shifts with a shift from one clutch to another, the lower gear first.
+fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usize; 2]> {
+    let rows = tables.tables();
+    let forward = car.gearbox.forward_gears();
+    let mut pairs: Vec<[usize; 2]> = forward.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+    let ratio = |gear: usize| car.gearbox.gears.get(gear).map_or(0.0, |gear| gear.ratio);
+    let lower_first = |[a, b]: [usize; 2]| if ratio(a) > ratio(b) { [a, b] } else { [b, a] };
+    for pair in shifts.iter().map(|log| lower_first(log.gears)) {
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    pairs.retain(|[low, high]| rows.shift(*low, *high).is_some() || rows.shift(*high, *low).is_some());
+    pairs
+}
+
+/// Which elements have a measured pressure, by their places in the tables.
+fn measured(tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<bool> {
+    let rows = tables.tables();
+    let mut measured = vec![false; rows.elements.len()];
+    for log in shifts {
+        let Some(row) = rows.shift(log.gears[0], log.gears[1]) else { continue };
+        for (clutch, pressure) in row.clutches.iter().zip(&log.pressure) {
+            measured[clutch.element] |= pressure.between(log.slip_s).next().is_some();
+        }
+    }
+    measured
 }
 
 impl Quantity {
@@ -167,11 +248,12 @@ impl Quantity {
     /// shrink with more shifts.
     pub(crate) fn floor(self) -> f64 {
         match self {
-            Self::Delay => 0.3e-3 / DELAY_UNIT_S,
+            Self::Delay(_) | Self::InputDelay => 0.3e-3 / DELAY_UNIT_S,
             Self::Drag => 0.2 / DRAG_UNIT_N_M,
             Self::Kiss(_) => 500.0 / KISS_UNIT_PA,
             Self::Lag(_) => 0.02,
             Self::Inertia(_) => 0.015,
+            Self::PressureScale => 1e-3,
             _ => 0.005,
         }
     }

@@ -67,6 +67,8 @@ pub struct Recorder<'a> {
     output: Series,
     engine_torque: Series,
     commands: [Series; MAX_ELEMENTS],
+    /// Of the shift that is open.
+    pressure: [Series; 2],
     open: Option<Open>,
     last_output: f64,
     found: Recorded,
@@ -85,6 +87,7 @@ impl<'a> Recorder<'a> {
             output: none(),
             engine_torque: none(),
             commands: std::array::from_fn(|_| none()),
+            pressure: [none(), none()],
             open: None,
             last_output: f64::NAN,
             found: Recorded::default(),
@@ -117,6 +120,15 @@ impl<'a> Recorder<'a> {
         self.forget(time_s);
     }
 
+    /// Takes measured pressures of the offgoing and the oncoming element of the shift of the step before, Pa; not a number where there is
+    /// none.
+    pub fn push_pressure(&mut self, time_s: f64, pressure_pa: [f64; 2]) {
+        if self.open.is_some_and(|open| open.ended_s.is_none()) {
+            let both = self.pressure.iter_mut().zip(pressure_pa);
+            both.filter(|(_, value)| value.is_finite()).for_each(|(series, value)| series.push(time_s, value));
+        }
+    }
+
     /// The shifts.
     pub fn finish(mut self) -> Recorded {
         if let Some(open) = self.open {
@@ -147,6 +159,7 @@ impl<'a> Recorder<'a> {
     }
 
     fn begin(&mut self, time_s: f64, gears: [usize; 2], lock_up: bool) {
+        self.pressure = Default::default();
         self.open = Some(Open { gears, begun_s: time_s, ended_s: None, lock_up });
     }
 
@@ -221,6 +234,7 @@ impl<'a> Recorder<'a> {
             output: part(&self.output, span),
             engine_torque: part(&self.engine_torque, span),
             commands,
+            pressure: self.pressure.clone(),
             slip_s: [f64::NAN; 2],
             lock_up: open.lock_up,
         })
@@ -228,7 +242,7 @@ impl<'a> Recorder<'a> {
 }
 
 /// The readings from one time to another.
-fn part(series: &Series, span: [f64; 2]) -> Series {
+pub(super) fn part(series: &Series, span: [f64; 2]) -> Series {
     let (time_s, value) = series.between(span).unzip();
     Series { time_s, value }
 }

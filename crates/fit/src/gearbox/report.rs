@@ -10,8 +10,13 @@ use crate::{ReportRow, Verdict};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
-/// Standard deviations on either side that 99.9 % lie within: 5 % over some 30 quantities.
+/// Standard deviations on either side that 99.9 % lie within: 5 % over some 40 quantities.
 const SIDES_OF_ALL: f64 = 3.3;
+
+/// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
+const NOT_FITTED: &str = "not fitted, and as in the given file: mass, road load, wheel radius, drive shafts, backlash, hysteresis of the valves and the shapes \
+     of all maps. Weighing the car would tell its mass; coasting down in neutral on a level road, both ways, rolling resistance and air drag; pressing \
+     and releasing the pedal in one gear, shafts and backlash; a fit does not read such drives";
 
 impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
@@ -32,7 +37,7 @@ impl GearboxFit {
             )
         };
         let (value, interval) = match quantity {
-            Quantity::Delay => plain(1e3 * DELAY_UNIT_S, "ms"),
+            Quantity::Delay(_) | Quantity::InputDelay => plain(1e3 * DELAY_UNIT_S, "ms"),
             Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
             Quantity::Drag => plain(DRAG_UNIT_N_M, "N m"),
             _ => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
@@ -44,7 +49,10 @@ impl GearboxFit {
     /// Whether a fitted shift depends on a quantity.
     pub(crate) fn is_seen(&self, quantity: Quantity) -> bool {
         match quantity {
-            Quantity::Torque(at) | Quantity::Kiss(at) | Quantity::Lag(at) => self.elements_seen[at],
+            Quantity::Torque(at) | Quantity::Kiss(at) | Quantity::Lag(at) | Quantity::Delay(at) => {
+                self.elements_seen[at]
+            }
+            Quantity::Gain(at) => self.quantities.measured[at],
             Quantity::Inertia(at) => self.by_pair[at].iter().any(|count| *count > 0),
             _ => true,
         }
@@ -66,23 +74,46 @@ impl GearboxFit {
                  factor; it comes from what was known before of {input}, friction and inertias together, and is in every interval"
             ),
             format!("beside that factor, friction x valve gain is known within +- {}", seen.join(", ")),
-            "friction and valve gain of an element are not told apart: their product stands in the file as friction, and the kiss point is that of \
-             the valve's maps. A measured pressure of an element would tell them"
-                .to_owned(),
+            self.said_of_gain(),
         ];
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
         lines.extend(self.warnings());
         lines.extend(self.proposals());
+        lines.push(NOT_FITTED.to_owned());
         lines
+    }
+
+    /// Of which elements friction and gain are told apart.
+    fn said_of_gain(&self) -> String {
+        let names = |is_measured: bool| {
+            let elements = self.quantities.elements.iter().enumerate();
+            let some =
+                elements.filter(|(at, _)| self.elements_seen[*at] && self.quantities.measured[*at] == is_measured);
+            some.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ")
+        };
+        let (measured, others) = (names(true), names(false));
+        let mut text = String::new();
+        if !measured.is_empty() {
+            text += &format!("the measured pressure tells friction and valve gain apart of {measured}");
+        }
+        if !others.is_empty() {
+            let between = if text.is_empty() { "" } else { "; " };
+            text += &format!(
+                "{between}friction and valve gain are not told apart of {others}: their product stands in the file as friction, and the kiss \
+                 point is that of the valve's maps. A measured pressure of an element would tell them"
+            );
+        }
+        text
     }
 
     /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni; those with the common factor of all
     /// torques also beside it.
     fn given_is_possible(&self) -> bool {
+        let is_of_car = |quantity| !matches!(quantity, Quantity::Drag | Quantity::InputDelay | Quantity::PressureScale);
         let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
-        let mut car = seen().filter(|quantity| *quantity != Quantity::Drag);
+        let mut car = seen().filter(|quantity| is_of_car(*quantity));
         let mut torques = seen().filter(|quantity| quantity.has_torque_scale());
         let scale = self.torque_scale();
         car.all(|quantity| self.unknown(quantity).abs() <= SIDES_OF_ALL * self.sd(quantity))

@@ -2,11 +2,14 @@
 
 use config::Car;
 use design::ShiftTables;
+use drivetrain::clutch::drag_torque;
 use drivetrain::{ClutchValve, ShiftKind};
+use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
 use observer::any_shift::ShiftRow;
 
 use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantities, Quantity};
+use super::recorder::part;
 use super::shift_log::ShiftLog;
 use crate::Series;
 use crate::pressure::{Grid, pressures};
@@ -17,19 +20,22 @@ const STEP_S: f64 = 0.002;
 pub(crate) const OWN: usize = 2;
 /// Deviation of the first, rad/s: nothing is known of it.
 const START_SD_RAD_S: f64 = 50.0;
-/// Deviation of the second: drag of the open elements from shift to shift, N m \[chosen\], and a share of the torque at the input by the shape of the
+/// Deviation of the second: what the drag of the open elements has beside its model, N m \[chosen\], and a share of the torque at the input by the shape of the
 /// converter's maps \[chosen, as in the filter\].
 const DRAG_SD_N_M: f64 = 1.0;
 const INPUT_SD_SHARE: f64 = 0.03;
 /// Steps for the derivatives by the logarithm of a lag and by a delay in its unit.
 const LAG_STEP: f64 = 0.02;
 const DELAY_STEP: f64 = 0.1;
+const GAIN_STEP: f64 = 0.02;
 
 /// A clutch of the shift.
 #[derive(Debug, Clone)]
 struct ClutchModel {
     place: usize,
     commands: Series,
+    /// Measured pressure while both clutches slip, Pa.
+    measured: Series,
     valve: ClutchValve<f64>,
     hysteresis_pa: f64,
     kiss_pa: f64,
@@ -44,9 +50,14 @@ pub(crate) struct ShiftModel {
     pub(crate) pair: usize,
     grid: Grid,
     clutches: [ClutchModel; 2],
+    /// Without a converter the reported engine torque, N m.
+    reported: Option<Series>,
     /// Torque at the input by the file, and the part of it by the torque ratio above 1, N m.
     input_n_m: Vec<f64>,
     above_one_n_m: Vec<f64>,
+    /// Torque at the turbine by the drag of the elements that slip: by the file, and with a peak of 1 N m of each, N m.
+    drag_n_m: Vec<f64>,
+    drag_of_one_n_m: Vec<f64>,
     /// `M11`, kg m^2.
     inertia_kg_m2: f64,
     /// By how much the output speed has slowed the turbine down until each reading by `M12/M11` of the file, rad/s. With another `M11`
@@ -63,6 +74,35 @@ pub(crate) struct Linearised {
     pub(crate) residuals: DVector<f64>,
     pub(crate) by_parameter: DMatrix<f64>,
     pub(crate) by_own: DMatrix<f64>,
+    /// Of the clutches whose pressure is measured.
+    pub(crate) pressure: Vec<MeasuredPressure>,
+}
+
+/// The measured pressure of a clutch about unknowns, Pa: residuals, and derivatives of the prediction.
+pub(crate) struct MeasuredPressure {
+    pub(crate) residuals: DVector<f64>,
+    pub(crate) by_parameter: DMatrix<f64>,
+}
+
+/// The unknowns of a fit, and the derivatives of a shift's angular momentum by them.
+struct Unknowns<'a> {
+    quantities: &'a Quantities,
+    at: &'a [f64],
+    by_momentum: DMatrix<f64>,
+}
+
+impl Unknowns<'_> {
+    fn of(&self, quantity: Quantity) -> f64 {
+        self.quantities.place(quantity).map_or(0.0, |place| self.at[place])
+    }
+
+    /// Adds to the derivative by a quantity.
+    fn put(&mut self, quantity: Quantity, momentum: &[f64]) {
+        if let Some(place) = self.quantities.place(quantity) {
+            let mut column = self.by_momentum.column_mut(place);
+            column.iter_mut().zip(momentum).for_each(|(cell, value)| *cell += value);
+        }
+    }
 }
 
 impl ShiftModel {
@@ -85,14 +125,18 @@ impl ShiftModel {
             .iter()
             .map(|time_s| row.mass_kg_m2[0][1] / row.mass_kg_m2[0][0] * (log.output.at(*time_s) - start))
             .collect();
+        let (drag_n_m, drag_of_one_n_m) = drag(car, log, grid)?;
         let mean = input_n_m.iter().sum::<f64>() / points as f64;
         Some(Self {
             kind: log.kind(car, mean),
             pair: quantities.pair(log.gears[0], log.gears[1])?,
             grid,
             clutches: [offgoing, oncoming],
+            reported: car.converter.is_none().then(|| log.engine_torque.clone()),
             input_n_m,
             above_one_n_m,
+            drag_n_m,
+            drag_of_one_n_m,
             inertia_kg_m2: row.mass_kg_m2[0][0],
             by_output,
             own_sd: [START_SD_RAD_S, DRAG_SD_N_M.hypot(INPUT_SD_SHARE * mean)],
@@ -108,56 +152,92 @@ impl ShiftModel {
 
     /// Residuals and derivatives at unknowns.
     pub(crate) fn linearised(&self, quantities: &Quantities, at: &[f64]) -> Linearised {
-        let of = |quantity: Quantity| quantities.place(quantity).map_or(0.0, |place| at[place]);
-        let inertia = self.inertia_kg_m2 * of(Quantity::Inertia(self.pair)).exp();
         let rows = self.reading.len();
-        let mut by_parameter = DMatrix::zeros(rows, at.len());
-        let mut put = |quantity: Quantity, momentum: &[f64]| {
-            if let Some(place) = quantities.place(quantity) {
-                let mut column = by_parameter.column_mut(place);
-                column.iter_mut().zip(momentum).for_each(|(cell, value)| *cell += value / inertia);
-            }
-        };
-        let capacity = of(Quantity::Input).exp();
-        let ratio = of(Quantity::TorqueRatio).exp();
-        let torques = self.input_n_m.iter().zip(&self.above_one_n_m);
-        let input: Vec<f64> = torques.map(|(all, above)| capacity * (all + (ratio - 1.0) * above)).collect();
-        let mut momentum = self.integral(&input);
-        put(Quantity::Input, &momentum);
-        let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
-        put(Quantity::TorqueRatio, &self.integral(&above));
-        let drag: Vec<f64> = self.integral(&vec![-DRAG_UNIT_N_M; input.len()]);
-        put(Quantity::Drag, &drag);
-        let braked = momentum.iter().zip(&drag).map(|(sum, drag)| sum + of(Quantity::Drag) * drag);
-        momentum = braked.collect();
+        let mut unknowns = Unknowns { quantities, at, by_momentum: DMatrix::zeros(rows, at.len()) };
+        let mut momentum = self.input_momentum(&mut unknowns);
+        let mut pressure = Vec::new();
         for clutch in &self.clutches {
-            let (torque, kiss) = (Quantity::Torque(clutch.place), Quantity::Kiss(clutch.place));
-            let lag = Quantity::Lag(clutch.place);
-            let late = of(Quantity::Delay);
-            let (factor, kiss_pa) = (of(torque).exp(), clutch.kiss_pa + KISS_UNIT_PA * of(kiss));
-            let pressure = clutch.pressures(self.grid, of(lag), late);
-            let slope = |i: usize| if pressure[i] > kiss_pa { -factor * clutch.per_pa[i] } else { 0.0 };
-            let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<f64> {
-                self.integral(&(0..pressure.len()).map(|i| slope(i) * by(i)).collect::<Vec<_>>())
-            };
-            let of_clutch = scaled(&|i| pressure[i] - kiss_pa);
-            put(torque, &of_clutch);
-            put(kiss, &scaled(&|_| -KISS_UNIT_PA));
-            let slower = clutch.pressures(self.grid, of(lag) + LAG_STEP, late);
-            put(lag, &scaled(&|i| (slower[i] - pressure[i]) / LAG_STEP));
-            let later = clutch.pressures(self.grid, of(lag), late + DELAY_STEP);
-            put(Quantity::Delay, &scaled(&|i| (later[i] - pressure[i]) / DELAY_STEP));
+            let (of_clutch, measured) = self.clutch_momentum(clutch, &mut unknowns);
             momentum.iter_mut().zip(of_clutch).for_each(|(sum, more)| *sum += more);
+            pressure.extend(measured);
         }
         let less: Vec<f64> = momentum.iter().map(|momentum| -momentum).collect();
-        put(Quantity::Inertia(self.pair), &less);
+        unknowns.put(Quantity::Inertia(self.pair), &less);
+        let inertia = self.inertia_kg_m2 * unknowns.of(Quantity::Inertia(self.pair)).exp();
         let speeds = momentum.iter().zip(&self.by_output).map(|(momentum, output)| momentum / inertia - output);
         let residuals = self.reading.iter().zip(speeds).map(|(reading, speed)| reading - speed);
         let by_own = DMatrix::from_fn(rows, OWN, |row, own| match own {
             0 => 1.0,
             _ => (self.time_s[row] - self.grid.begin_s) / inertia,
         });
-        Linearised { residuals: DVector::from_iterator(rows, residuals), by_parameter, by_own }
+        Linearised {
+            residuals: DVector::from_iterator(rows, residuals),
+            by_parameter: unknowns.by_momentum / inertia,
+            by_own,
+            pressure,
+        }
+    }
+
+    /// Angular momentum of the turbine by the torque at the input and the drag, at the readings.
+    fn input_momentum(&self, unknowns: &mut Unknowns<'_>) -> Vec<f64> {
+        let [capacity, ratio] = [Quantity::Input, Quantity::TorqueRatio].map(|quantity| unknowns.of(quantity).exp());
+        let late = unknowns.of(Quantity::InputDelay);
+        let late_n_m = self.reported_n_m(late);
+        let torques = late_n_m.as_ref().unwrap_or(&self.input_n_m).iter().zip(&self.above_one_n_m);
+        let input: Vec<f64> = torques.map(|(all, above)| capacity * (all + (ratio - 1.0) * above)).collect();
+        let mut momentum = self.integral(&input);
+        unknowns.put(Quantity::Input, &momentum);
+        if let (Some(now), Some(later)) = (&late_n_m, self.reported_n_m(late + DELAY_STEP)) {
+            let change = later.iter().zip(now).map(|(later, now)| capacity * (later - now) / DELAY_STEP);
+            unknowns.put(Quantity::InputDelay, &self.integral(&change.collect::<Vec<_>>()));
+        }
+        let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
+        unknowns.put(Quantity::TorqueRatio, &self.integral(&above));
+        let more: Vec<f64> = self.drag_of_one_n_m.iter().map(|drag| DRAG_UNIT_N_M * drag).collect();
+        unknowns.put(Quantity::Drag, &self.integral(&more));
+        let peak = unknowns.of(Quantity::Drag);
+        let drag: Vec<f64> = self.drag_n_m.iter().zip(&more).map(|(file, more)| file + peak * more).collect();
+        momentum.iter_mut().zip(self.integral(&drag)).for_each(|(sum, more)| *sum += more);
+        momentum
+    }
+
+    /// The same by a clutch, and residuals of its measured pressure.
+    fn clutch_momentum(
+        &self,
+        clutch: &ClutchModel,
+        unknowns: &mut Unknowns<'_>,
+    ) -> (Vec<f64>, Option<MeasuredPressure>) {
+        let place = clutch.place;
+        let quantities = [Quantity::Lag(place), Quantity::Gain(place), Quantity::Delay(place)];
+        let [lag, gain, late] = quantities.map(|quantity| unknowns.of(quantity));
+        let kiss_pa = clutch.kiss_pa + KISS_UNIT_PA * unknowns.of(Quantity::Kiss(place));
+        let factor = unknowns.of(Quantity::Torque(place)).exp();
+        let pressure = clutch.pressures(self.grid, lag, gain, late);
+        let slope = |i: usize| if pressure[i] > kiss_pa { -factor * clutch.per_pa[i] } else { 0.0 };
+        let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            self.integral(&(0..pressure.len()).map(|i| slope(i) * by(i)).collect::<Vec<_>>())
+        };
+        let momentum = scaled(&|i| pressure[i] - kiss_pa);
+        unknowns.put(Quantity::Torque(place), &momentum);
+        unknowns.put(Quantity::Kiss(place), &scaled(&|_| -KISS_UNIT_PA));
+        let change = |other: Vec<f64>, step: f64| -> Vec<f64> {
+            other.iter().zip(&pressure).map(|(other, pressure)| (other - pressure) / step).collect()
+        };
+        let changes = [
+            change(clutch.pressures(self.grid, lag + LAG_STEP, gain, late), LAG_STEP),
+            change(clutch.pressures(self.grid, lag, gain + GAIN_STEP, late), GAIN_STEP),
+            change(clutch.pressures(self.grid, lag, gain, late + DELAY_STEP), DELAY_STEP),
+        ];
+        let by: Vec<(Quantity, Vec<f64>)> = quantities.into_iter().zip(changes).collect();
+        by.iter().for_each(|(quantity, change)| unknowns.put(*quantity, &scaled(&|i| change[i])));
+        let measured = clutch.measured(self.grid, unknowns, &pressure, &by);
+        (momentum, measured)
+    }
+
+    /// The reported engine torque at the points of the grid with this unknown of its delay.
+    fn reported_n_m(&self, late: f64) -> Option<Vec<f64>> {
+        let reported = self.reported.as_ref()?;
+        Some((0..self.grid.points).map(|i| reported.at(self.grid.time_s(i) - DELAY_UNIT_S * late)).collect())
     }
 
     /// The integral of values at the points of the grid until each reading.
@@ -169,21 +249,56 @@ impl ShiftModel {
             sum += 0.5 * self.grid.step_s * (pair[0] + pair[1]);
             sums.push(sum);
         }
-        let at = |time_s: &f64| {
-            let place = (time_s - self.grid.begin_s) / self.grid.step_s;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
-            let before = (place.max(0.0) as usize).min(sums.len().saturating_sub(2));
-            sums[before] + (place - before as f64) * (sums[before + 1] - sums[before])
-        };
-        self.time_s.iter().map(at).collect()
+        self.time_s.iter().map(|time_s| between_points(self.grid, &sums, *time_s)).collect()
     }
 }
 
 impl ClutchModel {
-    fn pressures(&self, grid: Grid, log_lag: f64, late: f64) -> Vec<f64> {
-        let valve = self.valve.changed(log_lag.exp(), 1.0, None);
-        pressures(&valve, self.hysteresis_pa, DELAY_UNIT_S * late, &self.commands, grid)
+    /// Pressures by the gain of the file: the true ones, at which the valve has its lag, over the factor of the gain.
+    fn pressures(&self, grid: Grid, log_lag: f64, log_gain: f64, late: f64) -> Vec<f64> {
+        let valve = self.valve.changed(log_lag.exp(), log_gain.exp(), None);
+        let mut pressures = pressures(&valve, self.hysteresis_pa, DELAY_UNIT_S * late, &self.commands, grid);
+        pressures.iter_mut().for_each(|pressure| *pressure *= (-log_gain).exp());
+        pressures
     }
+
+    /// Residuals of the measured pressure, and derivatives of its prediction; `pressure` is that by the gain of the file, with derivatives.
+    fn measured(
+        &self,
+        grid: Grid,
+        Unknowns { quantities, at, .. }: &Unknowns<'_>,
+        pressure: &[f64],
+        by: &[(Quantity, Vec<f64>)],
+    ) -> Option<MeasuredPressure> {
+        let rows = self.measured.len();
+        let scale = quantities.place(Quantity::PressureScale).filter(|_| rows > 0)?;
+        let gain = quantities.place(Quantity::Gain(self.place))?;
+        let factor = (at[scale] + at[gain]).exp();
+        let predicted = |values: &[f64]| -> DVector<f64> {
+            let times = self.measured.time_s.iter();
+            DVector::from_iterator(rows, times.map(|time_s| factor * between_points(grid, values, *time_s)))
+        };
+        let all = predicted(pressure);
+        let mut by_parameter = DMatrix::zeros(rows, at.len());
+        by_parameter.column_mut(scale).copy_from(&all);
+        by_parameter.column_mut(gain).copy_from(&all);
+        for (quantity, change) in by {
+            if let Some(place) = quantities.place(*quantity) {
+                let mut column = by_parameter.column_mut(place);
+                column += predicted(change);
+            }
+        }
+        let residuals = DVector::from_column_slice(&self.measured.value) - all;
+        Some(MeasuredPressure { residuals, by_parameter })
+    }
+}
+
+/// The value at a time between the points of a grid.
+fn between_points(grid: Grid, values: &[f64], time_s: f64) -> f64 {
+    let place = (time_s - grid.begin_s) / grid.step_s;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
+    let before = (place.max(0.0) as usize).min(values.len().saturating_sub(2));
+    values[before] + (place - before as f64) * (values[before + 1] - values[before])
 }
 
 /// Torque at the gearbox input, N m, and the part of it by the torque ratio above 1.
@@ -195,6 +310,29 @@ fn input(car: &Car, log: &ShiftLog, time_s: f64) -> (f64, f64) {
         }
         None => (log.engine_torque.at(time_s), 0.0),
     }
+}
+
+/// Torque at the turbine by the drag of the elements that are not held, at the points of the grid: by the file, and with a peak of 1 N m of
+/// each. An element brakes the turbine by as much of its drag as its slip changes with the turbine speed.
+fn drag(car: &Car, log: &ShiftLog, grid: Grid) -> Option<(Vec<f64>, Vec<f64>)> {
+    let Change::Single { held, .. } = &car.gearbox.shift(log.gears[0], log.gears[1])?.change else { return None };
+    let train = car.gearbox.train.as_ref()?;
+    let speeds = train.speeds_in_shift(held)?;
+    let elements = car.clutches.iter().enumerate().filter(|(at, _)| !held.contains(at));
+    let slipping: Vec<(f64, f64, f64)> = elements
+        .filter_map(|(at, clutch)| {
+            let slip = train.slip_row(at) * &speeds;
+            Some((slip[0], slip[1], clutch.as_ref()?.drag_n_m))
+        })
+        .collect();
+    let at = |time_s: f64| {
+        let (turbine, output) = (log.turbine.at(time_s), log.output.at(time_s));
+        slipping.iter().fold((0.0, 0.0), |(file, one), (by_turbine, by_output, drag_n_m)| {
+            let of_one = -by_turbine * drag_torque(1.0, by_turbine * turbine + by_output * output);
+            (file + drag_n_m * of_one, one + of_one)
+        })
+    };
+    Some((0..grid.points).map(|i| at(grid.time_s(i))).unzip())
 }
 
 /// The model of the offgoing (0) or oncoming (1) clutch.
@@ -218,6 +356,7 @@ fn clutch(
     Some(ClutchModel {
         place: shift.element,
         commands: log.commands[which].clone(),
+        measured: part(&log.pressure[which], log.slip_s),
         valve: known.valve,
         hysteresis_pa: known.hysteresis_pa,
         kiss_pa: known.clutch.kiss_pressure(),
@@ -230,7 +369,7 @@ fn clutch(
 pub struct OpenLoop {
     /// Time in the log, s.
     pub time_s: f64,
-    /// Size of the torque of offgoing and oncoming clutch at the clutch, N m.
+    /// Size of the torque of offgoing and oncoming clutch at the clutch by pressure and friction, N m.
     pub torque_n_m: [f64; 2],
     /// Their pressures, Pa.
     pub pressure_pa: [f64; 2],
@@ -242,7 +381,7 @@ pub fn open_loop(car: &Car, tables: &ShiftTables<f64>, log: &ShiftLog) -> Vec<Op
     let rows = tables.tables();
     let row = rows.shift(log.gears[0], log.gears[1]);
     let (Some(model), Some(row)) = (ShiftModel::new(car, tables, &quantities, log), row) else { return Vec::new() };
-    let pressure = model.clutches.each_ref().map(|clutch| clutch.pressures(model.grid, 0.0, 0.0));
+    let pressure = model.clutches.each_ref().map(|clutch| clutch.pressures(model.grid, 0.0, 0.0, 0.0));
     let of_reading = |time_s: &f64| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
         let i = ((time_s - model.grid.begin_s) / model.grid.step_s).round() as usize;

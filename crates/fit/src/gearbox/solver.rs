@@ -6,9 +6,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 
 use super::quantities::Quantities;
-use super::shift::{Linearised, OWN, ShiftModel};
+use super::shift::{Linearised, MeasuredPressure, OWN, ShiftModel};
 use crate::FitError;
-use crate::weights::{HUBER, gain_and_scale, one_step};
+use crate::weights::{FACTOR, HUBER, correlation, gain_and_scale, one_step};
 
 /// A step that changes no unknown by more than this share of its plain standard deviation ends the fit.
 const CONVERGED: f64 = 0.1;
@@ -22,19 +22,62 @@ const OWN_TURNS: u32 = 4;
 /// Deviations of what was known before beyond which nothing is held possible.
 const LIMIT: f64 = 4.0;
 
-/// Gain and scale of the one-step errors of the turbine speed.
+/// Weights of the turbine speed and of the measured pressures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Weights {
+    pub(crate) turbine: ChannelWeights,
+    pub(crate) pressure: ChannelWeights,
+}
+
+impl Weights {
+    /// Where a fit starts: what is usual.
+    const START: Self = Self {
+        turbine: ChannelWeights { gain: 0.3, scale: 0.5, inflation: FACTOR * FACTOR },
+        pressure: ChannelWeights { gain: 0.3, scale: 3e3, inflation: FACTOR * FACTOR },
+    };
+}
+
+/// Gain and scale of the one-step errors of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ChannelWeights {
     pub(crate) gain: f64,
     pub(crate) scale: f64,
+    /// Factor by which the information of the readings is less than that of independent ones of a perfect model, in the fit as in the
+    /// intervals: otherwise what is known before would count too little in the fit.
+    pub(crate) inflation: f64,
+}
+
+impl ChannelWeights {
+    /// One-step errors of residuals, or of a column of their derivatives, in scales.
+    fn in_scales(&self, column: &mut [f64]) {
+        one_step(column, self.gain);
+        column.iter_mut().for_each(|error| *error /= self.scale);
+    }
+
+    fn weight(&self, error: f64) -> f64 {
+        (HUBER / error.abs()).min(1.0) / self.inflation
+    }
+
+    /// Half the robust sum of squares.
+    fn cost(&self, errors: &DVector<f64>) -> f64 {
+        let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
+        0.5 * errors.iter().map(loss).sum::<f64>() / self.inflation
+    }
+
+    /// Those that residuals ask for; without any they stay.
+    fn following(self, blocks: &[&[f64]]) -> Self {
+        gain_and_scale(blocks).map_or(self, |(gain, scale)| {
+            let inflation = FACTOR * FACTOR * correlation(blocks, gain, scale);
+            Self { gain, scale, inflation }
+        })
+    }
 }
 
 /// A shift at unknowns, with its own unknowns at their best.
 pub(crate) struct Profiled {
-    /// Residuals, rad/s.
-    pub(crate) residuals: Vec<f64>,
-    /// One-step errors in scales.
-    pub(crate) errors: DVector<f64>,
+    /// Residuals of the turbine speed, rad/s, and of measured pressures, Pa.
+    residuals: Vec<f64>,
+    pressure: Vec<Vec<f64>>,
     /// Half the gradient by the parameters, with the sign of a step.
     pub(crate) score: DVector<f64>,
     /// Information about the parameters, own unknowns eliminated.
@@ -53,26 +96,42 @@ pub(crate) struct Solved {
 }
 
 /// A shift with its own unknowns at their best for these parameters.
-pub(crate) fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights) -> Profiled {
-    let in_scales = |column: &mut [f64]| {
-        one_step(column, weights.gain);
-        column.iter_mut().for_each(|error| *error /= weights.scale);
-    };
+fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights) -> Profiled {
+    let mut profiled = profiled_turbine(shift, lines, weights.turbine);
+    for MeasuredPressure { residuals, by_parameter } in &lines.pressure {
+        let mut errors = residuals.clone();
+        let mut whitened = by_parameter.clone();
+        weights.pressure.in_scales(errors.as_mut_slice());
+        whitened.column_iter_mut().for_each(|mut column| weights.pressure.in_scales(column.as_mut_slice()));
+        let mut all = whitened.clone();
+        for (row, error) in errors.iter().enumerate() {
+            all.row_mut(row).scale_mut(weights.pressure.weight(*error));
+        }
+        profiled.score += all.tr_mul(&errors);
+        profiled.information += all.tr_mul(&whitened);
+        profiled.cost += weights.pressure.cost(&errors);
+        profiled.pressure.push(residuals.as_slice().to_vec());
+    }
+    profiled
+}
+
+fn profiled_turbine(shift: &ShiftModel, lines: &Linearised, weights: ChannelWeights) -> Profiled {
+    let in_scales = |column: &mut [f64]| weights.in_scales(column);
     let mut by_own = lines.by_own.clone();
     by_own.column_iter_mut().for_each(|mut column| in_scales(column.as_mut_slice()));
     let mut of_parameters = lines.residuals.clone();
     in_scales(of_parameters.as_mut_slice());
     let precision = Matrix2::from_diagonal(&Vector2::from(shift.own_sd.map(|sd| sd.powi(-2))));
     let mut own = Vector2::new(lines.residuals.get(0).copied().unwrap_or(0.0), 0.0);
-    let huber = |error: f64| (HUBER / error.abs()).min(1.0);
+    let weight = |error: f64| weights.weight(error);
     let own_step = |own: &Vector2<f64>| {
         let errors = &of_parameters - &by_own * own;
         let mut square = precision;
         let mut gradient = Vector2::zeros();
         for (row, error) in errors.iter().enumerate() {
             let line = Vector2::new(by_own[(row, 0)], by_own[(row, 1)]);
-            square += huber(*error) * line * line.transpose();
-            gradient += huber(*error) * *error * line;
+            square += weight(*error) * line * line.transpose();
+            gradient += weight(*error) * *error * line;
         }
         // The start of a shift has no mean before.
         gradient[1] -= precision[(1, 1)] * own[1];
@@ -87,19 +146,18 @@ pub(crate) fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights)
     whitened.column_iter_mut().for_each(|mut column| in_scales(column.as_mut_slice()));
     let mut all = whitened.clone();
     for (row, error) in errors.iter().enumerate() {
-        all.row_mut(row).scale_mut(huber(*error));
+        all.row_mut(row).scale_mut(weight(*error));
     }
     let (square, _) = own_step(&own);
     let mixed = by_own.tr_mul(&all);
     let inverse = square.try_inverse().unwrap_or_else(Matrix2::zeros);
     let information = all.tr_mul(&whitened) - mixed.tr_mul(&(inverse * &mixed));
-    let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
-    let cost = 0.5 * (errors.iter().map(loss).sum::<f64>() + precision[(1, 1)] * own[1] * own[1]);
+    let cost = weights.cost(&errors) + 0.5 * precision[(1, 1)] * own[1] * own[1];
     let residuals = (&lines.residuals - &lines.by_own * own).as_slice().to_vec();
     Profiled {
         residuals,
+        pressure: Vec::new(),
         score: all.tr_mul(&errors),
-        errors,
         information,
         torque_error: own[1] / shift.own_sd[1],
         cost,
@@ -109,14 +167,17 @@ pub(crate) fn profiled(shift: &ShiftModel, lines: &Linearised, weights: Weights)
 /// What does not change during a fit.
 pub(crate) struct Problem<'a> {
     pub(crate) quantities: &'a Quantities,
-    /// Inverse of the covariance before the fit.
+    /// Inverse of the covariance before the fit, with what is held.
     pub(crate) precision: DMatrix<f64>,
 }
 
 impl<'a> Problem<'a> {
     pub(crate) fn new(quantities: &'a Quantities) -> Result<Self, FitError> {
-        let cholesky = quantities.before.clone().cholesky().ok_or_else(not_finite)?;
-        Ok(Self { quantities, precision: cholesky.inverse() })
+        /// Share of its standard deviation in which a quantity is held; none would make it a constant, with which nothing is correlated.
+        const HELD_SHARE: f64 = 0.1;
+        let mut before = quantities.before.clone();
+        quantities.held().for_each(|place| before[(place, place)] *= HELD_SHARE * HELD_SHARE);
+        Ok(Self { quantities, precision: before.cholesky().ok_or_else(not_finite)?.inverse() })
     }
 
     fn profiles(&self, shifts: &[ShiftModel], at: &[f64], weights: Weights) -> Vec<Profiled> {
@@ -130,7 +191,7 @@ impl<'a> Problem<'a> {
 
     /// Finds the parameters of shifts, from those of the file.
     pub(crate) fn solve(&self, shifts: &[ShiftModel], progress: &mut dyn FnMut(u32)) -> Result<Solved, FitError> {
-        let mut weights = Weights { gain: 0.3, scale: 0.5 };
+        let mut weights = Weights::START;
         let mut at = vec![0.0; self.quantities.all.len()];
         let (mut damping, mut is_converged) = (1e-3, false);
         let mut profiles = self.profiles(shifts, &at, weights);
@@ -192,10 +253,11 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Gain and scale that the residuals ask for.
+/// Gain, scale and inflation that the residuals ask for.
 fn following(shifts: &[Profiled], before: Weights) -> Weights {
-    let blocks: Vec<&[f64]> = shifts.iter().map(|shift| shift.residuals.as_slice()).collect();
-    gain_and_scale(&blocks).map_or(before, |(gain, scale)| Weights { gain, scale })
+    let turbine: Vec<&[f64]> = shifts.iter().map(|shift| shift.residuals.as_slice()).collect();
+    let pressure: Vec<&[f64]> = shifts.iter().flat_map(|shift| shift.pressure.iter().map(Vec::as_slice)).collect();
+    Weights { turbine: before.turbine.following(&turbine), pressure: before.pressure.following(&pressure) }
 }
 
 const _: () = assert!(OWN == 2, "the own unknowns are solved for as two");

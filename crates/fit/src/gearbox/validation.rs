@@ -20,6 +20,24 @@ pub struct HeldOut {
 }
 
 impl GearboxFit {
+    /// Why the fitted file is not to be used in place of the given one, if so.
+    pub fn reason_against(&self, checked: Option<&HeldOut>) -> Option<String> {
+        if !self.at_limit.is_empty() {
+            return Some(format!("at the end of what is held possible: {}", self.at_limit.join(", ")));
+        }
+        let checked = checked?;
+        let [given, fitted] = checked.turbine_rad_s;
+        // An error that is not a number counts against the fit.
+        let is_better = fitted < given;
+        (!is_better).then(|| {
+            format!(
+                "on {} shifts that were held out the turbine speed is off by {given:.2} rad/s with the given file and by {fitted:.2} with the \
+                 fitted one",
+                checked.shifts
+            )
+        })
+    }
+
     /// Compares both vehicle files on shifts that were not fitted; none if there are none.
     pub fn validate(
         &self,

@@ -10,7 +10,7 @@ use observer::any_shift::ShiftInput;
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::ShiftDraw;
 use study::any_shift::matrix::Random;
-use study::any_shift::measured::SensedDrive;
+use study::any_shift::measured::{MeasuredRow, SensedDrive};
 
 /// Bounds of what is drawn: as shares, and of the kiss point in Pa.
 const FRICTION: f64 = 0.15;
@@ -18,10 +18,17 @@ const GAIN: f64 = 0.08;
 const CONVERTER: f64 = 0.08;
 const INERTIA: f64 = 0.10;
 const KISS_PA: f64 = 10e3;
+/// Scale and noise of a pressure sensor.
+const SENSOR_SCALE: f64 = 0.008;
+const SENSOR_PA: f64 = 3e3;
+/// Of the drag of each open element.
+const DRAG: f64 = 0.5;
+/// Sets the random numbers of the valves' timing apart from those of the others.
+const TIMING_STREAM: u64 = 0x5bf0_3635_dab2_c9e1;
 /// Time between two rows, s.
 const ROW_S: f64 = 0.01;
 
-fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
@@ -40,6 +47,17 @@ pub(crate) fn city(repetitions: u32) -> Drive {
     Drive { repetitions, ..Drive::read(&root().join("drives/city.toml")).unwrap() }
 }
 
+/// In what a car differs from its file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Case {
+    /// Friction, valve gain, kiss points, converter, inertias and drag.
+    Usual,
+    /// Lag, delay and hysteresis of each valve too, anywhere in the bounds of a car in series.
+    WithTiming,
+    /// In nothing.
+    Right,
+}
+
 /// A car as its file has it, and as it is.
 pub(crate) struct Drawn {
     pub(crate) file: Car,
@@ -52,9 +70,11 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
-    pub(crate) fn of(file: Car, seed: u64) -> Self {
+    /// A car drawn by this seed.
+    pub(crate) fn of(file: Car, seed: u64, case: Case) -> Self {
         let mut random = Random(seed);
-        let mut within = |bound: f64| bound * (2.0 * random.uniform() - 1.0);
+        let share = if case == Case::Right { 0.0 } else { 1.0 };
+        let mut within = |bound: f64| share * bound * (2.0 * random.uniform() - 1.0);
         let none = ShiftDraw::none(&file);
         let draw = ShiftDraw {
             friction: none.friction.iter().map(|_| 1.0 + within(FRICTION)).collect(),
@@ -62,11 +82,20 @@ impl Drawn {
             converter: 1.0 + within(CONVERTER),
             ..none
         };
+        // Streams of their own: the other draws do not depend on them.
+        let (mut timings, mut drags) = (Random(seed ^ TIMING_STREAM), Random(!seed));
+        let draw = match case {
+            Case::WithTiming => draw.with_timing(&file, &ShiftErrors::STANDARD, || timings.uniform()),
+            _ => draw,
+        };
         let mut truth = draw.car(&file);
         let kiss_pa: Vec<f64> = truth.clutches.iter().map(|_| within(KISS_PA)).collect();
         for (clutch, kiss_pa) in truth.clutches.iter_mut().zip(&kiss_pa) {
             let Some(clutch) = clutch else { continue };
             clutch.clutch.return_spring_n += kiss_pa * clutch.clutch.piston_area_m2;
+        }
+        for clutch in truth.clutches.iter_mut().flatten() {
+            clutch.drag_n_m *= 1.0 + share * DRAG * (2.0 * drags.uniform() - 1.0);
         }
         // The simulated gear train has its own inertia; that of the file is what is wrong.
         let mut file = file;
@@ -94,7 +123,10 @@ impl Drawn {
         let element = |place: usize| (0..self.file.clutches.len()).find(|at| tables.place(*at) == Some(place)).unwrap();
         match quantity {
             Quantity::Input if self.file.converter.is_some() => self.draw.converter.ln(),
-            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay | Quantity::Drag | Quantity::Lag(_) => 0.0,
+            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) | Quantity::Drag => 0.0,
+            Quantity::Lag(place) => self.draw.timing[element(place)].map_or(0.0, |timing| timing.lag.ln()),
+            Quantity::InputDelay | Quantity::PressureScale => 0.0,
+            Quantity::Gain(place) => self.draw.valve_gain[element(place)].ln(),
             Quantity::Torque(place) => {
                 let at = element(place);
                 (self.draw.friction[at] * self.draw.valve_gain[at]).ln()
@@ -124,20 +156,31 @@ impl Drawn {
     pub(crate) fn each_row(
         &self,
         drive: &Drive,
-        mut sampled: impl FnMut(&CarSample),
+        sampled: impl FnMut(&CarSample),
         mut read: impl FnMut(f64, &ShiftInput<f64>),
     ) {
         let tables = self.tables();
-        let sensors = Sensors { seed: self.seed, ..sensors() };
+        self.each_measured(drive, self.seed, sampled, |row| read(row.sample.time_s, &row.input(&self.file, &tables)));
+    }
+
+    /// The same with readings by sensors of this seed.
+    pub(crate) fn each_measured(
+        &self,
+        drive: &Drive,
+        seed: u64,
+        mut sampled: impl FnMut(&CarSample),
+        mut read: impl FnMut(&MeasuredRow),
+    ) {
+        let sensors = Sensors { seed, ..sensors() };
         let model = CarModel::new(self.truth.clone()).unwrap();
         let mut sensed = SensedDrive::new(&self.file, &sensors, ROW_S);
         let drive = Drive { sample_time_s: sensed.record_s(), ..drive.clone() };
         simulate_car_drive(&model, &self.file, CarCalibration::STANDARD, &drive, |sample| {
             sampled(sample);
-            sensed.each(sample, |row| read(row.sample.time_s, &row.input(&self.file, &tables)));
+            sensed.each(sample, &mut read);
         })
         .unwrap();
-        sensed.last(|row| read(row.sample.time_s, &row.input(&self.file, &tables)));
+        sensed.last(&mut read);
     }
 }
 
@@ -158,13 +201,30 @@ pub(crate) fn every_fifth(shifts: Vec<ShiftLog>) -> [Vec<ShiftLog>; 2] {
 #[derive(Default)]
 pub(crate) struct Truth {
     torque_n_m: [Series; 2],
+    pressure_pa: [Series; 2],
 }
 
 impl Truth {
     fn push(&mut self, sample: &CarSample) {
         let Some(shift) = &sample.shift else { return };
-        for (series, clutch) in self.torque_n_m.iter_mut().zip([&shift.offgoing, &shift.oncoming]) {
-            series.push(sample.time_s, clutch.torque_n_m.abs());
+        for (at, clutch) in [&shift.offgoing, &shift.oncoming].into_iter().enumerate() {
+            self.torque_n_m[at].push(sample.time_s, clutch.torque_n_m.abs());
+            self.pressure_pa[at].push(sample.time_s, clutch.pressure_pa);
+        }
+    }
+
+    /// Gives shifts the readings of a pressure sensor at an element, by its place in the tables.
+    pub(crate) fn measure(&self, shifts: &mut [ShiftLog], tables: &ShiftTables<f64>, place: usize, seed: u64) {
+        let mut random = Random(seed);
+        let scale = 1.0 + SENSOR_SCALE * (2.0 * random.uniform() - 1.0);
+        let rows = tables.tables();
+        for log in shifts {
+            let row = rows.shift(log.gears[0], log.gears[1]).unwrap();
+            let Some(clutch) = row.clutches.iter().position(|clutch| clutch.element == place) else { continue };
+            for time_s in &log.turbine.time_s {
+                let noise_pa = SENSOR_PA * (2.0 * random.uniform() - 1.0);
+                log.pressure[clutch].push(*time_s, scale * self.pressure_pa[clutch].at(*time_s) + noise_pa);
+            }
         }
     }
 

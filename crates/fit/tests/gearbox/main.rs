@@ -2,11 +2,13 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod drawn;
+mod estimated;
 
 use std::path::Path;
 
 use config::{Car, Source};
-use drawn::{Drawn, car, city, every_fifth, tables};
+use design::ShiftErrors;
+use drawn::{Case, Drawn, car, city, every_fifth, tables};
 use fit::gearbox::{GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
@@ -35,8 +37,13 @@ fn fit_of_rows(drawn: &Drawn, rows: &[(f64, ShiftInput<f64>)]) -> (GearboxFit, u
 /// Share of the true values that lie in their stated intervals.
 fn held(drawn: &Drawn, fit: &GearboxFit) -> f64 {
     let tables = drawn.tables();
-    let known: Vec<Quantity> =
-        fit.quantities.all.iter().copied().filter(|quantity| *quantity != Quantity::Drag).collect();
+    let known: Vec<Quantity> = fit
+        .quantities
+        .all
+        .iter()
+        .copied()
+        .filter(|quantity| !matches!(quantity, Quantity::Drag | Quantity::Gain(_)))
+        .collect();
     let inside = known.iter().filter(|quantity| {
         let truth = drawn.true_unknown(&tables, &fit.quantities, **quantity);
         (fit.unknown(**quantity) - truth).abs() <= 1.96 * fit.sd(**quantity)
@@ -48,7 +55,7 @@ fn held(drawn: &Drawn, fit: &GearboxFit) -> f64 {
 fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_held_out() {
     // The second has neither converter nor planetary gears.
     for (vehicle, seed) in [("eight_speed.toml", 1), ("dual_clutch.toml", 2)] {
-        let drawn = Drawn::of(car(vehicle), seed);
+        let drawn = Drawn::of(car(vehicle), seed, Case::Usual);
         let (recorded, truth) = drawn.driven(&city(2));
         let [fitted_shifts, held_out] = every_fifth(recorded.shifts);
         assert!(fitted_shifts.len() >= 20, "{vehicle}: {}", fitted_shifts.len());
@@ -69,7 +76,7 @@ fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_hel
 
 #[test]
 fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
-    let drawn = Drawn::of(car("eight_speed.toml"), 3);
+    let drawn = Drawn::of(car("eight_speed.toml"), 3, Case::Usual);
     let (recorded, _) = drawn.driven(&city(1));
     let fit = fitted(&drawn, &recorded.shifts);
     let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
@@ -101,7 +108,7 @@ fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
 
 #[test]
 fn outliers_and_lost_readings_leave_the_values_within_their_intervals() {
-    let drawn = Drawn::of(car("eight_speed.toml"), 4);
+    let drawn = Drawn::of(car("eight_speed.toml"), 4, Case::Usual);
     let mut rows = rows(&drawn, 1);
     let (clean, skipped) = fit_of_rows(&drawn, &rows);
     let is = |row: usize, every: usize| row.wrapping_mul(2_654_435_761).is_multiple_of(every);
@@ -129,7 +136,7 @@ fn outliers_and_lost_readings_leave_the_values_within_their_intervals() {
 
 #[test]
 fn one_shift_tells_little_and_says_so() {
-    let drawn = Drawn::of(car("eight_speed.toml"), 5);
+    let drawn = Drawn::of(car("eight_speed.toml"), 5, Case::Usual);
     let (recorded, _) = drawn.driven(&city(1));
     let fit = fitted(&drawn, &recorded.shifts[..1]);
     let before = |place: usize| fit.quantities.sd_before(place);
@@ -161,7 +168,7 @@ fn one_shift_tells_little_and_says_so() {
 
 #[test]
 fn a_log_of_another_car_does_not_fit_the_ratios() {
-    let drawn = Drawn::of(car("eight_speed.toml"), 6);
+    let drawn = Drawn::of(car("eight_speed.toml"), 6, Case::Usual);
     let other = car("ten_speed.toml");
     let other_tables = tables(&other);
     let mut recorder = Recorder::new(&other, &other_tables, ReadingAges::default());
@@ -173,7 +180,7 @@ fn a_log_of_another_car_does_not_fit_the_ratios() {
 /// Input without sense is no panic, and no shift comes from it.
 #[test]
 fn what_no_car_does_is_left_out() {
-    let drawn = Drawn::of(car("eight_speed.toml"), 7);
+    let drawn = Drawn::of(car("eight_speed.toml"), 7, Case::Usual);
     let good = rows(&drawn, 1);
     let tables = drawn.tables();
     let recorded = |change: &dyn Fn(usize, &mut f64, &mut ShiftInput<f64>)| {
@@ -225,8 +232,85 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
         ("[turbine_inertia_kg_m2]\n\"2-3\" = 0.01", "hint: more than"),
         ("[turbine_inertia_kg_m2]\n\"1-2\" = -1", "1-2"),
         ("[clutch.E]\nreturn_spring_n = -5", "clutch.E.return_spring_n"),
+        ("[clutch.E.error_bounds]\nfriction_factor = [1.1, 1.2]", "does not contain 1"),
+        ("[clutch.E.error_bounds]\nvalve_delay_s = [0.03, 0.0]", "expected [least, greatest]"),
+        ("[clutch.E.error_bounds]\nvalve_hysteresis_pa = -1", "clutch.E.error_bounds.valve_hysteresis_pa"),
+        ("[clutch.E.error_bounds]\nfriction = 0.1", "unknown field"),
+        ("[error_bounds]\nconverter_share = 2", "error_bounds.converter_share"),
     ] {
         let error = with(text).unwrap_err().to_string();
         assert!(error.contains(words), "{text}: {error}");
     }
+}
+
+/// The filter and its ranges take the bounds of the file, and those of a car in series where it has none.
+#[test]
+fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
+    let given = car("eight_speed.toml");
+    let gearbox = Source::read(&given.source.path.parent().unwrap().join("../gearboxes/8hp.toml")).unwrap();
+    let more = "[clutch.E.error_bounds]\nvalve_lag_factor = [0.9, 1.2]\n[error_bounds]\nconverter_share = 0.04\n";
+    let source = Source { text: format!("{}\n{more}", given.source.text), ..given.source.clone() };
+    let own = Car::from_sources(source, gearbox).unwrap();
+    let at = own.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
+    let standard = ShiftErrors::STANDARD;
+    assert_eq!(standard.of_element(&own, at).valve_lag_factor, [0.9, 1.2]);
+    assert_eq!(standard.of_element(&own, at).friction_factor, standard.of_element(&given, at).friction_factor);
+    assert_eq!(standard.of_car(&given), standard);
+    // Of the elements the widest.
+    assert_eq!(standard.of_car(&own), ShiftErrors { converter: 0.04, ..standard });
+    let tables = [&given, &own].map(tables);
+    let budget = |car: usize| tables[car].tables().elements[tables[car].place(at).unwrap()].budget.unwrap();
+    assert_eq!((budget(0).lag_factor, budget(1).lag_factor), ([0.5, 1.5], [0.9, 1.2]));
+}
+
+#[test]
+fn the_ranges_of_a_fitted_file_hold_and_are_narrower() {
+    for (case, seed) in [(Case::Usual, 9), (Case::WithTiming, 10)] {
+        let drawn = Drawn::of(car("eight_speed.toml"), seed, case);
+        let (recorded, _) = drawn.driven(&city(2));
+        let fit = fitted(&drawn, &recorded.shifts);
+        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+        for (place, name) in fit.quantities.elements.iter().enumerate() {
+            let table = format!("[clutch.{name}.error_bounds]");
+            assert_eq!(file.source.text.contains(&table), fit.elements_seen[place], "{name}");
+        }
+        let bounds = [&drawn.file, &file].map(|car| ShiftErrors::STANDARD.of_car(car));
+        assert!(bounds[1].converter <= bounds[0].converter && bounds[1].inertia <= bounds[0].inertia, "{bounds:?}");
+        let found = estimated::estimated(&drawn, &city(1), &[drawn.file.clone(), file]);
+        assert!(found[1].rows > 500.0, "{found:?}");
+        found.iter().for_each(|found| assert_eq!(found.outside, [0.0; 2], "{found:?}"));
+        if case == Case::Usual {
+            assert!(found[1].width_n_m < 0.97 * found[0].width_n_m, "{found:?}");
+            assert!(found[1].width_pa < 0.95 * found[0].width_pa, "{found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_measured_pressure_tells_friction_and_gain_apart() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 11, Case::Usual);
+    let (recorded, truth) = drawn.driven(&city(1));
+    let tables = drawn.tables();
+    let at = drawn.file.gearbox.elements.iter().position(|element| element.name == "C").unwrap();
+    let place = tables.place(at).unwrap();
+    let mut with = recorded.shifts.clone();
+    truth.measure(&mut with, &tables, place, 1);
+    let [without, with] = [&recorded.shifts, &with].map(|shifts| fitted(&drawn, shifts));
+    let gain = Quantity::Gain(place);
+    assert_eq!((without.verdict(gain), with.verdict(gain)), (Verdict::NotTold, Verdict::Measured));
+    let error = with.unknown(gain) - drawn.true_unknown(&tables, &with.quantities, gain);
+    assert!(error.abs() < 2.0 * with.sd(gain) && with.sd(gain) < 0.01, "{error} {}", with.sd(gain));
+    let [before, kept, found] = [None, Some(&without), Some(&with)].map(|fit| match fit {
+        None => drawn.file.clone(),
+        Some(fit) => fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap(),
+    });
+    let settled_pa = |car: &Car| car.clutches[at].unwrap().valve.settled_pressure(0.5);
+    assert_eq!(settled_pa(&kept), settled_pa(&before));
+    assert!((settled_pa(&found) / settled_pa(&before) / with.unknown(gain).exp() - 1.0).abs() < 1e-3);
+    let friction = |car: &Car| car.clutches[at].unwrap().clutch.friction.at(50.0);
+    let product = with.unknown(Quantity::Torque(place)) - with.unknown(gain);
+    assert!((friction(&found) / friction(&before) / product.exp() - 1.0).abs() < 1e-3);
+    let said = [&without, &with].map(|fit| fit.statements().join("\n").contains("gain apart of C"));
+    assert_eq!(said, [false, true]);
+    assert!(with.report().iter().any(|row| row.name == "C: valve gain"), "{:?}", with.report());
 }

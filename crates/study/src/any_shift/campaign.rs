@@ -74,7 +74,14 @@ impl CarCampaign {
     ///
     /// # Errors
     /// The gearbox has more clutches than the filter has room for, or the filter has tables for none of the shifts.
-    pub fn new(study: CarStudy, sensors: &Sensors) -> Result<Self, StudyError> {
+    pub fn new(mut study: CarStudy, sensors: &Sensors) -> Result<Self, StudyError> {
+        // What the study says comes before what the vehicle file says.
+        for own in &mut study.car.error_bounds.elements {
+            own.friction_factor = own.friction_factor.filter(|_| study.errors.friction.is_none());
+            own.valve_gain_factor = own.valve_gain_factor.filter(|_| study.errors.valve_gain.is_none());
+        }
+        let own_converter = &mut study.car.error_bounds.converter_share;
+        *own_converter = own_converter.filter(|_| study.errors.converter.is_none());
         let car = &study.car;
         let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
         let pairs: Vec<[usize; 2]> = match &study.what {

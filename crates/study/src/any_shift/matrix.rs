@@ -53,7 +53,7 @@ pub fn drawn_car(known: &Car, from: usize, to: usize, seed: u64) -> Car {
 fn draw(known: &Car, from: usize, to: usize, seed: u64, timing: bool) -> ShiftDraw {
     let mut random = Random(seed.wrapping_mul(1000).wrapping_add(from as u64 * 37 + to as u64));
     let draw = ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform());
-    if timing { draw.with_timing(&ShiftErrors::STANDARD, || random.uniform()) } else { draw }
+    if timing { draw.with_timing(known, &ShiftErrors::STANDARD, || random.uniform()) } else { draw }
 }
 
 /// A shift of the matrix.

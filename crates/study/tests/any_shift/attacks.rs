@@ -286,7 +286,7 @@ fn the_range_is_guaranteed_whatever_is_lost() {
         let [mut clutches, mut ranges, mut outside] = [0_u32; 3];
         for (from, to, throttle) in shifts(car).into_iter().step_by(3) {
             let draw = ShiftDraw::within(car, &ERRORS, || random.uniform());
-            let truth = draw.with_timing(&ERRORS, || random.uniform()).car(car);
+            let truth = draw.with_timing(car, &ERRORS, || random.uniform()).car(car);
             let samples = simulated(car, &truth, &CarShift::usual(car, from, to, throttle)).unwrap();
             let steps = std::cell::Cell::new(0);
             let rows = rows(car, &samples, 1, |input| {

@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use logs::ChannelMap;
 use study::any_shift::logged::LoggedDrive;
 
-use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, progress, reasons, table};
+use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, progress, reasons, said_of_file, table};
 use crate::args::Fit;
 use crate::commands::estimate::Messages;
 use crate::commands::estimate::any_car::check_ratios;
@@ -55,8 +55,13 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     let fitted = found.vehicle_file(&car, &options.output, &names.join(", "))?;
     let checked = found.validate((&car, &tables), (&fitted, &LoggedDrive::tables(&fitted)?), &held_out);
     bar.finish_and_clear();
+    let against = found.reason_against(checked.as_ref());
+    let written = match &against {
+        None => fitted,
+        Some(reason) => found.kept_file(&car, &options.output, reason)?,
+    };
     // Nobody has to read the report to its end.
-    write_text(&options.output, &fitted.source.text)?;
+    write_text(&options.output, &written.source.text)?;
     table(&found.report())?;
     let [scale, gain] = found.scale_and_gain;
     output::line(&format!("turbine speed: one-step error {scale:.3} rad/s, g {gain:.2}"))?;
@@ -64,8 +69,7 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
         output::line(&statement)?;
     }
     output::line(&checked.as_ref().map_or_else(nothing_held_out, said_of))?;
-    let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
-    output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
+    said_of_file(options, found.shifts, against);
     Ok(())
 }
 
@@ -108,6 +112,7 @@ fn record_one(
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
         recorder.push(step.time_s, &step.input);
+        recorder.push_pressure(step.time_s, step.truth.map(|[pressure_pa, ..]| pressure_pa));
         count += 1;
         if count.is_multiple_of(STEPS) {
             bar.set_message(format!("reading {}, {:.0} s", log.display(), step.time_s));
@@ -144,13 +149,9 @@ fn no_shift(options: &Fit) -> Failure {
 /// The result on held-out shifts, in words.
 fn said_of(checked: &HeldOut) -> String {
     let [given, fitted] = checked.turbine_rad_s;
-    let mut text = format!(
+    format!(
         "{} shifts held out: turbine speed while both clutches slip, by the torques of the given file off by {given:.2} rad/s, of the fitted one \
          by {fitted:.2} rad/s; the fitted file is the better one in {}",
         checked.shifts, checked.better
-    );
-    if fitted > given {
-        text += "\nwarning: the fitted file is worse on them: do not use it before the reason is known";
-    }
-    text
+    )
 }

@@ -66,16 +66,21 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     write_text(&options.output, &written.source.text)?;
     print(&found)?;
     output::line(&said_of(checked.as_ref()))?;
-    let shifts = if found.shifts == 1 { "shift" } else { "shifts" };
-    if let Some(reason) = against {
-        output::note(&format!(
-            "warning: the fitted values are not written: {reason}. {} has the values of the given file; do not use others before the reason is known",
-            options.output.display()
-        ));
-        return Ok(());
-    }
-    output::note(&format!("fitted to {} {shifts}: {}", found.shifts, options.output.display()));
+    said_of_file(options, found.shifts, against);
     Ok(())
+}
+
+/// Says what the file has, and of how many shifts, or why it has the given values.
+fn said_of_file(options: &Fit, shifts: usize, against: Option<String>) {
+    let output = options.output.display();
+    let shifts = if shifts == 1 { "1 shift".to_owned() } else { format!("{shifts} shifts") };
+    output::note(&match against {
+        None => format!("fitted to {shifts}: {output}"),
+        Some(reason) => format!(
+            "warning: the fitted values are not written: {reason}. {output} has the values of the given file; do not use others before the reason is \
+             known"
+        ),
+    });
 }
 
 /// The fitted values, the scatter of each channel, and what these logs tell.

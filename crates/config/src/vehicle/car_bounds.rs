@@ -1,0 +1,111 @@
+//! What a vehicle file with a whole gearbox says of its own errors: what it leaves out is that of a car in series.
+
+use serde::Deserialize;
+
+use super::HYSTERESES_PA;
+use crate::ConfigError;
+use crate::check::{Check, Number, Numbers};
+
+/// Bounds on the errors of a car's file; none where the file says nothing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CarErrorBounds {
+    /// Of the converter's capacity, as a share.
+    pub converter_share: Option<f64>,
+    /// Of the engine torque that the engine's controller reports, as a share.
+    pub engine_torque_share: Option<f64>,
+    /// Of the turbine-side inertia of a shift, as a share.
+    pub inertia_share: Option<f64>,
+    /// Of the stiffness of the drive shafts, as a share.
+    pub shaft_stiffness_share: Option<f64>,
+    /// Of each element, in the order of the gearbox's elements.
+    pub elements: Vec<ElementErrorBounds>,
+}
+
+/// Bounds on the errors of one friction element and its valve; none where the file says nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ElementErrorBounds {
+    /// Least and greatest factor on the friction.
+    pub friction_factor: Option<[f64; 2]>,
+    /// Least and greatest factor on the gain of the valve.
+    pub valve_gain_factor: Option<[f64; 2]>,
+    /// Least and greatest factor on its lag.
+    pub valve_lag_factor: Option<[f64; 2]>,
+    /// Its least and greatest delay, s.
+    pub valve_delay_s: Option<[f64; 2]>,
+    /// Greatest half-width of its hysteresis, Pa.
+    pub valve_hysteresis_pa: Option<f64>,
+}
+
+/// `[error_bounds]`.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct RawCarErrorBounds {
+    converter_share: Option<Number>,
+    engine_torque_share: Option<Number>,
+    inertia_share: Option<Number>,
+    shaft_stiffness_share: Option<Number>,
+}
+
+/// `[clutch.NAME.error_bounds]`.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct RawElementErrorBounds {
+    friction_factor: Option<Numbers>,
+    valve_gain_factor: Option<Numbers>,
+    valve_lag_factor: Option<Numbers>,
+    valve_delay_s: Option<Numbers>,
+    valve_hysteresis_pa: Option<Number>,
+}
+
+/// The bounds of a car whose elements have these.
+pub(super) fn of_car(
+    check: &Check<'_>,
+    raw: &RawCarErrorBounds,
+    elements: Vec<ElementErrorBounds>,
+) -> Result<CarErrorBounds, ConfigError> {
+    let share = |key: &str, value: &Option<Number>| {
+        value.as_ref().map(|value| check.number(format_args!("error_bounds.{key}"), value, 0.0..=0.9)).transpose()
+    };
+    Ok(CarErrorBounds {
+        converter_share: share("converter_share", &raw.converter_share)?,
+        engine_torque_share: share("engine_torque_share", &raw.engine_torque_share)?,
+        inertia_share: share("inertia_share", &raw.inertia_share)?,
+        shaft_stiffness_share: share("shaft_stiffness_share", &raw.shaft_stiffness_share)?,
+        elements,
+    })
+}
+
+/// The bounds of an element in the table `table`, whose valve has this hysteresis.
+pub(super) fn of_element(
+    check: &Check<'_>,
+    table: &str,
+    raw: &RawElementErrorBounds,
+    hysteresis_pa: f64,
+) -> Result<ElementErrorBounds, ConfigError> {
+    let range = |key: &str, values: &Option<Numbers>, allowed| {
+        values.as_ref().map(|values| check.pair(format_args!("{table}.{key}"), values, allowed)).transpose()
+    };
+    let factor = |key: &str, values: &Option<Numbers>| {
+        let found = range(key, values, 0.1..=10.0)?;
+        match (found, values) {
+            (Some([least, greatest]), Some(values)) if !(least..=greatest).contains(&1.0) => {
+                let message = format!(
+                    "{least} to {greatest} does not contain 1: the car of this file would be outside its own error bounds"
+                );
+                let hint = Some("an error of 10 % is [0.9, 1.1]".to_owned());
+                Err(check.meaning(format_args!("{table}.{key}"), values.span().start, message, hint))
+            }
+            _ => Ok(found),
+        }
+    };
+    let hysteresis = |value: &Number| {
+        check.number(format!("{table}.valve_hysteresis_pa"), value, hysteresis_pa..=*HYSTERESES_PA.end())
+    };
+    Ok(ElementErrorBounds {
+        friction_factor: factor("friction_factor", &raw.friction_factor)?,
+        valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor)?,
+        valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor)?,
+        valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
+        valve_hysteresis_pa: raw.valve_hysteresis_pa.as_ref().map(hysteresis).transpose()?,
+    })
+}

@@ -1,0 +1,48 @@
+//! The error budget of a fitted file: what a fit leaves open, as ranges.
+
+use crate::fitted_file::SIDES;
+
+/// Standard deviations in the error budget of a fitted file \[chosen: the ranges of `estimate` are to hold nearly always, not in 95 %
+/// of the cars\].
+pub(crate) const BUDGET_SIDES: f64 = 4.0;
+/// Least error of a converter's maps, as a share \[chosen\].
+pub(crate) const CONVERTER_SHARE_MIN: f64 = 0.03;
+/// What a line of the error budget says of itself.
+pub(crate) const BUDGET_COMMENT: &str =
+    "what the fit leaves open: 4 standard deviations, and no more than was known before";
+
+/// The range of a factor on a fitted value. `value` is the fitted value over the given one, `sd` the standard deviation of its logarithm, and
+/// `given` the range that was known around the given value: the fitted one lies elsewhere in it. The 95 % interval stays.
+pub(crate) fn factors(sd: f64, value: f64, given: [f64; 2]) -> [f64; 2] {
+    // No wider than the whole of what was known before, however much is open of it.
+    let known = (given[1] / given[0]).ln();
+    let half = (BUDGET_SIDES * sd).min(known);
+    let [least, greatest] = given.map(|end| end / value);
+    let stated = half * SIDES / BUDGET_SIDES;
+    [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]
+}
+
+/// The same as a share on either side, of which `least` is always open.
+pub(crate) fn share(sd: f64, value: f64, given: f64, least: f64) -> f64 {
+    let known = given + (value - 1.0).abs();
+    (BUDGET_SIDES * sd).clamp(least, known.max(least))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_is_no_wider_than_what_was_known_and_keeps_the_interval() {
+        let around = |range: [f64; 2], expected: [f64; 2]| {
+            range.iter().zip(expected).for_each(|(one, other)| assert!((one - other).abs() < 1e-3, "{range:?}"));
+        };
+        around(factors(0.01, 1.0, [0.5, 1.5]), [(-0.04_f64).exp(), 0.04_f64.exp()]);
+        // The fitted value is near the end of what was known: beyond it only the 95 % interval.
+        around(factors(0.05, 1.14, [0.85, 1.15]), [(-0.2_f64).exp(), 0.1_f64.exp()]);
+        // What is not told at all: the 95 % interval of a normal distribution over the same range.
+        around(factors(1.0, 1.0, [0.5, 1.5]), [0.5, 3.0_f64.sqrt()]);
+        assert_eq!(share(0.001, 1.0, 0.1, 0.03), 0.03);
+        assert!((share(1.0, 0.9, 0.1, 0.03) - 0.2).abs() < 1e-12);
+    }
+}

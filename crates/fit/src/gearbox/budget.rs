@@ -1,0 +1,99 @@
+//! The error bounds of a fitted file: what the fit leaves open of each quantity.
+
+use config::{Car, ShiftClutch};
+use design::ShiftErrors;
+
+use super::file::{Written, list};
+use super::fitting::GearboxFit;
+use super::quantities::{DELAY_UNIT_S, Quantity};
+use crate::FitError;
+use crate::budget::{BUDGET_COMMENT, BUDGET_SIDES, factors};
+use crate::fitted_file::SIDES;
+use crate::vehicle_text::number;
+
+impl GearboxFit {
+    /// Writes the bounds of the car and of the elements that slipped in a fitted shift; the others keep theirs.
+    pub(super) fn write_budget(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+        let given = ShiftErrors::STANDARD.of_car(car);
+        // The filter takes these as the edge of a uniform distribution.
+        let edge = |sd: f64| 3.0_f64.sqrt() * sd;
+        let comment = "what the fit leaves open: the edge of a uniform distribution of the stated deviation";
+        if car.converter.is_some() {
+            let share = edge(self.sd(Quantity::Input).hypot(self.sd(Quantity::TorqueRatio))).min(given.converter);
+            text.put(&["error_bounds"], "converter_share", &number(share), comment)?;
+        }
+        // One number for all shifts: that of the pair of gears that is known least.
+        let inertias = (0..self.quantities.pairs.len()).map(|at| edge(self.sd(Quantity::Inertia(at))));
+        let share = inertias.fold(0.0, f64::max).min(given.inertia);
+        text.put(&["error_bounds"], "inertia_share", &number(share), comment)?;
+        for (place, name) in self.quantities.elements.iter().enumerate() {
+            let element = car.gearbox.elements.iter().position(|element| element.name == *name);
+            let seen = element.filter(|_| self.elements_seen[place]);
+            if let Some((element, known)) = seen.and_then(|at| Some((at, car.clutches[at].as_ref()?))) {
+                self.write_element_budget(text, car, (element, known), place)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_element_budget(
+        &self,
+        text: &mut Written,
+        car: &Car,
+        (element, known): (usize, &ShiftClutch),
+        place: usize,
+    ) -> Result<(), FitError> {
+        let given = ShiftErrors::STANDARD.of_element(car, element);
+        let [friction, gain] = match self.quantities.measured[place] {
+            true => [
+                factors(self.friction_sd(place), self.friction_factor(place), given.friction_factor),
+                factors(self.sd(Quantity::Gain(place)), self.gain_factor(place), given.valve_gain_factor),
+            ],
+            false => self.untold_friction_and_gain(place, [given.friction_factor, given.valve_gain_factor]),
+        };
+        let lag = Quantity::Lag(place);
+        let lag = factors(self.sd(lag), self.unknown(lag).exp(), given.valve_lag_factor);
+        let delay_s = self.delay_s(car, known, place, given.valve_delay_s);
+        let table = ["clutch", self.quantities.elements[place].as_str(), "error_bounds"];
+        let all = [
+            ("friction_factor", friction),
+            ("valve_gain_factor", gain),
+            ("valve_lag_factor", lag),
+            ("valve_delay_s", delay_s),
+        ];
+        all.iter().try_for_each(|(key, range)| text.put(&table, key, &list(range), BUDGET_COMMENT))
+    }
+
+    /// Least and greatest delay of a valve, s: that of the fitted file over its commands, with what the fit leaves open of it and no more than
+    /// was known before; the 95 % interval of their middle stays.
+    fn delay_s(&self, car: &Car, known: &ShiftClutch, place: usize, given: [f64; 2]) -> [f64; 2] {
+        let quantity = Quantity::Delay(place);
+        let (late_s, sd_s) = (DELAY_UNIT_S * self.unknown(quantity), DELAY_UNIT_S * self.sd(quantity));
+        let of_file = [0.0, car.line_pressure_pa]
+            .map(|pressure_pa| (known.valve.delay(known.valve.command_for(pressure_pa)) + late_s).max(0.0));
+        let [least, greatest] = [of_file[0].min(of_file[1]), of_file[0].max(of_file[1])];
+        let middle = 0.5 * (least + greatest);
+        let lower = (least - BUDGET_SIDES * sd_s).max(given[0].min(middle - SIDES * sd_s));
+        let upper = (greatest + BUDGET_SIDES * sd_s).min(given[1].max(middle + SIDES * sd_s));
+        [lower.max(0.0), upper.min(DELAY_MOST_S)]
+    }
+
+    /// Ranges of friction and valve gain where only their product is told, beside the file that has the product as friction: what the product
+    /// leaves of one where the other is anywhere in its range, and no more than was known before. Both contain 1, so that the range of the
+    /// torque contains that of the file.
+    fn untold_friction_and_gain(&self, place: usize, [friction, gain]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+        let torque = Quantity::Torque(place);
+        let value = self.unknown(torque).exp();
+        let product = factors(self.sd(torque), value, [friction[0] * gain[0], friction[1] * gain[1]]);
+        let both = |least: [f64; 2], greatest: [f64; 2]| {
+            [least[0].max(least[1]).min(1.0), greatest[0].min(greatest[1]).max(1.0)]
+        };
+        [
+            both([product[0] / gain[1], friction[0] / value], [product[1] / gain[0], friction[1] / value]),
+            both([value * product[0] / friction[1], gain[0]], [value * product[1] / friction[0], gain[1]]),
+        ]
+    }
+}
+
+/// Longest delay of a valve that a file may have, s.
+const DELAY_MOST_S: f64 = 0.5;
