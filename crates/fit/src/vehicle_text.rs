@@ -108,7 +108,8 @@ impl VehicleText {
         self.edits.push((span, text));
     }
 
-    /// Adds lines to a table of the file, above its first key that begins a line; false if there is no such table.
+    /// Adds lines to a table of the file, above its first key that begins a line, or below the line of a table without keys; false if
+    /// there is no such table.
     pub(crate) fn add_to_table(&mut self, table: &[Step], lines: &str) -> Result<bool, FitError> {
         let root = DeTable::parse(&self.text).map_err(|error| FitError::input(error.to_string()))?;
         let mut found = root.get_ref();
@@ -120,10 +121,29 @@ impl VehicleText {
         }
         let line_of = |at: usize| self.text[..at].rfind('\n').map_or(0, |end| end + 1);
         let begins_line = |at: &usize| self.text[line_of(*at)..*at].trim().is_empty();
-        let Some(at) = found.keys().map(|key| key.span().start).filter(begins_line).min() else { return Ok(false) };
-        let at = line_of(at);
+        let first = found.keys().map(|key| key.span().start).filter(begins_line).min().map(line_of);
+        let Some(at) = first.or_else(|| self.end_of_header(table)) else { return Ok(false) };
         self.edits.push((at..at, lines.to_owned()));
         Ok(true)
+    }
+
+    /// The end of the line with the name of a table.
+    fn end_of_header(&self, table: &[Step]) -> Option<usize> {
+        let names: Vec<&str> =
+            table.iter().filter_map(|step| if let Step::Key(key) = step { Some(&**key) } else { None }).collect();
+        let header = format!("[{}]", names.join("."));
+        let mut at = 0;
+        for line in self.text.split_inclusive('\n') {
+            at += line.len();
+            let is_header = line.trim_start().strip_prefix(&header).is_some_and(|rest| {
+                let rest = rest.trim();
+                rest.is_empty() || rest.starts_with('#')
+            });
+            if is_header && line.ends_with('\n') {
+                return Some(at);
+            }
+        }
+        None
     }
 
     /// Adds a number to the table of another value, on the line above it.
@@ -194,6 +214,22 @@ fn missing(path: &[Step]) -> FitError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_go_below_the_name_of_a_table_that_has_only_comments() {
+        let text = "[engine]\ninertia_kg_m2 = 0.2\n\n[converter] # all defaults\n# capacity = 1\n\n[a.b]\n";
+        let mut changed = VehicleText::new(text).unwrap();
+        for table in [&["converter"][..], &["a", "b"]] {
+            assert!(changed.add_to_table(&keys(table), "x = 1\n").unwrap());
+        }
+        assert!(!changed.add_to_table(&keys(&["friction"]), "x = 1\n").unwrap());
+        let changed = changed.finish();
+        assert_eq!(
+            changed,
+            "[engine]\ninertia_kg_m2 = 0.2\n\n[converter] # all defaults\nx = 1\n# capacity = 1\n\n[a.b]\nx = 1\n"
+        );
+        assert!(changed.parse::<toml::Table>().is_ok());
+    }
 
     #[test]
     fn a_value_is_replaced_and_everything_else_stays() {

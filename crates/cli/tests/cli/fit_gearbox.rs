@@ -64,6 +64,14 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let again = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &folder.path("again.toml")]);
     let [again_e, ..] = factor(&printed(&again), "E: friction x valve gain");
     assert!((again_e - 1.0).abs() < 0.06, "{}", printed(&again));
+    // A first file, whose tables hold comments alone, is fitted in the same way.
+    let first = folder.path("first.toml");
+    let numbers = ["--mass-kg", "1500", "--wheel-radius-m", "0.3", "--final-ratio", "3", "--engine-torque-n-m", "190"];
+    said(&wetclutch(&[&["init", "--gearbox", "8hp"], &numbers[..], &["-o", &first]].concat()));
+    let output = wetclutch(&["fit", &log, "--vehicle", &first, "-o", &folder.path("own.toml")]);
+    let own = factor(&printed(&output), "E: friction x valve gain");
+    assert!((own[0] / clutch_e[0] - 1.0).abs() < 0.01, "{own:?} {clutch_e:?}");
+    assert!(folder.read("own.toml").contains("[converter]\n# fit: "), "{}", folder.read("own.toml"));
 }
 
 #[test]

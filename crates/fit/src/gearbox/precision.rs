@@ -17,18 +17,23 @@ pub(crate) fn stated(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solv
     let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
     let auto = (information + &problem.precision).cholesky().ok_or_else(singular)?.inverse();
     let cluster = intervals::cluster(&auto, &scores(models, solved), &problem.precision);
-    let scale = DVector::from_fn(count, |j, _| {
-        let found = auto[(j, j)].max(cluster[(j, j)]).sqrt();
+    let mut stated = with_deviations(&auto, |j| {
+        let found = auto[(j, j)].max(cluster[(j, j)]).sqrt().hypot(problem.quantities.all[j].floor());
         // No fit knows less than was known before.
-        let sd = found.hypot(problem.quantities.all[j].floor()).min(problem.quantities.sd_before(j));
-        sd / auto[(j, j)].sqrt()
+        found.min(problem.quantities.sd_before(j))
     });
-    let mut stated = DMatrix::from_fn(count, count, |i, j| scale[i] * scale[j] * auto[(i, j)]);
     for place in problem.quantities.held() {
         let only = DVector::from_fn(count, |j, _| f64::from(u8::from(j == place)));
         intervals::forget(&mut stated, &only, problem.quantities.before[(place, place)]);
     }
-    Ok(stated)
+    // Nor does one with what is held.
+    Ok(with_deviations(&stated, |j| stated[(j, j)].sqrt().min(problem.quantities.sd_before(j))))
+}
+
+/// The covariance with the same correlations and other standard deviations.
+fn with_deviations(covariance: &DMatrix<f64>, sd: impl Fn(usize) -> f64) -> DMatrix<f64> {
+    let scale: Vec<f64> = (0..covariance.nrows()).map(|j| sd(j) / covariance[(j, j)].sqrt()).collect();
+    DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * scale[j] * covariance[(i, j)])
 }
 
 /// The gradients of the groups of shifts.
