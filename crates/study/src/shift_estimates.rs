@@ -4,8 +4,6 @@
 //! both say about one shift. Pressures and torques are given for the shift that the vehicle file describes; of other shifts only
 //! the speeds tell something.
 
-use std::collections::VecDeque;
-
 use config::Vehicle;
 use drivetrain::ReducedShift;
 use logs::shifts::Held;
@@ -59,13 +57,15 @@ const MOST_HELD: usize = 500_000;
 /// The last seconds of a log.
 #[derive(Debug, Clone)]
 pub struct RecentSamples {
-    samples: VecDeque<LogSample>,
+    /// In the order of their times, so that a shift's are a slice; those before `first` are no longer held.
+    samples: Vec<LogSample>,
+    first: usize,
     held: Held,
 }
 
 impl Default for RecentSamples {
     fn default() -> Self {
-        Self { samples: VecDeque::new(), held: Held::new(HELD_S) }
+        Self { samples: Vec::new(), first: 0, held: Held::new(HELD_S) }
     }
 }
 
@@ -73,24 +73,29 @@ impl RecentSamples {
     /// Takes the next sample.
     pub fn push(&mut self, sample: LogSample) {
         // After a time stamp that was far too late, the time goes back.
-        while self.samples.back().is_some_and(|last| last.time_s > sample.time_s) {
-            self.samples.pop_back();
+        while self.samples.last().is_some_and(|last| last.time_s > sample.time_s) {
+            self.samples.pop();
         }
-        self.samples.push_back(sample);
+        self.first = self.first.min(self.samples.len());
+        self.samples.push(sample);
         let oldest_s = self.held.oldest_s(sample.time_s);
-        while self.samples.front().is_some_and(|first| first.time_s < oldest_s) || self.samples.len() > MOST_HELD {
-            self.samples.pop_front();
+        let is_old = |first: usize| self.samples[first].time_s < oldest_s || self.samples.len() - first > MOST_HELD;
+        while self.first < self.samples.len() && is_old(self.first) {
+            self.first += 1;
+        }
+        // Each sample is moved at most once for one that is taken.
+        if 2 * self.first > self.samples.len() {
+            self.samples.drain(..self.first);
+            self.first = 0;
         }
     }
 
     /// The samples from one time to another, with the one before them.
-    pub fn between(&self, [from_s, to_s]: [f64; 2]) -> Vec<LogSample> {
-        let first = self.samples.partition_point(|sample| sample.time_s < from_s).saturating_sub(1);
-        let end = self.samples.partition_point(|sample| sample.time_s <= to_s).max(first);
-        let (front, back) = self.samples.as_slices();
-        let back_at = |at: usize| at.saturating_sub(front.len());
-        let front_at = |at: usize| at.min(front.len());
-        [&front[front_at(first)..front_at(end)], &back[back_at(first)..back_at(end)]].concat()
+    pub fn between(&self, [from_s, to_s]: [f64; 2]) -> &[LogSample] {
+        let held = &self.samples[self.first..];
+        let first = held.partition_point(|sample| sample.time_s < from_s).saturating_sub(1);
+        let end = held.partition_point(|sample| sample.time_s <= to_s).max(first);
+        &held[first..end]
     }
 }
 
@@ -173,7 +178,7 @@ impl ShiftEstimate {
     pub fn of(number: usize, shift: Shift, of_vehicle: bool, recent: &RecentSamples, vehicle: &Vehicle) -> Self {
         let around_s = [shift.start_s() - BEFORE_S - logs::shifts::LONGEST_S, shift.end_s() + AFTER_S];
         let around = of_vehicle.then(|| recent.between(around_s));
-        let estimated = around.and_then(|samples| EstimatedShift::of(&shift, &samples, &vehicle.shift));
+        let estimated = around.and_then(|samples| EstimatedShift::of(&shift, samples, &vehicle.shift));
         let begin_s = estimated.as_ref().map_or(shift.start_s(), |e| e.torque_phase_s[0].min(shift.start_s()));
         let end_s = estimated.as_ref().and_then(|e| e.lock_up_s).map_or(shift.end_s(), |s| s.max(shift.end_s()));
         let window_s = [begin_s - BEFORE_S, end_s + AFTER_S];
@@ -433,7 +438,7 @@ mod tests {
             if step % 97 > 0 {
                 continue;
             }
-            let held: Vec<f64> = recent.samples.iter().map(|sample| sample.time_s).collect();
+            let held: Vec<f64> = recent.samples[recent.first..].iter().map(|sample| sample.time_s).collect();
             for [from_s, to_s] in [[-9.0, -2.0], [-20.0, 0.0], [-0.5, 5.0], [-3.001, -3.0005], [-2.0, -4.0], [1.0, 2.0]]
             {
                 let [from_s, to_s] = [time_s + from_s, time_s + to_s];

@@ -62,7 +62,7 @@ impl<'a> Shifts<'a> {
         let mut found = ShiftEstimate::of(self.selection.seen, shift, of_vehicle, &self.recent, self.vehicle);
         let is_drawn = self.found.len() < MOST_DRAWN;
         if is_drawn || self.is_selective() {
-            found.samples = self.recent.between(found.window_s);
+            found.samples = self.recent.between(found.window_s).to_vec();
             write(&found.samples)?;
             found.thin(if is_drawn { KEPT } else { 0 });
         }
