@@ -3,7 +3,7 @@
 //! The car makes every shift between neighbouring gears in every kind. What its sensors read is estimated with its file, and again with
 //! one value of the file off by its bound, one way and the other. Each error by itself, so that their squares can be added.
 
-use config::{Car, Sensors, ShiftClutch};
+use config::{Car, CarErrorBounds, Sensors, ShiftClutch};
 use design::ShiftErrors;
 use serde::Serialize;
 
@@ -171,11 +171,14 @@ pub struct ShiftSensitivity {
     pub phases: [Option<PhaseOfShift>; 2],
 }
 
-/// What the errors do to the estimates of all shifts between neighbouring gears.
+/// What the errors do to the estimates of all shifts between neighbouring gears: at the bounds of a car in series
+/// ([`ShiftErrors::STANDARD`]), also for a file that has bounds of its own.
 ///
 /// # Errors
 /// A shift of the car cannot be simulated, or the gearbox has more clutches than the filter has room for.
 pub fn car_sensitivity(car: &Car, sensors: &Sensors) -> Result<Vec<ShiftSensitivity>, StudyError> {
+    // Bounds of the file would stand before those that are tried.
+    let car = &Car { error_bounds: CarErrorBounds::default(), ..car.clone() };
     let shifts = nominal_shifts(car, sensors)?;
     let found = shifts.iter().filter_map(|shift| of_shift(car, sensors, shift).transpose());
     Ok(found.collect::<Result<_, AnyShiftError>>()?)

@@ -1,6 +1,6 @@
 //! What each error does to the estimates of a shift.
 
-use config::Car;
+use config::{Car, CarErrorBounds, ElementErrorBounds};
 use study::any_shift::influence::{ValueFrom, car_influences};
 use study::any_shift::sensitivity::{EffectInShift, PhaseOfShift, ShiftErrorKind, car_sensitivity};
 
@@ -42,6 +42,11 @@ fn the_valve_model_alone_has_its_own_errors_and_no_other() {
             assert!(phase.largest().unwrap().torque_n_m[0] <= 3.0_f64.sqrt() * filter);
         }
     }
+    // Bounds of the file itself do not hide the errors that are tried.
+    let own = ElementErrorBounds { valve_delay_s: Some([0.01; 2]), ..ElementErrorBounds::default() };
+    let elements = vec![own; car.clutches.len()];
+    let fitted = Car { error_bounds: CarErrorBounds { elements, ..CarErrorBounds::default() }, ..car.clone() };
+    assert_eq!(car_sensitivity(&fitted, &sensors()).unwrap(), shifts);
     // In the inertia phase under power the speeds show the clutch torque, but for the turbine torque.
     let up = shifts.iter().find(|shift| shift.shift.kind.name() == "power-on upshift").unwrap();
     let inertia = up.phases[1].as_ref().unwrap();
