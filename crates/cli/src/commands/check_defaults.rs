@@ -59,9 +59,19 @@ pub(super) fn describe_car_values(car: &Car, all: bool) -> Result<(), Failure> {
         return Ok(());
     }
     output::line(&format!("\n{} values are not in the file and are defaults", taken.len()))?;
-    let Some(influences) = car_influences(car, &bench_sensors()?)? else {
-        output::line("the filter has tables for no shift of this gearbox, so it cannot be said which of them matter")?;
-        return all_names(taken, &[], true);
+    // A file is not wrong because a shift of its car cannot be simulated.
+    let influences = match car_influences(car, &bench_sensors()?) {
+        Ok(Some(influences)) => influences,
+        Ok(None) => {
+            output::line(
+                "the filter has tables for no shift of this gearbox, so it cannot be said which of them matter",
+            )?;
+            return all_names(taken, &[], true);
+        }
+        Err(error) => {
+            output::line(&format!("it cannot be said which of them matter: {error}"))?;
+            return all_names(taken, &[], true);
+        }
     };
     output::line(&format!(
         "which values matter most: RMS error of torque (N m) and pressure (kPa) of the clutch that drives the inertia phase, while it\n\
