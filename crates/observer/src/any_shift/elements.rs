@@ -234,19 +234,8 @@ impl<T: Real> ElementState<T> {
             per_friction_n_m: u.torque_share * per_pa * pressed_pa,
             per_kiss_n_m: -per_pa * slope * kiss_pa,
             per_pressure_n_m: per_pa * slope * moving_pa,
-            open_loop_n_m: self.open_loop_n_m(element, shift, [slip_rad_s, direction]),
+            open_loop_n_m: shift.alpha.abs() * direction.signum() * clutch.torque_capacity(self.valve_pa, slip),
         }
-    }
-
-    /// The same by the valve model and the budget's friction and kiss point alone, N m.
-    #[inline]
-    pub(super) fn open_loop_n_m(
-        &self,
-        element: &FrictionElement<T>,
-        shift: &ShiftClutch<T>,
-        [slip_rad_s, direction]: [T; 2],
-    ) -> T {
-        shift.alpha.abs() * direction * element.clutch.torque_capacity(self.valve_pa, shift.alpha * slip_rad_s)
     }
 
     /// The torque at the turbine up to which the element holds, N m, by what is known of its errors: `factor` is that of its torque,

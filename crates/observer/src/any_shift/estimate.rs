@@ -217,19 +217,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torque = zero;
         }
         let deviation = x.variance(&row).sqrt();
-        let (valve_pa, correction, both, open_loop_n_m) =
-            self.element(elements, clutch.element).map_or((zero, zero, zero, zero), |(memory, element)| {
-                let open_loop_n_m = if holds {
-                    memory.open_loop_n_m(element, clutch, [zero, torque.signum()])
-                } else {
-                    own.open_loop_n_m
-                };
+        let (valve_pa, correction, both) =
+            self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
                 let gain = memory.valve_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
                 let itself = memory.deviation_pa(u) * x.mean[PRESSURE[c]];
-                let correction = gain + if holds { zero } else { itself };
-                (memory.valve_pa, correction, u.correlation_in_shift(element), open_loop_n_m)
+                (memory.valve_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
             });
+        let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();
         ClutchEstimate {
             element: clutch.element,
