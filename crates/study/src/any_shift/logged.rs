@@ -7,10 +7,10 @@
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::CommandKind;
-use observer::Reading;
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
 };
+use observer::{ChannelHealth, Reading};
 use plant::car::CarShiftQuality;
 use trace::{CsvRows, TraceError, signal};
 
@@ -307,10 +307,17 @@ impl<'c> LoggedDrive<'c> {
     pub fn push(&mut self, step: &LogStep) -> ShiftEstimate<f64> {
         let input = &step.input;
         let estimate = self.filter.step(&mut self.state, input);
-        for (speed, reading) in
-            self.speeds_rad_s.iter_mut().zip([input.engine_rad_s, input.turbine_rad_s, input.output_rad_s])
-        {
-            *speed = reading.map_or(*speed, |reading| reading.value);
+        let channels = &estimate.channels;
+        let readings = [
+            (input.engine_rad_s, channels.engine),
+            (input.turbine_rad_s, channels.turbine),
+            (input.output_rad_s, channels.output),
+        ];
+        for (speed, (reading, channel)) in self.speeds_rad_s.iter_mut().zip(readings) {
+            // A reading that the filter refused is no speed of the car.
+            if let Some(reading) = reading.filter(|_| channel != ChannelHealth::Refused) {
+                *speed = reading.value;
+            }
         }
         let GearCommand { from, to } = input.gear;
         self.passing.drive.states.push(DriveState {

@@ -311,7 +311,7 @@ impl<'a> Measured<'a> {
 }
 
 /// A table with another delimiter than the comma is one of a single column; a channel map reads it.
-fn other_delimiter(path: &Path, error: TraceError) -> Failure {
+pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
     let delimiter = match &error {
         TraceError::MissingColumn { present, .. } => match present.as_slice() {
             [only] => [';', '\t', '|'].into_iter().find(|delimiter| only.contains(*delimiter)),
