@@ -68,6 +68,12 @@ fn read_car(path: &Path) -> Result<Car, Failure> {
     Ok(Car::read(path)?)
 }
 
+/// `--sensors` where nothing is read by sensors.
+fn sensors_without_effect() -> Failure {
+    let message = "--sensors has an effect with the vehicle file of a car with a gearbox alone\nhint: leave it out";
+    Failure::Input(message.to_owned())
+}
+
 /// Writes rows of named cells as a comma-separated file, whole or not at all.
 fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Failure> {
     let write = || -> std::io::Result<()> {
