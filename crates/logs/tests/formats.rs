@@ -185,6 +185,15 @@ fn mdf_floats_of_sixteen_bits_and_of_the_other_order_are_read() {
 }
 
 #[test]
+fn mdf_channels_with_their_time_in_another_group_are_named() {
+    let (log, _, notes) = read(&data("remote.mf4"), &OpenOptions::default()).unwrap();
+    assert_eq!(log.channels(), []);
+    assert_eq!(notes.len(), 1);
+    let said = "2 channels have no time in their group and are left out: N_Eng, N_Turb\nhint: MDF 4.2 can keep";
+    assert!(notes[0].starts_with(said), "{notes:?}");
+}
+
+#[test]
 fn clock_times_dates_and_utf_16_are_read() {
     let folder = Folder::new("stamps");
     let noon_s = 1_711_886_400.0;

@@ -64,14 +64,12 @@ impl MdfLog {
         };
         let file = Mf4File::open_with_options(path, options).map_err(|error| damaged(path, "its structure", &error))?;
         let (mut places, mut channels, mut notes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut left_out = Vec::new();
+        let (mut left_out, mut without_time) = (Vec::new(), Vec::new());
         for (data_group, group, data) in groups(&file) {
             let name = group_name(&file, data, data_group);
             if data.master_channel().is_none_or(|master| !master.is_time_channel()) {
-                let count = data.channels.iter().filter(|channel| !channel.is_master()).count();
-                if count > 0 {
-                    notes.push(format!("{count} channels of group `{name}` have no time and are left out"));
-                }
+                let others = data.channels.iter().filter(|channel| !channel.is_master());
+                without_time.extend(others.map(|channel| error::shown(&channel.name)));
                 continue;
             }
             for (i, channel) in data.channels.iter().enumerate().filter(|(_, channel)| !channel.is_master()) {
@@ -82,6 +80,14 @@ impl MdfLog {
                 places.push(Place { data_group, group, channel: i });
                 channels.push(Channel { name: channel.name.clone(), unit: channel.unit.clone(), group: name.clone() });
             }
+        }
+        if !without_time.is_empty() {
+            notes.push(format!(
+                "{} channels have no time in their group and are left out: {}\nhint: MDF 4.2 can keep the time in another group, which is not read; \
+                 convert the file to 4.10, for example with asammdf (`MDF(path).convert(\"4.10\")`)",
+                without_time.len(),
+                error::some(&without_time)
+            ));
         }
         if !left_out.is_empty() {
             notes.push(format!(

@@ -86,7 +86,21 @@ def mdf():
         t, engine = fast()
         file.append([Signal((engine / 10).astype("<f2"), t, name="Half", unit="V"), Signal(engine.astype(">f4"), t, name="Big", unit="V")])
         file.save(HERE / "half.mf4", overwrite=True)
+    remote()
     unsorted()
+
+
+def remote():
+    """Columns in groups of their own, whose time is in another group. The writer of asammdf 8.8 asks a signal for what it has not."""
+
+    class Whole(Signal):
+        axes, conversions, units, comments, display_names_ = {}, {}, {}, {}, {}
+
+    t, engine = fast()
+    with MDF(version="4.20") as file:
+        file._mdf._column_storage = file._mdf._use_ld_blocks = True
+        file.append([Whole(engine, t, name="N_Eng", unit="1/min"), Whole(engine, t, name="N_Turb", unit="1/min")], common_timebase=True)
+        file.save(HERE / "remote.mf4", overwrite=True)
 
 
 def unsorted():
