@@ -124,6 +124,13 @@ impl Log {
                     "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf",
                 ));
             }
+            Format::OtherFrames => {
+                return Err(LogError::file(
+                    path,
+                    "these are frames of a bus in a form that is not read (PCAN trace, or a table of frames)\nhint: convert it, for example with \
+                     python-can: `python -m can.logconvert IN OUT.log`",
+                ));
+            }
             Format::Can(kind) => {
                 let database = database.ok_or_else(|| {
                     LogError::file(
@@ -303,6 +310,8 @@ enum Format {
     Mdf3,
     Parquet,
     Can(CanKind),
+    /// Frames in a form that is not read.
+    OtherFrames,
     Csv,
 }
 
@@ -325,6 +334,9 @@ impl Format {
             return Self::Can(CanKind::Candump);
         }
         let lower = first.to_lowercase();
+        if lower.starts_with(";$fileversion") || lower.starts_with("timestamp,arbitration_id,") {
+            return Self::OtherFrames;
+        }
         if lower.starts_with("date ") && !first.contains([',', ';', '\t'])
             || lower.starts_with("base hex")
             || lower.starts_with("base dec")

@@ -419,7 +419,7 @@ fn a_last_line_without_an_end_is_never_used_silently() {
 #[test]
 fn what_is_no_log_is_refused_with_what_to_do() {
     let folder = Folder::new("refused");
-    let cases: [(&[u8], &str); 9] = [
+    let cases: [(&[u8], &str); 11] = [
         (b"", ": the file is empty"),
         (b"hello", ": there are no rows"),
         (b"hello\nworld\n", ": this is no format that is known\nhint: logs are CSV"),
@@ -427,6 +427,11 @@ fn what_is_no_log_is_refused_with_what_to_do() {
         (b"1,2\n3,4\n5,6\n", ": line 1: there is no row of names above the first row of numbers\nhint: "),
         (b"a,b\n1,2\n3,4\n", ": there is no column for the time; the first columns are a, b\nhint: "),
         (b"time,b\nfurlong,rpm\n3,4\n5,6\n", "hint: "),
+        (
+            b";$FILEVERSION=2.1\n;$STARTTIME=4\n 1 0.1 DT 0100 Rx 1 00\n",
+            ": these are frames of a bus in a form that is not read",
+        ),
+        (b"timestamp,arbitration_id,extended\n1.0,0x100,0\n", "hint: convert it, for example with python-can"),
         (b"MDF     3.30    ", ": this is MDF of version 2 or 3\nhint: "),
         (
             b"(1.0) can0 123#00\n",
