@@ -16,7 +16,7 @@ use trace::Cell;
 pub struct LogSample {
     /// Time of the step, s.
     pub time_s: f64,
-    /// What the observer was given.
+    /// What the observer was given and did not refuse.
     pub input: Input<f64>,
     /// What it estimates.
     pub estimate: Estimate<f64>,
@@ -27,10 +27,32 @@ pub struct LogSample {
 }
 
 impl LogSample {
+    /// A step with its estimate, without measured pressure and torque. A reading that the observer refused is none: what is said of a shift
+    /// follows from the others.
+    pub fn new(time_s: f64, input: &Input<f64>, estimate: Estimate<f64>) -> Self {
+        let Channels { engine, turbine, output, wheel, command, offgoing_command, engine_torque } = estimate.channels;
+        let input = Input {
+            dt_s: input.dt_s,
+            engine_rad_s: input.engine_rad_s.filter(|_| !is_refused(engine)),
+            turbine_rad_s: input.turbine_rad_s.filter(|_| !is_refused(turbine)),
+            output_rad_s: input.output_rad_s.filter(|_| !is_refused(output)),
+            wheel_rad_s: input.wheel_rad_s.filter(|_| !is_refused(wheel)),
+            command: input.command.filter(|_| !is_refused(command)),
+            offgoing_command: input.offgoing_command.filter(|_| !is_refused(offgoing_command)),
+            engine_torque_n_m: input.engine_torque_n_m.filter(|_| !is_refused(engine_torque)),
+        };
+        Self { time_s, input, estimate, pressure_pa: None, torque_n_m: None }
+    }
+
     /// Whether there is an estimate: none in a gear that the vehicle file does not describe.
     pub fn is_estimated(&self) -> bool {
         !self.estimate.pressure_pa.is_nan()
     }
+}
+
+/// Whether an observer did not use a reading that came with this.
+pub fn is_refused(channel: ChannelHealth) -> bool {
+    matches!(channel, ChannelHealth::Refused | ChannelHealth::Lost)
 }
 
 /// Stands where there is no estimate.
@@ -419,22 +441,51 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_refused_reading_does_no_friction_work() {
+        let reduced = &Vehicle::two_speed_at().unwrap().shift;
+        let work = |turbine: ChannelHealth, spike: f64| {
+            let sample = |step: u32| {
+                let reading = |value: f64| Some(Reading::now(value));
+                let is_spike = step == 5;
+                let mut estimate = Estimate { clutch_torque_n_m: 100.0, pressure_pa: 1e5, ..no_estimate() };
+                estimate.channels.turbine = if is_spike { turbine } else { ChannelHealth::Good };
+                let input = Input {
+                    turbine_rad_s: reading(if is_spike { spike } else { 300.0 }),
+                    output_rad_s: reading(50.0),
+                    ..none()
+                };
+                LogSample::new(0.01 * f64::from(step), &input, estimate)
+            };
+            let samples: Vec<LogSample> = (0..10).map(sample).collect();
+            friction_work(&samples, 0..10, reduced).value
+        };
+        let good = work(ChannelHealth::Good, 300.0);
+        assert!(good.abs() > 1.0);
+        assert_eq!(work(ChannelHealth::Refused, 1e300), good);
+        assert_eq!(work(ChannelHealth::Lost, 1e300), good);
+        // What is not refused counts.
+        assert!(work(ChannelHealth::Good, 1e300).abs() > 1e290);
+    }
+
+    fn none() -> Input<f64> {
+        Input {
+            dt_s: 0.01,
+            engine_rad_s: None,
+            turbine_rad_s: None,
+            output_rad_s: None,
+            wheel_rad_s: None,
+            command: None,
+            offgoing_command: None,
+            engine_torque_n_m: None,
+        }
+    }
+
+    #[test]
     fn the_recent_samples_of_a_time_are_those_of_it_and_the_one_before() {
         let mut recent = RecentSamples::default();
-        let none = None::<Reading<f64>>;
-        let input = Input {
-            dt_s: 0.01,
-            engine_rad_s: none,
-            turbine_rad_s: none,
-            output_rad_s: none,
-            wheel_rad_s: none,
-            command: none,
-            offgoing_command: none,
-            engine_torque_n_m: none,
-        };
         for step in 0..7000 {
             let time_s = 0.01 * f64::from(step);
-            recent.push(LogSample { time_s, input, estimate: no_estimate(), pressure_pa: none, torque_n_m: none });
+            recent.push(LogSample::new(time_s, &none(), no_estimate()));
             if step % 97 > 0 {
                 continue;
             }

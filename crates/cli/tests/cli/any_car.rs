@@ -181,7 +181,7 @@ fn lost_repeated_and_late_readings_of_a_drive_are_no_error() {
 }
 
 /// A table with the cells of a column changed.
-fn with_column(table: &str, column: &str, change: impl Fn(&str) -> String) -> String {
+fn with_column(table: &str, column: &str, mut change: impl FnMut(&str) -> String) -> String {
     let at = table.lines().next().unwrap().split(',').position(|name| name == column).unwrap();
     let changed = |(row, line): (usize, &str)| {
         let cells = line.split(',').enumerate();
@@ -317,6 +317,45 @@ fn a_hole_in_a_shift_ends_it_and_is_said() {
     assert!(numbers(&shifts, "complete_s")[1..].iter().all(|time_s| *time_s < 3.0), "{shifts}");
     // The rest of the shift after the hole is no other shift.
     assert_eq!(column(&shifts, "from_gear"), ["1", "2", "3", "4", "3"]);
+}
+
+#[test]
+fn a_log_with_too_few_rows_is_told_once_and_its_rows_are_no_holes() {
+    let folder = simulated("slow-car");
+    let text = folder.read("sim/short_measured.csv");
+    let (names, rows) = text.split_once('\n').unwrap();
+    for (every, is_slow) in [(50, true), (20, true), (5, false)] {
+        let thinned: Vec<&str> = std::iter::once(names).chain(rows.lines().step_by(every)).collect();
+        folder.write("log.csv", thinned.join("\n") + "\n");
+        let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        let slow = said.matches("too long for the estimate of a shift").count();
+        assert_eq!(slow, usize::from(is_slow), "{every}: {said}");
+        assert!(!said.contains("hole"), "{every}: {said}");
+    }
+}
+
+#[test]
+fn a_reading_that_is_refused_is_no_flare() {
+    let folder = simulated("spike-car");
+    let text = folder.read("sim/short_measured.csv");
+    let [gear, target] = ["gear", "target_gear"].map(|name| column(&text, name));
+    let begin = (0..gear.len()).find(|&row| gear[row] != target[row]).unwrap();
+    for name in ["turbine_speed_rad_s", "output_speed_rad_s"] {
+        for spike in ["1e300", "-1e300", "3000"] {
+            let mut row = 0;
+            let spoilt = with_column(&text, name, |value| {
+                row += 1;
+                if row == begin + 30 { spike.to_owned() } else { value.to_owned() }
+            });
+            folder.write("log.csv", spoilt);
+            said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+            let shifts = folder.read("out_shifts.csv");
+            for column in ["flare_rad_s", "past_synchronous_rad_s"] {
+                let values = numbers(&shifts, column);
+                assert!(values.iter().all(|rad_s| *rad_s < 10.0), "{name} {spike} {column}: {values:?}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -152,7 +152,8 @@ impl RatioWatch {
             }
             if self.raw.len() == MEDIAN {
                 let ratio = middle(std::array::from_fn(|i| self.raw[i].ratio));
-                self.take(Point { ratio, ..self.raw[MEDIAN / 2] });
+                let output_rad_s = middle(std::array::from_fn(|i| self.raw[i].output_rad_s));
+                self.take(Point { ratio, output_rad_s, ..self.raw[MEDIAN / 2] });
             }
         }
     }

@@ -22,7 +22,7 @@ use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
 use super::Messages;
-use super::measured::check_step;
+use super::measured::{check_step, slow_log};
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::selection::Selection;
@@ -106,13 +106,17 @@ pub(super) fn estimate(
             table.flush()?;
         }
     }
-    check_step(path, trace::median_step_s(steps_s), !setup.map.channels.is_empty())?;
+    let median_s = trace::median_step_s(steps_s);
+    check_step(path, median_s, !setup.map.channels.is_empty())?;
     log.finish(say)?;
     checks.map_or(Ok(()), |checks| checks.check())?;
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say.note(&swapped);
     }
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
+    if let Some(warning) = slow_log(median_s) {
+        say.note(&warning);
+    }
     let mut drive = drive.finish();
     passing.check()?;
     drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
