@@ -63,12 +63,14 @@ pub(super) struct RatioChange {
 
 /// Watches the ratio.
 pub(super) struct RatioWatch {
-    /// Logarithms of the ratios and the widths of their bands.
-    gears: Vec<(f64, f64)>,
+    /// Logarithms of the ratios, and the least and greatest ratio that is in each gear.
+    gears: Vec<(f64, [f64; 2])>,
     turbine: Track,
     /// Output readings for which the turbine speed is still to come.
     outputs: VecDeque<(f64, f64)>,
-    raw: VecDeque<Point>,
+    /// The newest points before their middle one is taken, and how many of them there are.
+    raw: [Point; MEDIAN],
+    raw_count: usize,
     held_outputs: Held,
     held_points: Held,
     points: VecDeque<Point>,
@@ -85,10 +87,11 @@ impl RatioWatch {
             (BAND * step(i.wrapping_sub(1)).min(step(i + 1))).min(BAND_MAX)
         };
         Self {
-            gears: (0..logs.len()).map(|i| (logs[i], band(i))).collect(),
+            gears: (0..logs.len()).map(|i| (logs[i], [(logs[i] - band(i)).exp(), (logs[i] + band(i)).exp()])).collect(),
             turbine: Track::new(held_s),
             outputs: VecDeque::new(),
-            raw: VecDeque::new(),
+            raw: [Point { time_s: f64::NAN, ratio: f64::NAN, output_rad_s: f64::NAN }; MEDIAN],
+            raw_count: 0,
             held_outputs: Held::new(held_s),
             held_points: Held::new(held_s),
             points: VecDeque::new(),
@@ -139,19 +142,18 @@ impl RatioWatch {
             self.outputs.pop_front();
             let turbine_rad_s = self.turbine.at(time_s, HOLE_S).filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
             if let Some(turbine_rad_s) = turbine_rad_s.filter(|_| output_rad_s > OUTPUT_MIN_RAD_S) {
-                self.raw.push_back(Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s });
+                self.raw.copy_within(1.., 0);
+                self.raw[MEDIAN - 1] = Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s };
+                self.raw_count = (self.raw_count + 1).min(MEDIAN);
             } else {
                 // Standstill and holes: what is before is not compared with what comes after.
-                self.raw.clear();
+                self.raw_count = 0;
                 if self.now.or(self.before).is_none_or(|gear| time_s - gear.last_s > HOLE_S) {
                     (self.before, self.now) = (None, None);
                 }
             }
-            if self.raw.len() > MEDIAN {
-                self.raw.pop_front();
-            }
-            if self.raw.len() == MEDIAN {
-                let ratio = middle(std::array::from_fn(|i| self.raw[i].ratio));
+            if self.raw_count == MEDIAN {
+                let ratio = middle(self.raw.map(|point| point.ratio));
                 self.take(Point { ratio, ..self.raw[MEDIAN / 2] });
             }
         }
@@ -167,8 +169,7 @@ impl RatioWatch {
         while self.points.front().is_some_and(|first| first.time_s < oldest_s) {
             self.points.pop_front();
         }
-        let log = point.ratio.ln();
-        let gear = self.gears.iter().position(|(gear, band)| (log - gear).abs() <= *band);
+        let gear = self.gears.iter().position(|(_, [low, high])| (*low..=*high).contains(&point.ratio));
         match (gear, &mut self.now) {
             (Some(gear), Some(now)) if now.gear == gear => {
                 let counted = now.counts();
