@@ -141,16 +141,20 @@ impl<W: Write + Seek> MdfWriter<W> {
     /// # Errors
     /// What the writer meets, a cell that is not of the kind of its column, or too many words.
     pub fn row<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let (mut cells, mut record) = (cells.into_iter(), self.record.as_mut_slice());
+        let (mut cells, mut record, mut words_are_same) = (cells.into_iter(), self.record.as_mut_slice(), false);
         set(&mut record, &time_s.to_le_bytes());
         for column in &mut self.columns {
-            match (column, cells.next()) {
+            let cell = if words_are_same { Some(Cell::SameWord) } else { cells.next() };
+            words_are_same |= cell == Some(Cell::SameWords);
+            match (column, cell) {
                 (Column::Number, Some(Cell::Number(number))) => set(&mut record, &number.to_le_bytes()),
                 #[expect(clippy::cast_precision_loss, reason = "counts")]
                 (Column::Number, Some(Cell::Whole(number))) => {
                     set(&mut record, &(number as f64).to_le_bytes());
                 }
-                (Column::Words(words), Some(Cell::SameWord)) if !words.is_empty() => _ = record.split_off_first_mut(),
+                (Column::Words(words), Some(Cell::SameWord | Cell::SameWords)) if !words.is_empty() => {
+                    record.split_off_first_mut();
+                }
                 (Column::Words(words), Some(Cell::Word(word))) => {
                     let at = words.iter().position(|known| known == word).unwrap_or_else(|| {
                         words.push(word.to_owned());
@@ -289,6 +293,8 @@ mod tests {
         };
         let [good, bad] = ["good", "bad"].map(Cell::Word);
         assert_eq!(written([good, bad, Cell::SameWord, good]).unwrap(), written([good, bad, bad, good]).unwrap());
+        assert_eq!(written([good, bad, Cell::SameWords, good]).unwrap(), written([good, bad, bad, good]).unwrap());
         assert!(written([Cell::SameWord, bad, bad, good]).is_err());
+        assert!(written([Cell::SameWords, bad, bad, good]).is_err());
     }
 }

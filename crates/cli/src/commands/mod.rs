@@ -122,7 +122,7 @@ impl Serialize for JsonCell<'_> {
             Cell::Whole(number) => serializer.serialize_u64(number),
             Cell::Word(word) => serializer.serialize_str(word),
             // An object has no row before it.
-            Cell::SameWord => serializer.serialize_unit(),
+            Cell::SameWord | Cell::SameWords => serializer.serialize_unit(),
         }
     }
 }

@@ -127,7 +127,8 @@ impl RatioWatch {
 
     /// The points from one time to another.
     pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Point> {
-        self.points.iter().filter(move |point| (from_s..=to_s).contains(&point.time_s))
+        let first = self.points.partition_point(|point| point.time_s < from_s);
+        self.points.range(first..).take_while(move |point| point.time_s <= to_s)
     }
 
     /// Makes points of the output readings that the turbine speed has passed.
@@ -208,14 +209,22 @@ impl RatioWatch {
     fn inertia(&self, before: &InGear, now: &InGear) -> [f64; 2] {
         let (from, to) = (self.gears[before.gear].0, self.gears[now.gear].0);
         let way = |point: &Point| (point.ratio.ln() - from) / (to - from);
-        let points: Vec<(f64, f64)> =
-            self.between(before.last_s - 1.0, now.last_s).map(|point| (point.time_s, way(point))).collect();
-        let half = points.iter().position(|(_, way)| *way > 0.5).unwrap_or(0);
-        let crossing = |pair: &[(f64, f64)], level: f64| {
-            let ((t0, x0), (t1, x1)) = (pair[0], pair[1]);
+        // Whether a ratio is further on its way than this part of it.
+        let beyond = |level: f64| {
+            let ratio = (from + level * (to - from)).exp();
+            move |point: &Point| if to > from { point.ratio > ratio } else { point.ratio < ratio }
+        };
+        let points: Vec<&Point> = self.between(before.last_s - 1.0, now.last_s).collect();
+        let is_half = beyond(0.5);
+        let half = points.iter().position(|point| is_half(point)).unwrap_or(0);
+        let crossing = |pair: &[&Point], level: f64| {
+            let [(t0, x0), (t1, x1)] = [pair[0], pair[1]].map(|point| (point.time_s, way(point)));
             if x1 == x0 { t1 } else { t0 + ((level - x0) / (x1 - x0)).clamp(0.0, 1.0) * (t1 - t0) }
         };
-        let up = |level: f64| move |pair: &&[(f64, f64)]| pair[0].1 <= level && pair[1].1 > level;
+        let up = |level: f64| {
+            let beyond = beyond(level);
+            move |pair: &&[&Point]| !beyond(pair[0]) && beyond(pair[1])
+        };
         let first = points[..=half.min(points.len().saturating_sub(1))]
             .windows(2)
             .rev()

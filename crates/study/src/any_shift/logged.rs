@@ -313,7 +313,7 @@ impl<'c> LoggedDrive<'c> {
             *speed = reading.map_or(*speed, |reading| reading.value);
         }
         let GearCommand { from, to } = input.gear;
-        self.passing.drive.states.push(DriveState {
+        self.passing.state(DriveState {
             time_s: step.time_s,
             gear: from,
             pedals: step.pedals,

@@ -15,6 +15,8 @@ pub enum Cell<'a> {
     Word(&'a str),
     /// The word that stands in this column in the row before.
     SameWord,
+    /// The words that stand in this column and in all later ones in the row before; the last cell of its row.
+    SameWords,
 }
 
 /// Writes a comma-separated file row by row. Numbers are written so that reading gives the very same ones, with as few digits as that
@@ -170,31 +172,51 @@ impl<'a> Row<'a> {
         let at = self.count;
         self.count += 1;
         let Some(before) = self.written.get(at) else { return };
-        let (bits, may_wait) = match cell {
-            Cell::Number(number) => (if number.is_nan() { NO_NUMBER } else { number.to_bits() }, true),
-            Cell::SameWord => (WORD, true),
-            Cell::Word(_) => (WORD, false),
-            Cell::Whole(_) => (WHOLE, false),
-        };
-        if !may_wait || before.bits != bits {
-            self.write(at, cell, bits);
+        match cell {
+            Cell::Number(number) => {
+                let bits = if number.is_nan() { NO_NUMBER } else { number.to_bits() };
+                if before.bits != bits {
+                    self.number(at, number, bits);
+                }
+            }
+            Cell::SameWord => self.is_whole &= before.bits == WORD,
+            Cell::SameWords => {
+                self.is_whole &= self.written[at..].iter().all(|cell| cell.bits == WORD);
+                self.count = self.written.len();
+            }
+            Cell::Word(word) => self.word(at, word, WORD),
+            Cell::Whole(number) => self.word(at, &number.to_string(), WHOLE),
         }
     }
 
-    /// Writes a cell that has to be.
+    /// Writes a number that is not the one of the row before.
     #[inline(never)]
-    fn write(&mut self, at: usize, cell: Cell<'_>, bits: u64) {
-        self.copy_until(at);
+    fn number(&mut self, at: usize, number: f64, bits: u64) {
+        self.begin_cell(at);
+        push_number(self.rows, number);
+        self.end_cell(at, bits);
+    }
+
+    /// Writes a word, or a whole number.
+    #[inline(never)]
+    fn word(&mut self, at: usize, word: &str, bits: u64) {
+        self.begin_cell(at);
+        push_word(self.rows, word);
+        self.end_cell(at, bits);
+    }
+
+    #[inline]
+    fn begin_cell(&mut self, at: usize) {
+        if self.done < at {
+            self.copy_until(at);
+        }
         if at > 0 {
             self.rows.push(b',');
         }
-        match cell {
-            Cell::Number(number) => push_number(self.rows, number),
-            Cell::Word(word) => push_word(self.rows, word),
-            Cell::Whole(number) => self.rows.extend_from_slice(number.to_string().as_bytes()),
-            // The row before has no word here.
-            Cell::SameWord => self.is_whole = false,
-        }
+    }
+
+    #[inline]
+    fn end_cell(&mut self, at: usize, bits: u64) {
         let end = self.rows.len() - self.begin;
         if let Some(written) = self.written.get_mut(at) {
             self.done_before = std::mem::replace(written, Written { bits, end }).end;
@@ -203,7 +225,6 @@ impl<'a> Row<'a> {
     }
 
     /// Copies the cells that wait, all before this one.
-    #[inline]
     fn copy_until(&mut self, end: usize) {
         let Some(cells) = self.written.get_mut(self.done..end) else { return };
         let Some(last) = cells.last() else { return };
