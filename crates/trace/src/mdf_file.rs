@@ -293,8 +293,22 @@ mod tests {
         };
         let [good, bad] = ["good", "bad"].map(Cell::Word);
         assert_eq!(written([good, bad, Cell::SameWord, good]).unwrap(), written([good, bad, bad, good]).unwrap());
-        assert_eq!(written([good, bad, Cell::SameWords, good]).unwrap(), written([good, bad, bad, good]).unwrap());
         assert!(written([Cell::SameWord, bad, bad, good]).is_err());
-        assert!(written([Cell::SameWords, bad, bad, good]).is_err());
+        // Behind the word is a number.
+        assert!(written([good, bad, Cell::SameWords, good]).is_err());
+    }
+
+    #[test]
+    fn words_up_to_the_end_of_a_row_that_repeat_those_before_are_the_same_in_the_file() {
+        let columns = [("x", ColumnKind::Number), ("health", ColumnKind::Word), ("phase", ColumnKind::Word)];
+        let (x, [good, fill]) = (Cell::Number(0.5), ["good", "fill"].map(Cell::Word));
+        let written = |rows: [&[Cell<'_>]; 2]| {
+            let mut writer = MdfWriter::new(Cursor::new(Vec::new()), columns).unwrap();
+            rows.into_iter().try_for_each(|row| writer.row(0.0, row.iter().copied()))?;
+            writer.finish().map(Cursor::into_inner)
+        };
+        let (row, repeated) = ([x, good, fill], [x, Cell::SameWords]);
+        assert_eq!(written([&row, &repeated]).unwrap(), written([&row, &row]).unwrap());
+        assert!(written([&repeated, &row]).is_err());
     }
 }
