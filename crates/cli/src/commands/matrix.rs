@@ -8,7 +8,7 @@ use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::Cell;
 
 use crate::args::Bench;
-use crate::commands::{json_object, progress, read_car, writable, write_cells, write_text};
+use crate::commands::{JsonObject, progress, read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -41,7 +41,7 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
         write_cells(&folder.join(TABLE), &cells)?;
     }
     if options.json {
-        let objects: Vec<_> = cells.into_iter().map(json_object).collect();
+        let objects: Vec<_> = cells.into_iter().map(JsonObject::of).collect();
         output::line(&serde_json::to_string_pretty(&objects)?)?;
         return Ok(());
     }

@@ -311,12 +311,13 @@ impl ShiftFinder {
 
     /// Takes out the shifts that nothing after `now_s` can change, in the order of their beginning; each is given once.
     pub fn take_settled(&mut self, now_s: f64) -> Vec<Shift> {
-        if self.found.is_empty() && self.by_signal.is_empty() {
+        let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
+        let are_open = |shifts: &[Shift]| shifts.iter().all(is_open);
+        if are_open(&self.found) && are_open(&self.by_signal) {
             return Vec::new();
         }
         self.join_signals();
-        let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
-        if self.found.iter().chain(&self.by_signal).all(is_open) {
+        if are_open(&self.found) && are_open(&self.by_signal) {
             return Vec::new();
         }
         let (open, mut settled): (Vec<_>, Vec<_>) = std::mem::take(&mut self.found).into_iter().partition(is_open);

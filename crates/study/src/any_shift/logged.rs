@@ -345,7 +345,7 @@ impl<'c> LoggedDrive<'c> {
             }
         }
         let GearCommand { from, to } = input.gear;
-        self.passing.drive.states.push(DriveState {
+        self.passing.state(DriveState {
             time_s: step.time_s,
             gear: from,
             pedals: step.pedals,

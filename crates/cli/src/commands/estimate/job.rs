@@ -176,9 +176,8 @@ impl Rows<'_> {
             None => self.findings.push_other_gear(step.time_s),
         }
         let Step { time_s, input, pressure_pa, torque_n_m, .. } = *step;
-        let sample_estimate = estimate.copied().unwrap_or_else(no_estimate);
-        let sample = LogSample::new(time_s, &input, sample_estimate);
-        self.shifts.push(&LogSample { pressure_pa, torque_n_m, ..sample });
+        let sample = LogSample::new(time_s, &input, estimate.copied().unwrap_or_else(no_estimate));
+        self.shifts.push(LogSample { pressure_pa, torque_n_m, ..sample });
         for shift in std::mem::take(&mut step.shifts) {
             self.shift(shift)?;
         }
@@ -221,20 +220,20 @@ fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
     }
     /// Rows that a terminal shows.
     const SHOWN: usize = 40;
-    let (titles, rows) = shift_rows(&shifts.found);
-    let more = rows.len().saturating_sub(SHOWN);
-    let table = std::iter::once(titles).chain(rows.into_iter().take(SHOWN)).collect::<Vec<_>>();
+    let (titles, rows) = shift_rows(&shifts.found, SHOWN);
+    let more = shifts.found.len() - rows.len();
+    let table = std::iter::once(titles).chain(rows).collect::<Vec<_>>();
     for line in output::lines(3, &table) {
         say.note(&line);
     }
     if more > 0 {
         say.note(&format!("and {more} more shifts"));
     }
-    let others: Vec<_> = shifts.found.iter().filter(|shift| !shift.of_vehicle).collect();
-    if let Some(first) = others.first() {
+    let others = || shifts.found.iter().filter(|shift| !shift.of_vehicle);
+    if let Some(first) = others().next() {
         say.note(&format!(
             "{} shifts are not the one of the vehicle file, as {}-{}: of these no pressure is estimated",
-            others.len(),
+            others().count(),
             first.shift.from,
             first.shift.to
         ));

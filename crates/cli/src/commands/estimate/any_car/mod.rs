@@ -27,7 +27,7 @@ use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::selection::Selection;
 use crate::args::{Estimate, ObserverChoice};
-use crate::commands::{channel_map, json_object, write_cells, write_json_list, write_text};
+use crate::commands::{JsonObject, channel_map, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -157,7 +157,7 @@ fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path, say: 
     let [csv, json, page] = places;
     let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
     write_cells(&csv, &cells)?;
-    write_json_list(&json, cells.into_iter().map(json_object))?;
+    write_json_list(&json, cells.into_iter().map(JsonObject::of))?;
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
     write_text(&page, &html)?;
