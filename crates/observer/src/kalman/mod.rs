@@ -12,8 +12,9 @@
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
-//! with the speed at the time at which it was measured, which lies between two steps or before both: the covariance holds
-//! speeds at two earlier times, the older ones of turbine and output only while readings are that old. Before the shift
+//! with the speed at the time at which it was measured, which lies between two steps or before both: the filter remembers the
+//! speeds at two earlier times, and the covariance of the newer ones. What is older is taken to err as a line through
+//! the speeds now and then does. Before the shift
 //! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
 //! friction and gain are kept for some shifts and then forgotten.
 //!
@@ -139,9 +140,12 @@ struct Running<T> {
     covariance: Covariance<T>,
     /// The speeds at earlier times, with which readings are compared that are older than this step.
     past: Past<T>,
-    /// Time since a reading of turbine or output was older than the newest of the past, s: for as long as a channel may be
-    /// silent, the next one may be.
-    late_s: T,
+    /// The earlier speeds from this one on have their covariance kept up to date.
+    kept: usize,
+    /// Whether the gear's ratio was taken as a reading in the last step, so that it is the wheel's turn.
+    tied: bool,
+    /// Time since the shares that fade slowly have done so, s.
+    unfaded_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
     acting: Phase,
@@ -315,9 +319,13 @@ impl<T: Real> KalmanFilter<T> {
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
-        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s);
-        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s);
-        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s);
+        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s, true);
+        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s, true);
+        let held = state.supervisor.phase == Phase::BeforeShift
+            && holds_offgoing(&self.supervisor, &self.model, &state.newest);
+        // In the gear before the shift wheel speed and gear ratio take turns: both teach what changes slowly.
+        let tied = held && !(state.running.as_ref().is_some_and(|running| running.tied) && input.wheel_rad_s.is_some());
+        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s, !tied);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             for (health, silent_s) in health.iter_mut().zip(running.silent_s) {
@@ -325,11 +333,11 @@ impl<T: Real> KalmanFilter<T> {
                     *health = ChannelHealth::Lost;
                 }
             }
-            if state.supervisor.phase == Phase::BeforeShift
-                && holds_offgoing(&self.supervisor, &self.model, &state.newest)
-            {
+            if tied {
                 self.tie(running, dt_s);
             }
+            running.tied = tied;
+            self.limit_learnt(running);
         } else {
             for (health, newest) in health.iter_mut().zip(&state.newest) {
                 if *health == ChannelHealth::Absent && newest.is_none_or(|(_, age_s)| age_s > T::of(LOST_S)) {
@@ -343,9 +351,14 @@ impl<T: Real> KalmanFilter<T> {
         health
     }
 
-    /// Takes a reading of the speed `K`, if there is one.
+    /// Takes a reading of the speed `K`, if there is one. It corrects the filter if it is its `turn`.
     #[inline]
-    fn take_speed<const K: usize>(&self, state: &mut KalmanState<T>, reading: Option<Reading<T>>) -> ChannelHealth {
+    fn take_speed<const K: usize>(
+        &self,
+        state: &mut KalmanState<T>,
+        reading: Option<Reading<T>>,
+        turn: bool,
+    ) -> ChannelHealth {
         let Some(reading) = reading else { return ChannelHealth::Absent };
         let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
         // One that comes too late, after a newer one, is refused as well.
@@ -354,8 +367,8 @@ impl<T: Real> KalmanFilter<T> {
             return ChannelHealth::Refused;
         }
         let health = match &mut state.running {
-            Some(running) => self.correct::<K>(running, reading),
-            None => ChannelHealth::Good,
+            Some(running) if turn => self.correct::<K>(running, reading),
+            Some(_) | None => ChannelHealth::Good,
         };
         // What the filter refuses shows no slip either.
         if health == ChannelHealth::Good {
@@ -494,22 +507,18 @@ fn holds_offgoing<T: Real>(
 }
 
 impl<T: Real> Running<T> {
-    /// Corrects the covariance for a measurement, and states and remembered speeds by their gains times its innovation; of
-    /// the considered states' best gains these shares.
-    fn correct(&mut self, measured: &Measured<'_, T>, innovation: T, shares: &[T; CONSIDERED]) {
-        let gain = self.covariance.correct(measured, shares);
-        for (x, gain) in self.mean.iter_mut().zip(&gain) {
-            *x = *x + *gain * innovation;
+    /// Corrects mean, covariance and remembered speeds for a measurement; of the considered states' best gains these shares. The
+    /// readings of the speeds from `next` on are still to come in this step.
+    fn correct(&mut self, measured: &Measured<T>, innovation: T, shares: &[T; CONSIDERED], next: usize) {
+        // The next step remembers other speeds if it is due.
+        if self.past.is_due() {
+            self.kept = self.kept.max(next);
         }
-        self.past.correct(&gain, innovation);
-    }
-
-    /// Remembers the speeds of now; the oldest are forgotten, and in the covariance those of turbine and output left out if
-    /// it is not to be `whole`.
-    #[inline]
-    fn remember(&mut self, whole: bool) {
-        self.past.remember([self.mean[TURBINE], self.mean[OUTPUT], self.mean[WHEEL]]);
-        self.covariance.remember(whole);
+        let moves = self.covariance.correct(measured, shares, self.kept, innovation);
+        for (x, by) in self.mean.iter_mut().zip(&moves.states) {
+            *x = *x + *by;
+        }
+        self.past.correct(&moves);
     }
 
     /// Whether mean and covariance are numbers, and no variance is negative.
