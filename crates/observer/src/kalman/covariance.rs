@@ -428,9 +428,8 @@ mod tests {
         let variance = noise + (0..ALL).map(|i| h[i] * with[i]).sum::<f64>();
         let share = |i: usize| if (SHARE..N).contains(&i) { shares[i - SHARE] } else { 1.0 };
         let gain: [f64; ALL] = core::array::from_fn(|i| share(i) * with[i] / variance);
-        let left: Dense = core::array::from_fn(|i| {
-            core::array::from_fn(|j| f64::from(u8::from(i == j)) - gain[i] * h[j])
-        });
+        let left: Dense =
+            core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j)) - gain[i] * h[j]));
         let mut expected = product(&product(&left, &p), &transposed(&left));
         for i in 0..ALL {
             (0..ALL).for_each(|j| expected[i][j] += gain[i] * noise * gain[j]);

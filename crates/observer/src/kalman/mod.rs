@@ -142,8 +142,6 @@ struct Running<T> {
     past: Past<T>,
     /// The earlier speeds from this one on have their covariance kept up to date.
     kept: usize,
-    /// Whether the gear's ratio was taken as a reading in the last step, so that it is the wheel's turn.
-    tied: bool,
     /// Time since the shares that fade slowly have done so, s.
     unfaded_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
@@ -319,13 +317,10 @@ impl<T: Real> KalmanFilter<T> {
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
-        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s, true);
-        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s, true);
-        let held = state.supervisor.phase == Phase::BeforeShift
-            && holds_offgoing(&self.supervisor, &self.model, &state.newest);
-        // In the gear before the shift wheel speed and gear ratio take turns: both teach what changes slowly.
-        let tied = held && !(state.running.as_ref().is_some_and(|running| running.tied) && input.wheel_rad_s.is_some());
-        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s, !tied);
+        let skipped = self.skipped(state, input);
+        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s, skipped != Some(TURBINE));
+        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s, skipped != Some(OUTPUT));
+        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s, true);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             for (health, silent_s) in health.iter_mut().zip(running.silent_s) {
@@ -333,10 +328,11 @@ impl<T: Real> KalmanFilter<T> {
                     *health = ChannelHealth::Lost;
                 }
             }
-            if tied {
+            if state.supervisor.phase == Phase::BeforeShift
+                && holds_offgoing(&self.supervisor, &self.model, &state.newest)
+            {
                 self.tie(running, dt_s);
             }
-            running.tied = tied;
             self.limit_learnt(running);
         } else {
             for (health, newest) in health.iter_mut().zip(&state.newest) {
@@ -349,6 +345,17 @@ impl<T: Real> KalmanFilter<T> {
             }
         }
         health
+    }
+
+    /// The speed of which a reading of this step does not correct the filter. Before the shift turbine and output are tied by the
+    /// gear's ratio, and a reading of one tells both: where both come, they take turns.
+    #[inline]
+    fn skipped(&self, state: &KalmanState<T>, input: &Input<T>) -> Option<usize> {
+        let running = state.running.as_ref()?;
+        let both = input.turbine_rad_s.is_some() && input.output_rad_s.is_some();
+        let tied = both && state.supervisor.phase == Phase::BeforeShift;
+        let newer = if running.silent_s[TURBINE] < running.silent_s[OUTPUT] { TURBINE } else { OUTPUT };
+        (tied && holds_offgoing(&self.supervisor, &self.model, &state.newest)).then_some(newer)
     }
 
     /// Takes a reading of the speed `K`, if there is one. It corrects the filter if it is its `turn`.

@@ -80,7 +80,6 @@ impl<T: Real> KalmanFilter<T> {
             covariance,
             past,
             kept: 0,
-            tied: false,
             unfaded_s: zero,
             motion_pa_s: zero,
             acting,
