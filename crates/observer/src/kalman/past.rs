@@ -32,8 +32,8 @@ pub(super) struct Then<T> {
     pub(super) value: T,
     /// Slope of the line, rad/s^2.
     pub(super) acceleration: T,
-    /// What a parabola with another acceleration before differs from that line, per difference of the accelerations, s^2.
-    pub(super) bend_s2: T,
+    /// By how much a parabola differs from the line, per change of the acceleration from one interval to the next, s.
+    pub(super) bend_s: T,
     /// How much older than the oldest it is, s.
     pub(super) beyond_s: T,
 }
@@ -95,14 +95,14 @@ impl<T: Real> Past<T> {
         let slope = |change: T, width_s: T| if width_s > zero { change / width_s } else { zero };
         if age_s <= self.age_s {
             let acceleration = slope(now - self.speeds[k], self.age_s);
-            let bend_s2 = half * age_s * (one - slope(age_s, self.age_s));
-            return Then { value: now - age_s * acceleration, acceleration, bend_s2, beyond_s: zero };
+            let bend_s = half * age_s * (one - slope(age_s, self.age_s));
+            return Then { value: now - age_s * acceleration, acceleration, bend_s, beyond_s: zero };
         }
         let acceleration = slope(self.changes[k], self.span_s);
         let before_s = age_s - self.age_s;
         let (within_s, beyond_s) = (before_s.at_most(self.span_s), (before_s - self.span_s).at_least(zero));
-        let bend_s2 = half * (within_s * (one - slope(within_s, self.span_s)) + beyond_s);
-        Then { value: self.speeds[k] - before_s * acceleration, acceleration, bend_s2, beyond_s }
+        let bend_s = half * (within_s * (one - slope(within_s, self.span_s)) + beyond_s);
+        Then { value: self.speeds[k] - before_s * acceleration, acceleration, bend_s, beyond_s }
     }
 
     /// The line through now and the newer ones, carried on as far as `age_s` ago. Where the two are too near to each other it
@@ -149,8 +149,9 @@ mod tests {
         assert!((speed(2, 9.0, 0.0187) - 10.87).abs() < 1e-9);
         let then = past.then(2, 9.0, 0.03);
         assert!((then.beyond_s - 0.0113).abs() < 1e-9 && (then.value - 12.0).abs() < 1e-9, "{then:?}");
-        // Between two points the parabola is furthest from the line in the middle: an eighth of the square of the width.
-        assert!((past.then(0, 110.0, 0.005).bend_s2 - 0.01 * 0.01 / 8.0).abs() < 1e-12);
+        // A parabola `j t^2/2` over intervals of 10 ms: the acceleration changes by `0.01 j`, and in the middle of an interval
+        // the line is `j 0.01^2/8` off.
+        assert!((0.01 * past.then(0, 110.0, 0.005).bend_s - 0.01 * 0.01 / 8.0).abs() < 1e-12);
         assert!((past.accelerations(0, 110.0)[0] - 1000.0).abs() < 1e-6);
     }
 

@@ -82,7 +82,7 @@ impl<T: Real> KalmanFilter<T> {
         let pitch_s = self.readings[K].pitch_rad / size_rad_s;
         // Between two points a parabola differs from a line, and beyond the oldest by more and more.
         let mut variance =
-            square(then.bend_s2 * (newest - before)) + square(T::of(UNIFORM) * pitch_s * then.acceleration);
+            square(then.bend_s * (newest - before)) + square(T::of(UNIFORM) * pitch_s * then.acceleration);
         let on_line = past.on_line(age_s, K >= running.kept);
         if on_line.beyond > T::zero() {
             // The acceleration is carried on, as well as it is known.
