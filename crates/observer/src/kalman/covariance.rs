@@ -221,6 +221,14 @@ impl<T: Real> Covariance<T> {
         self.upper[state][state] = self.upper[state][state] + variance;
     }
 
+    /// Adds to the variance of the speed `K`, now and at the earlier time alike: both err by one unknown offset.
+    #[inline]
+    pub(super) fn offset<const K: usize>(&mut self, variance: T) {
+        for own in [&mut self.upper[K][K], &mut self.earlier[K][K], &mut self.among[K][K]] {
+            *own = *own + variance;
+        }
+    }
+
     /// Keeps the variance of a state from falling below a limit.
     #[inline]
     pub(super) fn hold_above(&mut self, state: usize, variance: T) {
@@ -455,6 +463,19 @@ mod tests {
             let gearbox = Row { learnt: [0.0, 0.0, 0.2], ..wheel };
             assert_corrects::<TURBINE>(&gearbox, kept);
             assert_corrects::<OUTPUT>(&Row { learnt: [0.0; 3], ..gearbox }, kept);
+        }
+    }
+
+    #[test]
+    fn a_speed_that_has_jumped_follows_its_reading_wherever_on_the_line_that_is() {
+        for [now, earlier] in [[1.0, 0.0], [0.4, 0.6], [0.0, 1.0], [-1.5, 2.5]] {
+            let mut covariance = any();
+            covariance.offset::<OUTPUT>(1e6);
+            let measured = covariance.measured::<OUTPUT>(&Row { now, earlier, learnt: [0.0; 3] }, 0.1);
+            let moves = covariance.correct(&measured, &[1.0; CONSIDERED], 0, 100.0);
+            for moved in [moves.states[OUTPUT], moves.earlier[OUTPUT]] {
+                assert!((moved - 100.0).abs() < 0.1, "{now} {earlier}: {moved}");
+            }
         }
     }
 

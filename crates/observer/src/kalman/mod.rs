@@ -125,6 +125,9 @@ pub struct KalmanState<T> {
     engine: Option<Engine<T>>,
     /// The newest readings of turbine, output and wheel: value, and age in s.
     newest: [Option<(T, T)>; 3],
+    /// Which of turbine and output stood back when both came last. Every such step changes it, so that it is the same in any
+    /// precision.
+    turn: usize,
     running: Option<Running<T>>,
     /// Mean and covariance of what was learnt.
     learnt: Option<([T; LEARNT.len()], [[T; LEARNT.len()]; LEARNT.len()])>,
@@ -192,6 +195,7 @@ impl<T: Real> Estimator<T> for KalmanFilter<T> {
             supervisor: SupervisorState::new(),
             engine: None,
             newest: [None; 3],
+            turn: TURBINE,
             running: None,
             learnt: None,
             lost: false,
@@ -350,12 +354,13 @@ impl<T: Real> KalmanFilter<T> {
     /// The speed of which a reading of this step does not correct the filter. Before the shift turbine and output are tied by the
     /// gear's ratio, and a reading of one tells both: where both come, they take turns.
     #[inline]
-    fn skipped(&self, state: &KalmanState<T>, input: &Input<T>) -> Option<usize> {
-        let running = state.running.as_ref()?;
-        let both = input.turbine_rad_s.is_some() && input.output_rad_s.is_some();
-        let tied = both && state.supervisor.phase == Phase::BeforeShift;
-        let newer = if running.silent_s[TURBINE] < running.silent_s[OUTPUT] { TURBINE } else { OUTPUT };
-        (tied && holds_offgoing(&self.supervisor, &self.model, &state.newest)).then_some(newer)
+    fn skipped(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Option<usize> {
+        if input.turbine_rad_s.is_none() || input.output_rad_s.is_none() {
+            return None;
+        }
+        state.turn = if state.turn == TURBINE { OUTPUT } else { TURBINE };
+        let tied = state.running.is_some() && state.supervisor.phase == Phase::BeforeShift;
+        (tied && holds_offgoing(&self.supervisor, &self.model, &state.newest)).then_some(state.turn)
     }
 
     /// Takes a reading of the speed `K`, if there is one. It corrects the filter if it is its `turn`.

@@ -22,8 +22,9 @@ const SHAFT_START: (f64, f64) = (0.3, 100.0);
 pub(super) const OFFGOING_START: (f64, f64) = (0.5, 50.0);
 const LOAD_START: (f64, f64) = (0.15, 400.0);
 const PRESSURE_START: f64 = 0.3;
-/// Time after which the shares fade that do so in seconds, s: not at every step.
-const FADING_S: f64 = 0.05;
+/// Time after which the shares fade that do so in seconds, s: not at every step, and no multiple of a usual sample time, so that
+/// rounding does not decide when.
+const FADING_S: f64 = 0.0487;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 

@@ -63,7 +63,7 @@ impl<T: Real> KalmanFilter<T> {
                 return ChannelHealth::Refused;
             }
             Verdict::Jumped => {
-                running.covariance.add(K, innovation * innovation);
+                running.covariance.offset::<K>(innovation * innovation);
                 measured = running.covariance.measured::<K>(&row, noise);
             }
             Verdict::Taken => {}
