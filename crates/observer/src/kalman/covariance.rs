@@ -139,12 +139,12 @@ impl<T: Real> Covariance<T> {
 
     /// An earlier time this long ago: the speeds were as uncertain as now, and have changed by accelerations with these variances.
     pub(super) fn steady_past(&mut self, age_s: T, acceleration_variances: [T; SPEEDS]) {
-        for k in 0..SPEEDS {
+        for (k, variance) in acceleration_variances.into_iter().enumerate() {
             self.earlier[k] = core::array::from_fn(|i| self.at(i, k));
             for l in k..SPEEDS {
                 self.among[k][l] = self.at(k, l);
             }
-            self.among[k][k] = self.among[k][k] + acceleration_variances[k] * age_s * age_s;
+            self.among[k][k] = self.among[k][k] + variance * age_s * age_s;
         }
     }
 

@@ -13,10 +13,12 @@
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
 //! with the speed at the time at which it was measured, which lies between two steps or before both: the filter remembers the
-//! speeds at two earlier times, and the covariance of the newer ones. What is older is taken to err as a line through
-//! the speeds now and then does. Before the shift
-//! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
-//! friction and gain are kept for some shifts and then forgotten.
+//! speeds at two earlier times. The covariance has the newer ones, about one step ago; an older speed errs as the line through
+//! the speed then and now does.
+//!
+//! Before the shift the gear ratio ties turbine to output speed: with it, scale and delays are found. A reading of one then
+//! tells both; where both come in a step, they take turns. Scale and delays are kept from shift to shift; friction and gain are
+//! kept for some shifts and then forgotten.
 //!
 //! Where a log has the command of the offgoing clutch, its valve model limits `T_ca`; where it has the torque that the engine's
 //! controller reports, that is a second source of the turbine torque.
