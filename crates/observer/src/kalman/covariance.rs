@@ -403,12 +403,10 @@ mod tests {
         let step = tangent();
         for remembered in [true, false] {
             let mut matrix = [[0.0; ALL]; ALL];
-            for c in 0..ALL {
-                matrix[c][c] = 1.0;
-                if c < COLUMNS {
-                    let next = step.of(&core::array::from_fn(|i| if i == c { 1.0 } else { 0.0 }));
-                    (0..LAWS).for_each(|r| matrix[r][c] = next[r]);
-                }
+            matrix.iter_mut().enumerate().for_each(|(i, row)| row[i] = 1.0);
+            for c in 0..COLUMNS {
+                let next = step.of(&core::array::from_fn(|i| if i == c { 1.0 } else { 0.0 }));
+                matrix.iter_mut().zip(next).for_each(|(row, next)| row[c] = next);
             }
             for (state, left) in [(OFFGOING, step.keep), (SHARE, step.stay), (FRICTION, step.last), (GAIN, step.last)] {
                 assert!(left < 1.0);
@@ -446,12 +444,12 @@ mod tests {
         assert!((measured.variance - variance).abs() < 1e-9 * variance);
         let moves = covariance.correct(&measured, &shares, kept, innovation);
         assert_alike(&dense(&covariance), &expected, kept);
-        for i in 0..N {
-            assert!((moves.states[i] - gain[i] * innovation).abs() < 1e-9);
+        for (moved, gain) in moves.states.iter().zip(gain) {
+            assert!((moved - gain * innovation).abs() < 1e-9);
         }
-        for k in 0..SPEEDS {
+        for (k, moved) in moves.earlier.iter().enumerate() {
             let expected = if k < kept { gain[k] } else { gain[N + k] };
-            assert!((moves.earlier[k] - expected * innovation).abs() < 1e-9);
+            assert!((moved - expected * innovation).abs() < 1e-9);
         }
     }
 
