@@ -15,6 +15,7 @@ pub mod measured;
 mod nominal;
 pub mod recording;
 pub mod sensitivity;
+mod thinned;
 pub mod tour;
 
 use config::{Car, ElementErrorBounds, Sensors};
