@@ -1,8 +1,8 @@
 //! Comma-separated files of any dialect.
 //!
 //! Delimiter, decimal comma and the row of names are told from the first lines. Lines before the names are passed over. Units stand
-//! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Times are numbers, clock times or dates (see
-//! [`crate::stamp`]). Rows are read one by one.
+//! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Times are numbers, clock times or dates.
+//! Rows are read one by one.
 
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};

@@ -17,7 +17,7 @@ pub struct Extremes {
     /// Values away from zero by their size: how many lie between two powers of two.
     sizes: [u32; SIZES],
     count: u64,
-    /// Values above and below zero by more than [`SMALL_RAD_S`].
+    /// Values above and below zero by more than `SMALL_RAD_S`.
     above: u64,
     below: u64,
 }
