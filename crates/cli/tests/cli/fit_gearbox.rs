@@ -48,6 +48,8 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
         "torque scale: not told by these logs",
         "shifts held out: ",
         "better one in ",
+        "mass and road load from ",
+        "the reported engine torque is used in ",
     ] {
         assert!(table.contains(words), "{words}: {table}");
     }

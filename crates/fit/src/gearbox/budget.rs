@@ -22,7 +22,7 @@ impl GearboxFit {
             let share = edge(self.sd(Quantity::Input).hypot(self.sd(Quantity::TorqueRatio))).min(given.converter);
             text.put(&["error_bounds"], "converter_share", &number(share), comment)?;
         }
-        if self.quantities.place(Quantity::Mass).is_some() {
+        if self.is_told(Quantity::Mass) {
             let share = edge(self.sd(Quantity::Mass));
             text.put(&["error_bounds"], "mass_share", &number(share), comment)?;
         }

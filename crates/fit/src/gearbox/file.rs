@@ -89,7 +89,7 @@ impl GearboxFit {
         Ok(())
     }
 
-    /// Mass, road load and engine, where driving between shifts is fitted.
+    /// Mass, road load and engine, where driving between shifts tells them: no ratio between torques in shifts depends on them.
     fn write_vehicle(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
         let values = [
             (Quantity::Mass, "vehicle", "mass_kg", car.road.mass_kg),
@@ -98,12 +98,17 @@ impl GearboxFit {
             (Quantity::EngineInertia, "engine", "inertia_kg_m2", car.engine.inertia_kg_m2),
         ];
         for (quantity, table, key, given) in values {
-            if self.quantities.place(quantity).is_some() {
+            if self.is_told(quantity) {
                 let value = number(given * self.unknown(quantity).exp());
                 text.put(&[table], key, &value, &self.comment(quantity))?;
             }
         }
         Ok(())
+    }
+
+    /// Whether the logs say something of a quantity.
+    pub(super) fn is_told(&self, quantity: Quantity) -> bool {
+        self.verdict(quantity) != Verdict::NotTold
     }
 
     fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {

@@ -182,11 +182,10 @@ impl GearboxFit {
         along.dot(&(&self.stated * &along)).max(0.0).sqrt()
     }
 
-    /// Standard deviation of the logarithm of the factor that all torques have in common, which the speeds do not tell: by what was known
-    /// before of all of them together.
+    /// Standard deviation of the logarithm of the factor that all torques of the shifts have in common, which the speeds do not tell: it comes
+    /// from what was known before.
     pub fn torque_scale_sd(&self) -> f64 {
-        let powers = DVector::from_vec(self.quantities.powers_of_torque());
-        let precision = self.quantities.before.clone().cholesky().map(|cholesky| powers.dot(&cholesky.solve(&powers)));
-        precision.map_or(f64::INFINITY, |precision| precision.sqrt().recip())
+        let weights = self.torque_scale_weights();
+        weights.dot(&(&self.stated * &weights)).max(0.0).sqrt()
     }
 }

@@ -190,10 +190,10 @@ impl Quantities {
         self.all.iter().enumerate().filter(move |(_, quantity)| is_held(quantity)).map(|(place, _)| place)
     }
 
-    /// Power of each quantity in the factor that all torques have in common: with all of them multiplied by one number the speeds
-    /// stay the same.
+    /// Power of each quantity of the shifts in the factor that all torques have in common: with all of them multiplied by one number the
+    /// speeds stay the same.
     pub(crate) fn powers_of_torque(&self) -> Vec<f64> {
-        let power = |quantity: &Quantity| f64::from(u8::from(quantity.has_torque_scale()));
+        let power = |quantity: &Quantity| f64::from(u8::from(quantity.is_torque_of_shifts()));
         self.all.iter().map(power).collect()
     }
 }
@@ -301,8 +301,13 @@ impl Quantity {
     /// Whether it is multiplied when all torques are multiplied by one number.
     pub(crate) fn has_torque_scale(self) -> bool {
         use Quantity as Q;
-        let is_of_shifts = matches!(self, Q::Input | Q::Torque(_) | Q::Inertia(_));
-        is_of_shifts || matches!(self, Q::Mass | Q::Rolling | Q::Air | Q::ReportedScale | Q::EngineInertia)
+        let is_of_driving = matches!(self, Q::Mass | Q::Rolling | Q::Air | Q::ReportedScale | Q::EngineInertia);
+        self.is_torque_of_shifts() || is_of_driving
+    }
+
+    /// The same of what acts in shifts.
+    fn is_torque_of_shifts(self) -> bool {
+        matches!(self, Self::Input | Self::Torque(_) | Self::Inertia(_))
     }
 
     fn floor_of_car(self) -> f64 {

@@ -196,6 +196,14 @@ impl Drawn {
         Self { file, truth, seed, draw, kiss_pa, inertia, vehicle, reported: None }
     }
 
+    /// With a mass in its file that is known to a percent.
+    pub(crate) fn weighed(mut self) -> Self {
+        self.file.road.mass_kg = self.truth.road.mass_kg;
+        self.file.error_bounds.mass_share = Some(0.01);
+        self.vehicle[0] = 1.0;
+        self
+    }
+
     /// With a reported engine torque.
     pub(crate) fn with_reported(self, case: Case) -> Self {
         let share = if case == Case::Right { 0.0 } else { 1.0 };
