@@ -103,11 +103,9 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Takes of the next step what the filter of `estimate` is not shown: the reported engine torque, N m, and the brake pedal, 0 to 1, not a
-    /// number where it is not known.
-    pub fn push_beside(&mut self, reported_n_m: Option<Reading<f64>>, brake: f64) {
+    /// Takes of the next step what the filter of `estimate` is not shown beside a converter: the reported engine torque, N m.
+    pub fn push_reported(&mut self, reported_n_m: Option<Reading<f64>>) {
         self.reported = reported_n_m;
-        self.driving.push_brake(brake);
     }
 
     /// Takes a step.

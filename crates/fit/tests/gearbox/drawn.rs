@@ -254,7 +254,7 @@ impl Drawn {
             drive,
             |sample| truth.push(sample),
             |time_s, input, reported| {
-                recorder.push_beside(reported, f64::NAN);
+                recorder.push_reported(reported);
                 recorder.push(time_s, input);
             },
         );

@@ -18,7 +18,6 @@ struct Row {
     time_s: f64,
     input: ShiftInput<f64>,
     reported: Option<Reading<f64>>,
-    brake: f64,
 }
 
 /// Some minutes in town on a road with hills.
@@ -27,7 +26,7 @@ fn rows(drawn: &Drawn) -> Vec<Row> {
     drawn.each_reported(
         &hilly(&city(1), drawn.seed),
         |_| (),
-        |time_s, input, reported| rows.push(Row { time_s, input: *input, reported, brake: f64::NAN }),
+        |time_s, input, reported| rows.push(Row { time_s, input: *input, reported }),
     );
     rows
 }
@@ -36,7 +35,7 @@ fn recorded(drawn: &Drawn, rows: &[Row]) -> Recorded {
     let tables = drawn.tables();
     let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::of(&drawn::sensors()));
     for row in rows {
-        recorder.push_beside(row.reported, row.brake);
+        recorder.push_reported(row.reported);
         recorder.push(row.time_s, &row.input);
     }
     recorder.finish()
@@ -141,11 +140,13 @@ fn a_log_without_driving_says_that_mass_is_not_told() {
     let rows = rows(&drawn);
     let (usual, said) = changed(&drawn, &rows, |_, _| ());
     assert!(said.contains("mass and road load from ") && said.contains("no reported engine torque is used"), "{said}");
-    // The foot on the brake all the time, and a wheel speed that is off: the one is no driving, the other is not used.
-    let (braked, said) = changed(&drawn, &rows, |_, row| row.brake = 0.3);
+    let alone =
+        fit(&drawn.file, &drawn.tables(), &recorded(&drawn, &rows).shifts, &Driving::default(), &mut |_| ()).unwrap();
+    let said = alone.statements().join("\n");
     assert!(said.contains("mass and road load are not told by these logs: 0 s of driving"), "{said}");
-    assert_eq!(braked.quantities.place(Quantity::Mass), None);
-    assert!(braked.report().iter().all(|row| row.name != "mass"));
+    assert_eq!(alone.quantities.place(Quantity::Mass), None);
+    assert!(alone.report().iter().all(|row| row.name != "mass"));
+    // A wheel speed that is off is not used.
     let (wheel, _) = changed(&drawn, &rows, |_, row| {
         let off = |reading: Reading<f64>| Reading { value: 1.01 * reading.value, ..reading };
         row.input.wheel_rad_s = row.input.wheel_rad_s.map(off);

@@ -112,7 +112,7 @@ fn record_one(
     let mut steps = CarSource::open(CarReading { car, tables, map, stop: None }, log, &mut opened)?;
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
-        recorder.push_beside(step.reported_n_m, step.pedals[1]);
+        recorder.push_reported(step.reported_n_m);
         recorder.push(step.time_s, &step.input);
         recorder.push_pressure(step.time_s, step.truth.map(|[pressure_pa, ..]| pressure_pa));
         count += 1;

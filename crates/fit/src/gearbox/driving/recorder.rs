@@ -21,11 +21,9 @@ const PULLS_N_M: [f64; 2] = [15.0, 5.0];
 /// Share and speed, rad/s, by which the turbine may be off the ratio of the gear.
 const RATIO_SHARE: f64 = 0.03;
 const RATIO_RAD_S: f64 = 2.0;
-/// Where the brake is not known, the end of a stretch is left out, s: from the release of the accelerator until the engine does not pull
-/// any more the brake may be on already.
+/// The end of a stretch is left out, s: from the release of the accelerator until the engine does not pull any more the brake may be on
+/// already.
 const FOOT_S: f64 = 0.5;
-/// Pressed brake, 0 to 1.
-const BRAKE: f64 = 0.005;
 /// Time of driving that is kept, s: two hours.
 const MOST_S: f64 = 7200.0;
 /// Of readings before a stretch what a late signal needs, s.
@@ -50,7 +48,6 @@ pub(crate) struct DrivingRecorder<'a> {
     /// Of the stretch that is open.
     readings: StretchReadings,
     open: Option<(usize, f64)>,
-    brake: f64,
     unsettled_s: f64,
     found: Driving,
 }
@@ -63,15 +60,9 @@ impl<'a> DrivingRecorder<'a> {
             is_known: tables.tables().gears.iter().map(known).collect(),
             readings: StretchReadings::default(),
             open: None,
-            brake: f64::NAN,
             unsettled_s: f64::NEG_INFINITY,
             found: Driving::default(),
         }
-    }
-
-    /// Takes the brake pedal of the next row; not a number where it is not known.
-    pub(crate) fn push_brake(&mut self, brake: f64) {
-        self.brake = brake;
     }
 
     /// Takes a row: its time, the readings of engine, turbine and output speed, the reported engine torque, and its state.
@@ -126,7 +117,7 @@ impl<'a> DrivingRecorder<'a> {
             Some(_) => newest(engine).is_some_and(|engine| engine > ENGINE_LEAST_RAD_S && turbine < slower * engine),
             None => newest(reported).is_some_and(|torque| torque > least_n_m),
         };
-        is_in_gear && is_driven && output > OUTPUT_LEAST_RAD_S && (self.brake.is_nan() || self.brake < BRAKE)
+        is_in_gear && is_driven && output > OUTPUT_LEAST_RAD_S
     }
 
     fn close(&mut self) {
@@ -139,9 +130,7 @@ impl<'a> DrivingRecorder<'a> {
             let (Some(first_s), Some(last_s)) = (series.time_s.first(), series.time_s.last()) else { return };
             span = [span[0].max(*first_s), span[1].min(*last_s)];
         }
-        if self.brake.is_nan() {
-            span[1] -= FOOT_S;
-        }
+        span[1] -= FOOT_S;
         if self.found.time_s() >= MOST_S {
             self.found.is_cut = true;
             return;
