@@ -55,9 +55,13 @@ impl fmt::Display for Failure {
     }
 }
 
+/// An error of standard output: those of files are [`Failure::writing`] with their path.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
-        if error.kind() == io::ErrorKind::BrokenPipe { Self::BrokenPipe } else { Self::Work(error.to_string()) }
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self::BrokenPipe,
+            _ => Self::Work(format!("standard output: {error}")),
+        }
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) fn end_cleanly(command: &Command) -> Result<(), Failure> {
     if matches!(command, Command::Estimate(options) if options.follow) {
         return Ok(());
     }
-    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let mut signals = signals()?;
     thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {
             end(signal);
@@ -28,7 +28,7 @@ pub(crate) fn end_cleanly(command: &Command) -> Result<(), Failure> {
 
 /// The first interrupt or SIGTERM sets `stop`, a second one ends the program.
 pub(crate) fn stop_then_end(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
-    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let mut signals = signals()?;
     let stop = Arc::clone(stop);
     thread::spawn(move || {
         for signal in signals.forever() {
@@ -38,6 +38,11 @@ pub(crate) fn stop_then_end(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
         }
     });
     Ok(())
+}
+
+fn signals() -> Result<Signals, Failure> {
+    let taken = Signals::new([SIGINT, SIGTERM]);
+    taken.map_err(|error| Failure::Work(format!("interrupts cannot be received: {error}")))
 }
 
 fn end(signal: i32) {

@@ -79,6 +79,16 @@ impl ConfigError {
         }
     }
 
+    /// An error of the parser with what to do about it; another error as it is.
+    pub(crate) fn with_hint(self, hint: &str) -> Self {
+        match self {
+            Self::Syntax { path, line, message } => {
+                Self::Syntax { path, line, message: format!("{message}\nhint: {hint}") }
+            }
+            other => other,
+        }
+    }
+
     /// The message without the place, for a text that is not in a file.
     pub fn what(&self) -> String {
         match self {

@@ -56,6 +56,24 @@ fn the_greatest_engine_torque_scales_what_depends_on_the_size_of_a_car() {
 }
 
 #[test]
+fn a_default_that_cannot_be_right_names_the_file_and_the_numbers_that_it_follows_from() {
+    let numbers = "[engine]\nmax_torque_n_m = 2000\n[vehicle]\nmass_kg = 60e3\nwheel_radius_m = 1.0\n";
+    let message = car(numbers).map(|_| "a car").unwrap_err();
+    assert!(message.starts_with("car.toml:4: `driveline.wheel_inertia_kg_m2`: its default"), "{message}");
+    assert!(message.contains("hint: check the greatest engine torque"), "{message}");
+    assert!(car(&format!("{numbers}[driveline]\nwheel_inertia_kg_m2 = 900\n")).is_ok());
+}
+
+#[test]
+fn a_valve_of_ones_own_that_is_not_whole_is_told_so() {
+    let message = car("[valve]\nzero_pressure_a = 1.0\n").unwrap_err();
+    assert!(
+        message.contains("missing field") && message.contains("hint: a [valve] of your own is given whole"),
+        "{message}"
+    );
+}
+
+#[test]
 fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
     for (name, text) in SHIPPED {
         for engine_torque_n_m in [20.0, 190.0, 2000.0] {

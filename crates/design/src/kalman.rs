@@ -1,6 +1,7 @@
 //! The Kalman filters of a vehicle: what it does not know, from the error budget and the sensors.
 
 use config::{Sensors, SpeedSensor, Vehicle};
+use drivetrain::ReducedShift;
 use observer::{
     EngineNoise, ExtendedFilter, FilterNoise, KalmanFilter, OffgoingClutch, Readings, ReportedTorque, SpeedReading,
     Uncertainty, UnscentedFilter, ValveModel,
@@ -88,38 +89,9 @@ pub(crate) fn engine_noise(inertia_kg_m2: f64, sensor: Option<&SpeedSensor>, qua
 ///
 /// A bound of the budget counts as the edge of a uniform distribution.
 pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilter<f64> {
-    let (budget, told) = (&vehicle.error_bounds, &vehicle.filter);
-    let model = compliant_model(vehicle);
-    let line = &vehicle.driveline;
-    let wheels = vehicle.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
-    // A quarter of a swing of the shafts between the gearbox, with the gear's share of the turbine, and the wheels.
-    let gearbox = model.shift.mass_kg_m2[1][1] * line.final_ratio.powi(2);
-    let swing_rad_s = (line.shaft_stiffness_n_m_rad * (gearbox.recip() + wheels.recip())).sqrt();
-    let quarter_swing_s = 0.5 * std::f64::consts::PI / swing_rad_s;
+    let budget = &vehicle.error_bounds;
     let [delay_least_s, delay_most_s] = budget.valve_delay_s;
-    let lag = deviation_of(budget.valve_lag_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max));
-    let delay = deviation_of(0.5 * (delay_most_s - delay_least_s)) / shift_time_constant(vehicle);
-    let uncertainty = Uncertainty {
-        turbine_share: deviation_of(budget.turbine_torque_share),
-        turbine_share_s: told.turbine_share_s,
-        stiffness_share: deviation_within(budget.shaft_stiffness_factor),
-        backlash_n_m: budget.backlash_rad * line.shaft_stiffness_n_m_rad,
-        valve_share: lag.hypot(delay),
-        valve_gain: deviation_within(budget.valve_gain_factor),
-        rate_s: told.valve_rate_s,
-        friction: deviation_within(budget.friction_factor),
-        clutch_s: CLUTCH_S,
-        offgoing_n_m: told.offgoing_n_m,
-        offgoing_release_s: told.offgoing_release_s,
-        load_shifting_n_m: budget.shaft_torque_n_m / quarter_swing_s.sqrt(),
-        load_in_gear_n_m: LOAD_IN_GEAR * budget.shaft_torque_n_m / LOAD_IN_GEAR_S.sqrt(),
-        wheel_scale: deviation_of(budget.wheel_scale),
-        wheel_delay_s: [-budget.channel_skew_s, budget.wheel_delay_s],
-        skew_s: budget.channel_skew_s,
-        scale_least: SCALE_LEAST.min(deviation_of(budget.wheel_scale)),
-        delay_least_s: DELAY_LEAST_S,
-        output_least_rad_s: told.output_least_rad_s,
-    };
+    let model = compliant_model(vehicle);
     let engine = engine_noise(
         vehicle.engine.inertia_kg_m2,
         sensors.map(|sensors| &sensors.engine),
@@ -139,7 +111,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
     KalmanFilter::new(
         model,
         valve_model(vehicle.oncoming.valve),
-        uncertainty,
+        uncertainty(vehicle, &model.shift),
         [
             speed_reading(sensors.map(|sensors| &sensors.turbine), budget.turbine_quantum_rad_s),
             speed_reading(sensors.map(|sensors| &sensors.output), budget.output_quantum_rad_s),
@@ -151,6 +123,41 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
         vehicle.supervisor,
         vehicle.limits,
     )
+}
+
+/// What the filter does not know.
+fn uncertainty(vehicle: &Vehicle, shift: &ReducedShift<f64>) -> Uncertainty<f64> {
+    let (budget, told) = (&vehicle.error_bounds, &vehicle.filter);
+    let line = &vehicle.driveline;
+    let wheels = vehicle.road.inertia_at_wheel() + line.wheel_inertia_kg_m2;
+    // A quarter of a swing of the shafts between the gearbox, with the gear's share of the turbine, and the wheels.
+    let gearbox = shift.mass_kg_m2[1][1] * line.final_ratio.powi(2);
+    let swing_rad_s = (line.shaft_stiffness_n_m_rad * (gearbox.recip() + wheels.recip())).sqrt();
+    let quarter_swing_s = 0.5 * std::f64::consts::PI / swing_rad_s;
+    let [delay_least_s, delay_most_s] = budget.valve_delay_s;
+    let lag = deviation_of(budget.valve_lag_factor.map(|factor| (factor - 1.0).abs()).into_iter().fold(0.0, f64::max));
+    let delay = deviation_of(0.5 * (delay_most_s - delay_least_s)) / shift_time_constant(vehicle);
+    Uncertainty {
+        turbine_share: deviation_of(budget.turbine_torque_share),
+        turbine_share_s: told.turbine_share_s,
+        stiffness_share: deviation_within(budget.shaft_stiffness_factor),
+        backlash_n_m: budget.backlash_rad * line.shaft_stiffness_n_m_rad,
+        valve_share: lag.hypot(delay),
+        valve_gain: deviation_within(budget.valve_gain_factor),
+        rate_s: told.valve_rate_s,
+        friction: deviation_within(budget.friction_factor),
+        clutch_s: CLUTCH_S,
+        offgoing_n_m: told.offgoing_n_m,
+        offgoing_release_s: told.offgoing_release_s,
+        load_shifting_n_m: budget.shaft_torque_n_m / quarter_swing_s.sqrt(),
+        load_in_gear_n_m: LOAD_IN_GEAR * budget.shaft_torque_n_m / LOAD_IN_GEAR_S.sqrt(),
+        wheel_scale: deviation_of(budget.wheel_scale),
+        wheel_delay_s: [-budget.channel_skew_s, budget.wheel_delay_s],
+        skew_s: budget.channel_skew_s,
+        scale_least: SCALE_LEAST.min(deviation_of(budget.wheel_scale)),
+        delay_least_s: DELAY_LEAST_S,
+        output_least_rad_s: told.output_least_rad_s,
+    }
 }
 
 /// The valve model of [`kalman_filter`] alone: the filter that believes no speed.

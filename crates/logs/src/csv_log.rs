@@ -1,7 +1,8 @@
 //! Comma-separated files of any dialect.
 //!
 //! Delimiter, decimal comma and the row of names are told from the first lines. Lines before the names are passed over. Units stand
-//! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Rows are read one by one.
+//! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Times are numbers, clock times or dates (see
+//! [`crate::stamp`]). Rows are read one by one.
 
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -11,6 +12,7 @@ use trace::{Quantity, RecordError, Records, Unit};
 
 use crate::columns::{Batch, Stream};
 use crate::samples::{Quality, Sample};
+use crate::stamp::{Midnight, StampForm};
 use crate::{Channel, LogError, TimeColumn, error};
 
 /// Rows in a batch.
@@ -21,14 +23,22 @@ pub(crate) struct CsvLog {
     path: PathBuf,
     dialect: Dialect,
     records: Option<Records>,
-    /// Column and size in s of the time.
-    time: (usize, f64),
+    /// Column of the time, and how it is written.
+    time: (usize, TimeForm),
     /// Column of each channel.
     columns: Vec<usize>,
     width: usize,
     /// Rows in a batch: one where each is wanted as it comes.
     batch: usize,
     notes: Vec<String>,
+}
+
+/// How the times of a table are written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum TimeForm {
+    /// Numbers of a unit of this size, s.
+    Numbers(f64),
+    Stamps(StampForm),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +48,8 @@ struct Dialect {
     /// Lines before the row of names.
     preamble: usize,
     units_row: bool,
+    /// Line of the first row.
+    first: usize,
 }
 
 impl CsvLog {
@@ -49,7 +61,10 @@ impl CsvLog {
         is_followed: bool,
     ) -> Result<(Self, Vec<Channel>), LogError> {
         let start = if head.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
-        let dialect = Dialect::of(path, &text(&head[start..]))?;
+        let beginning = text(&head[start..]);
+        let dialect = Dialect::of(path, &beginning)?;
+        let first = cells(beginning.lines().nth(dialect.first).unwrap_or_default(), dialect.delimiter);
+        let stamp = |column: usize| first.get(column).and_then(|cell| StampForm::of(cell));
         let mut input = Cursor::new(head).chain(rest);
         skip(&mut input, start, dialect.preamble).map_err(LogError::io(path))?;
         let mut records = Records::new(Box::new(input), dialect.delimiter);
@@ -69,7 +84,16 @@ impl CsvLog {
         };
         let names: Vec<(String, String)> = (0..titles.len()).map(|i| (split[i].0.clone(), unit(i))).collect();
         let mut notes = Vec::new();
-        let time = time_column(path, &names, &titles, time, &mut notes)?;
+        // A column of clock times or dates is the time where no name says so.
+        let named = names.iter().any(|(name, _)| is_time_name(name));
+        let by_form = (0..names.len()).find(|&i| stamp(i).is_some()).filter(|_| time.is_none() && !named);
+        let by_form = by_form.map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
+        let time = time.or(by_form.as_ref());
+        let column = time_column(path, &names, &titles, time)?;
+        let time = match stamp(column) {
+            Some(form) => (column, TimeForm::Stamps(form)),
+            None => (column, TimeForm::Numbers(time_unit(path, &names[column], time, &mut notes)?)),
+        };
         let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
         let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
         let channels = columns
@@ -102,12 +126,15 @@ impl CsvLog {
             log: self,
             records,
             text: Vec::new(),
+            midnight: Midnight::default(),
             rows: 0,
             without_time: 0,
+            first_without_time: String::new(),
             short: 0,
             long: 0,
             no_numbers: 0,
             first_text: None,
+            has_groups: false,
             cut: None,
         }))
     }
@@ -121,12 +148,16 @@ struct Rows<'a> {
     columns: Vec<(usize, usize)>,
     /// A cell with a point in place of its comma.
     text: Vec<u8>,
+    midnight: Midnight,
     rows: u64,
     without_time: u64,
+    first_without_time: String,
     short: u64,
     long: u64,
     no_numbers: u64,
     first_text: Option<String>,
+    /// Whether its digits stand in groups.
+    has_groups: bool,
     /// What became of a last line without an end.
     cut: Option<&'static str>,
 }
@@ -143,6 +174,18 @@ impl Rows<'_> {
         number(&self.text)
     }
 
+    /// The time of the row, s; none where it has none.
+    fn time_s(&mut self) -> Option<f64> {
+        let (column, form) = self.log.time;
+        match form {
+            TimeForm::Numbers(size) => self.number(column).map(|time| time * size).filter(|time_s| time_s.is_finite()),
+            TimeForm::Stamps(form) => {
+                let time_s = form.seconds(&text(self.records.cell(column)?))?;
+                Some(if matches!(form, StampForm::Clock(_)) { self.midnight.unwrap(time_s) } else { time_s })
+            }
+        }
+    }
+
     /// Appends the samples of the row that was read.
     fn take_row(&mut self, batch: &mut Vec<Sample>) {
         self.rows += 1;
@@ -153,16 +196,16 @@ impl Rows<'_> {
         }
         self.short += u64::from(cells < self.log.width);
         self.long += u64::from(self.records.cells().skip(self.log.width).any(|cell| !cell.trim_ascii().is_empty()));
-        let time_s = match self.number(self.log.time.0) {
-            _ if is_cut && self.log.time.0 + 1 == cells => {
-                self.cut = Some("is left out");
-                return;
+        if is_cut && self.log.time.0 + 1 == cells {
+            self.cut = Some("is left out");
+            return;
+        }
+        let Some(time_s) = self.time_s() else {
+            if self.without_time == 0 {
+                self.first_without_time = text(self.records.cell(self.log.time.0).unwrap_or_default());
             }
-            Some(time) if time.is_finite() => time * self.log.time.1,
-            _ => {
-                self.without_time += 1;
-                return;
-            }
+            self.without_time += 1;
+            return;
         };
         for i in 0..self.columns.len() {
             let (channel, column) = self.columns[i];
@@ -180,6 +223,7 @@ impl Rows<'_> {
                     if self.first_text.is_none() {
                         let line = self.records.line() + self.log.dialect.preamble as u64;
                         let cell = text(self.records.cell(column).unwrap_or_default());
+                        self.has_groups = has_groups(&cell);
                         self.first_text = Some(format!("line {line}: `{}`", error::shown(&cell)));
                     }
                     (f64::NAN, Quality::Missing)
@@ -200,7 +244,13 @@ impl Stream for Rows<'_> {
                 if 2 * self.without_time > self.rows {
                     return Err(LogError::file(
                         &self.log.path,
-                        format!("{} of {} rows have no time that is a number", self.without_time, self.rows),
+                        format!(
+                            "{} of {} rows have no time, the first is `{}`\nhint: times are numbers, `12:00:01.25`, `2024-03-31 12:00:01.25` or \
+                             `31.03.2024 12:00:01.25`, all in one form",
+                            self.without_time,
+                            self.rows,
+                            error::shown(&self.first_without_time)
+                        ),
                     ));
                 }
                 return Ok(false);
@@ -224,7 +274,12 @@ impl Stream for Rows<'_> {
             notes.push(format!("the last line has no end and {cut}"));
         }
         if let Some(first) = &self.first_text {
-            notes.push(format!("{} cells are not numbers and count as missing, the first in {first}", self.no_numbers));
+            let hint =
+                if self.has_groups { "\nhint: write numbers without a sign between their thousands" } else { "" };
+            notes.push(format!(
+                "{} cells are not numbers and count as missing, the first in {first}{hint}",
+                self.no_numbers
+            ));
         }
         notes
     }
@@ -248,6 +303,15 @@ fn read_row(path: &Path, records: &mut Records, preamble: usize) -> Result<bool,
 /// Text of a file: UTF-8, or else Latin-1, in which every byte is a letter.
 fn text(bytes: &[u8]) -> String {
     std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
+}
+
+/// Whether a text is a number with thousands apart: `1,007.25`, `1.007,25`, `1 007,25`, `1'007.25`. Such a number is not read: `1,007` may
+/// as well be a little more than one.
+fn has_groups(text: &str) -> bool {
+    let text = text.trim();
+    let plain: String = text.chars().filter(|c| c.is_ascii_digit()).collect();
+    let is_sign = |c: char| matches!(c, '.' | ',' | '\'' | ' ' | '\u{a0}' | '\u{202f}' | '+' | '-');
+    plain.len() > 3 && text.chars().all(|c| c.is_ascii_digit() || is_sign(c))
 }
 
 /// Passes over some bytes and then some lines.
@@ -319,7 +383,7 @@ impl Dialect {
                 if only == 1 {
                     "there are no rows"
                 } else {
-                    "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns), Parquet, MDF 4, candump, ASC or BLF"
+                    "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns, `,` `;` `|` or a tab between them), Parquet, MDF 4, candump, ASC or BLF"
                 },
             ));
         };
@@ -334,10 +398,10 @@ impl Dialect {
         let line = |nth: usize| filled.get(nth).and_then(|&i| above(i).map(|row| (i, row)));
         match (line(0), line(1).filter(|(_, row)| names(row))) {
             (Some((_, units)), Some((names_at, _))) if is_units(&units) => {
-                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: true })
+                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: true, first })
             }
             (Some((names_at, row)), _) if names(&row) => {
-                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: false })
+                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: false, first })
             }
             _ => Err(LogError::damaged(
                 path,
@@ -407,6 +471,7 @@ pub(crate) fn is_time_name(name: &str) -> bool {
         "epoch_us",
         "epoch_ns",
         "unix_time",
+        "x_value",
         "timestamp_s",
         "timestamp_ms",
         "timestamp_us",
@@ -415,42 +480,50 @@ pub(crate) fn is_time_name(name: &str) -> bool {
     NAMES.contains(&name.to_lowercase().replace([' ', '-'], "_").as_str())
 }
 
-/// The column of the time and its size in s.
+/// The column of the time.
 pub(crate) fn time_column(
     path: &Path,
     names: &[(String, String)],
     titles: &[String],
     wanted: Option<&TimeColumn>,
-    notes: &mut Vec<String>,
-) -> Result<(usize, f64), LogError> {
+) -> Result<usize, LogError> {
     let found = match wanted {
         Some(TimeColumn { name, .. }) => (0..names.len()).find(|&i| names[i].0 == *name || titles[i] == *name),
         None => (0..names.len()).find(|&i| is_time_name(&names[i].0)),
     };
-    let Some(i) = found else {
+    found.ok_or_else(|| {
         let wanted =
             wanted.map_or("for the time".to_owned(), |time| format!("`{}` for the time", error::shown(&time.name)));
         let some: Vec<String> = names.iter().take(12).map(|(name, _)| error::shown(name)).collect();
-        return Err(LogError::file(
+        LogError::file(
             path,
             format!(
                 "there is no column {wanted}; the first columns are {}\nhint: name it `time_s`, or in the channel map under [time]",
                 some.join(", ")
             ),
-        ));
-    };
-    let text = wanted.and_then(|time| time.unit.clone()).unwrap_or_else(|| names[i].1.clone());
+        )
+    })
+}
+
+/// The size of the unit of a column with times, s.
+pub(crate) fn time_unit(
+    path: &Path,
+    (name, unit): &(String, String),
+    wanted: Option<&TimeColumn>,
+    notes: &mut Vec<String>,
+) -> Result<f64, LogError> {
+    let text = wanted.and_then(|time| time.unit.clone()).unwrap_or_else(|| unit.clone());
     if text.is_empty() {
-        notes.push(format!("the column `{}` has no unit: taken as s", error::shown(&names[i].0)));
-        return Ok((i, 1.0));
+        notes.push(format!("the column `{}` has no unit: taken as s", error::shown(name)));
+        return Ok(1.0);
     }
     match Unit::parse(&text) {
-        Some(Unit { quantity: Quantity::Time, size, .. }) => Ok((i, size)),
+        Some(Unit { quantity: Quantity::Time, size, .. }) => Ok(size),
         _ => Err(LogError::file(
             path,
             format!(
                 "the time `{}` has the unit `{}`\nhint: it can be s, ms, us or ns; say it in the channel map under [time]",
-                error::shown(&names[i].0),
+                error::shown(name),
                 error::shown(&text)
             ),
         )),

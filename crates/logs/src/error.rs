@@ -64,3 +64,10 @@ pub(crate) fn shown(text: &str) -> String {
     let cut = if text.chars().nth(LONGEST).is_some() { "..." } else { "" };
     text.chars().take(LONGEST).flat_map(char::escape_debug).collect::<String>() + cut
 }
+
+/// The first of some names.
+pub(crate) fn some(names: &[String]) -> String {
+    const SHOWN: usize = 4;
+    let more = if names.len() > SHOWN { ", ..." } else { "" };
+    names[..names.len().min(SHOWN)].join(", ") + more
+}

@@ -22,8 +22,10 @@ pub mod readings;
 pub mod role;
 pub mod samples;
 pub mod shifts;
+mod stamp;
 pub mod steps;
 pub mod suggest;
+mod utf16;
 
 pub use columns::{Block, Column, Columns};
 pub use error::LogError;

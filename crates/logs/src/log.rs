@@ -14,6 +14,7 @@ use crate::csv_log::CsvLog;
 use crate::mdf::MdfLog;
 use crate::parquet_log::ParquetLog;
 use crate::samples::Samples;
+use crate::utf16::{Utf16, is_utf16};
 use crate::{LogError, error};
 
 /// A channel of a log.
@@ -88,9 +89,13 @@ impl Log {
 
     fn of(path: &Path, options: &OpenOptions, mut reader: Box<dyn Read>, is_followed: bool) -> Result<Self, LogError> {
         let io = LogError::io(path);
-        let head = head(&mut reader).map_err(&io)?;
+        let mut head = first_bytes(&mut reader).map_err(&io)?;
         if head.is_empty() {
             return Err(LogError::file(path, "the file is empty"));
+        }
+        if is_utf16(&head) {
+            reader = Box::new(Utf16::new(head, reader));
+            head = first_bytes(&mut reader).map_err(&io)?;
         }
         let database = options.dbc.as_deref().map(Database::read).transpose()?;
         let is_file = path != Path::new("-");
@@ -119,8 +124,12 @@ impl Log {
                     "this is MDF of version 2 or 3\nhint: convert it to version 4, for example with asammdf",
                 ));
             }
-            Format::Utf16 => {
-                return Err(LogError::file(path, "the text is UTF-16\nhint: save it as UTF-8"));
+            Format::OtherFrames => {
+                return Err(LogError::file(
+                    path,
+                    "these are frames of a bus in a form that is not read (PCAN trace, or a table of frames)\nhint: convert it, for example with \
+                     python-can: `python -m can.logconvert IN OUT.log`",
+                ));
             }
             Format::Can(kind) => {
                 let database = database.ok_or_else(|| {
@@ -264,12 +273,12 @@ pub fn needs_map(path: &Path) -> Result<bool, LogError> {
     if !path.metadata().map_err(&io)?.is_file() {
         return Ok(false);
     }
-    let head = head(&mut File::open(path).map_err(&io)?).map_err(&io)?;
-    Ok(!matches!(Format::of(&head), Format::Csv | Format::Utf16))
+    let head = first_bytes(&mut File::open(path).map_err(&io)?).map_err(&io)?;
+    Ok(is_utf16(&head) || !matches!(Format::of(&head), Format::Csv))
 }
 
 /// The first bytes of a file, or of a pipe as far as it has come: at least its first lines.
-fn head(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
+fn first_bytes(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
     const LINES: usize = 50;
     let mut head = vec![0; HEAD];
     let mut length = 0;
@@ -300,8 +309,9 @@ enum Format {
     Mdf,
     Mdf3,
     Parquet,
-    Utf16,
     Can(CanKind),
+    /// Frames in a form that is not read.
+    OtherFrames,
     Csv,
 }
 
@@ -316,9 +326,6 @@ impl Format {
         if head.starts_with(b"LOGG") {
             return Self::Can(CanKind::Blf);
         }
-        if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
-            return Self::Utf16;
-        }
         let text = String::from_utf8_lossy(head);
         let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("//")).unwrap_or("");
         let words: Vec<&str> = first.split_whitespace().collect();
@@ -327,6 +334,9 @@ impl Format {
             return Self::Can(CanKind::Candump);
         }
         let lower = first.to_lowercase();
+        if lower.starts_with(";$fileversion") || lower.starts_with("timestamp,arbitration_id,") {
+            return Self::OtherFrames;
+        }
         if lower.starts_with("date ") && !first.contains([',', ';', '\t'])
             || lower.starts_with("base hex")
             || lower.starts_with("base dec")

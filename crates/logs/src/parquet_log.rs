@@ -4,16 +4,17 @@ use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use parquet::basic::{Encoding, LogicalType, TimeUnit, Type as Physical};
+use half::f16;
+use parquet::basic::{ConvertedType, Encoding, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
-use parquet::data_type::DataType;
+use parquet::data_type::{DataType, Int96};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
 
 use crate::columns::{Batch, Block, Stream};
-use crate::csv_log::{is_time_name, split_unit, time_column};
+use crate::csv_log::{is_time_name, split_unit, time_column, time_unit};
 use crate::samples::Quality;
 use crate::{Channel, LogError, TimeColumn, error};
 use trace::Unit;
@@ -27,8 +28,9 @@ pub(crate) struct ParquetLog {
     reader: SerializedFileReader<File>,
     /// Column and size in s of the time.
     time: (usize, f64),
-    /// Column of each channel.
-    columns: Vec<usize>,
+    time_form: Form,
+    /// Column of each channel, and how its numbers are stored.
+    columns: Vec<(usize, Form)>,
     notes: Vec<String>,
 }
 
@@ -60,31 +62,40 @@ impl ParquetLog {
         let named = names.iter().any(|(name, _)| is_time_name(name));
         let by_kind =
             stamps.filter(|_| time.is_none() && !named).map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
-        let time = time_column(path, &names, &titles, time.or(by_kind.as_ref()), &mut notes)?;
-        let is_number = |leaf: &ColumnDescPtr| {
-            leaf.max_rep_level() == 0
-                && matches!(
-                    leaf.physical_type(),
-                    Physical::BOOLEAN | Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE
-                )
-        };
-        if !is_number(&leaves[time.0]) {
+        let wanted = time.or(by_kind.as_ref());
+        let time = time_column(path, &names, &titles, wanted)?;
+        let Some(time_form) = Form::of(&leaves[time]) else {
             return Err(LogError::file(
                 path,
-                format!("the time `{}` does not hold numbers", error::shown(&titles[time.0])),
+                format!(
+                    "the time `{}` holds {}\nhint: write it as a number or a time stamp",
+                    error::shown(&titles[time]),
+                    kind(&leaves[time])
+                ),
+            ));
+        };
+        let size_s = time_unit(path, &names[time], wanted, &mut notes)?;
+        let others = || (0..leaves.len()).filter(|&i| i != time);
+        let columns: Vec<(usize, Form)> = others().filter_map(|i| Some((i, Form::of(&leaves[i])?))).collect();
+        let left_out: Vec<String> = others()
+            .filter(|&i| Form::of(&leaves[i]).is_none())
+            .map(|i| format!("{} ({})", error::shown(&titles[i]), kind(&leaves[i])))
+            .collect();
+        if !left_out.is_empty() {
+            notes.push(format!(
+                "{} columns do not hold single numbers and are left out: {}",
+                left_out.len(),
+                error::some(&left_out)
             ));
         }
-        let columns: Vec<usize> = (0..leaves.len()).filter(|&i| i != time.0 && is_number(&leaves[i])).collect();
-        if columns.len() + 1 < leaves.len() {
-            notes.push(format!("{} columns do not hold numbers and are left out", leaves.len() - 1 - columns.len()));
-        }
-        let channels = columns.iter().map(|&i| Channel {
+        let channels = columns.iter().map(|&(i, _)| Channel {
             name: names[i].0.clone(),
             unit: names[i].1.clone(),
             group: String::new(),
         });
         let channels = channels.collect();
-        Ok((Self { path: path.to_owned(), reader, time, columns, notes }, channels))
+        let time = (time, size_s);
+        Ok((Self { path: path.to_owned(), reader, time, time_form, columns, notes }, channels))
     }
 
     pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
@@ -121,15 +132,71 @@ fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
     LogError::damaged(path, position, format!("{error}{hint}"))
 }
 
-/// The unit of a column of time stamps.
+/// The unit of a column of time stamps, or of times of the day.
 fn stamp_unit(leaf: &ColumnDescPtr) -> Option<&'static str> {
-    match leaf.logical_type_ref() {
-        Some(LogicalType::Timestamp(stamp)) => Some(match stamp.unit {
-            TimeUnit::MILLIS => "ms",
-            TimeUnit::MICROS => "us",
-            TimeUnit::NANOS => "ns",
-        }),
-        _ => None,
+    let unit = match leaf.logical_type_ref() {
+        Some(LogicalType::Timestamp(stamp)) => &stamp.unit,
+        Some(LogicalType::Time(time)) => &time.unit,
+        _ => return (leaf.physical_type() == Physical::INT96).then_some("ns"),
+    };
+    Some(match unit {
+        TimeUnit::MILLIS => "ms",
+        TimeUnit::MICROS => "us",
+        TimeUnit::NANOS => "ns",
+    })
+}
+
+/// What a column holds, in a word.
+fn kind(leaf: &ColumnDescPtr) -> &'static str {
+    match leaf.physical_type() {
+        _ if leaf.max_rep_level() > 0 => "lists",
+        Physical::BYTE_ARRAY | Physical::FIXED_LEN_BYTE_ARRAY => "text or bytes",
+        _ => "numbers of an unknown kind",
+    }
+}
+
+/// How the numbers of a column are stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Form {
+    /// As they are.
+    Plain,
+    /// Whole numbers whose highest bit is no sign.
+    Unsigned,
+    /// Whole numbers that are this many times as large.
+    Scaled(f64),
+    /// Floating numbers of 16 bits.
+    Half,
+    /// Days and nanoseconds in 96 bits: ns since 1970.
+    Stamp96,
+}
+
+impl Form {
+    /// That of a column; none if it does not hold single numbers.
+    fn of(leaf: &ColumnDescPtr) -> Option<Self> {
+        use ConvertedType::{DECIMAL, UINT_8, UINT_16, UINT_32, UINT_64};
+        let (physical, converted) = (leaf.physical_type(), leaf.converted_type());
+        if leaf.max_rep_level() > 0 {
+            return None;
+        }
+        match physical {
+            Physical::INT32 | Physical::INT64 | Physical::FIXED_LEN_BYTE_ARRAY if converted == DECIMAL => {
+                let scale = leaf.type_scale();
+                let fits = (0..=38).contains(&scale)
+                    && (physical != Physical::FIXED_LEN_BYTE_ARRAY || leaf.type_length() <= 16);
+                fits.then(|| Self::Scaled(10_f64.powi(scale)))
+            }
+            Physical::INT32 | Physical::INT64 if [UINT_8, UINT_16, UINT_32, UINT_64].contains(&converted) => {
+                Some(Self::Unsigned)
+            }
+            Physical::BOOLEAN | Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE => {
+                Some(Self::Plain)
+            }
+            Physical::INT96 => Some(Self::Stamp96),
+            Physical::FIXED_LEN_BYTE_ARRAY => (leaf.logical_type_ref() == Some(&LogicalType::Float16)
+                && leaf.type_length() == 2)
+                .then_some(Self::Half),
+            Physical::BYTE_ARRAY => None,
+        }
     }
 }
 
@@ -147,6 +214,8 @@ impl CheckedPages {
         if let Page::DictionaryPage { num_values, .. } = page {
             let size = match self.column.physical_type() {
                 Physical::INT32 | Physical::FLOAT => 4,
+                Physical::INT96 => 12,
+                Physical::FIXED_LEN_BYTE_ARRAY => usize::try_from(self.column.type_length()).unwrap_or(1).max(1),
                 _ => 8,
             };
             self.dictionary = true;
@@ -228,17 +297,17 @@ impl Groups<'_> {
             let pages = CheckedPages { pages, column: descriptor.clone(), dictionary: false };
             Ok::<_, ParquetError>(get_column_reader(descriptor, Box::new(pages)))
         };
-        let of = |channel: &usize| reader(self.log.columns[*channel]);
+        let of = |channel: &usize| reader(self.log.columns[*channel].0);
         let columns = self.channels.iter().map(of).collect::<Result<_, _>>()?;
         Ok(OpenGroup { time: reader(self.log.time.0)?, columns, rows_left })
     }
 
     fn decode(&mut self, open: &mut OpenGroup, block: &mut Block) -> Result<(), ParquetError> {
         let rows = BATCH.min(usize::try_from(open.rows_left).unwrap_or(BATCH));
-        numbers(&mut open.time, rows, &mut block.times_s)?;
+        numbers(&mut open.time, self.log.time_form, rows, &mut block.times_s)?;
         block.times_s.iter_mut().for_each(|time_s| *time_s *= self.log.time.1);
         for (reader, column) in open.columns.iter_mut().zip(&mut block.columns) {
-            numbers(reader, rows, &mut column.values)?;
+            numbers(reader, self.log.columns[column.channel].1, rows, &mut column.values)?;
             column.qualities.clear();
             if !column.values.iter().fold(true, |all, value| all & value.is_finite()) {
                 // An absent value, or NaN, is a reading that did not come.
@@ -302,7 +371,7 @@ impl Groups<'_> {
 }
 
 /// The next numbers of a column, in place of those before; NaN where there is none.
-fn numbers(column: &mut ColumnReader, rows: usize, numbers: &mut Vec<f64>) -> Result<(), ParquetError> {
+fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec<f64>) -> Result<(), ParquetError> {
     fn read<D: DataType>(
         column: &mut ColumnReaderImpl<D>,
         rows: usize,
@@ -332,12 +401,45 @@ fn numbers(column: &mut ColumnReader, rows: usize, numbers: &mut Vec<f64>) -> Re
     }
     numbers.clear();
     #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
-    match column {
-        ColumnReader::BoolColumnReader(column) => read(column, rows, numbers, |value| f64::from(u8::from(*value))),
-        ColumnReader::Int32ColumnReader(column) => read(column, rows, numbers, |value| f64::from(*value)),
-        ColumnReader::Int64ColumnReader(column) => read(column, rows, numbers, |value| *value as f64),
-        ColumnReader::FloatColumnReader(column) => read(column, rows, numbers, |value| f64::from(*value)),
-        ColumnReader::DoubleColumnReader(column) => read(column, rows, numbers, |value| *value),
+    match (column, form) {
+        (ColumnReader::BoolColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(u8::from(*value))),
+        (ColumnReader::Int32ColumnReader(column), Form::Unsigned) => {
+            read(column, rows, numbers, |value| f64::from(value.cast_unsigned()))
+        }
+        (ColumnReader::Int32ColumnReader(column), Form::Scaled(by)) => {
+            read(column, rows, numbers, |value| f64::from(*value) / by)
+        }
+        (ColumnReader::Int32ColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(*value)),
+        (ColumnReader::Int64ColumnReader(column), Form::Unsigned) => {
+            read(column, rows, numbers, |value| value.cast_unsigned() as f64)
+        }
+        (ColumnReader::Int64ColumnReader(column), Form::Scaled(by)) => {
+            read(column, rows, numbers, |value| *value as f64 / by)
+        }
+        (ColumnReader::Int64ColumnReader(column), _) => read(column, rows, numbers, |value| *value as f64),
+        (ColumnReader::Int96ColumnReader(column), _) => read(column, rows, numbers, stamp96_ns),
+        (ColumnReader::FloatColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(*value)),
+        (ColumnReader::DoubleColumnReader(column), _) => read(column, rows, numbers, |value| *value),
+        (ColumnReader::FixedLenByteArrayColumnReader(column), Form::Half) => {
+            read(column, rows, numbers, |value| match value.data() {
+                &[low, high] => f16::from_le_bytes([low, high]).to_f64(),
+                _ => f64::NAN,
+            })
+        }
+        (ColumnReader::FixedLenByteArrayColumnReader(column), Form::Scaled(by)) => {
+            read(column, rows, numbers, |value| {
+                let sign = if value.data().first().is_some_and(|byte| byte >> 7 == 1) { -1 } else { 0 };
+                value.data().iter().fold(sign, |number: i128, byte| number << 8 | i128::from(*byte)) as f64 / by
+            })
+        }
         _ => Err(ParquetError::General("the column does not hold numbers".to_owned())),
     }
+}
+
+/// The time of a stamp of 96 bits, which are nanoseconds of a day and a Julian day, ns since 1970.
+fn stamp96_ns(stamp: &Int96) -> f64 {
+    const DAY_NS: f64 = 86_400e9;
+    const JULIAN_DAY_OF_1970: f64 = 2_440_588.0;
+    let [low, high, day] = [0, 1, 2].map(|i| stamp.data().get(i).map_or(0.0, |word| f64::from(*word)));
+    (day - JULIAN_DAY_OF_1970) * DAY_NS + high * 2_f64.powi(32) + low
 }

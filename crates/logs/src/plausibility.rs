@@ -17,6 +17,9 @@ pub struct Extremes {
     /// Values away from zero by their size: how many lie between two powers of two.
     sizes: [u32; SIZES],
     count: u64,
+    /// Values above and below zero by more than [`SMALL_RAD_S`].
+    above: u64,
+    below: u64,
 }
 
 /// A shaft that never turns faster says nothing about its sign, rad/s. A car in reverse is slower.
@@ -30,7 +33,7 @@ const SIZES: usize = 64;
 
 impl Default for Extremes {
     fn default() -> Self {
-        Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY, sizes: [0; SIZES], count: 0 }
+        Self { least: f64::INFINITY, greatest: f64::NEG_INFINITY, sizes: [0; SIZES], count: 0, above: 0, below: 0 }
     }
 }
 
@@ -38,6 +41,8 @@ impl Extremes {
     /// Takes a value.
     pub fn push(&mut self, value: f64) {
         self.count += 1;
+        self.above += u64::from(value > SMALL_RAD_S);
+        self.below += u64::from(value < -SMALL_RAD_S);
         self.least = self.least.min(value);
         self.greatest = self.greatest.max(value);
         if value != 0.0 {
@@ -60,14 +65,14 @@ impl Extremes {
         None
     }
 
-    /// Whether nearly nothing is negative.
+    /// Whether it turns forward, but for a few readings that may be wrong.
     fn is_forward(&self) -> bool {
-        self.greatest > SMALL_RAD_S && self.least > -0.1 * self.greatest
+        self.above > 10 * self.below
     }
 
-    /// Whether nearly nothing is positive.
+    /// Whether it turns backward, but for a few readings that may be wrong: in more than a hundredth of all.
     fn is_backward(&self) -> bool {
-        self.least < -SMALL_RAD_S && self.greatest < -0.1 * self.least
+        self.below > 10 * self.above && 100 * self.below > self.count
     }
 
     /// Whether many values are all the same.
@@ -317,6 +322,18 @@ mod tests {
             summary(Role::OncomingCurrent, "A", &currents),
         ];
         assert_eq!(findings(&right, Seen::All), []);
+        // One reading does not turn a sign, be the other ones large or small.
+        for most in [20.0, 600.0] {
+            let mut speeds: Vec<f64> = (0..400).map(|i| most * f64::from(i) / 400.0).collect();
+            let good = speeds.clone();
+            speeds[200] = -1e300;
+            let of = |values: &[f64]| {
+                [summary(Role::TurbineSpeed, "rad/s", &good), summary(Role::OutputSpeed, "rad/s", values)]
+            };
+            assert_eq!(findings(&of(&speeds), Seen::All), []);
+            let backward: Vec<f64> = good.iter().map(|speed| -speed).collect();
+            assert_eq!(findings(&of(&backward), Seen::All).len(), usize::from(most > SMALL_RAD_S));
+        }
     }
 
     #[test]

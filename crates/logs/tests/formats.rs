@@ -152,8 +152,164 @@ fn parquet_gives_numbers_and_leaves_out_what_is_absent() {
         check(&channel(&log, &samples, "turbine_speed_rpm"), fast(|i| 700.0 + 3.0 * i), file);
         let unit = |name: &str| log.channels()[log.find(name, None).unwrap()].unit.clone();
         assert_eq!((unit("N_Eng").as_str(), unit("turbine_speed_rpm").as_str()), ("rpm", "rpm"), "{file}");
-        assert_eq!(notes, ["1 columns do not hold numbers and are left out"], "{file}");
+        assert_eq!(notes, ["1 columns do not hold single numbers and are left out: note (text or bytes)"], "{file}");
     }
+}
+
+#[test]
+fn parquet_numbers_of_every_kind_are_read() {
+    for (file, first_s) in [("types.parquet", 1.7e9), ("types_old.parquet", 1.7e9), ("types_day.parquet", 0.0)] {
+        let (log, samples, notes) = read(&data(file), &OpenOptions::default()).unwrap();
+        let rows =
+            |value: fn(f64) -> f64| (0..ROWS).map(move |i| good(first_s + f64::from(i) * 0.01, value(f64::from(i))));
+        check(&channel(&log, &samples, "u8"), rows(|i| 6.0 * i), file);
+        check(&channel(&log, &samples, "u32"), rows(|i| 4_294_967_295.0 - i), file);
+        check(&channel(&log, &samples, "u64"), rows(|i| 2_f64.powi(63) + 4096.0 * i), file);
+        check(&channel(&log, &samples, "half"), rows(|i| i / 4.0), file);
+        check(&channel(&log, &samples, "single"), rows(|i| i / 8.0), file);
+        check(&channel(&log, &samples, "cents"), rows(|i| 3.0 * i - 25.0), file);
+        check(&channel(&log, &samples, "inner.x"), rows(|i| i), file);
+        assert_eq!(notes.len(), 1, "{notes:?}");
+        assert!(notes[0].starts_with("1 columns do not hold single numbers and are left out: list."), "{notes:?}");
+        assert!(notes[0].ends_with("(lists)"), "{notes:?}");
+    }
+}
+
+#[test]
+fn mdf_floats_of_sixteen_bits_and_of_the_other_order_are_read() {
+    let (log, samples, notes) = read(&data("half.mf4"), &OpenOptions::default()).unwrap();
+    // 80 to 119 in steps of 1: sixteen bits hold them.
+    check(&channel(&log, &samples, "Half"), fast(|i| 80.0 + i), "half");
+    check(&channel(&log, &samples, "Big"), fast(|i| 800.0 + 10.0 * i), "big");
+    assert_eq!(notes, Vec::<String>::new());
+}
+
+#[test]
+fn mdf_channels_with_their_time_in_another_group_are_named() {
+    let (log, _, notes) = read(&data("remote.mf4"), &OpenOptions::default()).unwrap();
+    assert_eq!(log.channels(), []);
+    assert_eq!(notes.len(), 1);
+    let said = "2 channels have no time in their group and are left out: N_Eng, N_Turb\nhint: MDF 4.2 can keep";
+    assert!(notes[0].starts_with(said), "{notes:?}");
+}
+
+#[test]
+fn clock_times_dates_and_utf_16_are_read() {
+    let folder = Folder::new("stamps");
+    let noon_s = 1_711_886_400.0;
+    let table = |head: &str, stamp: &dyn Fn(u32) -> String| {
+        let rows = (0..ROWS).map(|i| format!("{};{};{}\n", stamp(i), 800 + 10 * i, 700 + 3 * i));
+        format!("{head};N_Eng [rpm];N_Turb [rpm]\n{}", rows.collect::<String>())
+    };
+    // Hundredths of a second from `seconds` on.
+    let clock = |seconds: u32, i: u32| {
+        let at = seconds + i / 100;
+        format!("{:02}:{:02}:{:02}.{:02}", at / 3600 % 24, at / 60 % 60, at % 60, i % 100)
+    };
+    let cases = [
+        (table("Time", &|i| clock(43_200, i)), 43_200.0),
+        (table("Uhrzeit", &|i| clock(43_200, i).replace('.', ",")), 43_200.0),
+        // 0.2 s before midnight.
+        (table("time [hh:mm:ss]", &|i| clock(86_399, i + 80)), 86_399.8),
+        (table("timestamp", &|i| format!("2024-03-31T{}Z", clock(43_200, i))), noon_s),
+        (table("Date/Time", &|i| format!("\"2024-03-31 {}\"", clock(43_200, i))), noon_s),
+        (table("t", &|i| format!("31.03.2024 {}", clock(43_200, i))), noon_s),
+        // The date stands in a column of its own.
+        (table("Date;Time", &|i| format!("2024-03-31;{}", clock(43_200, i))), 43_200.0),
+    ];
+    for (text, first_s) in cases {
+        for order in [None, Some(u16::to_le_bytes as fn(u16) -> [u8; 2]), Some(u16::to_be_bytes)] {
+            let wide = |order: fn(u16) -> [u8; 2]| {
+                std::iter::once(0xfeff).chain(text.encode_utf16()).flat_map(order).collect::<Vec<u8>>()
+            };
+            let path = folder.write("log.csv", order.map_or(text.clone().into_bytes(), wide));
+            let (log, samples, _) =
+                read(&path, &OpenOptions::default()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let engine = channel(&log, &samples, "N_Eng");
+            assert_eq!(engine.len(), ROWS as usize, "{text}");
+            for (i, (time_s, value, quality)) in (0_u32..).zip(engine) {
+                // Doubles of seconds since 1970 are 0.24 us apart.
+                assert!((time_s - first_s - 0.01 * f64::from(i)).abs() < 5e-7, "{time_s} {text}");
+                assert_eq!((value, quality), (f64::from(800 + 10 * i), Quality::Good), "{text}");
+            }
+        }
+    }
+    // Day or month: nobody knows.
+    let error = read(
+        &folder.write("log.csv", table("time_s", &|i| format!("3/4/2024 {}", clock(0, i)))),
+        &OpenOptions::default(),
+    );
+    let error = error.map(|_| ()).unwrap_err().to_string();
+    assert!(
+        error.contains("40 of 40 rows have no time, the first is `3/4/2024 00:00:00.00`\nhint: times are"),
+        "{error}"
+    );
+}
+
+#[test]
+fn thousands_in_groups_are_not_guessed() {
+    let folder = Folder::new("thousands");
+    let text = "time_s,a\n0,1\n1,\"1,007.25\"\n2,3\n";
+    let (log, samples, notes) = read(&folder.write("log.csv", text), &OpenOptions::default()).unwrap();
+    assert_eq!(channel(&log, &samples, "a")[1].2, Quality::Missing);
+    assert!(
+        notes[0].ends_with("line 3: `1,007.25`\nhint: write numbers without a sign between their thousands"),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn every_form_of_candump_is_read() {
+    let folder = Folder::new("candump");
+    let bytes = |i: u32| format!("{:02X}0C000000000000", 0x40 + i);
+    let apart =
+        |i: u32| bytes(i).as_bytes().chunks(2).map(|two| str::from_utf8(two).unwrap()).collect::<Vec<_>>().join(" ");
+    let forms: [(&dyn Fn(u32) -> String, f64); 7] = [
+        (&|i| format!("({}.{:02}0000) can0 100#{}", 1000, i, bytes(i)), 1000.0),
+        (&|i| format!("({}.{:02}0000) can0 100#{}_9", 1000, i, bytes(i)), 1000.0),
+        (&|i| format!("({}.{:02}0000) can0 100##1{}", 1000, i, bytes(i)), 1000.0),
+        (&|i| format!(" (000.{i:02}0000)  can0  100   [8]  {}", apart(i)), 0.0),
+        (&|i| format!(" (000.{i:02}0000)  can0  100   [8]  {}   '@.......'", apart(i)), 0.0),
+        (&|i| format!(" (000.{i:02}0000)  can0  RX - -  100   [8]  {}", apart(i)), 0.0),
+        (&|i| format!(" (2024-03-31 12:00:00.{i:02}0000)  can0  100   [8]  {}", apart(i)), 1_711_886_400.0),
+    ];
+    for (line, first_s) in forms {
+        // Errors of the bus and requests for data are no frames with data, and nothing to warn of.
+        let mut text: String = (0..8).map(|i| line(i) + "\n").collect();
+        text += "(1000.08) can0 20000004#000C000000000000\n(1000.09) can0 100#R\n";
+        if first_s == 1000.0 {
+            text += "(1000.08)  can0  20000080   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n";
+        }
+        let (log, samples, notes) = read(&folder.write("bus.log", text), &with_dbc()).unwrap();
+        let engine = channel(&log, &samples, "N_Eng");
+        assert_eq!(engine.len(), 8, "{}", line(0));
+        for (i, (time_s, value, quality)) in (0_u32..).zip(engine) {
+            assert!((time_s - first_s - 0.01 * f64::from(i)).abs() < 5e-7, "{time_s} {}", line(i));
+            assert_eq!((value, quality), (0.25 * f64::from(0x0c40 + i), Quality::Good), "{}", line(i));
+        }
+        assert_eq!(notes, Vec::<String>::new(), "{}", line(0));
+    }
+}
+
+#[test]
+fn times_between_frames_and_two_buses_are_told() {
+    let folder = Folder::new("two-buses");
+    let notes = |text: &str| read(&folder.write("bus.log", text), &with_dbc()).unwrap().2;
+    let frame = |stamp: &str, bus: u32| format!("({stamp}) can{bus} 100#400C000000000000\n");
+    let constant: String = (0..20).map(|_| frame("000.010000", 0)).collect();
+    let changing: String = (0..20).map(|i| frame(&format!("000.0{:02}000", 7 * i % 19), 0)).collect();
+    for text in [constant, changing] {
+        let notes = notes(&text);
+        assert!(notes.iter().any(|note| note.contains("candump -t d")), "{notes:?}");
+    }
+    let two: String = (0..20).map(|i| frame(&format!("{i}.0"), i % 2)).collect();
+    assert_eq!(
+        notes(&two),
+        [
+            "message 0x100 comes on two buses, whose values are mixed\nhint: write the frames of one bus to a file of their own"
+        ]
+    );
+    assert_eq!(notes(&(0..20).map(|i| frame(&format!("{i}.0"), 1)).collect::<String>()), Vec::<String>::new());
 }
 
 #[test]
@@ -263,7 +419,7 @@ fn a_last_line_without_an_end_is_never_used_silently() {
 #[test]
 fn what_is_no_log_is_refused_with_what_to_do() {
     let folder = Folder::new("refused");
-    let cases: [(&[u8], &str); 9] = [
+    let cases: [(&[u8], &str); 11] = [
         (b"", ": the file is empty"),
         (b"hello", ": there are no rows"),
         (b"hello\nworld\n", ": this is no format that is known\nhint: logs are CSV"),
@@ -271,6 +427,11 @@ fn what_is_no_log_is_refused_with_what_to_do() {
         (b"1,2\n3,4\n5,6\n", ": line 1: there is no row of names above the first row of numbers\nhint: "),
         (b"a,b\n1,2\n3,4\n", ": there is no column for the time; the first columns are a, b\nhint: "),
         (b"time,b\nfurlong,rpm\n3,4\n5,6\n", "hint: "),
+        (
+            b";$FILEVERSION=2.1\n;$STARTTIME=4\n 1 0.1 DT 0100 Rx 1 00\n",
+            ": these are frames of a bus in a form that is not read",
+        ),
+        (b"timestamp,arbitration_id,extended\n1.0,0x100,0\n", "hint: convert it, for example with python-can"),
         (b"MDF     3.30    ", ": this is MDF of version 2 or 3\nhint: "),
         (
             b"(1.0) can0 123#00\n",

@@ -17,7 +17,7 @@ fn most_memory() -> Option<usize> {
     line.trim().strip_suffix(" kB")?.parse::<usize>().ok().map(|kilobytes| kilobytes << 10)
 }
 
-const FILES: [&str; 18] = [
+const FILES: [&str; 22] = [
     "plain_400.mf4",
     "plain_420.mf4",
     "deflate.mf4",
@@ -26,6 +26,8 @@ const FILES: [&str; 18] = [
     "lz4.mf4",
     "invalidation.mf4",
     "unsorted.mf4",
+    "half.mf4",
+    "remote.mf4",
     "bus.mf4",
     "bus.blf",
     "fd.blf",
@@ -35,6 +37,8 @@ const FILES: [&str; 18] = [
     "snappy.parquet",
     "gzip.parquet",
     "stamps.parquet",
+    "types.parquet",
+    "types_old.parquet",
     "made_with.txt",
 ];
 

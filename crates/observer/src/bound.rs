@@ -99,7 +99,7 @@ struct Seen<'a, T> {
     dt_s: Option<T>,
     /// The command, if a usable one was read.
     command: Option<Reading<T>>,
-    /// The phase, if the speeds are usable.
+    /// The phase, if the speeds are usable and the shaft torque has a range.
     phase: Option<Phase>,
     /// The signals at the time of the step.
     sample: &'a Sample<T>,
@@ -171,20 +171,25 @@ impl<T: Real> RangeEstimator<T> {
     fn seen<'a>(&self, state: &mut RangeState<T>, input: &Input<T>, aligned: &'a Aligned<T>) -> Seen<'a, T> {
         let (limits, zero) = (&self.tracker.limits, T::zero());
         let Aligned { sample, channels } = aligned;
-        let interval = self.tracker.begin(&mut state.tracker, sample);
-        let usable = interval.map_or_else(|| limits.speeds_valid(sample), |interval| interval.speeds_valid());
-        let dt_s = interval.map(|interval| interval.dt_s);
+        let usable = limits.speeds_valid(sample);
+        let (dt_s, phase) = if self.shaft.is_some() {
+            let dt_s = self.tracker.begin(&mut state.tracker, sample).map(|interval| interval.dt_s);
+            let phase = usable.then(|| match dt_s {
+                Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, sample).0,
+                None => state.tracker.supervisor.phase,
+            });
+            (dt_s, phase)
+        } else {
+            // The guaranteed ranges do not depend on the phase.
+            (state.tracker.time_step(sample), None)
+        };
         let command = input.command.filter(|reading| limits.usable_command(reading));
-        let phase = usable.then(|| match dt_s {
-            Some(dt_s) => self.tracker.phase(&mut state.tracker, dt_s, sample).0,
-            None => state.tracker.supervisor.phase,
-        });
         let fresh = channels.turbine == ChannelHealth::Good && channels.output == ChannelHealth::Good;
         state.unread_s = if fresh { zero } else { state.unread_s + dt_s.unwrap_or_else(T::infinity) };
         // A slip carried on by its rate may be wrong by what it changes at most, twice: once that it does, once that it did.
         let carried = T::one() + (state.unread_s + state.unread_s) / self.age_s;
         let error = self.budget.slip_rad_s * if fresh { T::one() } else { carried };
-        let slip_rad_s = phase.map(|_| [sample.slip_rad_s, error]);
+        let slip_rad_s = usable.then_some([sample.slip_rad_s, error]);
         let read = fresh && channels.wheel == ChannelHealth::Good;
         Seen { dt_s, command, phase, sample, slip_rad_s, read }
     }

@@ -113,6 +113,17 @@ impl<T: Real> TrackerState<T> {
     }
 }
 
+impl<T: Real> TrackerState<T> {
+    /// The time step of a sample: none of the first one, and `None` if it cannot be used.
+    #[inline]
+    pub(crate) fn time_step(&mut self, sample: &Sample<T>) -> Option<T> {
+        let dt_s = if self.started { sample.dt_s } else { T::zero() };
+        let usable = dt_s >= T::zero() && dt_s.is_finite();
+        self.started |= usable;
+        usable.then_some(dt_s)
+    }
+}
+
 impl<T: Real> Default for TrackerState<T> {
     fn default() -> Self {
         Self::new()
@@ -176,11 +187,7 @@ impl<T: Real> Tracker<T> {
     /// Takes a sample: the interval that it ends, or `None` if its time step cannot be used.
     #[inline]
     pub fn begin(&self, state: &mut TrackerState<T>, sample: &Sample<T>) -> Option<Interval<T>> {
-        let dt_s = if state.started { sample.dt_s } else { T::zero() };
-        if !(dt_s >= T::zero() && dt_s.is_finite()) {
-            return None;
-        }
-        state.started = true;
+        let dt_s = state.time_step(sample)?;
         let (speeds_valid, command_valid) =
             (self.limits.speeds_valid(sample), self.limits.command_valid(sample.command));
         let health = match (speeds_valid, command_valid) {

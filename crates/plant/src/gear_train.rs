@@ -85,6 +85,16 @@ pub enum TrainError {
         "the train has more than {MAX_FREEDOMS} degrees of freedom, {MAX_ELEMENTS} elements or {MAX_CONTACTS} elements without slip"
     )]
     TooLarge,
+    /// More elements with plates than a simulated car has room for.
+    #[error(
+        "the gearbox has {packs} clutches and brakes, and a simulated car has room for {room}\nhint: leave out those that no gear engages"
+    )]
+    TooManyPacks {
+        /// Clutches and brakes of the gearbox.
+        packs: usize,
+        /// The most of a simulated car.
+        room: usize,
+    },
     /// A torque, speed or inertia is not a number, or the inertia is not positive.
     #[error("a torque, a speed or an inertia is not a finite number")]
     NotFinite,

@@ -390,6 +390,12 @@ fn gear_steps(drive: &ScoredDrive, car: &Car, wide_s: f64) -> Vec<(f64, f64)> {
     steps
 }
 
+/// Room above the highest gear, so that its line is seen.
+fn gear_axis(steps: &[(f64, f64)]) -> Axis {
+    let gears = || steps.iter().map(|(_, gear)| *gear);
+    Axis::Fixed(gears().fold(0.0, f64::min), gears().fold(1.0, f64::max) + 0.5)
+}
+
 /// Gear, speeds and pedals over the whole drive.
 fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
     let states = &drive.states;
@@ -419,10 +425,10 @@ fn overview_figure(drive: &ScoredDrive, car: &Car) -> Figure {
     let pedals = ["throttle", "brake"].into_iter().zip([Stroke::SIGNAL, Stroke::THIRD]).enumerate();
     let pedals = pedals.map(|(i, (label, stroke))| curve(label, stroke, &|state| state.pedals[i]));
     let panels = [
-        panel("gear", 120.0, vec![gear]),
+        Panel { axis: gear_axis(&gear.points), ..panel("gear", 120.0, vec![gear]) },
         panel("speed (km/h)", 80.0, vec![curve("vehicle", Stroke::SIGNAL, &|state| km_h(state.vehicle_m_s))]),
         panel("speed (rpm)", 110.0, speeds.collect()),
-        Panel { axis: Axis::Fixed(0.0, 1.0), ..panel("pedals (0 to 1)", 70.0, pedals.collect()) },
+        Panel { axis: Axis::Fixed(0.0, 1.0), ..panel("pedals (0\u{a0}to\u{a0}1)", 70.0, pedals.collect()) },
     ];
     Figure {
         x_label: "time (s)",

@@ -69,7 +69,7 @@ impl LogPage<'_> {
         });
         let figures: Vec<Value> = figures.collect();
         let drawn = figures.len();
-        let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)]);
+        let (titles, rows) = shift_rows(&self.shifts[..self.shifts.len().min(MOST_ROWS)], MOST_ROWS);
         let file = self.log.file_name().unwrap_or(self.log.as_os_str()).to_string_lossy();
         Ok(templates()?.get_template("log.html")?.render(context! {
             name => file,
@@ -168,8 +168,8 @@ fn kind(shift: &ShiftEstimate) -> String {
     kind_of(&shift.shift)
 }
 
-/// Titles and rows of the table of shifts. Columns that no shift fills are left out.
-pub fn shift_rows(shifts: &[ShiftEstimate]) -> (Vec<String>, Vec<Vec<String>>) {
+/// Titles of the table of shifts, and its first rows. Columns that no shift fills are left out.
+pub fn shift_rows(shifts: &[ShiftEstimate], most: usize) -> (Vec<String>, Vec<Vec<String>>) {
     /// A title and its cell.
     type Column = (&'static str, fn(&ShiftEstimate) -> String);
     const COLUMNS: &[Column] = &[
@@ -193,12 +193,11 @@ pub fn shift_rows(shifts: &[ShiftEstimate]) -> (Vec<String>, Vec<Vec<String>>) {
         ("torque RMS error N m", |s| of(s, |e| Some(number(e.torque_error_n_m?.rms, 1)))),
         ("health", |s| of(s, |e| Some(health(e)))),
     ];
-    let cells: Vec<Vec<String>> =
-        shifts.iter().map(|shift| COLUMNS.iter().map(|(_, cell)| cell(shift)).collect()).collect();
-    let filled = |column: &usize| cells.iter().any(|row| !row[*column].is_empty());
-    let columns: Vec<usize> = (0..COLUMNS.len()).filter(filled).collect();
-    let titles = columns.iter().map(|column| COLUMNS[*column].0.to_owned()).collect();
-    (titles, cells.iter().map(|row| columns.iter().map(|column| row[*column].clone()).collect()).collect())
+    let is_filled = |(_, cell): &&Column| shifts.iter().any(|shift| !cell(shift).is_empty());
+    let columns: Vec<&Column> = COLUMNS.iter().filter(is_filled).collect();
+    let row = |shift: &ShiftEstimate| columns.iter().map(|(_, cell)| cell(shift)).collect();
+    let titles = columns.iter().map(|(title, _)| (*title).to_owned()).collect();
+    (titles, shifts.iter().take(most).map(row).collect())
 }
 
 /// A cell of an estimated shift; empty for others.

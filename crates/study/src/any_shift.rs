@@ -15,6 +15,7 @@ pub mod measured;
 mod nominal;
 pub mod recording;
 pub mod sensitivity;
+mod thinned;
 pub mod tour;
 
 use config::{Car, ElementErrorBounds, Sensors};
@@ -146,7 +147,8 @@ fn drawn_factor(range: Option<[f64; 2]>, share: f64, uniform: f64) -> f64 {
 /// Truth and estimates of one clutch at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClutchRow {
-    /// Torque, N m: true (not a number where it is not known), estimated, by the valve model alone.
+    /// Torque, N m: true (not a number where it is not known), estimated, by the valve model alone; in a simulation this in the true
+    /// direction.
     pub torque_n_m: [f64; 3],
     /// Pressure, Pa: true (not a number where it is not known), estimated, by the valve model alone.
     pub pressure_pa: [f64; 3],
@@ -352,7 +354,8 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
         (Some(found.element) == tables.place(truth.element)).then(|| ClutchRow {
-            torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m],
+            // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
+            torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],
             pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
             sticks: truth.sticks,
             torque_range_n_m: found.torque_range_n_m,

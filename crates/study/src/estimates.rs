@@ -74,11 +74,13 @@ enum Content {
 
 impl OutputColumn {
     /// Numbers or words.
+    #[inline]
     pub fn kind(&self) -> ColumnKind {
         if matches!(self.content, Content::Number(_)) { ColumnKind::Number } else { ColumnKind::Word }
     }
 
     /// What an estimate writes into it.
+    #[inline]
     pub fn cell(&self, estimate: &Estimate<f64>) -> Cell<'static> {
         match self.content {
             Content::Number(value) => Cell::Number(value(estimate).unwrap_or(f64::NAN)),

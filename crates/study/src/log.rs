@@ -200,6 +200,7 @@ impl Log {
 impl Iterator for Log {
     type Item = Result<(Input<f64>, LogRow), TraceError>;
 
+    #[inline]
     fn next(&mut self) -> Option<Self::Item> {
         match self.looked_at.pop_front() {
             Some(sample) => Some(Ok(sample)),

@@ -16,7 +16,7 @@ use trace::Cell;
 pub struct LogSample {
     /// Time of the step, s.
     pub time_s: f64,
-    /// What the observer was given.
+    /// What the observer was given and did not refuse.
     pub input: Input<f64>,
     /// What it estimates.
     pub estimate: Estimate<f64>,
@@ -27,10 +27,32 @@ pub struct LogSample {
 }
 
 impl LogSample {
+    /// A step with its estimate, without measured pressure and torque. A reading that the observer refused is none: what is said of a shift
+    /// follows from the others.
+    pub fn new(time_s: f64, input: &Input<f64>, estimate: Estimate<f64>) -> Self {
+        let Channels { engine, turbine, output, wheel, command, offgoing_command, engine_torque } = estimate.channels;
+        let input = Input {
+            dt_s: input.dt_s,
+            engine_rad_s: input.engine_rad_s.filter(|_| !is_refused(engine)),
+            turbine_rad_s: input.turbine_rad_s.filter(|_| !is_refused(turbine)),
+            output_rad_s: input.output_rad_s.filter(|_| !is_refused(output)),
+            wheel_rad_s: input.wheel_rad_s.filter(|_| !is_refused(wheel)),
+            command: input.command.filter(|_| !is_refused(command)),
+            offgoing_command: input.offgoing_command.filter(|_| !is_refused(offgoing_command)),
+            engine_torque_n_m: input.engine_torque_n_m.filter(|_| !is_refused(engine_torque)),
+        };
+        Self { time_s, input, estimate, pressure_pa: None, torque_n_m: None }
+    }
+
     /// Whether there is an estimate: none in a gear that the vehicle file does not describe.
     pub fn is_estimated(&self) -> bool {
         !self.estimate.pressure_pa.is_nan()
     }
+}
+
+/// Whether an observer did not use a reading that came with this.
+pub fn is_refused(channel: ChannelHealth) -> bool {
+    matches!(channel, ChannelHealth::Refused | ChannelHealth::Lost)
 }
 
 /// Stands where there is no estimate.
@@ -281,10 +303,9 @@ impl EstimatedShift {
         let phase = |sample: &LogSample| sample.estimate.phase;
         // From the inertia phase back to where the clutch began to carry torque, and on to its lock-up.
         let [inertia_from_s, inertia_to_s] = shift.inertia_s.unwrap_or([shift.start_s(), shift.end_s()]);
-        let seen = |sample: &LogSample| {
-            phase(sample) == Phase::InertiaPhase && (inertia_from_s..=inertia_to_s).contains(&sample.time_s)
-        };
-        let within = samples.iter().position(seen)?;
+        let first = samples.partition_point(|sample| sample.time_s < inertia_from_s);
+        let mut of_ratio = samples[first..].iter().take_while(|sample| sample.time_s <= inertia_to_s);
+        let within = first + of_ratio.position(|sample| phase(sample) == Phase::InertiaPhase)?;
         let begin = samples[..within]
             .iter()
             .rposition(|sample| matches!(phase(sample), Phase::BeforeShift | Phase::AfterShift))
@@ -335,9 +356,14 @@ fn mean(values: impl Iterator<Item = Ranged>) -> Option<Ranged> {
 
 /// Torque times slip over time. A channel that is slower than the steps stands for as long as its last reading.
 fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: &ReducedShift<f64>) -> Ranged {
-    let (mut turbine_rad_s, mut output_rad_s) = (f64::NAN, f64::NAN);
-    let mut power = Vec::with_capacity(shift.end);
-    for sample in &samples[..shift.end] {
+    let before = |speed: fn(&Input<f64>) -> Option<Reading<f64>>| {
+        let newest = samples[..shift.start].iter().rev().find_map(|sample| speed(&sample.input));
+        newest.map_or(f64::NAN, |reading| reading.value)
+    };
+    let mut turbine_rad_s = before(|input| input.turbine_rad_s);
+    let mut output_rad_s = before(|input| input.output_rad_s);
+    let mut power = Vec::with_capacity(shift.len());
+    for sample in &samples[shift] {
         turbine_rad_s = sample.input.turbine_rad_s.map_or(turbine_rad_s, |reading| reading.value);
         output_rad_s = sample.input.output_rad_s.map_or(output_rad_s, |reading| reading.value);
         let slip_rad_s = reduced.oncoming_slip(turbine_rad_s, output_rad_s);
@@ -349,7 +375,7 @@ fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: 
         power.push((sample.time_s, Ranged { value: value * slip_rad_s, range: ends }));
     }
     let mut work = Ranged { value: 0.0, range: Some([0.0; 2]) };
-    for pair in power[shift].windows(2) {
+    for pair in power.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
         let half_s = 0.5 * (to_s - from_s);
         work.value += half_s * (from.value + to.value);
@@ -418,23 +444,78 @@ fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
 mod tests {
     use super::*;
 
+    const NO_INPUT: Input<f64> = Input {
+        dt_s: 0.01,
+        engine_rad_s: None,
+        turbine_rad_s: None,
+        output_rad_s: None,
+        wheel_rad_s: None,
+        command: None,
+        offgoing_command: None,
+        engine_torque_n_m: None,
+    };
+
+    #[test]
+    fn friction_work_counts_the_last_reading_from_before_the_shift() {
+        let reduced = ReducedShift {
+            mass_kg_m2: [[1.0, 0.0], [0.0, 1.0]],
+            slip_offgoing: [1.0, -2.0],
+            slip_oncoming: [1.0, -1.0],
+        };
+        let sample = |at: u32, turbine: Option<f64>, output: Option<f64>| LogSample {
+            time_s: 0.01 * f64::from(at),
+            input: Input {
+                turbine_rad_s: turbine.map(Reading::now),
+                output_rad_s: output.map(Reading::now),
+                ..NO_INPUT
+            },
+            estimate: Estimate { clutch_torque_n_m: 50.0, ..no_estimate() },
+            pressure_pa: None,
+            torque_n_m: None,
+        };
+        let speeds = [(Some(900.0), Some(5.0)), (Some(200.0), None), (None, None), (None, Some(100.0)), (None, None)];
+        let samples: Vec<_> = (0..).zip(speeds).map(|(at, (turbine, output))| sample(at, turbine, output)).collect();
+        // Slips of 195, 100 and 100 rad/s at 50 N m, each 10 ms apart.
+        let work = friction_work(&samples, 2..5, &reduced);
+        assert!((work.value - 50.0 * 0.01 * (0.5 * 195.0 + 100.0 + 0.5 * 100.0)).abs() < 1e-9, "{}", work.value);
+        // No reading has come before the shift, nor in it: the slip is not known.
+        assert!(friction_work(&samples[2..], 0..1, &reduced).value == 0.0);
+        assert!(friction_work(&samples[2..], 0..2, &reduced).value.is_nan());
+    }
+
+    #[test]
+    fn a_refused_reading_does_no_friction_work() {
+        let reduced = &Vehicle::two_speed_at().unwrap().shift;
+        let work = |turbine: ChannelHealth, spike: f64| {
+            let sample = |step: u32| {
+                let reading = |value: f64| Some(Reading::now(value));
+                let is_spike = step == 5;
+                let mut estimate = Estimate { clutch_torque_n_m: 100.0, pressure_pa: 1e5, ..no_estimate() };
+                estimate.channels.turbine = if is_spike { turbine } else { ChannelHealth::Good };
+                let input = Input {
+                    turbine_rad_s: reading(if is_spike { spike } else { 300.0 }),
+                    output_rad_s: reading(50.0),
+                    ..NO_INPUT
+                };
+                LogSample::new(0.01 * f64::from(step), &input, estimate)
+            };
+            let samples: Vec<LogSample> = (0..10).map(sample).collect();
+            friction_work(&samples, 0..10, reduced).value
+        };
+        let good = work(ChannelHealth::Good, 300.0);
+        assert!(good.abs() > 1.0);
+        assert_eq!(work(ChannelHealth::Refused, 1e300), good);
+        assert_eq!(work(ChannelHealth::Lost, 1e300), good);
+        // What is not refused counts.
+        assert!(work(ChannelHealth::Good, 1e300).abs() > 1e290);
+    }
+
     #[test]
     fn the_recent_samples_of_a_time_are_those_of_it_and_the_one_before() {
         let mut recent = RecentSamples::default();
-        let none = None::<Reading<f64>>;
-        let input = Input {
-            dt_s: 0.01,
-            engine_rad_s: none,
-            turbine_rad_s: none,
-            output_rad_s: none,
-            wheel_rad_s: none,
-            command: none,
-            offgoing_command: none,
-            engine_torque_n_m: none,
-        };
         for step in 0..7000 {
             let time_s = 0.01 * f64::from(step);
-            recent.push(LogSample { time_s, input, estimate: no_estimate(), pressure_pa: none, torque_n_m: none });
+            recent.push(LogSample::new(time_s, &NO_INPUT, no_estimate()));
             if step % 97 > 0 {
                 continue;
             }

@@ -90,7 +90,9 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
         let plain = |word: &&str| !PLAIN.contains(word);
         name.split('_').filter(plain).map(str::to_owned).collect()
     };
-    let known = |name: &str| signal::MEASURABLE.contains(&units::to_si(name).0.as_str());
+    // Columns of a drive that are what they are called.
+    const WORDS: [&str; 3] = ["gear", "target_gear", "engine_share"];
+    let known = |name: &str| WORDS.contains(&name) || signal::MEASURABLE.contains(&units::to_si(name).0.as_str());
     let wanted = about(wanted);
     let near = |name: &&String| !known(name) && about(name).iter().any(|word| wanted.contains(word));
     if let Some(near) = present.iter().find(near) {
@@ -113,5 +115,13 @@ mod tests {
         let present = ["time_s", "element_d_current_a", "turbine_n"].map(str::to_owned);
         assert!(column_hint("element_e_current_a", &present).starts_with("the columns are "));
         assert!(column_hint("turbine_speed_rad_s", &present).starts_with("`turbine_n` has a similar name"));
+    }
+
+    #[test]
+    fn another_column_of_a_drive_is_no_similar_name() {
+        let present = ["time_s", "target_gear", "engine_share"].map(str::to_owned);
+        for wanted in ["gear", "engine_speed_rad_s"] {
+            assert!(column_hint(wanted, &present).starts_with("the columns are "), "{wanted}");
+        }
     }
 }

@@ -141,16 +141,20 @@ impl<W: Write + Seek> MdfWriter<W> {
     /// # Errors
     /// What the writer meets, a cell that is not of the kind of its column, or too many words.
     pub fn row<'a>(&mut self, time_s: f64, cells: impl IntoIterator<Item = Cell<'a>>) -> io::Result<()> {
-        let (mut cells, mut record) = (cells.into_iter(), self.record.as_mut_slice());
+        let (mut cells, mut record, mut words_are_same) = (cells.into_iter(), self.record.as_mut_slice(), false);
         set(&mut record, &time_s.to_le_bytes());
         for column in &mut self.columns {
-            match (column, cells.next()) {
+            let cell = if words_are_same { Some(Cell::SameWord) } else { cells.next() };
+            words_are_same |= cell == Some(Cell::SameWords);
+            match (column, cell) {
                 (Column::Number, Some(Cell::Number(number))) => set(&mut record, &number.to_le_bytes()),
                 #[expect(clippy::cast_precision_loss, reason = "counts")]
                 (Column::Number, Some(Cell::Whole(number))) => {
                     set(&mut record, &(number as f64).to_le_bytes());
                 }
-                (Column::Words(words), Some(Cell::SameWord)) if !words.is_empty() => _ = record.split_off_first_mut(),
+                (Column::Words(words), Some(Cell::SameWord | Cell::SameWords)) if !words.is_empty() => {
+                    record.split_off_first_mut();
+                }
                 (Column::Words(words), Some(Cell::Word(word))) => {
                     let at = words.iter().position(|known| known == word).unwrap_or_else(|| {
                         words.push(word.to_owned());
@@ -290,5 +294,21 @@ mod tests {
         let [good, bad] = ["good", "bad"].map(Cell::Word);
         assert_eq!(written([good, bad, Cell::SameWord, good]).unwrap(), written([good, bad, bad, good]).unwrap());
         assert!(written([Cell::SameWord, bad, bad, good]).is_err());
+        // Behind the word is a number.
+        assert!(written([good, bad, Cell::SameWords, good]).is_err());
+    }
+
+    #[test]
+    fn words_up_to_the_end_of_a_row_that_repeat_those_before_are_the_same_in_the_file() {
+        let columns = [("x", ColumnKind::Number), ("health", ColumnKind::Word), ("phase", ColumnKind::Word)];
+        let (x, [good, fill]) = (Cell::Number(0.5), ["good", "fill"].map(Cell::Word));
+        let written = |rows: [&[Cell<'_>]; 2]| {
+            let mut writer = MdfWriter::new(Cursor::new(Vec::new()), columns).unwrap();
+            rows.into_iter().try_for_each(|row| writer.row(0.0, row.iter().copied()))?;
+            writer.finish().map(Cursor::into_inner)
+        };
+        let (row, repeated) = ([x, good, fill], [x, Cell::SameWords]);
+        assert_eq!(written([&row, &repeated]).unwrap(), written([&row, &row]).unwrap());
+        assert!(written([&repeated, &row]).is_err());
     }
 }

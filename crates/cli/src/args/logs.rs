@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use config::vehicle::short::ValveKind;
 use trace::TableFormat;
 
@@ -153,29 +153,30 @@ impl fmt::Display for GearPair {
 }
 
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("shifts").required(true).args(["gearbox", "ratios"])))]
 pub(crate) struct Init {
     /// Name of the car
     #[arg(long, default_value = "my car")]
     pub(crate) name: String,
-    /// Mass with driver, kg
+    /// Mass with driver, kg: 200 to 60000
     #[arg(long, value_name = "KG", allow_negative_numbers = true, value_parser = within(200.0..=60e3))]
     pub(crate) mass_kg: f64,
-    /// Rolling radius of the driven wheels, m
+    /// Rolling radius of the driven wheels, m: 0.1 to 1
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = within(0.1..=1.0))]
     pub(crate) wheel_radius_m: f64,
     /// The gearbox: 8hp, 10_speed, dual_clutch_7, lepelletier_6, ravigneaux_4, or a gearbox file
-    #[arg(long, value_name = "NAME|FILE", required_unless_present = "ratios", conflicts_with_all = ["ratios", "valve", "complete"])]
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["valve", "complete"])]
     pub(crate) gearbox: Option<String>,
     /// What connects engine and gearbox [default: clutch for dual_clutch_7, else converter]
-    #[arg(long, value_enum, requires = "gearbox")]
+    #[arg(long, value_enum, conflicts_with = "ratios")]
     pub(crate) launch: Option<LaunchChoice>,
-    /// For one upshift: ratios of the gears before and after it, such as 4.17,2.34
+    /// For one upshift: ratios of the gears before and after it, such as 4.17,2.34; each 0.6 to 20
     #[arg(long, value_name = "BEFORE,AFTER", value_delimiter = ',', num_args = 1, allow_negative_numbers = true, value_parser = within(0.6..=20.0))]
     pub(crate) ratios: Vec<f64>,
-    /// Ratio from gearbox output to wheels; 1 for dual_clutch_7, whose ratios contain it
+    /// Ratio from gearbox output to wheels, 0.5 to 10; 1 for dual_clutch_7, whose ratios contain it
     #[arg(long, value_name = "RATIO", allow_negative_numbers = true, value_parser = within(0.5..=10.0))]
     pub(crate) final_ratio: f64,
-    /// Greatest engine torque, N m
+    /// Greatest engine torque, N m: 20 to 2000
     #[arg(long, value_name = "N_M", allow_negative_numbers = true, value_parser = within(20.0..=2000.0))]
     pub(crate) engine_torque_n_m: f64,
     /// Kind of the clutches' valves

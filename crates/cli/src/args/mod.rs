@@ -18,17 +18,17 @@ pub(crate) use studies::{
 
 const EXAMPLES: &str = "\
 Examples:
-  wetclutch demo                                     simulation, design, estimation and report for the built-in car
-  wetclutch demo --vehicle vehicles/eight_speed.toml  a drive through all gears of any car, every shift with its estimate
-  wetclutch reproduce                                the source chapter's experiments, statement by statement
-  wetclutch bench                                    all observers on many drives, ranked
-  wetclutch bench --vehicle vehicles/eight_speed.toml   every shift of a gearbox, in every kind
-  wetclutch study experiments/settings.toml -o out   two thousand shifts: errors and sensitivities
-  wetclutch simulate experiments/e1.toml -o out      a drive as CSV
-  wetclutch design vehicles/two_speed_at.toml        gains with their certificate
-  wetclutch inspect drive.mf4                        channels, units, rates and gaps of a log
-  wetclutch estimate log.csv --vehicle my_car.toml   pressure from measured signals
-  wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml   a vehicle file that fits the car
+  wetclutch demo                                              simulation, design, estimation and report for the built-in car
+  wetclutch demo --vehicle vehicles/eight_speed.toml          a drive through all gears of any car, every shift with its estimate
+  wetclutch reproduce                                         the source chapter's experiments, statement by statement
+  wetclutch bench                                             all observers on many drives, ranked
+  wetclutch bench --vehicle vehicles/eight_speed.toml         every shift of a gearbox, in every kind
+  wetclutch study experiments/settings.toml -o out            two thousand shifts: errors and sensitivities
+  wetclutch simulate experiments/e1.toml -o out               a drive as CSV
+  wetclutch design vehicles/two_speed_at.toml                 gains with their certificate
+  wetclutch inspect drive.mf4                                 channels, units, rates and gaps of a log
+  wetclutch estimate log.csv --vehicle my_car.toml            pressure from measured signals
+  wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml  a vehicle file that fits the car
 
 All files use SI units, which are part of keys and column names. Column names of measured files may also
 end in _rpm, _bar, _mpa, _ma, _ms, _km_h; these columns are converted when they are read.
@@ -238,9 +238,9 @@ pub(crate) enum Command {
     /// in which of them the speeds show nothing of the clutch torque, so that the valve model serves.
     #[command(verbatim_doc_comment)]
     Sensitivity(SensitivityOptions),
-    /// Check a vehicle, gearbox, experiment or study file
+    /// Check a vehicle, gearbox, experiment, drive or study file
     ///
-    /// Checks a vehicle, gearbox, experiment or study file, and the files that it names, and prints a summary. Also checks a
+    /// Checks a vehicle, gearbox, experiment, drive or study file, and the files that it names, and prints a summary. Also checks a
     /// bounds file for `design --bounds` and a sensors file for `estimate --sensors`. Warns of given gains that are
     /// unstable at a vertex.
     ///
@@ -290,8 +290,12 @@ pub(crate) struct Simulate {
 
 #[derive(Debug, Args)]
 pub(crate) struct Check {
-    /// Vehicle, experiment, study, bounds or sensors file
+    /// Vehicle, gearbox, experiment, drive, study, bounds or sensors file
     pub(crate) file: PathBuf,
+    /// File whose table `sensors` describes how the speeds of a car with a gearbox are read; default: those of
+    /// experiments/bench.toml
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
     /// Folder for the diagrams of a gearbox file
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,

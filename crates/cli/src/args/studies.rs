@@ -133,6 +133,10 @@ pub(crate) struct ErrorBoundOptions {
 pub(crate) struct SensitivityOptions {
     /// Vehicle file; default: the built-in car
     pub(crate) vehicle: Option<PathBuf>,
+    /// File whose table `sensors` describes how the speeds of a car with a gearbox are read; default: those of
+    /// experiments/bench.toml
+    #[arg(long, value_name = "SENSORS.toml")]
+    pub(crate) sensors: Option<PathBuf>,
     /// Folder for the page
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,

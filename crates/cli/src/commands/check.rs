@@ -7,6 +7,7 @@ use report::tables::phase_name;
 
 use super::check_defaults::{describe_car_values, describe_defaults};
 use super::gearbox;
+use super::matrix::sensors_or_bench;
 use super::simulate_drive::{describe_car, describe_drive};
 use crate::args::Check;
 use crate::failure::Failure;
@@ -19,12 +20,16 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
         let message = format!("{}: only a gearbox file is drawn\nhint: leave -o out", options.file.display());
         return Err(Failure::Input(message));
     }
+    if options.sensors.is_some() && kind != Kind::Car {
+        return Err(super::sensors_without_effect());
+    }
     match kind {
         Kind::Gearbox => gearbox::describe(&GearboxFile::from_source(source)?, options.output.as_deref()),
         Kind::Car => {
             let car = Car::read(&options.file)?;
+            let sensors = sensors_or_bench(options.sensors.as_deref())?;
             describe_car(&car)?;
-            describe_car_values(&car, options.all)
+            describe_car_values(&car, &sensors, options.all)
         }
         Kind::CarStudy => super::study::describe_cars(&options.file),
         Kind::Drive => describe_drive(&Drive::from_source(source)?, &options.file),

@@ -1,11 +1,10 @@
 //! What `wetclutch check` says about the defaults of a vehicle file.
 
-use config::{Car, Change, DefaultTaken, Vehicle};
+use config::{Car, Change, DefaultTaken, Sensors, Vehicle};
 use study::any_shift::influence::{CarInfluence, ErrorOfEstimate, ValueFrom, car_influences};
 use study::{Influence, default_influences};
 use trace::units;
 
-use super::matrix::bench_sensors;
 use crate::failure::Failure;
 use crate::output;
 
@@ -53,23 +52,22 @@ fn short_value(taken: &DefaultTaken) -> String {
 }
 
 /// Lists the defaults of a vehicle file with a gearbox, and the values that matter most to an estimate.
-pub(super) fn describe_car_values(car: &Car, all: bool) -> Result<(), Failure> {
+pub(super) fn describe_car_values(car: &Car, sensors: &Sensors, all: bool) -> Result<(), Failure> {
     let taken = &car.defaults_taken;
     if taken.is_empty() && !all {
         return Ok(());
     }
     output::line(&format!("\n{} values are not in the file and are defaults", taken.len()))?;
-    // A file is not wrong because a shift of its car cannot be simulated.
-    let influences = match car_influences(car, &bench_sensors()?) {
-        Ok(Some(influences)) => influences,
-        Ok(None) => {
-            output::line(
-                "the filter has tables for no shift of this gearbox, so it cannot be said which of them matter",
-            )?;
-            return all_names(taken, &[], true);
-        }
-        Err(error) => {
-            output::line(&format!("it cannot be said which of them matter: {error}"))?;
+    let influences = match car_influences(car, sensors) {
+        Ok(Some(influences)) if influences.shifts > 0 => influences,
+        // A file is not wrong because a shift of its car cannot be simulated.
+        unknown => {
+            let why = match unknown {
+                Ok(Some(_)) => "no clutch slips in the simulated shifts".to_owned(),
+                Ok(None) => "the filter has tables for no shift of this gearbox".to_owned(),
+                Err(error) => error.to_string(),
+            };
+            output::line(&format!("it cannot be said which of them matter: {why}"))?;
             return all_names(taken, &[], true);
         }
     };

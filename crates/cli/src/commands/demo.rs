@@ -11,14 +11,20 @@ use trace::{Trace, signal, units};
 
 use crate::args::Demo;
 use crate::commands::estimate::{best, kind};
-use crate::commands::{write_text, write_trace};
+use crate::commands::{writable, write_text, write_trace};
 use crate::failure::Failure;
 use crate::output;
+
+/// The names of the files, but for the figures.
+const FILES: [&str; 4] = ["report.html", "trace.csv", "measured.csv", "estimate.csv"];
 
 pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     if let Some(vehicle) = &options.vehicle {
         return super::demo_drive::demo(options, vehicle);
     }
+    let folder = &options.output;
+    writable(folder, &FILES)?;
+    let [report, trace, measured_only, estimate] = FILES.map(|name| folder.join(name));
     let (vehicle, mut experiment) = (Vehicle::two_speed_at()?, Experiment::e1()?);
     // The gains that E1 gives are the chapter's; the demo designs its own.
     experiment.observers.retain(|entry| entry.gains.is_none());
@@ -26,17 +32,16 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     let comparison = compare(&vehicle, &experiment)?;
     let page = Page::of(&comparison, &vehicle)?;
 
-    let folder = &options.output;
-    write_text(&folder.join("report.html"), &page.html)?;
+    write_text(&report, &page.html)?;
     for (name, svg) in &page.figures {
         write_text(&folder.join(name), svg)?;
     }
     let measured = comparison.trace.filtered(|name| signal::MEASURABLE.contains(&name));
-    write_trace(&folder.join("trace.csv"), &comparison.trace)?;
-    write_trace(&folder.join("measured.csv"), &measured)?;
-    write_trace(&folder.join("estimate.csv"), &default_estimate(&vehicle, &measured)?)?;
+    write_trace(&trace, &comparison.trace)?;
+    write_trace(&measured_only, &measured)?;
+    write_trace(&estimate, &default_estimate(&vehicle, &measured)?)?;
 
-    print(&comparison, &folder.join("report.html"))
+    print(&comparison, &report)
 }
 
 /// The default output of `estimate` for measured signals with a wheel speed.

@@ -8,7 +8,7 @@ use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::Cell;
 
 use crate::args::Bench;
-use crate::commands::{json_object, progress, read_car, writable, write_cells, write_text};
+use crate::commands::{JsonObject, progress, read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -18,10 +18,7 @@ const TABLE: &str = "bench.csv";
 
 pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     let car = read_car(vehicle)?;
-    let sensors = match &options.sensors {
-        Some(path) => super::estimate::sensors(path)?,
-        None => bench_sensors()?,
-    };
+    let sensors = sensors_or_bench(options.sensors.as_deref())?;
     options.output.as_deref().map(|folder| writable(folder, &[PAGE, TABLE])).transpose()?;
     let (draws, seed) = (u64::from(options.draws), options.seed);
     let all = runs(&car, draws)?;
@@ -44,7 +41,7 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
         write_cells(&folder.join(TABLE), &cells)?;
     }
     if options.json {
-        let objects: Vec<_> = cells.into_iter().map(json_object).collect();
+        let objects: Vec<_> = cells.into_iter().map(JsonObject::of).collect();
         output::line(&serde_json::to_string_pretty(&objects)?)?;
         return Ok(());
     }
@@ -54,6 +51,11 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
         output::line(&format!("page: {}", folder.join(PAGE).display()))?;
     }
     Ok(())
+}
+
+/// The sensors of a file, or those of the built-in bench.
+pub(super) fn sensors_or_bench(path: Option<&Path>) -> Result<Sensors, Failure> {
+    path.map_or_else(bench_sensors, super::estimate::sensors)
 }
 
 /// The toothed wheels of the built-in bench.

@@ -41,7 +41,7 @@ use std::path::{Path, PathBuf};
 use config::{Car, Kind, Source};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
-use serde::Serializer as _;
+use serde::{Serialize, Serializer};
 use trace::{Cell, CsvWriter, Trace, WholeFile};
 
 use crate::args::Mapping;
@@ -68,6 +68,12 @@ fn read_car(path: &Path) -> Result<Car, Failure> {
     Ok(Car::read(path)?)
 }
 
+/// `--sensors` where nothing is read by sensors.
+fn sensors_without_effect() -> Failure {
+    let message = "--sensors has an effect with the vehicle file of a car with a gearbox alone\nhint: leave it out";
+    Failure::Input(message.to_owned())
+}
+
 /// Writes rows of named cells as a comma-separated file, whole or not at all.
 fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Failure> {
     let write = || -> std::io::Result<()> {
@@ -82,9 +88,9 @@ fn write_cells(path: &Path, rows: &[Vec<(String, Cell<'_>)>]) -> Result<(), Fail
 }
 
 /// Writes objects as a list in JSON, one after the other: there may be many.
-fn write_json_list(
+fn write_json_list<'a, N: AsRef<str> + 'a>(
     path: &Path,
-    objects: impl Iterator<Item = serde_json::Map<String, serde_json::Value>>,
+    objects: impl Iterator<Item = JsonObject<'a, N>>,
 ) -> Result<(), Failure> {
     let write = |writer: &mut (dyn io::Write + Send)| {
         let mut writer = BufWriter::new(writer);
@@ -95,16 +101,36 @@ fn write_json_list(
     trace::write_whole(path, write).map_err(|error| Failure::writing(path, &error))
 }
 
-/// Named cells as a JSON object; not a number becomes null.
-fn json_object<'a>(cells: impl IntoIterator<Item = (String, Cell<'a>)>) -> serde_json::Map<String, serde_json::Value> {
-    let value = |cell: Cell<'_>| match cell {
-        Cell::Number(number) => serde_json::Value::from(number),
-        Cell::Whole(number) => serde_json::Value::from(number),
-        Cell::Word(word) => serde_json::Value::from(word),
-        // An object has no row before it.
-        Cell::SameWord => serde_json::Value::Null,
-    };
-    cells.into_iter().map(|(name, cell)| (name, value(cell))).collect()
+/// Named cells as a JSON object, in the order of their names.
+struct JsonObject<'a, N>(Vec<(N, Cell<'a>)>);
+
+impl<'a, N: AsRef<str>> JsonObject<'a, N> {
+    fn of(cells: impl IntoIterator<Item = (N, Cell<'a>)>) -> Self {
+        let mut cells: Vec<_> = cells.into_iter().collect();
+        cells.sort_by(|(one, _), (other, _)| one.as_ref().cmp(other.as_ref()));
+        Self(cells)
+    }
+}
+
+impl<N: AsRef<str>> Serialize for JsonObject<'_, N> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, cell)| (name.as_ref(), JsonCell(*cell))))
+    }
+}
+
+/// A cell as a JSON value; not a number becomes null.
+struct JsonCell<'a>(Cell<'a>);
+
+impl Serialize for JsonCell<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Cell::Number(number) => serializer.serialize_f64(number),
+            Cell::Whole(number) => serializer.serialize_u64(number),
+            Cell::Word(word) => serializer.serialize_str(word),
+            // An object has no row before it.
+            Cell::SameWord | Cell::SameWords => serializer.serialize_unit(),
+        }
+    }
 }
 
 /// Checks that these files can be written into a folder, before the work starts. Creates a missing folder.

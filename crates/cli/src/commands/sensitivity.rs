@@ -10,15 +10,16 @@ use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivi
 use study::sensitivity as find;
 use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 
-use super::matrix::bench_sensors;
+use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
-use crate::commands::write_text;
+use crate::commands::{sensors_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
     let vehicle = match &options.vehicle {
         Some(path) if Source::read(path)?.kind()? == Kind::Car => return of_car(options, path),
+        _ if options.sensors.is_some() => return Err(sensors_without_effect()),
         Some(path) => Vehicle::read(path)?,
         None => Vehicle::two_speed_at()?,
     };
@@ -80,7 +81,7 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
 /// The same for every shift of a car with a gearbox.
 fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     let car = Car::read(path)?;
-    let shifts = car_sensitivity(&car, &bench_sensors()?)?;
+    let shifts = car_sensitivity(&car, &sensors_or_bench(options.sensors.as_deref())?)?;
     if shifts.is_empty() {
         let message = format!(
             "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; the elements need plates (`pack`) and valves",

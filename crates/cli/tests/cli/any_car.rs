@@ -181,7 +181,7 @@ fn lost_repeated_and_late_readings_of_a_drive_are_no_error() {
 }
 
 /// A table with the cells of a column changed.
-fn with_column(table: &str, column: &str, change: impl Fn(&str) -> String) -> String {
+fn with_column(table: &str, column: &str, mut change: impl FnMut(&str) -> String) -> String {
     let at = table.lines().next().unwrap().split(',').position(|name| name == column).unwrap();
     let changed = |(row, line): (usize, &str)| {
         let cells = line.split(',').enumerate();
@@ -320,6 +320,45 @@ fn a_hole_in_a_shift_ends_it_and_is_said() {
 }
 
 #[test]
+fn a_log_with_too_few_rows_is_told_once_and_its_rows_are_no_holes() {
+    let folder = simulated("slow-car");
+    let text = folder.read("sim/short_measured.csv");
+    let (names, rows) = text.split_once('\n').unwrap();
+    for (every, is_slow) in [(50, true), (20, true), (5, false)] {
+        let thinned: Vec<&str> = std::iter::once(names).chain(rows.lines().step_by(every)).collect();
+        folder.write("log.csv", thinned.join("\n") + "\n");
+        let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        let slow = said.matches("too long for the estimate of a shift").count();
+        assert_eq!(slow, usize::from(is_slow), "{every}: {said}");
+        assert!(!said.contains("hole"), "{every}: {said}");
+    }
+}
+
+#[test]
+fn a_reading_that_is_refused_is_no_flare() {
+    let folder = simulated("spike-car");
+    let text = folder.read("sim/short_measured.csv");
+    let [gear, target] = ["gear", "target_gear"].map(|name| column(&text, name));
+    let begin = (0..gear.len()).find(|&row| gear[row] != target[row]).unwrap();
+    for name in ["turbine_speed_rad_s", "output_speed_rad_s"] {
+        for spike in ["1e300", "-1e300", "3000"] {
+            let mut row = 0;
+            let spoilt = with_column(&text, name, |value| {
+                row += 1;
+                if row == begin + 30 { spike.to_owned() } else { value.to_owned() }
+            });
+            folder.write("log.csv", spoilt);
+            said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+            let shifts = folder.read("out_shifts.csv");
+            for column in ["flare_rad_s", "past_synchronous_rad_s"] {
+                let values = numbers(&shifts, column);
+                assert!(values.iter().all(|rad_s| *rad_s < 10.0), "{name} {spike} {column}: {values:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn rows_of_a_drive_out_of_their_order_are_left_out_and_counted() {
     let folder = simulated("order-car");
     let text = folder.read("sim/short_measured.csv");
@@ -335,4 +374,107 @@ fn rows_of_a_drive_out_of_their_order_are_left_out_and_counted() {
     folder.write("log.csv", late);
     let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("ns.csv")]));
     assert!(error.contains("if the time is in ns, ") && error.contains("`unit = \"ns\"` under [time]"), "{error}");
+}
+
+/// The gearbox of a shipped file with more of the same brake.
+fn with_brakes(more: usize) -> String {
+    let gearbox = std::fs::read_to_string(format!("{ROOT}gearboxes/8hp.toml")).unwrap();
+    let brake = |i: usize| {
+        format!(
+            "\n[[element]]\nname = \"X{i}\"\nkind = \"brake\"\ninput = \"housing\"\noutput = \"ring1\"\npack = {{ friction_faces = 6, \
+             mean_radius_m = 0.095, piston_area_m2 = 0.014, return_spring_n = 1500, friction_coefficient = 0.12 }}\n"
+        )
+    };
+    gearbox + &(0..more).map(brake).collect::<String>()
+}
+
+#[test]
+fn check_of_a_car_that_cannot_be_simulated_goes_on_and_says_why() {
+    let folder = Folder::new("unsimulated");
+    for (brakes, why) in [
+        (2, "the gearbox has 7 clutches and brakes, and a simulated car has room for 6"),
+        (4, "the gearbox has 9 clutches and brakes, and the filter has room for 8"),
+    ] {
+        folder.write("many.toml", with_brakes(brakes));
+        let car = folder.write("car.toml", "name = \"x\"\ngearbox = \"many.toml\"\n");
+        let text = printed(&wetclutch(&["check", &car]));
+        assert!(text.contains("it cannot be said which of them matter: ") && text.contains(why), "{text}");
+        // The defaults are listed nevertheless.
+        assert!(text.contains("vehicle.mass_kg = 1500"), "{text}");
+        assert!(refused(&wetclutch(&["sensitivity", &car])).contains(why));
+    }
+}
+
+#[test]
+fn the_sensors_of_check_and_sensitivity_can_be_those_of_a_file() {
+    let folder = Folder::new("own-sensors");
+    let bench = std::fs::read_to_string(format!("{ROOT}experiments/bench.toml")).unwrap();
+    let sensors = folder.write("sensors.toml", sensors_of(&bench, "noise_rad_s", "1.0"));
+    let same = folder.write("same.toml", &bench);
+    // A car with few shifts.
+    folder.write("two_speed.toml", std::fs::read_to_string(format!("{ROOT}gearboxes/two_speed.toml")).unwrap());
+    let car = folder.write("car.toml", "name = \"x\"\ngearbox = \"two_speed.toml\"\n");
+    let check = |more: &[&str]| printed(&wetclutch(&[&["check", &car, "--all"], more].concat()));
+    let of_bench = check(&[]);
+    assert_eq!(of_bench, check(&["--sensors", &same]));
+    assert_ne!(of_bench, check(&["--sensors", &sensors]));
+    let shifts = |more: &[&str]| printed(&wetclutch(&[&["sensitivity", &car], more].concat()));
+    assert_ne!(shifts(&[]), shifts(&["--sensors", &sensors]));
+    for command in ["check", "sensitivity"] {
+        let output = wetclutch(&[command, VEHICLE, "--sensors", &sensors]);
+        assert!(
+            refused(&output).contains("--sensors has an effect with the vehicle file of a car with a gearbox alone")
+        );
+    }
+}
+
+/// A file with another value of all keys of this name.
+fn sensors_of(text: &str, key: &str, value: &str) -> String {
+    let line = |line: &str| match line.split_once(" = ") {
+        Some((name, _)) if name == key => format!("{key} = {value}\n"),
+        _ => format!("{line}\n"),
+    };
+    text.lines().map(line).collect()
+}
+
+#[test]
+fn a_table_of_a_drive_with_another_delimiter_gets_a_hint() {
+    let folder = simulated("semicolon");
+    let table = folder.read("sim/short_measured.csv").replace(',', ";");
+    folder.write("semicolon.csv", table);
+    let text = refused(&estimate(&folder, "semicolon.csv", &[]));
+    assert!(text.contains("separated by `;`") && text.contains("--map map.toml"), "{text}");
+}
+
+#[test]
+fn a_gearbox_whose_first_gear_is_held_by_a_one_way_clutch_is_driven_from_its_second() {
+    let folder = Folder::new("one-way");
+    let gearbox = std::fs::read_to_string(format!("{ROOT}gearboxes/ravigneaux_4.toml")).unwrap();
+    let one_way = "\n[[element]]\nname = \"F1\"\nkind = \"one-way-clutch\"\ninput = \"housing\"\noutput = \"car\"\n";
+    let first =
+        gearbox.replace("name = \"1\", engaged = [\"FWD\", \"LR\"]", "name = \"1\", engaged = [\"FWD\", \"F1\"]");
+    folder.write("one_way.toml", first + one_way);
+    let car = folder.write("car.toml", "name = \"x\"\ngearbox = \"one_way.toml\"\n");
+    let text = printed(&wetclutch(&["demo", "--vehicle", &car, "-o", &folder.path("out")]));
+    assert!(text.contains("8 of 8 shifts were completed"), "{text}");
+    assert_eq!(column(&folder.read("out/shifts.csv"), "from_gear")[..4], ["2", "3", "4", "3"]);
+}
+
+#[test]
+fn a_reading_that_was_refused_is_no_flare() {
+    let folder = simulated("outlier");
+    let text = folder.read("sim/short_measured.csv");
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| names.iter().position(|other| *other == name).unwrap();
+    let (gear, target, turbine) = (at("gear"), at("target_gear"), at("turbine_speed_rad_s"));
+    let mut rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let in_shift = rows.iter().skip(1).position(|row| row[gear] != row[target]).unwrap() + 20;
+    rows[in_shift][turbine] = "1e300";
+    let log: String = rows.iter().map(|row| row.join(",") + "\n").collect();
+    folder.write("outlier.csv", log);
+    let output = folder.path("out.csv");
+    said(&estimate(&folder, "outlier.csv", &["-o", &output]));
+    let flares = numbers(&folder.read("out_shifts.csv"), "flare_rad_s");
+    assert!(flares.len() >= 3 && flares.iter().all(|flare| *flare < 20.0), "{flares:?}");
+    assert!(folder.read("out.csv").contains("reading_refused"));
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, stderr, stdout, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, stderr, stdout, wetclutch};
 
 fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(path).unwrap()
@@ -500,6 +500,11 @@ fn an_output_over_an_input_is_refused_and_the_input_stays() {
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));
     assert_eq!(read(&vehicle), before);
+    // A measurement cannot be made again.
+    let before = read(&log);
+    let output = wetclutch(&["estimate", &log, "--vehicle", &vehicle, "-o", &log]);
+    assert!(refused(&output).contains("the output would replace this input"), "{}", stderr(&output));
+    assert_eq!(read(&log), before);
 }
 
 #[test]

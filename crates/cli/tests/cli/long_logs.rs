@@ -46,6 +46,42 @@ fn rows(text: &str) -> Vec<std::collections::HashMap<String, String>> {
 }
 
 #[test]
+fn a_reading_that_is_refused_is_not_in_the_quality_of_a_shift() {
+    let folder = Folder::new("refused-readings");
+    let log = folder.drives("log.csv", 1, None);
+    said(&estimate(&log, &["-o", &folder.path("out.csv")]));
+    let good = rows(&folder.read("out_shifts.csv"));
+    let text = folder.read("log.csv");
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    // One reading in the inertia phase.
+    for name in ["turbine_speed_rad_s", "output_speed_rad_s", "engine_speed_rad_s", "wheel_speed_rad_s"] {
+        let at = names.iter().position(|other| *other == name).unwrap();
+        for spike in ["1e300", "-1e300", "3000"] {
+            let row = |line: &str| {
+                let spoilt = |(i, cell): (usize, &str)| if i == at { spike.to_owned() } else { cell.to_owned() };
+                match line.starts_with("8.10,") {
+                    true => line.split(',').enumerate().map(spoilt).collect::<Vec<_>>().join(","),
+                    false => line.to_owned(),
+                }
+            };
+            let spoilt = text.lines().map(row).collect::<Vec<_>>().join("\n") + "\n";
+            assert_ne!(spoilt, text);
+            let spoilt = folder.write("spoilt.csv", spoilt);
+            said(&estimate(&spoilt, &["-o", &folder.path("spoilt_out.csv")]));
+            let found = rows(&folder.read("spoilt_out_shifts.csv"));
+            assert_eq!(found.len(), 1);
+            for column in ["friction_work_j", "flare_rad_s", "jerk_m_s3", "oncoming_torque_mean_n_m"] {
+                let number =
+                    |row: &std::collections::HashMap<String, String>| row[column].parse::<f64>().unwrap_or(0.0);
+                let (found, good) = (number(&found[0]), number(&good[0]));
+                // Ten milliseconds of a shift of half a second are not seen.
+                assert!((found - good).abs() <= 0.05 * good.abs() + 0.5, "{name} {spike} {column}: {found} for {good}");
+            }
+        }
+    }
+}
+
+#[test]
 fn every_shift_has_its_estimate_quality_and_error() {
     let folder = Folder::new("shifts");
     let log = folder.drives("log.csv", 3, None);

@@ -15,8 +15,9 @@ use super::raw::{
 };
 use crate::ConfigError;
 use crate::check::{Check, Number, Word};
+use crate::vehicle::{FRICTION_FACES, PISTON_AREAS_M2, PLATE_RADII_M, RETURN_SPRINGS_N};
 
-/// Ranges of a friction element, the same as of a vehicle's clutches.
+/// Slips of a friction element.
 const SLIPS_RAD_S: [f64; 2] = [0.0, 2e3];
 
 /// What a file says, and where.
@@ -245,10 +246,10 @@ fn pack(check: &Check<'_>, element: &str, raw: &RawPack) -> Result<Clutch<f64>, 
         check.meaning(key("friction_coefficient"), start(&raw.friction_coefficient), error.to_string(), None)
     })?;
     Ok(Clutch {
-        mean_radius_m: number("mean_radius_m", &raw.mean_radius_m, 0.02..=0.5)?,
-        friction_faces: check.count(key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
-        piston_area_m2: number("piston_area_m2", &raw.piston_area_m2, 0.001..=0.1)?,
-        return_spring_n: number("return_spring_n", &raw.return_spring_n, 0.0..=10e3)?,
+        mean_radius_m: number("mean_radius_m", &raw.mean_radius_m, PLATE_RADII_M)?,
+        friction_faces: check.count(key("friction_faces"), &raw.friction_faces, FRICTION_FACES)?,
+        piston_area_m2: number("piston_area_m2", &raw.piston_area_m2, PISTON_AREAS_M2)?,
+        return_spring_n: number("return_spring_n", &raw.return_spring_n, RETURN_SPRINGS_N)?,
         static_friction: friction,
         friction: flat,
     })

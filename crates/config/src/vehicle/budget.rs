@@ -135,21 +135,20 @@ pub(super) fn error_bounds(
     let pressure_max_pa = number("pressure_max_pa", &raw.pressure_max_pa, 1e5..=10e6)?;
     let line = raw.line_pressure_pa.as_ref();
     let line_pressure_pa = line.map(|line| range("line_pressure_pa", line, 0.0..=pressure_max_pa)).transpose()?;
+    let stiffness =
+        raw.shaft_stiffness_factor.as_ref().map(|factors| factor("shaft_stiffness_factor", factors, 0.2..=5.0));
     Ok(ErrorBounds {
         wheel_scale: optional("wheel_scale", &raw.wheel_scale, 0.0..=0.2, WHEEL_SCALE)?,
         wheel_delay_s: optional("wheel_delay_s", &raw.wheel_delay_s, 0.0..=0.2, WHEEL_DELAY_S)?,
         channel_skew_s: optional("channel_skew_s", &raw.channel_skew_s, 0.0..=0.1, CHANNEL_SKEW_S)?,
         engine_torque_share: optional("engine_torque_share", &raw.engine_torque_share, 0.0..=1.0, ENGINE_TORQUE_SHARE)?,
-        shaft_stiffness_factor: match &raw.shaft_stiffness_factor {
-            Some(factors) => factor("shaft_stiffness_factor", factors, 0.2..=5.0)?,
-            None => SHAFT_STIFFNESS_FACTOR,
-        },
+        shaft_stiffness_factor: stiffness.transpose()?.unwrap_or(SHAFT_STIFFNESS_FACTOR),
         backlash_rad: optional("backlash_rad", &raw.backlash_rad, 0.0..=0.2, BACKLASH_RAD)?,
         turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
         pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
         mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
         grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
-        shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=50e3)?,
+        shaft_torque_n_m: number("shaft_torque_n_m", &raw.shaft_torque_n_m, 0.0..=200e3)?,
         output_torque_n_m: number("output_torque_n_m", &raw.output_torque_n_m, 0.0..=50e3)?,
         offgoing_torque_n_m: number("offgoing_torque_n_m", &raw.offgoing_torque_n_m, 0.0..=1e4)?,
         offgoing_drain_s: number("offgoing_drain_s", &raw.offgoing_drain_s, 0.0..=2.0)?,
@@ -165,16 +164,13 @@ pub(super) fn error_bounds(
         valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor, 0.01..=100.0)?,
         valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor, 0.1..=10.0)?,
         valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
-        valve_hysteresis_pa: match &raw.valve_hysteresis_pa {
-            Some(half_width) => {
-                number("valve_hysteresis_pa", half_width, oncoming.hysteresis_pa..=*HYSTERESES_PA.end())?
-            }
-            None => VALVE_HYSTERESIS_PA.max(oncoming.hysteresis_pa),
-        },
-        command_age_s: match &raw.command_age_s {
-            Some(age) => number("command_age_s", age, 0.0..=1.0)?,
-            None => COMMAND_AGE_S,
-        },
+        valve_hysteresis_pa: optional(
+            "valve_hysteresis_pa",
+            &raw.valve_hysteresis_pa,
+            oncoming.hysteresis_pa..=*HYSTERESES_PA.end(),
+            VALVE_HYSTERESIS_PA.max(oncoming.hysteresis_pa),
+        )?,
+        command_age_s: optional("command_age_s", &raw.command_age_s, 0.0..=1.0, COMMAND_AGE_S)?,
         line_pressure_pa: line_pressure_pa.unwrap_or([pressure_max_pa; 2]),
         fill: fill_bounds::bounds(check, raw.fill.as_ref(), oncoming, oil_degc)?,
         friction_factor: factor("friction_factor", &raw.friction_factor, 0.1..=10.0)?,

@@ -14,10 +14,10 @@ use toml::Spanned;
 use super::car_bounds::{self, CarErrorBounds, ElementErrorBounds, RawCarErrorBounds, RawElementErrorBounds};
 use super::fill::{self, RawFill};
 use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFriction, RawOil, RawRoad, RawTyre};
-use super::short::{car_defaults, car_defaults_taken};
+use super::short::{car_defaults, car_defaults_taken, of_default};
 use super::{
-    DefaultTaken, HYSTERESES_PA, ShiftClutch, backlash, converter, driveline, engine, oil_temperature, road, tyre,
-    valves,
+    DefaultTaken, HYSTERESES_PA, RETURN_SPRINGS_N, ShiftClutch, backlash, converter, driveline, engine,
+    oil_temperature, road, tyre, valves,
 };
 use crate::check::{Check, Number, Word};
 use crate::source::Layers;
@@ -26,6 +26,10 @@ use crate::{ConfigError, GearboxFile, Kind, Source};
 /// What a vehicle file leaves out.
 const DEFAULTS: (&str, &str) = ("vehicles/eight_speed.toml", include_str!("../../../../vehicles/eight_speed.toml"));
 const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../gearboxes/8hp.toml"));
+
+/// What to do about a `[valve]` of which a part is missing.
+const WHOLE_VALVE: &str =
+    "a [valve] of your own is given whole, as in vehicles/eight_speed.toml: all of its keys, or none";
 
 /// The lock-up clutch of the converter, and when it is closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,10 +119,15 @@ impl Car {
     /// # Errors
     /// As [`Self::read`].
     pub fn from_sources(source: Source, gearbox: Source) -> Result<Self, ConfigError> {
-        let mut gearbox = GearboxFile::from_source(gearbox)?.gearbox;
+        let gearbox = GearboxFile::from_source(gearbox)?.gearbox;
         let defaults = car_defaults(&source, Source::built_in(DEFAULTS.0, DEFAULTS.1), &gearbox)?;
-        let raw: RawCar = Layers { source: &defaults, over: Some(&source) }.parse()?;
-        let check = Check { layers: Layers { source: &defaults, over: Some(&source) } };
+        Self::over(&defaults, source.clone(), gearbox).map_err(|error| of_default(error, &defaults, &source))
+    }
+
+    /// The car of a file over these defaults.
+    fn over(defaults: &Source, source: Source, mut gearbox: Gearbox) -> Result<Self, ConfigError> {
+        let raw: RawCar = Layers { source: defaults, over: Some(&source) }.parse()?;
+        let check = Check { layers: Layers { source: defaults, over: Some(&source) } };
         let at = raw.gearbox.span().start;
         if gearbox.train.is_none() {
             let message = format!("\"{}\" has no stick diagram", raw.gearbox.get_ref());
@@ -130,7 +139,7 @@ impl Car {
             check.number("hydraulics.line_pressure_pa", &raw.hydraulics.line_pressure_pa, 1e5..=10e6)?;
         let oil_temperature_degc = oil_temperature(&check, &raw.oil)?;
         // A valve of one's own has nothing of the shipped one, which may be of another kind.
-        let own: RawOwnValve = source.parse()?;
+        let own: RawOwnValve = source.parse().map_err(|error| error.with_hint(WHOLE_VALVE))?;
         let own_check = Check::of(&source);
         let valve = own.valve.as_ref().map_or((&check, &raw.valve), |valve| (&own_check, valve));
         let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
@@ -156,7 +165,7 @@ impl Car {
             tyre: tyre(&check, &raw.tyre)?,
             road: road(&check, &raw.vehicle)?,
             oil_temperature_degc,
-            defaults_taken: car_defaults_taken(&source, &defaults, matches!(raw.launch, RawLaunch::Converter))?,
+            defaults_taken: car_defaults_taken(&source, defaults, matches!(raw.launch, RawLaunch::Converter))?,
             source,
         })
     }
@@ -437,7 +446,7 @@ impl CommonClutch<'_> {
             ..pack
         };
         if let Some(value) = own.and_then(|own| own.return_spring_n.as_ref()) {
-            clutch.return_spring_n = check.number(key("return_spring_n"), value, 0.0..=10e3)?;
+            clutch.return_spring_n = check.number(key("return_spring_n"), value, RETURN_SPRINGS_N)?;
         }
         if let Some(friction) = own.and_then(|own| own.friction.as_ref()) {
             clutch.friction = own_friction(check, &key("friction"), friction)?;

@@ -8,6 +8,14 @@ use super::{fill, fill_bounds, valves};
 use crate::ConfigError;
 use crate::check::{Check, Key};
 
+/// Mean radii of plates, m.
+pub(crate) const PLATE_RADII_M: std::ops::RangeInclusive<f64> = 0.02..=0.5;
+/// Numbers of friction faces.
+pub(crate) const FRICTION_FACES: std::ops::RangeInclusive<f64> = 1.0..=30.0;
+/// Areas of pistons, m^2: of a small car's clutch to a heavy truck's.
+pub(crate) const PISTON_AREAS_M2: std::ops::RangeInclusive<f64> = 0.0001..=0.2;
+/// Forces of return springs, N.
+pub(crate) const RETURN_SPRINGS_N: std::ops::RangeInclusive<f64> = 0.0..=20e3;
 /// Half-widths of a valve's hysteresis, Pa.
 pub(crate) const HYSTERESES_PA: std::ops::RangeInclusive<f64> = 0.0..=0.2e6;
 /// A shift clutch with the valve that fills it.
@@ -68,10 +76,10 @@ pub(super) fn check(
         (key("friction.coefficient"), &raw.friction.coefficient, 0.02..=0.5),
     )?;
     let clutch = Clutch {
-        mean_radius_m: check.number(key("mean_radius_m"), &raw.mean_radius_m, 0.02..=0.5)?,
-        friction_faces: check.count(key("friction_faces"), &raw.friction_faces, 1.0..=30.0)?,
-        piston_area_m2: check.number(key("piston_area_m2"), &raw.piston_area_m2, 0.001..=0.05)?,
-        return_spring_n: check.number(key("return_spring_n"), &raw.return_spring_n, 0.0..=10e3)?,
+        mean_radius_m: check.number(key("mean_radius_m"), &raw.mean_radius_m, PLATE_RADII_M)?,
+        friction_faces: check.count(key("friction_faces"), &raw.friction_faces, FRICTION_FACES)?,
+        piston_area_m2: check.number(key("piston_area_m2"), &raw.piston_area_m2, PISTON_AREAS_M2)?,
+        return_spring_n: check.number(key("return_spring_n"), &raw.return_spring_n, RETURN_SPRINGS_N)?,
         static_friction: check.number(key("static_friction"), &raw.static_friction, 0.02..=0.5)?,
         friction,
     };

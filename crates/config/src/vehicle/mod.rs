@@ -28,14 +28,14 @@ use crate::{ConfigError, Kind, Source};
 pub use budget::ErrorBounds;
 pub use car::{Car, LockUp};
 pub use car_bounds::{CarErrorBounds, ElementErrorBounds};
-pub(crate) use clutch::HYSTERESES_PA;
 pub use clutch::ShiftClutch;
+pub(crate) use clutch::{FRICTION_FACES, HYSTERESES_PA, PISTON_AREAS_M2, PLATE_RADII_M, RETURN_SPRINGS_N};
 use raw::{
     RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
     RawRequirement, RawRoad, RawTyre, RawVehicleFile,
 };
 pub use short::DefaultTaken;
-use short::{Short, refuse_facts};
+use short::{Short, of_default, refuse_facts};
 
 /// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
 const SHAFT_OVER_TYRES: f64 = 2.0;
@@ -235,7 +235,8 @@ impl Vehicle {
         }
         if let Some(short) = Short::of(&source)? {
             let layers = short.layers(&source);
-            let vehicle = Self::checked(&Check { layers }, &layers.parse()?)?;
+            let vehicle = Self::checked(&Check { layers }, &layers.parse()?)
+                .map_err(|error| of_default(error, &short.defaults, &source))?;
             let (source, defaults_taken) = short.complete(&source)?;
             return Ok(Self { source, defaults_taken, ..vehicle });
         }
@@ -350,9 +351,9 @@ fn driveline(check: &Check<'_>, raw: &RawDriveline) -> Result<Driveline<f64>, Co
     let number = |key: &str, value: &Number, range| check.number(format_args!("driveline.{key}"), value, range);
     Ok(Driveline {
         final_ratio: number("final_ratio", &raw.final_ratio, FINAL_RATIOS)?,
-        shaft_stiffness_n_m_rad: number("shaft_stiffness_n_m_rad", &raw.shaft_stiffness_n_m_rad, 500.0..=200e3)?,
-        shaft_damping_n_m_s_rad: number("shaft_damping_n_m_s_rad", &raw.shaft_damping_n_m_s_rad, 0.0..=2e3)?,
-        wheel_inertia_kg_m2: number("wheel_inertia_kg_m2", &raw.wheel_inertia_kg_m2, 0.2..=50.0)?,
+        shaft_stiffness_n_m_rad: number("shaft_stiffness_n_m_rad", &raw.shaft_stiffness_n_m_rad, 100.0..=2e6)?,
+        shaft_damping_n_m_s_rad: number("shaft_damping_n_m_s_rad", &raw.shaft_damping_n_m_s_rad, 0.0..=10e3)?,
+        wheel_inertia_kg_m2: number("wheel_inertia_kg_m2", &raw.wheel_inertia_kg_m2, 0.05..=1e3)?,
     })
 }
 
@@ -365,7 +366,7 @@ fn backlash(check: &Check<'_>, raw: &RawDriveline) -> Result<f64, ConfigError> {
 
 fn tyre(check: &Check<'_>, raw: &RawTyre) -> Result<Tyre<f64>, ConfigError> {
     Ok(Tyre {
-        max_force_n: check.number("tyre.max_force_n", &raw.max_force_n, 1e3..=200e3)?,
+        max_force_n: check.number("tyre.max_force_n", &raw.max_force_n, 1e3..=600e3)?,
         slip_scale: check.number("tyre.slip_scale", &raw.slip_scale, 0.01..=0.5)?,
         floor_m_s: check.number("tyre.floor_m_s", &raw.floor_m_s, 0.1..=10.0)?,
     })
@@ -456,7 +457,7 @@ fn road(check: &Check<'_>, raw: &RawRoad) -> Result<RoadLoad<f64>, ConfigError> 
         front_area_m2: check.number("vehicle.front_area_m2", &raw.front_area_m2, 0.5..=15.0)?,
         drag_coefficient: check.number("vehicle.drag_coefficient", &raw.drag_coefficient, 0.05..=2.0)?,
         air_density_kg_m3: check.number("vehicle.air_density_kg_m3", &raw.air_density_kg_m3, 0.5..=2.0)?,
-        rolling_moment_n_m: check.number("vehicle.rolling_moment_n_m", &raw.rolling_moment_n_m, 0.0..=5e3)?,
+        rolling_moment_n_m: check.number("vehicle.rolling_moment_n_m", &raw.rolling_moment_n_m, 0.0..=20e3)?,
         grade_rad: check.number("vehicle.grade_rad", &raw.grade_rad, -0.4..=0.4)?,
     })
 }

@@ -33,7 +33,7 @@ fn a_value_in_the_wrong_unit_gets_file_line_key_range_and_hint() {
     assert_eq!(
         vehicle_error("piston_area_m2 = 0.01 ", "piston_area_m2 = 117 "),
         format!(
-            "vehicle.toml:{line}: `clutch.b.piston_area_m2` is 117, expected 0.001 to 0.05\n\
+            "vehicle.toml:{line}: `clutch.b.piston_area_m2` is 117, expected 0.0001 to 0.2\n\
              hint: 117 cm2 is 0.0117 m2"
         )
     );

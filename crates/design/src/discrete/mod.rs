@@ -185,24 +185,11 @@ fn certified(
     sample_time_s: f64,
 ) -> Result<DiscreteCertificate, DesignError> {
     let system = ErrorSystem::of(vehicle, model, quantity, phase, sample_time_s);
-    let round = |gain: &DMatrix<f64>| rounded(gain, model, phase);
     let open_loop_bound = open_loop_bound(&system);
-    let (found, solver) = match method {
+    let (found, solver) = match open_loop_bound {
         // Nothing disturbs the valve model, and no gain can do better than that.
-        _ if open_loop_bound == 0.0 => (None, SolverRecord::default()),
-        GainMethod::Iss | GainMethod::IssDiscrete => {
-            let kappa2_per_s = match model {
-                Model::Rigid => 4.0 / requirement(vehicle, phase).settling_time_s,
-                Model::Compliant => compliant_requirement(vehicle, phase).kappa2_per_s,
-            };
-            match smallest_gain::smallest_gain(&system, kappa2_per_s, sample_time_s, round) {
-                Err(DesignError::DecayUnreachable { .. }) => (None, SolverRecord { solved: 1, failed: 0 }),
-                found => found.map(|(found, solver)| (Some(found), solver))?,
-            }
-        }
-        GainMethod::PeakToPeak => ellipsoid::smallest_ellipsoid(&system, false, round)?,
-        GainMethod::Scheduled => ellipsoid::smallest_ellipsoid(&system, true, round)?,
-        GainMethod::Interval => interval::narrowest_interval(&system, round)?,
+        0.0 => (None, SolverRecord::default()),
+        _ => best_gain(vehicle, &system, method, (model, phase), sample_time_s)?,
     };
     // Where no gain is certified, none is the best.
     let found = found.unwrap_or_else(|| without_a_gain(&system, method, open_loop_bound));
@@ -241,6 +228,32 @@ fn certified(
         slip_directions: BOTH_DIRECTIONS,
         vehicle_sha256: vehicle.source.sha256(),
     })
+}
+
+/// The gain by this method with its bound; none where no gain is certified.
+fn best_gain(
+    vehicle: &Vehicle,
+    system: &ErrorSystem,
+    method: GainMethod,
+    (model, phase): (Model, Phase),
+    sample_time_s: f64,
+) -> Result<(Option<Found>, SolverRecord), DesignError> {
+    let round = |gain: &DMatrix<f64>| rounded(gain, model, phase);
+    match method {
+        GainMethod::Iss | GainMethod::IssDiscrete => {
+            let kappa2_per_s = match model {
+                Model::Rigid => 4.0 / requirement(vehicle, phase).settling_time_s,
+                Model::Compliant => compliant_requirement(vehicle, phase).kappa2_per_s,
+            };
+            match smallest_gain::smallest_gain(system, kappa2_per_s, sample_time_s, round) {
+                Err(DesignError::DecayUnreachable { .. }) => Ok((None, SolverRecord { solved: 1, failed: 0 })),
+                found => found.map(|(found, solver)| (Some(found), solver)),
+            }
+        }
+        GainMethod::PeakToPeak => ellipsoid::smallest_ellipsoid(system, false, round),
+        GainMethod::Scheduled => ellipsoid::smallest_ellipsoid(system, true, round),
+        GainMethod::Interval => interval::narrowest_interval(system, round),
+    }
 }
 
 /// Clutch torque of 1 MPa at the middle of the friction's range, N m.

@@ -9,6 +9,7 @@
 
 mod hour;
 
+use std::fs::File;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,6 +17,7 @@ use std::time::Instant;
 
 use libdeflater::Decompressor;
 use logs::{Column, Log, OpenOptions, Quality};
+use parquet::file::reader::{FileReader, SerializedFileReader};
 
 const TRIES: usize = 25;
 const RIVAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/mdf/rival.py");
@@ -76,6 +78,12 @@ fn measure(path: &Path) {
     show("all channels in columns, some thousand records at once", columns_s);
     let (channels, kept_s) = fastest(|| kept(path));
     show("all channels in columns, each kept as arrays of times and of values", kept_s);
+    let fresh = || channels.iter().flat_map(|(times_s, values)| [vec![1.0; times_s.len()], vec![1.0; values.len()]]);
+    let fresh = || black_box(fresh().collect::<Vec<Vec<f64>>>()).len();
+    show("memory for these arrays alone: fresh, and written once", fastest(fresh).1);
+    if path.extension().is_some_and(|ending| ending == "parquet") {
+        show("pages of all columns, read and unpacked alone", fastest(|| pages(path)).1);
+    }
     let sum = channels.iter().map(|(_, values)| values.iter().filter(|value| value.is_finite()).sum::<f64>()).sum();
     let (count_merged, merged_s) = fastest(|| merged(path));
     show("all channels, merged in time order", merged_s);
@@ -168,6 +176,19 @@ fn kept(path: &Path) -> Vec<(Vec<f64>, Vec<f64>)> {
         }
     }
     channels
+}
+
+/// Reads and unpacks the pages of a Parquet file, without their numbers; how many bytes they have.
+fn pages(path: &Path) -> usize {
+    let file = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
+    let mut bytes = 0;
+    for group in (0..file.num_row_groups()).map(|group| file.get_row_group(group).unwrap()) {
+        for column in 0..group.num_columns() {
+            let pages = group.get_column_page_reader(column).unwrap();
+            bytes += pages.map(|page| black_box(page.unwrap()).buffer().len()).sum::<usize>();
+        }
+    }
+    bytes
 }
 
 /// Reads all samples in time order, and counts them.

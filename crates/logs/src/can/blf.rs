@@ -193,7 +193,10 @@ impl Blf {
             }
             _ => return None,
         };
-        (!remote).then(|| Frame::new(time_s, id & 0x1fff_ffff, id & 0x8000_0000 != 0, payload))
+        // Of the newest object the number of the bus has one byte.
+        let bus = if object.kind == CAN_FD_MESSAGE_64 { u16::from(*body.first()?) } else { u16_at(body, 0) };
+        let frame = Frame::new(time_s, id & 0x1fff_ffff, id & 0x8000_0000 != 0, payload);
+        (!remote).then(|| frame.on(u32::from(bus)))
     }
 }
 

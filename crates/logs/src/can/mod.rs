@@ -4,7 +4,7 @@ mod blf;
 mod database;
 mod text;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 
@@ -24,17 +24,24 @@ pub(crate) struct Frame {
     pub(crate) time_s: f64,
     pub(crate) id: u32,
     pub(crate) extended: bool,
+    /// The number of its bus, where a log has several.
+    pub(crate) bus: u32,
     data: [u8; PAYLOAD],
     length: usize,
 }
 
 impl Frame {
-    /// A frame; of a longer payload the first 64 bytes count.
+    /// A frame of the first bus; of a longer payload the first 64 bytes count.
     pub(crate) fn new(time_s: f64, id: u32, extended: bool, payload: &[u8]) -> Self {
         let mut data = [0; PAYLOAD];
         let length = payload.len().min(PAYLOAD);
         data[..length].copy_from_slice(&payload[..length]);
-        Self { time_s, id, extended, data, length }
+        Self { time_s, id, extended, bus: 0, data, length }
+    }
+
+    /// The same frame on this bus.
+    pub(crate) fn on(self, bus: u32) -> Self {
+        Self { bus, ..self }
     }
 
     pub(crate) fn data(&self) -> &[u8] {
@@ -134,11 +141,22 @@ pub(crate) struct Decoder<'a> {
     /// Frames of each identifier that the database does not have.
     unknown: BTreeMap<(bool, u32), u64>,
     unknown_frames: u64,
+    /// The bus of the first frame of each message, and the message that came on another one too.
+    buses: HashMap<(bool, u32), u32>,
+    on_two_buses: Option<(bool, u32)>,
 }
 
 impl<'a> Decoder<'a> {
     pub(crate) fn new(database: &'a Database, wanted: &[bool]) -> Self {
-        Self { database, wanted: wanted.to_vec(), frames: 0, unknown: BTreeMap::new(), unknown_frames: 0 }
+        Self {
+            database,
+            wanted: wanted.to_vec(),
+            frames: 0,
+            unknown: BTreeMap::new(),
+            unknown_frames: 0,
+            buses: HashMap::new(),
+            on_two_buses: None,
+        }
     }
 
     pub(crate) fn decode(&mut self, frame: &Frame, batch: &mut Vec<Sample>) {
@@ -152,27 +170,36 @@ impl<'a> Decoder<'a> {
             } else if known < MOST {
                 self.unknown.insert((frame.extended, frame.id), 1);
             }
+        } else if self.on_two_buses.is_none() {
+            let key = (frame.extended, frame.id);
+            self.on_two_buses = Some(key).filter(|_| *self.buses.entry(key).or_insert(frame.bus) != frame.bus);
         }
     }
 
     pub(crate) fn notes(&self) -> Vec<String> {
         const SHOWN: usize = 8;
+        let shown = |(extended, id): (bool, u32)| if extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") };
+        let mixed = |key| {
+            format!(
+                "message {} comes on two buses, whose values are mixed\nhint: write the frames of one bus to a file of their own",
+                shown(key)
+            )
+        };
+        let mut notes: Vec<String> = self.on_two_buses.map(mixed).into_iter().collect();
         if self.unknown_frames == 0 {
-            return Vec::new();
+            return notes;
         }
         let mut most: Vec<_> = self.unknown.iter().collect();
         most.sort_by_key(|(id, count)| (std::cmp::Reverse(**count), **id));
-        let ids = most
-            .iter()
-            .take(SHOWN)
-            .map(|((extended, id), _)| if *extended { format!("0x{id:08X}") } else { format!("0x{id:03X}") });
-        vec![format!(
+        let ids = most.iter().take(SHOWN).map(|(key, _)| shown(**key));
+        notes.push(format!(
             "{} of {} frames, of {} identifiers, are not in the DBC: {}{}",
             self.unknown_frames,
             self.frames,
             self.unknown.len(),
             ids.collect::<Vec<_>>().join(", "),
             if self.unknown.len() > SHOWN { ", ..." } else { "" }
-        )]
+        ));
+        notes
     }
 }

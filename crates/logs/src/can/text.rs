@@ -5,10 +5,13 @@ use std::path::{Path, PathBuf};
 
 use super::{Frame, Frames, PAYLOAD};
 use crate::log::CanKind;
+use crate::stamp::StampForm;
 use crate::{LogError, error};
 
 /// Longest line that is read, bytes.
 const LONGEST_LINE: u64 = 4096;
+/// The flag of a candump identifier that marks an error of the bus.
+const ERROR_FRAME: u32 = 0x2000_0000;
 
 /// The lines of a log. A line that is no frame and no known remark is counted.
 pub(crate) struct Lines {
@@ -25,6 +28,12 @@ pub(crate) struct Lines {
     /// ASC: times count from the frame before.
     relative: bool,
     time_s: f64,
+    /// The last time stamp, s, and how many were above and below the one before.
+    last_s: f64,
+    rising: u64,
+    falling: u64,
+    /// Names of the interfaces (candump).
+    interfaces: Vec<String>,
 }
 
 /// What a line is.
@@ -49,6 +58,10 @@ impl Lines {
             hex: true,
             relative: false,
             time_s: 0.0,
+            last_s: f64::NAN,
+            rising: 0,
+            falling: 0,
+            interfaces: Vec::new(),
         }
     }
 
@@ -62,47 +75,84 @@ impl Lines {
         Ok(read > 0)
     }
 
-    fn candump(text: &str) -> Line {
-        let candump = |text: &str| -> Option<Frame> {
-            let (stamp, rest) = text.trim().strip_prefix('(')?.split_once(')')?;
-            let time_s: f64 = stamp.trim().parse().ok()?;
-            let mut words = rest.split_whitespace();
-            words.next()?;
-            let second = words.next()?;
-            let (id, payload) = match second.split_once('#') {
-                Some((id, data)) => {
-                    // `ID##F` is CAN FD with one digit of flags; `ID#R` asks for data.
-                    let data = match data.strip_prefix('#') {
-                        Some(fd) => fd.get(1..)?,
-                        None => data,
-                    };
-                    (id, data.to_owned())
-                }
-                // The form without -l: `can0  43F   [8]  83 44 ...`
-                None => {
-                    let length = words.next()?;
-                    length.strip_prefix('[')?.strip_suffix(']')?;
-                    (second, words.collect())
-                }
-            };
-            if !id.bytes().all(|byte| byte.is_ascii_hexdigit()) || id.len() > 8 {
-                return None;
-            }
-            let (mut data, length) = ([0; PAYLOAD], payload.len() / 2);
-            if payload.len() % 2 != 0 || length > PAYLOAD || !payload.is_ascii() {
-                return None;
-            }
-            for (i, byte) in data.iter_mut().take(length).enumerate() {
-                *byte = u8::from_str_radix(&payload[2 * i..2 * i + 2], 16).ok()?;
-            }
-            let number = u32::from_str_radix(id, 16).ok()?;
-            time_s.is_finite().then(|| Frame::new(time_s, number & 0x1fff_ffff, id.len() > 3, &data[..length]))
-        };
-        match candump(text) {
-            Some(frame) => Line::Frame(frame),
-            None if text.trim().is_empty() || text.contains("#R") || text.contains("remote request") => Line::Remark,
+    /// `(STAMP) INTERFACE ID#DATA`, or what candump prints without -l: `(STAMP) INTERFACE [RX FLAGS] ID [LENGTH] DATA...`
+    fn candump(&mut self, text: &str) -> Line {
+        let is_remark = text.trim().is_empty() || text.contains("#R") || text.contains("remote request");
+        match self.candump_frame(text) {
+            // The kernel gives errors of the bus as frames with this bit.
+            Some((id, _)) if id & ERROR_FRAME != 0 => Line::Remark,
+            Some((_, frame)) => Line::Frame(frame),
+            None if is_remark => Line::Remark,
             None => Line::Unread,
         }
+    }
+
+    /// The identifier with its flags, and the frame.
+    fn candump_frame(&mut self, text: &str) -> Option<(u32, Frame)> {
+        let (stamp, rest) = text.trim().strip_prefix('(')?.split_once(')')?;
+        let time_s = match stamp.trim().parse::<f64>() {
+            Ok(time_s) => time_s,
+            // -t A
+            Err(_) => StampForm::of(stamp)?.seconds(stamp)?,
+        };
+        let mut words = rest.split_whitespace();
+        let interface = words.next()?;
+        let mut id = words.next()?;
+        let (id, payload) = match id.split_once('#') {
+            Some((id, data)) => {
+                // `ID##F` is CAN FD with one digit of flags; `ID#R` asks for data; `_9` is a length beyond the eight bytes.
+                let data = match data.strip_prefix('#') {
+                    Some(fd) => fd.get(1..)?,
+                    None => data,
+                };
+                (id, data.split_once('_').map_or(data, |(data, _)| data).to_owned())
+            }
+            None => {
+                // Direction and flags (-x) stand before the identifier.
+                let length = loop {
+                    match words.next()? {
+                        length if length.starts_with('[') => break length,
+                        word => id = word,
+                    }
+                };
+                let length: usize = length.strip_prefix('[')?.strip_suffix(']')?.parse().ok()?;
+                // Behind the data may stand its letters (-a).
+                (id, words.take(length).collect())
+            }
+        };
+        if !id.bytes().all(|byte| byte.is_ascii_hexdigit()) || id.len() > 8 {
+            return None;
+        }
+        let (mut data, length) = ([0; PAYLOAD], payload.len() / 2);
+        if payload.len() % 2 != 0 || length > PAYLOAD || !payload.is_ascii() {
+            return None;
+        }
+        for (i, byte) in data.iter_mut().take(length).enumerate() {
+            *byte = u8::from_str_radix(&payload[2 * i..2 * i + 2], 16).ok()?;
+        }
+        let number = u32::from_str_radix(id, 16).ok()?;
+        let frame = Frame::new(time_s, number & 0x1fff_ffff, id.len() > 3, &data[..length]);
+        time_s.is_finite().then(|| (number, frame.on(self.bus(interface))))
+    }
+
+    /// The number of an interface: in the order in which they come, from zero.
+    fn bus(&mut self, interface: &str) -> u32 {
+        const MOST: usize = 256;
+        let known = self.interfaces.iter().position(|known| known == interface);
+        let at = known.unwrap_or_else(|| {
+            if self.interfaces.len() < MOST {
+                self.interfaces.push(interface.to_owned());
+            }
+            self.interfaces.len() - 1
+        });
+        u32::try_from(at).unwrap_or(u32::MAX)
+    }
+
+    /// Counts time stamps that rise and that fall.
+    fn watch(&mut self, time_s: f64) {
+        self.rising += u64::from(time_s > self.last_s);
+        self.falling += u64::from(time_s < self.last_s);
+        self.last_s = time_s;
     }
 
     fn asc(&mut self, text: &str) -> Line {
@@ -142,7 +192,8 @@ impl Lines {
     fn asc_classic(&self, words: &[&str]) -> Option<Frame> {
         let (id, extended) = self.asc_id(words.get(1)?)?;
         let length = usize::from_str_radix(words.get(4)?, 16).ok().filter(|length| *length <= 8)?;
-        self.asc_data(id, extended, words.get(5..5 + length)?)
+        let frame = self.asc_data(id, extended, words.get(5..5 + length)?)?;
+        Some(frame.on(words.first()?.parse().ok()?))
     }
 
     /// `CHANNEL Rx ID [NAME] BRS ESI DLC LENGTH DATA...`
@@ -151,7 +202,8 @@ impl Lines {
         // A name of the message may stand between; the first 0 or 1 is the bit-rate switch.
         let switch = (3..words.len().min(5)).find(|&i| matches!(words[i], "0" | "1"))?;
         let length: usize = words.get(switch + 3)?.parse().ok().filter(|length| *length <= PAYLOAD)?;
-        self.asc_data(id, extended, words.get(switch + 4..switch + 4 + length)?)
+        let frame = self.asc_data(id, extended, words.get(switch + 4..switch + 4 + length)?)?;
+        Some(frame.on(words.first()?.parse().ok()?))
     }
 
     fn asc_id(&self, word: &str) -> Option<(u32, bool)> {
@@ -177,11 +229,12 @@ impl Frames for Lines {
             let text = String::from_utf8_lossy(&self.line).into_owned();
             let line = match self.kind {
                 CanKind::Asc => self.asc(&text),
-                _ => Self::candump(&text),
+                _ => self.candump(&text),
             };
             match line {
                 Line::Frame(frame) => {
                     self.frames += 1;
+                    self.watch(frame.time_s);
                     return Ok(Some(frame));
                 }
                 Line::Remark => {}
@@ -209,6 +262,14 @@ impl Frames for Lines {
     fn notes(&self) -> Vec<String> {
         let note =
             |first: &String| format!("{} lines are no frames and are left out, the first is {first}", self.unread);
-        self.first_unread.iter().map(note).collect()
+        let mut notes: Vec<String> = self.first_unread.iter().map(note).collect();
+        // Of times between frames nearly half are less than the one before, or all are the same; of stamps in two orders, few are.
+        if 4 * self.falling > self.frames || self.rising == 0 && self.frames > 1 {
+            notes.push(
+                "the time stamps do not rise: they may be the times between frames (candump -t d)\nhint: log with `candump -L` or `-t a`"
+                    .to_owned(),
+            );
+        }
+        notes
     }
 }

@@ -1,5 +1,7 @@
 //! Where a number is in a record, and its decoding for many records at once.
 
+use half::f16;
+
 use falcon_mdf::blocks::channel::{ChannelType, DataType};
 use falcon_mdf::{Channel as MdfChannel, ChannelGroup, Conversion, blocks::conversion::ConversionOutput};
 
@@ -75,7 +77,7 @@ impl<'a> Field<'a> {
         };
         let (shift, bits) = (u32::from(channel.bit_offset), channel.bit_count);
         let has_place = shift < 8 && (1..=64).contains(&(shift + bits)) && bits > 0;
-        let is_whole = kind != Kind::Float || (shift == 0 && (bits == 32 || bits == 64));
+        let is_whole = kind != Kind::Float || (shift == 0 && matches!(bits, 16 | 32 | 64));
         if kind != Kind::Index && !(has_place && is_whole) {
             return None;
         }
@@ -212,10 +214,11 @@ impl<'a> Field<'a> {
         words
     }
 
-    /// Numbers of at most 16 bits: not floating.
+    /// Numbers of at most 16 bits.
     fn short(&self, words: &[u16], values: &mut Vec<f64>) {
         let (up, down) = (16 - self.bits - self.shift, 16 - self.bits);
         match self.kind {
+            Kind::Float => self.convert(words.iter().map(|word| f16::from_bits(*word).to_f64()), values),
             Kind::Signed => {
                 self.convert(words.iter().map(|word| f64::from((word << up).cast_signed() >> down)), values)
             }

@@ -18,7 +18,7 @@ use falcon_mdf::{
 use crate::can::{Database, Decoder, Frame};
 use crate::columns::{Batch, Block, Column, Stream};
 use crate::samples::Quality;
-use crate::{Channel, LogError};
+use crate::{Channel, LogError, error};
 use field::{Field, Tile};
 use records::Records;
 
@@ -64,30 +64,37 @@ impl MdfLog {
         };
         let file = Mf4File::open_with_options(path, options).map_err(|error| damaged(path, "its structure", &error))?;
         let (mut places, mut channels, mut notes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut unreadable = 0;
+        let (mut left_out, mut without_time) = (Vec::new(), Vec::new());
         for (data_group, group, data) in groups(&file) {
             let name = group_name(&file, data, data_group);
             if data.master_channel().is_none_or(|master| !master.is_time_channel()) {
-                let count = data.channels.iter().filter(|channel| !channel.is_master()).count();
-                if count > 0 {
-                    notes.push(format!("{count} channels of group `{name}` have no time and are left out"));
-                }
+                let others = data.channels.iter().filter(|channel| !channel.is_master());
+                without_time.extend(others.map(|channel| error::shown(&channel.name)));
                 continue;
             }
             for (i, channel) in data.channels.iter().enumerate().filter(|(_, channel)| !channel.is_master()) {
-                if channel.unreadable().is_some()
-                    || !(channel.value_kind().is_numeric() || channel.raw_value_kind().is_numeric())
-                    || channel.is_array()
-                {
-                    unreadable += 1;
+                if let Some(kind) = not_numbers(channel) {
+                    left_out.push(format!("{} ({kind})", error::shown(&channel.name)));
                     continue;
                 }
                 places.push(Place { data_group, group, channel: i });
                 channels.push(Channel { name: channel.name.clone(), unit: channel.unit.clone(), group: name.clone() });
             }
         }
-        if unreadable > 0 {
-            notes.push(format!("{unreadable} channels do not hold single numbers and are left out"));
+        if !without_time.is_empty() {
+            notes.push(format!(
+                "{} channels have no time in their group and are left out: {}\nhint: MDF 4.2 can keep the time in another group, which is not read; \
+                 convert the file to 4.10, for example with asammdf (`MDF(path).convert(\"4.10\")`)",
+                without_time.len(),
+                error::some(&without_time)
+            ));
+        }
+        if !left_out.is_empty() {
+            notes.push(format!(
+                "{} channels do not hold single numbers and are left out: {}",
+                left_out.len(),
+                error::some(&left_out)
+            ));
         }
         if file.unfinalized().is_some() {
             notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
@@ -142,6 +149,16 @@ impl MdfLog {
     }
 }
 
+/// What a channel holds in place of single numbers, in a word; none if it holds these.
+fn not_numbers(channel: &MdfChannel) -> Option<&'static str> {
+    match () {
+        () if channel.is_array() => Some("an array"),
+        () if channel.unreadable().is_some() => Some("cannot be read"),
+        () if channel.value_kind().is_numeric() || channel.raw_value_kind().is_numeric() => None,
+        () => Some("text or bytes"),
+    }
+}
+
 /// Data group, channel group, and the group itself.
 fn groups(file: &Mf4File) -> impl Iterator<Item = (usize, usize, &ChannelGroup)> {
     file.data_groups()
@@ -162,7 +179,11 @@ fn group_name(file: &Mf4File, group: &ChannelGroup, data_group: usize) -> String
 }
 
 fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
-    LogError::damaged(path, place, error.to_string())
+    let hint = match error {
+        Mf4Error::UnsupportedVersion { .. } => "\nhint: versions 4.00 to 4.20 are read; save it as one of them",
+        _ => "",
+    };
+    LogError::damaged(path, place, format!("{error}{hint}"))
 }
 
 /// The records of a channel group.
@@ -246,6 +267,10 @@ fn fill(signal: &Signal, column: &mut Column, rows: usize) -> Result<(), Mf4Erro
 /// The values of a signal; where the conversion makes text of them, the numbers before it.
 fn numbers(signal: &Signal) -> Result<Vec<f64>, Mf4Error> {
     let channel = signal.channel();
+    if channel.is_float() && channel.bit_count == 16 {
+        // `falcon_mdf` 0.7 takes them for other numbers: they count as missing.
+        return Ok(Vec::new());
+    }
     // `values` converts a scaled integer sample by sample, at several times the cost.
     if let (Conversion::Linear { offset, factor }, ChannelType::FixedLength | ChannelType::Master) =
         (&channel.conversion, channel.channel_type)
@@ -321,7 +346,8 @@ impl Stream for Bus<'_> {
         for i in self.at..end {
             let Some(frame) = self.frames.get(i).filter(|frame| frame.timestamp.is_finite()) else { continue };
             let extended = frame.extended.unwrap_or(frame.id > 0x7ff);
-            self.decoder.decode(&Frame::new(frame.timestamp, frame.id, extended, frame.data), batch);
+            let own = Frame::new(frame.timestamp, frame.id, extended, frame.data);
+            self.decoder.decode(&own.on(u32::from(frame.bus_channel)), batch);
         }
         self.at = end;
         for sample in &mut batch[before..] {

@@ -22,16 +22,19 @@ impl Held {
     }
 
     /// Takes the time of the next value, s, and gives that of the oldest that is held, s.
+    #[inline]
     pub fn oldest_s(&mut self, time_s: f64) -> f64 {
         let step_s = time_s - self.newest_s;
         self.newest_s = time_s;
         if step_s > PAUSE_S {
             self.pauses.push_back((time_s, step_s - PAUSE_S));
         }
-        let mut oldest_s = time_s - self.held_s;
-        if self.pauses.is_empty() {
-            return oldest_s;
-        }
+        let oldest_s = time_s - self.held_s;
+        if self.pauses.is_empty() { oldest_s } else { self.before_pauses(time_s, oldest_s) }
+    }
+
+    /// The oldest time that is held, where so long ago was a pause.
+    fn before_pauses(&mut self, time_s: f64, mut oldest_s: f64) -> f64 {
         // The time may go back.
         self.pauses.retain(|(end_s, _)| *end_s <= time_s);
         let mut within = 0;

@@ -13,6 +13,8 @@ mod quality;
 mod ratio;
 mod track;
 
+use trace::Quantity;
+
 use crate::map::check_ratios;
 use crate::{Gearbox, LogError, Reading, Role};
 use contradiction::SeenRatios;
@@ -165,6 +167,17 @@ pub const SETTLED_S: f64 = SAME_S + ratio::LONGEST_S + AFTER_S;
 /// A shift begins at most so much before its end, s.
 pub const LONGEST_S: f64 = COMMAND_S + ratio::LONGEST_S;
 
+/// Whether a car can have this value. A speed in a wrong unit can pass.
+fn is_of_a_car(role: Role, value: f64) -> bool {
+    let most = match role.quantity() {
+        Some(Quantity::Rotation) => 1e5,
+        Some(Quantity::Velocity | Quantity::Acceleration) => 1e3,
+        Some(Quantity::Torque) => 1e6,
+        _ => return true,
+    };
+    value.abs() <= most
+}
+
 /// Finds the shifts of a drive.
 pub struct ShiftFinder {
     ratios: Vec<f64>,
@@ -224,6 +237,9 @@ impl ShiftFinder {
     /// Takes a reading. Readings of each role come in the order of time.
     pub fn push(&mut self, reading: &Reading) {
         let Reading { role, time_s, value, .. } = *reading;
+        if !is_of_a_car(role, value) {
+            return;
+        }
         if let Some(track) = self.tracks.get_mut(role as usize) {
             track.push(time_s, value);
         }
@@ -271,6 +287,14 @@ impl ShiftFinder {
         self.settle(time_s - AFTER_S);
     }
 
+    /// Takes back a reading of this time: load and quality of a shift do without it. The ratio of the speeds is the middle one of several
+    /// in any case.
+    pub fn take_back(&mut self, role: Role, time_s: f64) {
+        if let Some(track) = self.tracks.get_mut(role as usize) {
+            track.take_back(time_s);
+        }
+    }
+
     /// The gears whose given ratio is not that of the speeds while the gear signal says them, in a sentence with a hint.
     pub fn contradiction(&self) -> Option<String> {
         self.seen_ratios.contradiction(&self.ratios)
@@ -287,12 +311,13 @@ impl ShiftFinder {
 
     /// Takes out the shifts that nothing after `now_s` can change, in the order of their beginning; each is given once.
     pub fn take_settled(&mut self, now_s: f64) -> Vec<Shift> {
-        if self.found.is_empty() && self.by_signal.is_empty() {
+        let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
+        let are_open = |shifts: &[Shift]| shifts.iter().all(is_open);
+        if are_open(&self.found) && are_open(&self.by_signal) {
             return Vec::new();
         }
         self.join_signals();
-        let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
-        if self.found.iter().chain(&self.by_signal).all(is_open) {
+        if are_open(&self.found) && are_open(&self.by_signal) {
             return Vec::new();
         }
         let (open, mut settled): (Vec<_>, Vec<_>) = std::mem::take(&mut self.found).into_iter().partition(is_open);

@@ -63,12 +63,14 @@ pub(super) struct RatioChange {
 
 /// Watches the ratio.
 pub(super) struct RatioWatch {
-    /// Logarithms of the ratios and the widths of their bands.
-    gears: Vec<(f64, f64)>,
+    /// Logarithms of the ratios, and the least and greatest ratio that is in each gear.
+    gears: Vec<(f64, [f64; 2])>,
     turbine: Track,
     /// Output readings for which the turbine speed is still to come.
     outputs: VecDeque<(f64, f64)>,
-    raw: VecDeque<Point>,
+    /// The newest points before their middle one is taken, and how many of them there are.
+    raw: [Point; MEDIAN],
+    raw_count: usize,
     held_outputs: Held,
     held_points: Held,
     points: VecDeque<Point>,
@@ -85,10 +87,11 @@ impl RatioWatch {
             (BAND * step(i.wrapping_sub(1)).min(step(i + 1))).min(BAND_MAX)
         };
         Self {
-            gears: (0..logs.len()).map(|i| (logs[i], band(i))).collect(),
+            gears: (0..logs.len()).map(|i| (logs[i], [(logs[i] - band(i)).exp(), (logs[i] + band(i)).exp()])).collect(),
             turbine: Track::new(held_s),
             outputs: VecDeque::new(),
-            raw: VecDeque::new(),
+            raw: [Point { time_s: f64::NAN, ratio: f64::NAN, output_rad_s: f64::NAN }; MEDIAN],
+            raw_count: 0,
             held_outputs: Held::new(held_s),
             held_points: Held::new(held_s),
             points: VecDeque::new(),
@@ -124,7 +127,8 @@ impl RatioWatch {
 
     /// The points from one time to another.
     pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Point> {
-        self.points.iter().filter(move |point| (from_s..=to_s).contains(&point.time_s))
+        let first = self.points.partition_point(|point| point.time_s < from_s);
+        self.points.range(first..).take_while(move |point| point.time_s <= to_s)
     }
 
     /// Makes points of the output readings that the turbine speed has passed.
@@ -139,20 +143,20 @@ impl RatioWatch {
             self.outputs.pop_front();
             let turbine_rad_s = self.turbine.at(time_s, HOLE_S).filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
             if let Some(turbine_rad_s) = turbine_rad_s.filter(|_| output_rad_s > OUTPUT_MIN_RAD_S) {
-                self.raw.push_back(Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s });
+                self.raw.copy_within(1.., 0);
+                self.raw[MEDIAN - 1] = Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s };
+                self.raw_count = (self.raw_count + 1).min(MEDIAN);
             } else {
                 // Standstill and holes: what is before is not compared with what comes after.
-                self.raw.clear();
+                self.raw_count = 0;
                 if self.now.or(self.before).is_none_or(|gear| time_s - gear.last_s > HOLE_S) {
                     (self.before, self.now) = (None, None);
                 }
             }
-            if self.raw.len() > MEDIAN {
-                self.raw.pop_front();
-            }
-            if self.raw.len() == MEDIAN {
-                let ratio = middle(std::array::from_fn(|i| self.raw[i].ratio));
-                self.take(Point { ratio, ..self.raw[MEDIAN / 2] });
+            if self.raw_count == MEDIAN {
+                let ratio = middle(self.raw.map(|point| point.ratio));
+                let output_rad_s = middle(self.raw.map(|point| point.output_rad_s));
+                self.take(Point { ratio, output_rad_s, ..self.raw[MEDIAN / 2] });
             }
         }
     }
@@ -167,8 +171,7 @@ impl RatioWatch {
         while self.points.front().is_some_and(|first| first.time_s < oldest_s) {
             self.points.pop_front();
         }
-        let log = point.ratio.ln();
-        let gear = self.gears.iter().position(|(gear, band)| (log - gear).abs() <= *band);
+        let gear = self.gears.iter().position(|(_, [low, high])| (*low..=*high).contains(&point.ratio));
         match (gear, &mut self.now) {
             (Some(gear), Some(now)) if now.gear == gear => {
                 let counted = now.counts();
@@ -207,14 +210,22 @@ impl RatioWatch {
     fn inertia(&self, before: &InGear, now: &InGear) -> [f64; 2] {
         let (from, to) = (self.gears[before.gear].0, self.gears[now.gear].0);
         let way = |point: &Point| (point.ratio.ln() - from) / (to - from);
-        let points: Vec<(f64, f64)> =
-            self.between(before.last_s - 1.0, now.last_s).map(|point| (point.time_s, way(point))).collect();
-        let half = points.iter().position(|(_, way)| *way > 0.5).unwrap_or(0);
-        let crossing = |pair: &[(f64, f64)], level: f64| {
-            let ((t0, x0), (t1, x1)) = (pair[0], pair[1]);
+        // Whether a ratio is further on its way than this part of it.
+        let beyond = |level: f64| {
+            let ratio = (from + level * (to - from)).exp();
+            move |point: &Point| if to > from { point.ratio > ratio } else { point.ratio < ratio }
+        };
+        let points: Vec<&Point> = self.between(before.last_s - 1.0, now.last_s).collect();
+        let is_half = beyond(0.5);
+        let half = points.iter().position(|point| is_half(point)).unwrap_or(0);
+        let crossing = |pair: &[&Point], level: f64| {
+            let [(t0, x0), (t1, x1)] = [pair[0], pair[1]].map(|point| (point.time_s, way(point)));
             if x1 == x0 { t1 } else { t0 + ((level - x0) / (x1 - x0)).clamp(0.0, 1.0) * (t1 - t0) }
         };
-        let up = |level: f64| move |pair: &&[(f64, f64)]| pair[0].1 <= level && pair[1].1 > level;
+        let up = |level: f64| {
+            let beyond = beyond(level);
+            move |pair: &&[&Point]| !beyond(pair[0]) && beyond(pair[1])
+        };
         let first = points[..=half.min(points.len().saturating_sub(1))]
             .windows(2)
             .rev()

@@ -32,6 +32,17 @@ impl Track {
         }
     }
 
+    /// Removes the newest value of this time, if there is one.
+    pub(super) fn take_back(&mut self, time_s: f64) {
+        // A time that was computed back differs in its last digits.
+        const SAME_S: f64 = 1e-9;
+        let is_it = |(other_s, _): &(f64, f64)| (other_s - time_s).abs() <= SAME_S * time_s.abs().max(1.0);
+        let newest = self.values.iter().rev().take_while(|(other_s, _)| *other_s >= time_s - 1.0).position(is_it);
+        if let Some(newest) = newest {
+            self.values.remove(self.values.len() - 1 - newest);
+        }
+    }
+
     /// The values from one time to another.
     pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let first = self.values.partition_point(|(time_s, _)| *time_s < from_s);

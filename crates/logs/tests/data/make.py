@@ -8,6 +8,7 @@ The tests read the files and know the formulas below, so they need no Python. `f
 """
 
 import struct
+from decimal import Decimal
 from pathlib import Path
 
 import asammdf
@@ -81,7 +82,25 @@ def mdf():
         for group in signals(invalid=True):
             file.append(group, acq_name="fast" if len(group) == 1 else "slow", common_timebase=True)
         file.save(HERE / "invalidation.mf4", overwrite=True)
+    with MDF(version="4.10") as file:
+        t, engine = fast()
+        file.append([Signal((engine / 10).astype("<f2"), t, name="Half", unit="V"), Signal(engine.astype(">f4"), t, name="Big", unit="V")])
+        file.save(HERE / "half.mf4", overwrite=True)
+    remote()
     unsorted()
+
+
+def remote():
+    """Columns in groups of their own, whose time is in another group. The writer of asammdf 8.8 asks a signal for what it has not."""
+
+    class Whole(Signal):
+        axes, conversions, units, comments, display_names_ = {}, {}, {}, {}, {}
+
+    t, engine = fast()
+    with MDF(version="4.20") as file:
+        file._mdf._column_storage = file._mdf._use_ld_blocks = True
+        file.append([Whole(engine, t, name="N_Eng", unit="1/min"), Whole(engine, t, name="N_Turb", unit="1/min")], common_timebase=True)
+        file.save(HERE / "remote.mf4", overwrite=True)
 
 
 def unsorted():
@@ -214,6 +233,29 @@ def parquet():
     pq.write_table(table, HERE / "lz4.parquet", compression="lz4")
     stamps = table.set_column(0, "when", pa.array(i * 10_000, pa.timestamp("us")))
     pq.write_table(stamps, HERE / "stamps.parquet", compression="none")
+    types()
+
+
+def types():
+    """Every way in which Parquet stores a number."""
+    i = np.arange(ROWS)
+    stamps = 1_700_000_000_000_000_000 + i * 10_000_000
+    cents = pa.array([Decimal(12 * k - 100) / 4 for k in range(ROWS)], pa.decimal128(9, 2))
+    table = pa.table({
+        "when": pa.array(stamps, pa.timestamp("ns")),
+        "u8": pa.array((i * 6).astype("uint8")),
+        "u32": pa.array((2**32 - 1 - i).astype("uint32")),
+        "u64": pa.array(np.uint64(2**63) + (i * 4096).astype("uint64")),
+        "half": pa.array((i / 4).astype("float16")),
+        "single": pa.array((i / 8).astype("float32")),
+        "cents": cents,
+        "inner": pa.array([{"x": float(k)} for k in range(ROWS)]),
+        "list": pa.array([[1.0, 2.0]] * ROWS),
+    })
+    pq.write_table(table, HERE / "types.parquet")
+    pq.write_table(table, HERE / "types_old.parquet", store_decimal_as_integer=True, use_deprecated_int96_timestamps=True, use_dictionary=False)
+    day = table.set_column(0, "time", pa.array(i * 10_000, pa.time64("us")))
+    pq.write_table(day, HERE / "types_day.parquet")
 
 
 if __name__ == "__main__":

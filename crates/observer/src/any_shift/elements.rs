@@ -1,6 +1,6 @@
 //! The valve models of all elements, which run through the whole drive, and the torque that a slipping element has by them.
 
-use drivetrain::Real;
+use drivetrain::{Clutch, Real};
 
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
@@ -30,20 +30,32 @@ impl<T: Real> PressureError<T> {
     }
 }
 
-/// Mean of the pressure that presses the plates, Pa, and its derivative by the pressure above the kiss point, whose
-/// mean and variance these are. The plates do not pull: near the kiss point the mean of `max(p, 0)` is more than that of the
-/// mean. Of a uniform distribution, which has no tail far from its bounds.
-fn pressed<T: Real>(mean_pa: T, variance: T) -> (T, T) {
-    let half_pa = (T::of(3.0) * variance.max(T::zero())).sqrt();
-    let above_pa = mean_pa + half_pa;
-    if mean_pa >= half_pa {
-        (mean_pa, T::one())
-    } else if above_pa > T::zero() {
-        let slope = above_pa / (half_pa + half_pa);
-        (T::of(0.5) * slope * above_pa, slope)
+/// Mean of `max(x, 0)`, where `x` has this mean and variance, and its derivative by that mean: the probability that `x` is
+/// positive. Of a uniform distribution, which has no tail far from its bounds.
+pub(super) fn positive_part<T: Real>(mean: T, variance: T) -> (T, T) {
+    let half = (T::of(3.0) * variance.max(T::zero())).sqrt();
+    let above = mean + half;
+    if mean >= half {
+        (mean, T::one())
+    } else if above > T::zero() {
+        let slope = above / (half + half);
+        (T::of(0.5) * slope * above, slope)
     } else {
         (T::zero(), T::zero())
     }
+}
+
+/// What presses the plates, Pa.
+struct Pressing<T> {
+    /// Mean of the pressure above the kiss point, where it is positive.
+    pressed_pa: T,
+    /// Its derivative by that pressure.
+    slope: T,
+    /// Mean of the error of the pressure above the kiss point.
+    error_pa: T,
+    /// Deviations of kiss point and pressure by the budget.
+    kiss_pa: T,
+    moving_pa: T,
 }
 
 /// The newest command.
@@ -188,6 +200,18 @@ impl<T: Real> ElementState<T> {
         (moving + square(u.pressure_pa)).sqrt()
     }
 
+    /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the
+    /// positive part is more than that of the mean.
+    #[inline]
+    fn pressing(&self, clutch: &Clutch<T>, u: &ShiftUncertainty<T>, wrong: &PressureError<T>) -> Pressing<T> {
+        let (kiss_pa, moving_pa) = (u.kiss_deviation_pa(clutch), self.deviation_pa(u));
+        let error_pa = moving_pa * wrong.pressure - kiss_pa * wrong.kiss;
+        let variance = square(moving_pa) * wrong.variance[0] + square(kiss_pa) * wrong.variance[1]
+            - T::of(2.0) * moving_pa * kiss_pa * wrong.covariance;
+        let (pressed_pa, slope) = positive_part(self.valve_pa - clutch.kiss_pressure() + error_pa, variance);
+        Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa }
+    }
+
     /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
     /// is its sign, less where it is uncertain.
     #[inline]
@@ -203,36 +227,32 @@ impl<T: Real> ElementState<T> {
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
-        let (kiss_pa, moving_pa) = (u.kiss_deviation_pa(clutch), self.deviation_pa(u));
-        let error_pa = moving_pa * wrong.pressure - kiss_pa * wrong.kiss;
-        let variance = square(moving_pa) * wrong.variance[0] + square(kiss_pa) * wrong.variance[1]
-            - T::of(2.0) * moving_pa * kiss_pa * wrong.covariance;
-        let (pressed_pa, slope) = pressed(self.valve_pa - clutch.kiss_pressure() + error_pa, variance);
+        let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa } = self.pressing(clutch, u, wrong);
         ClutchTorque {
             ratio: shift.ratio,
             base_n_m: per_pa * (pressed_pa - slope * error_pa),
             per_friction_n_m: u.torque_share * per_pa * pressed_pa,
             per_kiss_n_m: -per_pa * slope * kiss_pa,
             per_pressure_n_m: per_pa * slope * moving_pa,
-            open_loop_n_m: size * clutch.torque_capacity(self.valve_pa, slip),
+            open_loop_n_m: shift.alpha.abs() * direction.signum() * clutch.torque_capacity(self.valve_pa, slip),
         }
     }
 
-    /// The torque at the turbine that the element can hold with an error of one deviation, and of three, N m.
+    /// The torque at the turbine up to which the element holds, N m, by what is known of its errors: `factor` is that of its torque,
+    /// in deviations.
     #[inline]
     pub(super) fn holds(
         &self,
         element: &FrictionElement<T>,
         shift: &ShiftClutch<T>,
         u: &ShiftUncertainty<T>,
-    ) -> [T; 2] {
-        let (clutch, one, three) = (&element.clutch, T::one(), T::of(3.0));
+        factor: T,
+        wrong: &PressureError<T>,
+    ) -> T {
+        let clutch = &element.clutch;
         let friction = clutch.static_friction.max(clutch.friction.at(T::zero()));
-        let per_force = shift.alpha.abs() * friction * clutch.lever();
-        let capacity = per_force * clutch.clamp_force(self.valve_pa);
-        let wrong_pa = (square(self.deviation_pa(u)) + square(u.kiss_deviation_pa(clutch))).sqrt();
-        let wrong = per_force * clutch.piston_area_m2 * wrong_pa;
-        [capacity * (one + u.torque_share), capacity * (one + three * u.torque_share) + three * wrong]
+        let per_pa = shift.alpha.abs() * friction * clutch.lever() * clutch.piston_area_m2;
+        per_pa * self.pressing(clutch, u, wrong).pressed_pa * (T::one() + u.torque_share * factor)
     }
 
     /// Guaranteed ranges of pressure and torque at the element, with its slip and the error of the slip if it is known.
@@ -294,6 +314,51 @@ mod tests {
             assert!((rests.rate_pa_s - moves.rate_pa_s).abs() <= 100.0 * RESTS_PA, "{k}");
         }
         assert!(rested > 3000 && moves.newest.is_some_and(|newest| newest.rests_s.is_none()), "{rested}");
+    }
+
+    /// Near the kiss point and above it, with errors that are known.
+    #[test]
+    fn an_element_holds_what_it_carries_by_the_estimate() {
+        let u = ShiftUncertainty {
+            torque_share: 0.12,
+            slow_part: 0.75,
+            torque_share_s: 3.0,
+            valve_gain: 0.06,
+            kiss_point_pa: 7e3,
+            valve_lag_share: 0.3,
+            valve_delay_s: 9e-3,
+            pressure_pa: 7e3,
+            pressure_s: 0.15,
+            turbine_share: 0.03,
+            turbine_share_s: 3.0,
+            inertia_share: 0.14,
+            stiffness_share: 0.12,
+            rate_rad_s: 0.1,
+            rate_walk: 0.01,
+            load_walk: 1500.0,
+            output_least_rad_s: 15.0,
+        };
+        let (element, shift) = (element(), ShiftClutch { element: 0, alpha: -1.4, ratio: 2.0 });
+        let mut state = ElementState::new(&element, &LIMITS);
+        for (valve_pa, factor, pressure, kiss) in [
+            (2e5, 0.0, 0.0, 0.0),
+            (2e5, 0.8, 0.5, -0.7),
+            (6e4, -1.0, 0.3, 0.4),
+            (6.5e4, 0.5, -0.6, 0.9),
+            (1e4, 0.5, 0.0, 0.0),
+        ] {
+            (state.valve_pa, state.rate_pa_s) = (valve_pa, 3e5);
+            let wrong = PressureError { pressure, kiss, variance: [0.5, 0.7], covariance: -0.2 };
+            let slips = state.torque(&element, &shift, &u, [0.0, -1.0], &wrong);
+            let carries = slips.base_n_m
+                + factor * slips.per_friction_n_m
+                + kiss * slips.per_kiss_n_m
+                + pressure * slips.per_pressure_n_m;
+            // Its static friction is larger.
+            let holds = state.holds(&element, &shift, &u, factor, &wrong);
+            assert!((holds + carries * 0.14 / 0.13).abs() < 1e-9, "{valve_pa}: {holds} {carries}");
+            assert!((holds > 0.0) == (valve_pa > 1.5e4), "{valve_pa}: {holds}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use drivetrain::Real;
 
 use super::elements::{ElementState, PressureError};
-use super::powertrain::ClutchTorque;
+use super::powertrain::{ClutchTorque, Torques};
 use super::{
     AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE, SHARE,
     SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
@@ -26,7 +26,8 @@ pub struct ClutchEstimate<T> {
     pub deviation_n_m: T,
     /// Pressure by the valve model alone, Pa.
     pub valve_pa: T,
-    /// Torque by valve model and friction alone, N m; of a clutch that holds, the torque up to which it does.
+    /// Torque by valve model and friction alone, N m; of a clutch that holds, the torque up to which it does, in the direction of
+    /// its load.
     pub open_loop_n_m: T,
     /// Whether it holds.
     pub holds: bool,
@@ -209,15 +210,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         };
         let own = torques.clutches[c];
         let holds = running.phase.phase.holding() == Some(c);
-        let mut row = [zero; N];
-        let mut rest = own.base_n_m;
-        if holds {
-            (row, rest) = self.held_torque(shift, c, &torques);
-        } else {
-            row[FRICTION[c]] = own.per_friction_n_m;
-            row[KISS[c]] = own.per_kiss_n_m;
-            row[PRESSURE[c]] = own.per_pressure_n_m;
-        }
+        let (row, rest) = self.torque_row(running, shift, c, &torques);
         let mut torque = x.value(&row) + rest;
         if !holds && torque * own.per_pressure_n_m <= zero {
             // A slipping clutch does not push.
@@ -231,6 +224,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 let itself = memory.deviation_pa(u) * x.mean[PRESSURE[c]];
                 (memory.valve_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
             });
+        let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();
         ClutchEstimate {
             element: clutch.element,
@@ -238,12 +232,37 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torque_n_m: torque / clutch.alpha,
             deviation_n_m: (deviation / clutch.alpha).abs(),
             valve_pa,
-            open_loop_n_m: own.open_loop_n_m / clutch.alpha,
+            open_loop_n_m: open_loop_n_m / clutch.alpha,
             holds,
             hidden: !holds && deviation >= T::of(HIDDEN) * alone,
             pressure_range_pa: None,
             torque_range_n_m: None,
         }
+    }
+
+    /// The torque at the turbine as a row over the states, and what is left beside them: of a clutch that slips that of its
+    /// pressure, of one that holds its load; of one that has just gripped the mean of both, weighted by the probability that it slips
+    /// yet.
+    fn torque_row(
+        &self,
+        running: &super::Running<T>,
+        shift: &ShiftRow<T>,
+        c: usize,
+        torques: &Torques<T>,
+    ) -> ([T; N], T) {
+        let own = &torques.clutches[c.min(1)];
+        let holds = running.phase.phase.holding() == Some(c);
+        let slips = if holds { running.phase.slips_yet.abs() } else { T::one() };
+        let (mut row, mut rest) = if holds { self.held_torque(shift, c, torques) } else { ([T::zero(); N], T::zero()) };
+        if slips > T::zero() {
+            let held = T::one() - slips;
+            row.iter_mut().for_each(|x| *x = held * *x);
+            row[FRICTION[c.min(1)]] = row[FRICTION[c.min(1)]] + slips * own.per_friction_n_m;
+            row[KISS[c.min(1)]] = row[KISS[c.min(1)]] + slips * own.per_kiss_n_m;
+            row[PRESSURE[c.min(1)]] = row[PRESSURE[c.min(1)]] + slips * own.per_pressure_n_m;
+            rest = held * rest + slips * own.base_n_m;
+        }
+        (row, rest)
     }
 
     /// Brings an estimate into the guaranteed ranges, where there are some.

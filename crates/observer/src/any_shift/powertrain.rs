@@ -50,7 +50,7 @@ pub(super) struct ClutchTorque<T> {
     pub(super) per_friction_n_m: T,
     pub(super) per_kiss_n_m: T,
     pub(super) per_pressure_n_m: T,
-    /// By the valve model and the budget's friction and kiss point alone.
+    /// By the valve model and the budget's friction and kiss point alone, of full size also where the direction is uncertain.
     pub(super) open_loop_n_m: T,
 }
 

@@ -5,6 +5,7 @@ use super::{
     MODEL_SHARE, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SHARE, SHARE_S, SPRING, ShiftRow, TURBINE,
     TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
 };
+use crate::any_shift::elements::positive_part;
 use drivetrain::Real;
 
 impl<T: Real> AnyShiftFilter<'_, T> {
@@ -156,11 +157,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             let (clutch, slip) = (&shift.clutches[c], self.slip(shift.clutches[c].ratio, speeds));
             if slip.is_over() || holding.is_some_and(|held| held != c) {
                 // Its slip alone decides.
-                return Contact { slip, needed_n_m: T::zero(), holds_n_m: [T::zero(); 2] };
+                return Contact { slip, needed_n_m: T::zero(), holds_n_m: T::zero() };
             }
-            let holds_n_m = self
-                .element(elements, clutch.element)
-                .map_or([T::zero(); 2], |(memory, element)| memory.holds(element, clutch, &self.uncertainty));
+            let (factor, wrong) = (running.x.mean[FRICTION[c.min(1)]], running.x.pressure_error(c));
+            let holds_n_m = self.element(elements, clutch.element).map_or(T::zero(), |(memory, element)| {
+                memory.holds(element, clutch, &self.uncertainty, factor, &wrong)
+            });
             let (row, rest) = self.held_torque(&shift, c, torques);
             Contact { slip, needed_n_m: running.x.value(&row) + rest, holds_n_m }
         };
@@ -179,8 +181,19 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         if let Some(held) = after.holding() {
             let held = held.min(1);
+            running.phase.slips_yet = Self::slips_yet(running, &shift, held, torques);
             Self::tie(running, &shift, shift.clutches[held].ratio);
         }
+    }
+
+    /// The probability that a clutch whose readings show no slip any more slips yet, by the speeds that the model carried on to now,
+    /// with the sign of its torque. The readings are older.
+    fn slips_yet(running: &Running<T>, shift: &ShiftRow<T>, held: usize, torques: &Torques<T>) -> T {
+        let mut slip = [T::zero(); N];
+        (slip[TURBINE], slip[OUTPUT]) = (T::one(), -shift.clutches[held.min(1)].ratio);
+        let direction = torques.clutches[held.min(1)].per_friction_n_m.signum();
+        let (_, probability) = positive_part(direction * running.x.value(&slip), running.x.variance(&slip));
+        direction * probability
     }
 
     /// A clutch that grips ties both speeds with its ratio `i`. Its impulse acts between them, so that what is kept is the

@@ -5,8 +5,9 @@
 
 use drivetrain::Real;
 
-use super::covariance::{ALL, CONSIDERED, Measured};
+use super::covariance::CONSIDERED;
 use super::engine::Engine;
+use super::past::SPEEDS;
 use super::{KalmanFilter, KalmanState, SHARE, TURBINE};
 use crate::{ChannelHealth, Input, LOST_S, Reading};
 
@@ -89,14 +90,13 @@ impl<T: Real> KalmanFilter<T> {
         let changed = rate_n_m_s * (reading.age_s + T::of(SETTLED_S));
         let own = alike * (square(told.share * reading.value.abs() + told.beside_n_m) + square(changed));
         let noise = square(ratio) * (own + square(told.engine_kg_m2 * acceleration_deviation));
-        let mut with = [T::zero(); ALL];
-        running.covariance.add_row::<SHARE>(&mut with, by_map.turbine_n_m);
-        let variance = (by_map.turbine_n_m * with[SHARE]).at_least(T::zero()) + noise;
+        let mut measured = running.covariance.with_state::<SHARE>(by_map.turbine_n_m);
+        measured.variance = (by_map.turbine_n_m * measured.with[SHARE]).at_least(T::zero()) + noise;
         let innovation = found - by_map.turbine_n_m * (one + running.mean[SHARE]);
-        if !(variance.is_finite() && innovation.is_finite()) {
+        if !(measured.variance.is_finite() && innovation.is_finite()) {
             return;
         }
-        running.correct(&Measured { with: &with, variance }, innovation, &[one; CONSIDERED]);
+        running.correct(&measured, innovation, &[one; CONSIDERED], SPEEDS);
     }
 }
 

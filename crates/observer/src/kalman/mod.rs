@@ -12,10 +12,13 @@
 //! | `s`, `d_w`, `d_o` | constant | scale of the wheel speed; delay of the wheel speed and of the output speed, both against the turbine speed, s |
 //!
 //! Every reading is a measurement of its own that may be absent; a step without one only predicts. A reading is compared
-//! with the speed at the time at which it was measured, which lies between two steps or before both: the covariance holds
-//! speeds at two earlier times, the older ones of turbine and output only while readings are that old. Before the shift
-//! the gear ratio ties turbine to output speed: with it, scale and delays are found. They are kept from shift to shift;
-//! friction and gain are kept for some shifts and then forgotten.
+//! with the speed at the time at which it was measured, which lies between two steps or before both: the filter remembers the
+//! speeds at two earlier times. The covariance has the newer ones, about one step ago; an older speed errs as the line through
+//! the speed then and now does.
+//!
+//! Before the shift the gear ratio ties turbine to output speed: with it, scale and delays are found. A reading of one then
+//! tells both; where both come in a step, they take turns. Scale and delays are kept from shift to shift; friction and gain are
+//! kept for some shifts and then forgotten.
 //!
 //! Where a log has the command of the offgoing clutch, its valve model limits `T_ca`; where it has the torque that the engine's
 //! controller reports, that is a second source of the turbine torque.
@@ -124,6 +127,9 @@ pub struct KalmanState<T> {
     engine: Option<Engine<T>>,
     /// The newest readings of turbine, output and wheel: value, and age in s.
     newest: [Option<(T, T)>; 3],
+    /// Which of turbine and output stood back when both came last. Every such step changes it, so that it is the same in any
+    /// precision.
+    turn: usize,
     running: Option<Running<T>>,
     /// Mean and covariance of what was learnt.
     learnt: Option<([T; LEARNT.len()], [[T; LEARNT.len()]; LEARNT.len()])>,
@@ -139,9 +145,10 @@ struct Running<T> {
     covariance: Covariance<T>,
     /// The speeds at earlier times, with which readings are compared that are older than this step.
     past: Past<T>,
-    /// Time since a reading of turbine or output was older than the newest of the past, s: for as long as a channel may be
-    /// silent, the next one may be.
-    late_s: T,
+    /// The earlier speeds from this one on have their covariance kept up to date.
+    kept: usize,
+    /// Time since the shares that fade slowly have done so, s.
+    unfaded_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
     acting: Phase,
@@ -190,6 +197,7 @@ impl<T: Real> Estimator<T> for KalmanFilter<T> {
             supervisor: SupervisorState::new(),
             engine: None,
             newest: [None; 3],
+            turn: TURBINE,
             running: None,
             learnt: None,
             lost: false,
@@ -315,9 +323,10 @@ impl<T: Real> KalmanFilter<T> {
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
-        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s);
-        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s);
-        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s);
+        let skipped = self.skipped(state, input);
+        health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s, skipped != Some(TURBINE));
+        health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s, skipped != Some(OUTPUT));
+        health[WHEEL] = self.take_speed::<WHEEL>(state, input.wheel_rad_s, true);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             for (health, silent_s) in health.iter_mut().zip(running.silent_s) {
@@ -330,6 +339,7 @@ impl<T: Real> KalmanFilter<T> {
             {
                 self.tie(running, dt_s);
             }
+            self.limit_learnt(running);
         } else {
             for (health, newest) in health.iter_mut().zip(&state.newest) {
                 if *health == ChannelHealth::Absent && newest.is_none_or(|(_, age_s)| age_s > T::of(LOST_S)) {
@@ -343,9 +353,26 @@ impl<T: Real> KalmanFilter<T> {
         health
     }
 
-    /// Takes a reading of the speed `K`, if there is one.
+    /// The speed of which a reading of this step does not correct the filter. Before the shift turbine and output are tied by the
+    /// gear's ratio, and a reading of one tells both: where both come, they take turns.
     #[inline]
-    fn take_speed<const K: usize>(&self, state: &mut KalmanState<T>, reading: Option<Reading<T>>) -> ChannelHealth {
+    fn skipped(&self, state: &mut KalmanState<T>, input: &Input<T>) -> Option<usize> {
+        if input.turbine_rad_s.is_none() || input.output_rad_s.is_none() {
+            return None;
+        }
+        state.turn = if state.turn == TURBINE { OUTPUT } else { TURBINE };
+        let tied = state.running.is_some() && state.supervisor.phase == Phase::BeforeShift;
+        (tied && holds_offgoing(&self.supervisor, &self.model, &state.newest)).then_some(state.turn)
+    }
+
+    /// Takes a reading of the speed `K`, if there is one. It corrects the filter if it is its `turn`.
+    #[inline]
+    fn take_speed<const K: usize>(
+        &self,
+        state: &mut KalmanState<T>,
+        reading: Option<Reading<T>>,
+        turn: bool,
+    ) -> ChannelHealth {
         let Some(reading) = reading else { return ChannelHealth::Absent };
         let aged = reading.age_s >= T::zero() && reading.age_s <= T::of(LOST_S);
         // One that comes too late, after a newer one, is refused as well.
@@ -354,8 +381,8 @@ impl<T: Real> KalmanFilter<T> {
             return ChannelHealth::Refused;
         }
         let health = match &mut state.running {
-            Some(running) => self.correct::<K>(running, reading),
-            None => ChannelHealth::Good,
+            Some(running) if turn => self.correct::<K>(running, reading),
+            Some(_) | None => ChannelHealth::Good,
         };
         // What the filter refuses shows no slip either.
         if health == ChannelHealth::Good {
@@ -494,22 +521,18 @@ fn holds_offgoing<T: Real>(
 }
 
 impl<T: Real> Running<T> {
-    /// Corrects the covariance for a measurement, and states and remembered speeds by their gains times its innovation; of
-    /// the considered states' best gains these shares.
-    fn correct(&mut self, measured: &Measured<'_, T>, innovation: T, shares: &[T; CONSIDERED]) {
-        let gain = self.covariance.correct(measured, shares);
-        for (x, gain) in self.mean.iter_mut().zip(&gain) {
-            *x = *x + *gain * innovation;
+    /// Corrects mean, covariance and remembered speeds for a measurement; of the considered states' best gains these shares. The
+    /// readings of the speeds from `next` on are still to come in this step.
+    fn correct(&mut self, measured: &Measured<T>, innovation: T, shares: &[T; CONSIDERED], next: usize) {
+        // The next step remembers other speeds if it is due.
+        if self.past.is_due() {
+            self.kept = self.kept.max(next);
         }
-        self.past.correct(&gain, innovation);
-    }
-
-    /// Remembers the speeds of now; the oldest are forgotten, and in the covariance those of turbine and output left out if
-    /// it is not to be `whole`.
-    #[inline]
-    fn remember(&mut self, whole: bool) {
-        self.past.remember([self.mean[TURBINE], self.mean[OUTPUT], self.mean[WHEEL]]);
-        self.covariance.remember(whole);
+        let moves = self.covariance.correct(measured, shares, self.kept, innovation);
+        for (x, by) in self.mean.iter_mut().zip(&moves.states) {
+            *x = *x + *by;
+        }
+        self.past.correct(&moves);
     }
 
     /// Whether mean and covariance are numbers, and no variance is negative.

@@ -2,7 +2,8 @@
 
 use drivetrain::{Clutch, Real};
 
-use super::covariance::{ALL, CONSIDERED, Measured};
+use super::covariance::CONSIDERED;
+use super::past::SPEEDS;
 use super::predict::hypot;
 use super::valve_model::Commands;
 use super::{KalmanFilter, OFFGOING, PIECE_S, Running, ValveModel};
@@ -99,11 +100,10 @@ impl<T: Real> KalmanFilter<T> {
         if torque.abs() <= most {
             return;
         }
-        let mut with = [T::zero(); ALL];
-        running.covariance.add_row::<OFFGOING>(&mut with, T::one());
-        let variance = with[OFFGOING].at_least(T::zero()) + deviation * deviation;
+        let mut measured = running.covariance.with_state::<OFFGOING>(T::one());
+        measured.variance = measured.with[OFFGOING].at_least(T::zero()) + deviation * deviation;
         let beyond = if torque > T::zero() { most - torque } else { -most - torque };
-        running.correct(&Measured { with: &with, variance }, beyond, &[T::one(); CONSIDERED]);
+        running.correct(&measured, beyond, &[T::one(); CONSIDERED], SPEEDS);
     }
 }
 

@@ -1,139 +1,133 @@
-//! The speeds at a few earlier times: readings are older than the step that they come with.
+//! The speeds at two earlier times: readings are older than the step that they come with.
 
 use drivetrain::Real;
 
-use super::covariance::{ALL, speed_at};
+use super::covariance::Moves;
 
-/// Earlier times that are remembered.
-pub(super) const PASTS: usize = 2;
 /// Turbine, output and wheel.
 pub(super) const SPEEDS: usize = 3;
-/// Remembered speeds.
-pub(super) const CLONES: usize = PASTS * SPEEDS;
 /// Time after which the speeds are remembered again, s: no multiple of a usual sample time, so that rounding does not decide.
 /// Most readings are less than twice that old.
-pub(super) const EVERY_S: f64 = 0.0087;
+const EVERY_S: f64 = 0.0087;
 /// Least time over which an acceleration is taken, s.
 const LEAST_SPAN_S: f64 = 0.0047;
 
-/// The speeds at one time, rad/s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Point<T> {
-    age_s: T,
-    speeds: [T; SPEEDS],
-}
-
-/// The speeds at the earlier times, the newest first.
+/// The speeds at two earlier times. The covariance has those of the newer one; those of the older one err alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Past<T> {
-    points: [Point<T>; PASTS],
+    /// Age of the newer ones, s.
+    age_s: T,
+    /// The newer ones, rad/s.
+    speeds: [T; SPEEDS],
+    /// How much older the others are, s.
+    span_s: T,
+    /// How the speeds have changed from the older to the newer, rad/s.
+    changes: [T; SPEEDS],
 }
 
-/// A time between two of `now` and the earlier times, which are counted from 1.
+/// A speed a time ago, on the line between the two of now and the earlier times around that, or through both earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place<T> {
-    /// The one after it, and the one before it.
-    pub(super) between: [usize; 2],
-    /// How much of each.
-    pub(super) shares: [T; 2],
-    /// Time between the two, s.
-    pub(super) width_s: T,
-    /// How much older it is than the oldest, s.
+pub(super) struct Then<T> {
+    /// The speed, rad/s.
+    pub(super) value: T,
+    /// Slope of the line, rad/s^2.
+    pub(super) acceleration: T,
+    /// By how much a parabola differs from the line, per change of the acceleration from one interval to the next, s.
+    pub(super) bend_s: T,
+    /// How much older than the oldest it is, s.
     pub(super) beyond_s: T,
 }
 
-impl<T> Place<T> {
-    /// Whether it is between now and the newest.
-    #[inline]
-    pub(super) fn is_recent(&self) -> bool {
-        self.between[0] == 0
-    }
+/// A time on the line through now and the newer of the earlier times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct OnLine<T> {
+    /// How much of now, and of the earlier time.
+    pub(super) shares: [T; 2],
+    /// How many times the length of the line it is behind its end: zero where the line reaches it.
+    pub(super) beyond: T,
 }
 
 impl<T: Real> Past<T> {
     /// As it would be with accelerations that have stood for long.
     pub(super) fn steady(speeds: [T; SPEEDS], accelerations: [T; SPEEDS]) -> Self {
-        let mut age_s = T::zero();
-        let points = core::array::from_fn(|_| {
-            age_s = age_s + T::of(EVERY_S);
-            Point { age_s, speeds: core::array::from_fn(|k| speeds[k] - age_s * accelerations[k]) }
-        });
-        Self { points }
+        let age_s = T::of(EVERY_S);
+        let changes = accelerations.map(|acceleration| age_s * acceleration);
+        Self { age_s, speeds: core::array::from_fn(|k| speeds[k] - changes[k]), span_s: age_s, changes }
     }
 
     /// Lets time pass.
     #[inline]
     pub(super) fn pass(&mut self, dt_s: T) {
-        for point in &mut self.points {
-            point.age_s = point.age_s + dt_s;
-        }
+        self.age_s = self.age_s + dt_s;
     }
 
-    /// Whether the newest is old enough for the speeds to be remembered again.
+    /// Whether the newer ones are old enough for the speeds to be remembered again by the next step.
     #[inline]
     pub(super) fn is_due(&self) -> bool {
-        self.points[0].age_s >= T::of(EVERY_S)
+        self.age_s >= T::of(EVERY_S)
+    }
+
+    /// Age of the newer ones, s.
+    #[inline]
+    pub(super) fn age_s(&self) -> T {
+        self.age_s
     }
 
     /// Remembers the speeds of now; the oldest are forgotten.
     #[inline]
     pub(super) fn remember(&mut self, speeds: [T; SPEEDS]) {
-        for n in (1..PASTS).rev() {
-            self.points[n] = self.points[n - 1];
-        }
-        self.points[0] = Point { age_s: T::zero(), speeds };
+        let changes = core::array::from_fn(|k| speeds[k] - self.speeds[k]);
+        *self = Self { age_s: T::zero(), speeds, span_s: self.age_s, changes };
     }
 
-    /// Ages, s.
-    pub(super) fn ages(&self) -> [T; PASTS] {
-        core::array::from_fn(|n| self.points[n].age_s)
-    }
-
-    /// Moves the remembered speeds, in the order of [`speed_at`], by a gain each times an innovation.
+    /// Corrects the remembered speeds. The older ones move as the newer, with which they have most of their error in common.
     #[inline]
-    pub(super) fn correct(&mut self, gains: &[T; ALL], innovation: T) {
-        for (n, point) in self.points.iter_mut().enumerate() {
-            for (k, speed) in point.speeds.iter_mut().enumerate() {
-                *speed = *speed + gains[speed_at(k, n + 1)] * innovation;
-            }
+    pub(super) fn correct(&mut self, moves: &Moves<T>) {
+        for (speed, by) in self.speeds.iter_mut().zip(&moves.earlier) {
+            *speed = *speed + *by;
         }
     }
 
-    /// The speed `k` at a point, counted from 0 for now.
+    /// The speed `k` of which the one now is given, `age_s` ago.
     #[inline]
-    pub(super) fn speed(&self, k: usize, now: T, point: usize) -> T {
-        match point.checked_sub(1).and_then(|n| self.points.get(n)) {
-            Some(point) => point.speeds[k],
-            None => now,
+    pub(super) fn then(&self, k: usize, now: T, age_s: T) -> Then<T> {
+        let (zero, one, half) = (T::zero(), T::one(), T::of(0.5));
+        let slope = |change: T, width_s: T| if width_s > zero { change / width_s } else { zero };
+        if age_s <= self.age_s {
+            let acceleration = slope(now - self.speeds[k], self.age_s);
+            let bend_s = half * age_s * (one - slope(age_s, self.age_s));
+            return Then { value: now - age_s * acceleration, acceleration, bend_s, beyond_s: zero };
         }
+        let acceleration = slope(self.changes[k], self.span_s);
+        let before_s = age_s - self.age_s;
+        let (within_s, beyond_s) = (before_s.at_most(self.span_s), (before_s - self.span_s).at_least(zero));
+        let bend_s = half * (within_s * (one - slope(within_s, self.span_s)) + beyond_s);
+        Then { value: self.speeds[k] - before_s * acceleration, acceleration, bend_s, beyond_s }
+    }
+
+    /// The line through now and the newer ones, carried on as far as `age_s` ago. Where the two are too near to each other it
+    /// ends there, and now if the covariance of the newer ones is not `kept`: at a second reading of one time.
+    #[inline]
+    pub(super) fn on_line(&self, age_s: T, kept: bool) -> OnLine<T> {
+        let (zero, one) = (T::zero(), T::one());
+        let share = if self.age_s > zero { age_s / self.age_s } else { zero };
+        let reached = match kept {
+            false => zero,
+            true if self.age_s < T::of(LEAST_SPAN_S) => share.at_most(one),
+            true => share,
+        };
+        OnLine { shares: [one - reached, reached], beyond: share - reached }
     }
 
     /// Accelerations of the speed `k`, rad/s^2: now, and over the time before.
     #[inline]
     pub(super) fn accelerations(&self, k: usize, now: T) -> [T; 2] {
-        let [newest, oldest] = &self.points;
-        let over =
-            |late: T, early: &Point<T>, span_s: T| (late - early.speeds[k]) / span_s.at_least(T::of(LEAST_SPAN_S));
-        let before = over(newest.speeds[k], oldest, oldest.age_s - newest.age_s);
-        let after = if newest.age_s >= T::of(LEAST_SPAN_S) { newest } else { oldest };
-        [over(now, after, after.age_s), before]
-    }
-
-    /// Where a time is that was `age_s` ago.
-    #[inline]
-    pub(super) fn place(&self, age_s: T) -> Place<T> {
-        let zero = T::zero();
-        let mut after = (0, zero);
-        for (n, point) in self.points.iter().enumerate() {
-            if age_s <= point.age_s {
-                let width_s = point.age_s - after.1;
-                let share = if width_s > zero { (age_s - after.1) / width_s } else { zero };
-                return Place { between: [after.0, n + 1], shares: [T::one() - share, share], width_s, beyond_s: zero };
-            }
-            after = (n + 1, point.age_s);
+        let least_s = T::of(LEAST_SPAN_S);
+        let (mut change, mut span_s) = (now - self.speeds[k], self.age_s);
+        if span_s < least_s {
+            (change, span_s) = (change + self.changes[k], span_s + self.span_s);
         }
-        let width_s = self.points[PASTS - 1].age_s - self.points[PASTS - 2].age_s;
-        Place { between: [PASTS - 1, PASTS], shares: [zero, T::one()], width_s, beyond_s: age_s - after.1 }
+        [change / span_s.at_least(least_s), self.changes[k] / self.span_s.at_least(least_s)]
     }
 }
 
@@ -142,22 +136,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_lies_between_the_points_around_it() {
+    fn a_time_lies_between_the_times_around_it() {
         let mut past = Past::<f64>::steady([100.0, 50.0, 10.0], [1000.0, 0.0, -100.0]);
-        assert_eq!(past.ages(), [0.0087, 0.0174]);
+        assert_eq!((past.age_s, past.span_s), (0.0087, 0.0087));
+        assert!((past.then(0, 100.0, 0.015).value - 85.0).abs() < 1e-9);
         past.remember([100.0, 50.0, 10.0]);
         past.pass(0.01);
-        let speed = |k: usize, now: f64, age_s: f64| {
-            let place = past.place(age_s);
-            let [a, b] = place.between.map(|point| past.speed(k, now, point));
-            place.shares[0] * a + place.shares[1] * b
-        };
+        let speed = |k: usize, now: f64, age_s: f64| past.then(k, now, age_s).value;
         assert!((speed(0, 110.0, 0.0) - 110.0).abs() < 1e-9);
         assert!((speed(0, 110.0, 0.005) - 105.0).abs() < 1e-9);
         assert!((speed(0, 110.0, 0.015) - 95.0).abs() < 1e-9);
         assert!((speed(2, 9.0, 0.0187) - 10.87).abs() < 1e-9);
-        let place = past.place(0.03);
-        assert!((place.beyond_s - 0.0113).abs() < 1e-9 && place.between[1] == PASTS, "{place:?}");
+        let then = past.then(2, 9.0, 0.03);
+        assert!((then.beyond_s - 0.0113).abs() < 1e-9 && (then.value - 12.0).abs() < 1e-9, "{then:?}");
+        // A parabola `j t^2/2` over intervals of 10 ms: the acceleration changes by `0.01 j`, and in the middle of an interval
+        // the line is `j 0.01^2/8` off.
+        assert!((0.01 * past.then(0, 110.0, 0.005).bend_s - 0.01 * 0.01 / 8.0).abs() < 1e-12);
         assert!((past.accelerations(0, 110.0)[0] - 1000.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_line_through_now_and_the_earlier_time_reaches_as_far_as_it_may() {
+        let mut past = Past::<f64>::steady([100.0, 50.0, 10.0], [0.0; 3]);
+        past.remember([100.0, 50.0, 10.0]);
+        past.pass(0.002);
+        assert_eq!(past.on_line(0.001, true), OnLine { shares: [0.5, 0.5], beyond: 0.0 });
+        // Two milliseconds tell no acceleration.
+        assert_eq!(past.on_line(0.006, true), OnLine { shares: [0.0, 1.0], beyond: 2.0 });
+        assert_eq!(past.on_line(0.006, false), OnLine { shares: [1.0, 0.0], beyond: 3.0 });
+        past.pass(0.008);
+        assert_eq!(past.on_line(0.02, true), OnLine { shares: [-1.0, 2.0], beyond: 0.0 });
     }
 }

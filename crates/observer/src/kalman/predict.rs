@@ -11,7 +11,7 @@ use super::{
     DELAY, FIRST_S, FRICTION, GAIN, KalmanFilter, KalmanState, LEARNT, LOAD, N, OFFGOING, OUTPUT, PRESSURE, Running,
     SCALE, SHARE, SKEW, SPRING, TURBINE, WHEEL,
 };
-use crate::{LOST_S, Phase};
+use crate::Phase;
 
 /// Innovation beyond which a reading is refused, in its deviations.
 const GATE: u8 = 4;
@@ -22,6 +22,9 @@ const SHAFT_START: (f64, f64) = (0.3, 100.0);
 pub(super) const OFFGOING_START: (f64, f64) = (0.5, 50.0);
 const LOAD_START: (f64, f64) = (0.15, 400.0);
 const PRESSURE_START: f64 = 0.3;
+/// Time after which the shares fade that do so in seconds, s: not at every step, and no multiple of a usual sample time, so that
+/// rounding does not decide when.
+const FADING_S: f64 = 0.0487;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 
@@ -72,12 +75,13 @@ impl<T: Real> KalmanFilter<T> {
         }
         let past = Past::steady([mean[TURBINE], mean[OUTPUT], mean[WHEEL]], accelerations);
         // On a hill, or in a shift, the acceleration is another one.
-        covariance.steady_past(past.ages(), accelerations.map(|acceleration| acceleration * acceleration));
+        covariance.steady_past(past.age_s(), accelerations.map(|acceleration| acceleration * acceleration));
         Some(Running {
             mean,
             covariance,
             past,
-            late_s: zero,
+            kept: 0,
+            unfaded_s: zero,
             motion_pa_s: zero,
             acting,
             direction: direction(model.shift.oncoming_slip(turbine, output)),
@@ -142,37 +146,33 @@ impl<T: Real> KalmanFilter<T> {
             let rate = shift.oncoming_slip(turbine, output);
             let until_s = -slip / rate;
             if until_s > T::zero() && until_s < dt_s {
-                self.advance(running, engine, settled_pa, [until_s, dt_s - until_s], false);
+                self.advance(running, engine, settled_pa, [until_s, dt_s - until_s]);
                 running.acting = Phase::AfterShift;
-                self.advance(running, engine, settled_pa, [dt_s - until_s, T::zero()], true);
+                self.advance(running, engine, settled_pa, [dt_s - until_s, T::zero()]);
                 return;
             }
         }
-        self.advance(running, engine, settled_pa, [dt_s, T::zero()], false);
+        self.advance(running, engine, settled_pa, [dt_s, T::zero()]);
     }
 
-    /// A step in one phase, that ends `left_s` before now; `second` if it is not the first of its time step.
+    /// A step in one phase, that ends `left_s` before now.
     #[inline]
-    fn advance(
-        &self,
-        running: &mut Running<T>,
-        engine: &Engine<T>,
-        settled_pa: T,
-        [dt_s, left_s]: [T; 2],
-        second: bool,
-    ) {
+    fn advance(&self, running: &mut Running<T>, engine: &Engine<T>, settled_pa: T, [dt_s, left_s]: [T; 2]) {
+        let x = running.mean;
         let remembered = running.past.is_due();
         if remembered {
-            // The readings of this time step may be older than its second half.
-            running.remember(second || running.late_s < T::of(LOST_S));
+            running.past.remember([x[TURBINE], x[OUTPUT], x[WHEEL]]);
+            running.kept = 0;
         }
-        let x = running.mean;
+        running.unfaded_s = running.unfaded_s + dt_s;
         let step = self.step_of(running, engine, settled_pa, dt_s, left_s);
+        if running.unfaded_s >= T::of(FADING_S) {
+            running.unfaded_s = T::zero();
+        }
         running.mean = step.propagate(&x);
         running.covariance.spread(&step.tangent(&x, &running.mean), remembered);
         self.add_noise(running, engine, &step, &x, settled_pa);
         running.past.pass(dt_s);
-        running.late_s = running.late_s + dt_s;
         for silent_s in &mut running.silent_s {
             *silent_s = *silent_s + dt_s;
         }
@@ -193,6 +193,7 @@ impl<T: Real> KalmanFilter<T> {
             rows[1].per_offgoing_torque = zero;
         }
         let released = matches!(running.acting, Phase::InertiaPhase | Phase::AfterShift);
+        let fading_s = if running.unfaded_s >= T::of(FADING_S) { running.unfaded_s } else { zero };
         let slip = self.model.shift.oncoming_slip(x[TURBINE], x[OUTPUT]);
         let valve = self.valve.step(settled_pa, x[PRESSURE], dt_s);
         let per_start = valve.psi / dt_s;
@@ -220,9 +221,9 @@ impl<T: Real> KalmanFilter<T> {
             stiffness: line.shaft_stiffness_n_m_rad,
             damping: line.shaft_damping_n_m_s_rad,
             inertia: rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2,
-            stay: lasting(dt_s, u.turbine_share_s),
+            stay: lasting(fading_s, u.turbine_share_s),
             keep: if released { lasting(dt_s, u.offgoing_release_s) } else { one },
-            last: lasting(dt_s, u.clutch_s),
+            last: lasting(fading_s, u.clutch_s),
         }
     }
 
@@ -247,9 +248,11 @@ impl<T: Real> KalmanFilter<T> {
         let stiffness_share = if x[SPRING].abs() < u.backlash_n_m { one } else { u.stiffness_share };
         p.add(SPRING, two * dt * u.rate_s * square(stiffness_share * step.stiffness * twist_rate));
         p.add(PRESSURE, two * dt * u.rate_s * square(u.valve_share * running.motion_pa_s));
-        p.add(SHARE, square(u.turbine_share) * (one - square(step.stay)));
-        for (state, deviation) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {
-            p.add(state, square(deviation) * (one - square(step.last)));
+        if step.last < one {
+            p.add(SHARE, square(u.turbine_share) * (one - square(step.stay)));
+            for (state, deviation) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {
+                p.add(state, square(deviation) * (one - square(step.last)));
+            }
         }
         // How fast it drains is not known: the rate may be wrong by its own size for as long as it lasts.
         let offgoing =

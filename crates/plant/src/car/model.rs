@@ -193,7 +193,10 @@ impl CarModel {
             });
         }
         parts.push(Part::LockUp);
-        if packs > MAX_PACKS || parts.len() != train.elements {
+        if packs > MAX_PACKS {
+            return Err(TrainError::TooManyPacks { packs, room: MAX_PACKS });
+        }
+        if parts.len() != train.elements {
             return Err(TrainError::TooLarge);
         }
         let has_stroke = car.clutches.iter().flatten().any(|clutch| clutch.has_stroke);

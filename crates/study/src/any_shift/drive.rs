@@ -9,6 +9,7 @@ use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating}
 
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
 use super::recording::Recording;
+use super::thinned::thinned;
 use super::{AnyShiftError, ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase, row};
 
 /// The drive at one time.
@@ -122,10 +123,13 @@ impl ScoredShift {
     }
 }
 
+/// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`SAMPLE_S`].
+pub const MOST_STATES: u32 = 400_000;
+
 /// A drive with its shifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScoredDrive {
-    /// Every [`SAMPLE_S`].
+    /// Every [`SAMPLE_S`]; of a drive of more than [`MOST_STATES`] those that are kept: fewer where nothing happens.
     pub states: Vec<DriveState>,
     /// Its shifts.
     pub shifts: Vec<ScoredShift>,
@@ -161,9 +165,23 @@ impl ScoredDrive {
 pub(super) struct PassingShifts {
     pub(super) drive: ScoredDrive,
     pub(super) open: Option<ScoredShift>,
+    /// States that were left when some were left out the last time.
+    left: usize,
 }
 
 impl PassingShifts {
+    /// Takes the next state of the drive.
+    pub(super) fn state(&mut self, state: DriveState) {
+        let states = &mut self.drive.states;
+        states.push(state);
+        if states.len() >= (MOST_STATES as usize).max(2 * self.left) {
+            let under_way = self.open.as_ref().map(|open| [open.time_s[0], f64::INFINITY]);
+            let shifts_s = self.drive.shifts.iter().map(|shift| shift.time_s).chain(under_way);
+            *states = thinned(states, shifts_s, MOST_STATES / 4);
+            self.left = states.len();
+        }
+    }
+
     /// Whether a shift ends with the first row that is in a gear or in this other shift. A change of mind begins another shift.
     pub(super) fn ends(&self, gears: Option<[usize; 2]>) -> bool {
         self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
@@ -245,7 +263,7 @@ impl<'a> DriveScorer<'a> {
     pub fn push(&mut self, sample: &CarSample, input: &ShiftInput<f64>) {
         let Self { known, passing, rating, .. } = self;
         let estimate = self.filter.step(&mut self.state, input);
-        passing.drive.states.push(state_of(sample, estimate.health));
+        passing.state(state_of(sample, estimate.health));
         self.last = Some(*sample);
         let gears = sample.shift.as_ref().map(|shift| [shift.from, shift.to]);
         if passing.ends(gears) {

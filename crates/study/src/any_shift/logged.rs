@@ -19,6 +19,7 @@ use super::drive::{DriveState, PassingShifts, ScoredDrive};
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
 use crate::row_clock::{RowClock, RowTime};
+use crate::shift_estimates::is_refused;
 use crate::swapped_speeds::SwappedSpeeds;
 
 /// Slip below which a true clutch sticks, rad/s.
@@ -28,7 +29,7 @@ const STICKS_RAD_S: f64 = 0.05;
 const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_SHARE: f64 = 0.1;
 
-/// Rows further apart are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
+/// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;
 
 /// Names for neither a forward gear nor reverse, and their place: that of no gear.
@@ -261,6 +262,8 @@ pub struct LoggedDrive<'c> {
     filter: AnyShiftFilter<'c, f64>,
     state: AnyShiftState<f64>,
     passing: PassingShifts,
+    /// Newest speeds of engine, turbine and output, rad/s: as they came, and those that the filter did not refuse.
+    came_rad_s: [f64; 3],
     speeds_rad_s: [f64; 3],
     begun_s: f64,
     /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
@@ -271,11 +274,35 @@ pub struct LoggedDrive<'c> {
 }
 
 /// Holes of the recording within shifts.
-#[derive(Default)]
 struct Holes {
     count: u64,
     /// The shift that the last one cut, as long as the log goes on in it: the rest is no other shift.
     cut: Option<[usize; 2]>,
+    /// The last times between rows, s; the oldest is at `at`.
+    steps_s: [f64; 31],
+    at: usize,
+}
+
+impl Default for Holes {
+    fn default() -> Self {
+        // What is not a number sorts behind the numbers: half of the times must be known.
+        Self { count: 0, cut: None, steps_s: [f64::NAN; 31], at: 0 }
+    }
+}
+
+impl Holes {
+    /// Takes a time between two rows, s: whether it is a hole. In a log whose rows are always so far apart it is none.
+    fn is_hole(&mut self, dt_s: f64) -> bool {
+        const TIMES: f64 = 3.0;
+        let mut before_s = self.steps_s;
+        self.steps_s[self.at] = dt_s;
+        self.at = (self.at + 1) % self.steps_s.len();
+        if dt_s <= HOLE_S {
+            return false;
+        }
+        before_s.sort_by(f64::total_cmp);
+        dt_s > TIMES * before_s[before_s.len() / 2]
+    }
 }
 
 impl<'c> LoggedDrive<'c> {
@@ -289,6 +316,7 @@ impl<'c> LoggedDrive<'c> {
             filter,
             state,
             passing: PassingShifts::default(),
+            came_rad_s: [f64::NAN; 3],
             speeds_rad_s: [f64::NAN; 3],
             begun_s: f64::NAN,
             in_gear: [0; 2],
@@ -310,13 +338,17 @@ impl<'c> LoggedDrive<'c> {
     pub fn push(&mut self, step: &LogStep) -> ShiftEstimate<f64> {
         let input = &step.input;
         let estimate = self.filter.step(&mut self.state, input);
-        for (speed, reading) in
-            self.speeds_rad_s.iter_mut().zip([input.engine_rad_s, input.turbine_rad_s, input.output_rad_s])
-        {
-            *speed = reading.map_or(*speed, |reading| reading.value);
+        let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
+        let channels = [estimate.channels.engine, estimate.channels.turbine, estimate.channels.output];
+        for (at, (reading, health)) in readings.into_iter().zip(channels).enumerate() {
+            let Some(Reading { value, .. }) = reading else { continue };
+            self.came_rad_s[at] = value;
+            if !is_refused(health) {
+                self.speeds_rad_s[at] = value;
+            }
         }
         let GearCommand { from, to } = input.gear;
-        self.passing.drive.states.push(DriveState {
+        self.passing.state(DriveState {
             time_s: step.time_s,
             gear: from,
             pedals: step.pedals,
@@ -328,9 +360,8 @@ impl<'c> LoggedDrive<'c> {
         if gears != self.holes.cut {
             self.holes.cut = None;
         }
-        if let Some(open) = &self.passing.open
-            && input.dt_s > HOLE_S
-        {
+        let is_hole = self.holes.is_hole(input.dt_s);
+        if let Some(open) = self.passing.open.as_ref().filter(|_| is_hole) {
             self.holes.count += 1;
             self.holes.cut = gears.filter(|gears| *gears == [open.from, open.to]);
             self.end(f64::NAN, usize::MAX);
@@ -342,13 +373,13 @@ impl<'c> LoggedDrive<'c> {
             Some(_) => self.during(step, &estimate),
             None => self.compare_ratio(from),
         }
-        let [_, turbine, output] = self.speeds_rad_s;
+        let [_, turbine, output] = self.came_rad_s;
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         estimate
     }
 
     fn compare_ratio(&mut self, gear: usize) {
-        let [engine, turbine, output] = self.speeds_rad_s;
+        let [engine, turbine, output] = self.came_rad_s;
         let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output;
         if output > RATIO_FROM_RAD_S {
             self.swapped.push(engine, turbine, &[by_output]);

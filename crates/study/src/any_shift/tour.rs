@@ -42,18 +42,23 @@ pub struct Leg {
 }
 
 /// The shifts of a drive through all forward gears. A gear to which no shift between two clutches leads from the one below is passed
-/// over.
+/// over; so is the lowest gear, where a one-way clutch holds it, if more gears are reached from the next one.
 pub fn legs(car: &Car, tables: &ShiftTables<f64>) -> Vec<Leg> {
     let is_single = |from: usize, to: usize| tables.tables().shift(from, to).is_some();
-    let mut up: Vec<[usize; 2]> = Vec::new();
-    let mut gear = None;
-    for next in car.gearbox.forward_gears() {
-        let from = *gear.get_or_insert(next);
-        if is_single(from, next) && is_single(next, from) {
-            up.push([from, next]);
-            gear = Some(next);
+    let gears = car.gearbox.forward_gears();
+    let from_gear = |first: usize| -> Vec<[usize; 2]> {
+        let mut gear = gears[first];
+        let mut up = Vec::new();
+        for &next in &gears[first + 1..] {
+            if is_single(gear, next) && is_single(next, gear) {
+                up.push([gear, next]);
+                gear = next;
+            }
         }
-    }
+        up
+    };
+    let longer = |one: Vec<[usize; 2]>, other: Vec<[usize; 2]>| if other.len() > one.len() { other } else { one };
+    let up = (0..gears.len()).map(from_gear).fold(Vec::new(), longer);
     let leg = |throttle: f64| move |&[from, to]: &[usize; 2]| Leg { from, to, throttle };
     let down: Vec<[usize; 2]> = up.iter().rev().map(|&[from, to]| [to, from]).collect();
     let first = up.iter().map(leg(POWER_ON)).chain(down.iter().map(leg(0.0)));
@@ -145,7 +150,7 @@ pub fn drive_tour(
         if !reached && driver.run.state().vehicle_m_s < SLOWEST * speed_m_s(leg) {
             let speed = 3.6 * speed_m_s(leg);
             return Err(failed(format!(
-                "the car does not reach {speed:.0} km/h in gear {}\nhint: check mass, resistance and engine torque",
+                "the car does not reach {speed:.0} km/h in gear {}\nhint: check mass, ratios, wheel radius, resistance and engine torque; `demo --drive` and `bench --vehicle` need no such speed",
                 name(leg.from)
             )));
         }

@@ -6,7 +6,7 @@ use std::any::Any;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 
 use super::row::{Campaign, Row};
@@ -34,11 +34,77 @@ pub fn execute<E: From<StudyError>>(
 /// A result, or the message of the panic in its place.
 type Outcome<T> = Result<T, String>;
 
-struct Shared<T> {
+struct State<T> {
     next_block: u64,
     due_block: u64,
     finished: BTreeMap<u64, Vec<Outcome<T>>>,
     stopped: bool,
+}
+
+/// The blocks of a range, shared by the threads that work on them and the one that shows their results.
+struct Blocks<T> {
+    runs: Range<u64>,
+    size: u64,
+    count: u64,
+    /// Blocks that may be finished ahead of the one that is due.
+    ahead: u64,
+    state: Mutex<State<T>>,
+    changed: Condvar,
+}
+
+impl<T> Blocks<T> {
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(&self, guard: MutexGuard<'a, State<T>>) -> MutexGuard<'a, State<T>> {
+        self.changed.wait(guard).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The numbers of a block.
+    fn numbers(&self, block: u64) -> Range<u64> {
+        let first = self.runs.start + block * self.size;
+        first..(first + self.size).min(self.runs.end)
+    }
+
+    /// The next block that nobody works on, when there is room for its results.
+    fn next(&self) -> Option<u64> {
+        let mut state = self.lock();
+        while !state.stopped && state.next_block < self.count && state.next_block >= state.due_block + self.ahead {
+            state = self.wait(state);
+        }
+        let block = state.next_block;
+        state.next_block += 1;
+        (!state.stopped && block < self.count).then_some(block)
+    }
+
+    /// Works on blocks until there are no more.
+    fn work_through(&self, work: impl Fn(u64) -> T) {
+        while let Some(block) = self.next() {
+            let results = self.numbers(block).map(|run| catch(|| work(run))).collect();
+            self.lock().finished.insert(block, results);
+            self.changed.notify_all();
+        }
+    }
+
+    /// The results of a block, when they are there.
+    fn results(&self, block: u64) -> Vec<Outcome<T>> {
+        let mut state = self.lock();
+        loop {
+            if let Some(results) = state.finished.remove(&block) {
+                state.due_block = block + 1;
+                self.changed.notify_all();
+                return results;
+            }
+            state = self.wait(state);
+        }
+    }
+
+    /// Ends the work after the blocks that are under way.
+    fn stop(&self) {
+        self.lock().stopped = true;
+        self.changed.notify_all();
+    }
 }
 
 /// Does `work` for every number of a range on `threads` threads and shows the results to `sink` in their order.
@@ -65,61 +131,28 @@ pub fn in_blocks<T: Send, E: From<StudyError>>(
     work: impl Fn(u64) -> T + Sync,
     mut sink: impl FnMut(T) -> Result<(), E>,
 ) -> Result<(), E> {
-    let block_size = block_size.max(1);
-    let blocks = runs.end.saturating_sub(runs.start).div_ceil(block_size);
-    let shared = Mutex::new(Shared { next_block: 0, due_block: 0, finished: BTreeMap::new(), stopped: false });
-    let changed = Condvar::new();
-    let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
-    let wait = |guard| changed.wait(guard).unwrap_or_else(PoisonError::into_inner);
-    let threads = blocks.min(threads.max(1) as u64);
-    let ahead = AHEAD * threads;
-    let next_block = || {
-        let mut state = lock();
-        while !state.stopped && state.next_block < blocks && state.next_block >= state.due_block + ahead {
-            state = wait(state);
-        }
-        let block = state.next_block;
-        state.next_block += 1;
-        (!state.stopped && block < blocks).then_some(block)
-    };
-    let due = |block| {
-        let mut state = lock();
-        loop {
-            if let Some(results) = state.finished.remove(&block) {
-                state.due_block = block + 1;
-                changed.notify_all();
-                return results;
-            }
-            state = wait(state);
-        }
-    };
-    let numbers = |block: u64| {
-        let first = runs.start + block * block_size;
-        first..(first + block_size).min(runs.end)
-    };
-    let worker = || {
-        while let Some(block) = next_block() {
-            let results = numbers(block).map(|run| catch(|| work(run))).collect();
-            lock().finished.insert(block, results);
-            changed.notify_all();
-        }
-    };
+    let size = block_size.max(1);
+    let count = runs.end.saturating_sub(runs.start).div_ceil(size);
+    let threads = count.min(threads.max(1) as u64);
+    let state = State { next_block: 0, due_block: 0, finished: BTreeMap::new(), stopped: false };
+    let blocks =
+        Blocks { runs, size, count, ahead: AHEAD * threads, state: Mutex::new(state), changed: Condvar::new() };
     let mut show = |(run, outcome): (u64, Outcome<T>)| {
         let defect = |message| E::from(StudyError::Defect { run, message });
         catch(|| sink(outcome.map_err(defect)?)).map_err(defect)?
     };
     std::thread::scope(|scope| {
         for started in 0..threads {
-            match Builder::new().spawn_scoped(scope, worker) {
+            match Builder::new().spawn_scoped(scope, || blocks.work_through(&work)) {
                 Ok(_) => {}
                 Err(error) if started == 0 => return Err(StudyError::Threads(error).into()),
                 // The system has no more of them; fewer threads give the same results.
                 Err(_) => break,
             }
         }
-        let result = (0..blocks).try_for_each(|block| numbers(block).zip(due(block)).try_for_each(&mut show));
-        lock().stopped = true;
-        changed.notify_all();
+        let result =
+            (0..count).try_for_each(|block| blocks.numbers(block).zip(blocks.results(block)).try_for_each(&mut show));
+        blocks.stop();
         result
     })
 }

@@ -1,7 +1,7 @@
 //! What each error does to the estimates of a shift.
 
-use config::{Car, CarErrorBounds, ElementErrorBounds};
-use study::any_shift::influence::{ValueFrom, car_influences};
+use config::{Car, CarErrorBounds, ElementErrorBounds, Source};
+use study::any_shift::influence::{CarInfluences, ValueFrom, car_influences};
 use study::any_shift::sensitivity::{EffectInShift, PhaseOfShift, ShiftErrorKind, car_sensitivity};
 
 use crate::cars::{cars, sensors};
@@ -80,4 +80,35 @@ fn values_of_the_file_of_the_gearbox_and_defaults_are_told_apart() {
         pair[0].errors.torque_n_m[0] >= pair[1].errors.torque_n_m[0]
     };
     assert!(found.values.windows(2).all(order));
+}
+
+#[test]
+fn the_bounds_of_a_file_say_how_far_its_values_are_off() {
+    let car = car("AODE");
+    let narrow = ElementErrorBounds { valve_gain_factor: Some([0.98, 1.01]), ..ElementErrorBounds::default() };
+    let wide = ElementErrorBounds { valve_gain_factor: Some([0.99, 1.03]), ..ElementErrorBounds::default() };
+    let mut elements = vec![narrow; car.clutches.len()];
+    elements[0] = wide;
+    let error_bounds = CarErrorBounds { elements, converter_share: Some(0.02), ..CarErrorBounds::default() };
+    let fitted = Car { error_bounds, ..car.clone() };
+    let [series, fitted] = [car, fitted].map(|car| car_influences(&car, &sensors()).unwrap().unwrap());
+    let of = |found: &CarInfluences, key: &str| found.values.iter().find(|value| value.key == key).unwrap().clone();
+    assert_eq!(of(&series, "valve.gain.gain_pa_a").limits, [0.9, 1.1]);
+    assert_eq!(of(&fitted, "valve.gain.gain_pa_a").limits, [0.98, 1.03]);
+    assert_eq!(of(&fitted, "converter.capacity_n_m_s2").limits, [0.98, 1.02]);
+    // What the file does not say is that of a car in series.
+    assert_eq!(of(&fitted, "valve.lag.time_constant_s").limits, of(&series, "valve.lag.time_constant_s").limits);
+    // The valve model alone has what the gain adds: a fifth of the error, not all of it.
+    let added =
+        |found: &CarInfluences| of(found, "valve.gain.gain_pa_a").errors.pressure_pa[1] - found.as_it_is.pressure_pa[1];
+    assert!(added(&fitted) < 0.4 * added(&series), "{} {}", added(&fitted), added(&series));
+}
+
+#[test]
+fn a_car_that_makes_no_shift_is_no_car_without_errors() {
+    // Oil at -40 degC: the pistons do not arrive in time.
+    let text = "name = \"cold\"\ngearbox = \"8hp.toml\"\n[fill]\nstroke_m = 0.02\n[oil]\ntemperature_degc = -40\n";
+    let gearbox = include_str!("../../../../gearboxes/8hp.toml");
+    let car = Car::from_sources(Source::built_in("car.toml", text), Source::built_in("8hp.toml", gearbox)).unwrap();
+    assert_eq!(car_influences(&car, &sensors()).unwrap().unwrap().shifts, 0);
 }

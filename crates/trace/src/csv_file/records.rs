@@ -154,8 +154,8 @@ impl Records {
         let delimiter = self.delimiter;
         let mut from = self.scanned;
         self.row.line = self.next_line;
-        for eight in text[from..].chunks(8) {
-            let mut signs = signs(padded(eight), delimiter);
+        while from < text.len() {
+            let mut signs = signs(eight(&text[from..]), delimiter);
             while signs != 0 {
                 let at = from + (signs.trailing_zeros() / 8) as usize;
                 signs &= signs - 1;
@@ -265,10 +265,10 @@ impl Records {
     }
 }
 
-/// Eight bytes as a number, or what there is of them before letters.
+/// The first eight bytes as a number; where there are fewer, letters stand behind them.
 #[inline]
-fn padded(bytes: &[u8]) -> u64 {
-    u64::from_le_bytes(bytes.try_into().unwrap_or_else(|_| {
+fn eight(bytes: &[u8]) -> u64 {
+    u64::from_le_bytes(bytes.first_chunk().copied().unwrap_or_else(|| {
         let mut eight = [b'x'; 8];
         eight[..bytes.len()].copy_from_slice(bytes);
         eight

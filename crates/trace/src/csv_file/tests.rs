@@ -108,7 +108,11 @@ fn cells_that_repeat_those_of_the_row_before_are_written_as_all_others() {
         let time_s = f64::from(row / 2);
         plain.row(time_s, cells(&|i| Cell::Word(words[said[i]]))).unwrap();
         let is_same = |i: usize| before.is_some_and(|before| before[i] == said[i]);
-        let word = |i: usize| if is_same(i) { Cell::SameWord } else { Cell::Word(words[said[i]]) };
+        let word = |i: usize| match is_same(i) {
+            true if i == 3 && row % 2 == 0 => Cell::SameWords,
+            true => Cell::SameWord,
+            false => Cell::Word(words[said[i]]),
+        };
         repeating.row(time_s, cells(&word)).unwrap();
         if row % 1000 == 7 {
             repeating.flush().unwrap();
@@ -130,9 +134,19 @@ fn a_row_cannot_repeat_what_no_row_has() {
     writer.row(1.0, [Cell::Word("good"), Cell::Number(1.0)]).unwrap();
     // A number is no word.
     assert!(writer.row(2.0, [Cell::SameWord, Cell::SameWord]).is_err());
+    assert!(writer.row(2.0, [Cell::SameWords]).is_err());
     // The row that was refused is not the row before, nor is the one before it any more.
     assert!(writer.row(2.0, [Cell::SameWord, Cell::Number(1.0)]).is_err());
     assert_eq!(String::from_utf8(writer.finish().unwrap()).unwrap(), "time_s,word,x\n1,good,1\n");
+    let mut both = CsvWriter::new(Vec::new(), ["x", "one", "other"]).unwrap();
+    let row = [Cell::Number(0.5), Cell::SameWords];
+    assert!(both.row(0.0, row).is_err());
+    both.row(0.0, [Cell::Number(0.1), Cell::Word("a"), Cell::Word("b, c")]).unwrap();
+    both.row(1.0, row).unwrap();
+    both.row(1.0, row).unwrap();
+    // Nothing comes after the words.
+    assert!(both.row(2.0, [Cell::Number(0.5), Cell::SameWords, Cell::SameWord]).is_err());
+    assert_eq!(both.finish().unwrap(), b"time_s,x,one,other\n0,0.1,a,\"b, c\"\n1,0.5,a,\"b, c\"\n1,0.5,a,\"b, c\"\n");
     let mut alone = CsvWriter::without_time(Vec::new(), ["word"]).unwrap();
     for cell in [Cell::Word(""), Cell::SameWord, Cell::Word("x"), Cell::SameWord] {
         alone.cells([cell]).unwrap();

@@ -15,6 +15,8 @@ pub enum Cell<'a> {
     Word(&'a str),
     /// The word that stands in this column in the row before.
     SameWord,
+    /// The words that stand in this column and in all later ones in the row before; the last cell of its row.
+    SameWords,
 }
 
 /// Writes a comma-separated file row by row. Numbers are written so that reading gives the very same ones, with as few digits as that
@@ -36,13 +38,12 @@ pub struct CsvWriter<W: Write> {
 struct Written {
     /// The bits of its number, or what else it is.
     bits: u64,
-    /// Where its text begins and ends in the row.
-    begin: usize,
+    /// Where its text ends in the row. It begins behind the comma at the end of the cell before.
     end: usize,
 }
 
 impl Written {
-    const NONE: Self = Self { bits: NOT_YET, begin: 0, end: 0 };
+    const NONE: Self = Self { bits: NOT_YET, end: 0 };
 }
 
 /// What stands for the bits of a cell that has no number. No number has these bits: each is a NaN, and of those only the first is used.
@@ -154,77 +155,92 @@ struct Row<'a> {
     /// Cells so far, and how many of them are in the row; the others wait to be copied.
     count: usize,
     done: usize,
+    /// Where the last one that is in the row ended in the row before.
+    done_before: usize,
     is_whole: bool,
 }
 
 impl<'a> Row<'a> {
     fn behind(rows: &'a mut Vec<u8>, written: &'a mut [Written], before: usize) -> Self {
         let begin = rows.len();
-        Self { rows, written, before, begin, count: 0, done: 0, is_whole: true }
+        Self { rows, written, before, begin, count: 0, done: 0, done_before: 0, is_whole: true }
     }
 
-    #[inline]
+    /// Takes a cell. Most are those of the row before, and wait: that part stands in the loop over the cells.
+    #[inline(always)]
     fn push(&mut self, cell: Cell<'_>) {
         let at = self.count;
         self.count += 1;
         let Some(before) = self.written.get(at) else { return };
-        let bits = match cell {
-            Cell::Number(number) if number.is_nan() => NO_NUMBER,
-            Cell::Number(number) => number.to_bits(),
-            Cell::Word(_) | Cell::SameWord => WORD,
-            Cell::Whole(_) => WHOLE,
-        };
         match cell {
-            Cell::Number(_) if before.bits == bits => return,
-            Cell::SameWord => {
-                self.is_whole &= before.bits == bits;
-                return;
+            Cell::Number(number) => {
+                let bits = if number.is_nan() { NO_NUMBER } else { number.to_bits() };
+                if before.bits != bits {
+                    self.number(at, number, bits);
+                }
             }
-            _ => {}
+            Cell::SameWord => self.is_whole &= before.bits == WORD,
+            Cell::SameWords => {
+                self.is_whole &= self.written[at..].iter().all(|cell| cell.bits == WORD);
+                self.count = self.written.len();
+            }
+            Cell::Word(word) => self.word(at, word, WORD),
+            Cell::Whole(number) => self.word(at, &number.to_string(), WHOLE),
         }
-        self.copy_until(at);
+    }
+
+    /// Writes a number that is not the one of the row before.
+    #[inline(never)]
+    fn number(&mut self, at: usize, number: f64, bits: u64) {
+        self.begin_cell(at);
+        push_number(self.rows, number);
+        self.end_cell(at, bits);
+    }
+
+    /// Writes a word, or a whole number.
+    #[inline(never)]
+    fn word(&mut self, at: usize, word: &str, bits: u64) {
+        self.begin_cell(at);
+        push_word(self.rows, word);
+        self.end_cell(at, bits);
+    }
+
+    #[inline]
+    fn begin_cell(&mut self, at: usize) {
+        if self.done < at {
+            self.copy_until(at);
+        }
         if at > 0 {
             self.rows.push(b',');
         }
-        let begin = self.rows.len() - self.begin;
-        match cell {
-            Cell::Number(number) => push_number(self.rows, number),
-            Cell::Word(word) => push_word(self.rows, word),
-            Cell::Whole(number) => self.rows.extend_from_slice(number.to_string().as_bytes()),
-            Cell::SameWord => {}
-        }
+    }
+
+    #[inline]
+    fn end_cell(&mut self, at: usize, bits: u64) {
+        let end = self.rows.len() - self.begin;
         if let Some(written) = self.written.get_mut(at) {
-            *written = Written { bits, begin, end: self.rows.len() - self.begin };
+            self.done_before = std::mem::replace(written, Written { bits, end }).end;
         }
         self.done = at + 1;
     }
 
     /// Copies the cells that wait, all before this one.
-    #[inline]
     fn copy_until(&mut self, end: usize) {
-        if self.done < end {
-            self.copy(end);
-        }
-    }
-
-    fn copy(&mut self, end: usize) {
         let Some(cells) = self.written.get_mut(self.done..end) else { return };
-        let (Some(first), Some(last)) = (cells.first(), cells.last()) else { return };
-        let (from, to) = (first.begin, last.end);
-        if self.done > 0 {
-            self.rows.push(b',');
-        }
-        let begin = self.rows.len() - self.begin;
+        let Some(last) = cells.last() else { return };
+        // With the comma before them.
+        let (from, to) = (self.done_before, last.end);
+        let moved = (self.rows.len() - self.begin).wrapping_sub(from);
         self.rows.extend_from_within(self.before + from..self.before + to);
         for cell in cells {
-            cell.begin = cell.begin - from + begin;
-            cell.end = cell.end - from + begin;
+            cell.end = cell.end.wrapping_add(moved);
         }
+        (self.done, self.done_before) = (end, to);
     }
 
     /// Where it begins, how many cells it has, and whether all were there.
     fn finish(mut self) -> (usize, usize, bool) {
-        self.copy_until(self.count);
+        self.copy_until(self.count.min(self.written.len()));
         (self.begin, self.count, self.is_whole)
     }
 }
@@ -237,7 +253,7 @@ pub(super) fn push_number(row: &mut Vec<u8>, number: f64) {
     if (1e-5..1e16).contains(&size) {
         // Of a number of this size the text has no exponent.
         let text = digits.format_finite(number).as_bytes();
-        return row.extend_from_slice(text.strip_suffix(b".0").unwrap_or(text));
+        return push_digits(row, text.strip_suffix(b".0").unwrap_or(text));
     }
     if size == 0.0 {
         return row.extend_from_slice(if number.is_sign_negative() { b"-0" } else { b"0" });
@@ -248,6 +264,23 @@ pub(super) fn push_number(row: &mut Vec<u8>, number: f64) {
     match digits.format(number).split_once('e') {
         None => row.extend_from_slice(digits.format(number).as_bytes()),
         Some((mantissa, exponent)) => push_expanded(row, mantissa, exponent.parse().unwrap_or(0)),
+    }
+}
+
+/// The text of a number. Two copies of 16 bytes, which may overlap, take less time than one copy of any length.
+#[inline]
+fn push_digits(row: &mut Vec<u8>, text: &[u8]) {
+    const ROOM: usize = 32;
+    let count = text.len();
+    match (text.first_chunk::<16>(), text.last_chunk::<16>()) {
+        (Some(first), Some(last)) if count <= ROOM => {
+            let begin = row.len();
+            row.extend_from_slice(&[0; ROOM]);
+            row[begin..begin + 16].copy_from_slice(first);
+            row[begin + count - 16..begin + count].copy_from_slice(last);
+            row.truncate(begin + count);
+        }
+        _ => row.extend_from_slice(text),
     }
 }
 

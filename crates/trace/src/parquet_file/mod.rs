@@ -90,6 +90,12 @@ impl<W: Write + Send> ParquetWriter<W> {
             (Some(Values::Numbers(values, _)), Cell::Number(value)) => values.push(value),
             (Some(Values::Words(words)), Cell::Word(word)) => words.push(word),
             (Some(Values::Words(words)), Cell::SameWord) => is_of_kind &= words.repeat(),
+            (Some(first), Cell::SameWords) => {
+                is_of_kind &= std::iter::once(first).chain(columns.by_ref()).all(|column| match column {
+                    Values::Words(words) => words.repeat(),
+                    Values::Whole(_) | Values::Numbers(..) => false,
+                });
+            }
             (Some(Values::Whole(values)), Cell::Whole(value)) => values.push(value.cast_signed()),
             _ => is_of_kind = false,
         });
@@ -248,7 +254,11 @@ mod tests {
         assert!(ParquetWriter::new(Vec::new(), columns).unwrap().row(none).is_err());
         for row in 0..rows {
             let x = if row % 5 == 2 { f64::NAN } else { row as f64 };
-            let same = if row == 0 { Cell::Word("e") } else { Cell::SameWord };
+            let same = match row % 3 {
+                _ if row == 0 => Cell::Word("e"),
+                1 => Cell::SameWords,
+                _ => Cell::SameWord,
+            };
             writer.row([Cell::Whole(row as u64), Cell::Word(&word(row)), Cell::Number(x), same]).unwrap();
         }
         let reader = SerializedFileReader::new(Bytes::from(writer.finish().unwrap())).unwrap();

@@ -14,7 +14,7 @@ use study::LogSample;
 use study::shift_estimates::no_estimate;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step};
+use super::measured::{Measured, Step, slow_log};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
@@ -52,6 +52,9 @@ pub(super) fn estimate(
     }
     let Rows { table, shifts, findings, .. } = rows;
     check_findings(&findings, vehicle, &log, observer.kind)?;
+    if let Some(warning) = slow_log(log.median_step_s()) {
+        say.note(&warning);
+    }
     shifts.check()?;
     table.finish()?;
     let sentences = findings.sentences();
@@ -115,7 +118,9 @@ fn pass<'log, 'rows>(
         }
     });
     observer.observer.run_over(Some(vehicle), in_gears, |(), estimate| {
-        rows.borrow_mut().take(&mut log.borrow_mut().step, Some(&estimate))
+        let mut log = log.borrow_mut();
+        log.take_back(&estimate.channels);
+        rows.borrow_mut().take(&mut log.step, Some(&estimate))
     })?;
     let (mut log, mut rows) = (log.into_inner(), rows.into_inner());
     for shift in log.last_shifts() {
@@ -171,8 +176,8 @@ impl Rows<'_> {
             None => self.findings.push_other_gear(step.time_s),
         }
         let Step { time_s, input, pressure_pa, torque_n_m, .. } = *step;
-        let sample_estimate = estimate.copied().unwrap_or_else(no_estimate);
-        self.shifts.push(&LogSample { time_s, input, estimate: sample_estimate, pressure_pa, torque_n_m });
+        let sample = LogSample::new(time_s, &input, estimate.copied().unwrap_or_else(no_estimate));
+        self.shifts.push(LogSample { pressure_pa, torque_n_m, ..sample });
         for shift in std::mem::take(&mut step.shifts) {
             self.shift(shift)?;
         }
@@ -215,20 +220,20 @@ fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
     }
     /// Rows that a terminal shows.
     const SHOWN: usize = 40;
-    let (titles, rows) = shift_rows(&shifts.found);
-    let more = rows.len().saturating_sub(SHOWN);
-    let table = std::iter::once(titles).chain(rows.into_iter().take(SHOWN)).collect::<Vec<_>>();
+    let (titles, rows) = shift_rows(&shifts.found, SHOWN);
+    let more = shifts.found.len() - rows.len();
+    let table = std::iter::once(titles).chain(rows).collect::<Vec<_>>();
     for line in output::lines(3, &table) {
         say.note(&line);
     }
     if more > 0 {
         say.note(&format!("and {more} more shifts"));
     }
-    let others: Vec<_> = shifts.found.iter().filter(|shift| !shift.of_vehicle).collect();
-    if let Some(first) = others.first() {
+    let others = || shifts.found.iter().filter(|shift| !shift.of_vehicle);
+    if let Some(first) = others().next() {
         say.note(&format!(
             "{} shifts are not the one of the vehicle file, as {}-{}: of these no pressure is estimated",
-            others.len(),
+            others().count(),
             first.shift.from,
             first.shift.to
         ));

@@ -13,8 +13,9 @@ use logs::plausibility::{Seen, likely_time_unit};
 use logs::{
     ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
 };
-use observer::{Input, Reading as Measurement};
+use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
+use study::shift_estimates::is_refused;
 use trace::{CsvRows, Following, LastLine, TraceError, signal};
 
 use super::Messages;
@@ -280,6 +281,20 @@ impl<'a> Measured<'a> {
         }
     }
 
+    /// Takes the readings of the step that the observer refused back from the shift finder, before a shift is known that has them.
+    pub(super) fn take_back(&mut self, channels: &observer::Channels<ChannelHealth>) {
+        let Input { engine_rad_s, turbine_rad_s, output_rad_s, .. } = &self.step.input;
+        for (role, reading, health) in [
+            (Role::EngineSpeed, engine_rad_s, channels.engine),
+            (Role::TurbineSpeed, turbine_rad_s, channels.turbine),
+            (Role::OutputSpeed, output_rad_s, channels.output),
+        ] {
+            if let Some(Measurement { age_s, .. }) = reading.filter(|_| is_refused(health)) {
+                self.finder.take_back(role, self.step.time_s - age_s);
+            }
+        }
+    }
+
     /// The shifts that were not given with a step, after the last step.
     pub(super) fn last_shifts(&mut self) -> Vec<Shift> {
         self.finder.restart();
@@ -311,7 +326,7 @@ impl<'a> Measured<'a> {
 }
 
 /// A table with another delimiter than the comma is one of a single column; a channel map reads it.
-fn other_delimiter(path: &Path, error: TraceError) -> Failure {
+pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
     let delimiter = match &error {
         TraceError::MissingColumn { present, .. } => match present.as_slice() {
             [only] => [';', '\t', '|'].into_iter().find(|delimiter| only.contains(*delimiter)),
@@ -345,6 +360,19 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
          hint: if the time is in {unit}, {hint}",
         path.display()
     )))
+}
+
+/// Says that a log has too few rows for its shifts.
+pub(super) fn slow_log(median_s: f64) -> Option<String> {
+    /// Five rows in an inertia phase of half a second \[chosen\].
+    const LONGEST_S: f64 = 0.1;
+    (median_s > LONGEST_S).then(|| {
+        format!(
+            "warning: the middle time between two rows is {median_s:.3} s, too long for the estimate of a shift: an inertia phase takes 0.3 to 1 s, \
+             and {} s without a reading count as a lost channel\nhint: record speeds and commands every {LONGEST_S} s or more often",
+            observer::LOST_S
+        )
+    })
 }
 
 /// Says what was met in mapped channels, after their last step.

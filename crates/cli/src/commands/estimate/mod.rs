@@ -57,7 +57,7 @@ impl Messages {
 }
 
 pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
-    not_an_input(options.output.as_ref(), inputs(options))?;
+    not_an_input(options.output.as_ref(), options.logs.iter().chain(inputs(options)))?;
     outputs::check_name(options)?;
     if let Some(toml) = options.logs.iter().find(|log| log.extension().is_some_and(|ending| ending == "toml")) {
         let message =
@@ -88,11 +88,8 @@ fn each_log<S: Sync>(
         None => options.output.clone(),
     };
     check_output(output.as_ref())?;
-    // A log that is named as its own output is replaced; in a folder that is a mistake.
-    let log_itself = folder.map(|_| log);
-    not_an_input(output.as_ref(), inputs(options).chain(log_itself))?;
-    for beside in output.iter().filter_map(|output| outputs::beside(output)).flatten() {
-        not_an_input(Some(&beside), inputs(options).chain([log]))?;
+    for written in output.iter().filter_map(|output| outputs::beside(output)).flatten().chain(output.clone()) {
+        not_an_input(Some(&written), inputs(options).chain([log]))?;
     }
     output.as_deref().map(outputs::only_own_beside).transpose()?;
     estimate(&prepare()?, log, output.as_deref(), &mut Messages::at_once())

@@ -130,6 +130,8 @@ impl Output {
 pub(super) struct EstimateTable {
     output: Output,
     columns: Vec<OutputColumn>,
+    /// The columns from this one on hold words.
+    words_from: usize,
     /// What the words of the row before say: they are mostly the same.
     said: Option<(Phase, Health, Channels<ChannelHealth>)>,
 }
@@ -138,17 +140,20 @@ impl EstimateTable {
     /// Begins a file, or the table on standard output.
     pub(super) fn create(path: Option<&Path>, columns: Vec<OutputColumn>) -> Result<Self, Failure> {
         let output = Output::named(path, columns.iter().map(|column| (column.name, column.kind())))?;
-        Ok(Self { output, columns, said: None })
+        let words_from =
+            columns.iter().rposition(|column| column.kind() != ColumnKind::Word).map_or(0, |last| last + 1);
+        Ok(Self { output, columns, words_from, said: None })
     }
 
     pub(super) fn row(&mut self, time_s: f64, estimate: &Estimate<f64>) -> Result<(), Failure> {
         let says = Some((estimate.phase, estimate.health, estimate.channels));
         let is_same = std::mem::replace(&mut self.said, says) == says;
-        let cells = self.columns.iter().map(|column| match column.kind() {
+        let (columns, words) = self.columns.split_at(if is_same { self.words_from } else { self.columns.len() });
+        let cells = columns.iter().map(|column| match column.kind() {
             ColumnKind::Word if is_same => Cell::SameWord,
             _ => column.cell(estimate),
         });
-        self.output.cells(time_s, cells)
+        self.output.cells(time_s, cells.chain((!words.is_empty()).then_some(Cell::SameWords)))
     }
 
     /// A row without an estimate.

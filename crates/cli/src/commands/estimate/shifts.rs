@@ -12,7 +12,7 @@ use trace::{Cell, CsvWriter, WholeFile};
 
 use super::selection::Selection;
 use crate::args::Estimate;
-use crate::commands::{json_object, write_json_list};
+use crate::commands::{JsonObject, write_json_list};
 use crate::failure::Failure;
 
 /// Collects the shifts of a log while its estimates pass by.
@@ -48,9 +48,9 @@ impl<'a> Shifts<'a> {
         self.selection.seen
     }
 
-    pub(super) fn push(&mut self, sample: &LogSample) {
-        self.overview.push(sample);
-        self.recent.push(*sample);
+    pub(super) fn push(&mut self, sample: LogSample) {
+        self.overview.push(&sample);
+        self.recent.push(sample);
     }
 
     /// Takes a shift that is known now; `write` gets its samples if only some shifts are wanted and this is one.
@@ -97,7 +97,7 @@ pub(super) fn write(shifts: &[ShiftEstimate], csv: &Path, json: &Path) -> Result
     let object = |shift: &ShiftEstimate| {
         let time = std::iter::once((trace::signal::TIME, Cell::Number(shift.begin_s())));
         let cells = time.chain(columns.iter().map(|(name, cell)| (*name, cell(shift))));
-        json_object(cells.map(|(name, cell)| (name.to_owned(), cell)))
+        JsonObject::of(cells)
     };
     write_json_list(json, shifts.iter().map(object))
 }

@@ -165,6 +165,30 @@ mod tests {
     }
 
     #[test]
+    fn a_file_is_written_for_a_small_car_and_for_a_heavy_truck() {
+        let cars =
+            [(20.0, 200.0, 0.2, 4.0), (100.0, 800.0, 0.26, 4.3), (1000.0, 5e3, 0.45, 3.9), (2000.0, 60e3, 0.55, 5.0)];
+        for (engine_torque_n_m, mass_kg, wheel_radius_m, final_ratio) in cars {
+            for (before, after) in [(4.0, 2.3), (1.52, 1.14), (0.87, 0.69)] {
+                let facts = Facts { engine_torque_n_m, mass_kg, wheel_radius_m, final_ratio, ..facts(before, after) };
+                let found = vehicle(&facts);
+                assert!(found.is_ok(), "{engine_torque_n_m} {before} {:?}", found.err());
+            }
+        }
+    }
+
+    #[test]
+    fn a_default_that_cannot_be_right_names_the_numbers_that_it_follows_from() {
+        let message = vehicle(&Facts { engine_torque_n_m: 2000.0, ..facts(20.0, 0.6) }).unwrap_err().to_string();
+        assert!(message.starts_with("the new vehicle file:"), "{message}");
+        assert!(
+            message.contains("`clutch.a.mean_radius_m`: its default for the numbers of this file is "),
+            "{message}"
+        );
+        assert!(message.contains("hint: check the greatest engine torque, the ratios"), "{message}");
+    }
+
+    #[test]
     fn a_short_file_is_the_complete_one_with_all_that_was_given() {
         for valve in [ValveKind::Proportional, ValveKind::PulseWidth] {
             for has_stroke in [false, true] {

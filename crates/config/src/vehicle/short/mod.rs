@@ -13,17 +13,22 @@ mod uncertainty;
 use toml::de::DeValue;
 
 use super::budget;
+use crate::check::Check;
 use crate::source::{Layers, toml_number};
 use crate::{ConfigError, Source, Vehicle};
 pub use car::{CarFacts, short_car_file, sized_gearbox};
 pub(super) use car::{car_defaults, car_defaults_taken};
 pub use complete::DefaultTaken;
+use facts::located;
 pub(super) use facts::refuse_facts;
 pub use facts::{Facts, ValveKind};
 pub use first_file::{complete_file, short_file};
 pub use uncertainty::Uncertainty;
 
 const DEFAULTS: &str = include_str!("defaults.toml");
+
+/// What to do about a default that cannot be right.
+const NUMBERS: &str = "check the greatest engine torque, the ratios, the mass and the wheel radius; if they are right, give this key a value of your own";
 
 /// A short file with the defaults under it.
 pub(super) struct Short {
@@ -75,6 +80,25 @@ pub(super) fn left_out(source: &Source) -> Result<Vec<DefaultTaken>, ConfigError
     Ok(budget::OPTIONAL.into_iter().filter(|(key, _)| !given(key)).map(taken).collect())
 }
 
+/// An error of a default, as one of the file that leaves the value out.
+pub(super) fn of_default(error: ConfigError, defaults: &Source, source: &Source) -> ConfigError {
+    // The shipped file may itself be the one that is read.
+    if error.path() != defaults.path || defaults.path == source.path {
+        return error;
+    }
+    let (key, message, hint) = match error {
+        ConfigError::Range { key, value, allowed, .. } => {
+            (key, format!("its default for the numbers of this file is {value}, expected {allowed}"), None)
+        }
+        ConfigError::Meaning { key, message, hint, .. } => (key, format!("its default does not fit: {message}"), hint),
+        other => return other,
+    };
+    let torque =
+        source.table().ok().and_then(|table| located(table.get_ref(), &["engine", "max_torque_n_m"]).map(|(at, _)| at));
+    let hint = hint.unwrap_or_else(|| NUMBERS.to_owned());
+    Check::of(source).meaning(key, torque.unwrap_or(0), message, Some(hint))
+}
+
 fn has_ratios(source: &Source) -> Result<bool, ConfigError> {
     Ok(complete::find(source.table()?.get_ref(), &["gear_train", "ratios"]).is_some())
 }
@@ -102,8 +126,10 @@ const LOWER_GEAR: f64 = 2.5 * 3.0;
 /// Its mass error over the mass, and its rolling resistance over the weight.
 const MASS_SHARE: f64 = 0.15;
 const ROLLING_SHARE: f64 = 0.02;
-/// Piston area per share of the turbine torque that the clutch carries, m^2, offgoing and oncoming clutch.
-const AREAS_M2: [f64; 2] = [0.012 / 1.5, 0.01 / 0.6];
+/// Its offgoing and oncoming clutch: share of the turbine torque that they carry, mean radius of the plates, m, and piston area, m^2.
+const TORQUE_SHARES: [f64; 2] = [1.5, 0.6];
+const PLATE_RADII_M: [f64; 2] = [0.14, 0.13];
+const PISTON_AREAS_M2: [f64; 2] = [0.012, 0.01];
 /// Pressure at which its plates touch, Pa.
 const KISS_PA: f64 = 60e3;
 
@@ -120,7 +146,10 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
     let rows = map.rows().iter().map(|speed| format!("  {},\n", row(speed))).collect::<String>();
     let elements =
         train::elements([facts.ratio_before, facts.ratio_after]).map_err(|wrong| facts.wrong_ratios(wrong))?;
-    let area = |i: usize| torque * AREAS_M2[i] * elements[i].torque_share;
+    // A clutch that is larger in all directions has a torque by the third power of its length.
+    let length = |i: usize| (torque * elements[i].torque_share / TORQUE_SHARES[i]).cbrt();
+    let plates = |i: usize| length(i) * PLATE_RADII_M[i];
+    let area = |i: usize| length(i).powi(2) * PISTON_AREAS_M2[i];
     let weight_n = facts.mass_kg * drivetrain::road::GRAVITY_M_S2;
     let mut fields = vec![
         ("before", toml_number(facts.ratio_before)),
@@ -132,6 +161,8 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
         ("train", elements.iter().map(|element| element.text.as_str()).collect()),
         ("sides_a", elements[0].sides.clone()),
         ("sides_b", elements[1].sides.clone()),
+        ("plates_a", toml_number(plates(0))),
+        ("plates_b", toml_number(plates(1))),
         ("area_a", toml_number(area(0))),
         ("area_b", toml_number(area(1))),
         ("spring_a", toml_number(KISS_PA * area(0))),

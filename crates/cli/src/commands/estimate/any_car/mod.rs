@@ -22,12 +22,12 @@ use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
 use super::Messages;
-use super::measured::check_step;
+use super::measured::{check_step, slow_log};
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::selection::Selection;
 use crate::args::{Estimate, ObserverChoice};
-use crate::commands::{channel_map, json_object, write_cells, write_json_list, write_text};
+use crate::commands::{JsonObject, channel_map, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -106,13 +106,17 @@ pub(super) fn estimate(
             table.flush()?;
         }
     }
-    check_step(path, trace::median_step_s(steps_s), !setup.map.channels.is_empty())?;
+    let median_s = trace::median_step_s(steps_s);
+    check_step(path, median_s, !setup.map.channels.is_empty())?;
     log.finish(say)?;
     checks.map_or(Ok(()), |checks| checks.check())?;
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say.note(&swapped);
     }
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
+    if let Some(warning) = slow_log(median_s) {
+        say.note(&warning);
+    }
     let mut drive = drive.finish();
     passing.check()?;
     drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
@@ -153,7 +157,7 @@ fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path, say: 
     let [csv, json, page] = places;
     let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
     write_cells(&csv, &cells)?;
-    write_json_list(&json, cells.into_iter().map(json_object))?;
+    write_json_list(&json, cells.into_iter().map(JsonObject::of))?;
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
     write_text(&page, &html)?;

@@ -14,7 +14,7 @@ use study::any_shift::logged::{CarLog, LogStep};
 use trace::{CsvRows, Following};
 
 use super::super::Messages;
-use super::super::measured::report_readings;
+use super::super::measured::{other_delimiter, report_readings};
 use super::checks::Columns;
 use crate::failure::Failure;
 
@@ -51,7 +51,8 @@ impl<'a> CarSource<'a> {
                 None if is_pipe => Box::new(io::stdin()),
                 None => Box::new(File::open(path).map_err(opening)?),
             };
-            return Ok(Self::Rows(Box::new(CarLog::of(CsvRows::of(path, input)?, car, tables)?)));
+            let rows = CsvRows::of(path, input).map_err(|error| other_delimiter(path, error))?;
+            return Ok(Self::Rows(Box::new(CarLog::of(rows, car, tables)?)));
         }
         let log = match stop {
             Some(stop) => Log::follow(path, &map.open, stop)?,
