@@ -1,7 +1,8 @@
 //! Cars with a whole gearbox whose parameters are off, fitted to a drive in town behind sensors: prints the statistics of many of them.
 //!
 //! `FIT_CARS=20 cargo run --release -p fit --example gearbox_draws`; `FIT_FIRST` is the first seed, `FIT_DRIVES` how often the drive of
-//! three minutes is driven (5), `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
+//! three minutes is driven (5), on a road with hills unless `FIT_ROAD=level`; with `FIT_TORQUE=1` the engine torque is reported, with
+//! `FIT_WEIGHED=1` the mass is known to a percent, and with `FIT_DRIVING=off` driving between shifts is not fitted; `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
 //! sensor; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
 //! the WLTC with the given file, with the fitted one without its error bounds, and with it.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
@@ -11,10 +12,10 @@ mod drawn;
 #[path = "../tests/gearbox/estimated.rs"]
 mod estimated;
 
-use config::{Car, Drive};
+use config::{Car, Drive, DriveSegment};
 use drawn::{Case, Drawn, every_fifth};
 use estimated::{Estimated, estimated};
-use fit::gearbox::Quantity;
+use fit::gearbox::{Driving, Quantity};
 
 /// Of a quantity the error of the fit, and the standard deviations stated and before, in its unknown.
 struct Told {
@@ -39,6 +40,8 @@ fn number(name: &str, default: u64) -> u64 {
 fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let tables = drawn.tables();
     let (recorded, truth) = drawn.driven(drive);
+    let is_left_out = std::env::var("FIT_DRIVING").is_ok();
+    let driving = if is_left_out { Driving::default() } else { recorded.driving };
     let number = recorded.shifts.len();
     let [mut fitted, held_out] = every_fifth(recorded.shifts);
     if let Ok(name) = std::env::var("FIT_PRESSURE") {
@@ -47,7 +50,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     }
     let begin = std::time::Instant::now();
     let mut iterations = 0;
-    let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &mut |_| iterations += 1).unwrap();
+    let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &driving, &mut |_| iterations += 1).unwrap();
     let seconds = begin.elapsed().as_secs_f64();
     let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a simulation").unwrap();
     let torque_n_m = [&drawn.file, &file].map(|car| truth.squared_error(car, &held_out).sqrt());
@@ -96,6 +99,12 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         Err(_) => Vec::new(),
     };
     Outcome { torque_n_m, told, estimates }
+}
+
+/// A drive on a level road.
+fn level(drive: &Drive) -> Drive {
+    let segments = drive.segments.iter().map(|segment| DriveSegment { grade_rad: [0.0; 2], ..*segment });
+    Drive { segments: segments.collect(), ..drive.clone() }
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -157,8 +166,16 @@ fn main() {
         Ok("right") => Case::Right,
         Ok(other) => panic!("FIT_CASE={other}"),
     };
-    let outcomes: Vec<Outcome> =
-        (first..first + cars).map(|seed| outcome(&Drawn::of(drawn::car(&vehicle), seed, case), case, &drive)).collect();
+    let (is_hilly, is_reported) = (std::env::var("FIT_ROAD").is_err(), std::env::var("FIT_TORQUE").is_ok());
+    let is_weighed = std::env::var("FIT_WEIGHED").is_ok();
+    let of_car = |seed: u64| {
+        let drawn = Drawn::of(drawn::car(&vehicle), seed, case);
+        let drawn = if is_reported { drawn.with_reported(case) } else { drawn };
+        let drawn = if is_weighed { drawn.weighed() } else { drawn };
+        let drive = if is_hilly { drawn::hilly(&drive, seed) } else { level(&drive) };
+        outcome(&drawn, case, &drive)
+    };
+    let outcomes: Vec<Outcome> = (first..first + cars).map(of_car).collect();
     print_quantities(&outcomes);
     print_estimates(&outcomes);
     let rms = [0, 1].map(|which| mean(outcomes.iter().map(|outcome| outcome.torque_n_m[which].powi(2))).sqrt());

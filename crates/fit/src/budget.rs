@@ -22,6 +22,14 @@ pub(crate) fn factors(sd: f64, value: f64, given: [f64; 2]) -> [f64; 2] {
     [(-half).exp().max(least.min((-stated).exp())), half.exp().min(greatest.max(stated.exp()))]
 }
 
+/// Least and greatest delay of a fitted valve, s, from its delays at the ends of the command, with so much open to each side.
+pub(crate) fn delays(at_ends_s: [f64; 2], half_s: f64) -> [f64; 2] {
+    /// Longest delay of a valve that a file may have, s.
+    const MOST_S: f64 = 0.5;
+    let [one, other] = at_ends_s;
+    [(one.min(other) - half_s).max(0.0), (one.max(other) + half_s).min(MOST_S)]
+}
+
 /// The same as a share on either side, of which `least` is always open.
 pub(crate) fn share(sd: f64, value: f64, given: f64, least: f64) -> f64 {
     let known = given + (value - 1.0).abs();

@@ -7,7 +7,7 @@ use drivetrain::CommandKind;
 use logs::{ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Readings, Role, Shift, ShiftFinder};
 use trace::{Unit, signal};
 
-use crate::{FitError, Series, ShiftRecord};
+use crate::{FitError, Series, ShiftKinds, ShiftRecord};
 
 /// Readings are kept from so long before the inertia phase on, s: the commands of the torque phase and of the fill.
 const BEFORE_S: f64 = 2.0;
@@ -21,6 +21,8 @@ pub struct Collected {
     pub shifts: Vec<ShiftRecord>,
     /// Shifts that are not used, each with the reason.
     pub skipped: Vec<String>,
+    /// How many of which kind there are.
+    pub kinds: ShiftKinds,
     /// What is to be said about the log.
     pub notes: Vec<String>,
 }
@@ -73,12 +75,17 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Colle
     for shift in shifts {
         match reason_against(&shift) {
             None => usable.push(shift),
-            Some(reason) => collected.skipped.push(format!("{}: {reason}", name(path, shift.start_s()))),
+            Some(reason) => {
+                collected.kinds.count(shift.direction, shift.load, false);
+                collected.skipped.push(format!("{}: {reason}", name(path, shift.start_s())));
+            }
         }
     }
     collected.notes.append(&mut notes);
-    for mut record in read(path, &map, commands, &usable)? {
-        match record.find_segments(&vehicle.shift) {
+    for (mut record, shift) in read(path, &map, commands, &usable)?.into_iter().zip(&usable) {
+        let found = record.find_segments(&vehicle.shift);
+        collected.kinds.count(shift.direction, shift.load, found.is_ok());
+        match found {
             Ok(()) => collected.shifts.push(record),
             Err(reason) => collected.skipped.push(format!("{}: {reason}", record.name)),
         }

@@ -134,8 +134,8 @@ impl Fit {
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
             let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
-            let (one, other) = (delay(0.0), delay(vehicle.limits.command_max));
-            set(bound("valve_delay_s"), &[(one.min(other) - half_s).max(0.0), one.max(other) + half_s])?;
+            let at_ends_s = [delay(0.0), delay(vehicle.limits.command_max)];
+            set(bound("valve_delay_s"), &budget::delays(at_ends_s, half_s))?;
         }
         Ok(())
     }

@@ -23,20 +23,8 @@ pub struct HeldOut {
 impl Fit {
     /// Why the fitted file is not to be used in place of the given one, if so.
     pub fn reason_against(&self, checked: Option<&HeldOut>) -> Option<String> {
-        if !self.at_limit.is_empty() {
-            return Some(format!("at the end of what is held possible: {}", self.at_limit.join(", ")));
-        }
-        let checked = checked?;
-        let [given, fitted] = checked.turbine_rad_s;
-        // An error that is not a number counts against the fit.
-        let is_better = fitted < given;
-        (!is_better).then(|| {
-            format!(
-                "on {} shifts that were held out the turbine speed has a one-step error of {given:.3} rad/s with the given file and \
-                 {fitted:.3} with the fitted one",
-                checked.shifts
-            )
-        })
+        let checked = checked.map(|checked| (checked.shifts, checked.turbine_rad_s));
+        reason_to_keep(&self.at_limit, checked, "the one-step error of the turbine speed")
     }
 
     /// Compares both vehicles on shifts that were not fitted; none if there are none.
@@ -108,6 +96,22 @@ impl Fit {
         });
         Ok(rms(errors))
     }
+}
+
+/// Why given values are kept, if so: names of values that ended at the limit of what is held possible, or errors, in rad/s, on so many
+/// shifts that were held out, with the given and with the fitted file.
+pub(crate) fn reason_to_keep(at_limit: &[String], checked: Option<(usize, [f64; 2])>, error: &str) -> Option<String> {
+    if !at_limit.is_empty() {
+        return Some(format!("at the end of what is held possible: {}", at_limit.join(", ")));
+    }
+    let (shifts, [given, fitted]) = checked?;
+    // An error that is not a number counts against the fit.
+    let is_better = fitted < given;
+    (!is_better).then(|| {
+        format!(
+            "on {shifts} shifts that were held out {error} is {given:.3} rad/s with the given file and {fitted:.3} with the fitted one"
+        )
+    })
 }
 
 fn rms(errors: impl Iterator<Item = f64>) -> Option<f64> {

@@ -137,6 +137,7 @@ fn one_shift_with_lost_readings_is_fitted_and_the_report_says_how_little_that_is
     let said = printed(&output);
     assert!(said.contains("one shift only"), "{said}");
     assert!(said.contains("no shift is held out"), "{said}");
+    assert!(said.contains("shifts used: 1 of 1 power-on upshift\n"), "{said}");
     printed(&wetclutch(&["check", &fitted]));
     let output = wetclutch(&["fit", &log, "--vehicle", &fitted, "-o", &fitted]);
     assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));

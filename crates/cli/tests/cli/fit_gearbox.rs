@@ -48,13 +48,15 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
         "torque scale: not told by these logs",
         "shifts held out: ",
         "better one in ",
+        "mass and road load from ",
+        "the reported engine torque is used in ",
     ] {
         assert!(table.contains(words), "{words}: {table}");
     }
     assert!(notes.contains("shifts: ") && notes.contains(&fitted), "{notes}");
     let text = folder.read("fitted.toml");
     for words in
-        ["# fit: values below", "[clutch.E]", "[turbine_inertia_kg_m2]", "inertia_kg_m2 = 0.17 # crank and pump wheel"]
+        ["# fit: values below", "[clutch.E]", "[turbine_inertia_kg_m2]", "drag_n_m_s = 0.047   # C_e, [chapter]"]
     {
         assert!(text.contains(words), "{words}: {text}");
     }

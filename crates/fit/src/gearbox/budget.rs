@@ -7,7 +7,7 @@ use super::file::{Written, list};
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, Quantity};
 use crate::FitError;
-use crate::budget::{BUDGET_COMMENT, BUDGET_SIDES, factors};
+use crate::budget::{BUDGET_COMMENT, BUDGET_SIDES, delays, factors};
 use crate::fitted_file::SIDES;
 use crate::vehicle_text::number;
 
@@ -21,6 +21,10 @@ impl GearboxFit {
         if car.converter.is_some() {
             let share = edge(self.sd(Quantity::Input).hypot(self.sd(Quantity::TorqueRatio))).min(given.converter);
             text.put(&["error_bounds"], "converter_share", &number(share), comment)?;
+        }
+        if self.is_told(Quantity::Mass) {
+            let share = edge(self.sd(Quantity::Mass));
+            text.put(&["error_bounds"], "mass_share", &number(share), comment)?;
         }
         // One number for all shifts: that of the pair of gears that is known least.
         let inertias = (0..self.quantities.pairs.len()).map(|at| edge(self.sd(Quantity::Inertia(at))));
@@ -71,11 +75,10 @@ impl GearboxFit {
         let (late_s, sd_s) = (DELAY_UNIT_S * self.unknown(quantity), DELAY_UNIT_S * self.sd(quantity));
         let of_file = [0.0, car.line_pressure_pa]
             .map(|pressure_pa| (known.valve.delay(known.valve.command_for(pressure_pa)) + late_s).max(0.0));
-        let [least, greatest] = [of_file[0].min(of_file[1]), of_file[0].max(of_file[1])];
-        let middle = 0.5 * (least + greatest);
-        let lower = (least - BUDGET_SIDES * sd_s).max(given[0].min(middle - SIDES * sd_s));
-        let upper = (greatest + BUDGET_SIDES * sd_s).min(given[1].max(middle + SIDES * sd_s));
-        [lower.max(0.0), upper.min(DELAY_MOST_S)]
+        let middle = 0.5 * (of_file[0] + of_file[1]);
+        let [least, greatest] = delays(of_file, BUDGET_SIDES * sd_s);
+        let known = delays([given[0].min(middle - SIDES * sd_s), given[1].max(middle + SIDES * sd_s)], 0.0);
+        [least.max(known[0]), greatest.min(known[1])]
     }
 
     /// Ranges of friction and valve gain where only their product is told, beside the file that has the product as friction: what the product
@@ -94,6 +97,3 @@ impl GearboxFit {
         ]
     }
 }
-
-/// Longest delay of a valve that a file may have, s.
-const DELAY_MOST_S: f64 = 0.5;

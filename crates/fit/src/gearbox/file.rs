@@ -25,6 +25,7 @@ impl GearboxFit {
         let mut text = Written::new(&car.source.text)?;
         self.write_converter(&mut text, car)?;
         self.write_drag(&mut text, car)?;
+        self.write_vehicle(&mut text, car)?;
         for (place, name) in self.quantities.elements.iter().enumerate() {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             if let Some(element) = element.filter(|_| self.elements_seen[place]) {
@@ -86,6 +87,28 @@ impl GearboxFit {
             text.put(&["clutch", name], "drag_n_m", &with(drag_n_m), &comment)?;
         }
         Ok(())
+    }
+
+    /// Mass, road load and engine, where driving between shifts tells them: no ratio between torques in shifts depends on them.
+    fn write_vehicle(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+        let values = [
+            (Quantity::Mass, "vehicle", "mass_kg", car.road.mass_kg),
+            (Quantity::Rolling, "vehicle", "rolling_moment_n_m", car.road.rolling_moment_n_m),
+            (Quantity::Air, "vehicle", "drag_coefficient", car.road.drag_coefficient),
+            (Quantity::EngineInertia, "engine", "inertia_kg_m2", car.engine.inertia_kg_m2),
+        ];
+        for (quantity, table, key, given) in values {
+            if self.is_told(quantity) {
+                let value = number(given * self.unknown(quantity).exp());
+                text.put(&[table], key, &value, &self.comment(quantity))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the logs say something of a quantity.
+    pub(super) fn is_told(&self, quantity: Quantity) -> bool {
+        self.verdict(quantity) != Verdict::NotTold
     }
 
     fn write_element(&self, text: &mut Written, car: &Car, element: usize, place: usize) -> Result<(), FitError> {
@@ -155,7 +178,7 @@ impl GearboxFit {
         let (value, half) = (self.unknown(quantity), SIDES * self.sd(quantity));
         let told = self.verdict(quantity).name();
         match quantity {
-            Quantity::Delay(_) | Quantity::InputDelay => {
+            Quantity::Delay(_) | Quantity::InputDelay | Quantity::ReportedDelay => {
                 let ms = 1e3 * DELAY_UNIT_S;
                 format!("delays {:+.1} ms, 95 % within {:.1} ms, {told}", ms * value, ms * half)
             }
@@ -178,6 +201,7 @@ impl GearboxFit {
             _ => {
                 let more = match quantity {
                     Quantity::Torque(_) => "; friction and valve gain show as one, and stand here as friction",
+                    Quantity::Rolling => "; a mean grade of the drive acts like it",
                     _ => "",
                 };
                 factor_comment(value.exp(), self.sd(quantity), self.verdict(quantity)) + more

@@ -5,11 +5,13 @@ use design::ShiftTables;
 use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
+use super::balances::Balances;
+use super::driving::{Driving, DrivingModel};
 use super::precision::stated;
 use super::quantities::{Quantities, Quantity};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
-use super::solver::Problem;
+use super::solver::{Models, Problem};
 use crate::{FitError, Verdict};
 
 /// How far a fit is.
@@ -42,11 +44,15 @@ pub struct GearboxFit {
     pub torque_misfit: f64,
     /// Whether the last step was small; otherwise the iterations were used up.
     pub is_converged: bool,
+    /// Time of driving in a gear with the engine pulling, s, and with a reported engine torque.
+    pub driving_s: [f64; 2],
+    /// Which balances of it were fitted.
+    pub(crate) balances: Balances,
     /// Names of the quantities that ended where nothing beyond is held possible.
     pub at_limit: Vec<String>,
 }
 
-/// Fits the quantities of a car to its shifts.
+/// Fits the quantities of a car to its shifts and to the driving between them.
 ///
 /// # Errors
 /// There is no shift, the car cannot be fitted, or no minimum was found.
@@ -54,16 +60,36 @@ pub fn fit(
     car: &Car,
     tables: &ShiftTables<f64>,
     shifts: &[ShiftLog],
+    driving: &Driving,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<GearboxFit, FitError> {
-    let quantities = Quantities::of(car, tables, shifts);
+    let mut balances = Balances::of(car, driving);
+    loop {
+        let (fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
+        if !balances.leave_out(scales) {
+            return Ok(fit);
+        }
+    }
+}
+
+/// The fit with some balances, and the scales of their errors.
+fn fit_with(
+    car: &Car,
+    tables: &ShiftTables<f64>,
+    shifts: &[ShiftLog],
+    (driving, balances): (&Driving, &Balances),
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(GearboxFit, [f64; 2]), FitError> {
+    let quantities = Quantities::of(car, tables, shifts, balances.used());
     let models: Vec<ShiftModel> =
         shifts.iter().filter_map(|log| ShiftModel::new(car, tables, &quantities, log)).collect();
     if models.is_empty() {
         return Err(FitError::input("there is no shift to fit"));
     }
     let problem = Problem::new(&quantities)?;
-    let solved = problem.solve(&models, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
+    let of_driving = DrivingModel::new(car, tables, &quantities, driving, balances.used());
+    let all = Models { shifts: &models, driving: of_driving };
+    let solved = problem.solve(&all, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
     let stated = stated(&problem, &models, &solved)?;
     let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
     let mut elements_seen = vec![false; quantities.elements.len()];
@@ -72,9 +98,10 @@ pub fn fit(
         by_pair[model.pair][kind.unwrap_or(0)] += 1;
         model.elements().iter().for_each(|at| elements_seen[*at] = true);
     }
-    let squares = solved.shifts.iter().map(|shift| shift.torque_error.powi(2)).sum::<f64>();
-    Ok(GearboxFit {
-        torque_misfit: (squares / solved.shifts.len() as f64).sqrt(),
+    let scales = solved.point.driving.scales();
+    let squares = solved.point.shifts.iter().map(|shift| shift.torque_error.powi(2)).sum::<f64>();
+    let fit = GearboxFit {
+        torque_misfit: (squares / models.len() as f64).sqrt(),
         at_limit: problem.at_limit(&solved.at),
         unknowns: solved.at,
         stated,
@@ -83,8 +110,11 @@ pub fn fit(
         elements_seen,
         scale_and_gain: [solved.weights.turbine.scale, solved.weights.turbine.gain],
         is_converged: solved.is_converged,
+        driving_s: [driving.time_s(), driving.reported_s()],
+        balances: balances.clone(),
         quantities,
-    })
+    };
+    Ok((fit, scales))
 }
 
 impl GearboxFit {
@@ -152,11 +182,10 @@ impl GearboxFit {
         along.dot(&(&self.stated * &along)).max(0.0).sqrt()
     }
 
-    /// Standard deviation of the logarithm of the factor that all torques have in common, which the speeds do not tell: by what was known
-    /// before of all of them together.
+    /// Standard deviation of the logarithm of the factor that all torques of the shifts have in common, which the speeds do not tell: it comes
+    /// from what was known before.
     pub fn torque_scale_sd(&self) -> f64 {
-        let powers = DVector::from_vec(self.quantities.powers_of_torque());
-        let precision = self.quantities.before.clone().cholesky().map(|cholesky| powers.dot(&cholesky.solve(&powers)));
-        precision.map_or(f64::INFINITY, |precision| precision.sqrt().recip())
+        let weights = self.torque_scale_weights();
+        weights.dot(&(&self.stated * &weights)).max(0.0).sqrt()
     }
 }

@@ -7,10 +7,12 @@
 //! ```
 //!
 //! `T_t` is the converter's by engine and turbine speed, or without a converter the reported engine torque, and `p_c` that of the
-//! valve's model. The output speed is measured and is no unknown. [`Recorder`] takes the steps of a log and keeps what belongs to
-//! its shifts; [`fit`] finds the parameters that all shifts have in common ([`Quantity`]).
+//! valve's model. The output speed is measured and is no unknown. Driving in a gear between shifts shows the torques on car and engine
+//! ([`Driving`]). [`Recorder`] takes the steps of a log and keeps what belongs to its shifts and between them; [`fit`] finds the parameters that all shifts have in common ([`Quantity`]).
 
+mod balances;
 mod budget;
+mod driving;
 mod file;
 mod fitting;
 mod precision;
@@ -22,6 +24,7 @@ mod shift_log;
 mod solver;
 mod validation;
 
+pub use driving::Driving;
 pub use fitting::{GearboxFit, Progress, fit};
 pub use quantities::{Quantities, Quantity};
 pub use recorder::{Recorded, Recorder};

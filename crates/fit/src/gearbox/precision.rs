@@ -1,8 +1,8 @@
 //! How sure the parameters are: the larger of two standard deviations, one with the correlation of the residuals in time and one from
 //! the scatter of the groups of shifts, times a factor and with a floor, as in the one-shift fit.
 //!
-//! A group is all shifts between the same gears of one kind: what the model leaves out, such as the drag of the elements that are open
-//! there, is alike in them.
+//! A group is all shifts between the same gears of one kind, or all driving in a gear: what the model leaves out, such as the drag of the
+//! elements that are open there, is alike in them.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,12 +13,12 @@ use crate::{FitError, intervals};
 /// Covariance of the unknowns as it is stated.
 pub(crate) fn stated(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved) -> Result<DMatrix<f64>, FitError> {
     let count = solved.at.len();
-    let information = solved.shifts.iter().fold(DMatrix::zeros(count, count), |sum, shift| sum + &shift.information);
+    let (information, _) = solved.point.normal();
     let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
     let auto = (information + &problem.precision).cholesky().ok_or_else(singular)?.inverse();
     let cluster = intervals::cluster(&auto, &scores(models, solved), &problem.precision);
     let mut stated = with_deviations(&auto, |j| {
-        let found = auto[(j, j)].max(cluster[(j, j)]).sqrt().hypot(problem.quantities.all[j].floor());
+        let found = auto[(j, j)].max(cluster[(j, j)]).sqrt().hypot(problem.quantities.floor(problem.quantities.all[j]));
         // No fit knows less than was known before.
         found.min(problem.quantities.sd_before(j))
     });
@@ -36,15 +36,16 @@ fn with_deviations(covariance: &DMatrix<f64>, sd: impl Fn(usize) -> f64) -> DMat
     DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * scale[j] * covariance[(i, j)])
 }
 
-/// The gradients of the groups of shifts.
+/// The gradients of the groups of shifts and of driving.
 fn scores(models: &[ShiftModel], solved: &Solved) -> Vec<DVector<f64>> {
     let mut groups: Vec<(&ShiftModel, DVector<f64>)> = Vec::new();
-    for (model, shift) in models.iter().zip(&solved.shifts) {
+    for (model, shift) in models.iter().zip(&solved.point.shifts) {
         let is_same = |other: &ShiftModel| (other.pair, other.kind) == (model.pair, model.kind);
         match groups.iter_mut().find(|(other, _)| is_same(other)) {
             Some((_, sum)) => *sum += &shift.score,
             None => groups.push((model, shift.score.clone())),
         }
     }
-    groups.into_iter().map(|(_, score)| score).collect()
+    let of_driving = solved.point.driving.groups.iter().map(|(_, score)| score.clone());
+    groups.into_iter().map(|(_, score)| score).chain(of_driving).collect()
 }

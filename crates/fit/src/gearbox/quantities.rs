@@ -2,6 +2,7 @@
 
 use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::road::GRAVITY_M_S2;
 use nalgebra::DMatrix;
 use observer::any_shift::AnyShiftFilter;
 
@@ -22,6 +23,16 @@ const TORQUE_RATIO: f64 = 0.10;
 
 /// Bound of the delay of the reported engine torque, s: one cycle of a bus, and whether it is held or interpolated.
 const INPUT_DELAY_S: f64 = 0.01;
+/// Bound of the delay of the reported engine torque beside a converter, s \[chosen: the torque that is asked for comes some strokes later\].
+const REPORTED_DELAY_S: f64 = 0.05;
+/// Bounds of mass \[chosen: an empty car with four people and luggage\], rolling resistance, air drag and inertia of the engine \[chosen\].
+const MASS: f64 = 0.25;
+const ROLLING: f64 = 0.5;
+const AIR: f64 = 0.3;
+const ENGINE_INERTIA: f64 = 0.2;
+/// Least deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a share \[chosen: a mean wind\].
+const MEAN_GRADE_RAD: f64 = 0.005;
+const WIND: f64 = 0.1;
 /// Error of the scale of a pressure sensor, as a standard deviation.
 const PRESSURE_SCALE: f64 = 0.005;
 
@@ -50,6 +61,18 @@ pub enum Quantity {
     Inertia(usize),
     /// Scale of the pressure sensor.
     PressureScale,
+    /// Mass of the car.
+    Mass,
+    /// Rolling resistance.
+    Rolling,
+    /// Air drag.
+    Air,
+    /// Beside a converter: what the reported engine torque has to be multiplied with.
+    ReportedScale,
+    /// Its delay against the turbine speed.
+    ReportedDelay,
+    /// Inertia of the engine in front of a converter.
+    EngineInertia,
 }
 
 /// The quantities of a car, in the order of the unknowns.
@@ -70,11 +93,14 @@ pub struct Quantities {
     /// Elements whose pressure is measured in a shift.
     pub measured: Vec<bool>,
     pub(crate) has_converter: bool,
+    /// Least deviation of the logarithm of the rolling resistance: a mean grade acts like it.
+    rolling_floor: f64,
 }
 
 impl Quantities {
-    /// Those of a car with these tables, with the pairs of neighbouring gears and of these shifts.
-    pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Self {
+    /// Those of a car with these tables, with the pairs of neighbouring gears and of these shifts. `balances` says whether the torque
+    /// balance of the car and that of the engine are fitted to driving between shifts.
+    pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog], balances: [bool; 2]) -> Self {
         let (pairs, measured) = (pairs(car, tables, shifts), measured(tables, shifts));
         let has_converter = car.converter.is_some();
         let input = if has_converter { Quantity::TorqueRatio } else { Quantity::InputDelay };
@@ -86,8 +112,14 @@ impl Quantities {
         if measured.contains(&true) {
             all.push(Quantity::PressureScale);
         }
+        let of_balances = [
+            [Quantity::Mass, Quantity::Rolling, Quantity::Air],
+            [Quantity::ReportedScale, Quantity::ReportedDelay, Quantity::EngineInertia],
+        ];
+        all.extend(of_balances.into_iter().zip(balances).filter(|(_, is_used)| *is_used).flat_map(|(some, _)| some));
         let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, None);
-        let known = Known { filter: &filter, has_converter, measured: &measured };
+        let mass_share = car.error_bounds.mass_share.unwrap_or(MASS);
+        let known = Known { filter: &filter, has_converter, measured: &measured, mass_share };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {
             if i == j { known.sd(all[i]).powi(2) } else { known.covariance(all[i], all[j]) }
         });
@@ -97,7 +129,10 @@ impl Quantities {
         named.sort_by_key(|(place, _)| *place);
         let pair_names = pairs.iter().map(|pair| named_pair(car, *pair)).collect();
         let elements = named.into_iter().map(|(_, name)| name).collect();
-        Self { all, elements, pairs, pair_names, before, measured, has_converter }
+        let road = &car.road;
+        let weight_n_m = road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m;
+        let rolling_floor = MEAN_GRADE_RAD * weight_n_m / road.rolling_moment_n_m.max(f64::MIN_POSITIVE);
+        Self { all, elements, pairs, pair_names, before, measured, has_converter, rolling_floor }
     }
 
     /// Place of a quantity among the unknowns.
@@ -108,6 +143,12 @@ impl Quantities {
     /// Place of the shifts between two gears among the pairs.
     pub fn pair(&self, from: usize, to: usize) -> Option<usize> {
         self.pairs.iter().position(|pair| [[from, to], [to, from]].contains(pair))
+    }
+
+    /// Least standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not
+    /// shrink with more shifts.
+    pub(crate) fn floor(&self, quantity: Quantity) -> f64 {
+        if quantity == Quantity::Rolling { self.rolling_floor } else { quantity.floor_of_car() }
     }
 
     /// Words for a quantity.
@@ -123,6 +164,12 @@ impl Quantities {
             Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
             Quantity::Gain(at) => format!("{}: valve gain", element(at)),
             Quantity::PressureScale => "pressure sensor, scale".to_owned(),
+            Quantity::Mass => "mass".to_owned(),
+            Quantity::Rolling => "rolling resistance".to_owned(),
+            Quantity::Air => "air drag".to_owned(),
+            Quantity::ReportedScale => "true over reported engine torque".to_owned(),
+            Quantity::ReportedDelay => "reported engine torque, delay".to_owned(),
+            Quantity::EngineInertia => "engine inertia".to_owned(),
             Quantity::Kiss(at) => format!("{}: kiss point", element(at)),
             Quantity::Lag(at) => format!("{}: valve lag", element(at)),
             Quantity::Inertia(at) => {
@@ -143,10 +190,10 @@ impl Quantities {
         self.all.iter().enumerate().filter(move |(_, quantity)| is_held(quantity)).map(|(place, _)| place)
     }
 
-    /// Power of each quantity in the factor that all torques have in common: with all of them multiplied by one number the speeds
-    /// stay the same.
+    /// Power of each quantity of the shifts in the factor that all torques have in common: with all of them multiplied by one number the
+    /// speeds stay the same.
     pub(crate) fn powers_of_torque(&self) -> Vec<f64> {
-        let power = |quantity: &Quantity| f64::from(u8::from(quantity.has_torque_scale()));
+        let power = |quantity: &Quantity| f64::from(u8::from(quantity.is_torque_of_shifts()));
         self.all.iter().map(power).collect()
     }
 }
@@ -156,6 +203,7 @@ struct Known<'a> {
     filter: &'a AnyShiftFilter<'a, f64>,
     has_converter: bool,
     measured: &'a [bool],
+    mass_share: f64,
 }
 
 impl Known<'_> {
@@ -165,8 +213,8 @@ impl Known<'_> {
         match quantity {
             Quantity::Input if self.has_converter => self.filter.turbine.converter_share,
             Quantity::Input => self.filter.turbine.engine_share,
-            Quantity::TorqueRatio => TORQUE_RATIO / 3.0_f64.sqrt(),
-            Quantity::InputDelay => INPUT_DELAY_S / DELAY_UNIT_S / 3.0_f64.sqrt(),
+            Quantity::TorqueRatio => deviation_of(TORQUE_RATIO),
+            Quantity::InputDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
             Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
             Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
             Quantity::Torque(_) => known.torque_share,
@@ -175,6 +223,12 @@ impl Known<'_> {
             Quantity::PressureScale => PRESSURE_SCALE,
             Quantity::Lag(_) => known.valve_lag_share,
             Quantity::Inertia(_) => known.inertia_share,
+            Quantity::Mass => deviation_of(self.mass_share),
+            Quantity::Rolling => deviation_of(ROLLING),
+            Quantity::Air => deviation_of(AIR),
+            Quantity::ReportedScale => self.filter.turbine.engine_share,
+            Quantity::ReportedDelay => deviation_of(REPORTED_DELAY_S / DELAY_UNIT_S),
+            Quantity::EngineInertia => deviation_of(ENGINE_INERTIA),
         }
     }
 
@@ -209,6 +263,11 @@ impl Known<'_> {
     }
 }
 
+/// Standard deviation of a uniform distribution with this bound.
+fn deviation_of(bound: f64) -> f64 {
+    bound / 3.0_f64.sqrt()
+}
+
 /// The pairs of neighbouring gears and of these shifts with a shift from one clutch to another, the lower gear first.
 fn pairs(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<[usize; 2]> {
     let rows = tables.tables();
@@ -241,18 +300,27 @@ fn measured(tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Vec<bool> {
 impl Quantity {
     /// Whether it is multiplied when all torques are multiplied by one number.
     pub(crate) fn has_torque_scale(self) -> bool {
+        use Quantity as Q;
+        let is_of_driving = matches!(self, Q::Mass | Q::Rolling | Q::Air | Q::ReportedScale | Q::EngineInertia);
+        self.is_torque_of_shifts() || is_of_driving
+    }
+
+    /// The same of what acts in shifts.
+    fn is_torque_of_shifts(self) -> bool {
         matches!(self, Self::Input | Self::Torque(_) | Self::Inertia(_))
     }
 
-    /// Least standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not
-    /// shrink with more shifts.
-    pub(crate) fn floor(self) -> f64 {
+    fn floor_of_car(self) -> f64 {
         match self {
             Self::Delay(_) | Self::InputDelay => 0.3e-3 / DELAY_UNIT_S,
+            // Whether a reading is held or interpolated until the next one is not known: half a cycle of 5 ms.
+            Self::ReportedDelay => 2.5e-3 / DELAY_UNIT_S,
             Self::Drag => 0.2 / DRAG_UNIT_N_M,
             Self::Kiss(_) => 500.0 / KISS_UNIT_PA,
             Self::Lag(_) => 0.02,
-            Self::Inertia(_) => 0.015,
+            Self::Inertia(_) | Self::Mass => 0.015,
+            Self::EngineInertia => 0.03,
+            Self::Air => WIND,
             Self::PressureScale => 1e-3,
             _ => 0.005,
         }

@@ -3,8 +3,9 @@
 use config::Car;
 use design::ShiftTables;
 use observer::Reading;
-use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
+use super::driving::{Driving, DrivingRecorder, RowState};
 use super::shift_log::{ShiftLog, named_pair};
 use crate::{ReadingAges, Series};
 
@@ -20,13 +21,15 @@ const READINGS_KEPT: usize = 4000;
 const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_SHARE: f64 = 0.1;
 
-/// The shifts of a log.
+/// The shifts of a log, and the driving between them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recorded {
     /// Shifts that can be fitted.
     pub shifts: Vec<ShiftLog>,
     /// Shifts that cannot, each with the reason.
     pub skipped: Vec<String>,
+    /// Driving in a gear between them.
+    pub driving: Driving,
     /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
     pub in_gear: [u64; 2],
 }
@@ -35,6 +38,7 @@ impl Recorded {
     /// Adds the shifts of another log. A shift tells what it has to tell once: copies are left out.
     pub fn add(&mut self, more: Self) {
         self.skipped.extend(more.skipped);
+        self.driving.add(more.driving);
         for shift in more.shifts {
             let same = |other: &&ShiftLog| other.turbine.value == shift.turbine.value && other.engine == shift.engine;
             match self.shifts.iter().find(same) {
@@ -69,6 +73,9 @@ pub struct Recorder<'a> {
     commands: [Series; MAX_ELEMENTS],
     /// Of the shift that is open.
     pressure: [Series; 2],
+    driving: DrivingRecorder<'a>,
+    /// Of the next step, what the filter of `estimate` is not shown.
+    reported: Option<Reading<f64>>,
     open: Option<Open>,
     last_output: f64,
     found: Recorded,
@@ -88,10 +95,17 @@ impl<'a> Recorder<'a> {
             engine_torque: none(),
             commands: std::array::from_fn(|_| none()),
             pressure: [none(), none()],
+            driving: DrivingRecorder::new(car, tables),
+            reported: None,
             open: None,
             last_output: f64::NAN,
             found: Recorded::default(),
         }
+    }
+
+    /// Takes of the next step what the filter of `estimate` is not shown beside a converter: the reported engine torque, N m.
+    pub fn push_reported(&mut self, reported_n_m: Option<Reading<f64>>) {
+        self.reported = reported_n_m;
     }
 
     /// Takes a step.
@@ -134,28 +148,35 @@ impl<'a> Recorder<'a> {
         if let Some(open) = self.open {
             self.close(open);
         }
+        self.found.driving = self.driving.finish();
         self.found
     }
 
     fn take(&mut self, time_s: f64, input: &ShiftInput<f64>) {
-        let ages = self.ages;
-        let wheels = [
-            (&mut self.engine, input.engine_rad_s, ages.engine_rad),
-            (&mut self.turbine, input.turbine_rad_s, ages.turbine_rad),
-            (&mut self.output, input.output_rad_s, ages.output_rad),
-        ];
-        for (series, reading, turned_rad) in wheels {
-            // What cannot be a reading is none.
-            let Some(Reading { value, age_s }) = reading.filter(|reading| reading.value.is_finite()) else { continue };
+        // What cannot be a reading is none.
+        let dated = |reading: Option<Reading<f64>>, turned_rad: f64| {
+            let Reading { value, age_s } = reading.filter(|reading| reading.value.is_finite())?;
             let turning_s = if value.abs() > 1.0 { turned_rad / value.abs() } else { 0.0 };
-            series.push(time_s - age_s - turning_s, value);
-        }
-        let others = std::iter::once((&mut self.engine_torque, input.engine_n_m));
-        for (series, reading) in others.chain(self.commands.iter_mut().zip(input.commands)) {
-            if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
-                series.push(time_s - reading.age_s, reading.value);
+            Some((time_s - age_s - turning_s, value))
+        };
+        let ages = self.ages;
+        let speeds = [
+            dated(input.engine_rad_s, ages.engine_rad),
+            dated(input.turbine_rad_s, ages.turbine_rad),
+            dated(input.output_rad_s, ages.output_rad),
+        ];
+        let torque = dated(input.engine_n_m, 0.0);
+        let readings = speeds.into_iter().chain([torque]).chain(input.commands.map(|reading| dated(reading, 0.0)));
+        let series = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
+        for (series, reading) in series.into_iter().chain(&mut self.commands).zip(readings) {
+            if let Some((time_s, value)) = reading {
+                series.push(time_s, value);
             }
         }
+        let GearCommand { from, to } = input.gear;
+        let state = RowState { gear: (from == to).then_some(from), lock_up: input.lock_up_applied };
+        let reported = dated(self.reported.take(), 0.0).or(torque);
+        self.driving.push(time_s, speeds, reported, state);
     }
 
     fn begin(&mut self, time_s: f64, gears: [usize; 2], lock_up: bool) {

@@ -2,6 +2,7 @@
 
 use drivetrain::ShiftKind;
 
+use super::driving::Balance;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
 use crate::fitted_file::SIDES;
@@ -14,9 +15,8 @@ const MISFIT: f64 = 2.0;
 const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
-const NOT_FITTED: &str = "not fitted, and as in the given file: mass, road load, wheel radius, drive shafts, backlash, hysteresis of the valves and the shapes \
-     of all maps. Weighing the car would tell its mass; coasting down in neutral on a level road, both ways, rolling resistance and air drag; pressing \
-     and releasing the pedal in one gear, shafts and backlash; a fit does not read such drives";
+const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, backlash, hysteresis of the valves and the shapes of all maps. \
+     Pressing and releasing the pedal in one gear would tell shafts and backlash; a fit does not read it";
 
 impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
@@ -37,7 +37,7 @@ impl GearboxFit {
             )
         };
         let (value, interval) = match quantity {
-            Quantity::Delay(_) | Quantity::InputDelay => plain(1e3 * DELAY_UNIT_S, "ms"),
+            Quantity::Delay(_) | Quantity::InputDelay | Quantity::ReportedDelay => plain(1e3 * DELAY_UNIT_S, "ms"),
             Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
             Quantity::Drag => plain(DRAG_UNIT_N_M, "N m"),
             _ => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
@@ -61,7 +61,6 @@ impl GearboxFit {
     /// What is to be said besides the table: torque scale, what is not told, misfit, and which drive would tell more.
     pub fn statements(&self) -> Vec<String> {
         let scale = 100.0 * SIDES * self.torque_scale_sd();
-        let input = if self.quantities.has_converter { "converter" } else { "reported engine torque" };
         let beside = |at: usize| {
             let half = 100.0 * SIDES * self.sd_beside_scale(Quantity::Torque(at));
             format!("{} {half:.1} %", self.quantities.elements[at])
@@ -71,11 +70,13 @@ impl GearboxFit {
         let mut lines = vec![
             format!(
                 "torque scale: not told by these logs, +- {scale:.1} %. Speeds fix the ratios of all torques and inertias and not their common \
-                 factor; it comes from what was known before of {input}, friction and inertias together, and is in every interval"
+                 factor; it comes from what was known before of {} together, and is in every interval",
+                self.anchors()
             ),
             format!("beside that factor, friction x valve gain is known within +- {}", seen.join(", ")),
             self.said_of_gain(),
         ];
+        lines.extend(self.said_of_driving());
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
@@ -83,6 +84,50 @@ impl GearboxFit {
         lines.extend(self.proposals());
         lines.push(NOT_FITTED.to_owned());
         lines
+    }
+
+    /// What the common factor of all torques comes from.
+    fn anchors(&self) -> String {
+        let has = |quantity| self.quantities.place(quantity).is_some();
+        let mut all =
+            vec![if self.quantities.has_converter { "converter" } else { "reported engine torque" }, "friction"];
+        all.extend(has(Quantity::ReportedScale).then_some("reported engine torque"));
+        all.extend(has(Quantity::Mass).then_some("mass"));
+        format!("{} and inertias", all.join(", "))
+    }
+
+    /// What driving between shifts says of mass, road load and engine torque, or why it says nothing.
+    fn said_of_driving(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let beside = |quantity| 100.0 * SIDES * self.sd_beside_scale(quantity);
+        match self.balances.reason(Balance::Car) {
+            None => lines.push(format!(
+                "mass and road load from {:.0} s in gear with the engine pulling: beside the common factor of all torques the mass is known within +- \
+                 {:.1} %. Grade is not measured; rolling resistance is told apart from a mean grade by driving the same road both ways",
+                self.driving_s[0],
+                beside(Quantity::Mass)
+            )),
+            Some(reason) => lines.push(format!(
+                "mass and road load are not told by these logs: {reason}. Accelerating and rolling in gear without the brake would tell them"
+            )),
+        }
+        match self.balances.reason(Balance::Engine) {
+            None => lines.push(format!(
+                "the reported engine torque is used in {:.0} s in gear: its scale is known before within +- {:.1} % and counts for the common factor \
+                 of all torques",
+                self.driving_s[1],
+                100.0 * SIDES * self.sd_before(Quantity::ReportedScale)
+            )),
+            Some(reason) if self.quantities.has_converter => {
+                lines.push(format!("no reported engine torque is used: {reason}"));
+            }
+            Some(_) => (),
+        }
+        lines
+    }
+
+    fn sd_before(&self, quantity: Quantity) -> f64 {
+        self.quantities.place(quantity).map_or(f64::NAN, |place| self.quantities.sd_before(place))
     }
 
     /// Of which elements friction and gain are told apart.
@@ -111,10 +156,13 @@ impl GearboxFit {
     /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni; those with the common factor of all
     /// torques also beside it.
     fn given_is_possible(&self) -> bool {
-        let is_of_car = |quantity| !matches!(quantity, Quantity::Drag | Quantity::InputDelay | Quantity::PressureScale);
+        use Quantity as Q;
+        let is_of_signals =
+            |quantity| matches!(quantity, Q::InputDelay | Q::PressureScale | Q::ReportedDelay | Q::ReportedScale);
+        let is_of_car = |quantity| quantity != Q::Drag && !is_of_signals(quantity);
         let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
         let mut car = seen().filter(|quantity| is_of_car(*quantity));
-        let mut torques = seen().filter(|quantity| quantity.has_torque_scale());
+        let mut torques = seen().filter(|quantity| quantity.has_torque_scale() && is_of_car(*quantity));
         let scale = self.torque_scale();
         car.all(|quantity| self.unknown(quantity).abs() <= SIDES_OF_ALL * self.sd(quantity))
             && torques

@@ -22,11 +22,11 @@ pub(crate) const OWN: usize = 2;
 const START_SD_RAD_S: f64 = 50.0;
 /// Deviation of the second: what the drag of the open elements has beside its model, N m \[chosen\], and a share of the torque at the input by the shape of the
 /// converter's maps \[chosen, as in the filter\].
-const DRAG_SD_N_M: f64 = 1.0;
-const INPUT_SD_SHARE: f64 = 0.03;
+pub(crate) const DRAG_SD_N_M: f64 = 1.0;
+pub(crate) const INPUT_SD_SHARE: f64 = 0.03;
 /// Steps for the derivatives by the logarithm of a lag and by a delay in its unit.
 const LAG_STEP: f64 = 0.02;
-const DELAY_STEP: f64 = 0.1;
+pub(crate) const DELAY_STEP: f64 = 0.1;
 const GAIN_STEP: f64 = 0.02;
 
 /// A clutch of the shift.
@@ -377,7 +377,7 @@ pub struct OpenLoop {
 
 /// What the valves and the friction of a vehicle file say of a shift while both clutches slip, at each reading of the turbine speed.
 pub fn open_loop(car: &Car, tables: &ShiftTables<f64>, log: &ShiftLog) -> Vec<OpenLoop> {
-    let quantities = Quantities::of(car, tables, std::slice::from_ref(log));
+    let quantities = Quantities::of(car, tables, std::slice::from_ref(log), [false; 2]);
     let rows = tables.tables();
     let row = rows.shift(log.gears[0], log.gears[1]);
     let (Some(model), Some(row)) = (ShiftModel::new(car, tables, &quantities, log), row) else { return Vec::new() };

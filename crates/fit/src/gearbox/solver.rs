@@ -5,6 +5,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 
+use super::driving::{DrivingModel, DrivingWeights, Evaluated};
 use super::quantities::Quantities;
 use super::shift::{Linearised, MeasuredPressure, OWN, ShiftModel};
 use crate::FitError;
@@ -27,6 +28,8 @@ const LIMIT: f64 = 4.0;
 pub(crate) struct Weights {
     pub(crate) turbine: ChannelWeights,
     pub(crate) pressure: ChannelWeights,
+    /// Of the balances of car and engine while driving, whose errors are independent already.
+    pub(crate) driving: [DrivingWeights; 2],
 }
 
 impl Weights {
@@ -34,6 +37,7 @@ impl Weights {
     const START: Self = Self {
         turbine: ChannelWeights { gain: 0.3, scale: 0.5, inflation: FACTOR * FACTOR },
         pressure: ChannelWeights { gain: 0.3, scale: 3e3, inflation: FACTOR * FACTOR },
+        driving: [DrivingWeights::START; 2],
     };
 }
 
@@ -54,14 +58,19 @@ impl ChannelWeights {
         column.iter_mut().for_each(|error| *error /= self.scale);
     }
 
-    fn weight(&self, error: f64) -> f64 {
+    pub(crate) fn weight(&self, error: f64) -> f64 {
         (HUBER / error.abs()).min(1.0) / self.inflation
     }
 
     /// Half the robust sum of squares.
-    fn cost(&self, errors: &DVector<f64>) -> f64 {
+    pub(crate) fn cost(&self, errors: &DVector<f64>) -> f64 {
         let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
         0.5 * errors.iter().map(loss).sum::<f64>() / self.inflation
+    }
+
+    /// For errors that are to be independent already.
+    pub(crate) fn of_independent(errors: &[f64], scale: f64) -> Self {
+        Self { gain: 0.0, scale, inflation: FACTOR * FACTOR * correlation(&[errors], 0.0, scale) }
     }
 
     /// Those that residuals ask for; without any they stay.
@@ -70,6 +79,22 @@ impl ChannelWeights {
             let inflation = FACTOR * FACTOR * correlation(blocks, gain, scale);
             Self { gain, scale, inflation }
         })
+    }
+}
+
+/// Shifts and driving at unknowns.
+pub(crate) struct Point {
+    pub(crate) shifts: Vec<Profiled>,
+    pub(crate) driving: Evaluated,
+}
+
+impl Point {
+    /// Information about the unknowns, and half the gradient by them, with the sign of a step.
+    pub(crate) fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let start = (self.driving.information.clone(), self.driving.score.clone());
+        self.shifts
+            .iter()
+            .fold(start, |(information, score), shift| (information + &shift.information, score + &shift.score))
     }
 }
 
@@ -92,7 +117,7 @@ pub(crate) struct Solved {
     pub(crate) at: Vec<f64>,
     pub(crate) weights: Weights,
     pub(crate) is_converged: bool,
-    pub(crate) shifts: Vec<Profiled>,
+    pub(crate) point: Point,
 }
 
 /// A shift with its own unknowns at their best for these parameters.
@@ -164,6 +189,12 @@ fn profiled_turbine(shift: &ShiftModel, lines: &Linearised, weights: ChannelWeig
     }
 }
 
+/// What is fitted.
+pub(crate) struct Models<'a> {
+    pub(crate) shifts: &'a [ShiftModel],
+    pub(crate) driving: DrivingModel<'a>,
+}
+
 /// What does not change during a fit.
 pub(crate) struct Problem<'a> {
     pub(crate) quantities: &'a Quantities,
@@ -180,37 +211,43 @@ impl<'a> Problem<'a> {
         Ok(Self { quantities, precision: before.cholesky().ok_or_else(not_finite)?.inverse() })
     }
 
-    fn profiles(&self, shifts: &[ShiftModel], at: &[f64], weights: Weights) -> Vec<Profiled> {
-        shifts.iter().map(|shift| profiled(shift, &shift.linearised(self.quantities, at), weights)).collect()
+    fn point(&self, models: &Models<'_>, at: &[f64], weights: Weights) -> Point {
+        let shift = |shift: &ShiftModel| profiled(shift, &shift.linearised(self.quantities, at), weights);
+        Point {
+            shifts: models.shifts.iter().map(shift).collect(),
+            driving: models.driving.evaluated(self.quantities, at, weights.driving),
+        }
     }
 
-    fn cost(&self, shifts: &[Profiled], at: &[f64]) -> f64 {
+    fn cost(&self, point: &Point, at: &[f64]) -> f64 {
         let at = DVector::from_column_slice(at);
-        0.5 * at.dot(&(&self.precision * &at)) + shifts.iter().map(|shift| shift.cost).sum::<f64>()
+        let shifts = point.shifts.iter().map(|shift| shift.cost).sum::<f64>();
+        0.5 * at.dot(&(&self.precision * &at)) + shifts + point.driving.cost
     }
 
-    /// Finds the parameters of shifts, from those of the file.
-    pub(crate) fn solve(&self, shifts: &[ShiftModel], progress: &mut dyn FnMut(u32)) -> Result<Solved, FitError> {
+    /// Finds the parameters of shifts and driving, from those of the file.
+    pub(crate) fn solve(&self, models: &Models<'_>, progress: &mut dyn FnMut(u32)) -> Result<Solved, FitError> {
         let mut weights = Weights::START;
         let mut at = vec![0.0; self.quantities.all.len()];
         let (mut damping, mut is_converged) = (1e-3, false);
-        let mut profiles = self.profiles(shifts, &at, weights);
+        let mut point = self.point(models, &at, weights);
         for iteration in 0..ITERATIONS {
             progress(iteration);
             if iteration <= SCALED_ITERATIONS {
-                weights = following(&profiles, weights);
-                profiles = self.profiles(shifts, &at, weights);
+                weights = following(&point, weights);
+                weights.driving = models.driving.following(self.quantities, &at);
+                point = self.point(models, &at, weights);
             }
-            let cost = self.cost(&profiles, &at);
+            let cost = self.cost(&point, &at);
             if !cost.is_finite() {
                 return Err(not_finite());
             }
             let mut largest = f64::INFINITY;
             for _ in 0..TRIES {
-                let (next, size) = self.step(&profiles, &at, damping)?;
-                let next_profiles = self.profiles(shifts, &next, weights);
-                if self.cost(&next_profiles, &next) <= cost {
-                    (at, profiles, largest) = (next, next_profiles, size);
+                let (next, size) = self.step(&point, &at, damping)?;
+                let next_point = self.point(models, &next, weights);
+                if self.cost(&next_point, &next) <= cost {
+                    (at, point, largest) = (next, next_point, size);
                     damping = (damping / 10.0).max(1e-8);
                     break;
                 }
@@ -222,18 +259,15 @@ impl<'a> Problem<'a> {
                 break;
             }
         }
-        Ok(Solved { at, weights, is_converged, shifts: profiles })
+        Ok(Solved { at, weights, is_converged, point })
     }
 
     /// The unknowns after a step, and its largest size in standard deviations.
-    fn step(&self, shifts: &[Profiled], at: &[f64], damping: f64) -> Result<(Vec<f64>, f64), FitError> {
+    fn step(&self, point: &Point, at: &[f64], damping: f64) -> Result<(Vec<f64>, f64), FitError> {
         let here = DVector::from_column_slice(at);
-        let mut matrix = self.precision.clone();
-        let mut gradient = -(&self.precision * &here);
-        for shift in shifts {
-            matrix += &shift.information;
-            gradient += &shift.score;
-        }
+        let (information, score) = point.normal();
+        let mut matrix = information + &self.precision;
+        let gradient = score - &self.precision * &here;
         for j in 0..at.len() {
             matrix[(j, j)] *= 1.0 + damping;
         }
@@ -253,11 +287,12 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Gain, scale and inflation that the residuals ask for.
-fn following(shifts: &[Profiled], before: Weights) -> Weights {
+/// Gain, scale and inflation that the residuals of the shifts ask for.
+fn following(point: &Point, before: Weights) -> Weights {
+    let shifts = &point.shifts;
     let turbine: Vec<&[f64]> = shifts.iter().map(|shift| shift.residuals.as_slice()).collect();
     let pressure: Vec<&[f64]> = shifts.iter().flat_map(|shift| shift.pressure.iter().map(Vec::as_slice)).collect();
-    Weights { turbine: before.turbine.following(&turbine), pressure: before.pressure.following(&pressure) }
+    Weights { turbine: before.turbine.following(&turbine), pressure: before.pressure.following(&pressure), ..before }
 }
 
 const _: () = assert!(OWN == 2, "the own unknowns are solved for as two");

@@ -6,6 +6,7 @@ use design::ShiftTables;
 use super::fitting::GearboxFit;
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
+use crate::validation::reason_to_keep;
 
 /// Errors over shifts that were held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,20 +23,8 @@ pub struct HeldOut {
 impl GearboxFit {
     /// Why the fitted file is not to be used in place of the given one, if so.
     pub fn reason_against(&self, checked: Option<&HeldOut>) -> Option<String> {
-        if !self.at_limit.is_empty() {
-            return Some(format!("at the end of what is held possible: {}", self.at_limit.join(", ")));
-        }
-        let checked = checked?;
-        let [given, fitted] = checked.turbine_rad_s;
-        // An error that is not a number counts against the fit.
-        let is_better = fitted < given;
-        (!is_better).then(|| {
-            format!(
-                "on {} shifts that were held out the turbine speed is off by {given:.2} rad/s with the given file and by {fitted:.2} with the \
-                 fitted one",
-                checked.shifts
-            )
-        })
+        let checked = checked.map(|checked| (checked.shifts, checked.turbine_rad_s));
+        reason_to_keep(&self.at_limit, checked, "the error of the turbine speed")
     }
 
     /// Compares both vehicle files on shifts that were not fitted; none if there are none.

@@ -1,16 +1,20 @@
 //! A car with a whole gearbox that differs from its file, and a drive of it behind sensors.
 
+use std::cell::RefCell;
 use std::path::Path;
 
-use config::{Car, Drive, Sensors};
+use config::{Car, Drive, DriveSegment, Sensors};
 use design::{ShiftErrors, ShiftTables};
 use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
 use fit::{ReadingAges, Series};
+use observer::Reading;
 use observer::any_shift::ShiftInput;
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::ShiftDraw;
+
 use study::any_shift::matrix::Random;
 use study::any_shift::measured::{MeasuredRow, SensedDrive};
+use study::any_shift::recording::reported_engine_n_m;
 
 /// Bounds of what is drawn: as shares, and of the kiss point in Pa.
 const FRICTION: f64 = 0.15;
@@ -23,6 +27,23 @@ const SENSOR_SCALE: f64 = 0.008;
 const SENSOR_PA: f64 = 3e3;
 /// Of the drag of each open element.
 const DRAG: f64 = 0.5;
+/// Of mass, rolling resistance, air drag, engine inertia, stiffness of the drive shafts and slip of the tyres.
+const MASS: f64 = 0.15;
+const ROLLING: f64 = 0.3;
+const AIR: f64 = 0.2;
+const ENGINE_INERTIA: f64 = 0.1;
+const STIFFNESS: f64 = 0.2;
+const TYRE: f64 = 0.25;
+/// Of a reported engine torque: scale, an error that comes and goes, both as shares, noise, N m, and by how much it is ahead, s.
+const REPORTED: f64 = 0.08;
+const REPORTED_SLOWLY: f64 = 0.03;
+const REPORTED_N_M: f64 = 1.0;
+const AHEAD_S: [f64; 2] = [-0.02, 0.04];
+/// Grade at the ends of the segments of a hilly road, and in the mean, rad.
+const GRADE_RAD: f64 = 0.03;
+const MEAN_GRADE_RAD: f64 = 0.008;
+/// Sets random numbers of their own apart from those of the others.
+const ROAD_STREAM: u64 = 0x2545_f491_4f6c_dd1d;
 /// Sets the random numbers of the valves' timing apart from those of the others.
 const TIMING_STREAM: u64 = 0x5bf0_3635_dab2_c9e1;
 /// Time between two rows, s.
@@ -47,6 +68,22 @@ pub(crate) fn city(repetitions: u32) -> Drive {
     Drive { repetitions, ..Drive::read(&root().join("drives/city.toml")).unwrap() }
 }
 
+/// A drive on a road whose grade is drawn by this seed, with as many segments as its repetitions have together.
+pub(crate) fn hilly(drive: &Drive, seed: u64) -> Drive {
+    let mut random = Random(seed.wrapping_mul(ROAD_STREAM));
+    // A sum of three uniform numbers is nearly normal.
+    let mut normal = |sd: f64| 2.0 * sd * ((0..3).map(|_| random.uniform()).sum::<f64>() - 1.5);
+    let mean = normal(MEAN_GRADE_RAD);
+    let mut grade = mean + normal(GRADE_RAD);
+    let mut segments = Vec::new();
+    for segment in (0..drive.repetitions).flat_map(|_| &drive.segments) {
+        let next = mean + normal(GRADE_RAD);
+        segments.push(DriveSegment { grade_rad: [grade, next], ..*segment });
+        grade = next;
+    }
+    Drive { segments, repetitions: 1, ..drive.clone() }
+}
+
 /// In what a car differs from its file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Case {
@@ -67,6 +104,40 @@ pub(crate) struct Drawn {
     kiss_pa: Vec<f64>,
     /// What the file's inertias are multiplied with to be true, by pairs of gears.
     inertia: Vec<([usize; 2], f64)>,
+    /// The same of mass, rolling resistance, air drag and engine inertia.
+    vehicle: [f64; 4],
+    /// What the engine's controller reports of its torque.
+    pub(crate) reported: Option<ReportedErrors>,
+}
+
+/// Errors of a reported engine torque.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ReportedErrors {
+    /// Reported over true torque.
+    pub(crate) factor: f64,
+    pub(crate) slowly: f64,
+    pub(crate) noise_n_m: f64,
+    pub(crate) ahead_s: f64,
+}
+
+impl ReportedErrors {
+    fn of(seed: u64, share: f64) -> Self {
+        let mut random = Random(!seed ^ ROAD_STREAM);
+        Self {
+            factor: 1.0 + share * REPORTED * (2.0 * random.uniform() - 1.0),
+            slowly: share * REPORTED_SLOWLY,
+            noise_n_m: REPORTED_N_M,
+            ahead_s: AHEAD_S[0] + (AHEAD_S[1] - AHEAD_S[0]) * random.uniform(),
+        }
+    }
+
+    /// The reading of a row.
+    fn reading(&self, torque_n_m: &Series, time_s: f64) -> Reading<f64> {
+        // A number that is another one in every row.
+        let noise = 2.0 * Random((1e3 * time_s) as u64).uniform() - 1.0;
+        let factor = self.factor * (1.0 + self.slowly * (0.3 * time_s).sin());
+        Reading::now(factor * torque_n_m.at(time_s + self.ahead_s) + self.noise_n_m * noise)
+    }
 }
 
 impl Drawn {
@@ -100,7 +171,7 @@ impl Drawn {
         // The simulated gear train has its own inertia; that of the file is what is wrong.
         let mut file = file;
         let forward = file.gearbox.forward_gears();
-        let pairs = [1, 2, 3].into_iter().flat_map(|apart| forward.windows(apart + 1));
+        let pairs = (1..forward.len()).flat_map(|apart| forward.windows(apart + 1));
         let inertia: Vec<([usize; 2], f64)> =
             pairs.map(|gears| ([gears[0], gears[gears.len() - 1]], 1.0 + within(INERTIA))).collect();
         for shift in &mut file.gearbox.shifts {
@@ -111,7 +182,32 @@ impl Drawn {
                 reduced.mass_kg_m2[0][0] /= factor;
             }
         }
-        Self { file, truth, seed, draw, kiss_pa, inertia }
+        let mut roads = Random(seed ^ ROAD_STREAM);
+        let mut factor = |bound: f64| 1.0 + share * bound * (2.0 * roads.uniform() - 1.0);
+        // Without a converter the engine's inertia is part of `M11`.
+        let engine = if file.converter.is_some() { ENGINE_INERTIA } else { 0.0 };
+        let vehicle = [factor(MASS), factor(ROLLING), factor(AIR), factor(engine)];
+        file.road.mass_kg /= vehicle[0];
+        file.road.rolling_moment_n_m /= vehicle[1];
+        file.road.drag_coefficient /= vehicle[2];
+        file.engine.inertia_kg_m2 /= vehicle[3];
+        file.driveline.shaft_stiffness_n_m_rad /= factor(STIFFNESS);
+        file.tyre.slip_scale /= factor(TYRE);
+        Self { file, truth, seed, draw, kiss_pa, inertia, vehicle, reported: None }
+    }
+
+    /// With a mass in its file that is known to a percent.
+    pub(crate) fn weighed(mut self) -> Self {
+        self.file.road.mass_kg = self.truth.road.mass_kg;
+        self.file.error_bounds.mass_share = Some(0.01);
+        self.vehicle[0] = 1.0;
+        self
+    }
+
+    /// With a reported engine torque.
+    pub(crate) fn with_reported(self, case: Case) -> Self {
+        let share = if case == Case::Right { 0.0 } else { 1.0 };
+        Self { reported: Some(ReportedErrors::of(self.seed, share)), ..self }
     }
 
     pub(crate) fn tables(&self) -> ShiftTables<f64> {
@@ -126,6 +222,12 @@ impl Drawn {
             Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) | Quantity::Drag => 0.0,
             Quantity::Lag(place) => self.draw.timing[element(place)].map_or(0.0, |timing| timing.lag.ln()),
             Quantity::InputDelay | Quantity::PressureScale => 0.0,
+            Quantity::Mass => self.vehicle[0].ln(),
+            Quantity::Rolling => self.vehicle[1].ln(),
+            Quantity::Air => self.vehicle[2].ln(),
+            Quantity::EngineInertia => self.vehicle[3].ln(),
+            Quantity::ReportedScale => -self.reported.map_or(1.0, |reported| reported.factor).ln(),
+            Quantity::ReportedDelay => self.reported.map_or(0.0, |reported| reported.ahead_s) / 0.01,
             Quantity::Gain(place) => self.draw.valve_gain[element(place)].ln(),
             Quantity::Torque(place) => {
                 let at = element(place);
@@ -148,8 +250,36 @@ impl Drawn {
         let tables = self.tables();
         let mut recorder = Recorder::new(&self.file, &tables, ReadingAges::of(&sensors()));
         let mut truth = Truth::default();
-        self.each_row(drive, |sample| truth.push(sample), |time_s, input| recorder.push(time_s, input));
+        self.each_reported(
+            drive,
+            |sample| truth.push(sample),
+            |time_s, input, reported| {
+                recorder.push_reported(reported);
+                recorder.push(time_s, input);
+            },
+        );
         (recorder.finish(), truth)
+    }
+
+    /// As [`Self::each_row`], with the reported engine torque.
+    pub(crate) fn each_reported(
+        &self,
+        drive: &Drive,
+        mut sampled: impl FnMut(&CarSample),
+        mut read: impl FnMut(f64, &ShiftInput<f64>, Option<Reading<f64>>),
+    ) {
+        let torque = RefCell::new(Series::default());
+        self.each_row(
+            drive,
+            |sample| {
+                sampled(sample);
+                torque.borrow_mut().push(sample.time_s, reported_engine_n_m(&self.truth, sample));
+            },
+            |time_s, input| {
+                let reported = self.reported.map(|reported| reported.reading(&torque.borrow(), time_s));
+                read(time_s, input, reported);
+            },
+        );
     }
 
     /// Simulates a drive: `sampled` gets the truth, `read` what is read of it.

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod drawn;
+mod driving;
 mod estimated;
 
 use std::path::Path;
@@ -9,13 +10,13 @@ use std::path::Path;
 use config::{Car, Source};
 use design::ShiftErrors;
 use drawn::{Case, Drawn, car, city, every_fifth, tables};
-use fit::gearbox::{GearboxFit, Quantity, Recorder, ShiftLog, fit};
+use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
 use observer::any_shift::ShiftInput;
 
 fn fitted(drawn: &Drawn, shifts: &[ShiftLog]) -> GearboxFit {
-    fit(&drawn.file, &drawn.tables(), shifts, &mut |_| ()).unwrap()
+    fit(&drawn.file, &drawn.tables(), shifts, &Driving::default(), &mut |_| ()).unwrap()
 }
 
 /// The rows of a drive of a drawn car as its file's filter is shown them.
@@ -94,7 +95,7 @@ fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
     let kiss_pa = before.kiss_pressure() + 1e4 * fit.unknown(Quantity::Kiss(place));
     assert!((after.kiss_pressure() - kiss_pa).abs() < 50.0);
     // A fit to the same shifts from the fitted file has nothing to change beyond what the logs leave open.
-    let again = fit::gearbox::fit(&file, &tables(&file), &recorded.shifts, &mut |_| ()).unwrap();
+    let again = fit::gearbox::fit(&file, &tables(&file), &recorded.shifts, &Driving::default(), &mut |_| ()).unwrap();
     let torque = Quantity::Torque(place);
     assert!(again.unknown(torque).abs() < fit.sd(torque), "{} {}", again.unknown(torque), fit.sd(torque));
     let twice = again.vehicle_file(&file, &file.source.path, "a drive").unwrap().source.text;
@@ -162,7 +163,8 @@ fn one_shift_tells_little_and_says_so() {
     twice.add(recorded.clone());
     assert_eq!(twice.shifts, recorded.shifts);
     assert_eq!(twice.skipped.len(), 2 * recorded.skipped.len() + recorded.shifts.len());
-    let none = fit::gearbox::fit(&drawn.file, &drawn.tables(), &[], &mut |_| ()).unwrap_err().to_string();
+    let none = fit::gearbox::fit(&drawn.file, &drawn.tables(), &[], &recorded.driving, &mut |_| ());
+    let none = none.unwrap_err().to_string();
     assert!(none.contains("no shift"), "{none}");
 }
 
@@ -204,7 +206,7 @@ fn what_no_car_does_is_left_out() {
     recorded(&|at, _, input| (input.gear.from, input.gear.to) = (1 + at % 3, 2));
     // Speeds that are huge: the model must not be left with numbers that are none.
     let huge = recorded(&|_, _, input| input.engine_rad_s = Some(Reading::now(1e300)));
-    if let Ok(fit) = fit::gearbox::fit(&drawn.file, &tables, &huge.shifts, &mut |_| ()) {
+    if let Ok(fit) = fit::gearbox::fit(&drawn.file, &tables, &huge.shifts, &huge.driving, &mut |_| ()) {
         assert!(fit.unknowns.iter().all(|x| x.is_finite()));
     }
 }

@@ -131,6 +131,7 @@ impl<'a> CarChannels<'a> {
             input,
             pedals: [self.pedal, f64::NAN],
             vehicle_m_s: self.vehicle_m_s.unwrap_or(by_wheels),
+            reported_n_m: engine_n_m,
             truth: [[f64::NAN; 3], oncoming],
         }))
     }

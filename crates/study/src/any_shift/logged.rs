@@ -151,6 +151,8 @@ pub struct LogStep {
     pub pedals: [f64; 2],
     /// Vehicle speed, m/s; by the wheels where the log has none.
     pub vehicle_m_s: f64,
+    /// Engine torque as the engine's controller reports it, N m, also where the filter is not shown it.
+    pub reported_n_m: Option<Reading<f64>>,
     /// Pressure, Pa, torque, N m, and slip, rad/s, of offgoing and oncoming clutch; not a number where the log has none.
     pub truth: [[f64; 3]; 2],
 }
@@ -214,6 +216,7 @@ impl<'c> CarLog<'c> {
             *values = rows.number(*places)?;
         }
         let lock_up_applied = number(columns.lock_up)? > 0.5;
+        let reported_n_m = reading(columns.engine_torque)?;
         // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
         let mut input = ShiftInput {
             dt_s,
@@ -221,7 +224,7 @@ impl<'c> CarLog<'c> {
             turbine_rad_s: reading(Some(columns.turbine))?,
             output_rad_s: reading(Some(columns.output))?,
             wheel_rad_s,
-            engine_n_m: reading(columns.engine_torque)?.filter(|_| self.car.converter.is_none() || lock_up_applied),
+            engine_n_m: reported_n_m.filter(|_| self.car.converter.is_none() || lock_up_applied),
             lock_up_applied,
             commands,
             gear: GearCommand { from: gear, to },
@@ -229,7 +232,7 @@ impl<'c> CarLog<'c> {
         let pedals = [number(columns.pedals[0])?, number(columns.pedals[1])?];
         let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
         self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
-        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, truth }))
+        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, reported_n_m, truth }))
     }
 
     /// The gear of a cell; an empty one is the gear before.

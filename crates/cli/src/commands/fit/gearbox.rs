@@ -42,12 +42,13 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     let bar = progress();
     let recorded = record(options, &car, &tables, ages.unwrap_or_default(), &bar)?;
     bar.suspend(|| reasons("not used", &recorded.skipped));
-    let (fitted_shifts, held_out) = divided(recorded.shifts);
+    let Recorded { shifts, driving, .. } = recorded;
+    let (fitted_shifts, held_out) = divided(shifts);
     if fitted_shifts.is_empty() {
         bar.finish_and_clear();
         return Err(no_shift(options));
     }
-    let found = fit::gearbox::fit(&car, &tables, &fitted_shifts, &mut |progress| {
+    let found = fit::gearbox::fit(&car, &tables, &fitted_shifts, &driving, &mut |progress| {
         bar.set_message(format!("{} shifts, iteration {}", progress.shifts, progress.iteration + 1));
         bar.tick();
     })?;
@@ -111,6 +112,7 @@ fn record_one(
     let mut steps = CarSource::open(CarReading { car, tables, map, stop: None }, log, &mut opened)?;
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
+        recorder.push_reported(step.reported_n_m);
         recorder.push(step.time_s, &step.input);
         recorder.push_pressure(step.time_s, step.truth.map(|[pressure_pa, ..]| pressure_pa));
         count += 1;

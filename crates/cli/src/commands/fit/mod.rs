@@ -42,10 +42,11 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         output::note(&format!("warning: {note}"));
     }
     reasons("not used", &collected.skipped);
+    let kinds = collected.kinds.statement();
     let (fitted_shifts, held_out) = divided(collected.shifts);
     if fitted_shifts.is_empty() {
         bar.finish_and_clear();
-        return Err(no_shift(&vehicle, options));
+        return Err(no_shift(&vehicle, options, &kinds));
     }
     let found = fit::fit(&vehicle, &fitted_shifts, ages, &mut |progress| {
         bar.set_message(format!("{} shifts, iteration {}", progress.shifts, progress.iteration + 1));
@@ -65,6 +66,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     // Nobody has to read the report to its end.
     write_text(&options.output, &written.source.text)?;
     print(&found)?;
+    output::line(&kinds)?;
     output::line(&said_of(checked.as_ref()))?;
     said_of_file(options, found.shifts, against);
     Ok(())
@@ -121,6 +123,7 @@ fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collec
         let mut one = fit::collect(log, &map, vehicle)?;
         all.shifts.append(&mut one.shifts);
         all.skipped.append(&mut one.skipped);
+        all.kinds.add(one.kinds);
         all.notes.extend(one.notes.iter().map(|note| format!("{}: {note}", log.display())));
     }
     Ok(all)
@@ -135,10 +138,10 @@ fn divided(mut shifts: Vec<ShiftRecord>) -> (Vec<ShiftRecord>, Vec<ShiftRecord>)
     ((0..some).map(|i| shifts[i * shifts.len() / some].clone()).collect(), held_out)
 }
 
-fn no_shift(vehicle: &Vehicle, options: &Fit) -> Failure {
+fn no_shift(vehicle: &Vehicle, options: &Fit, kinds: &str) -> Failure {
     let [from, to] = [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()];
     FitError::Input(format!(
-        "the logs have no power-on upshift from ratio {from:.3} to {to:.3} that can be fitted\n\
+        "the logs have no power-on upshift from ratio {from:.3} to {to:.3} that can be fitted; {kinds}\n\
          hint: `wetclutch inspect {} --shifts --ratios {from:.3},{to:.3}` with the same map lists the shifts that it finds",
         options.logs.first().map(|log| shell_quoted(log)).unwrap_or_default()
     ))

@@ -1,0 +1,154 @@
+//! From the steps of a log to stretches of driving in which the engine pulls.
+
+use config::Car;
+use design::ShiftTables;
+
+use super::stretch::{Driving, Stretch, StretchReadings};
+use crate::Series;
+
+/// After a shift clutches and shafts come to rest, s.
+const SETTLES_S: f64 = 0.5;
+/// Longest time without a reading of a speed, s.
+const GAP_S: f64 = 0.1;
+/// Output speed below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
+const OUTPUT_LEAST_RAD_S: f64 = 15.0;
+/// The engine pulls where the turbine turns slower than this share of its speed, and until it turns faster than the second one \[chosen\] ...
+const PULLS: [f64; 2] = [0.97, 0.99];
+/// ... and it is not idling, rad/s \[chosen: with a foot on the brake it idles, cold too\].
+const ENGINE_LEAST_RAD_S: f64 = 120.0;
+/// Without a converter it pulls with this torque, and until it has less than the second one, N m \[chosen\].
+const PULLS_N_M: [f64; 2] = [15.0, 5.0];
+/// Share and speed, rad/s, by which the turbine may be off the ratio of the gear.
+const RATIO_SHARE: f64 = 0.03;
+const RATIO_RAD_S: f64 = 2.0;
+/// The end of a stretch is left out, s: from the release of the accelerator until the engine does not pull any more the brake may be on
+/// already.
+const FOOT_S: f64 = 0.5;
+/// Time of driving that is kept, s: two hours.
+const MOST_S: f64 = 7200.0;
+/// Of readings before a stretch what a late signal needs, s.
+const BEFORE_S: f64 = 0.5;
+
+/// What a row shows besides its readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RowState {
+    /// The gear; none in a shift.
+    pub(crate) gear: Option<usize>,
+    pub(crate) lock_up: bool,
+}
+
+/// A reading at the time that it belongs to.
+pub(crate) type Dated = Option<(f64, f64)>;
+
+/// Takes the steps of a log one after the other.
+pub(crate) struct DrivingRecorder<'a> {
+    car: &'a Car,
+    /// Gears whose inertia is known.
+    is_known: Vec<bool>,
+    /// Of the stretch that is open.
+    readings: StretchReadings,
+    open: Option<(usize, f64)>,
+    unsettled_s: f64,
+    found: Driving,
+}
+
+impl<'a> DrivingRecorder<'a> {
+    pub(crate) fn new(car: &'a Car, tables: &ShiftTables<f64>) -> Self {
+        let known = |gear: &observer::any_shift::GearRow<f64>| gear.ratio > 0.0 && gear.inertia_kg_m2.is_finite();
+        Self {
+            car,
+            is_known: tables.tables().gears.iter().map(known).collect(),
+            readings: StretchReadings::default(),
+            open: None,
+            unsettled_s: f64::NEG_INFINITY,
+            found: Driving::default(),
+        }
+    }
+
+    /// Takes a row: its time, the readings of engine, turbine and output speed, the reported engine torque, and its state.
+    pub(crate) fn push(&mut self, time_s: f64, speeds: [Dated; 3], reported: Dated, state: RowState) {
+        let StretchReadings { engine, turbine, output, reported: torque } = &mut self.readings;
+        for (series, reading) in [engine, turbine, output].into_iter().zip(speeds).chain([(torque, reported)]) {
+            if let Some((time_s, value)) = reading {
+                series.push(time_s, value);
+            }
+        }
+        let gear = state.gear.filter(|_| !state.lock_up);
+        if gear.is_none() || gear != self.open.map(|(gear, _)| gear).or(gear) {
+            self.unsettled_s = time_s;
+        }
+        let is_settled = time_s > self.unsettled_s + SETTLES_S;
+        match (self.open, gear) {
+            (Some((open, begin_s)), Some(gear)) if open == gear && self.pulls(gear, time_s, PULLS[1], PULLS_N_M[1]) => {
+                if time_s < begin_s {
+                    self.close();
+                }
+            }
+            (Some(_), _) => self.close(),
+            (None, Some(gear)) if is_settled && self.pulls(gear, time_s, PULLS[0], PULLS_N_M[0]) => {
+                self.open = Some((gear, time_s));
+            }
+            (None, _) if time_s < self.unsettled_s => self.unsettled_s = time_s,
+            (None, _) => (),
+        }
+        if self.open.is_none() {
+            self.forget();
+        }
+    }
+
+    /// The stretches.
+    pub(crate) fn finish(mut self) -> Driving {
+        self.close();
+        self.found
+    }
+
+    /// Whether the engine pulls the car in a gear.
+    fn pulls(&self, gear: usize, time_s: f64, slower: f64, least_n_m: f64) -> bool {
+        let StretchReadings { engine, turbine, output, reported } = &self.readings;
+        let newest = |series: &Series| {
+            let last_s = series.time_s.last().filter(|last_s| (time_s - **last_s).abs() <= GAP_S);
+            last_s.and_then(|_| series.value.last().copied())
+        };
+        let (Some(turbine), Some(output)) = (newest(turbine), newest(output)) else { return false };
+        let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio * output);
+        let is_in_gear = self.is_known.get(gear) == Some(&true)
+            && (turbine - by_output).abs() <= RATIO_RAD_S + RATIO_SHARE * by_output.abs();
+        let is_driven = match &self.car.converter {
+            Some(_) => newest(engine).is_some_and(|engine| engine > ENGINE_LEAST_RAD_S && turbine < slower * engine),
+            None => newest(reported).is_some_and(|torque| torque > least_n_m),
+        };
+        is_in_gear && is_driven && output > OUTPUT_LEAST_RAD_S
+    }
+
+    fn close(&mut self) {
+        let Some((gear, begin_s)) = self.open.take() else { return };
+        let readings = std::mem::take(&mut self.readings);
+        // Before its first reading and after its last one nothing is known.
+        let with_engine = self.car.converter.is_some().then_some(&readings.engine);
+        let mut span = [begin_s, f64::INFINITY];
+        for series in [&readings.turbine, &readings.output].into_iter().chain(with_engine) {
+            let (Some(first_s), Some(last_s)) = (series.time_s.first(), series.time_s.last()) else { return };
+            span = [span[0].max(*first_s), span[1].min(*last_s)];
+        }
+        span[1] -= FOOT_S;
+        if self.found.time_s() >= MOST_S {
+            self.found.is_cut = true;
+            return;
+        }
+        if let Some(stretch) = Stretch::of(self.car, gear, readings, span) {
+            self.found.stretches.push(stretch);
+        }
+    }
+
+    /// Drops what no stretch needs: one that begins has at most a step of old readings.
+    fn forget(&mut self) {
+        const KEPT: usize = 200;
+        let StretchReadings { engine, turbine, output, reported } = &mut self.readings;
+        for series in [engine, turbine, output, reported] {
+            if series.len() > KEPT {
+                let last_s = series.time_s.last().copied().unwrap_or(0.0);
+                *series = super::super::recorder::part(series, [last_s - BEFORE_S, f64::INFINITY]);
+            }
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! A stretch of driving in one gear, reduced to steps.
+
+use config::Car;
+use drivetrain::clutch::drag_torque;
+
+use crate::Series;
+
+/// Length of a step, s: over some periods of the oscillation of the drive shafts, which the model leaves out and which acts back on the torque of
+/// the converter. Noise of a reported engine torque, which would make it look as if it did less (errors in variables), averages out too.
+///
+/// Between two steps a mean speed changes by the integral of its rate with weights that rise over the first step and fall over the
+/// second one. So a step has two means of each torque, with falling and with rising weights.
+pub(crate) const STEP_S: f64 = 0.4;
+/// Length of the steps from which the noise of the readings is found, and time between the points of a mean, s.
+pub(crate) const FINE_S: f64 = 0.1;
+const POINT_S: f64 = 0.01;
+/// Fewest steps of a stretch.
+const STEPS_MIN: usize = 3;
+
+/// Driving in a gear, between shifts.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Driving {
+    /// Stretches in their order.
+    pub(crate) stretches: Vec<Stretch>,
+    /// Whether the log was longer than what is kept.
+    pub(crate) is_cut: bool,
+}
+
+impl Driving {
+    /// Adds the driving of another log.
+    pub(crate) fn add(&mut self, more: Self) {
+        // The same drive says what it has to say once.
+        let new = more.stretches.into_iter().filter(|stretch| !self.stretches.contains(stretch)).collect::<Vec<_>>();
+        self.stretches.extend(new);
+        self.is_cut |= more.is_cut;
+    }
+
+    /// Time in gear with a pulling engine, s.
+    pub fn time_s(&self) -> f64 {
+        STEP_S * self.stretches.iter().map(Stretch::count).sum::<usize>() as f64
+    }
+
+    /// The same with a reported engine torque.
+    pub fn reported_s(&self) -> f64 {
+        let with = self.stretches.iter().filter(|stretch| stretch.has_reported());
+        STEP_S * with.map(Stretch::count).sum::<usize>() as f64
+    }
+}
+
+/// Readings of a stretch, at the times that they belong to.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct StretchReadings {
+    pub(crate) engine: Series,
+    pub(crate) turbine: Series,
+    pub(crate) output: Series,
+    pub(crate) reported: Series,
+}
+
+/// A stretch in one gear.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stretch {
+    pub(crate) gear: usize,
+    /// Two for each step: with falling and with rising weights.
+    pub(crate) halves: Vec<HalfStep>,
+    /// The same for fine steps.
+    pub(crate) fine: Vec<HalfStep>,
+    /// Reported engine torque, N m.
+    reported: Series,
+}
+
+/// Means over a step with weights.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct HalfStep {
+    /// Middle of the step, s.
+    pub(crate) time_s: f64,
+    pub(crate) engine_rad_s: f64,
+    pub(crate) output_rad_s: f64,
+    /// By the converter of the file, N m: torque at the turbine, the part of it by the torque ratio above 1, and torque of the pump.
+    pub(crate) turbine_n_m: f64,
+    pub(crate) above_one_n_m: f64,
+    pub(crate) pump_n_m: f64,
+    /// Torque at the turbine by the drag of the open elements: by the file, and with a peak of 1 N m of each.
+    pub(crate) drag_n_m: f64,
+    pub(crate) drag_of_one_n_m: f64,
+}
+
+impl Stretch {
+    /// The stretch of these readings in a gear; none if it is too short.
+    pub(crate) fn of(car: &Car, gear: usize, readings: StretchReadings, [begin_s, end_s]: [f64; 2]) -> Option<Self> {
+        let open = OpenElements::of(car, gear)?;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over a step")]
+        let count = |step_s: f64| ((end_s - begin_s).max(0.0) / step_s) as usize;
+        let [halves, fine] = [STEP_S, FINE_S].map(|step_s| {
+            let span = |at: usize| [begin_s + step_s * at as f64, step_s];
+            let of_step = |at: usize| WEIGHTS.map(|weight| half(car, &open, &readings, span(at), weight));
+            (0..count(step_s)).flat_map(of_step).collect()
+        });
+        (count(STEP_S) >= STEPS_MIN).then_some(Self { gear, halves, fine, reported: readings.reported })
+    }
+
+    /// How many steps there are.
+    fn count(&self) -> usize {
+        self.halves.len() / 2
+    }
+
+    /// Whether the engine torque is reported all the time.
+    pub(crate) fn has_reported(&self) -> bool {
+        let ends = [self.halves.first(), self.halves.last()].map(|half| half.map_or(0.0, |half| half.time_s));
+        self.reported.len() > 1 && self.reported.longest_gap_s(ends) <= 2.0 * FINE_S
+    }
+
+    /// The same means of the reported engine torque over these steps, `late_s` after its signal, N m.
+    pub(crate) fn reported_n_m(&self, halves: &[HalfStep], step_s: f64, late_s: f64) -> Vec<f64> {
+        let mean = |(half, weight): (&HalfStep, Weight)| {
+            points([half.time_s - 0.5 * step_s, step_s], weight)
+                .map(|(time_s, share)| share * self.reported.at(time_s - late_s))
+                .sum::<f64>()
+        };
+        halves.iter().zip(WEIGHTS.into_iter().cycle()).map(mean).collect()
+    }
+}
+
+/// Means over steps of a value of their halves.
+pub(crate) fn means<T>(halves: &[T], of: impl Fn(&T) -> f64) -> Vec<f64> {
+    halves.chunks_exact(2).map(|halves| 0.5 * (of(&halves[0]) + of(&halves[1]))).collect()
+}
+
+/// How a mean is weighed over a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Weight {
+    Falling,
+    Rising,
+}
+
+const WEIGHTS: [Weight; 2] = [Weight::Falling, Weight::Rising];
+
+/// Times in a step with this begin and length, and their shares in its mean.
+fn points([begin_s, step_s]: [f64; 2], weight: Weight) -> impl Iterator<Item = (f64, f64)> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "constants")]
+    let points = (step_s / POINT_S).round() as u32;
+    (0..points).map(move |point| {
+        let passed = (f64::from(point) + 0.5) / f64::from(points);
+        let share = if weight == Weight::Rising { passed } else { 1.0 - passed };
+        (begin_s + step_s * passed, 2.0 * share / f64::from(points))
+    })
+}
+
+fn half(car: &Car, open: &OpenElements, readings: &StretchReadings, span: [f64; 2], weight: Weight) -> HalfStep {
+    let mut mean = HalfStep { time_s: span[0] + 0.5 * span[1], ..HalfStep::default() };
+    for (time_s, share) in points(span, weight) {
+        let [engine, turbine, output] =
+            [&readings.engine, &readings.turbine, &readings.output].map(|series| series.at(time_s));
+        mean.engine_rad_s += share * engine;
+        mean.output_rad_s += share * output;
+        if let Some(converter) = &car.converter {
+            let torques = converter.torques(engine, turbine);
+            mean.turbine_n_m += share * torques.turbine_n_m;
+            mean.pump_n_m += share * torques.pump_n_m;
+            mean.above_one_n_m += share * (torques.turbine_n_m - torques.pump_n_m);
+        }
+        let [drag_n_m, of_one] = open.drag(turbine);
+        mean.drag_n_m += share * drag_n_m;
+        mean.drag_of_one_n_m += share * of_one;
+    }
+    mean
+}
+
+/// The elements that are open in a gear: slip per turbine speed, and peak of the drag, N m.
+struct OpenElements(Vec<[f64; 2]>);
+
+impl OpenElements {
+    fn of(car: &Car, gear: usize) -> Option<Self> {
+        let train = car.gearbox.train.as_ref()?;
+        let gear = car.gearbox.gears.get(gear)?;
+        let is_held = |at: usize| gear.holding.iter().any(|holding| holding.element == at);
+        let elements = car.clutches.iter().enumerate().filter(|(at, _)| !is_held(*at));
+        let slipping = elements.filter_map(|(at, clutch)| {
+            let row = train.slip_row(at);
+            // An idle shaft turns as it likes, and nothing is known of its drag.
+            let turned = row.iter().zip(&gear.shaft_speeds).filter(|(factor, _)| **factor != 0.0);
+            let slip = turned.map(|(factor, speed)| speed.map(|speed| factor * speed)).sum::<Option<f64>>()?;
+            Some([slip, clutch.as_ref()?.drag_n_m])
+        });
+        Some(Self(slipping.collect()))
+    }
+
+    /// Torque at the turbine by the drag of the file, and with a peak of 1 N m of each element.
+    fn drag(&self, turbine_rad_s: f64) -> [f64; 2] {
+        self.0.iter().fold([0.0; 2], |[file, one], [slip, drag_n_m]| {
+            let of_one = -slip * drag_torque(1.0, slip * turbine_rad_s);
+            [file + drag_n_m * of_one, one + of_one]
+        })
+    }
+}
