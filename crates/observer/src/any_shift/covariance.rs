@@ -145,7 +145,7 @@ impl<T: Real> Gaussian<T> {
 
     /// What is known of the errors of a shift clutch's pressure and kiss point.
     pub(super) fn pressure_error(&self, clutch: usize) -> PressureError<T> {
-        let (x, k) = (PRESSURE[clutch.min(1)], KISS[clutch.min(1)]);
+        let (x, k) = (PRESSURE[clutch.min(1)].min(N - 1), KISS[clutch.min(1)].min(N - 1));
         let p = &self.covariance;
         PressureError { pressure: self.mean[x], kiss: self.mean[k], variance: [p[x][x], p[k][k]], covariance: p[x][k] }
     }

@@ -154,7 +154,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let Some(shift) = running.shift else { return };
         let holding = running.phase.phase.holding();
         let contact = |c: usize| {
-            let (clutch, slip) = (&shift.clutches[c], self.slip(shift.clutches[c].ratio, speeds));
+            let clutch = &shift.clutches[c.min(1)];
+            let slip = self.slip(clutch.ratio, speeds);
             if slip.is_over() || holding.is_some_and(|held| held != c) {
                 // Its slip alone decides.
                 return Contact { slip, needed_n_m: T::zero(), holds_n_m: T::zero() };
