@@ -9,7 +9,7 @@ pub(crate) struct Bar {
 }
 
 /// Colours of the parts.
-const COLOURS: [&str; 2] = ["#0b6e99", "#c8a15a"];
+const COLOURS: [&str; 3] = ["#0b6e99", "#c8a15a", "#8f8f8f"];
 /// Sizes, in pixels.
 const LABELS: f64 = 330.0;
 const WIDTH: f64 = 420.0;
