@@ -145,9 +145,10 @@ impl<'a> DrivingRecorder<'a> {
         const KEPT: usize = 200;
         let StretchReadings { engine, turbine, output, reported } = &mut self.readings;
         for series in [engine, turbine, output, reported] {
-            if series.len() > KEPT {
-                let last_s = series.time_s.last().copied().unwrap_or(0.0);
-                *series = super::super::recorder::part(series, [last_s - BEFORE_S, f64::INFINITY]);
+            let from_s = series.time_s.last().map_or(f64::NAN, |last_s| last_s - BEFORE_S);
+            // At least half of it goes, so that a fast log is not copied in every row.
+            if series.len() > KEPT && series.time_s[series.len() / 2] < from_s {
+                *series = super::super::recorder::part(series, [from_s, f64::INFINITY]);
             }
         }
     }
