@@ -32,12 +32,25 @@ impl Column {
     pub fn quality(&self, record: usize) -> Option<Quality> {
         self.qualities.get(record).copied().unwrap_or(Some(Quality::Good))
     }
+
+    /// Says that the values that were appended are good.
+    pub(crate) fn all_good(&mut self) {
+        if !self.qualities.is_empty() {
+            self.qualities.resize(self.values.len(), Some(Quality::Good));
+        }
+    }
+
+    /// Where to append what each of the values from `first` on is worth.
+    pub(crate) fn qualities_from(&mut self, first: usize) -> &mut Vec<Option<Quality>> {
+        self.qualities.resize(first, Some(Quality::Good));
+        &mut self.qualities
+    }
 }
 
 impl Block {
-    /// Leaves out records whose time is not finite; how many they were.
-    pub(crate) fn leave_out_without_time(&mut self) -> u64 {
-        if are_finite(&self.times_s) {
+    /// Leaves out records from the given one on whose time is not finite; how many they were.
+    pub(crate) fn leave_out_without_time(&mut self, first: usize) -> u64 {
+        if are_finite(&self.times_s[first..]) {
             return 0;
         }
         let keep: Vec<bool> = self.times_s.iter().map(|time_s| time_s.is_finite()).collect();
@@ -48,6 +61,22 @@ impl Block {
             kept(&mut column.qualities, &keep);
         }
         (before - self.times_s.len()) as u64
+    }
+
+    /// Leaves out all records behind the first ones.
+    pub(crate) fn truncate(&mut self, records: usize) {
+        self.times_s.truncate(records);
+        for column in &mut self.columns {
+            column.values.truncate(records);
+            column.qualities.truncate(records);
+        }
+    }
+
+    /// Takes memory for so many records, where there is so much.
+    fn reserve(&mut self, records: usize) {
+        // Where there is not, the arrays grow as far as they can.
+        let _ = self.times_s.try_reserve_exact(records);
+        self.columns.iter_mut().for_each(|column| drop(column.values.try_reserve_exact(records)));
     }
 }
 
@@ -73,10 +102,10 @@ fn kept<T>(elements: &mut Vec<T>, keep: &[bool]) {
 pub(crate) struct Batch {
     pub(crate) samples: Vec<Sample>,
     pub(crate) block: Block,
-    pub(crate) memory: Memory,
+    pub(crate) memory: Vec<Memory>,
 }
 
-/// What the stream that fills a batch has read and unpacked, and not yet given. Another stream can use the memory after it.
+/// What the stream that fills a batch has read and unpacked of one place, and not yet given. Another stream can use the memory after it.
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
     pub(crate) packed: Vec<u8>,
@@ -93,7 +122,7 @@ impl Batch {
 
     fn clear(&mut self) {
         self.samples.clear();
-        self.block.times_s.clear();
+        self.block.truncate(0);
     }
 
     /// How many records there are; a sample alone is one.
@@ -127,9 +156,14 @@ impl Batch {
 
 /// What shares one clock.
 pub(crate) trait Stream {
-    /// Gives the next samples in the order of the file, with finite times and the quality as far as the format says it: appends them
-    /// one by one, or puts them in place of what the block has. False at the end.
+    /// Appends the next samples in the order of the file, with finite times and the quality as far as the format says it: one by one, or
+    /// to the block. False at the end.
     fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError>;
+
+    /// How many records it has at most, as far as the file says it.
+    fn most_records(&self) -> usize {
+        0
+    }
 
     /// What else is to be said about the stream, at its end.
     fn notes(&self) -> Vec<String> {
@@ -156,10 +190,16 @@ impl<'a> Source<'a> {
         Self { stream, batch: Batch::default() }
     }
 
-    /// Reads the next batch; false at the end. A damaged place is the end, and is noted.
+    /// Reads the next batch in place of the last; false at the end. A damaged place is the end, and is noted.
     pub(crate) fn read(&mut self, said: &mut Said) -> Result<bool, LogError> {
         self.batch.clear();
-        while self.batch.len() == 0 {
+        self.read_on(said)
+    }
+
+    /// Reads the next batch behind what there is.
+    fn read_on(&mut self, said: &mut Said) -> Result<bool, LogError> {
+        let before = self.batch.len();
+        while self.batch.len() == before {
             let damage = match self.stream.next_batch(&mut self.batch) {
                 Ok(true) => continue,
                 Ok(false) => None,
@@ -173,11 +213,26 @@ impl<'a> Source<'a> {
             }
             // What came with the end or before the damage is given first.
             self.stream = Box::new(Ended);
-            if self.batch.len() == 0 {
+            if self.batch.len() == before {
                 return Ok(false);
             }
         }
         Ok(true)
+    }
+
+    /// Reads a stream to its end: its records as one block, or samples as one for each channel. The memory is that of the stream before.
+    pub(crate) fn whole(mut self, memory: &mut Vec<Memory>, said: &mut Said) -> Result<Vec<Block>, LogError> {
+        std::mem::swap(&mut self.batch.memory, memory);
+        let most = self.stream.most_records();
+        while self.read_on(said)? {
+            // The first batch has made the columns.
+            self.batch.block.reserve(most.saturating_sub(self.batch.block.times_s.len()));
+        }
+        std::mem::swap(&mut self.batch.memory, memory);
+        match self.batch.samples.is_empty() {
+            true => Ok(vec![self.batch.block]),
+            false => Ok(by_channel(&self.batch.samples)),
+        }
     }
 }
 

@@ -380,7 +380,7 @@ impl Dialect {
             let only = lines.iter().filter(|line| !line.trim().is_empty()).count();
             return Err(LogError::file(
                 path,
-                if only == 1 {
+                if only == 1 && !head.contains('\0') {
                     "there are no rows"
                 } else {
                     "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns, `,` `;` `|` or a tab between them), Parquet, MDF 4, candump, ASC or BLF"

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use trace::shown_path;
+
 /// Why a log cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", shown_path(path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -14,7 +16,7 @@ pub enum LogError {
         source: std::io::Error,
     },
     /// The file as a whole is not what it should be.
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {message}", shown_path(path))]
     File {
         /// The file.
         path: PathBuf,
@@ -22,7 +24,7 @@ pub enum LogError {
         message: String,
     },
     /// The file is damaged at one place.
-    #[error("{}: {position}: {message}", path.display())]
+    #[error("{}: {position}: {message}", shown_path(path))]
     Damaged {
         /// The file.
         path: PathBuf,

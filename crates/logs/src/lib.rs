@@ -7,6 +7,7 @@
 //!
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
+pub mod arrays;
 pub mod can;
 pub mod columns;
 pub mod csv_log;
@@ -27,6 +28,7 @@ pub mod steps;
 pub mod suggest;
 mod utf16;
 
+pub use arrays::Arrays;
 pub use columns::{Block, Column, Columns};
 pub use error::LogError;
 pub use frozen::{FrozenSpeed, Speeds};

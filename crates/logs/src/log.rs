@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use trace::Following;
+use trace::csv_file::LONGEST_ROW;
+use trace::{Following, shown_path};
 
+use crate::arrays::Arrays;
 use crate::can::{CanLog, Database};
 use crate::columns::{Columns, Stream};
 use crate::csv_log::CsvLog;
@@ -185,15 +187,35 @@ impl Log {
         Ok(Columns::new(self.streams(wanted)?))
     }
 
-    fn streams(&mut self, wanted: &[usize]) -> Result<Vec<Box<dyn Stream + '_>>, LogError> {
+    /// These channels as whole arrays, as they stand in the file: not merged, and with its time stamps. Each clock of an MDF file is read
+    /// on one of at most `threads` threads; other formats have one clock, and are read on this one. Tables and bus logs are read once: a
+    /// second call is an error.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    pub fn arrays(&mut self, wanted: &[usize], threads: usize) -> Result<Arrays, LogError> {
+        let mask = self.mask(wanted);
+        match &mut self.source {
+            Source::Mdf(log) => Arrays::on_threads(log.streams(&mask)?, threads),
+            _ => Arrays::of(self.streams(wanted)?),
+        }
+    }
+
+    /// Which channels are wanted.
+    fn mask(&self, wanted: &[usize]) -> Vec<bool> {
         let mut mask = vec![false; self.channels.len()];
         for &channel in wanted {
             mask[channel] = true;
         }
+        mask
+    }
+
+    fn streams(&mut self, wanted: &[usize]) -> Result<Vec<Box<dyn Stream + '_>>, LogError> {
+        let mask = self.mask(wanted);
         Ok(match &mut self.source {
             Source::Csv(log) => vec![log.stream(&mask)?],
             Source::Parquet(log) => vec![log.stream(&mask)?],
-            Source::Mdf(log) => log.streams(&mask)?,
+            Source::Mdf(log) => log.streams(&mask)?.into_iter().map(|stream| stream as Box<dyn Stream>).collect(),
             Source::Can(log) => vec![log.stream(&mask)?],
         })
     }
@@ -217,14 +239,14 @@ impl Log {
             [one] => Ok(one),
             [] => Err(LogError::map(format!(
                 "{}: there is no channel `{}`{}\nhint: {}",
-                self.path.display(),
+                shown_path(&self.path),
                 error::shown(name),
                 group.map_or(String::new(), |group| format!(" in group `{}`", error::shown(group))),
                 self.nearest(name)
             ))),
             _ => Err(LogError::map(format!(
                 "{}: there are {} channels `{}`\nhint: {}",
-                self.path.display(),
+                shown_path(&self.path),
                 found.len(),
                 error::shown(name),
                 self.told_apart(&found)
@@ -277,23 +299,28 @@ pub fn needs_map(path: &Path) -> Result<bool, LogError> {
     Ok(is_utf16(&head) || !matches!(Format::of(&head), Format::Csv))
 }
 
-/// The first bytes of a file, or of a pipe as far as it has come: at least its first lines.
+/// The first bytes of a file, or of a pipe as far as it has come: at least its first lines. Where lines are long, as many more as names,
+/// units and a row take.
 fn first_bytes(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
     const LINES: usize = 50;
-    let mut head = vec![0; HEAD];
-    let mut length = 0;
-    while length < HEAD {
-        match reader.read(&mut head[length..]) {
+    const LONG_LINES: usize = 3;
+    const MOST: usize = LONG_LINES * LONGEST_ROW;
+    let (mut head, mut lines, mut long_lines, mut is_text) = (Vec::new(), 0, 0, true);
+    let mut bytes = vec![0; HEAD];
+    while lines < LINES && long_lines < LONG_LINES && head.len() < if is_text { MOST } else { HEAD } {
+        match reader.read(&mut bytes) {
             Ok(0) => break,
-            Ok(read) => length += read,
+            Ok(read) => {
+                let new = bytes[..read].iter().filter(|&&byte| byte == b'\n').count();
+                lines += new;
+                long_lines += if head.len() >= HEAD { new } else { 0 };
+                is_text &= !bytes[..read].contains(&0);
+                head.extend_from_slice(&bytes[..read]);
+            }
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
-        if head[..length].iter().filter(|&&byte| byte == b'\n').count() >= LINES {
-            break;
-        }
     }
-    head.truncate(length);
     Ok(head)
 }
 

@@ -13,14 +13,17 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
 
-use crate::columns::{Batch, Block, Stream};
+use crate::columns::{Batch, Block, Stream, are_finite};
 use crate::csv_log::{is_time_name, split_unit, time_column, time_unit};
 use crate::samples::Quality;
 use crate::{Channel, LogError, TimeColumn, error};
 use trace::Unit;
 
-/// Rows that are decoded at once: their columns stay in the second cache.
+/// Rows that are decoded at once: their columns stay in the second cache. Of many columns fewer, but so many, are.
 const BATCH: usize = 8192;
+const FEWEST: usize = 256;
+/// Numbers that are decoded at once, at most.
+const NUMBERS: usize = 1 << 20;
 
 /// An open Parquet file.
 pub(crate) struct ParquetLog {
@@ -40,6 +43,9 @@ impl ParquetLog {
         let length = file.metadata().map_err(LogError::io(path))?.len();
         let reader = SerializedFileReader::new(file).map_err(|error| damaged(path, "its end", &error))?;
         check_places(path, length, &reader)?;
+        if reader.metadata().file_metadata().num_rows() == 0 {
+            return Err(LogError::file(path, "there are no rows"));
+        }
         let leaves: Vec<ColumnDescPtr> = reader.metadata().file_metadata().schema_descr().columns().to_vec();
         let titles: Vec<String> = leaves.iter().map(|leaf| leaf.path().string()).collect();
         let names: Vec<(String, String)> = titles
@@ -126,7 +132,7 @@ fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -
 
 fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
     let hint = match error.to_string().contains("Disabled feature") {
-        true => "\nhint: this compression is not built in; write the file with snappy, gzip, lz4 or none",
+        true => "\nhint: this compression is not built in; write the file with zstd, snappy, gzip, lz4 or none",
         false => "",
     };
     LogError::damaged(path, position, format!("{error}{hint}"))
@@ -303,26 +309,31 @@ impl Groups<'_> {
     }
 
     fn decode(&mut self, open: &mut OpenGroup, block: &mut Block) -> Result<(), ParquetError> {
-        let rows = BATCH.min(usize::try_from(open.rows_left).unwrap_or(BATCH));
+        let at_once = (NUMBERS / (1 + open.columns.len())).clamp(FEWEST, BATCH);
+        let rows = at_once.min(usize::try_from(open.rows_left).unwrap_or(BATCH));
+        let first = block.times_s.len();
+        let end = first + rows;
         numbers(&mut open.time, self.log.time_form, rows, &mut block.times_s)?;
-        block.times_s.iter_mut().for_each(|time_s| *time_s *= self.log.time.1);
+        block.times_s[first..].iter_mut().for_each(|time_s| *time_s *= self.log.time.1);
         for (reader, column) in open.columns.iter_mut().zip(&mut block.columns) {
             numbers(reader, self.log.columns[column.channel].1, rows, &mut column.values)?;
-            column.qualities.clear();
-            if !column.values.iter().fold(true, |all, value| all & value.is_finite()) {
-                // An absent value, or NaN, is a reading that did not come.
-                let of = |value: &f64| match value.is_finite() {
-                    true => Some(Quality::Good),
-                    false => (!value.is_nan()).then_some(Quality::Missing),
-                };
-                column.qualities.extend(column.values.iter().map(of));
+            if are_finite(&column.values[first..]) {
+                column.all_good();
+                continue;
             }
+            // An absent value, or NaN, is a reading that did not come.
+            let of = |value: &f64| match value.is_finite() {
+                true => Some(Quality::Good),
+                false => (!value.is_nan()).then_some(Quality::Missing),
+            };
+            let qualities: Vec<_> = column.values[first..].iter().map(of).collect();
+            column.qualities_from(first).extend(qualities);
         }
-        if block.times_s.len() < rows || block.columns.iter().any(|column| column.values.len() < rows) {
+        if block.times_s.len() < end || block.columns.iter().any(|column| column.values.len() < end) {
             return Err(ParquetError::EOF("a column has fewer rows than its group".to_owned()));
         }
         open.rows_left -= rows as u64;
-        self.without_time += block.leave_out_without_time();
+        self.without_time += block.leave_out_without_time(first);
         Ok(())
     }
 }
@@ -330,6 +341,7 @@ impl Groups<'_> {
 impl Stream for Groups<'_> {
     fn next_batch(&mut self, batch: &mut Batch) -> Result<bool, LogError> {
         let block = batch.block_of(&self.channels);
+        let before = block.times_s.len();
         // The decoders of `parquet` 60.1 index and assert on what pages say (byte-stream split, for one), deeper than can be checked
         // before. What they leave behind is not used again: the stream ends here.
         let read = catch_unwind(AssertUnwindSafe(|| self.read(block)));
@@ -338,7 +350,11 @@ impl Stream for Groups<'_> {
             Err(LogError::damaged(&self.log.path, place, "the pages of a column contradict themselves"))
         });
         // What is not whole is not given.
-        read.inspect_err(|_| block.times_s.clear())
+        read.inspect_err(|_| block.truncate(before))
+    }
+
+    fn most_records(&self) -> usize {
+        usize::try_from(self.log.reader.metadata().file_metadata().num_rows()).unwrap_or(0)
     }
 
     fn notes(&self) -> Vec<String> {
@@ -370,7 +386,7 @@ impl Groups<'_> {
     }
 }
 
-/// The next numbers of a column, in place of those before; NaN where there is none.
+/// Appends the next numbers of a column; NaN where there is none.
 fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec<f64>) -> Result<(), ParquetError> {
     fn read<D: DataType>(
         column: &mut ColumnReaderImpl<D>,
@@ -399,7 +415,6 @@ fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec
         numbers.extend(levels.iter().map(|level| next(level).unwrap_or(f64::NAN)));
         Ok(())
     }
-    numbers.clear();
     #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
     match (column, form) {
         (ColumnReader::BoolColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(u8::from(*value))),

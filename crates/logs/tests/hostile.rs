@@ -17,7 +17,7 @@ fn most_memory() -> Option<usize> {
     line.trim().strip_suffix(" kB")?.parse::<usize>().ok().map(|kilobytes| kilobytes << 10)
 }
 
-const FILES: [&str; 22] = [
+const FILES: [&str; 24] = [
     "plain_400.mf4",
     "plain_420.mf4",
     "deflate.mf4",
@@ -36,6 +36,8 @@ const FILES: [&str; 22] = [
     "bus.log",
     "snappy.parquet",
     "gzip.parquet",
+    "zstd.parquet",
+    "polars.parquet",
     "stamps.parquet",
     "types.parquet",
     "types_old.parquet",

@@ -10,7 +10,7 @@ use std::path::Path;
 use common::{Folder, channel, data, read};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
-use logs::{OpenOptions, Sample};
+use logs::{OpenOptions, Quality, Sample};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -69,9 +69,9 @@ fn block(id: &[u8; 4], links: &[usize], content: &[u8]) -> Vec<u8> {
     [id.as_slice(), &[0; 4]].concat().into_iter().chain(words).chain(content.iter().copied()).collect()
 }
 
-fn packed(content: &[u8], packing: Packing) -> Vec<u8> {
+fn packed(content: &[u8], packing: Packing, id: &[u8; 2]) -> Vec<u8> {
     let (kind, columns) = match packing {
-        Packing::Plain => return block(b"##DT", &[], content),
+        Packing::Plain => return block(&[b'#', b'#', id[0], id[1]], &[], content),
         Packing::Deflated => (0_u8, 0),
         Packing::Transposed(columns) => (1, columns),
     };
@@ -83,7 +83,7 @@ fn packed(content: &[u8], packing: Packing) -> Vec<u8> {
     let deflated = encoder.finish().unwrap();
     let columns = u32::try_from(columns).unwrap().to_le_bytes();
     let sizes = [content.len(), deflated.len()].map(|size| (size as u64).to_le_bytes()).concat();
-    block(b"##DZ", &[], &[b"DT", [kind, 0].as_slice(), &columns, &sizes, &deflated].concat())
+    block(b"##DZ", &[], &[id, [kind, 0].as_slice(), &columns, &sizes, &deflated].concat())
 }
 
 /// The blocks of a file with this id.
@@ -91,21 +91,31 @@ fn places(bytes: &[u8], id: &[u8; 8]) -> Vec<usize> {
     (0..bytes.len() - HEAD).filter(|at| bytes[*at..].starts_with(id)).collect()
 }
 
-/// The file with the data of each group, which must be one plain block, in several that are cut at these places.
+/// What stands in the plain block of data to which a link leads, itself or over a list of one.
+fn content_of(bytes: &[u8], link: usize) -> Vec<u8> {
+    let at = number(bytes, link);
+    if bytes[at..].starts_with(b"##LD") {
+        return content_of(bytes, at + HEAD + 8);
+    }
+    assert!(bytes[at..].starts_with(b"##DT") || bytes[at..].starts_with(b"##DV"));
+    bytes[at + HEAD..at + number(bytes, at + 8)].to_vec()
+}
+
+/// The file with the data of each group, which must be one plain block, in several that are cut at these places, and in the other groups behind
+/// them.
 fn divided(mut bytes: Vec<u8>, cuts: &[usize], packing: impl Fn(usize) -> Packing) -> Vec<u8> {
-    for group in places(&bytes, b"##DG\0\0\0\0") {
+    for (nth, group) in places(&bytes, b"##DG\0\0\0\0").into_iter().enumerate() {
         let link = group + HEAD + 16;
-        let at = number(&bytes, link);
-        assert!(bytes[at..].starts_with(b"##DT"));
-        let content = bytes[at + HEAD..at + number(&bytes, at + 8)].to_vec();
-        let mut ends: Vec<usize> = cuts.iter().map(|cut| cut % content.len()).chain([content.len()]).collect();
+        let content = content_of(&bytes, link);
+        let mut ends: Vec<usize> =
+            cuts.iter().map(|cut| (cut + 61 * nth) % content.len()).chain([content.len()]).collect();
         ends.sort_unstable();
         let (mut from, mut links, mut offsets) = (0, vec![0], Vec::new());
         for (i, end) in ends.into_iter().enumerate() {
             bytes.resize(bytes.len().next_multiple_of(8), 0);
             links.push(bytes.len());
             offsets.extend((from as u64).to_le_bytes());
-            bytes.extend(packed(&content[from..end], packing(i)));
+            bytes.extend(packed(&content[from..end], packing(i), b"DT"));
             from = end;
         }
         bytes.resize(bytes.len().next_multiple_of(8), 0);
@@ -184,4 +194,105 @@ fn a_damaged_block_is_told_by_its_place_and_what_is_before_it_is_read() {
         notes[0].contains(&format!("block at byte {place}: it says that it unpacks to 209715200 bytes")),
         "{notes:?}"
     );
+}
+
+/// Appends a block where one may begin; its place.
+fn put(bytes: &mut Vec<u8>, block: &[u8]) -> usize {
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes.extend_from_slice(block);
+    bytes.len() - block.len()
+}
+
+/// The file with the data of each group, which must be one plain block, in two blocks of data and two of invalidation bits.
+fn with_bits_apart(mut bytes: Vec<u8>, packing: impl Fn(usize, usize) -> Packing) -> Vec<u8> {
+    const FLAGS: u32 = 0x8000_0001;
+    for group in places(&bytes, b"##DG\0\0\0\0") {
+        let (channels, link) = (number(&bytes, group + HEAD + 8), group + HEAD + 16);
+        let content = content_of(&bytes, link);
+        // Behind six links: identifier, number of records, flags; then the bytes of data and of invalidation bits.
+        let sizes = channels + HEAD + 48 + 24;
+        let size = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let (data, bits) = (size(sizes), size(sizes + 4));
+        if bits == 0 {
+            continue;
+        }
+        let parts = |from: usize, to: usize| {
+            content.chunks(data + bits).flat_map(|record| record[from..to].to_vec()).collect::<Vec<u8>>()
+        };
+        let mut links = vec![0];
+        for (nth, (part, width)) in [(parts(0, data), data), (parts(data, data + bits), bits)].into_iter().enumerate() {
+            let cut = part.len() / width / 2 * width;
+            for half in [&part[..cut], &part[cut..]] {
+                let id = if nth == 0 { b"DV" } else { b"DI" };
+                let block = packed(half, packing(nth, width), id);
+                links.push(put(&mut bytes, &block));
+            }
+        }
+        let equal = (content.len() / (data + bits) / 2 * data) as u64;
+        let own = [FLAGS.to_le_bytes(), 2_u32.to_le_bytes()].concat();
+        let list = block(b"##LD", &links, &[own, equal.to_le_bytes().to_vec()].concat());
+        let list = put(&mut bytes, &list);
+        bytes[link..link + 8].copy_from_slice(&(list as u64).to_le_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn invalidation_bits_in_blocks_of_their_own_are_read() {
+    let folder = Folder::new("bits-apart");
+    let whole = samples(&data("invalidation.mf4"));
+    assert!(whole.0.iter().any(|sample| sample.quality == Quality::Invalid));
+    let bytes = std::fs::read(data("invalidation.mf4")).unwrap();
+    let packings: [fn(usize, usize) -> Packing; 3] = [
+        |_, _| Packing::Plain,
+        |nth, _| if nth == 0 { Packing::Deflated } else { Packing::Plain },
+        |_, width| Packing::Transposed(width),
+    ];
+    for packing in packings {
+        let found = samples(&folder.write("apart.mf4", with_bits_apart(bytes.clone(), packing)));
+        assert_eq!(format!("{found:?}"), format!("{whole:?}"));
+    }
+}
+
+#[test]
+fn records_of_groups_with_one_time_lie_over_the_ends_of_blocks_differently() {
+    let folder = Folder::new("remote-blocks");
+    let whole = samples(&data("remote.mf4"));
+    assert_eq!(whole.0.len(), 80);
+    let bytes = std::fs::read(data("remote.mf4")).unwrap();
+    for cut in 1..40 {
+        let found = samples(&folder.write(
+            "remote.mf4",
+            divided(bytes.clone(), &[cut * 37], |i| match i {
+                0 => Packing::Deflated,
+                _ => Packing::Transposed(cut % 9 + 1),
+            }),
+        ));
+        assert_eq!(format!("{found:?}"), format!("{whole:?}"), "{cut}");
+    }
+}
+
+#[test]
+fn channels_that_are_not_over_time_are_named_with_their_group() {
+    let folder = Folder::new("over-an-angle");
+    let patched = |name: &str, kind: u8, at: usize, value: u8| {
+        let mut bytes = std::fs::read(data(name)).unwrap();
+        // Of a channel: eight links, then what it is and what it is over.
+        for channel in places(&bytes, b"##CN\0\0\0\0").into_iter().map(|at| at + HEAD + 64) {
+            if bytes[channel] == kind {
+                bytes[channel + at] = value;
+            }
+        }
+        let (log, _, notes) = read(&folder.write("patched.mf4", bytes), &OpenOptions::default()).unwrap();
+        assert_eq!(log.channels(), []);
+        notes
+    };
+    let notes = patched("plain_410.mf4", 2, 1, 2);
+    assert!(
+        notes[0].starts_with("3 channels are not over time and are left out: N_Eng (group `fast`, over an angle), "),
+        "{notes:?}"
+    );
+    // Its master is an ordinary channel now.
+    let notes = patched("remote.mf4", 2, 0, 0);
+    assert!(notes[0].contains("N_Eng (group `") && notes[0].contains("`, no time)"), "{notes:?}");
 }

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::{signal, units};
+use crate::{shown_path, signal, units};
 
 /// Why a trace cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", shown_path(path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -16,7 +16,7 @@ pub enum TraceError {
         source: std::io::Error,
     },
     /// The file is not a table.
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {message}", shown_path(path))]
     Table {
         /// The file.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum TraceError {
         message: String,
     },
     /// A row that does not fit.
-    #[error("{}:{line}: {message}", path.display())]
+    #[error("{}:{line}: {message}", shown_path(path))]
     Row {
         /// The file.
         path: PathBuf,
@@ -34,7 +34,10 @@ pub enum TraceError {
         message: String,
     },
     /// A signal that is needed contains text that is not a number.
-    #[error("{}: column `{column}` contains `{text}` (row {row}), which is not a number\nhint: leave a lost sample empty", path.display())]
+    #[error(
+        "{}: column `{column}` contains `{text}` (row {row}), which is not a number\nhint: leave a lost sample empty",
+        shown_path(path)
+    )]
     NotNumbers {
         /// The file.
         path: PathBuf,
@@ -49,7 +52,7 @@ pub enum TraceError {
     #[error(
         "{}: the log has `{found}`, but the command of the vehicle's valve is `{wanted}`\n\
          hint: give the vehicle file of this log, or check `kind` in its [observer.valve] and [clutch.*.valve]",
-        path.display()
+        shown_path(path)
     )]
     OtherCommand {
         /// The file.
@@ -60,7 +63,7 @@ pub enum TraceError {
         found: String,
     },
     /// A signal that is needed is missing.
-    #[error("{}: there is no column `{wanted}`\nhint: {}", path.display(), column_hint(wanted, present))]
+    #[error("{}: there is no column `{wanted}`\nhint: {}", shown_path(path), column_hint(wanted, present))]
     MissingColumn {
         /// The file.
         path: PathBuf,

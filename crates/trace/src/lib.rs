@@ -19,7 +19,7 @@ pub mod table;
 pub mod units;
 
 use std::borrow::Cow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use atomic::{WholeFile, check_target, remove_unfinished, write_whole};
 pub use csv_file::{Cell, CsvRows, CsvWriter, RecordError, Records, csv_written, read_csv, write_csv};
@@ -31,6 +31,11 @@ pub use parquet_file::{ColumnKind, ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
 pub use table::{TableFormat, TableWriter};
 pub use units::{Quantity, Unit};
+
+/// A file as messages show it; `-` is standard input.
+pub fn shown_path(path: &Path) -> std::path::Display<'_> {
+    if path == Path::new("-") { Path::new("standard input").display() } else { path.display() }
+}
 
 /// A word of a column; the program's own cost nothing to copy.
 pub type Word = Cow<'static, str>;

@@ -38,7 +38,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         return shifts(options, &mut log, &map);
     }
     let inspection = logs::inspect(&mut log)?;
-    output::line(&format!("{}: {}, {} channels", options.log.display(), log.format(), log.channels().len()))?;
+    output::line(&format!("{}: {}, {} channels", trace::shown_path(&options.log), log.format(), log.channels().len()))?;
     channels(&inspection)?;
     remarks(&inspection.notes);
     let steps_s = inspection.channels.iter().filter_map(|summary| summary.period_s);

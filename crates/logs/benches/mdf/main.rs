@@ -1,9 +1,10 @@
 //! Reading of MDF 4 and of Parquet, beside asammdf and pyarrow and beside the decompression of the blocks alone.
 //!
 //! `cargo bench -p logs --bench mdf -- LOG` reads all channels of a log; without a file, of an hour with nine channels that it writes as
-//! MDF with transposed and deflated blocks, and as Parquet. Every time is the least of several in one process, of the processor and on
-//! one thread, with the file in the memory of the system. A rival is measured where `python3`, or the Python of `WETCLUTCH_PYTHON`, has
-//! it; what it decodes must have the same sums. `-- LOG --only columns` (or `kept`, `merged`) reads once, for a profiler.
+//! MDF with transposed and deflated blocks, and as Parquet. Every time is the least of several in one process, with the file in the memory
+//! of the system: of the processor on one thread, and by the clock on all processors. A rival is measured where `python3`, or the Python of
+//! `WETCLUTCH_PYTHON`, has it; what it decodes must have the same sums. `-- LOG --only columns` (or `arrays`, `merged`) reads once, for a
+//! profiler.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark")]
 
@@ -16,7 +17,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use libdeflater::Decompressor;
-use logs::{Column, Log, OpenOptions, Quality};
+use logs::{Arrays, Column, Log, OpenOptions, Quality};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 const TRIES: usize = 25;
@@ -45,7 +46,7 @@ fn main() {
 fn job_of(name: &str) -> fn(&Path) -> usize {
     match name {
         "columns" => columns,
-        "kept" => |path| kept(path).len(),
+        "arrays" => |path| arrays(path, 1).blocks.len(),
         _ => merged,
     }
 }
@@ -76,19 +77,22 @@ fn measure(path: &Path) {
         show("the same with flate2 (zlib-rs)", fastest(|| blocks.iter().map(&mut inflate).sum::<usize>()).1);
     }
     show("all channels in columns, some thousand records at once", columns_s);
-    let (channels, kept_s) = fastest(|| kept(path));
-    show("all channels in columns, each kept as arrays of times and of values", kept_s);
-    let fresh = || channels.iter().flat_map(|(times_s, values)| [vec![1.0; times_s.len()], vec![1.0; values.len()]]);
-    let fresh = || black_box(fresh().collect::<Vec<Vec<f64>>>()).len();
+    let (read, arrays_s) = fastest(|| arrays(path, 1));
+    show("all channels as whole arrays of times and of values", arrays_s);
+    let (_, arrays_by_clock_s) = fastest_by(by_clock_s, || arrays(path, processors()));
+    show("the same on all processors, by the clock", arrays_by_clock_s);
+    let lengths = || read.blocks.iter().flat_map(|block| vec![block.times_s.len(); 1 + block.columns.len()]);
+    let fresh = || black_box(lengths().map(|length| vec![1.0; length]).collect::<Vec<Vec<f64>>>()).len();
     show("memory for these arrays alone: fresh, and written once", fastest(fresh).1);
     if path.extension().is_some_and(|ending| ending == "parquet") {
         show("pages of all columns, read and unpacked alone", fastest(|| pages(path)).1);
     }
-    let sum = channels.iter().map(|(_, values)| values.iter().filter(|value| value.is_finite()).sum::<f64>()).sum();
+    let columns = || read.blocks.iter().flat_map(|block| &block.columns);
+    let sum = columns().map(|column| column.values.iter().filter(|value| value.is_finite()).sum::<f64>()).sum();
     let (count_merged, merged_s) = fastest(|| merged(path));
     show("all channels, merged in time order", merged_s);
     assert_eq!(count_merged, samples);
-    let Some([rival_s, rival_sum, inflate_s]) = rival(path) else {
+    let Some([rival_s, rival_by_clock_s, rival_sum, inflate_s]) = rival(path) else {
         println!("no rival: no Python with asammdf and pyarrow (WETCLUTCH_PYTHON names one)");
         return;
     };
@@ -97,7 +101,11 @@ fn measure(path: &Path) {
         show("decompression of the blocks alone, with the library of the rival", inflate_s);
     }
     show("the rival (asammdf, pyarrow): all channels, each as an array of values, and the times", rival_s);
-    for (what, seconds) in [("columns", columns_s), ("kept columns", kept_s), ("merged", merged_s)] {
+    show("the same on all processors, by the clock", rival_by_clock_s);
+    let by_clock = ("whole arrays on all processors", arrays_by_clock_s, rival_by_clock_s);
+    let on_one = [("columns", columns_s), ("whole arrays", arrays_s), ("merged", merged_s)];
+    for (what, seconds, rival_s) in on_one.map(|(what, seconds)| (what, seconds, rival_s)).into_iter().chain([by_clock])
+    {
         println!("the rival takes {:.2} times as long as {what}", rival_s / seconds);
     }
 }
@@ -107,13 +115,22 @@ fn is_same(one: f64, other: f64) -> bool {
     (one - other).abs() <= 1e-9 * one.abs().max(1.0)
 }
 
-/// The result of a job and its least time, s.
-fn fastest<T>(mut job: impl FnMut() -> T) -> (T, f64) {
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The result of a job and its least time of the processor, s.
+fn fastest<T>(job: impl FnMut() -> T) -> (T, f64) {
+    fastest_by(used_s, job)
+}
+
+/// The result of a job and its least time by a clock, s.
+fn fastest_by<T>(clock: fn(Instant) -> f64, mut job: impl FnMut() -> T) -> (T, f64) {
     let start = Instant::now();
     let mut timed = || {
-        let began_s = used_s(start);
+        let began_s = clock(start);
         let result = job();
-        (result, used_s(start) - began_s)
+        (result, clock(start) - began_s)
     };
     let first = timed();
     (1..TRIES).fold(first, |best, _| {
@@ -132,6 +149,10 @@ fn used_s(start: Instant) -> f64 {
         used.tv_sec as f64 + 1e-9 * used.tv_nsec as f64
     }
     #[cfg(not(unix))]
+    start.elapsed().as_secs_f64()
+}
+
+fn by_clock_s(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
@@ -160,22 +181,10 @@ fn present(column: &Column) -> usize {
     }
 }
 
-/// Reads all channels in columns and keeps their times and values.
-fn kept(path: &Path) -> Vec<(Vec<f64>, Vec<f64>)> {
+/// Reads all channels as whole arrays.
+fn arrays(path: &Path, threads: usize) -> Arrays {
     let (mut log, all) = opened(path);
-    let mut columns = log.columns(&all).unwrap();
-    let mut channels = vec![(Vec::new(), Vec::new()); all.len()];
-    while let Some(block) = columns.next_block().unwrap() {
-        for (i, column) in block.columns.iter().enumerate() {
-            let (times_s, values) = &mut channels[column.channel];
-            // Times stand once for all channels of a group, as the rival has them: with the first of them.
-            if i == 0 {
-                times_s.extend_from_slice(&block.times_s);
-            }
-            values.extend_from_slice(&column.values);
-        }
-    }
-    channels
+    log.arrays(&all, threads).unwrap()
 }
 
 /// Reads and unpacks the pages of a Parquet file, without their numbers; how many bytes they have.
@@ -211,8 +220,9 @@ fn deflated(bytes: &[u8]) -> Vec<(&[u8], usize)> {
     blocks.map(|at| (&bytes[at + HEADER..at + HEADER + number(at + 40)], number(at + 32))).collect()
 }
 
-/// Time of the rival, s, the sum of what it decoded, and the time of its decompression alone, s; that is 0 where there is none.
-fn rival(path: &Path) -> Option<[f64; 3]> {
+/// Time of the rival on one thread, s, and on all by the clock, s, the sum of what it decoded, and the time of its decompression alone, s; that
+/// is 0 where there is none.
+fn rival(path: &Path) -> Option<[f64; 4]> {
     let python = std::env::var_os("WETCLUTCH_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let output = Command::new(python).arg(RIVAL).arg(path).arg(TRIES.to_string()).output().ok()?;
     let text = String::from_utf8(output.stdout).ok().filter(|_| output.status.success())?;

@@ -113,26 +113,29 @@ impl<'a> Field<'a> {
         })
     }
 
-    /// The numbers of some records, in place of those that the column has, and what they are worth.
+    /// Appends the numbers of some records, and what they are worth.
     pub(super) fn fill(&self, records: &Window<'_>, tile: &mut Tile, column: &mut Column) {
+        let first = column.values.len();
         self.decode(records, tile, &mut column.values);
-        column.qualities.clear();
-        let is_finite = self.is_always_finite || are_finite(&column.values);
+        let is_finite = self.is_always_finite || are_finite(&column.values[first..]);
         let invalid = match self.invalid {
             Invalid::Bit(at, bit) => Some((at, bit)),
             Invalid::Never => None,
             Invalid::Always => {
-                column.qualities.resize(records.count, Some(Quality::Invalid));
+                column.qualities_from(first).resize(first + records.count, Some(Quality::Invalid));
                 return;
             }
         };
         if is_finite && invalid.is_none() {
+            column.all_good();
             return;
         }
         let of = |value: &f64| Some(if value.is_finite() { Quality::Good } else { Quality::Missing });
-        column.qualities.extend(column.values.iter().map(of));
+        let worth: Vec<_> = column.values[first..].iter().map(of).collect();
+        let qualities = column.qualities_from(first);
+        qualities.extend(worth);
         if let Some((at, bit)) = invalid {
-            for (i, quality) in column.qualities.iter_mut().enumerate() {
+            for (i, quality) in qualities[first..].iter_mut().enumerate() {
                 if records.byte(i, at) >> bit & 1 == 1 {
                     *quality = Some(Quality::Invalid);
                 }
@@ -140,9 +143,8 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The numbers of some records.
+    /// Appends the numbers of some records.
     pub(super) fn decode(&self, records: &Window<'_>, tile: &mut Tile, values: &mut Vec<f64>) {
-        values.clear();
         values.reserve(records.count);
         for from in (0..records.count).step_by(TILE) {
             let count = TILE.min(records.count - from);
@@ -275,19 +277,20 @@ fn is_by_text(channel: &MdfChannel) -> bool {
 #[cfg(test)]
 mod tests {
     use std::fs::File;
+    use std::sync::Mutex;
 
     use falcon_mdf::write::WriteCodec;
     use falcon_mdf::{Mf4File, Mf4Writer, SignalValues};
     use rand_pcg::Pcg64Mcg;
     use rand_pcg::rand_core::{Rng, SeedableRng};
 
-    use super::super::numbers;
+    use super::super::group::numbers;
     use super::super::records::Records;
     use super::*;
     use crate::columns::Memory;
 
     /// Records of a time and sixteen random bytes.
-    fn random(codec: Option<WriteCodec>) -> (Mf4File, File) {
+    fn random(codec: Option<WriteCodec>) -> (Mf4File, Mutex<File>) {
         let mut generator = Pcg64Mcg::seed_from_u64(7);
         let times: Vec<f64> = (0..3 * TILE + 5).map(|i| i as f64).collect();
         let mut writer = Mf4Writer::new();
@@ -300,7 +303,7 @@ mod tests {
         }
         let path = std::env::temp_dir().join(format!("wetclutch-fields-{}.mf4", std::process::id()));
         writer.write_to_file(&path).unwrap();
-        let open = (Mf4File::open(&path).unwrap(), File::open(&path).unwrap());
+        let open = (Mf4File::open(&path).unwrap(), Mutex::new(File::open(&path).unwrap()));
         let _ = std::fs::remove_file(path);
         open
     }
@@ -331,11 +334,14 @@ mod tests {
                 channel.conversion = conversions[case / 6 % 3].clone();
                 let Some(field) = Field::of(&channel, group, 0) else { continue };
                 let mut records = Records::of(&blocks, data, group).unwrap();
-                let (mut memory, mut values, mut found) = (Memory::default(), Vec::new(), Vec::new());
+                let (mut memory, mut found) = (Memory::default(), Vec::new());
                 // Some records at once, of which the last are fewer.
-                while let Some(window) = records.next(TILE + 3, &mut memory).unwrap() {
-                    field.decode(&window, &mut tile, &mut values);
-                    found.extend_from_slice(&values);
+                loop {
+                    let count = records.ready(&mut memory).unwrap().min(TILE + 3);
+                    if count == 0 {
+                        break;
+                    }
+                    field.decode(&records.take(count, &memory), &mut tile, &mut found);
                 }
                 let expected = numbers(&file.signal(&channel).unwrap()).unwrap();
                 let is_same =

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
+use std::sync::{Mutex, PoisonError};
 
 use falcon_mdf::blocks::data_block::CompressionType;
 use falcon_mdf::data_index::DataBlockInfo;
@@ -102,7 +103,7 @@ struct Mixed {
 
 /// The records of a group, read block by block.
 pub(super) struct Records<'a> {
-    file: &'a File,
+    file: &'a Mutex<File>,
     blocks: &'a [DataBlockInfo],
     /// Bytes of the first of them that were read: it is not packed, and long.
     read: usize,
@@ -130,13 +131,8 @@ impl<'a> Records<'a> {
     }
 
     /// The records of a group; none where its blocks are in a form that the library must read.
-    pub(super) fn of(file: &'a File, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
+    pub(super) fn of(file: &'a Mutex<File>, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
         let blocks = data.block_index().blocks();
-        let is_known = |block: &DataBlockInfo| {
-            let is_known =
-                |algorithm| matches!(algorithm, CompressionType::Deflate | CompressionType::TransposedDeflate);
-            block.invalidation_block.is_none() && block.compression.is_none_or(|with| is_known(with.algorithm))
-        };
         let id_bytes = data.rec_id_size();
         let (layout, size) = if data.is_unsorted() {
             let of =
@@ -147,7 +143,7 @@ impl<'a> Records<'a> {
         } else {
             (Layout::Sorted, group.record_size(id_bytes))
         };
-        (size > 0 && blocks.iter().all(is_known)).then(|| Self {
+        (size > 0 && blocks.iter().all(can_unpack)).then(|| Self {
             file,
             blocks,
             read: 0,
@@ -166,19 +162,29 @@ impl<'a> Records<'a> {
         })
     }
 
-    /// The next records, at most so many; none at the end. The memory is that of the calls before.
-    pub(super) fn next<'m>(&mut self, most: usize, memory: &'m mut Memory) -> Result<Option<Window<'m>>, String> {
+    /// How many records there are at most, as far as the file says it.
+    pub(super) fn most(&self) -> usize {
+        let bytes = self.blocks.iter().fold(0_u64, |bytes, block| bytes.saturating_add(block.original_size));
+        usize::try_from(self.count.min(bytes / self.size as u64)).unwrap_or(usize::MAX)
+    }
+
+    /// How many records can be taken now, at least one; zero at the end. The memory is that of the calls before.
+    pub(super) fn ready(&mut self, memory: &mut Memory) -> Result<usize, String> {
         while self.given == self.held {
             if let Some(damage) = self.damage.take() {
                 self.blocks = &[];
                 return Err(damage);
             }
             if self.index == self.count || !self.next_block(memory)? {
-                return Ok(None);
+                return Ok(0);
             }
         }
         let left = usize::try_from(self.count - self.index).unwrap_or(usize::MAX);
-        let count = most.min(self.held - self.given).min(left);
+        Ok(left.min(self.held - self.given))
+    }
+
+    /// The next records: at most as many as are ready, out of the same memory.
+    pub(super) fn take<'m>(&mut self, count: usize, memory: &'m Memory) -> Window<'m> {
         let window = Window {
             bytes: &memory.unpacked[..self.length],
             stride: if self.is_planes { self.held } else { self.size },
@@ -187,9 +193,9 @@ impl<'a> Records<'a> {
             count,
             index: self.index,
         };
-        self.given = if count == left { self.held } else { self.given + count };
+        self.given += count;
         self.index += count as u64;
-        Ok(Some(window))
+        window
     }
 
     /// Reads the next bytes and finds the records in them; false at the end.
@@ -197,6 +203,14 @@ impl<'a> Records<'a> {
         let Some((block, others)) = self.blocks.split_first() else { return Ok(false) };
         (self.given, self.held, self.is_planes) = (0, 0, false);
         let place = |message: String| format!("block at byte {}: {message}", block.offset);
+        if let Some(invalid) = block.invalidation_block.as_deref() {
+            let data = self.whole(block).map_err(place)?;
+            let invalid =
+                self.whole(invalid).map_err(|message| format!("block at byte {}: {message}", invalid.offset))?;
+            self.blocks = others;
+            self.divide(&side_by_side(block, &data, &invalid), unpacked);
+            return Ok(true);
+        }
         match block.compression {
             None => {
                 let size = usize::try_from(block.original_size).unwrap_or(usize::MAX);
@@ -220,7 +234,7 @@ impl<'a> Records<'a> {
                     (self.is_planes, self.held) = (is_transposed, self.length / self.size);
                     self.rest.extend_from_slice(&bytes[self.held * self.size..]);
                 } else if is_transposed {
-                    let rows = in_rows(bytes, columns).ok_or_else(|| place("it has no columns".to_owned()))?;
+                    let rows = in_rows(bytes, columns).map_err(place)?;
                     self.divide(&rows, unpacked);
                 } else {
                     packed.clear();
@@ -230,6 +244,22 @@ impl<'a> Records<'a> {
             }
         }
         Ok(true)
+    }
+
+    /// The bytes of a block, unpacked and row by row.
+    fn whole(&mut self, block: &DataBlockInfo) -> Result<Vec<u8>, String> {
+        let (mut packed, mut bytes) = (Vec::new(), Vec::new());
+        let Some(with) = block.compression else {
+            read(self.file, block.offset + HEAD, block.original_size, &mut bytes)?;
+            return Ok(bytes);
+        };
+        read(self.file, with.data_offset, block.compressed_size, &mut packed)?;
+        let length = inflate(&mut self.inflater, &packed, block.original_size, &mut bytes)?;
+        bytes.truncate(length);
+        match with.algorithm {
+            CompressionType::TransposedDeflate => in_rows(&bytes, with.parameter as usize),
+            _ => Ok(bytes),
+        }
     }
 
     /// Finds the records in these bytes, behind what was left of those before, and keeps what is less than one.
@@ -284,8 +314,16 @@ impl Mixed {
     }
 }
 
+/// Whether a block is not packed, or deflated.
+fn can_unpack(block: &DataBlockInfo) -> bool {
+    let is_known = |algorithm| matches!(algorithm, CompressionType::Deflate | CompressionType::TransposedDeflate);
+    block.compression.is_none_or(|with| is_known(with.algorithm))
+        && block.invalidation_block.as_deref().is_none_or(can_unpack)
+}
+
 /// Reads bytes of the file, in place of what is in `bytes`.
-fn read(mut file: &File, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
+fn read(file: &Mutex<File>, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
+    let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
     let of_file = file.metadata().map_err(|error| error.to_string())?.len();
     let end = at.checked_add(length).filter(|end| *end <= of_file);
     end.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
@@ -318,9 +356,9 @@ fn inflate(inflater: &mut Decompressor, packed: &[u8], size: u64, memory: &mut V
     }
 }
 
-/// The bytes of a transposed block row by row; what is less than a row stands behind them. None without columns.
-fn in_rows(transposed: &[u8], columns: usize) -> Option<Vec<u8>> {
-    let rows = transposed.len().checked_div(columns)?;
+/// The bytes of a transposed block row by row; what is less than a row stands behind them.
+fn in_rows(transposed: &[u8], columns: usize) -> Result<Vec<u8>, String> {
+    let rows = transposed.len().checked_div(columns).ok_or("it has no columns")?;
     let (planes, tail) = transposed.split_at(rows * columns);
     let mut bytes = vec![0; planes.len()];
     if rows > 0 {
@@ -334,5 +372,12 @@ fn in_rows(transposed: &[u8], columns: usize) -> Option<Vec<u8>> {
         }
     }
     bytes.extend_from_slice(tail);
-    Some(bytes)
+    Ok(bytes)
+}
+
+/// Records of which a block and the one with its invalidation bits hold a part each.
+fn side_by_side(block: &DataBlockInfo, data: &[u8], invalid: &[u8]) -> Vec<u8> {
+    let (data_bytes, invalid_bytes) = (block.data_bytes.max(1) as usize, block.inval_bytes.max(1) as usize);
+    let both = data.chunks_exact(data_bytes).zip(invalid.chunks_exact(invalid_bytes));
+    both.flat_map(|(data, invalid)| data.iter().chain(invalid)).copied().collect()
 }

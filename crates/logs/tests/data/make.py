@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes the files of this folder with the libraries that others use.
 
-    pip install asammdf python-can cantools pyarrow && python make.py
+    pip install asammdf python-can cantools pyarrow polars && python make.py
 
 The tests read the files and know the formulas below, so they need no Python. `formulas` is stated again in
 `tests/formats.rs`; nothing here comes from our own readers. Versions that made the files stand in `made_with.txt`.
@@ -15,6 +15,7 @@ import asammdf
 import can
 import cantools
 import numpy as np
+import polars
 import pyarrow as pa
 import pyarrow.parquet as pq
 from asammdf import MDF, Signal
@@ -231,6 +232,10 @@ def parquet():
     pq.write_table(table, HERE / "snappy.parquet", row_group_size=16)
     pq.write_table(table, HERE / "gzip.parquet", compression="gzip", use_dictionary=False, data_page_version="2.0")
     pq.write_table(table, HERE / "lz4.parquet", compression="lz4")
+    # Zstandard is what polars takes by itself.
+    pq.write_table(table, HERE / "zstd.parquet", compression="zstd")
+    pq.write_table(table.slice(0, 0), HERE / "no_rows.parquet")
+    polars.from_arrow(table).write_parquet(HERE / "polars.parquet")
     stamps = table.set_column(0, "when", pa.array(i * 10_000, pa.timestamp("us")))
     pq.write_table(stamps, HERE / "stamps.parquet", compression="none")
     types()
@@ -262,5 +267,5 @@ if __name__ == "__main__":
     mdf()
     bus()
     parquet()
-    versions = {"asammdf": asammdf.__version__, "python-can": can.__version__, "cantools": cantools.__version__, "pyarrow": pa.__version__}
+    versions = {"asammdf": asammdf.__version__, "python-can": can.__version__, "cantools": cantools.__version__, "pyarrow": pa.__version__, "polars": polars.__version__}
     (HERE / "made_with.txt").write_text("".join(f"{name} {version}\n" for name, version in versions.items()))

@@ -16,7 +16,7 @@ use logs::{
 use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use study::shift_estimates::is_refused;
-use trace::{CsvRows, Following, LastLine, TraceError, signal};
+use trace::{CsvRows, Following, LastLine, TraceError, shown_path, signal};
 
 use super::Messages;
 use super::watched::{WatchedColumn, WatchedColumns};
@@ -335,10 +335,11 @@ pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
         _ => None,
     };
     let Some(delimiter) = delimiter else { return error.into() };
-    let path = path.display();
+    let given = path.display();
     Failure::Input(format!(
-        "{path}: the columns are separated by `{}`, which is read by a channel map only\n\
-         hint: `wetclutch inspect {path} --suggest > map.toml` writes one; check it, then add --map map.toml",
+        "{}: the columns are separated by `{}`, which is read by a channel map only\n\
+         hint: `wetclutch inspect {given} --suggest > map.toml` writes one; check it, then add --map map.toml",
+        shown_path(path),
         delimiter.escape_debug()
     ))
 }
@@ -358,7 +359,7 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
     Err(Failure::Input(format!(
         "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
          hint: if the time is in {unit}, {hint}",
-        path.display()
+        shown_path(path)
     )))
 }
 

@@ -16,7 +16,7 @@ use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_wor
 use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
 use study::log::FIRST_LOOK;
-use trace::Cell;
+use trace::{Cell, shown_path};
 
 use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
@@ -142,8 +142,8 @@ pub(in crate::commands) fn check_ratios(rows: [u64; 2], vehicle: &Path, log: &Pa
     }
     let [all, unfit] = rows;
     Err(Failure::Input(format!(
-        "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\n         hint: check the units of both speeds, the gear, and whether this is the vehicle file of the car",
-        log.display(),
+        "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\nhint: check the units of both speeds, the gear, and whether this is the vehicle file of the car",
+        shown_path(log),
         vehicle.display()
     )))
 }
