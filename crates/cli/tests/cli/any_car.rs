@@ -180,6 +180,39 @@ fn lost_repeated_and_late_readings_of_a_drive_are_no_error() {
     assert!(!estimates.contains("NaN") && !estimates.contains("inf"));
 }
 
+#[test]
+fn a_drive_without_a_wheel_speed_has_not_lost_it() {
+    let folder = simulated("no-wheel-car");
+    let text = folder.read("sim/short_measured.csv");
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let at = names.iter().position(|name| *name == "wheel_speed_rad_s").unwrap();
+    let without = |line: &str| {
+        let cells: Vec<&str> =
+            line.split(',').enumerate().filter(|(cell, _)| *cell != at).map(|(_, cell)| cell).collect();
+        cells.join(",") + "\n"
+    };
+    folder.write("log.csv", text.lines().map(without).collect::<String>());
+    // It stays away from the middle on.
+    let half = text.lines().count() / 2;
+    let stays_away = |(row, line): (usize, &str)| match row < half {
+        true => format!("{line}\n"),
+        false => {
+            line.split(',')
+                .enumerate()
+                .map(|(cell, value)| if cell == at { "" } else { value })
+                .collect::<Vec<_>>()
+                .join(",")
+                + "\n"
+        }
+    };
+    folder.write("away.csv", text.lines().enumerate().map(stays_away).collect::<String>());
+    for (log, is_lost) in [("log.csv", false), ("away.csv", true)] {
+        said(&estimate(&folder, log, &["-o", &folder.path("out.csv")]));
+        assert_eq!(folder.read("out.csv").contains("channel_lost"), is_lost, "{log}");
+        assert_eq!(folder.read("out_shifts.csv").contains("lost"), is_lost, "{log}");
+    }
+}
+
 /// A table with the cells of a column changed.
 fn with_column(table: &str, column: &str, mut change: impl FnMut(&str) -> String) -> String {
     let at = table.lines().next().unwrap().split(',').position(|name| name == column).unwrap();

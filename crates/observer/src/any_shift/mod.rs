@@ -210,6 +210,8 @@ pub struct AnyShiftState<T> {
     reported: Option<(T, T)>,
     /// The newest readings of turbine, output and wheel.
     newest: [Option<Newest<T>>; SPEEDS],
+    /// Whether a wheel speed ever came: a car without one has not lost it.
+    wheel_came: bool,
     running: Option<Running<T>>,
     /// Whether it has run before and lost its state.
     lost: bool,
@@ -323,6 +325,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             engine: None,
             reported: None,
             newest: [None; SPEEDS],
+            wheel_came: false,
             running: None,
             lost: false,
             unfit: 0,

@@ -144,6 +144,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 && Newest::take(newest, reading.value, self.age_and_late(sensor, &reading), sensor.deviation_rad_s);
             *health = if taken { ChannelHealth::Good } else { ChannelHealth::Refused };
         }
+        state.wheel_came |= input.wheel_rad_s.is_some();
+        if !state.wheel_came {
+            channels.wheel = ChannelHealth::Unused;
+        }
     }
 
     /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.

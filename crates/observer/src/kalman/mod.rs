@@ -127,8 +127,6 @@ pub struct KalmanState<T> {
     engine: Option<Engine<T>>,
     /// The newest readings of turbine, output and wheel: value, and age in s.
     newest: [Option<(T, T)>; 3],
-    /// Whether a wheel speed ever came: a log without one has not lost it.
-    wheel_came: bool,
     /// Which of turbine and output stood back when both came last. Every such step changes it, so that it is the same in any
     /// precision.
     turn: usize,
@@ -199,7 +197,6 @@ impl<T: Real> Estimator<T> for KalmanFilter<T> {
             supervisor: SupervisorState::new(),
             engine: None,
             newest: [None; 3],
-            wheel_came: false,
             turn: TURBINE,
             running: None,
             learnt: None,
@@ -326,7 +323,6 @@ impl<T: Real> KalmanFilter<T> {
         if let Some(running) = &mut state.running {
             running.squared_innovations = [None; 3];
         }
-        state.wheel_came |= input.wheel_rad_s.is_some();
         let skipped = self.skipped(state, input);
         health[TURBINE] = self.take_speed::<TURBINE>(state, input.turbine_rad_s, skipped != Some(TURBINE));
         health[OUTPUT] = self.take_speed::<OUTPUT>(state, input.output_rad_s, skipped != Some(OUTPUT));
@@ -353,9 +349,6 @@ impl<T: Real> KalmanFilter<T> {
             if self.uncertainty.output_least_rad_s == T::infinity() {
                 health[WHEEL] = ChannelHealth::Unused;
             }
-        }
-        if !state.wheel_came {
-            health[WHEEL] = ChannelHealth::Unused;
         }
         health
     }
