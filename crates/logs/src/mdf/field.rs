@@ -61,6 +61,23 @@ pub(super) struct Field<'a> {
     is_always_finite: bool,
 }
 
+/// A call of [`Field::decode_tiles`], to be compiled for several kinds of processor.
+struct Decode<'d> {
+    field: &'d Field<'d>,
+    records: &'d Window<'d>,
+    tile: &'d mut Tile,
+    values: &'d mut Vec<f64>,
+}
+
+impl pulp::WithSimd for Decode<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.field.decode_tiles(self.records, self.tile, self.values);
+    }
+}
+
 impl<'a> Field<'a> {
     /// The number of a channel in the records of its group, which begin with `id_bytes` of an identifier. None where it is not a plain
     /// number at a fixed place: the library must decode it.
@@ -143,8 +160,14 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Appends the numbers of some records.
+    /// Appends the numbers of some records, with the widest words of the processor.
     pub(super) fn decode(&self, records: &Window<'_>, tile: &mut Tile, values: &mut Vec<f64>) {
+        pulp::Arch::new().dispatch(Decode { field: self, records, tile, values });
+    }
+
+    // All that this calls is compiled for several kinds of processor, and therefore always inlined.
+    #[inline(always)]
+    fn decode_tiles(&self, records: &Window<'_>, tile: &mut Tile, values: &mut Vec<f64>) {
         values.reserve(records.count);
         for from in (0..records.count).step_by(TILE) {
             let count = TILE.min(records.count - from);
@@ -165,6 +188,7 @@ impl<'a> Field<'a> {
     }
 
     /// Its bytes of this weight and the next one, of the records from `from` on.
+    #[inline(always)]
     fn quarter<'w>(&self, records: &Window<'_>, from: usize, weight: usize, words: &'w mut [u16]) -> &'w [u16] {
         let place = |weight: usize| {
             let is_there = weight < self.bytes;
@@ -175,6 +199,7 @@ impl<'a> Field<'a> {
     }
 
     /// Its four bytes from this weight on.
+    #[inline(always)]
     fn half<'w>(
         &self,
         records: &Window<'_>,
@@ -198,6 +223,7 @@ impl<'a> Field<'a> {
     }
 
     /// All its bytes.
+    #[inline(always)]
     fn whole<'w>(&self, records: &Window<'_>, from: usize, count: usize, tile: &'w mut Tile) -> &'w [u64] {
         let words = &mut tile.whole[..count];
         match (self.bytes, self.big_endian) {
@@ -217,6 +243,7 @@ impl<'a> Field<'a> {
     }
 
     /// Numbers of at most 16 bits.
+    #[inline(always)]
     fn short(&self, words: &[u16], values: &mut Vec<f64>) {
         let (up, down) = (16 - self.bits - self.shift, 16 - self.bits);
         match self.kind {
@@ -229,6 +256,7 @@ impl<'a> Field<'a> {
     }
 
     /// Numbers of at most 32 bits.
+    #[inline(always)]
     fn middle(&self, words: &[u32], values: &mut Vec<f64>) {
         let (up, down) = (32 - self.bits - self.shift, 32 - self.bits);
         match self.kind {
@@ -245,6 +273,7 @@ impl<'a> Field<'a> {
     }
 
     /// Numbers of at most 64 bits.
+    #[inline(always)]
     fn long(&self, words: &[u64], values: &mut Vec<f64>) {
         let (up, down) = (64 - self.bits - self.shift, 64 - self.bits);
         #[expect(clippy::cast_precision_loss, reason = "a double keeps 53 bits")]
@@ -256,6 +285,7 @@ impl<'a> Field<'a> {
     }
 
     /// Applies the conversion; where it makes text, the numbers before it.
+    #[inline(always)]
     fn convert(&self, numbers: impl Iterator<Item = f64>, values: &mut Vec<f64>) {
         match self.conversion {
             Conversion::None => values.extend(numbers),

@@ -44,6 +44,7 @@ impl Window<'_> {
     }
 
     /// Takes a number of `N` bytes at `at` out of each record from `from` on; false where its bytes do not stand together.
+    #[inline(always)]
     pub(super) fn gather<const N: usize, W>(
         &self,
         from: usize,
@@ -64,6 +65,7 @@ impl Window<'_> {
     }
 
     /// Makes words of two bytes of each record from `from` on, the lower one first; zero for a byte that is not there.
+    #[inline(always)]
     pub(super) fn pair(&self, from: usize, places: [Option<usize>; 2], words: &mut [u16]) {
         let from = self.first + from;
         let (start, step) = if self.is_planes { (from, 1) } else { (from * self.stride, self.stride) };
@@ -81,6 +83,7 @@ impl Window<'_> {
 }
 
 /// Makes words of low and high bytes.
+#[inline(always)]
 fn of_pairs<'b>(words: &mut [u16], pairs: impl Iterator<Item = (&'b u8, &'b u8)>) {
     words.iter_mut().zip(pairs).for_each(|(word, (low, high))| *word = u16::from_le_bytes([*low, *high]));
 }
