@@ -48,20 +48,8 @@ impl ParquetLog {
         }
         let leaves: Vec<ColumnDescPtr> = reader.metadata().file_metadata().schema_descr().columns().to_vec();
         let titles: Vec<String> = leaves.iter().map(|leaf| leaf.path().string()).collect();
-        let names: Vec<(String, String)> = titles
-            .iter()
-            .zip(&leaves)
-            .map(|(title, leaf)| {
-                let (name, mut unit) = split_unit(title);
-                if unit.is_empty() {
-                    unit = stamp_unit(leaf)
-                        .map(str::to_owned)
-                        .or_else(|| Unit::of_name(&name).map(|unit| unit.name.to_owned()))
-                        .unwrap_or_default();
-                }
-                (name, unit)
-            })
-            .collect();
+        let names: Vec<(String, String)> =
+            titles.iter().zip(&leaves).map(|(title, leaf)| name_and_unit(title, leaf)).collect();
         let mut notes = Vec::new();
         // A column of time stamps is the time where no name says so.
         let stamps = (0..leaves.len()).find(|&i| stamp_unit(&leaves[i]).is_some());
@@ -136,6 +124,17 @@ fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
         false => "",
     };
     LogError::damaged(path, position, format!("{error}{hint}"))
+}
+
+/// Name and unit of a column: by its title, by what it holds, or by the end of its name.
+fn name_and_unit(title: &str, leaf: &ColumnDescPtr) -> (String, String) {
+    let (name, unit) = split_unit(title);
+    if !unit.is_empty() {
+        return (name, unit);
+    }
+    let by_name = || Unit::of_name(&name).map(|unit| unit.name);
+    let unit = stamp_unit(leaf).or_else(by_name).unwrap_or_default().to_owned();
+    (name, unit)
 }
 
 /// The unit of a column of time stamps, or of times of the day.
