@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
 use crate::{TraceError, signal, units};
 
@@ -199,6 +200,9 @@ impl CsvRows {
 /// The number in a cell: NaN where it is empty, none where it holds something else.
 #[inline]
 pub fn number(cell: &[u8]) -> Option<f64> {
+    if let Some(number) = decimal::plain(cell) {
+        return Some(number);
+    }
     let cell = match cell {
         [first, .., last] if *first > b' ' && *last > b' ' => cell,
         _ => cell.trim_ascii(),
