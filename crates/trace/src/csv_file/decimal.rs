@@ -1,4 +1,4 @@
-//! Numbers in the plain form that tables mostly have: a sign or none, up to seven digits, a point, and digits.
+//! Numbers in the plain form that tables mostly have: a sign or none, up to seven digits, and a point with digits behind it or none.
 //!
 //! Eight digits are read at once: each byte of a word holds one of them, the first one the lowest. What has another form is left to
 //! a library, which gives the very same number for this form too.
@@ -10,13 +10,16 @@ pub(super) fn plain(cell: &[u8]) -> Option<f64> {
         [b'-', text @ ..] => (true, text),
         text => (false, text),
     };
-    let (first, last) = (word(text.first_chunk()?), word(text.last_chunk()?));
-    let whole = first_point(first);
-    let places = text.len().checked_sub(whole + 1)?;
-    if !(1..=7).contains(&whole) || !(1..=16).contains(&places) || whole + places > MOST_DIGITS {
+    let (first, last) = ends(text)?;
+    let whole = first_point(first).min(text.len());
+    // None behind the point, or behind a whole number.
+    let places = text.len() - (whole + 1).min(text.len());
+    if !(1..=7).contains(&whole) || places > 16 || whole + places > MOST_DIGITS {
         return None;
     }
-    let digits = if places <= 8 {
+    let digits = if places == 0 {
+        beginning(first, whole)?
+    } else if places <= 8 {
         let (power, last) = (POWERS[places], ending(last, places)?);
         beginning(first, whole)? * power + last
     } else {
@@ -46,13 +49,29 @@ const POWERS: [u64; MOST_DIGITS] = {
 /// A byte in each place of a word.
 const EACH: u64 = 0x0101_0101_0101_0101;
 
-#[inline]
+#[inline(always)]
 fn word(bytes: &[u8; 8]) -> u64 {
     u64::from_le_bytes(*bytes)
 }
 
+/// The first eight letters and the last eight. Of a shorter text, zeros stand behind it and before it.
+#[inline(always)]
+fn ends(text: &[u8]) -> Option<(u64, u64)> {
+    if let (Some(first), Some(last)) = (text.first_chunk(), text.last_chunk()) {
+        return Some((word(first), word(last)));
+    }
+    let first = if let (Some(first), Some(last)) = (text.first_chunk(), text.last_chunk()) {
+        u64::from(u32::from_le_bytes(*first)) | u64::from(u32::from_le_bytes(*last)) << (8 * (text.len() - 4))
+    } else {
+        let (middle, last) = (text.len() / 2, text.len().checked_sub(1)?);
+        let at = |place: usize| u64::from(text[place]) << (8 * place);
+        at(0) | at(middle) | at(last)
+    };
+    Some((first, first << (8 * (8 - text.len()))))
+}
+
 /// The place of the first point among eight letters; 8 without one.
-#[inline]
+#[inline(always)]
 fn first_point(letters: u64) -> usize {
     let differs = letters ^ (EACH * b'.' as u64);
     // The lowest mark is of a byte that is zero; higher ones need not be.
@@ -61,7 +80,7 @@ fn first_point(letters: u64) -> usize {
 }
 
 /// The number of the first so many of eight letters, at most 8; none if they are not all digits.
-#[inline]
+#[inline(always)]
 fn beginning(letters: u64, count: usize) -> Option<u64> {
     // Zeros stand before them; what is behind them leaves the word. In two steps, as there may be nothing to keep.
     let half = 32 - 4 * count;
@@ -69,14 +88,14 @@ fn beginning(letters: u64, count: usize) -> Option<u64> {
 }
 
 /// The number of the last so many of eight letters, from 1 to 8; none if they are not all digits.
-#[inline]
+#[inline(always)]
 fn ending(letters: u64, count: usize) -> Option<u64> {
     let kept = u64::MAX << (64 - 8 * count);
     number((letters ^ (EACH * b'0' as u64)) & kept)
 }
 
 /// The number of eight digits, each a byte; none if a byte is none.
-#[inline]
+#[inline(always)]
 fn number(digits: u64) -> Option<u64> {
     if (digits.wrapping_add(EACH * (0x80 - 10)) | digits) & (0x80 * EACH) != 0 {
         return None;
@@ -89,7 +108,7 @@ fn number(digits: u64) -> Option<u64> {
 }
 
 /// The digits over a power of ten, rounded once to the nearest number.
-#[inline]
+#[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "whole, or rounded once")]
 fn quotient(digits: u64, places: usize) -> f64 {
     let power = POWERS[places];
@@ -162,16 +181,30 @@ mod tests {
     }
 
     #[test]
+    fn short_numbers_are_plain_too() {
+        let cases = [
+            ("0", 0.0),
+            ("7.", 7.0),
+            ("-1", -1.0),
+            ("1.5", 1.5),
+            ("123", 123.0),
+            ("0.003", 0.003),
+            ("9999999", 9_999_999.0),
+            ("1234567.", 1_234_567.0),
+        ];
+        for (text, number) in cases {
+            assert_eq!(plain(text.as_bytes()), Some(number), "{text}");
+        }
+    }
+
+    #[test]
     fn any_other_form_is_left_to_the_library() {
         let others = [
             "",
             "-",
             ".",
-            "1",
-            "1.5",
             "12345678",
             "12345678.5",
-            "123456.",
             ".1234567",
             "1234.5e3",
             "12.34567e-3",
@@ -193,6 +226,14 @@ mod tests {
             "12.345678\u{ff10}",
             "infinity",
             "0.0000000000000000001",
+            ".5",
+            "-.5",
+            "1e5",
+            "nan",
+            "1 ",
+            " 1",
+            "+1",
+            "1,5",
         ];
         for text in others {
             assert_eq!(plain(text.as_bytes()), None, "{text}");
@@ -209,8 +250,8 @@ mod tests {
                 let random = bits(&mut state);
                 cell[random as usize % 19] = LETTERS[(random >> 32) as usize % LETTERS.len()];
             }
-            let from = bits(&mut state) as usize % 12;
-            let cell = &cell[from.min(1)..19 - from.min(10)];
+            let random = bits(&mut state) as usize;
+            let cell = &cell[random % 2..19 - random / 2 % 18];
             if let Some(found) = plain(cell) {
                 let text = std::str::from_utf8(cell).unwrap();
                 assert!(!text.contains(['e', '+']), "{text}");

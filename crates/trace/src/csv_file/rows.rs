@@ -200,13 +200,13 @@ impl CsvRows {
 /// The number in a cell: NaN where it is empty, none where it holds something else.
 #[inline]
 pub fn number(cell: &[u8]) -> Option<f64> {
-    if let Some(number) = decimal::plain(cell) {
-        return Some(number);
-    }
-    let cell = match cell {
-        [first, .., last] if *first > b' ' && *last > b' ' => cell,
-        _ => cell.trim_ascii(),
-    };
+    decimal::plain(cell).or_else(|| of_any_form(cell))
+}
+
+/// The same of a number with an exponent, one without a point, or one between spaces.
+#[inline(never)]
+fn of_any_form(cell: &[u8]) -> Option<f64> {
+    let cell = cell.trim_ascii();
     if cell.is_empty() {
         return Some(f64::NAN);
     }
