@@ -113,19 +113,9 @@ mod tests {
     use observer::{ChannelHealth, Channels, Estimate, Input, Phase, Reading};
 
     fn sample(time_s: f64, engine_rad_s: f64, health: Health) -> LogSample {
-        let none = None::<Reading<f64>>;
         LogSample {
             time_s,
-            input: Input {
-                dt_s: 0.01,
-                engine_rad_s: Some(Reading::now(engine_rad_s)),
-                turbine_rad_s: none,
-                output_rad_s: none,
-                wheel_rad_s: none,
-                command: none,
-                offgoing_command: none,
-                engine_torque_n_m: none,
-            },
+            input: Input { engine_rad_s: Some(Reading::now(engine_rad_s)), ..Input::none(0.01) },
             estimate: Estimate {
                 pressure_pa: 1.0,
                 clutch_torque_n_m: 0.0,
@@ -135,8 +125,8 @@ mod tests {
                 channels: Channels::all(ChannelHealth::Good),
                 bounds: None,
             },
-            pressure_pa: none,
-            torque_n_m: none,
+            pressure_pa: None,
+            torque_n_m: None,
         }
     }
 
