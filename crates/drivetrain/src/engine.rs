@@ -22,6 +22,13 @@ impl<T: Real> Engine<T> {
         self.torque_n_m.at(speed_rad_s, throttle)
     }
 
+    /// Largest torque of the map, N m.
+    pub fn largest_torque(&self) -> T {
+        let (speeds, throttles) = (self.torque_n_m.rows(), self.torque_n_m.columns());
+        let all = speeds.iter().flat_map(|speed| throttles.iter().map(|throttle| self.torque(*speed, *throttle)));
+        all.fold(T::neg_infinity(), |largest, torque| largest.at_least(torque))
+    }
+
     /// Angular acceleration against the pump torque, rad/s^2, Eq. (2.3).
     #[inline]
     pub fn acceleration(&self, speed_rad_s: T, torque_n_m: T, pump_torque_n_m: T) -> T {
@@ -39,6 +46,7 @@ mod tests {
         let engine = Engine { inertia_kg_m2: 0.2, drag_n_m_s: 0.05, torque_n_m };
         let torque = engine.torque(100.0, 0.5);
         assert_eq!(torque, 95.0);
+        assert_eq!(engine.largest_torque(), 200.0);
         // (95 - 40 - 5) N m on 0.2 kg m^2.
         assert_eq!(engine.acceleration(100.0, torque, 40.0), 250.0);
     }

@@ -1,5 +1,6 @@
 //! How many shifts of which kind a log has, and how many of them a fit of one shift uses.
 
+use drivetrain::ShiftKind;
 use logs::{Direction, Load};
 
 /// Shifts of a log by direction and load.
@@ -12,7 +13,7 @@ pub struct ShiftKinds {
     power_off_upshifts: usize,
     power_on_downshifts: usize,
     /// Power-off, and those of which no channel tells.
-    coasting_downshifts: usize,
+    coast_downshifts: usize,
     downshifts: usize,
 }
 
@@ -23,7 +24,7 @@ impl ShiftKinds {
             (Direction::Up, Load::PowerOff) => &mut self.power_off_upshifts,
             (Direction::Up, _) => &mut self.upshifts[usize::from(!is_used)],
             (Direction::Down, Load::PowerOn) => &mut self.power_on_downshifts,
-            (Direction::Down, Load::PowerOff) => &mut self.coasting_downshifts,
+            (Direction::Down, Load::PowerOff) => &mut self.coast_downshifts,
             (Direction::Down, Load::Unknown) => &mut self.downshifts,
         };
         *place += 1;
@@ -39,7 +40,7 @@ impl ShiftKinds {
             (&mut self.unknown_load, more.unknown_load),
             (&mut self.power_off_upshifts, more.power_off_upshifts),
             (&mut self.power_on_downshifts, more.power_on_downshifts),
-            (&mut self.coasting_downshifts, more.coasting_downshifts),
+            (&mut self.coast_downshifts, more.coast_downshifts),
             (&mut self.downshifts, more.downshifts),
         ];
         pairs.into_iter().for_each(|(sum, count)| *sum += count);
@@ -57,15 +58,15 @@ impl ShiftKinds {
         let mut text = format!(
             "shifts used: {} of {}",
             self.upshifts[0],
-            named(&[(self.upshifts[0] + self.upshifts[1], "power-on upshift")])
+            named(&[(self.upshifts[0] + self.upshifts[1], ShiftKind::PowerOnUp.name())])
         );
         if self.unknown_load > 0 {
             text += &format!(" ({} of them by direction alone: no channel tells the load)", self.unknown_load);
         }
         let others = named(&[
-            (self.power_off_upshifts, "power-off upshift"),
-            (self.power_on_downshifts, "power-on downshift"),
-            (self.coasting_downshifts, "coasting downshift"),
+            (self.power_off_upshifts, ShiftKind::PowerOffUp.name()),
+            (self.power_on_downshifts, ShiftKind::PowerOnDown.name()),
+            (self.coast_downshifts, ShiftKind::CoastDown.name()),
             (self.downshifts, "downshift of unknown load"),
         ]);
         if !others.is_empty() {
@@ -98,7 +99,7 @@ mod tests {
         kinds.add(more);
         let text = kinds.statement();
         let begin = "shifts used: 3 of 4 power-on upshifts (1 of them by direction alone: no channel tells the load). Not used: \
-                     1 power-on downshift, 2 coasting downshifts. The fit";
+                     1 power-on downshift, 2 coast downshifts. The fit";
         assert!(text.starts_with(begin), "{text}");
     }
 }

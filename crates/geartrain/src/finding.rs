@@ -94,6 +94,12 @@ pub enum Fault {
     Capacity { element: String, gear: String, capacity_n_m: f64, wanted_n_m: f64, line_pressure_pa: f64 },
     #[error("the one-way clutch \"{element}\" would have to drive its input side in \"{gear}\"")]
     OneWay { element: String, gear: String },
+    #[error("no gear engages \"{0}\"")]
+    Unused(String),
+    #[error("\"{gear}\" engages the same elements as \"{other}\"")]
+    SameElements { gear: String, other: String },
+    #[error("the ratio of \"{gear}\" is {ratio:.4}, larger than {before_ratio:.4} of \"{before}\" before it")]
+    Order { gear: String, ratio: f64, before: String, before_ratio: f64 },
     #[error("is missing")]
     Missing(&'static str),
     #[error("the mass of the shift between \"{0}\" and \"{1}\" is not positive definite")]
@@ -146,6 +152,9 @@ impl Fault {
                 1e-6 * line_pressure_pa
             ),
             Self::OneWay { .. } => "swap its `input` and `output`, or engage a brake or clutch in its place".to_owned(),
+            Self::Unused(_) => "engage it in a gear, or leave it out: it is open in all of them".to_owned(),
+            Self::SameElements { .. } => "two names of one gear: check `engaged` of both".to_owned(),
+            Self::Order { .. } => "gears are listed from the largest ratio to the smallest, each ratio turbine over output speed".to_owned(),
             Self::Missing(why) => (*why).to_owned(),
             Self::Mass(..) => "`turbine_kg_m2` and `output_kg_m2` are positive and their product is larger than the square of `coupling_kg_m2`".to_owned(),
             Self::None | Self::TooMany { .. } | Self::Number { .. } | Self::InputIsOutput(_) => return None,

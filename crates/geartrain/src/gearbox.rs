@@ -8,6 +8,7 @@ use crate::finding::{Fault, Finding, Part};
 use crate::resolve::{engaged, names, place, positive, train};
 use crate::shift::{Change, Shift, change};
 use crate::train::{GearTrain, NoGear, ZERO};
+use crate::unusual;
 
 /// An element of a gearbox.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +83,7 @@ impl Gearbox {
             positive(Part::Gearbox, "line_pressure_pa", line_pressure_pa)?;
         }
         gearbox.capacities = capacity::check(&gearbox.elements, &gearbox.gears, description.line_pressure_pa)?;
+        gearbox.warnings.extend(unusual::find(&gearbox));
         Ok(gearbox)
     }
 

@@ -17,6 +17,7 @@ mod resolve;
 pub mod shift;
 mod teeth;
 pub mod train;
+mod unusual;
 
 pub use capacity::Capacity;
 pub use description::{

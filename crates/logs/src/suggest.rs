@@ -42,7 +42,7 @@ const TABLE: &[Words] = &[
         role: Role::TurbineSpeed,
         all: &[TURBINE, SPEED],
         none: &["target", "soll", "engine"],
-        exact: &["nt", "n_t", "nturb", "nturbine", "turbinespeed", "turbinendrehzahl", "n_turbine"],
+        exact: &["nt", "n_t", "nin", "n_in", "nturb", "nturbine", "turbinespeed", "turbinendrehzahl", "n_turbine"],
     },
     Words {
         role: Role::OutputSpeed,
@@ -297,6 +297,9 @@ fn elements(channels: &[Channel]) -> Vec<(String, usize)> {
     if keys.len() == found.len() && found.len() >= WHOLE_GEARBOX { found } else { Vec::new() }
 }
 
+/// Unused channels that are named at most; a bus has hundreds.
+const UNUSED: usize = 20;
+
 /// A channel map for a log, as the text of a TOML file. Channels in doubt stand beside it as comments.
 pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     let mut text = String::from("# A first channel map, from names and units alone: check every line.\n");
@@ -339,6 +342,16 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     }
     if !missing.is_empty() {
         let _ = writeln!(text, "\n# No channel was found for: {}", missing.join(", "));
+    }
+    let unused: Vec<String> = channels
+        .iter()
+        .zip(&taken)
+        .filter(|(_, taken)| !**taken)
+        .map(|(channel, _)| error::shown(&channel.name))
+        .collect();
+    if !unused.is_empty() {
+        let more = if unused.len() > UNUSED { ", ..." } else { "" };
+        let _ = writeln!(text, "# Channels that are not used: {}{more}", unused[..unused.len().min(UNUSED)].join(", "));
     }
     text
 }
@@ -447,6 +460,15 @@ mod tests {
             }
             assert_eq!(found.len(), log.iter().filter(|(.., role)| !role.is_empty()).count(), "{found:?}");
         }
+    }
+
+    #[test]
+    fn the_input_of_a_gearbox_is_found_and_unused_channels_are_named() {
+        let text = suggest(&[channel("N_In", "1/min"), channel("I_K1", "mA"), channel("Wiper", "")], None);
+        assert!(text.contains("[channel.turbine_speed]\nname = \"N_In\""), "{text}");
+        assert!(text.ends_with("# Channels that are not used: I_K1, Wiper\n"), "{text}");
+        let many: Vec<Channel> = (0..30).map(|at| channel(&format!("Signal{at}"), "")).collect();
+        assert!(suggest(&many, None).ends_with("Signal19, ...\n"));
     }
 
     #[test]

@@ -159,6 +159,18 @@ impl<T: Real> ShaftMemory<T> {
     pub fn new() -> Self {
         Self { last: None, recent: None, before: None, spring: None, released_s: T::zero() }
     }
+
+    /// Takes in a sample `dt` after the one before; all that was seen since `reach_s` ago, or a little longer.
+    fn look_back(&mut self, now: Span<T>, dt: T, reach_s: T) -> Span<T> {
+        let recent = self.recent.map_or(now, |recent| recent.joined(&now).lasting(recent.length_s + dt));
+        let span = self.before.map_or(recent, |before| before.joined(&recent));
+        if recent.length_s >= reach_s {
+            (self.before, self.recent) = (Some(recent), Some(now));
+        } else {
+            self.recent = Some(recent);
+        }
+        span
+    }
 }
 
 impl<T: Real> Default for ShaftMemory<T> {
@@ -211,21 +223,9 @@ impl<T: Real> ShaftRange<T> {
             return None;
         };
         let dt = sample.dt_s;
-        let recent = memory.recent.map_or(now, |recent| recent.joined(&now).lasting(recent.length_s + dt));
         let reach_s = dt + errors.age_s;
-        let span = memory.before.map_or(recent, |before| before.joined(&recent));
-        if recent.length_s >= reach_s {
-            (memory.before, memory.recent) = (Some(recent), Some(now));
-        } else {
-            memory.recent = Some(recent);
-        }
-
-        // The twist. Readings may be old: what they have not shown yet is taken to be as much again as they showed.
-        let ahead = errors.age_s / reach_s;
-        let output = widened(span.output, ahead, errors.output_rad_s);
-        let scale = errors.wheel_scale * sample.wheel_rad_s.abs();
-        let wheel = widened(span.wheel, ahead, errors.wheel_rad_s + scale);
-        let twist = [line.twist_rate(output[0], wheel[1]), line.twist_rate(output[1], wheel[0])];
+        let span = memory.look_back(now, dt, reach_s);
+        let twist = self.twist_rates(&span, reach_s, sample.wheel_rad_s);
         let ratio = line.final_ratio;
         let turned = twist.map(|rate| line.shaft_stiffness_n_m_rad * rate);
         let damping = twist.map(|rate| line.shaft_damping_n_m_s_rad * rate);
@@ -257,6 +257,17 @@ impl<T: Real> ShaftRange<T> {
         }
         memory.spring = Some(spring);
         Some([spring[0] + damping[0], spring[1] + damping[1]])
+    }
+
+    /// Least and greatest rate of the shafts' twist, rad/s at the wheels. Readings may be old: what they have not shown yet is taken
+    /// to be as much again as they showed.
+    fn twist_rates(&self, span: &Span<T>, reach_s: T, wheel_rad_s: T) -> [T; 2] {
+        let (errors, line) = (&self.errors, &self.driveline);
+        let ahead = errors.age_s / reach_s;
+        let output = widened(span.output, ahead, errors.output_rad_s);
+        let scale = errors.wheel_scale * wheel_rad_s.abs();
+        let wheel = widened(span.wheel, ahead, errors.wheel_rad_s + scale);
+        [line.twist_rate(output[0], wheel[1]), line.twist_rate(output[1], wheel[0])]
     }
 
     /// What the readings leave open between two of them, between which turbine and output speed changed by these.

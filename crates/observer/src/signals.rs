@@ -20,6 +20,11 @@ impl<T: Real> Reading<T> {
     pub fn now(value: T) -> Self {
         Self { value, age_s: T::zero() }
     }
+
+    /// The same reading in another precision.
+    pub fn cast<U: Real>(&self) -> Reading<U> {
+        Reading { value: U::of(self.value.to_f64_exact()), age_s: U::of(self.age_s.to_f64_exact()) }
+    }
 }
 
 /// What came since the step before: of each channel the newest reading, or none. Channels may come at any rate, in any
@@ -47,18 +52,45 @@ pub struct Input<T> {
 }
 
 impl<T: Real> Input<T> {
+    /// A step of this time, s, in which nothing came.
+    pub const fn none(dt_s: T) -> Self {
+        Self {
+            dt_s,
+            engine_rad_s: None,
+            turbine_rad_s: None,
+            output_rad_s: None,
+            wheel_rad_s: None,
+            command: None,
+            offgoing_command: None,
+            engine_torque_n_m: None,
+        }
+    }
+
+    /// The same input in another precision.
+    pub fn cast<U: Real>(&self) -> Input<U> {
+        let to = |reading: Option<Reading<T>>| reading.map(|reading| reading.cast());
+        Input {
+            dt_s: U::of(self.dt_s.to_f64_exact()),
+            engine_rad_s: to(self.engine_rad_s),
+            turbine_rad_s: to(self.turbine_rad_s),
+            output_rad_s: to(self.output_rad_s),
+            wheel_rad_s: to(self.wheel_rad_s),
+            command: to(self.command),
+            offgoing_command: to(self.offgoing_command),
+            engine_torque_n_m: to(self.engine_torque_n_m),
+        }
+    }
+
     /// Readings of every channel at the moment of the step.
     pub fn of_sample(sample: &Sample<T>, shift: &ReducedShift<T>) -> Self {
         let now = |value: T| Some(Reading::now(value));
         Self {
-            dt_s: sample.dt_s,
             engine_rad_s: now(sample.engine_rad_s),
             turbine_rad_s: now(sample.turbine_rad_s),
             output_rad_s: now(shift.output_speed(sample.turbine_rad_s, sample.slip_rad_s)),
             wheel_rad_s: now(sample.wheel_rad_s),
             command: now(sample.command),
-            offgoing_command: None,
-            engine_torque_n_m: None,
+            ..Self::none(sample.dt_s)
         }
     }
 }

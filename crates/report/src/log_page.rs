@@ -5,7 +5,6 @@ use std::path::Path;
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::{Direction, Load, Shift};
 use minijinja::{Value, context};
 use observer::Health;
 use study::shift_estimates::{EstimatedShift, Ranged};
@@ -61,7 +60,7 @@ impl LogPage<'_> {
         let figures = drawn.iter().zip(figures).map(|(shift, svg)| {
             context! {
                 number => shift.number,
-                title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, kind(shift)),
+                title => format!("{}-{}, {}", shift.shift.from, shift.shift.to, shift.shift.kind_name()),
                 at => format!("{:.2}", shift.begin_s()),
                 remark => remark(shift),
                 svg => inline(&svg),
@@ -154,20 +153,6 @@ fn tenth(word: &str) -> Option<(Cow<'_, str>, u8)> {
     }
 }
 
-/// Load and direction in words.
-pub(crate) fn kind_of(shift: &Shift) -> String {
-    let load = match shift.load {
-        Load::PowerOn => "power-on ",
-        Load::PowerOff => "power-off ",
-        Load::Unknown => "",
-    };
-    format!("{load}{}", if shift.direction == Direction::Up { "up" } else { "down" })
-}
-
-fn kind(shift: &ShiftEstimate) -> String {
-    kind_of(&shift.shift)
-}
-
 /// Titles of the table of shifts, and its first rows. Columns that no shift fills are left out.
 pub fn shift_rows(shifts: &[ShiftEstimate], most: usize) -> (Vec<String>, Vec<Vec<String>>) {
     /// A title and its cell.
@@ -175,7 +160,7 @@ pub fn shift_rows(shifts: &[ShiftEstimate], most: usize) -> (Vec<String>, Vec<Ve
     const COLUMNS: &[Column] = &[
         ("#", |s| s.number.to_string()),
         ("shift", |s| format!("{}-{}", s.shift.from, s.shift.to)),
-        ("kind", kind),
+        ("kind", |s| s.shift.kind_name().to_owned()),
         ("begin s", |s| format!("{:.2}", s.begin_s())),
         ("torque phase s", |s| of(s, |e| Some(number(e.torque_phase_s[1] - e.torque_phase_s[0], 2)))),
         ("inertia phase s", |s| match s.estimated.as_ref().and_then(|e| Some(e.lock_up_s? - e.torque_phase_s[1])) {

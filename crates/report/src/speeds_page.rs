@@ -10,7 +10,7 @@ use minijinja::{Value, context};
 use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
-use crate::log_page::{MOST_DRAWN, compact, kind_of, panel, within_bytes};
+use crate::log_page::{MOST_DRAWN, compact, panel, within_bytes};
 use crate::page::{PageError, inline, origin, templates};
 use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
@@ -60,7 +60,7 @@ impl SpeedsPage<'_> {
             .map(|(i, ((shift, torque), svg))| {
                 context! {
                     number => i + 1,
-                    title => format!("{}-{}, {}", shift.from, shift.to, kind_of(shift)),
+                    title => format!("{}-{}, {}", shift.from, shift.to, shift.kind_name()),
                     at => number(shift.start_s(), 2),
                     remark => self.remark(torque.as_ref()),
                     svg => inline(&svg),
@@ -201,7 +201,7 @@ impl SpeedsPage<'_> {
             vec![
                 ("#", (i + 1).to_string()),
                 ("shift", format!("{}-{}", shift.from, shift.to)),
-                ("kind", kind_of(shift)),
+                ("kind", shift.kind_name().to_owned()),
                 ("begin s", number(shift.start_s(), 2)),
                 ("command to gear s", optional(shift.gear_s.zip(shift.command_s).map(|(end, begin)| end - begin), 2)),
                 ("inertia phase s", optional(shift.inertia_s.map(|[from_s, to_s]| to_s - from_s), 2)),

@@ -1,6 +1,6 @@
 //! Whether a Kalman filter is as sure as it may be, and whether it gives the same in single precision.
 
-use observer::{Estimator, Health, Input, KalmanFilter, Phase, Reading};
+use observer::{Estimator, Health, KalmanFilter, Phase};
 use serde::Serialize;
 use trace::{Trace, TraceError, signal};
 
@@ -52,7 +52,7 @@ impl Consistency {
         for ((sample, &truth), &phase) in columns.samples().zip(truth).zip(&phases) {
             let Ok((input, ())) = sample;
             let double = filter.step(&mut double_state, &input);
-            let narrow = single.step(&mut single_state, &narrowed(&input));
+            let narrow = single.step(&mut single_state, &input.cast());
             sums.restarts += u64::from(narrow.health == Health::Restarted && double.health != Health::Restarted);
             if phase == Phase::BeforeShift {
                 continue;
@@ -126,23 +126,5 @@ impl Consistency {
     /// By how much the RMS error in single precision exceeds that in double, as a share.
     pub fn excess_in_single(&self) -> f64 {
         (self.squares_pa2[1] / self.squares_pa2[0]).sqrt() - 1.0
-    }
-}
-
-/// The input in single precision.
-#[expect(clippy::cast_possible_truncation, reason = "single precision is the purpose")]
-fn narrowed(input: &Input<f64>) -> Input<f32> {
-    let reading = |reading: Option<Reading<f64>>| {
-        reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })
-    };
-    Input {
-        dt_s: input.dt_s as f32,
-        engine_rad_s: reading(input.engine_rad_s),
-        turbine_rad_s: reading(input.turbine_rad_s),
-        output_rad_s: reading(input.output_rad_s),
-        wheel_rad_s: reading(input.wheel_rad_s),
-        command: reading(input.command),
-        offgoing_command: reading(input.offgoing_command),
-        engine_torque_n_m: reading(input.engine_torque_n_m),
     }
 }

@@ -451,16 +451,7 @@ fn unhealthy(samples: &[LogSample]) -> Vec<(Health, f64)> {
 mod tests {
     use super::*;
 
-    const NO_INPUT: Input<f64> = Input {
-        dt_s: 0.01,
-        engine_rad_s: None,
-        turbine_rad_s: None,
-        output_rad_s: None,
-        wheel_rad_s: None,
-        command: None,
-        offgoing_command: None,
-        engine_torque_n_m: None,
-    };
+    const NO_INPUT: Input<f64> = Input::none(0.01);
 
     #[test]
     fn friction_work_counts_the_last_reading_from_before_the_shift() {

@@ -1,5 +1,7 @@
 //! `wetclutch check`.
 
+use std::path::Path;
+
 use config::{Car, Drive, Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values, Vehicle};
 use design::{longest_step_of, unstable_corners};
 
@@ -29,6 +31,7 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
             let car = Car::read(&options.file)?;
             let sensors = sensors_or_bench(options.sensors.as_deref())?;
             describe_car(&car)?;
+            warn(&car.implausible());
             describe_car_values(&car, &sensors, options.all)
         }
         Kind::CarStudy => super::study::describe_cars(&options.file),
@@ -36,6 +39,7 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
         Kind::Vehicle => {
             let vehicle = Vehicle::from_source(source)?;
             describe(&vehicle)?;
+            warn(&vehicle.implausible());
             describe_defaults(&vehicle, options.all)
         }
         Kind::Experiment => {
@@ -49,20 +53,13 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
         }
         Kind::Overlay => {
             Vehicle::check_overlay(&source)?;
-            let file = options.file.display();
-            output::line(&format!(
-                "values for a vehicle file, such as the output of `wetclutch error-bound`; all keys are valid in a vehicle file\n\
-                 use: wetclutch design VEHICLE --bounds {file}"
-            ))?;
-            Ok(())
+            let what = "values for a vehicle file, such as the output of `wetclutch error-bound`; all keys are valid in a vehicle file";
+            describe_use(what, "wetclutch design VEHICLE --bounds", &options.file)
         }
         Kind::Sensors => {
             Sensors::read(&options.file)?;
-            let file = options.file.display();
-            output::line(&format!(
-                "sensors of a car\nuse: wetclutch estimate LOG --vehicle VEHICLE --observer kalman --sensors {file}"
-            ))?;
-            Ok(())
+            let command = "wetclutch estimate LOG --vehicle VEHICLE --observer kalman --sensors";
+            describe_use("sensors of a car", command, &options.file)
         }
         Kind::Study => {
             let study = Study::read(&options.file)?;
@@ -71,6 +68,17 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
             describe(&study.vehicle)
         }
     }
+}
+
+/// Says what a file holds that belongs to a command.
+fn describe_use(what: &str, command: &str, file: &Path) -> Result<(), Failure> {
+    output::line(&format!("{what}\nuse: {command} {}", file.display()))?;
+    Ok(())
+}
+
+/// Says what is unusual about a vehicle.
+fn warn(unusual: &[String]) {
+    unusual.iter().for_each(|what| output::note(&format!("warning: {what}")));
 }
 
 fn describe_study(study: &Study) -> Result<(), Failure> {

@@ -11,7 +11,7 @@ use study::any_shift::drive::{ScoredDrive, score_drive};
 use study::any_shift::matrix::Random;
 use study::any_shift::measured::MeasuredRow;
 use study::any_shift::recording::Recording;
-use study::any_shift::tour::drive_tour;
+use study::any_shift::tour::{LeftOut, drive_tour};
 use study::any_shift::{RECORD_S, ShiftDraw};
 use trace::Cell;
 
@@ -46,7 +46,8 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
         }
         None => {
             output::note("driving through all gears, up and down, with power and without");
-            drive_tour(&model, &car, |sample| recording.push(sample), || ())?;
+            let left_out = drive_tour(&model, &car, |sample| recording.push(sample), || ())?;
+            say_left_out(&left_out, &car);
             "Through all gears".to_owned()
         }
     };
@@ -60,6 +61,40 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
         DrivePage { name: &name, car: &car, draw: Some((&draw, options.seed)), drive: &scored, sources: &sources };
     write_text(&folder.join(PAGE), &page.html()?)?;
     print(&scored, &car, &folder.join(PAGE))
+}
+
+/// Says which shifts the car is too slow for.
+fn say_left_out(left_out: &[LeftOut], car: &Car) {
+    let name = |gear: usize| &car.gearbox.gears[gear].name;
+    let shift = |left: &LeftOut| format!("{}-{}", name(left.leg.from), name(left.leg.to));
+    let (mut said, mut behind) = (Vec::new(), Vec::new());
+    for left in left_out {
+        let sentence = match left.speeds_m_s {
+            Some([wanted_m_s, reached_m_s]) => format!(
+                "left out: {}, made at {:.0} km/h, which the car does not get near in gear {}: {:.0} km/h at full throttle",
+                shift(left),
+                3.6 * wanted_m_s,
+                name(left.leg.from),
+                3.6 * reached_m_s
+            ),
+            None => {
+                behind.push(shift(left));
+                continue;
+            }
+        };
+        if !said.contains(&sentence) {
+            said.push(sentence);
+        }
+    }
+    behind.sort_unstable();
+    behind.dedup();
+    if !behind.is_empty() {
+        said.push(format!("left out with it: {}", behind.join(", ")));
+    }
+    if !said.is_empty() {
+        said.push("hint: check mass, ratios, wheel radius, resistance and engine torque; `demo --drive` and `bench --vehicle` need no such speed".to_owned());
+    }
+    said.iter().for_each(|sentence| output::note(sentence));
 }
 
 /// The signals of the drive, as `simulate` writes them.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fit::drive::{DriveRecord, fit_converter};
 use logs::plausibility::likely_time_unit;
-use logs::{ChannelMap, Direction, Inspection, Load, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder};
+use logs::{ChannelMap, Inspection, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder};
 use report::SpeedsPage;
 use trace::units::rpm;
 
@@ -248,15 +248,6 @@ fn notes(readings: &Readings<'_>) -> Vec<String> {
 }
 
 fn row(shift: &Shift) -> Vec<String> {
-    let load = match shift.load {
-        Load::PowerOn => "power-on ",
-        Load::PowerOff => "power-off ",
-        Load::Unknown => "",
-    };
-    let direction = match shift.direction {
-        Direction::Up => "up",
-        Direction::Down => "down",
-    };
     let time = |time_s: Option<f64>| time_s.map_or(String::new(), |time_s| format!("{time_s:.2}"));
     let number =
         |number: Option<f64>, digits: usize| number.map_or(String::new(), |number| format!("{number:.digits$}"));
@@ -264,7 +255,7 @@ fn row(shift: &Shift) -> Vec<String> {
         shift.phases().iter().map(|(phase, [from_s, to_s])| format!("{} {:.2}", phase.name(), to_s - from_s)).collect();
     vec![
         format!("{}-{}", shift.from, shift.to),
-        format!("{load}{direction}"),
+        shift.kind_name().to_owned(),
         phases.join(", "),
         time(shift.command_s),
         time(shift.gear_s),

@@ -155,7 +155,14 @@ fn not_an_input<'a>(output: Option<&PathBuf>, inputs: impl IntoIterator<Item = &
     }
 }
 
-/// The channel map of these options.
+/// The channel map of the options for a log of a car; a map without the radius of the wheels takes that of the car.
+fn channel_map_of_car(options: &Mapping, wheel_radius_m: f64) -> Result<ChannelMap, Failure> {
+    let mut map = channel_map(options)?;
+    map.gearbox.wheel_radius_m.get_or_insert(wheel_radius_m);
+    Ok(map)
+}
+
+/// The channel map of the options.
 fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
     let mut map = match options.map.as_deref() {
         Some(path) => ChannelMap::read(path).map_err(|error| match Source::read(path).and_then(|source| source.kind()) {

@@ -117,7 +117,7 @@ fn an_estimate_ends_with_what_was_done() {
         format!("report: {stem}_report.html"),
     ];
     assert_eq!(said.lines().rev().take(3).collect::<Vec<_>>(), [&*places[2], &places[1], &places[0]]);
-    assert!(said.lines().any(|line| line.starts_with("1  1-2    power-on up     7.70 ")), "{said}");
+    assert!(said.lines().any(|line| line.starts_with("1  1-2    power-on upshift     7.70 ")), "{said}");
 }
 
 #[test]

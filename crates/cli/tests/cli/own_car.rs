@@ -4,7 +4,7 @@ use std::path::Path;
 
 use config::{Car, Vehicle};
 
-use crate::support::{EXPERIMENT, Folder, ROOT, printed, refused, said, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, printed, refused, said, wetclutch};
 
 /// The numbers of the two-speed car.
 const NUMBERS: [&str; 10] = [
@@ -218,4 +218,66 @@ fn a_first_file_of_a_gearbox_that_is_none_is_refused() {
     refused(&init_car(&folder, "car.toml", &["--ratios", "4,2", "--launch", "clutch"]));
     assert!(!std::path::Path::new(&folder.path("car.toml")).exists());
     assert!(!std::path::Path::new(&folder.path("8hp.toml")).exists());
+}
+
+#[test]
+fn check_warns_of_values_that_no_car_has_and_refuses_an_engine_without_torque() {
+    let folder = Folder::new("implausible");
+    let shipped = std::fs::read_to_string(VEHICLE).unwrap();
+    let check = |text: &str| {
+        std::fs::write(folder.path("car.toml"), text).unwrap();
+        wetclutch(&["check", &folder.path("car.toml")])
+    };
+    assert_eq!(said(&check(&shipped)), "");
+    // Stiffness for each degree, mass of a truck.
+    let wrong = shipped.replace("rad = 13000", "rad = 227").replace("mass_kg = 1500 ", "mass_kg = 15000 ");
+    let warned = said(&check(&wrong));
+    assert!(warned.contains("warning: `driveline.shaft_stiffness_n_m_rad`: twist of the drive shafts"), "{warned}");
+    assert!(warned.contains("warning: `tyre.max_force_n`") && warned.matches("hint: ").count() >= 3, "{warned}");
+    let (before, map) = shipped.split_once("torque_n_m = [\n").unwrap();
+    let (_, after) = map.split_once("\n]").unwrap();
+    let rows = "  [0, 0, 0, 0, 0, 0, 0, 0, 0],\n".repeat(12);
+    let message = refused(&check(&format!("{before}torque_n_m = [\n{rows}]{after}")));
+    assert!(
+        message.contains("car.toml:20: `engine.torque.torque_n_m`: no torque of the map is above zero"),
+        "{message}"
+    );
+
+    let gearbox = std::fs::read_to_string(format!("{ROOT}gearboxes/8hp.toml")).unwrap();
+    let idle = gearbox.replace(
+        "  { name = \"5\", engaged = [\"B\", \"C\", \"D\"], stated_ratio = 1.2845",
+        "  { name = \"5\", engaged = [\"B\", \"C\", \"E\"], stated_ratio = 2.1039",
+    );
+    assert_ne!(idle, gearbox);
+    std::fs::write(folder.path("8hp.toml"), idle).unwrap();
+    let warned = said(&wetclutch(&["check", &folder.path("8hp.toml")]));
+    assert!(warned.contains("\"5\" engages the same elements as \"3\""), "{warned}");
+    let warned = said(&check("name = \"car\"\ngearbox = \"8hp.toml\"\n"));
+    assert!(warned.contains("warning: gearbox: \"5\" engages the same elements as \"3\""), "{warned}");
+}
+
+#[test]
+fn a_wheel_speed_in_km_h_takes_the_radius_of_the_vehicle_file() {
+    let folder = Folder::new("radius");
+    let log = simulated(&folder, EXPERIMENT);
+    let estimate = |wheel: &str, out: &str| {
+        let channels = ["engine_speed", "turbine_speed", "output_speed"]
+            .map(|name| format!("[channel.{name}]\nname = \"{name}_rad_s\"\n"));
+        let command = "[channel.oncoming_current]\nname = \"oncoming_current_a\"\n";
+        let map = format!("{}{command}[channel.wheel_speed]\nname = \"wheel_speed_rad_s\"\n{wheel}", channels.concat());
+        std::fs::write(folder.path("map.toml"), map).unwrap();
+        let (map, out) = (folder.path("map.toml"), folder.path(out));
+        said(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--map", &map, "-o", &out]))
+    };
+    // Wheels of 0.3 m: the speed of the car in km/h.
+    estimate("", "rad_s.csv");
+    estimate("unit = \"km/h\"\nscale = 1.08\n", "km_h.csv");
+    let pressures = |name: &str| -> Vec<f64> {
+        let text = folder.read(name);
+        let at = text.lines().next().unwrap().split(',').position(|column| column.contains("pressure_pa")).unwrap();
+        text.lines().skip(1).filter_map(|line| line.split(',').nth(at)?.parse().ok()).collect()
+    };
+    let (one, other) = (pressures("rad_s.csv"), pressures("km_h.csv"));
+    assert!(one.len() == other.len() && one.len() > 500, "{} {}", one.len(), other.len());
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 10.0));
 }

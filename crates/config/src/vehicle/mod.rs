@@ -7,6 +7,7 @@ mod clutch;
 mod fill;
 mod fill_bounds;
 mod gear_train;
+mod plausible;
 mod raw;
 pub mod short;
 mod valves;
@@ -386,6 +387,12 @@ fn engine_map(check: &Check<'_>, raw: &RawEngineMap) -> Result<Table2<f64>, Conf
         }
     }
     let values: Vec<&[f64]> = rows.iter().map(|row| row.get_ref().as_slice()).collect();
+    if !values.is_empty() && values.iter().all(|row| row.iter().all(|torque| *torque <= 0.0)) {
+        let message = "no torque of the map is above zero".to_owned();
+        let hint =
+            "rows are speeds, columns are throttle positions; the last column is that of open throttle, N m".to_owned();
+        return Err(check.meaning(key, raw.torque_n_m.span().start, message, Some(hint)));
+    }
     Table2::new(speed, throttle, &values).map_err(|error| {
         // Axes and rows are as they must be: what is left is the number of rows.
         let message = match error {

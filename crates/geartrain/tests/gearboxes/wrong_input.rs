@@ -355,3 +355,18 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_is_possible_and_seldom_meant_is_a_warning() {
+    assert_eq!(Gearbox::new(&described(two_speed())).unwrap().warnings, []);
+    let mut diagram = two_speed();
+    diagram.elements.push(element("C", HOUSING, "carrier"));
+    diagram.gears.push(gear("3", &["A"]));
+    let warnings = Gearbox::new(&described(diagram)).unwrap().warnings;
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+    assert_finding(&warnings[0], Part::Element(2), "name", &Fault::Unused("C".to_owned()));
+    let same = Fault::SameElements { gear: "3".to_owned(), other: "1".to_owned() };
+    assert_finding(&warnings[1], Part::Gear(2), "engaged", &same);
+    let is_order = |fault: &Fault| matches!(fault, Fault::Order { gear, before, .. } if gear == "3" && before == "2");
+    assert!(is_order(&warnings[2].fault) && warnings[2].fault.hint().is_some(), "{warnings:?}");
+}

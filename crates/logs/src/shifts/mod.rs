@@ -13,6 +13,7 @@ mod quality;
 mod ratio;
 mod track;
 
+use drivetrain::ShiftKind;
 use trace::Quantity;
 
 use crate::map::check_ratios;
@@ -76,6 +77,20 @@ pub struct Shift {
 }
 
 impl Shift {
+    /// Its kind in words, as far as the load is known: `power-on upshift`, or `upshift`.
+    pub fn kind_name(&self) -> &'static str {
+        let (on, off) = match self.direction {
+            Direction::Up => (ShiftKind::PowerOnUp, ShiftKind::PowerOffUp),
+            Direction::Down => (ShiftKind::PowerOnDown, ShiftKind::CoastDown),
+        };
+        match (self.load, self.direction) {
+            (Load::PowerOn, _) => on.name(),
+            (Load::PowerOff, _) => off.name(),
+            (Load::Unknown, Direction::Up) => "upshift",
+            (Load::Unknown, Direction::Down) => "downshift",
+        }
+    }
+
     /// When it began, s: with its command, else with the inertia phase, else with the gear signal.
     pub fn start_s(&self) -> f64 {
         let first = self.command_s.or(self.inertia_s.map(|inertia_s| inertia_s[0]));
@@ -100,7 +115,7 @@ impl Shift {
 
     /// The phases, as far as the times are known, each from one time to another, s.
     ///
-    /// In power-on upshifts and power-off downshifts the torque phase comes before the inertia phase, otherwise after it. The filling of
+    /// In power-on upshifts and coast downshifts the torque phase comes before the inertia phase, otherwise after it. The filling of
     /// the oncoming clutch cannot be told from a torque phase that follows it, nor the torque phase at the end from what the
     /// control unit does until it reports the gear.
     pub fn phases(&self) -> Vec<(ShiftPhase, [f64; 2])> {

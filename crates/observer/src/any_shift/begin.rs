@@ -59,13 +59,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         input: &ShiftInput<T>,
         torque: Option<&turbine::Found<T>>,
     ) -> (Option<Running<T>>, bool) {
-        let (u, line, gear) = (&self.uncertainty, &self.driveline, input.gear);
+        let gear = input.gear;
         let first =
             |k: usize| state.newest[k].filter(|newest| newest.age_s <= T::of(FIRST_S)).map(|newest| newest.value);
         let (Some(turbine), Some(output), Some(torque)) = (first(TURBINE), first(OUTPUT), torque) else {
             return (None, false);
         };
-        if output.abs() <= u.output_least_rad_s {
+        if output.abs() <= self.uncertainty.output_least_rad_s {
             return (None, false);
         }
         let shift = self.tables.shift(gear.from, gear.to).copied().filter(|_| gear.from != gear.to);
@@ -82,10 +82,40 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             return (None, false);
         }
         let phase = if shift.is_some() { phase } else { ShiftPhase::InGear };
-        let shaft = torque.turbine_n_m * ratio * line.final_ratio;
-        let wheel = output / line.final_ratio;
+        let wheel = first(WHEEL).unwrap_or(output / self.driveline.final_ratio);
+        let mut running = Running {
+            x: self.balanced(state, ratio, [output, wheel], torque),
+            gear: gear.from,
+            shift: None,
+            phase: PhaseMemory::new(phase),
+            torques: None,
+            slow_n_m: torque.turbine_n_m,
+            motion: None,
+            rates: [T::zero(); SPEEDS],
+            gates: [Gate::new(GATE); SPEEDS],
+            silent_s: [T::zero(); SPEEDS],
+            misfit: T::one(),
+            before: None,
+        };
+        running.renew_shift();
+        if let Some(shift) = shift {
+            self.enter_shift(&mut running, shift, &state.learnt);
+        }
+        (Some(running), false)
+    }
+
+    /// Mean and covariance in a gear with this ratio, the drive shafts in balance with the torque at the gearbox input.
+    fn balanced(
+        &self,
+        state: &AnyShiftState<T>,
+        ratio: T,
+        [output, wheel]: [T; 2],
+        torque: &turbine::Found<T>,
+    ) -> Gaussian<T> {
+        let u = &self.uncertainty;
+        let shaft = torque.turbine_n_m * ratio * self.driveline.final_ratio;
         let mut mean = [T::zero(); N];
-        (mean[TURBINE], mean[OUTPUT], mean[WHEEL]) = (ratio * output, output, first(WHEEL).unwrap_or(wheel));
+        (mean[TURBINE], mean[OUTPUT], mean[WHEEL]) = (ratio * output, output, wheel);
         (mean[SPRING], mean[LOAD]) = (shaft, shaft);
         let mut deviations = [T::zero(); N];
         deviations[OUTPUT] = self.readings[OUTPUT].deviation_rad_s;
@@ -107,24 +137,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             x.add(SPRING, SPRING, variance * per * per);
             x.add(SPRING, share, variance * per);
         }
-        let mut running = Running {
-            x,
-            gear: gear.from,
-            shift: None,
-            phase: PhaseMemory::new(phase),
-            torques: None,
-            slow_n_m: torque.turbine_n_m,
-            motion: None,
-            rates: [T::zero(); SPEEDS],
-            gates: [Gate::new(GATE); SPEEDS],
-            silent_s: [T::zero(); SPEEDS],
-            misfit: T::one(),
-            before: None,
-        };
-        running.renew_shift();
-        if let Some(shift) = shift {
-            self.enter_shift(&mut running, shift, &state.learnt);
-        }
-        (Some(running), false)
+        x
     }
 }

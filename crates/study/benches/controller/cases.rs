@@ -5,7 +5,7 @@ use std::process::Command;
 
 use config::{Experiment, Vehicle};
 use design::{design_rigid, kalman_filter, range, rigid_observer};
-use observer::{Bounded, Estimator, Input, Reading};
+use observer::{Bounded, Estimator, Input};
 use serde::Serialize;
 use study::sampling::through_sensors;
 use study::{RunColumns, simulate_shift};
@@ -65,24 +65,7 @@ fn readings(vehicle: &Vehicle) -> Vec<Input<f32>> {
     let shift = simulate_shift(vehicle, vehicle, &bench, BEFORE_S).unwrap();
     let seen = through_sensors(&shift, SAMPLE_TIME_S, &bench.sensors.unwrap(), vehicle);
     let columns = RunColumns::of(&seen, vehicle).unwrap();
-    columns.samples().map(|sample| narrowed(&sample.unwrap().0)).collect()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "rounding to the controller's precision is the purpose")]
-fn narrowed(input: &Input<f64>) -> Input<f32> {
-    let to = |reading: Option<Reading<f64>>| {
-        reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })
-    };
-    Input {
-        dt_s: input.dt_s as f32,
-        engine_rad_s: to(input.engine_rad_s),
-        turbine_rad_s: to(input.turbine_rad_s),
-        output_rad_s: to(input.output_rad_s),
-        wheel_rad_s: to(input.wheel_rad_s),
-        command: to(input.command),
-        offgoing_command: to(input.offgoing_command),
-        engine_torque_n_m: to(input.engine_torque_n_m),
-    }
+    columns.samples().map(|sample| sample.unwrap().0.cast()).collect()
 }
 
 impl Case {

@@ -99,6 +99,29 @@ impl TourDriver<'_> {
         Ok(())
     }
 
+    /// Makes a shift at the speed that the car has.
+    fn shift<'n>(
+        &mut self,
+        leg: &Leg,
+        name: impl Fn(usize) -> &'n str,
+        record: &mut impl FnMut(&CarSample),
+    ) -> Result<(), AnyShiftError> {
+        self.hold(leg.throttle, SETTLE_S, record)?;
+        self.run.request(leg.to)?;
+        let until_s = self.run.time_s() + LONGEST_SHIFT_S;
+        // The request becomes a shift in the next control period.
+        self.advance(leg.throttle, 0.0, record)?;
+        while self.run.controller().shift().is_some() {
+            if self.run.time_s() > until_s {
+                let (from, to) = (name(leg.from), name(leg.to));
+                let message = format!("the shift {from}-{to} does not end within {LONGEST_SHIFT_S} s");
+                return Err(CarError::Request(message).into());
+            }
+            self.advance(leg.throttle, 0.0, record)?;
+        }
+        self.hold(leg.throttle, AFTER_S, record)
+    }
+
     /// Brings the car to a speed, or near it; false if it does not get there in time.
     fn reach(&mut self, vehicle_m_s: f64, record: &mut impl FnMut(&CarSample)) -> Result<bool, AnyShiftError> {
         let until_s = self.run.time_s() + LONGEST_APPROACH_S;
@@ -118,18 +141,27 @@ impl TourDriver<'_> {
     }
 }
 
+/// A shift that the car is too slow for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// The shift.
+    pub leg: Leg,
+    /// Speed of the shift, m/s, and the highest that the car reaches in the gear before; `None` where it does not get into that gear.
+    pub speeds_m_s: Option<[f64; 2]>,
+}
+
 /// Drives the car `model`, whose controller knows the car `known`, through the legs and shows every sample to `record`, one every
-/// [`RECORD_S`]. `done` is called after each leg.
+/// [`RECORD_S`]. `done` is called after each leg. A shift whose speed the car does not get near, and those that need the gear behind it,
+/// are left out; they are what is returned.
 ///
 /// # Errors
-/// The gearbox has no shift between two clutches, the car is far from reaching the speed of a shift, a shift does not end, or the
-/// simulation fails.
+/// The gearbox has no shift between two clutches, the car is too slow for all of them, a shift does not end, or the simulation fails.
 pub fn drive_tour(
     model: &CarModel,
     known: &Car,
     mut record: impl FnMut(&CarSample),
     mut done: impl FnMut(),
-) -> Result<(), AnyShiftError> {
+) -> Result<Vec<LeftOut>, AnyShiftError> {
     let tables = ShiftTables::of_car(known, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
     let legs = legs(known, &tables);
     let Some(first) = legs.first() else {
@@ -142,32 +174,36 @@ pub fn drive_tour(
     let state = model.in_gear(first.from, Some(first.to), start_m_s, start.throttle)?;
     let run = CarRun::new(model, known, CarCalibration::STANDARD, first.from, state, (start, RECORD_S))?;
     let mut driver = TourDriver { model, run, throttle: start.throttle };
-    for leg in &legs {
-        driver.run.preselect(Some(leg.to));
-        let name = |gear: usize| known.gearbox.gears[gear].name.clone();
-        let failed = |what: String| AnyShiftError::from(CarError::Request(what));
-        let reached = driver.reach(speed_m_s(leg), &mut record)?;
-        if !reached && driver.run.state().vehicle_m_s < SLOWEST * speed_m_s(leg) {
-            let speed = 3.6 * speed_m_s(leg);
-            return Err(failed(format!(
-                "the car does not reach {speed:.0} km/h in gear {}\nhint: check mass, ratios, wheel radius, resistance and engine torque; `demo --drive` and `bench --vehicle` need no such speed",
-                name(leg.from)
-            )));
-        }
-        driver.hold(leg.throttle, SETTLE_S, &mut record)?;
-        driver.run.request(leg.to)?;
-        let until_s = driver.run.time_s() + LONGEST_SHIFT_S;
-        // The request becomes a shift in the next control period.
-        driver.advance(leg.throttle, 0.0, &mut record)?;
-        while driver.run.controller().shift().is_some() {
-            if driver.run.time_s() > until_s {
-                let (from, to) = (name(leg.from), name(leg.to));
-                return Err(failed(format!("the shift {from}-{to} does not end within {LONGEST_SHIFT_S} s")));
+    let name = |gear: usize| known.gearbox.gears[gear].name.as_str();
+    let (mut gear, mut left_out) = (first.from, Vec::<LeftOut>::new());
+    for &leg in &legs {
+        let tried = left_out.iter().find(|before| [before.leg.from, before.leg.to] == [leg.from, leg.to]);
+        let speeds_m_s = match tried {
+            Some(before) => before.speeds_m_s,
+            None if leg.from != gear => None,
+            None => {
+                driver.run.preselect(Some(leg.to));
+                let wanted_m_s = speed_m_s(&leg);
+                let reached = driver.reach(wanted_m_s, &mut record)?;
+                let now_m_s = driver.run.state().vehicle_m_s;
+                if reached || now_m_s >= SLOWEST * wanted_m_s {
+                    driver.shift(&leg, name, &mut record)?;
+                    gear = leg.to;
+                    done();
+                    continue;
+                }
+                Some([wanted_m_s, now_m_s])
             }
-            driver.advance(leg.throttle, 0.0, &mut record)?;
-        }
-        driver.hold(leg.throttle, AFTER_S, &mut record)?;
-        done();
+        };
+        left_out.push(LeftOut { leg, speeds_m_s });
     }
-    Ok(())
+    if left_out.len() == legs.len() {
+        let [wanted, reached] = left_out[0].speeds_m_s.unwrap_or_default().map(|m_s| 3.6 * m_s);
+        return Err(CarError::Request(format!(
+            "the car reaches {reached:.0} km/h in gear {}, and its first shift needs {wanted:.0} km/h\nhint: check mass, ratios, wheel radius, resistance and engine torque; `demo --drive` and `bench --vehicle` need no such speed",
+            name(first.from)
+        ))
+        .into());
+    }
+    Ok(left_out)
 }

@@ -63,6 +63,35 @@ fn a_weak_car_drives_through_all_its_gears_too() {
     assert!(drive.shifts.iter().all(|shift| shift.quality.complete_s.is_some()));
 }
 
+/// A top gear so long that the engine cannot pull the car to its speed: all other shifts are made.
+#[test]
+fn shifts_that_a_car_is_too_slow_for_are_left_out_and_named() {
+    let mut weak = Car::eight_speed().unwrap();
+    weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.25);
+    let model = CarModel::new(weak.clone()).unwrap();
+    let mut done = 0;
+    let left_out = drive_tour(&model, &weak, |_| (), || done += 1).unwrap();
+    let shifts: Vec<_> = left_out.iter().map(|left| (left.leg.from, left.leg.to, left.speeds_m_s.is_some())).collect();
+    println!("{shifts:?}");
+    assert!(!left_out.is_empty() && done >= 12 && done + left_out.len() == 28, "{done} {shifts:?}");
+    // What is not reached is not shifted down from.
+    for left in &left_out {
+        match left.speeds_m_s {
+            Some([wanted_m_s, reached_m_s]) => assert!(reached_m_s < wanted_m_s, "{left:?}"),
+            None => assert!(
+                left_out
+                    .iter()
+                    .any(|other| other.speeds_m_s.is_some() && other.leg.to <= left.leg.from.max(left.leg.to)),
+                "{left:?}"
+            ),
+        }
+    }
+    weak.engine.torque_n_m = weak.engine.torque_n_m.scaled(0.05);
+    let model = CarModel::new(weak.clone()).unwrap();
+    let none = drive_tour(&model, &weak, |_| (), || ()).unwrap_err().to_string();
+    assert!(none.contains("its first shift needs") || none.contains("stalls"), "{none}");
+}
+
 /// The budget of a car whose pistons have a stroke has limits of the stroke, too.
 #[test]
 fn the_ranges_hold_while_pistons_move() {

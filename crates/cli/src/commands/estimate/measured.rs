@@ -92,17 +92,7 @@ impl Step {
 
     /// Before the first step.
     fn none() -> Self {
-        let input = Input {
-            dt_s: 0.0,
-            engine_rad_s: None,
-            turbine_rad_s: None,
-            output_rad_s: None,
-            wheel_rad_s: None,
-            command: None,
-            offgoing_command: None,
-            engine_torque_n_m: None,
-        };
-        Self::new(f64::NAN, input, 0)
+        Self::new(f64::NAN, Input::none(0.0), 0)
     }
 
     /// A row of a table with the names of the program.

@@ -21,7 +21,7 @@ use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
 
 use crate::args::{Estimate, FormatChoice};
-use crate::commands::{channel_map, check_output, not_an_input};
+use crate::commands::{channel_map_of_car, check_output, not_an_input};
 use crate::failure::Failure;
 use crate::output;
 use crate::signals::stop_then_end;
@@ -106,7 +106,8 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
 }
 
 fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
-    let (vehicle, map) = (Vehicle::read(&options.vehicle)?, channel_map(&options.mapping)?);
+    let vehicle = Vehicle::read(&options.vehicle)?;
+    let map = channel_map_of_car(&options.mapping, vehicle.road.wheel_radius_m)?;
     Ok(Setup { options, vehicle, map, stop: stop(options)? })
 }
 

@@ -16,7 +16,7 @@ use crate::commands::estimate::Messages;
 use crate::commands::estimate::any_car::check_ratios;
 use crate::commands::estimate::any_car::source::{CarReading, CarSource};
 use crate::commands::estimate::sensors;
-use crate::commands::{channel_map, shell_quoted, write_text};
+use crate::commands::{channel_map_of_car, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -89,7 +89,7 @@ fn record(
     ages: ReadingAges,
     bar: &ProgressBar,
 ) -> Result<Recorded, Failure> {
-    let map = channel_map(&options.mapping)?;
+    let map = channel_map_of_car(&options.mapping, car.road.wheel_radius_m)?;
     let mut all = Recorded::default();
     for log in &options.logs {
         bar.set_message(format!("reading {}", log.display()));

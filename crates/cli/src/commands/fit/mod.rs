@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Fit;
 use crate::commands::estimate::observer::sensors;
-use crate::commands::{channel_map, check_output, not_an_input, shell_quoted, write_text};
+use crate::commands::{channel_map_of_car, check_output, not_an_input, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -115,7 +115,7 @@ fn only_a_vehicle_file(output: &Path) -> Result<(), Failure> {
 
 /// The shifts of all logs.
 fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collected, Failure> {
-    let map = channel_map(&options.mapping)?;
+    let map = channel_map_of_car(&options.mapping, vehicle.road.wheel_radius_m)?;
     let mut all = Collected::default();
     for log in &options.logs {
         bar.set_message(format!("reading {}", log.display()));

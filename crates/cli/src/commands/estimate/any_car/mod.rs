@@ -27,7 +27,7 @@ use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::selection::Selection;
 use crate::args::{Estimate, ObserverChoice};
-use crate::commands::{JsonObject, channel_map, write_cells, write_json_list, write_text};
+use crate::commands::{JsonObject, channel_map_of_car, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -62,7 +62,8 @@ impl<'a> CarSetup<'a> {
     pub(super) fn new(options: &'a Estimate) -> Result<Self, Failure> {
         let car = Car::read(&options.vehicle)?;
         let sensors = options.sensors.as_deref().map(sensors).transpose()?;
-        let (tables, map) = (LoggedDrive::tables(&car)?, channel_map(&options.mapping)?);
+        let tables = LoggedDrive::tables(&car)?;
+        let map = channel_map_of_car(&options.mapping, car.road.wheel_radius_m)?;
         Ok(Self { options, car, tables, sensors, map, stop: super::stop(options)? })
     }
 }
