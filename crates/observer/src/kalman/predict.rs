@@ -196,9 +196,8 @@ impl<T: Real> KalmanFilter<T> {
         let fading_s = if running.unfaded_s >= T::of(FADING_S) { running.unfaded_s } else { zero };
         let slip = self.model.shift.oncoming_slip(x[TURBINE], x[OUTPUT]);
         let valve = self.valve.step(settled_pa, x[PRESSURE], dt_s);
-        let per_dt = dt_s.recip();
-        let per_start = valve.psi * per_dt;
-        let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s * per_dt;
+        let per_start = valve.psi / dt_s;
+        let mean_pa = per_start * x[PRESSURE] + valve.drift_integral_pa_s / dt_s;
         let variance = running.covariance.at(PRESSURE, PRESSURE).at_least(zero);
         let (above_pa, slope) = above(mean_pa - clutch.kiss_pressure(), variance);
         let (turbine_n_m, slope_n_m_s) =
