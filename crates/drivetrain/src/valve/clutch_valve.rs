@@ -113,6 +113,17 @@ impl<T: Real> ClutchValve<T> {
         }
     }
 
+    /// Where a pressure is after `dt_s` on its way to `settled_pa`, with the lag at the start.
+    #[inline]
+    pub fn carried(&self, settled_pa: T, pressure_pa: T, dt_s: T) -> T {
+        match self {
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => {
+                settled_pa + (pressure_pa - settled_pa) * (-dt_s / maps.time_constant_s.at(pressure_pa)).exp()
+            }
+            Self::PulseWidth { law, .. } => law.moved(pressure_pa, settled_pa, dt_s),
+        }
+    }
+
     /// Where a pressure is after `dt_s` on its way to `settled_pa`, at the furthest or at the nearest that a factor on its
     /// lag between the two of `lag_factor` allows.
     #[inline]
@@ -170,6 +181,20 @@ mod tests {
             time_constant_s: Table1::constant(0.04),
             gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[1.0e6, 1.4e6, 1.6e6]).unwrap(),
             delay_s: Table1::new(&[0.0, 1.0], &[0.03, 0.01]).unwrap(),
+        }
+    }
+
+    #[test]
+    fn a_pressure_is_carried_to_where_the_step_ends() {
+        let law = PulseWidth { flow_sqrt_pa_s: 12e3, line_pressure_pa: 1e6 };
+        let pulse_width = ClutchValve::PulseWidth { law, delay_s: Table1::constant(0.01) };
+        let high = ClutchValve::NormallyHigh { maps: maps(), zero_pressure_a: 1.1 };
+        for valve in [ClutchValve::Proportional(maps()), high, pulse_width] {
+            for (settled, pressure) in [(0.8e6, 0.1e6), (0.0, 0.6e6), (0.3e6, 0.3e6)] {
+                let step = valve.step(settled, pressure, 0.01);
+                let end = valve.carried(settled, pressure, 0.01);
+                assert!((end - (step.phi * pressure + step.drift_pa)).abs() < 1e-6, "{valve:?}: {end} {step:?}");
+            }
         }
     }
 

@@ -185,13 +185,15 @@ impl<T: Real> Covariance<T> {
                 }
             }
         }
-        // `(F P) F'`.
-        for c in 0..LAWS {
+        // `(F P) F'`, whose columns are what the step makes of the rows of `F P`.
+        for c in 0..PRESSURE {
             let next = step.of(&core::array::from_fn(|i| p[c][i]));
             for (row, next) in p.iter_mut().zip(next).take(c + 1) {
                 row[c] = next;
             }
+            p[c][PRESSURE] = next[PRESSURE];
         }
+        p[PRESSURE][PRESSURE] = step.pressure(p[PRESSURE][PRESSURE], p[PRESSURE][GAIN]);
         self.fade::<OFFGOING>(step.keep);
         self.fade::<SHARE>(step.stay);
         self.fade::<FRICTION>(step.last);

@@ -42,11 +42,12 @@ pub(super) struct Step<T> {
     pub(super) settled_pa: T,
     /// The valve over the step.
     pub(super) valve: ValveStep<T>,
-    pub(super) ratio: T,
+    /// `1/i`.
+    pub(super) per_ratio: T,
     pub(super) stiffness: T,
     pub(super) damping: T,
-    /// Of wheels and vehicle, kg m^2.
-    pub(super) inertia: T,
+    /// `dt/J` of wheels and vehicle, s/(kg m^2).
+    pub(super) per_inertia: T,
     /// What is left of the turbine's share, of the offgoing torque, and of friction and gain.
     pub(super) stay: T,
     pub(super) keep: T,
@@ -71,7 +72,7 @@ impl<T: Real> Step<T> {
     fn implicit(&self, share: T, slope_n_m_s: T) -> Implicit<T> {
         let (one, half, dt) = (T::one(), T::of(0.5), self.dt_s);
         let per_turbine = half * dt * (one + share) * slope_n_m_s;
-        let per_output = half * dt * self.shaft_per_twist() / (self.ratio * self.ratio);
+        let per_output = half * dt * self.shaft_per_twist() * self.per_ratio * self.per_ratio;
         let [t, o] = &self.rows;
         let matrix = [
             [one - per_turbine * t.per_turbine_torque, -per_output * t.per_output_torque],
@@ -86,25 +87,25 @@ impl<T: Real> Step<T> {
     pub(super) fn propagate(&self, x: &[T; N]) -> [T; N] {
         let (one, half, dt) = (T::one(), T::of(0.5), self.dt_s);
         let oncoming = (one + x[FRICTION]) * self.per_pressure * self.above_kiss[0];
-        let twist = x[OUTPUT] / self.ratio - x[WHEEL];
-        let middle = x[WHEEL] + half * dt / self.inertia * (x[SPRING] + self.damping * twist - x[LOAD]);
-        let k = self.shaft_per_twist();
-        let held = x[SPRING] + k * (x[OUTPUT] / self.ratio - middle);
+        let twist = x[OUTPUT] * self.per_ratio - x[WHEEL];
+        let middle = x[WHEEL] + half * self.per_inertia * (x[SPRING] + self.damping * twist - x[LOAD]);
+        let (k, rate) = (self.shaft_per_twist(), x[OUTPUT] * self.per_ratio - middle);
+        let held = x[SPRING] + k * rate;
         let explicit = |row: &AccelerationRow<T>| {
             dt * (row.per_turbine_torque * self.turbine[0] * (one + x[SHARE])
                 + row.per_oncoming_torque * oncoming
                 + row.per_offgoing_torque * x[OFFGOING]
-                + row.per_output_torque / self.ratio * held)
+                + row.per_output_torque * self.per_ratio * held)
         };
         let implicit = self.implicit(x[SHARE], self.turbine[1]);
         let [turbine, output] = implicit.solve([explicit(&self.rows[0]), explicit(&self.rows[1])]);
-        let mean_twist = (x[OUTPUT] + half * output) / self.ratio - middle;
-        let shaft = x[SPRING] + k * mean_twist;
+        let mean_rate = rate + half * self.per_ratio * output;
+        let shaft = x[SPRING] + k * mean_rate;
         let mut next = *x;
         next[TURBINE] = x[TURBINE] + turbine;
         next[OUTPUT] = x[OUTPUT] + output;
-        next[WHEEL] = x[WHEEL] + dt / self.inertia * (shaft - x[LOAD]);
-        next[SPRING] = x[SPRING] + self.stiffness * dt * mean_twist;
+        next[WHEEL] = x[WHEEL] + self.per_inertia * (shaft - x[LOAD]);
+        next[SPRING] = x[SPRING] + self.stiffness * dt * mean_rate;
         next[PRESSURE] = self.valve.phi * x[PRESSURE] + self.valve.drift_pa + self.per_gain() * x[GAIN];
         next[SHARE] = self.stay * x[SHARE];
         next[OFFGOING] = self.keep * x[OFFGOING];
@@ -122,13 +123,14 @@ impl<T: Real> Step<T> {
         let implicit = self.implicit(x[SHARE], slope_n_m_s);
         let [t, o] = &self.rows;
         let per = |t: T, o: T| implicit.solve([dt * t, dt * o]);
-        let per_ratio = self.ratio.recip();
+        let Self { per_ratio, per_inertia, .. } = *self;
+        let half_per_inertia = half * per_inertia;
         Tangent {
             per_ratio,
             half_per_ratio: half * per_ratio,
-            damping: self.damping,
-            per_inertia: dt / self.inertia,
-            half_per_inertia: half * dt / self.inertia,
+            damped: one - half_per_inertia * self.damping,
+            per_inertia,
+            half_per_inertia,
             shaft_per_twist: self.shaft_per_twist(),
             spring_per_twist: self.stiffness * dt,
             per_turbine_torque: per(t.per_turbine_torque, o.per_turbine_torque),
@@ -153,7 +155,8 @@ impl<T: Real> Step<T> {
 pub(super) struct Tangent<T> {
     per_ratio: T,
     half_per_ratio: T,
-    damping: T,
+    /// What the damping leaves of a twist rate until the middle of the step.
+    damped: T,
     per_inertia: T,
     half_per_inertia: T,
     shaft_per_twist: T,
@@ -182,10 +185,9 @@ impl<T: Real> Tangent<T> {
     #[inline(always)]
     pub(super) fn of(&self, x: &[T; COLUMNS]) -> [T; LAWS] {
         let (output, wheel, spring) = (x[OUTPUT], x[WHEEL], x[SPRING]);
-        let by_ratio = output * self.per_ratio;
-        let force = spring + self.damping * (by_ratio - wheel) - x[LOAD];
+        let driving = spring - x[LOAD];
         // The twist rate with the output speed of the start, and the shaft torque with it.
-        let rate = by_ratio - (wheel + self.half_per_inertia * force);
+        let rate = self.damped * (self.per_ratio * output - wheel) - self.half_per_inertia * driving;
         let held = spring + self.shaft_per_twist * rate;
         let turbine_torque = self.turbine_per_share * x[SHARE] + self.turbine_per_speed * x[TURBINE];
         let oncoming = self.oncoming_per_pressure * x[PRESSURE] + self.oncoming_per_friction * x[FRICTION];
@@ -197,14 +199,19 @@ impl<T: Real> Tangent<T> {
         };
         let (by_turbine, by_output) = (by(0), by(1));
         let mean_rate = rate + self.half_per_ratio * by_output;
-        let shaft = spring + self.shaft_per_twist * mean_rate;
         let mut next = [T::zero(); LAWS];
         next[TURBINE] = x[TURBINE] + by_turbine;
         next[OUTPUT] = output + by_output;
-        next[WHEEL] = wheel + self.per_inertia * (shaft - x[LOAD]);
+        next[WHEEL] = wheel + self.per_inertia * (driving + self.shaft_per_twist * mean_rate);
         next[SPRING] = spring + self.spring_per_twist * mean_rate;
-        next[PRESSURE] = self.phi * x[PRESSURE] + self.per_gain * x[GAIN];
+        next[PRESSURE] = self.pressure(x[PRESSURE], x[GAIN]);
         next
+    }
+
+    /// Change of the pressure at the end, of changes of the pressure and of the valve's gain.
+    #[inline(always)]
+    pub(super) fn pressure(&self, pressure: T, gain: T) -> T {
+        self.phi * pressure + self.per_gain * gain
     }
 }
 
@@ -242,10 +249,10 @@ pub(super) mod tests {
             above_kiss: [0.15e6, 0.9],
             settled_pa: 0.23e6,
             valve: ValveStep { phi: 0.78, psi: 0.009, drift_pa: 0.05e6, drift_integral_pa_s: 300.0 },
-            ratio: 3.0,
+            per_ratio: 3.0_f64.recip(),
             stiffness: 13_000.0,
             damping: 20.0,
-            inertia: 137.0,
+            per_inertia: 0.01 / 137.0,
             stay: 0.997,
             keep: 0.75,
             last: 0.999,

@@ -217,10 +217,10 @@ impl<T: Real> KalmanFilter<T> {
             above_kiss: [above_pa, slope * per_start],
             settled_pa,
             valve,
-            ratio: line.final_ratio,
+            per_ratio: line.final_ratio.recip(),
             stiffness: line.shaft_stiffness_n_m_rad,
             damping: line.shaft_damping_n_m_s_rad,
-            inertia: rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2,
+            per_inertia: dt_s / (rigid.road.inertia_at_wheel() + line.wheel_inertia_kg_m2),
             stay: lasting(fading_s, u.turbine_share_s),
             keep: if released { lasting(dt_s, u.offgoing_release_s) } else { one },
             last: lasting(fading_s, u.clutch_s),
@@ -239,7 +239,7 @@ impl<T: Real> KalmanFilter<T> {
         running.motion_pa_s = rate.at_least(running.motion_pa_s * lasting(dt, u.rate_s));
         let shifting = matches!(running.acting, Phase::TorquePhase | Phase::InertiaPhase);
         let released = matches!(running.acting, Phase::InertiaPhase | Phase::AfterShift);
-        let twist_rate = x[OUTPUT] / step.ratio - x[WHEEL];
+        let twist_rate = x[OUTPUT] * step.per_ratio - x[WHEEL];
         let p = &mut running.covariance;
         for k in [TURBINE, OUTPUT] {
             p.add(k, per_10_ms * square(T::of(MODEL_SHARE) * self.readings[k].deviation_rad_s));

@@ -126,8 +126,7 @@ impl<T: Real> ValveModel<T> {
         if (settled_pa - pressure_pa).abs() < T::of(SETTLED_PA) {
             return settled_pa;
         }
-        let step = self.step(settled_pa, pressure_pa, dt_s);
-        step.phi * pressure_pa + step.drift_pa
+        self.valve.carried(settled_pa, pressure_pa, dt_s)
     }
 
     /// The valve over `dt_s` on its way from `pressure_pa` to `settled_pa`.
