@@ -9,7 +9,7 @@ use std::path::Path;
 
 use config::{Car, Source};
 use design::ShiftErrors;
-use drawn::{Case, Drawn, car, city, every_fifth, tables};
+use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
@@ -321,7 +321,7 @@ fn a_measured_pressure_tells_friction_and_gain_apart() {
 #[test]
 fn a_measured_pressure_tells_a_fill_volume() {
     let drawn = Drawn::of(car("eight_speed_stroke.toml"), 2, Case::Usual);
-    let (recorded, truth) = drawn.driven(&city(3));
+    let (recorded, truth) = drawn.driven(&hilly(&city(3), 2));
     let tables = drawn.tables();
     let at = drawn.file.gearbox.elements.iter().position(|element| element.name == "C").unwrap();
     let place = tables.place(at).unwrap();
