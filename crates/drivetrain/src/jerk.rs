@@ -17,6 +17,8 @@ const LEAST: usize = 7;
 const MOST: usize = 40;
 /// Times are sums of periods, and differ in their last digits, s.
 const ROUNDING_S: f64 = 1e-6;
+/// Steps that differ by less are equal, s: in a window of them no time is further than this from even ones.
+const EVEN_S: f64 = 1e-9;
 /// A window is whole if it is no shorter than this share: bins of uneven clocks.
 const WHOLE: f64 = 0.95;
 
@@ -26,6 +28,8 @@ pub struct PeakJerk {
     /// Times, s, and speeds, m/s, of the window, the oldest first.
     points: [(f64, f64); MOST],
     count: usize,
+    /// The newest steps that are equal: their length, s, and how many there are.
+    even: (f64, usize),
     bin: Bin,
     /// Time, acceleration and speed of the integral.
     integral: Option<[f64; 3]>,
@@ -44,7 +48,7 @@ struct Bin {
 impl Default for PeakJerk {
     fn default() -> Self {
         let points = [(0.0, 0.0); MOST];
-        Self { points, count: 0, bin: Bin::default(), integral: None, peak_m_s3: None }
+        Self { points, count: 0, even: (f64::NAN, 0), bin: Bin::default(), integral: None, peak_m_s3: None }
     }
 }
 
@@ -84,16 +88,24 @@ impl PeakJerk {
 
     fn point(&mut self, time_s: f64, speed_m_s: f64) {
         let points = &self.points[..self.count];
-        let old = points.iter().filter(|(old_s, _)| *old_s < time_s - WINDOW_S - ROUNDING_S).count();
+        let old = points.iter().take_while(|(old_s, _)| *old_s < time_s - WINDOW_S - ROUNDING_S).count();
         let out = old.max((self.count + 1).saturating_sub(MOST));
         self.points.copy_within(out..self.count, 0);
         self.count -= out;
+        if let Some((last_s, _)) = self.points[..self.count].last() {
+            let step_s = time_s - last_s;
+            self.even = match self.even {
+                (even_s, steps) if (step_s - even_s).abs() <= EVEN_S => (even_s, steps + 1),
+                _ => (step_s, 1),
+            };
+        }
         self.points[self.count] = (time_s, speed_m_s);
         self.count += 1;
         let points = &self.points[..self.count];
+        let derivative = if self.even.1 + 1 >= self.count { even_second_derivative } else { second_derivative };
         if points.len() >= LEAST
             && time_s - points[0].0 >= WHOLE * WINDOW_S
-            && let Some(jerk) = second_derivative(points)
+            && let Some(jerk) = derivative(points)
         {
             self.peak_m_s3 = Some(self.peak_m_s3.map_or(jerk.abs(), |peak| peak.max(jerk.abs())));
         }
@@ -134,9 +146,34 @@ fn second_derivative(points: &[(f64, f64)]) -> Option<f64> {
     Some(2.0 * quadratic / (half_s * half_s)).filter(|jerk| jerk.is_finite())
 }
 
+/// The same of points at even times. From the middle, in half steps, their squares less the mean square are the weights: two points that
+/// are as far from it have the same one.
+fn even_second_derivative(points: &[(f64, f64)]) -> Option<f64> {
+    let ((first_s, _), (last_s, _)) = (*points.first()?, *points.last()?);
+    #[expect(clippy::cast_precision_loss, reason = "a small count")]
+    let count = points.len() as f64;
+    let squares = count * count - 1.0;
+    let mean = squares / 3.0;
+    let (mut sum, mut from_middle) = (0.0, count - 1.0);
+    for ((_, early), (_, late)) in points.iter().zip(points.iter().rev()).take(points.len() / 2) {
+        sum += (from_middle * from_middle - mean) * (early + late);
+        from_middle -= 2.0;
+    }
+    if points.len() % 2 == 1 {
+        sum -= mean * points[points.len() / 2].1;
+    }
+    // The sum of the weights' squares.
+    let weights = count * squares * (3.0 * count * count - 7.0) / 15.0 - count * mean * mean;
+    let step_s = (last_s - first_s) / (count - 1.0);
+    Some(8.0 * sum / (weights * step_s * step_s)).filter(|jerk| jerk.is_finite())
+}
+
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
+    use std::vec::Vec;
 
     fn peak(step_s: f64, count: i32, speed: impl Fn(f64) -> f64) -> Option<f64> {
         let mut jerk = PeakJerk::default();
@@ -152,6 +189,25 @@ mod tests {
         }
         // Too few speeds, and too short a time.
         assert_eq!((peak(0.1, 100, |t| t * t), peak(0.01, 28, |t| t * t)), (None, None));
+    }
+
+    #[test]
+    fn even_times_have_the_parabola_of_any_times() {
+        for count in LEAST..=MOST {
+            let speed = |i: usize| 30.0 + (0.7 * i as f64).sin() + 1e-3 * (i * i % 17) as f64;
+            let points: Vec<(f64, f64)> = (0..count).map(|i| (100.0 + 0.01 * i as f64, speed(i))).collect();
+            let [even, any] =
+                [even_second_derivative, second_derivative].map(|derivative| derivative(&points).unwrap());
+            assert!((even - any).abs() < 1e-8 * any.abs().max(1.0), "{count}: {even} {any}");
+        }
+        // One step that is longer.
+        let jerk = |late_s: f64| {
+            let mut jerk = PeakJerk::default();
+            let time_s = |i: i32| 0.01 * f64::from(i) + if i > 20 { late_s } else { 0.0 };
+            (0..40).map(time_s).for_each(|t| jerk.speed(t, 3.0 * t * t));
+            jerk.peak_m_s3().unwrap()
+        };
+        assert!([0.0, 1e-3, 5e-3, 8e-8].into_iter().all(|late_s| (jerk(late_s) - 6.0).abs() < 1e-6));
     }
 
     #[test]

@@ -28,8 +28,11 @@ pub const COUPLED: f64 = 0.95;
 /// Roles that are speeds: the first five.
 pub const SPEEDS: usize = 5;
 
-/// The newest value of each speed that is not frozen, rad/s, or m/s of the car.
-pub type Speeds = [Option<f64>; SPEEDS];
+/// The newest value of each speed that is not frozen, rad/s, or m/s of the car; NaN before the first.
+pub type Speeds = [f64; SPEEDS];
+
+/// Before the first values.
+pub const NO_SPEEDS: Speeds = [f64::NAN; SPEEDS];
 
 /// Watches a speed.
 #[derive(Debug, Clone, Copy)]
@@ -81,13 +84,10 @@ impl FrozenSpeed {
             let quanta = if self.quantum.is_finite() { FROZEN_QUANTA * self.quantum / value.abs() } else { 0.0 };
             let limit = share.max(quanta);
             still.frozen = partners(self.role).iter().any(|partner| {
-                match (speeds[*partner as usize], still.others[*partner as usize]) {
-                    (Some(now), Some(then)) => {
-                        let takes_along = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
-                        takes_along && (now - then).abs() > limit * then.abs().max(now.abs())
-                    }
-                    _ => false,
-                }
+                // Without one of both nothing has changed.
+                let (now, then) = (speeds[*partner as usize], still.others[*partner as usize]);
+                let takes_along = self.role != Role::EngineSpeed || then.max(now) > COUPLED * value;
+                takes_along && (now - then).abs() > limit * then.abs().max(now.abs())
             });
         }
         still.frozen

@@ -29,7 +29,7 @@ mod utf16;
 
 pub use columns::{Block, Column, Columns};
 pub use error::LogError;
-pub use frozen::{FrozenSpeed, Speeds};
+pub use frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
 pub use inspect::{ChannelSummary, Inspection, inspect};
 pub use log::{Channel, Log, OpenOptions, TimeColumn, needs_map};
 pub use map::{ChannelMap, Combine, Gearbox, Mapped};

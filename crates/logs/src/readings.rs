@@ -7,7 +7,7 @@
 //! - a speed that stands still while it cannot is not used until it changes, see [`crate::frozen`];
 //! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
-use crate::frozen::{FrozenSpeed, SPEEDS, Speeds};
+use crate::frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Finding, Likely, Seen};
 use crate::samples::{Quality, QualityCounts};
@@ -98,7 +98,7 @@ impl<'a> Readings<'a> {
             pending: Vec::new(),
             sample: None,
             entry: 0,
-            speeds: [None; SPEEDS],
+            speeds: NO_SPEEDS,
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
     }
@@ -227,7 +227,7 @@ impl<'a> Readings<'a> {
             if channels.frozen.is_frozen(value, sample.time_s, &self.speeds) {
                 quality = Quality::Frozen;
             } else {
-                self.speeds[kind as usize] = Some(value);
+                self.speeds[kind as usize] = value;
             }
         }
         channels.counts.push(quality);

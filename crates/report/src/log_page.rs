@@ -289,13 +289,7 @@ fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> F
     let mut shift = shift.clone();
     shift.thin(points.max(1));
     let samples = Samples(&shift.samples);
-    let readings = |i: usize| {
-        samples.measured(&|sample| {
-            let input = &sample.input;
-            let reading = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s][i]?;
-            Some(rpm(reading.value))
-        })
-    };
+    let readings = |i: usize| samples.measured(&|sample| read(sample.speeds_rad_s[i]).map(rpm));
     let speeds = SPEEDS.iter().enumerate().map(|(i, (label, stroke))| Series {
         label: (*label).to_owned(),
         stroke: *stroke,
@@ -321,6 +315,11 @@ fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> F
 
 fn estimate(points: Points) -> Series {
     Series { label: "estimate".to_owned(), stroke: ESTIMATE, points }
+}
+
+/// What was read; NaN stands for nothing.
+fn read(value: f64) -> Option<f64> {
+    (!value.is_nan()).then_some(value)
 }
 
 /// The samples of a shift, as curves.
@@ -388,7 +387,7 @@ impl Samples<'_> {
             CommandKind::Current => "current (A)",
             CommandKind::DutyCycle => "duty cycle (%)",
         };
-        let points = self.measured(&|sample| Some(sample.input.command?.value));
+        let points = self.measured(&|sample| read(sample.command));
         panel(title, 70.0, vec![Series { label: "oncoming valve".to_owned(), stroke: Stroke::SIGNAL, points }])
     }
 }

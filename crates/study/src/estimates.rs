@@ -79,6 +79,15 @@ impl OutputColumn {
         if matches!(self.content, Content::Number(_)) { ColumnKind::Number } else { ColumnKind::Word }
     }
 
+    /// The number that an estimate writes into it, NaN where it has none; none in a column of words.
+    #[inline]
+    pub fn number(&self, estimate: &Estimate<f64>) -> Option<f64> {
+        match self.content {
+            Content::Number(value) => Some(value(estimate).unwrap_or(f64::NAN)),
+            Content::Phase | Content::Health | Content::Reading(_) => None,
+        }
+    }
+
     /// What an estimate writes into it.
     #[inline]
     pub fn cell(&self, estimate: &Estimate<f64>) -> Cell<'static> {

@@ -1,6 +1,6 @@
 //! Frozen speeds of the rows of a table.
 
-use logs::{FrozenSpeed, Role, Speeds};
+use logs::{FrozenSpeed, NO_SPEEDS, Role, Speeds};
 use observer::Reading;
 
 /// The speeds of a row, in the order of [`WATCHED`].
@@ -25,7 +25,7 @@ impl FrozenRows {
     pub(crate) fn new() -> Self {
         Self {
             watched: WATCHED.map(FrozenSpeed::new),
-            newest: Speeds::default(),
+            newest: NO_SPEEDS,
             newest_s: [(f64::NEG_INFINITY, false); WATCHED.len()],
             counts: [(0, 0); WATCHED.len()],
         }
@@ -46,7 +46,7 @@ impl FrozenRows {
                 self.counts[i].1 += 1;
                 *speed = None;
             } else {
-                self.newest[WATCHED[i] as usize] = Some(value);
+                self.newest[WATCHED[i] as usize] = value;
             }
         }
     }

@@ -49,12 +49,10 @@ impl Interval {
 
     /// Joins a sample to it.
     fn take(&mut self, sample: &LogSample) {
-        let LogSample { input, estimate, .. } = sample;
-        let speeds = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
-        for (extremes, reading) in self.speeds_rad_s.iter_mut().zip(speeds) {
-            if let Some(reading) = reading {
-                *extremes = joined(*extremes, [reading.value; 2]);
-            }
+        let LogSample { speeds_rad_s, estimate, .. } = sample;
+        // One that was not read changes nothing.
+        for (extremes, speed) in self.speeds_rad_s.iter_mut().zip(speeds_rad_s) {
+            *extremes = joined(*extremes, [*speed; 2]);
         }
         self.pressure_pa = joined(self.pressure_pa, [estimate.pressure_pa; 2]);
         if let Some(bounds) = estimate.bounds {
@@ -110,22 +108,13 @@ impl Overview {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use observer::{ChannelHealth, Channels, Estimate, Input, Phase, Reading};
+    use observer::{ChannelHealth, Channels, Estimate, Phase};
 
     fn sample(time_s: f64, engine_rad_s: f64, health: Health) -> LogSample {
-        let none = None::<Reading<f64>>;
         LogSample {
             time_s,
-            input: Input {
-                dt_s: 0.01,
-                engine_rad_s: Some(Reading::now(engine_rad_s)),
-                turbine_rad_s: none,
-                output_rad_s: none,
-                wheel_rad_s: none,
-                command: none,
-                offgoing_command: none,
-                engine_torque_n_m: none,
-            },
+            speeds_rad_s: [engine_rad_s, f64::NAN, f64::NAN],
+            command: f64::NAN,
             estimate: Estimate {
                 pressure_pa: 1.0,
                 clutch_torque_n_m: 0.0,
@@ -135,8 +124,8 @@ mod tests {
                 channels: Channels::all(ChannelHealth::Good),
                 bounds: None,
             },
-            pressure_pa: none,
-            torque_n_m: none,
+            pressure_pa: None,
+            torque_n_m: None,
         }
     }
 

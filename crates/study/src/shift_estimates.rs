@@ -16,8 +16,10 @@ use trace::Cell;
 pub struct LogSample {
     /// Time of the step, s.
     pub time_s: f64,
-    /// What the observer was given and did not refuse.
-    pub input: Input<f64>,
+    /// Engine, turbine and output speed, rad/s, as far as they were read and the observer did not refuse them; else NaN.
+    pub speeds_rad_s: [f64; 3],
+    /// Command of the oncoming clutch's valve, A or %, likewise.
+    pub command: f64,
     /// What it estimates.
     pub estimate: Estimate<f64>,
     /// Measured pressure of the oncoming clutch, Pa.
@@ -30,18 +32,21 @@ impl LogSample {
     /// A step with its estimate, without measured pressure and torque. A reading that the observer refused is none: what is said of a shift
     /// follows from the others.
     pub fn new(time_s: f64, input: &Input<f64>, estimate: Estimate<f64>) -> Self {
-        let Channels { engine, turbine, output, wheel, command, offgoing_command, engine_torque } = estimate.channels;
-        let input = Input {
-            dt_s: input.dt_s,
-            engine_rad_s: input.engine_rad_s.filter(|_| !is_refused(engine)),
-            turbine_rad_s: input.turbine_rad_s.filter(|_| !is_refused(turbine)),
-            output_rad_s: input.output_rad_s.filter(|_| !is_refused(output)),
-            wheel_rad_s: input.wheel_rad_s.filter(|_| !is_refused(wheel)),
-            command: input.command.filter(|_| !is_refused(command)),
-            offgoing_command: input.offgoing_command.filter(|_| !is_refused(offgoing_command)),
-            engine_torque_n_m: input.engine_torque_n_m.filter(|_| !is_refused(engine_torque)),
+        let Channels { engine, turbine, output, command, .. } = estimate.channels;
+        let value = |reading: Option<Reading<f64>>, channel: ChannelHealth| match reading {
+            Some(reading) if !is_refused(channel) => reading.value,
+            _ => f64::NAN,
         };
-        Self { time_s, input, estimate, pressure_pa: None, torque_n_m: None }
+        let speeds_rad_s =
+            [value(input.engine_rad_s, engine), value(input.turbine_rad_s, turbine), value(input.output_rad_s, output)];
+        Self {
+            time_s,
+            speeds_rad_s,
+            command: value(input.command, command),
+            estimate,
+            pressure_pa: None,
+            torque_n_m: None,
+        }
     }
 
     /// Whether there is an estimate: none in a gear that the vehicle file does not describe.
@@ -356,16 +361,18 @@ fn mean(values: impl Iterator<Item = Ranged>) -> Option<Ranged> {
 
 /// Torque times slip over time. A channel that is slower than the steps stands for as long as its last reading.
 fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: &ReducedShift<f64>) -> Ranged {
-    let before = |speed: fn(&Input<f64>) -> Option<Reading<f64>>| {
-        let newest = samples[..shift.start].iter().rev().find_map(|sample| speed(&sample.input));
-        newest.map_or(f64::NAN, |reading| reading.value)
-    };
-    let mut turbine_rad_s = before(|input| input.turbine_rad_s);
-    let mut output_rad_s = before(|input| input.output_rad_s);
+    const SPEEDS: [usize; 2] = [1, 2];
+    let mut newest_rad_s = SPEEDS.map(|speed| {
+        let read =
+            samples[..shift.start].iter().rev().map(|sample| sample.speeds_rad_s[speed]).find(|speed| !speed.is_nan());
+        read.unwrap_or(f64::NAN)
+    });
     let mut power = Vec::with_capacity(shift.len());
     for sample in &samples[shift] {
-        turbine_rad_s = sample.input.turbine_rad_s.map_or(turbine_rad_s, |reading| reading.value);
-        output_rad_s = sample.input.output_rad_s.map_or(output_rad_s, |reading| reading.value);
+        for (newest, speed) in newest_rad_s.iter_mut().zip(SPEEDS.map(|speed| sample.speeds_rad_s[speed])) {
+            *newest = if speed.is_nan() { *newest } else { speed };
+        }
+        let [turbine_rad_s, output_rad_s] = newest_rad_s;
         let slip_rad_s = reduced.oncoming_slip(turbine_rad_s, output_rad_s);
         let Ranged { value, range } = torque(sample);
         let ends = range.map(|range| {
@@ -464,11 +471,8 @@ mod tests {
         };
         let sample = |at: u32, turbine: Option<f64>, output: Option<f64>| LogSample {
             time_s: 0.01 * f64::from(at),
-            input: Input {
-                turbine_rad_s: turbine.map(Reading::now),
-                output_rad_s: output.map(Reading::now),
-                ..NO_INPUT
-            },
+            speeds_rad_s: [f64::NAN, turbine.unwrap_or(f64::NAN), output.unwrap_or(f64::NAN)],
+            command: f64::NAN,
             estimate: Estimate { clutch_torque_n_m: 50.0, ..no_estimate() },
             pressure_pa: None,
             torque_n_m: None,

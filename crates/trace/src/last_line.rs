@@ -14,8 +14,9 @@ const LONGEST_LINE: usize = 32 << 20;
 /// Gives the lines of a comma-separated text, without what may be cut of a last line without an end.
 pub struct LastLine {
     input: Box<dyn Read>,
-    /// Bytes that came: those before `given` were given, those before `whole` are of whole lines.
+    /// Bytes that came, up to `filled`: those before `given` were given, those before `whole` are of whole lines.
     bytes: Vec<u8>,
+    filled: usize,
     given: usize,
     whole: usize,
     ended: bool,
@@ -29,33 +30,38 @@ impl LastLine {
     pub fn new(input: Box<dyn Read>) -> (Self, Arc<AtomicBool>) {
         let was_cut = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&was_cut);
-        (Self { input, bytes: Vec::new(), given: 0, whole: 0, ended: false, commas: None, was_cut: flag }, was_cut)
+        let (filled, given, whole) = (0, 0, 0);
+        (Self { input, bytes: Vec::new(), filled, given, whole, ended: false, commas: None, was_cut: flag }, was_cut)
     }
 
     /// Reads more, until there is a whole line or the end.
     fn refill(&mut self) -> io::Result<()> {
-        self.bytes.drain(..self.given);
+        self.bytes.copy_within(self.given..self.filled, 0);
+        self.filled -= self.given;
         (self.given, self.whole) = (0, 0);
         while self.whole == 0 && !self.ended {
-            let before = self.bytes.len();
-            self.bytes.resize(before + READ_AT_ONCE, 0);
-            let read = self.input.read(&mut self.bytes[before..]);
-            self.bytes.truncate(before + read.as_ref().copied().unwrap_or(0));
-            if read? == 0 {
+            let before = self.filled;
+            if self.bytes.len() < before + READ_AT_ONCE {
+                self.bytes.resize(before + READ_AT_ONCE, 0);
+            }
+            let read = self.input.read(&mut self.bytes[before..])?;
+            self.filled += read;
+            let came = &self.bytes[..self.filled];
+            if read == 0 {
                 self.ended = true;
                 if let Some(names) = self.commas {
                     self.take_back(names);
                 }
-                self.whole = self.bytes.len();
+                self.whole = self.filled;
             } else {
-                let end = self.bytes[before..].iter().rposition(|byte| matches!(byte, b'\n' | b'\r'));
+                let end = came[before..].iter().rposition(|byte| matches!(byte, b'\n' | b'\r'));
                 self.whole = end.map_or(0, |end| before + end + 1);
                 if self.commas.is_none() && self.whole > 0 {
-                    let first = self.bytes.split(|byte| matches!(byte, b'\n' | b'\r')).next();
+                    let first = came.split(|byte| matches!(byte, b'\n' | b'\r')).next();
                     self.commas = first.map(commas);
                 }
-                if self.bytes.len() > LONGEST_LINE {
-                    self.whole = self.bytes.len();
+                if self.filled > LONGEST_LINE {
+                    self.whole = self.filled;
                 }
             }
         }
@@ -64,16 +70,18 @@ impl LastLine {
 
     /// Takes what may be cut out of a last line without an end.
     fn take_back(&mut self, names: usize) {
-        if self.bytes.is_empty() {
+        let last_line = &mut self.bytes[..self.filled];
+        if last_line.is_empty() {
             return;
         }
         self.was_cut.store(true, Ordering::Relaxed);
-        let last = self.bytes.iter().rposition(|byte| *byte == b',');
-        match last.filter(|_| commas(&self.bytes) >= names) {
-            None => self.bytes.clear(),
+        let last = last_line.iter().rposition(|byte| *byte == b',');
+        match last.filter(|_| commas(last_line) >= names) {
+            None => self.filled = 0,
             Some(comma) => {
-                self.bytes.truncate(comma + 1);
-                self.bytes.push(b'\n');
+                // There is room for more than the line.
+                self.bytes[comma + 1] = b'\n';
+                self.filled = comma + 2;
             }
         }
     }

@@ -71,6 +71,19 @@ impl TableWriter {
         }
     }
 
+    /// Writes a row that holds numbers, and behind them the words of the row before.
+    ///
+    /// # Errors
+    /// What the file meets, or there is no row before.
+    pub fn numbers(&mut self, time_s: f64, numbers: &[f64]) -> io::Result<()> {
+        match self {
+            Self::Csv(writer) => writer.numbers(time_s, numbers),
+            Self::Parquet(_) | Self::Mdf(_) => {
+                self.row(time_s, numbers.iter().map(|number| Cell::Number(*number)).chain([Cell::SameWords]))
+            }
+        }
+    }
+
     /// Hands the rows so far to the file, where the format allows it.
     ///
     /// # Errors

@@ -25,9 +25,11 @@ const MEDIAN: usize = 5;
 
 /// The middle one of ratios, of which each is a number. Least and greatest take no branches, which noise makes hard to predict.
 fn middle([a, b, c, d, e]: [f64; MEDIAN]) -> f64 {
+    let least = |a: f64, b: f64| if a < b { a } else { b };
+    let most = |a: f64, b: f64| if a > b { a } else { b };
     // Of the greatest of two and two, the less, and of the least the greater: neither can be left out. The other two can.
-    let (low, high) = (a.min(b).max(c.min(d)), a.max(b).min(c.max(d)));
-    low.min(high).max(e.min(low.max(high)))
+    let (low, high) = (most(least(a, b), least(c, d)), least(most(a, b), most(c, d)));
+    most(least(low, high), least(e, most(low, high)))
 }
 
 /// Ratio of turbine and output at one time.
@@ -68,7 +70,7 @@ pub(super) struct RatioWatch {
     turbine: Track,
     /// Output readings for which the turbine speed is still to come.
     outputs: VecDeque<(f64, f64)>,
-    /// The newest points before their middle one is taken, and how many of them there are.
+    /// The newest points before their middle one is taken, each in the place of the oldest, and how many came.
     raw: [Point; MEDIAN],
     raw_count: usize,
     held_outputs: Held,
@@ -143,9 +145,8 @@ impl RatioWatch {
             self.outputs.pop_front();
             let turbine_rad_s = self.turbine.at(time_s, HOLE_S).filter(|rad_s| *rad_s > TURBINE_MIN_RAD_S);
             if let Some(turbine_rad_s) = turbine_rad_s.filter(|_| output_rad_s > OUTPUT_MIN_RAD_S) {
-                self.raw.copy_within(1.., 0);
-                self.raw[MEDIAN - 1] = Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s };
-                self.raw_count = (self.raw_count + 1).min(MEDIAN);
+                self.raw[self.raw_count % MEDIAN] = Point { time_s, ratio: turbine_rad_s / output_rad_s, output_rad_s };
+                self.raw_count += 1;
             } else {
                 // Standstill and holes: what is before is not compared with what comes after.
                 self.raw_count = 0;
@@ -153,10 +154,11 @@ impl RatioWatch {
                     (self.before, self.now) = (None, None);
                 }
             }
-            if self.raw_count == MEDIAN {
-                let ratio = middle(self.raw.map(|point| point.ratio));
-                let output_rad_s = middle(self.raw.map(|point| point.output_rad_s));
-                self.take(Point { ratio, output_rad_s, ..self.raw[MEDIAN / 2] });
+            if self.raw_count >= MEDIAN {
+                let ratio = middle(self.raw.each_ref().map(|point| point.ratio));
+                let output_rad_s = middle(self.raw.each_ref().map(|point| point.output_rad_s));
+                let Point { time_s, .. } = self.raw[(self.raw_count + MEDIAN / 2) % MEDIAN];
+                self.take(Point { time_s, ratio, output_rad_s });
             }
         }
     }

@@ -2,6 +2,7 @@
 //!
 //! They are read and written row by row, so that a file of any length needs the memory of one row.
 
+mod decimal;
 mod records;
 mod rows;
 #[cfg(test)]

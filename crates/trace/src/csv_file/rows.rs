@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
 use crate::{TraceError, signal, units};
 
@@ -199,10 +200,13 @@ impl CsvRows {
 /// The number in a cell: NaN where it is empty, none where it holds something else.
 #[inline]
 pub fn number(cell: &[u8]) -> Option<f64> {
-    let cell = match cell {
-        [first, .., last] if *first > b' ' && *last > b' ' => cell,
-        _ => cell.trim_ascii(),
-    };
+    decimal::plain(cell).or_else(|| of_any_form(cell))
+}
+
+/// The same of a number with an exponent, one without a point, or one between spaces.
+#[inline(never)]
+fn of_any_form(cell: &[u8]) -> Option<f64> {
+    let cell = cell.trim_ascii();
     if cell.is_empty() {
         return Some(f64::NAN);
     }

@@ -99,7 +99,26 @@ impl<W: Write> CsvWriter<W> {
         let mut row = Row::behind(&mut self.rows, &mut self.written, self.before);
         // A chain of cells is faster from within.
         cells.into_iter().for_each(|cell| row.push(cell));
-        let (begin, count, is_whole) = row.finish();
+        let finished = row.finish();
+        self.end_row(finished)
+    }
+
+    /// Writes a row that holds numbers, and behind them the words of the row before.
+    ///
+    /// # Errors
+    /// As [`Self::row`].
+    pub fn numbers(&mut self, time_s: f64, numbers: &[f64]) -> io::Result<()> {
+        let mut row = Row::behind(&mut self.rows, &mut self.written, self.before);
+        row.numbers(time_s, numbers);
+        if row.count < self.columns {
+            row.push(Cell::SameWords);
+        }
+        let finished = row.finish();
+        self.end_row(finished)
+    }
+
+    /// Ends a row that begins here, has so many cells, and has all that the row before should have given.
+    fn end_row(&mut self, (begin, count, is_whole): (usize, usize, bool)) -> io::Result<()> {
         if count != self.columns || !is_whole {
             self.rows.truncate(begin);
             self.written.fill(Written::NONE);
@@ -189,8 +208,16 @@ impl<'a> Row<'a> {
         }
     }
 
+    /// Takes numbers. Those of the row before wait to be copied.
+    #[inline]
+    fn numbers(&mut self, first: f64, others: &[f64]) {
+        for number in std::iter::once(first).chain(others.iter().copied()) {
+            self.push(Cell::Number(number));
+        }
+    }
+
     /// Writes a number that is not the one of the row before.
-    #[inline(never)]
+    #[inline(always)]
     fn number(&mut self, at: usize, number: f64, bits: u64) {
         self.begin_cell(at);
         push_number(self.rows, number);
@@ -225,6 +252,7 @@ impl<'a> Row<'a> {
     }
 
     /// Copies the cells that wait, all before this one.
+    #[inline(never)]
     fn copy_until(&mut self, end: usize) {
         let Some(cells) = self.written.get_mut(self.done..end) else { return };
         let Some(last) = cells.last() else { return };
@@ -251,16 +279,25 @@ pub(super) fn push_number(row: &mut Vec<u8>, number: f64) {
     let size = number.abs();
     let mut digits = zmij::Buffer::new();
     if (1e-5..1e16).contains(&size) {
-        // Of a number of this size the text has no exponent.
+        // Of a number of this size the text has no exponent, and that of a whole one ends with `.0`. To look for it would wait for the text.
         let text = digits.format_finite(number).as_bytes();
-        return push_digits(row, text.strip_suffix(b".0").unwrap_or(text));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "exact if it is whole")]
+        let is_whole = number as i64 as f64 == number;
+        return push_digits(row, &text[..text.len() - if is_whole { 2 } else { 0 }]);
     }
-    if size == 0.0 {
+    push_odd_number(row, number);
+}
+
+/// A number that is zero, none, or of a size whose text may have an exponent.
+#[inline(never)]
+fn push_odd_number(row: &mut Vec<u8>, number: f64) {
+    if number == 0.0 {
         return row.extend_from_slice(if number.is_sign_negative() { b"-0" } else { b"0" });
     }
     if number.is_nan() {
         return;
     }
+    let mut digits = zmij::Buffer::new();
     match digits.format(number).split_once('e') {
         None => row.extend_from_slice(digits.format(number).as_bytes()),
         Some((mantissa, exponent)) => push_expanded(row, mantissa, exponent.parse().unwrap_or(0)),

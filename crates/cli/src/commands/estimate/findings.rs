@@ -4,11 +4,13 @@ use config::Vehicle;
 use logs::Role;
 use observer::{ChannelHealth, Estimate as Sample, Health};
 use report::tables::{health_meaning, phase_name};
+use study::log::FIRST_LOOK;
 use study::{ErrorScore, Passages};
 use trace::units;
 
 use super::measured::Step;
 use super::ratios::Ratios;
+use super::watched::is_looked_at;
 use crate::failure::Failure;
 use crate::output;
 
@@ -66,7 +68,7 @@ impl Findings {
     pub(super) fn push(&mut self, row: &Step, estimate: &Sample<f64>) {
         self.pass(row.time_s);
         self.rows += 1;
-        self.ratios.push(&row.input);
+        self.ratios.push(&row.input, is_looked_at(self.rows, FIRST_LOOK));
         let input = &row.input;
         let readings = [
             input.engine_rad_s,

@@ -109,6 +109,14 @@ impl Output {
         }
     }
 
+    /// Writes a row of numbers, and behind them the words of the row before.
+    fn numbers(&mut self, time_s: f64, numbers: &[f64]) -> Result<(), Failure> {
+        match self {
+            Self::File(writer, path) => writer.numbers(time_s, numbers).map_err(|error| Failure::writing(path, &error)),
+            Self::Standard(writer) => Ok(writer.numbers(time_s, numbers)?),
+        }
+    }
+
     /// Hands the rows so far to their reader.
     pub(super) fn flush(&mut self) -> Result<(), Failure> {
         match self {
@@ -130,8 +138,10 @@ impl Output {
 pub(super) struct EstimateTable {
     output: Output,
     columns: Vec<OutputColumn>,
-    /// The columns from this one on hold words.
-    words_from: usize,
+    /// Whether all columns of numbers stand before all columns of words, of which there are some.
+    is_in_order: bool,
+    /// The numbers of a row.
+    numbers: Vec<f64>,
     /// What the words of the row before say: they are mostly the same.
     said: Option<(Phase, Health, Channels<ChannelHealth>)>,
 }
@@ -140,20 +150,24 @@ impl EstimateTable {
     /// Begins a file, or the table on standard output.
     pub(super) fn create(path: Option<&Path>, columns: Vec<OutputColumn>) -> Result<Self, Failure> {
         let output = Output::named(path, columns.iter().map(|column| (column.name, column.kind())))?;
-        let words_from =
-            columns.iter().rposition(|column| column.kind() != ColumnKind::Word).map_or(0, |last| last + 1);
-        Ok(Self { output, columns, words_from, said: None })
+        let is_word = |column: &OutputColumn| column.kind() == ColumnKind::Word;
+        let is_in_order = columns.is_sorted_by_key(is_word) && columns.last().is_some_and(is_word);
+        Ok(Self { output, columns, is_in_order, numbers: Vec::new(), said: None })
     }
 
     pub(super) fn row(&mut self, time_s: f64, estimate: &Estimate<f64>) -> Result<(), Failure> {
         let says = Some((estimate.phase, estimate.health, estimate.channels));
         let is_same = std::mem::replace(&mut self.said, says) == says;
-        let (columns, words) = self.columns.split_at(if is_same { self.words_from } else { self.columns.len() });
-        let cells = columns.iter().map(|column| match column.kind() {
+        if is_same && self.is_in_order {
+            self.numbers.clear();
+            self.numbers.extend(self.columns.iter().map_while(|column| column.number(estimate)));
+            return self.output.numbers(time_s, &self.numbers);
+        }
+        let cells = self.columns.iter().map(|column| match column.kind() {
             ColumnKind::Word if is_same => Cell::SameWord,
             _ => column.cell(estimate),
         });
-        self.output.cells(time_s, cells.chain((!words.is_empty()).then_some(Cell::SameWords)))
+        self.output.cells(time_s, cells)
     }
 
     /// A row without an estimate.

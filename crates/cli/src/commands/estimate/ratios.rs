@@ -57,7 +57,8 @@ impl Ratios {
         self.swapped.warning()
     }
 
-    pub(super) fn push(&mut self, input: &Input<f64>) {
+    /// Takes the speeds of a row; only where it is looked at, they are judged.
+    pub(super) fn push(&mut self, input: &Input<f64>, is_looked_at: bool) {
         let readings = [input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s];
         for (newest, reading) in self.newest_rad_s.iter_mut().zip(readings) {
             if let Some(Reading { value, .. }) = reading.filter(|reading| reading.value.is_finite()) {
@@ -68,7 +69,7 @@ impl Ratios {
             self.engine_rad_s = value;
         }
         let [turbine, output, wheel] = self.newest_rad_s;
-        if output > OUTPUT_MIN_RAD_S && turbine.is_finite() {
+        if is_looked_at && output > OUTPUT_MIN_RAD_S && turbine.is_finite() {
             self.moving += 1;
             self.moving_s += input.dt_s.clamp(0.0, 1.0);
             self.swapped.push(self.engine_rad_s, turbine, &self.gears.map(|gear| gear * output));

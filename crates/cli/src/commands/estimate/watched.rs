@@ -9,6 +9,11 @@ use crate::output;
 /// Later rows of which one is looked at.
 const EVERY: u64 = 32;
 
+/// Whether a row, from 1, is looked at whether it can be right: all of the first, and later one of [`EVERY`].
+pub(super) fn is_looked_at(row: u64, first: usize) -> bool {
+    row <= first as u64 || row.is_multiple_of(EVERY)
+}
+
 /// Endings of column names that say a unit.
 const ENDINGS: [(&str, &str); 5] = [("rpm", "rpm"), ("rad/s", "rad_s"), ("mA", "ma"), ("A", "a"), ("%", "percent")];
 
@@ -27,7 +32,7 @@ pub(super) struct WatchedColumn {
 /// The columns of a table that are watched.
 pub(super) struct WatchedColumns {
     /// Rows at the beginning of which all are looked at.
-    first: u64,
+    first: usize,
     rows: u64,
     summaries: Vec<RoleSummary>,
     /// Whether each is needed, and how many values it has.
@@ -48,13 +53,13 @@ impl WatchedColumns {
             summaries.push(RoleSummary { role, name, counts, extremes, unit_name: unit_name.to_owned() });
             needs.push((is_needed, 0));
         }
-        Self { first: first as u64, rows: 0, summaries, needs }
+        Self { first, rows: 0, summaries, needs }
     }
 
     /// Takes a row; the values are those of the columns, in their order.
     pub(super) fn push(&mut self, values: impl IntoIterator<Item = Option<f64>>) {
         self.rows += 1;
-        let is_looked_at = self.rows <= self.first || self.rows.is_multiple_of(EVERY);
+        let is_looked_at = is_looked_at(self.rows, self.first);
         for ((entry, (_, count)), value) in self.summaries.iter_mut().zip(&mut self.needs).zip(values) {
             if let Some(value) = value.filter(|value| value.is_finite()) {
                 *count += 1;

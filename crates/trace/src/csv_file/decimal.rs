@@ -1,0 +1,262 @@
+//! Numbers in the plain form that tables mostly have: a sign or none, up to seven digits, and a point with digits behind it or none.
+//!
+//! Eight digits are read at once: each byte of a word holds one of them, the first one the lowest. What has another form is left to
+//! a library, which gives the very same number for this form too.
+
+/// The number in a cell of the plain form; none in any other form.
+#[inline]
+pub(super) fn plain(cell: &[u8]) -> Option<f64> {
+    let (is_negative, text) = match cell {
+        [b'-', text @ ..] => (true, text),
+        text => (false, text),
+    };
+    let (first, last) = ends(text)?;
+    let whole = first_point(first).min(text.len());
+    // None behind the point, or behind a whole number.
+    let places = text.len() - (whole + 1).min(text.len());
+    if !(1..=7).contains(&whole) || places > 16 || whole + places > MOST_DIGITS {
+        return None;
+    }
+    let digits = if places == 0 {
+        beginning(first, whole)?
+    } else if places <= 8 {
+        let (power, last) = (POWERS[places], ending(last, places)?);
+        beginning(first, whole)? * power + last
+    } else {
+        // What the last eight leave of the places.
+        let between = places - 8;
+        let middle = beginning(word(text.get(whole + 1..)?.first_chunk()?), between)?;
+        (beginning(first, whole)? * POWERS[between] + middle) * POWERS[8] + ending(last, 8)?
+    };
+    let size = quotient(digits, places);
+    Some(if is_negative { -size } else { size })
+}
+
+/// As many digits never make a number that is too large for 64 bits.
+const MOST_DIGITS: usize = 19;
+
+/// Powers of ten.
+const POWERS: [u64; MOST_DIGITS] = {
+    let mut powers = [1; MOST_DIGITS];
+    let mut at = 1;
+    while at < MOST_DIGITS {
+        powers[at] = 10 * powers[at - 1];
+        at += 1;
+    }
+    powers
+};
+
+/// A byte in each place of a word.
+const EACH: u64 = 0x0101_0101_0101_0101;
+
+#[inline(always)]
+fn word(bytes: &[u8; 8]) -> u64 {
+    u64::from_le_bytes(*bytes)
+}
+
+/// The first eight letters and the last eight. Of a shorter text, zeros stand behind it and before it.
+#[inline(always)]
+fn ends(text: &[u8]) -> Option<(u64, u64)> {
+    if let (Some(first), Some(last)) = (text.first_chunk(), text.last_chunk()) {
+        return Some((word(first), word(last)));
+    }
+    let first = if let (Some(first), Some(last)) = (text.first_chunk(), text.last_chunk()) {
+        u64::from(u32::from_le_bytes(*first)) | u64::from(u32::from_le_bytes(*last)) << (8 * (text.len() - 4))
+    } else {
+        let (middle, last) = (text.len() / 2, text.len().checked_sub(1)?);
+        let at = |place: usize| u64::from(text[place]) << (8 * place);
+        at(0) | at(middle) | at(last)
+    };
+    Some((first, first << (8 * (8 - text.len()))))
+}
+
+/// The place of the first point among eight letters; 8 without one.
+#[inline(always)]
+fn first_point(letters: u64) -> usize {
+    let differs = letters ^ (EACH * b'.' as u64);
+    // The lowest mark is of a byte that is zero; higher ones need not be.
+    let marks = differs.wrapping_sub(EACH) & !differs & (0x80 * EACH);
+    (marks.trailing_zeros() / 8) as usize
+}
+
+/// The number of the first so many of eight letters, at most 8; none if they are not all digits.
+#[inline(always)]
+fn beginning(letters: u64, count: usize) -> Option<u64> {
+    // Zeros stand before them; what is behind them leaves the word. In two steps, as there may be nothing to keep.
+    let half = 32 - 4 * count;
+    number(letters.wrapping_sub(EACH * b'0' as u64) << half << half)
+}
+
+/// The number of the last so many of eight letters, from 1 to 8; none if they are not all digits.
+#[inline(always)]
+fn ending(letters: u64, count: usize) -> Option<u64> {
+    let kept = u64::MAX << (64 - 8 * count);
+    number((letters ^ (EACH * b'0' as u64)) & kept)
+}
+
+/// The number of eight digits, each a byte; none if a byte is none.
+#[inline(always)]
+fn number(digits: u64) -> Option<u64> {
+    if (digits.wrapping_add(EACH * (0x80 - 10)) | digits) & (0x80 * EACH) != 0 {
+        return None;
+    }
+    const PAIR: u64 = 0x0000_00ff_0000_00ff;
+    let pairs = digits * 10 + (digits >> 8);
+    let [even, odd] = [pairs & PAIR, (pairs >> 16) & PAIR];
+    let sum = even.wrapping_mul(100 + (1_000_000 << 32)).wrapping_add(odd.wrapping_mul(1 + (10_000 << 32)));
+    Some(sum >> 32)
+}
+
+/// The digits over a power of ten, rounded once to the nearest number.
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "whole, or rounded once")]
+fn quotient(digits: u64, places: usize) -> f64 {
+    let power = POWERS[places];
+    if digits >> f64::MANTISSA_DIGITS == 0 {
+        return digits.cast_signed() as f64 / power.cast_signed() as f64;
+    }
+    // From 61 to 63 bits: more than a number keeps. The lowest one says, too, whether something is left over.
+    let shift = 62 + digits.leading_zeros() - power.leading_zeros();
+    let above = u128::from(digits) << shift;
+    #[expect(clippy::cast_possible_truncation, reason = "at most 63 bits, and a rest below 64")]
+    let (whole, low) = ((above / u128::from(power)) as u64, above as u64);
+    let has_rest = low != whole.wrapping_mul(power);
+    (whole | u64::from(has_rest)).cast_signed() as f64 * f64::from_bits(u64::from(1023 - shift) << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Random bits.
+    fn bits(state: &mut u64) -> u64 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        state.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    #[test]
+    fn a_number_is_that_of_the_library_to_the_last_bit() {
+        let mut state = 0x9e37_79b9_7f4a_7c15;
+        let mut plain_ones = 0;
+        for i in 0..400_000_u64 {
+            let random = bits(&mut state);
+            let number = f64::from_bits(random >> 12 | 0x3ff0_0000_0000_0000) - 1.0;
+            let size = [0.001, 0.1, 1.0, 70.0, 5e3, 1e6][(random % 6) as usize];
+            let places = (random >> 8) as usize % 18;
+            let text = if i % 2 == 0 { format!("{}", number * size) } else { format!("-{:.places$}", number * size) };
+            let Some(found) = plain(text.as_bytes()) else { continue };
+            plain_ones += 1;
+            assert_eq!(found.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
+        }
+        assert!(plain_ones > 200_000, "{plain_ones}");
+    }
+
+    #[test]
+    fn all_digits_near_the_middle_between_two_numbers_round_to_the_right_one() {
+        // Numbers from 2^53 times a power of ten on: the digits of a middle between two of them, more, and less.
+        let mut state = 1;
+        for _ in 0..100_000 {
+            let places = bits(&mut state) % 11 + 1;
+            let number = 4096.0 * f64::from_bits(bits(&mut state) >> 12 | 0x3ff0_0000_0000_0000);
+            let middle = format!("{:.1$}", number + 0.5 * f64::EPSILON * 4096.0, 3 + places as usize);
+            for digit in ["", "1", "9"] {
+                let text = format!("{middle}{digit}");
+                if let Some(found) = plain(text.as_bytes()) {
+                    assert_eq!(found.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
+                }
+            }
+        }
+        // The most digits, and the first ones that are more than a number keeps. No middle between two numbers has so few digits.
+        for text in [
+            "123.4567890123456789",
+            "9999999.999999999999",
+            "1.0000000000000000",
+            "-0.000000000000000",
+            "9.0071992547409935",
+        ] {
+            assert_eq!(plain(text.as_bytes()).unwrap().to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
+        }
+    }
+
+    #[test]
+    fn short_numbers_are_plain_too() {
+        let cases = [
+            ("0", 0.0),
+            ("7.", 7.0),
+            ("-1", -1.0),
+            ("1.5", 1.5),
+            ("123", 123.0),
+            ("0.003", 0.003),
+            ("9999999", 9_999_999.0),
+            ("1234567.", 1_234_567.0),
+        ];
+        for (text, number) in cases {
+            assert_eq!(plain(text.as_bytes()), Some(number), "{text}");
+        }
+    }
+
+    #[test]
+    fn any_other_form_is_left_to_the_library() {
+        let others = [
+            "",
+            "-",
+            ".",
+            "12345678",
+            "12345678.5",
+            ".1234567",
+            "1234.5e3",
+            "12.34567e-3",
+            "+12.345678",
+            "--12.34567",
+            "12.345.678",
+            "12,345678",
+            "12.34567 ",
+            " 12.34567",
+            "1234567.1234567890123",
+            "0x12.345678",
+            "12_345.678",
+            "12.3456/8",
+            "12.3456:8",
+            "1/3.456789",
+            "1:3.456789",
+            "12.-456789",
+            "\u{e9}12.3456789",
+            "12.345678\u{ff10}",
+            "infinity",
+            "0.0000000000000000001",
+            ".5",
+            "-.5",
+            "1e5",
+            "nan",
+            "1 ",
+            " 1",
+            "+1",
+            "1,5",
+        ];
+        for text in others {
+            assert_eq!(plain(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn whatever_is_taken_has_only_digits_a_sign_and_a_point() {
+        const LETTERS: &[u8] = b"0123456789.-+e,/: \x00\x7f\x80\xff";
+        let mut state = 7;
+        for _ in 0..300_000 {
+            let mut cell = *b"-12.345678901234567";
+            for _ in 0..bits(&mut state) % 3 {
+                let random = bits(&mut state);
+                cell[random as usize % 19] = LETTERS[(random >> 32) as usize % LETTERS.len()];
+            }
+            let random = bits(&mut state) as usize;
+            let cell = &cell[random % 2..19 - random / 2 % 18];
+            if let Some(found) = plain(cell) {
+                let text = std::str::from_utf8(cell).unwrap();
+                assert!(!text.contains(['e', '+']), "{text}");
+                assert_eq!(found.to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
+            }
+        }
+    }
+}
