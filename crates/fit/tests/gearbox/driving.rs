@@ -111,8 +111,7 @@ fn a_weighed_car_tells_the_common_factor_of_all_torques() {
     let drawn = drawn.weighed();
     let fits = [usual, fitted(&drawn, &recorded)];
     let sd = fits.each_ref().map(|fit| fit.torque_scale_sd());
-    let most = with_half_of((0.01 / 3.0_f64.sqrt()).hypot(fits[1].sd_beside_scale(Quantity::Mass)), sd[0]);
-    assert!(sd[1] < most, "{sd:?} {most}");
+    assert!(sd[1] < 0.95 * sd[0], "{sd:?}");
     let error = fits.each_ref().map(|fit| {
         fit.unknown(Quantity::Input) - drawn.true_unknown(&drawn.tables(), &fit.quantities, Quantity::Input)
     });
