@@ -32,8 +32,8 @@ struct Outcome {
     reason_against: Option<String>,
 }
 
-/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`, `hysteresis`, `other converter`, `right file`; all others are cars of the
-/// two-speed file.
+/// A car of a case: `sensors unknown`, `lossy`, `other car`, `other shape`, `hysteresis`, `other converter`, `right file`, `stroke`; all others are cars
+/// of the two-speed file.
 fn car_of(case: &str, seed: u64) -> TestCar {
     let mut car = match case {
         "other car" => {
@@ -54,6 +54,7 @@ fn car_of(case: &str, seed: u64) -> TestCar {
         "other converter" => TestCar::drawn(seed).with_other_converter(),
         "right file" => TestCar::drawn(seed).with_the_right_file(),
         "hysteresis" => TestCar::drawn(seed).with_hysteresis(),
+        "stroke" => TestCar::with_stroke(seed),
         _ => TestCar::drawn(seed),
     };
     if case == "lossy" {
@@ -90,12 +91,24 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let checked: Vec<_> = (200..200 + CHECKED).map(|number| car.shift(number, logs).record).collect();
     let checked = fit.validate(&car.file, &fitted, &checked, ages).unwrap();
     let reason_against = fit.reason_against(checked.as_ref());
-    let errors = (fit.priors.iter().enumerate())
+    let errors: Vec<_> = (fit.priors.iter().enumerate())
         .map(|(i, prior)| {
             let error = fit.unknowns[i] - car.true_value(prior.parameter);
             (prior.name.clone(), error / fit.precision.stated[(i, i)].sqrt())
         })
         .collect();
+    if let Some(fill) = &fit.fill {
+        let error = fill.log_volume - car.fill.ln();
+        println!(
+            "fill {:+.3}, true {:+.3}, sd {:.3} of {:.3}, off by {:+.1} sd, {}",
+            fill.log_volume,
+            car.fill.ln(),
+            fill.sd[0],
+            fill.sd[1],
+            error / fill.sd[0],
+            fill.verdict().name()
+        );
+    }
     let torque_n_m = [mean(&car.file, 0), mean(&fitted, 0)];
     let pressure_pa = [mean(&car.file, 1), mean(&fitted, 1)];
     Outcome { fit, torque_n_m, pressure_pa, errors, cpu_s, iterations, reason_against }

@@ -73,10 +73,24 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         fit.statements().iter().any(|line| line.contains("do not ask for another file")),
         fit.reason_against(Some(&checked)).is_some()
     );
+    for (place, fill) in fit.fills.iter().enumerate() {
+        let Some(fill) = fill.filter(|fill| fill.shifts > 0) else { continue };
+        let at = (0..drawn.fill.len()).find(|at| tables.place(*at) == Some(place)).unwrap();
+        let truth = drawn.fill[at].ln();
+        println!(
+            "{}: fill {:+.3}, true {truth:+.3}, sd {:.3} of {:.3}, off by {:+.1} sd, {} shifts",
+            fit.quantities.elements[place],
+            fill.log_volume,
+            fill.sd[0],
+            fill.sd[1],
+            (fill.log_volume - truth) / fill.sd[0],
+            fill.shifts
+        );
+    }
     let quantities = &fit.quantities;
-    // The simulated drag is another in each element, the sensor's scale is none of the car, and a gain that is not measured is not fitted.
+    // The sensor's scale is none of the car, and a gain that is not measured is not fitted.
     let is_known = |quantity: Quantity| match quantity {
-        Quantity::Drag | Quantity::PressureScale | Quantity::InputDelay => false,
+        Quantity::PressureScale | Quantity::InputDelay => false,
         Quantity::Gain(place) => quantities.measured[place],
         // Drawn delays are constant, those of the file depend on the command.
         Quantity::Delay(_) => case != Case::WithTiming,

@@ -1,12 +1,11 @@
 //! The car of a set of parameters.
 
 use config::{SpeedSensor, Vehicle};
-use drivetrain::{
-    Clutch, ClutchValve, Converter, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Tyre,
-};
+use drivetrain::{Clutch, Converter, Cylinder, Driveline, Engagement, ReducedShift, RoadLoad, ShiftCoefficients, Tyre};
 
 use crate::Parameter;
 use crate::parameters::{Prior, SHAPE_MIDDLE_RAD_S, SLOPE_SPAN_RAD_S, Shaft};
+use crate::pressure::Hydraulics;
 use crate::record::SegmentKind;
 use crate::shape::{Knots, Map, mapped};
 
@@ -43,10 +42,10 @@ pub(crate) struct Car {
     pub(crate) converter: Converter<f64>,
     pub(crate) clutch: Clutch<f64>,
     pub(crate) offgoing: Clutch<f64>,
-    pub(crate) valve: ClutchValve<f64>,
-    pub(crate) offgoing_valve: ClutchValve<f64>,
-    pub(crate) hysteresis_pa: f64,
-    pub(crate) offgoing_hysteresis_pa: f64,
+    pub(crate) hydraulics: Hydraulics,
+    pub(crate) offgoing_hydraulics: Hydraulics,
+    /// That of the oncoming clutch, of which the motion does not depend: a fill is over before both clutches slip.
+    pub(crate) cylinder: Option<Cylinder<f64>>,
     pub(crate) command_delay_s: f64,
     pub(crate) shift: ReducedShift<f64>,
     coefficients: [ShiftCoefficients<f64>; 3],
@@ -62,6 +61,7 @@ pub(crate) struct Car {
     pub(crate) engine_torque_scale: f64,
     pub(crate) engine_torque_delay_s: f64,
     pub(crate) pressure_scale: f64,
+    pub(crate) pressure_delay_s: f64,
     pub(crate) ages: ReadingAges,
     pub(crate) knots: Knots,
 }
@@ -76,10 +76,9 @@ impl Car {
                 ..vehicle.oncoming.clutch
             },
             offgoing: vehicle.offgoing.clutch,
-            valve: vehicle.oncoming.valve,
-            offgoing_valve: vehicle.offgoing.valve,
-            hysteresis_pa: vehicle.oncoming.hysteresis_pa,
-            offgoing_hysteresis_pa: vehicle.offgoing.hysteresis_pa,
+            hydraulics: Hydraulics::filled(&vehicle.oncoming),
+            offgoing_hydraulics: Hydraulics::filled(&vehicle.offgoing),
+            cylinder: Hydraulics::of(&vehicle.oncoming).cylinder,
             command_delay_s: 0.0,
             shift: vehicle.shift,
             coefficients: coefficients(&vehicle.shift),
@@ -95,6 +94,7 @@ impl Car {
             engine_torque_scale: 1.0,
             engine_torque_delay_s: 0.0,
             pressure_scale: 1.0,
+            pressure_delay_s: 0.0,
             ages,
             knots: Knots::of(vehicle),
         }
@@ -131,8 +131,8 @@ impl Car {
                     mapped(&self.clutch.friction, |slip, mu| mu * friction_shape([0.0, value], slip));
             }
             Parameter::Spring => self.clutch.return_spring_n *= value,
-            Parameter::Gain => self.valve = self.valve.changed(1.0, value, None),
-            Parameter::Lag => self.valve = self.valve.changed(value, 1.0, None),
+            Parameter::Gain => self.hydraulics.valve = self.hydraulics.valve.changed(1.0, value, None),
+            Parameter::Lag => self.hydraulics.valve = self.hydraulics.valve.changed(value, 1.0, None),
             Parameter::CommandDelay => self.command_delay_s = value,
             Parameter::Inertia(i) => {
                 if let Some(shaft) = shafts.get(i) {
@@ -154,14 +154,15 @@ impl Car {
             Parameter::EngineTorqueScale => self.engine_torque_scale = value,
             Parameter::EngineTorqueDelay => self.engine_torque_delay_s = value,
             Parameter::PressureScale => self.pressure_scale = value,
-            Parameter::Hysteresis => self.hysteresis_pa = value,
+            Parameter::PressureDelay => self.pressure_delay_s = value,
+            Parameter::Hysteresis => self.hydraulics.hysteresis_pa = value,
             Parameter::Shape(map @ Map::Friction, i) => {
                 self.clutch.friction = self.knots.changed(&self.clutch.friction, map, i, value);
             }
             Parameter::Shape(map @ Map::Capacity, i) => {
                 self.converter.capacity_n_m_s2 = self.knots.changed(&self.converter.capacity_n_m_s2, map, i, value);
             }
-            Parameter::Shape(map, i) => self.valve = self.knots.valve(self.valve, map, i, value),
+            Parameter::Shape(map, i) => self.hydraulics.valve = self.knots.valve(self.hydraulics.valve, map, i, value),
         }
     }
 

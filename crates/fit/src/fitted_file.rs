@@ -5,8 +5,8 @@ use config::{Source, Vehicle};
 use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
 use crate::parameters::HYSTERESIS_UNIT_PA;
-use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
-use crate::{Fit, FitError, Map, Parameter, ReadingAges, parameters};
+use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number, shaft_inertia};
+use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
 
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
@@ -24,6 +24,9 @@ impl Fit {
         let fitted = Car::of_file(vehicle, ReadingAges::default()).with(&shafts, &self.priors, &self.unknowns);
         for prior in &self.priors {
             self.write(&mut text, &fitted, &oncoming, prior.parameter)?;
+        }
+        if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) {
+            write_fill(&mut text, vehicle, &oncoming, &fill)?;
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
@@ -137,6 +140,26 @@ impl Fit {
             let at_ends_s = [delay(0.0), delay(vehicle.limits.command_max)];
             set(bound("valve_delay_s"), &budget::delays(at_ends_s, half_s))?;
         }
+        self.write_fill_budget(text, vehicle)
+    }
+
+    /// The limits of the piston's stroke: pressures move with the spring, the volume has what the fit leaves open of it.
+    fn write_fill_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
+        let Some(given) = &vehicle.error_bounds.fill else { return Ok(()) };
+        let bound = |key: &str| keys(&["design", "error_bounds", "fill", key]);
+        let spring = self.value(Parameter::Spring).unwrap_or(1.0);
+        for key in ["kiss_pressure_pa", "preload_pressure_pa"] {
+            if text.has(&bound(key)) {
+                text.map(&bound(key), |pressure| spring * pressure, Some("moves with the fitted return spring"))?;
+            }
+        }
+        if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) {
+            let given = given.volume_m3.map(|volume_m3| volume_m3 / vehicle.oncoming.cylinder.stroke_m3);
+            let factors = budget::factors(fill.sd[0], fill.factor(), given);
+            if text.has(&bound("volume_factor")) {
+                text.set(&bound("volume_factor"), &factors, Some(BUDGET_COMMENT))?;
+            }
+        }
         Ok(())
     }
 }
@@ -161,7 +184,13 @@ fn write_clutch(
             let more = "keeps its ratio to the fitted friction, and is not below it";
             text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
         }
-        Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
+        Parameter::Spring => {
+            let preload = of_clutch(&["fill", "preload_n"]);
+            if text.has(&preload) {
+                text.map(&preload, |force| value * force, Some("keeps its ratio to the fitted return spring"))?;
+            }
+            text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment)
+        }
         Parameter::CommandDelay => {
             text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
         }
@@ -176,6 +205,34 @@ fn write_clutch(
     }
 }
 
+/// What a fitted fill volume says of itself.
+pub(crate) fn fill_comment(fill: &FillFit) -> String {
+    let [least, value, most] = [-SIDES, 0.0, SIDES].map(|sides| (fill.log_volume + sides * fill.sd[0]).exp());
+    match fill.verdict() {
+        Verdict::NotTold => format!("as in the given file: {}", Verdict::NotTold.name()),
+        told => format!(
+            "fill volume x {value:.3}, 95 % {least:.3} to {most:.3}, {}; by the flow of the passages of this file",
+            told.name()
+        ),
+    }
+}
+
+/// Writes the stroke of its piston.
+fn write_fill(text: &mut VehicleText, vehicle: &Vehicle, clutch: &str, fill: &FillFit) -> Result<(), FitError> {
+    let words = &fill_comment(fill);
+    let stroke_m = fill.factor() * vehicle.oncoming.cylinder.stroke_m3 / vehicle.oncoming.clutch.piston_area_m2;
+    let table = keys(&["clutch", clutch, "fill"]);
+    let path = [table.clone(), keys(&["stroke_m"])].concat();
+    if text.has(&path) {
+        return text.set(&path, &[stroke_m], Some(words));
+    }
+    let line = format!("{FITTED}{words}; the file had none\nstroke_m = {}\n", number(stroke_m));
+    if !text.add_to_table(&table, &line)? {
+        text.add_table(&table, &line);
+    }
+    Ok(())
+}
+
 /// Writes gain or lag of its valve, and of the observer's.
 fn write_valve(
     text: &mut VehicleText,
@@ -187,7 +244,7 @@ fn write_valve(
     let comment = Some(words);
     let of_valve = |key: &[&str]| keys(&[&["clutch", clutch, "valve"], key].concat());
     let of_observer = |key: &str| keys(&["observer", "valve", key]);
-    let (map, axis, [table, axis_key, values_key], common) = match (parameter, fitted.valve.maps()) {
+    let (map, axis, [table, axis_key, values_key], common) = match (parameter, fitted.hydraulics.valve.maps()) {
         (Parameter::Gain, Some(maps)) => {
             (maps.gain_pa_a.values(), maps.gain_pa_a.axis(), ["gain", "current_a", "gain_pa_a"], "gain_pa_a")
         }

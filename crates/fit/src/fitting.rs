@@ -4,9 +4,11 @@ use config::Vehicle;
 use nalgebra::DVector;
 
 use crate::car::Car;
+use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
-use crate::parameters::{self, Available, Prior};
+use crate::parameters::{self, Available, DELAY_UNIT_S, Prior};
+use crate::pressure::Hydraulics;
 use crate::record::OutputClock;
 use crate::shape::Map;
 use crate::shift_model::ShiftModel;
@@ -53,6 +55,8 @@ pub struct Fit {
     pub misfits: Vec<Map>,
     /// What the fit changes of the torque of the oncoming clutch in these shifts.
     pub torque_change: TorqueChange,
+    /// The fill volume of the oncoming clutch; none where its piston has no stroke.
+    pub fill: Option<FillFit>,
     pub(crate) weights: Weights,
 }
 
@@ -76,32 +80,16 @@ pub fn available(shifts: &[ShiftRecord]) -> Available {
     }
 }
 
-/// Refuses a vehicle whose oncoming clutch the model of the fit leaves out.
-///
-/// # Errors
-/// The piston of the oncoming clutch has a stroke.
-pub fn check_vehicle(vehicle: &Vehicle) -> Result<(), FitError> {
-    if vehicle.oncoming.has_stroke {
-        return Err(FitError::input(format!(
-            "{}: the piston of the oncoming clutch has a stroke, which the fit does not model\n\
-             hint: set `enabled = false` in its `fill` table for the fit; a fill that has ended before the torque phase changes little",
-            vehicle.source.path.display()
-        )));
-    }
-    Ok(())
-}
-
 /// Fits the parameters of a vehicle to shifts.
 ///
 /// # Errors
-/// There is no shift, the vehicle cannot be fitted, or no minimum was found.
+/// There is no shift, or no minimum was found.
 pub fn fit(
     vehicle: &Vehicle,
     shifts: &[ShiftRecord],
     ages: ReadingAges,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Fit, FitError> {
-    check_vehicle(vehicle)?;
     let (shifts, mut left_out) = sound(shifts)?;
     let available = available(&shifts);
     let shafts = parameters::shafts(vehicle)?;
@@ -137,6 +125,10 @@ pub fn fit(
         precision.forget_all(&priors);
     }
     let unknowns = scaled_by_priors(&priors, at.shared);
+    let fill = fill_of(vehicle, &file.with(&shafts, &priors, &unknowns), &models, &|parameter| {
+        let place = priors.iter().position(|prior| prior.parameter == parameter)?;
+        Some(precision.stated[(place, place)].sqrt())
+    });
     let torque_change = TorqueChange::of(&file, &shafts, &models, &priors, &unknowns, &precision);
     Ok(Fit {
         at_limit: limited.into_iter().map(|i| priors[i].name.clone()).collect(),
@@ -150,6 +142,7 @@ pub fn fit(
         freed,
         misfits: grave(&misfits),
         torque_change,
+        fill,
         weights,
         priors,
     })
@@ -191,6 +184,34 @@ fn found(
     let maps: Vec<Map> = pairs.into_iter().map(|(map, _)| map).collect();
     let misfits = freeing::misfits(&all, &precision.stated, known, &maps, &normal, &at.shared).ok_or_else(singular)?;
     Ok((precision, misfits))
+}
+
+/// The fill volume of the oncoming clutch by the measured pressures of a fitted car, with the deviations of its parameters.
+fn fill_of(
+    vehicle: &Vehicle,
+    car: &Car,
+    models: &[ShiftModel],
+    sd: &dyn Fn(Parameter) -> Option<f64>,
+) -> Option<FillFit> {
+    let (cylinder, budget) = (car.cylinder?, vehicle.error_bounds.fill.as_ref()?);
+    let logs: Vec<FillLog<'_>> = models.iter().filter_map(ShiftModel::fill_log).collect();
+    let filling = Filling {
+        hydraulics: Hydraulics { cylinder: Some(cylinder), ..car.hydraulics },
+        kiss_pa: car.clutch.kiss_pressure(),
+        late_s: car.command_delay_s,
+        sensor_scale: car.pressure_scale,
+        sensor_late_s: car.pressure_delay_s,
+    };
+    let known = |parameter: Parameter| sd(parameter).unwrap_or(0.0);
+    let [spring, gain, lag] = [Parameter::Spring, Parameter::Gain, Parameter::Lag].map(known);
+    let late_s = known(Parameter::CommandDelay).hypot(known(Parameter::PressureDelay)) * DELAY_UNIT_S;
+    let moved = [
+        Filling { kiss_pa: filling.kiss_pa * spring.exp(), ..filling },
+        Filling { hydraulics: filling.hydraulics.with_valve(0.0, gain), ..filling },
+        Filling { hydraulics: filling.hydraulics.with_valve(lag, 0.0), ..filling },
+        Filling { late_s: filling.late_s + late_s, ..filling },
+    ];
+    Some(FillFit::of(&logs, &filling, &moved, budget))
 }
 
 /// The maps with a misfit that is worth a warning.

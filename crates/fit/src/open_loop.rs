@@ -3,7 +3,7 @@
 use config::Vehicle;
 
 use crate::car::Car;
-use crate::pressure::{Grid, pressures};
+use crate::pressure::{Grid, Hydraulics, pressures};
 use crate::{ReadingAges, ShiftRecord};
 
 /// Pressure and torque at one time.
@@ -27,7 +27,7 @@ pub fn open_loop(vehicle: &Vehicle, record: &ShiftRecord) -> Vec<OpenLoop> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over milliseconds")]
     let points = ((end_s - begin_s) / STEP_S) as usize + 1;
     let grid = Grid { begin_s, step_s: STEP_S, points };
-    let pressure = pressures(&car.valve, car.hysteresis_pa, 0.0, &record.oncoming, grid);
+    let pressure = pressures(&Hydraulics::of(&vehicle.oncoming), 0.0, &record.oncoming, grid);
     let series = crate::Series { time_s: (0..points).map(|i| grid.time_s(i)).collect(), value: pressure };
     (record.turbine.between([begin_s, end_s]))
         .map(|(time_s, turbine_rad_s)| {

@@ -64,6 +64,8 @@ pub enum Parameter {
     EngineTorqueDelay,
     /// Factor on the reading of the pressure sensor.
     PressureScale,
+    /// Delay of the reading of the pressure against the turbine speed, s.
+    PressureDelay,
     /// Half-width of the hysteresis of the oncoming clutch's valve, Pa.
     Hysteresis,
     /// Relative change of a map at a point of its own: the first two where the map is freed.
@@ -80,7 +82,12 @@ impl Parameter {
     pub fn is_delay(self) -> bool {
         matches!(
             self,
-            Self::CommandDelay | Self::OutputDelay | Self::WheelDelay | Self::EngineDelay | Self::EngineTorqueDelay
+            Self::CommandDelay
+                | Self::OutputDelay
+                | Self::WheelDelay
+                | Self::EngineDelay
+                | Self::EngineTorqueDelay
+                | Self::PressureDelay
         )
     }
 
@@ -106,12 +113,14 @@ impl Parameter {
                 | Self::EngineTorqueScale
                 | Self::EngineTorqueDelay
                 | Self::PressureScale
+                | Self::PressureDelay
         )
     }
 
     /// Whether it acts on readings alone: the motion of the car stays as it is.
     pub(crate) fn leaves_motion(self) -> bool {
-        matches!(self, Self::OutputDelay | Self::WheelDelay | Self::WheelScale | Self::PressureScale)
+        let is_of_pressure = matches!(self, Self::PressureScale | Self::PressureDelay);
+        is_of_pressure || matches!(self, Self::OutputDelay | Self::WheelDelay | Self::WheelScale)
     }
 
     /// The value in its own unit of the unknown `x`: a factor, s, or a relative change.
@@ -199,7 +208,7 @@ fn uniform(share: f64) -> f64 {
 }
 
 /// The standard deviation of the logarithm of a factor that lies anywhere between these.
-fn between([least, greatest]: [f64; 2]) -> f64 {
+pub(crate) fn between([least, greatest]: [f64; 2]) -> f64 {
     ((greatest / least).ln() / 12.0_f64.sqrt()).max(1e-3)
 }
 
@@ -250,6 +259,7 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
     }
     if has.pressure {
         more.push((P::PressureScale, "pressure sensor, scale", 0.0, 0.005));
+        more.push((P::PressureDelay, "pressure sensor, delay", 0.0, delay(uniform(budget.channel_skew_s))));
     }
     names.extend(more.iter().map(|(_, name, ..)| (*name).to_owned()));
     list.extend(more);

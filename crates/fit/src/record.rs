@@ -19,7 +19,7 @@ const CREEPING_RAD_S: f64 = 1.2;
 /// Slip of the oncoming clutch above which it slips for sure, rad/s.
 const SLIPPING_RAD_S: f64 = 8.0;
 /// A segment that is shorter tells nothing, s.
-const SHORTEST_S: f64 = 0.08;
+pub(crate) const SHORTEST_S: f64 = 0.08;
 /// Longest time without a reading in a segment, s.
 const GAP_MAX_S: f64 = 0.1;
 

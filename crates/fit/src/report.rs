@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
@@ -53,6 +54,7 @@ impl Fit {
         };
         let mut rows: Vec<ReportRow> = combinations.into_iter().map(combination).collect();
         rows.extend(self.priors.iter().enumerate().map(single));
+        rows.extend(self.fill.as_ref().map(|fill| fill_row("fill volume of the oncoming clutch", fill)));
         rows
     }
 
@@ -154,7 +156,15 @@ impl Fit {
                 names.join(", ")
             )
         });
-        self.channels.iter().filter(|channel| wrong(channel)).map(warn).chain(finer).chain(limited).collect()
+        let fill = self.fill.and_then(|fill| fill.misfit("the oncoming clutch"));
+        self.channels
+            .iter()
+            .filter(|channel| wrong(channel))
+            .map(warn)
+            .chain(finer)
+            .chain(limited)
+            .chain(fill)
+            .collect()
     }
 
     /// Delays and scale of channels, which belong into a channel map.
@@ -174,6 +184,7 @@ impl Fit {
             of(Parameter::OutputDelay, "output_speed"),
             of(Parameter::EngineDelay, "engine_speed"),
             of(Parameter::WheelDelay, "wheel_speed"),
+            of(Parameter::PressureDelay, "oncoming_pressure"),
             scale.map(|scale| {
                 format!("wheel_speed reads x {scale:.4}: `scale = {:.4}` in the channel map", scale.recip())
             }),
@@ -198,6 +209,10 @@ impl Fit {
         when(
             !self.available.pressure,
             "for valve gain, spring and friction singly, measure the pressure of the oncoming clutch in one shift; one tells what ten tell",
+        );
+        when(
+            self.fill.is_some_and(|fill| fill.verdict() == Verdict::NotTold),
+            &format!("for the fill volume of the oncoming clutch, which is not told by these logs, {FILL_TOLD_BY}"),
         );
         when(!self.available.wheel, "for shafts, tyres and mass, log the speed of the driven wheels");
         when(
@@ -226,6 +241,11 @@ enum Kind {
     Delay,
     Share,
     Pressure,
+}
+
+/// The row of a fill volume.
+pub(crate) fn fill_row(name: &str, fill: &FillFit) -> ReportRow {
+    row(name, fill.log_volume, fill.sd[0], fill.sd[1], fill.verdict(), Kind::Factor)
 }
 
 fn row(name: &str, x: f64, sd: f64, before: f64, verdict: Verdict, kind: Kind) -> ReportRow {

@@ -3,10 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::car::Car;
+use crate::fill::{FillLog, fill_begin_s};
 use crate::motion::{Circumstances, Inputs, Motion, Part, STEP_S, State};
 use crate::parameters::{Prior, Shaft};
 use crate::pressure::{Grid, pressures};
-use crate::record::{Segment, SegmentKind, ShiftRecord, age_s};
+use crate::record::{SHORTEST_S, Segment, SegmentKind, ShiftRecord, age_s};
 use crate::shape::Map;
 use crate::{Parameter as P, Series};
 
@@ -101,7 +102,8 @@ pub(crate) struct Linearised {
 
 impl ShiftModel {
     /// Lays out a shift that is seen from the car of the file.
-    pub(crate) fn new(record: ShiftRecord, car: &Car) -> Self {
+    pub(crate) fn new(mut record: ShiftRecord, car: &Car) -> Self {
+        record.segments = without_fill(&record, car);
         let segments = record.segments.clone();
         let begin_s = segments.iter().map(|segment| segment.span_s[0]).fold(f64::INFINITY, f64::min);
         let end_s = segments.iter().map(|segment| segment.span_s[1]).fold(f64::NEG_INFINITY, f64::max);
@@ -124,7 +126,7 @@ impl ShiftModel {
         let offgoing_pa = if record.offgoing.is_empty() {
             Vec::new()
         } else {
-            pressures(&car.offgoing_valve, car.offgoing_hysteresis_pa, 0.0, &record.offgoing, half_steps)
+            pressures(&car.offgoing_hydraulics, 0.0, &record.offgoing, half_steps)
         };
         let has_engine_torque = !record.engine_torque.is_empty();
         let mut model = Self {
@@ -138,12 +140,12 @@ impl ShiftModel {
             directions: directions(&record, car),
             record,
         };
-        model.lay_out_rows(&segments);
+        model.lay_out_rows(&segments, car.cylinder.is_some());
         model.lay_out_unknowns(&segments, car);
         model
     }
 
-    fn lay_out_rows(&mut self, segments: &[Segment]) {
+    fn lay_out_rows(&mut self, segments: &[Segment], has_stroke: bool) {
         let mut blocks = Vec::new();
         for (i, segment) in segments.iter().enumerate() {
             let [from_s, to_s] = segment.span_s;
@@ -159,7 +161,10 @@ impl ShiftModel {
             }
         }
         let until_s = self.half_steps.time_s(self.half_steps.points - 1);
-        let readings = self.record.pressure.between([self.half_steps.begin_s, until_s]).collect();
+        // Of a piston that moves, the pressure is not the valve's.
+        let slipping = segments.iter().find(|segment| has_stroke && segment.kind == SegmentKind::Slipping);
+        let from_s = slipping.map_or(self.half_steps.begin_s, |segment| segment.span_s[0]);
+        let readings = self.record.pressure.between([from_s, until_s]).collect();
         blocks.push(Block { channel: Channel::Pressure, segment: None, rows: 0..0, readings });
         blocks.retain(|block| !block.readings.is_empty());
         for block in &mut blocks {
@@ -219,7 +224,7 @@ impl ShiftModel {
     }
 
     pub(crate) fn oncoming(&self, car: &Car) -> Vec<f64> {
-        pressures(&car.valve, car.hysteresis_pa, car.command_delay_s, &self.record.oncoming, self.half_steps)
+        pressures(&car.hydraulics, car.command_delay_s, &self.record.oncoming, self.half_steps)
     }
 
     /// Torque of the oncoming clutch at the readings of the turbine speed before it locks, N m, of a car and the measured slip.
@@ -301,9 +306,17 @@ impl ShiftModel {
     fn pressure(&self, car: &Car, inputs: &Inputs, rows: &mut DVector<f64>) {
         for block in self.blocks.iter().filter(|block| block.segment.is_none()) {
             for (row, (time_s, reading)) in block.rows.clone().zip(&block.readings) {
-                rows[row] = reading - car.pressure_scale * self.on_grid(&inputs.oncoming_pa, *time_s);
+                let seen_s = time_s - car.pressure_delay_s;
+                rows[row] = reading - car.pressure_scale * self.on_grid(&inputs.oncoming_pa, seen_s);
             }
         }
+    }
+
+    /// What this shift shows of a fill; none without a measured pressure.
+    pub(crate) fn fill_log(&self) -> Option<FillLog<'_>> {
+        let slipping = self.record.segments.iter().find(|segment| segment.kind == SegmentKind::Slipping)?;
+        let (commands, pressure) = (&self.record.oncoming, &self.record.pressure);
+        (!pressure.is_empty()).then_some(FillLog { commands, pressure, until_s: slipping.span_s[0] })
     }
 
     /// A value between the half steps.
@@ -405,6 +418,20 @@ impl ShiftModel {
         }
         by_own
     }
+}
+
+/// The segments without a fill: how long it lasts differs from shift to shift, by what is left of the oil. It is over before both clutches slip.
+fn without_fill(record: &ShiftRecord, car: &Car) -> Vec<Segment> {
+    let Some(fill_s) = car.cylinder.and_then(|cylinder| fill_begin_s(&car.hydraulics, &cylinder, &record.oncoming))
+    else {
+        return record.segments.clone();
+    };
+    let before = |segment: &Segment| match (segment.kind, segment.span_s) {
+        (SegmentKind::Held, [from_s, to_s]) => Segment { span_s: [from_s, to_s.min(fill_s)], ..*segment },
+        _ => *segment,
+    };
+    let cut = record.segments.iter().map(before);
+    cut.filter(|segment| segment.span_s[1] - segment.span_s[0] >= SHORTEST_S).collect()
 }
 
 /// Signs of the slips of the oncoming and the offgoing clutch while both slip.

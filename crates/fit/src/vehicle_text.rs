@@ -127,11 +127,16 @@ impl VehicleText {
         Ok(true)
     }
 
+    /// Adds a table that the file does not have, at its end.
+    pub(crate) fn add_table(&mut self, table: &[Step], lines: &str) {
+        let end = self.text.len();
+        let line_end = if self.text.ends_with('\n') { "" } else { "\n" };
+        self.edits.push((end..end, format!("{line_end}\n[{}]\n{lines}", name_of(table))));
+    }
+
     /// The end of the line with the name of a table.
     fn end_of_header(&self, table: &[Step]) -> Option<usize> {
-        let names: Vec<&str> =
-            table.iter().filter_map(|step| if let Step::Key(key) = step { Some(&**key) } else { None }).collect();
-        let header = format!("[{}]", names.join("."));
+        let header = format!("[{}]", name_of(table));
         let mut at = 0;
         for line in self.text.split_inclusive('\n') {
             at += line.len();
@@ -193,6 +198,12 @@ impl VehicleText {
         }
         Ok((span, key_at))
     }
+}
+
+/// The name of a table as it stands in its line.
+fn name_of(table: &[Step]) -> String {
+    let names = table.iter().filter_map(|step| if let Step::Key(key) = step { Some(&**key) } else { None });
+    names.collect::<Vec<&str>>().join(".")
 }
 
 /// Names of the shafts of the gear train, in the order of the file.

@@ -7,7 +7,7 @@ use drivetrain::{ClutchValve, Table1};
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
-use crate::fitted_file::SIDES;
+use crate::fitted_file::{SIDES, fill_comment};
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
 use crate::{FitError, Verdict};
 
@@ -68,23 +68,16 @@ impl GearboxFit {
         text.put(&["converter"], "torque_ratio", &list(&ratios), &self.comment(Quantity::TorqueRatio))
     }
 
-    /// The drag of all elements, and of those that have one of their own.
+    /// The drag of the elements of which the logs tell it.
     fn write_drag(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
-        let (more_n_m, comment) = (DRAG_UNIT_N_M * self.unknown(Quantity::Drag), self.comment(Quantity::Drag));
-        let with = |drag_n_m: f64| number((drag_n_m + more_n_m).max(0.0));
-        let (mut own, mut common) = (Vec::new(), None);
-        for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
-            let Some(clutch) = clutch else { continue };
-            match text.has(&["clutch", &element.name], "drag_n_m") {
-                true => own.push((element.name.as_str(), clutch.drag_n_m)),
-                false => common = Some(clutch.drag_n_m),
+        for (place, name) in self.quantities.elements.iter().enumerate() {
+            let element = car.gearbox.elements.iter().position(|element| element.name == *name);
+            let known = element.and_then(|at| car.clutches[at].as_ref());
+            let drag = Quantity::Drag(place);
+            if let (Some(known), true) = (known, self.is_told(drag)) {
+                let value = (known.drag_n_m + DRAG_UNIT_N_M * self.unknown(drag)).max(0.0);
+                text.put(&["clutch", name], "drag_n_m", &number(value), &self.comment(drag))?;
             }
-        }
-        if let Some(drag_n_m) = common {
-            text.put(&["friction"], "drag_n_m", &with(drag_n_m), &comment)?;
-        }
-        for (name, drag_n_m) in own {
-            text.put(&["clutch", name], "drag_n_m", &with(drag_n_m), &comment)?;
         }
         Ok(())
     }
@@ -128,7 +121,36 @@ impl GearboxFit {
         let kiss_pa = known.clutch.kiss_pressure() + KISS_UNIT_PA * self.unknown(Quantity::Kiss(place));
         let spring_n = (kiss_pa * self.gain_factor(place) * known.clutch.piston_area_m2).max(0.0);
         text.put(&table, "return_spring_n", &number(spring_n), &self.comment(Quantity::Kiss(place)))?;
+        self.write_fill(text, name, known, place, spring_n)?;
         self.write_valve(text, name, known, place)
+    }
+
+    /// How the cylinder of an element fills, as a table of its own: one has nothing of the common one.
+    fn write_fill(
+        &self,
+        text: &mut Written,
+        name: &str,
+        known: &config::ShiftClutch,
+        place: usize,
+        spring_n: f64,
+    ) -> Result<(), FitError> {
+        let (cylinder, Some(fill)) = (&known.cylinder, self.fills[place]) else { return Ok(()) };
+        let factor = fill.factor();
+        let preload_n = cylinder.preload_pa / cylinder.kiss_pa.max(f64::MIN_POSITIVE) * spring_n;
+        let same = "as in the given file";
+        let values = [
+            ("stroke_m", factor * cylinder.stroke_m3 / known.clutch.piston_area_m2, fill_comment(&fill)),
+            ("preload_n", preload_n.min(spring_n), "keeps its ratio to the fitted return spring".to_owned()),
+            ("home_capacity_m3_pa", cylinder.home_capacity_m3_pa, same.to_owned()),
+            ("capacity_m3_pa", cylinder.capacity_m3_pa, same.to_owned()),
+            ("laminar_pa_s2_m5", cylinder.supply.laminar_pa_s2_m5, same.to_owned()),
+            ("orifice_pa_s2_m6", cylinder.supply.orifice_pa_s2_m6, same.to_owned()),
+            ("exhaust_factor", cylinder.exhaust.laminar_pa_s2_m5 / cylinder.supply.laminar_pa_s2_m5, same.to_owned()),
+            ("flow_max_m3_s", cylinder.flow_max_m3_s, same.to_owned()),
+            ("leak_m3_s_pa", cylinder.leak_m3_s_pa, same.to_owned()),
+        ];
+        let table = ["clutch", name, "fill"];
+        values.iter().try_for_each(|(key, value, comment)| text.put(&table, key, &number(*value), comment))
     }
 
     /// The valve of an element as a table of its own.
@@ -190,13 +212,9 @@ impl GearboxFit {
                     kpa * half
                 )
             }
-            Quantity::Drag => {
+            Quantity::Drag(_) => {
                 let n_m = DRAG_UNIT_N_M;
-                format!(
-                    "drag {:+.2} N m, 95 % within {:.2} N m, {told}; in the mean of all elements",
-                    n_m * value,
-                    n_m * half
-                )
+                format!("drag {:+.2} N m, 95 % within {:.2} N m, {told}", n_m * value, n_m * half)
             }
             _ => {
                 let more = match quantity {
@@ -240,10 +258,6 @@ pub(super) struct Written {
 impl Written {
     fn new(text: &str) -> Result<Self, FitError> {
         Ok(Self { text: VehicleText::new(text)?, added: Vec::new() })
-    }
-
-    fn has(&self, table: &[&str], key: &str) -> bool {
-        self.text.has(&keys(&[table, &[key]].concat()))
     }
 
     /// Puts a value in TOML into a table.

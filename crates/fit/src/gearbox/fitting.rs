@@ -8,10 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use super::balances::Balances;
 use super::driving::{Driving, DrivingModel};
 use super::precision::stated;
-use super::quantities::{Quantities, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
+use crate::fill::{FillFit, FillLog, Filling};
+use crate::pressure::Hydraulics;
 use crate::{FitError, Verdict};
 
 /// How far a fit is.
@@ -46,6 +48,8 @@ pub struct GearboxFit {
     pub is_converged: bool,
     /// Time of driving in a gear with the engine pulling, s, and with a reported engine torque.
     pub driving_s: [f64; 2],
+    /// Fill volumes of the elements, by their places; none where a piston has no stroke.
+    pub fills: Vec<Option<FillFit>>,
     /// Which balances of it were fitted.
     pub(crate) balances: Balances,
     /// Names of the quantities that ended where nothing beyond is held possible.
@@ -100,7 +104,8 @@ fn fit_with(
     }
     let scales = solved.point.driving.scales();
     let squares = solved.point.shifts.iter().map(|shift| shift.torque_error.powi(2)).sum::<f64>();
-    let fit = GearboxFit {
+    let mut fit = GearboxFit {
+        fills: Vec::new(),
         torque_misfit: (squares / models.len() as f64).sqrt(),
         at_limit: problem.at_limit(&solved.at),
         unknowns: solved.at,
@@ -114,10 +119,47 @@ fn fit_with(
         balances: balances.clone(),
         quantities,
     };
+    fit.fills = (0..fit.quantities.elements.len()).map(|place| fit.fill_of(car, tables, shifts, place)).collect();
     Ok((fit, scales))
 }
 
 impl GearboxFit {
+    /// The fill volume of an element by the measured pressures of the shifts in which it is the oncoming one.
+    fn fill_of(&self, car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog], place: usize) -> Option<FillFit> {
+        let element = (0..car.clutches.len()).find(|at| tables.place(*at) == Some(place))?;
+        let known = car.clutches[element].as_ref()?;
+        let budget = known.standard_fill_budget(car.oil_temperature_degc)?;
+        let rows = tables.tables();
+        let is_oncoming = |log: &&ShiftLog| {
+            rows.shift(log.gears[0], log.gears[1]).is_some_and(|row| row.clutches[1].element == place)
+        };
+        let measured = shifts.iter().filter(|log| self.quantities.measured[place] && is_oncoming(log));
+        let logs: Vec<FillLog<'_>> = (measured.map(|log| FillLog {
+            commands: &log.commands[1],
+            pressure: &log.pressure[1],
+            until_s: log.slip_s[0],
+        }))
+        .collect();
+        let [lag, gain, kiss, late] = [Quantity::Lag, Quantity::Gain, Quantity::Kiss, Quantity::Delay]
+            .map(|quantity: fn(usize) -> Quantity| [self.unknown(quantity(place)), self.sd(quantity(place))]);
+        let kiss_pa = |more: f64| (known.clutch.kiss_pressure() + KISS_UNIT_PA * (kiss[0] + more)) * gain[0].exp();
+        let hydraulics = Hydraulics::of(known).with_valve(lag[0], gain[0]);
+        let filling = Filling {
+            hydraulics,
+            kiss_pa: kiss_pa(0.0),
+            late_s: DELAY_UNIT_S * late[0],
+            sensor_scale: self.unknown(Quantity::PressureScale).exp(),
+            sensor_late_s: 0.0,
+        };
+        let moved = [
+            Filling { kiss_pa: kiss_pa(kiss[1]), ..filling },
+            Filling { hydraulics: hydraulics.with_valve(lag[1], 0.0), ..filling },
+            Filling { hydraulics: hydraulics.with_valve(0.0, gain[1]), ..filling },
+            Filling { late_s: filling.late_s + DELAY_UNIT_S * late[1], ..filling },
+        ];
+        Some(FillFit::of(&logs, &filling, &moved, &budget))
+    }
+
     /// The unknown of a quantity; zero, the file's value, for one that the car does not have.
     pub fn unknown(&self, quantity: Quantity) -> f64 {
         self.quantities.place(quantity).map_or(0.0, |place| self.unknowns[place])

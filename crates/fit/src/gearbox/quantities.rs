@@ -15,7 +15,7 @@ pub(crate) const KISS_UNIT_PA: f64 = 1e4;
 /// Unit of the unknown of the drag, N m, and its standard deviation before \[chosen: the drag of an element with hot oil\].
 pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
 const DRAG_N_M: f64 = 1.0;
-/// Part of the variance that friction elements, valves or inertias have in common \[chosen\]: oil, temperature, the shaft at the input, the
+/// Part of the variance that friction elements, their drags, valves or inertias have in common \[chosen\]: oil, temperature, the shaft at the input, the
 /// channel of the currents.
 const COMMON: f64 = 1.0 / 3.0;
 /// Bound of the torque ratio above 1, as a share \[chosen\].
@@ -45,8 +45,8 @@ pub enum Quantity {
     TorqueRatio,
     /// Without a converter the delay of the reported engine torque against the turbine speed.
     InputDelay,
-    /// Peak of the drag of each element that slips, in the mean over all.
-    Drag,
+    /// Peak of the drag of an element that is open or slips.
+    Drag(usize),
     /// Torque of an element: friction times valve gain.
     Torque(usize),
     /// Kiss point of an element, as a pressure by the gain of the file.
@@ -104,10 +104,11 @@ impl Quantities {
         let (pairs, measured) = (pairs(car, tables, shifts), measured(tables, shifts));
         let has_converter = car.converter.is_some();
         let input = if has_converter { Quantity::TorqueRatio } else { Quantity::InputDelay };
-        let mut all = vec![Quantity::Input, input, Quantity::Drag];
+        let mut all = vec![Quantity::Input, input];
         all.extend((0..measured.len()).flat_map(|at| {
             [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at), Quantity::Delay(at), Quantity::Gain(at)]
         }));
+        all.extend((0..measured.len()).map(Quantity::Drag));
         all.extend((0..pairs.len()).map(Quantity::Inertia));
         if measured.contains(&true) {
             all.push(Quantity::PressureScale);
@@ -160,7 +161,7 @@ impl Quantities {
             Quantity::TorqueRatio => "converter torque ratio above 1".to_owned(),
             Quantity::InputDelay => "reported engine torque, delay".to_owned(),
             Quantity::Delay(at) => format!("{}: valve delay", element(at)),
-            Quantity::Drag => "drag of each open element".to_owned(),
+            Quantity::Drag(at) => format!("{}: drag", element(at)),
             Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
             Quantity::Gain(at) => format!("{}: valve gain", element(at)),
             Quantity::PressureScale => "pressure sensor, scale".to_owned(),
@@ -216,7 +217,7 @@ impl Known<'_> {
             Quantity::TorqueRatio => deviation_of(TORQUE_RATIO),
             Quantity::InputDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
             Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
-            Quantity::Drag => DRAG_N_M / DRAG_UNIT_N_M,
+            Quantity::Drag(_) => DRAG_N_M / DRAG_UNIT_N_M,
             Quantity::Torque(_) => known.torque_share,
             Quantity::Kiss(at) => (known.kiss_point_pa / KISS_UNIT_PA).hypot(self.kiss_by_gain(at)),
             Quantity::Gain(_) => known.valve_gain,
@@ -251,9 +252,10 @@ impl Known<'_> {
     fn covariance(&self, one: Quantity, other: Quantity) -> f64 {
         use Quantity as Q;
         match (one, other) {
-            (Q::Torque(_), Q::Torque(_)) | (Q::Delay(_), Q::Delay(_)) | (Q::Inertia(_), Q::Inertia(_)) => {
-                COMMON * self.sd(one) * self.sd(other)
-            }
+            (Q::Torque(_), Q::Torque(_))
+            | (Q::Delay(_), Q::Delay(_))
+            | (Q::Inertia(_), Q::Inertia(_))
+            | (Q::Drag(_), Q::Drag(_)) => COMMON * self.sd(one) * self.sd(other),
             _ => match (self.by_gain(one), self.by_gain(other)) {
                 // The gain of one whose pressure is not measured stays that of the file.
                 (Some((at, of_one)), Some((of, of_other))) if at == of && self.measured[at] => of_one * of_other,
@@ -315,7 +317,7 @@ impl Quantity {
             Self::Delay(_) | Self::InputDelay => 0.3e-3 / DELAY_UNIT_S,
             // Whether a reading is held or interpolated until the next one is not known: half a cycle of 5 ms.
             Self::ReportedDelay => 2.5e-3 / DELAY_UNIT_S,
-            Self::Drag => 0.2 / DRAG_UNIT_N_M,
+            Self::Drag(_) => 0.2 / DRAG_UNIT_N_M,
             Self::Kiss(_) => 500.0 / KISS_UNIT_PA,
             Self::Lag(_) => 0.02,
             Self::Inertia(_) | Self::Mass => 0.015,

@@ -5,8 +5,9 @@ use drivetrain::ShiftKind;
 use super::driving::Balance;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
+use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
-use crate::report::cautions;
+use crate::report::{cautions, fill_row};
 use crate::{ReportRow, Verdict};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
@@ -24,7 +25,14 @@ impl GearboxFit {
         let all = self.quantities.all.iter().enumerate();
         all.filter(|(_, quantity)| self.is_seen(**quantity))
             .map(|(place, quantity)| self.row(place, *quantity))
+            .chain(self.seen_fills().map(|(name, fill)| fill_row(&format!("{name}: fill volume"), fill)))
             .collect()
+    }
+
+    /// Fill volumes of the elements with a stroke that slipped in a fitted shift, with their names.
+    fn seen_fills(&self) -> impl Iterator<Item = (&str, &FillFit)> {
+        let all = self.quantities.elements.iter().zip(&self.fills).zip(&self.elements_seen);
+        all.filter(|(_, seen)| **seen).filter_map(|((name, fill), _)| Some((name.as_str(), fill.as_ref()?)))
     }
 
     fn row(&self, place: usize, quantity: Quantity) -> ReportRow {
@@ -39,7 +47,7 @@ impl GearboxFit {
         let (value, interval) = match quantity {
             Quantity::Delay(_) | Quantity::InputDelay | Quantity::ReportedDelay => plain(1e3 * DELAY_UNIT_S, "ms"),
             Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
-            Quantity::Drag => plain(DRAG_UNIT_N_M, "N m"),
+            Quantity::Drag(_) => plain(DRAG_UNIT_N_M, "N m"),
             _ => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
         };
         let share = format!("{:.2}", sd / self.quantities.sd_before(place));
@@ -49,10 +57,11 @@ impl GearboxFit {
     /// Whether a fitted shift depends on a quantity.
     pub(crate) fn is_seen(&self, quantity: Quantity) -> bool {
         match quantity {
-            Quantity::Torque(at) | Quantity::Kiss(at) | Quantity::Lag(at) | Quantity::Delay(at) => {
-                self.elements_seen[at]
-            }
+            Quantity::Torque(at) | Quantity::Kiss(at) | Quantity::Lag(at) => self.elements_seen[at],
+            Quantity::Delay(at) => self.elements_seen[at],
             Quantity::Gain(at) => self.quantities.measured[at],
+            // Of one that is always open or held in these shifts the drag may be told too.
+            Quantity::Drag(at) => self.elements_seen[at] || self.is_told(quantity),
             Quantity::Inertia(at) => self.by_pair[at].iter().any(|count| *count > 0),
             _ => true,
         }
@@ -159,7 +168,7 @@ impl GearboxFit {
         use Quantity as Q;
         let is_of_signals =
             |quantity| matches!(quantity, Q::InputDelay | Q::PressureScale | Q::ReportedDelay | Q::ReportedScale);
-        let is_of_car = |quantity| quantity != Q::Drag && !is_of_signals(quantity);
+        let is_of_car = |quantity| !matches!(quantity, Q::Drag(_)) && !is_of_signals(quantity);
         let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
         let mut car = seen().filter(|quantity| is_of_car(*quantity));
         let mut torques = seen().filter(|quantity| quantity.has_torque_scale() && is_of_car(*quantity));
@@ -186,6 +195,7 @@ impl GearboxFit {
                 self.at_limit.join(", ")
             ));
         }
+        lines.extend(self.seen_fills().filter_map(|(name, fill)| fill.misfit(name)));
         lines.extend(cautions(self.is_converged, self.shifts));
         lines
     }
@@ -233,8 +243,9 @@ impl GearboxFit {
             ));
         }
         let of_element = |quantity: fn(usize) -> Quantity| {
-            let open = (0..quantities.elements.len())
-                .filter(|at| self.elements_seen[*at] && self.verdict(quantity(*at)) == Verdict::NotTold);
+            let is_open =
+                |at: usize| quantities.place(quantity(at)).is_some() && self.verdict(quantity(at)) == Verdict::NotTold;
+            let open = (0..quantities.elements.len()).filter(|at| self.elements_seen[*at] && is_open(*at));
             open.map(|at| quantities.elements[at].as_str()).collect::<Vec<_>>().join(", ")
         };
         let kiss = of_element(Quantity::Kiss);
@@ -244,6 +255,13 @@ impl GearboxFit {
             ));
         }
         let torque = of_element(Quantity::Torque);
+        let open = self.seen_fills().filter(|(_, fill)| fill.verdict() == Verdict::NotTold);
+        let fill = open.map(|(name, _)| name).collect::<Vec<_>>().join(", ");
+        if !fill.is_empty() {
+            lines.push(format!(
+                "to know more: for the fill volume of {fill}, which is not told by these logs, {FILL_TOLD_BY}"
+            ));
+        }
         if !torque.is_empty() {
             lines.push(format!("to know more: for the friction of {torque}, shifts at much throttle in which it drives the change of speed"));
         }

@@ -2,8 +2,8 @@
 
 use config::Car;
 use design::ShiftTables;
+use drivetrain::ShiftKind;
 use drivetrain::clutch::drag_torque;
-use drivetrain::{ClutchValve, ShiftKind};
 use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
 use observer::any_shift::ShiftRow;
@@ -12,7 +12,7 @@ use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantities, Q
 use super::recorder::part;
 use super::shift_log::ShiftLog;
 use crate::Series;
-use crate::pressure::{Grid, pressures};
+use crate::pressure::{Grid, Hydraulics, pressures};
 
 /// Step of the integrals, s.
 const STEP_S: f64 = 0.002;
@@ -36,8 +36,8 @@ struct ClutchModel {
     commands: Series,
     /// Measured pressure while both clutches slip, Pa.
     measured: Series,
-    valve: ClutchValve<f64>,
-    hysteresis_pa: f64,
+    /// Without a cylinder: a fill is over before both clutches slip.
+    hydraulics: Hydraulics,
     kiss_pa: f64,
     /// Torque at the turbine per pressure above the kiss point, at the points of the grid, N m/Pa.
     per_pa: Vec<f64>,
@@ -55,9 +55,9 @@ pub(crate) struct ShiftModel {
     /// Torque at the input by the file, and the part of it by the torque ratio above 1, N m.
     input_n_m: Vec<f64>,
     above_one_n_m: Vec<f64>,
-    /// Torque at the turbine by the drag of the elements that slip: by the file, and with a peak of 1 N m of each, N m.
+    /// Torque at the turbine by the drag of the elements that slip: by the file, and by each with a peak of 1 N m, N m.
     drag_n_m: Vec<f64>,
-    drag_of_one_n_m: Vec<f64>,
+    drag_of_one_n_m: Vec<(usize, Vec<f64>)>,
     /// `M11`, kg m^2.
     inertia_kg_m2: f64,
     /// By how much the output speed has slowed the turbine down until each reading by `M12/M11` of the file, rad/s. With another `M11`
@@ -125,7 +125,7 @@ impl ShiftModel {
             .iter()
             .map(|time_s| row.mass_kg_m2[0][1] / row.mass_kg_m2[0][0] * (log.output.at(*time_s) - start))
             .collect();
-        let (drag_n_m, drag_of_one_n_m) = drag(car, log, grid)?;
+        let (drag_n_m, drag_of_one_n_m) = drag(car, tables, log, grid)?;
         let mean = input_n_m.iter().sum::<f64>() / points as f64;
         Some(Self {
             kind: log.kind(car, mean),
@@ -193,11 +193,13 @@ impl ShiftModel {
         }
         let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
         unknowns.put(Quantity::TorqueRatio, &self.integral(&above));
-        let more: Vec<f64> = self.drag_of_one_n_m.iter().map(|drag| DRAG_UNIT_N_M * drag).collect();
-        unknowns.put(Quantity::Drag, &self.integral(&more));
-        let peak = unknowns.of(Quantity::Drag);
-        let drag: Vec<f64> = self.drag_n_m.iter().zip(&more).map(|(file, more)| file + peak * more).collect();
-        momentum.iter_mut().zip(self.integral(&drag)).for_each(|(sum, more)| *sum += more);
+        momentum.iter_mut().zip(self.integral(&self.drag_n_m)).for_each(|(sum, more)| *sum += more);
+        for (place, of_one_n_m) in &self.drag_of_one_n_m {
+            let by_drag: Vec<f64> = self.integral(of_one_n_m).into_iter().map(|by| DRAG_UNIT_N_M * by).collect();
+            let peak = unknowns.of(Quantity::Drag(*place));
+            momentum.iter_mut().zip(&by_drag).for_each(|(sum, by)| *sum += peak * by);
+            unknowns.put(Quantity::Drag(*place), &by_drag);
+        }
         momentum
     }
 
@@ -249,15 +251,15 @@ impl ShiftModel {
             sum += 0.5 * self.grid.step_s * (pair[0] + pair[1]);
             sums.push(sum);
         }
-        self.time_s.iter().map(|time_s| between_points(self.grid, &sums, *time_s)).collect()
+        self.time_s.iter().map(|time_s| self.grid.at(&sums, *time_s)).collect()
     }
 }
 
 impl ClutchModel {
     /// Pressures by the gain of the file: the true ones, at which the valve has its lag, over the factor of the gain.
     fn pressures(&self, grid: Grid, log_lag: f64, log_gain: f64, late: f64) -> Vec<f64> {
-        let valve = self.valve.changed(log_lag.exp(), log_gain.exp(), None);
-        let mut pressures = pressures(&valve, self.hysteresis_pa, DELAY_UNIT_S * late, &self.commands, grid);
+        let of = self.hydraulics.with_valve(log_lag, log_gain);
+        let mut pressures = pressures(&of, DELAY_UNIT_S * late, &self.commands, grid);
         pressures.iter_mut().for_each(|pressure| *pressure *= (-log_gain).exp());
         pressures
     }
@@ -276,7 +278,7 @@ impl ClutchModel {
         let factor = (at[scale] + at[gain]).exp();
         let predicted = |values: &[f64]| -> DVector<f64> {
             let times = self.measured.time_s.iter();
-            DVector::from_iterator(rows, times.map(|time_s| factor * between_points(grid, values, *time_s)))
+            DVector::from_iterator(rows, times.map(|time_s| factor * grid.at(values, *time_s)))
         };
         let all = predicted(pressure);
         let mut by_parameter = DMatrix::zeros(rows, at.len());
@@ -293,14 +295,6 @@ impl ClutchModel {
     }
 }
 
-/// The value at a time between the points of a grid.
-fn between_points(grid: Grid, values: &[f64], time_s: f64) -> f64 {
-    let place = (time_s - grid.begin_s) / grid.step_s;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
-    let before = (place.max(0.0) as usize).min(values.len().saturating_sub(2));
-    values[before] + (place - before as f64) * (values[before + 1] - values[before])
-}
-
 /// Torque at the gearbox input, N m, and the part of it by the torque ratio above 1.
 fn input(car: &Car, log: &ShiftLog, time_s: f64) -> (f64, f64) {
     match &car.converter {
@@ -312,27 +306,31 @@ fn input(car: &Car, log: &ShiftLog, time_s: f64) -> (f64, f64) {
     }
 }
 
-/// Torque at the turbine by the drag of the elements that are not held, at the points of the grid: by the file, and with a peak of 1 N m of
-/// each. An element brakes the turbine by as much of its drag as its slip changes with the turbine speed.
-fn drag(car: &Car, log: &ShiftLog, grid: Grid) -> Option<(Vec<f64>, Vec<f64>)> {
+/// Torque at the turbine by the drag of the elements that are not held, at the points of the grid: of all by the file, and of each with a peak of
+/// 1 N m, by its place in the tables. An element brakes the turbine by as much of its drag as its slip changes with the turbine speed.
+#[expect(clippy::type_complexity, reason = "a value over time, and one of each element")]
+fn drag(
+    car: &Car,
+    tables: &ShiftTables<f64>,
+    log: &ShiftLog,
+    grid: Grid,
+) -> Option<(Vec<f64>, Vec<(usize, Vec<f64>)>)> {
     let Change::Single { held, .. } = &car.gearbox.shift(log.gears[0], log.gears[1])?.change else { return None };
     let train = car.gearbox.train.as_ref()?;
     let speeds = train.speeds_in_shift(held)?;
-    let elements = car.clutches.iter().enumerate().filter(|(at, _)| !held.contains(at));
-    let slipping: Vec<(f64, f64, f64)> = elements
-        .filter_map(|(at, clutch)| {
-            let slip = train.slip_row(at) * &speeds;
-            Some((slip[0], slip[1], clutch.as_ref()?.drag_n_m))
-        })
-        .collect();
-    let at = |time_s: f64| {
-        let (turbine, output) = (log.turbine.at(time_s), log.output.at(time_s));
-        slipping.iter().fold((0.0, 0.0), |(file, one), (by_turbine, by_output, drag_n_m)| {
-            let of_one = -by_turbine * drag_torque(1.0, by_turbine * turbine + by_output * output);
-            (file + drag_n_m * of_one, one + of_one)
-        })
-    };
-    Some((0..grid.points).map(|i| at(grid.time_s(i))).unzip())
+    let (mut file_n_m, mut each) = (vec![0.0; grid.points], Vec::new());
+    for (at, clutch) in car.clutches.iter().enumerate().filter(|(at, _)| !held.contains(at)) {
+        let Some(clutch) = clutch else { continue };
+        let slip = train.slip_row(at) * &speeds;
+        let of_one = |time_s: f64| {
+            let slip_rad_s = slip[0] * log.turbine.at(time_s) + slip[1] * log.output.at(time_s);
+            -slip[0] * drag_torque(1.0, slip_rad_s)
+        };
+        let of_one: Vec<f64> = (0..grid.points).map(|i| of_one(grid.time_s(i))).collect();
+        file_n_m.iter_mut().zip(&of_one).for_each(|(sum, of_one)| *sum += clutch.drag_n_m * of_one);
+        each.extend(tables.place(at).map(|place| (place, of_one)));
+    }
+    Some((file_n_m, each))
 }
 
 /// The model of the offgoing (0) or oncoming (1) clutch.
@@ -357,8 +355,7 @@ fn clutch(
         place: shift.element,
         commands: log.commands[which].clone(),
         measured: part(&log.pressure[which], log.slip_s),
-        valve: known.valve,
-        hysteresis_pa: known.hysteresis_pa,
+        hydraulics: Hydraulics { cylinder: None, ..Hydraulics::of(known) },
         kiss_pa: known.clutch.kiss_pressure(),
         per_pa: per_pa.collect(),
     })

@@ -1,6 +1,7 @@
 //! Cars drawn at random, their shifts behind sensors, and what a fit is compared with.
 #![allow(dead_code, clippy::unwrap_used, reason = "shared by several tests; a test may panic")]
 
+use config::vehicle::ShiftClutch;
 use config::{Experiment, Sensors, Source, Vehicle};
 use drivetrain::{ClutchValve, Table1};
 use fit::{Map, Parameter, ReadingAges, Series, ShiftRecord};
@@ -51,6 +52,9 @@ pub(crate) struct TestCar {
     pub(crate) truth: Vec<(Parameter, f64)>,
     torque_signal_scale: f64,
     pressure_scale: f64,
+    pressure_late_s: f64,
+    /// Factor on the time of the fill.
+    pub(crate) fill: f64,
     draw: Draw,
 }
 
@@ -74,9 +78,31 @@ fn around(whole: Parameter, map: Map, [low, middle, high]: [f64; 3]) -> [(Parame
     [(whole, middle.ln()), shape(0, low), shape(1, high)]
 }
 
+/// Gives a clutch another stroke, other passages and another preload; the factor on the time of its fill.
+fn draw_fill(clutch: &mut ShiftClutch, draw: &mut Draw) -> f64 {
+    /// Drop over the passages in a fast fill, Pa.
+    const DROP_PA: f64 = 0.15e6;
+    let cylinder = &mut clutch.cylinder;
+    let flow = cylinder.flow(DROP_PA);
+    let (volume, passages) = (draw.between(0.75, 1.25), draw.between(0.8, 1.25));
+    let share = draw.between(0.9, 1.1) * cylinder.preload_pa / cylinder.kiss_pa;
+    cylinder.stroke_m3 *= volume;
+    cylinder.supply = cylinder.supply.with_resistance_factor(passages);
+    cylinder.exhaust = cylinder.exhaust.with_resistance_factor(passages);
+    cylinder.kiss_pa = clutch.clutch.kiss_pressure();
+    cylinder.preload_pa = share * cylinder.kiss_pa;
+    volume * flow / cylinder.flow(DROP_PA)
+}
+
 impl TestCar {
     pub(crate) fn drawn(seed: u64) -> Self {
         Self::of(Vehicle::two_speed_at().unwrap(), seed)
+    }
+
+    /// A car whose pistons have a stroke.
+    pub(crate) fn with_stroke(seed: u64) -> Self {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_stroke.toml");
+        Self::of(Vehicle::read(std::path::Path::new(path)).unwrap(), seed)
     }
 
     /// A car that differs from this file.
@@ -151,7 +177,16 @@ impl TestCar {
         // The plant holds the throttle for 10 ms: a line between the readings is late by half of it.
         truth.push((Parameter::EngineTorqueDelay, -0.5));
         truth.push((Parameter::PressureScale, pressure_scale.ln()));
-        let mut drawn = Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, draw };
+        // Random numbers of their own: the other draws do not depend on them.
+        let mut more = Draw::new(!seed);
+        let pressure_late_s = more.between(0.0, 0.01);
+        truth.push((Parameter::PressureDelay, pressure_late_s / 0.01));
+        let mut fill = 1.0;
+        if file.oncoming.has_stroke {
+            fill = draw_fill(&mut car.oncoming, &mut more);
+        }
+        let mut drawn =
+            Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, pressure_late_s, fill, draw };
         drawn.tell_maps();
         drawn
     }
@@ -354,7 +389,7 @@ impl TestCar {
             wheel: series(signal::WHEEL_SPEED, read),
             oncoming: series(signal::ONCOMING_CURRENT, read),
             offgoing: series(signal::OFFGOING_CURRENT, read),
-            pressure: some(more && number == 0, signal::ONCOMING_PRESSURE),
+            pressure: later(some(more && number == 0, signal::ONCOMING_PRESSURE), self.pressure_late_s),
             engine_torque: some(more, signal::ENGINE_TORQUE),
             lock_s: whole.time_s[lock] - zero_s,
             segments: Vec::new(),
@@ -367,6 +402,12 @@ impl TestCar {
             pressure_pa: series(signal::ONCOMING_PRESSURE, whole),
         })
     }
+}
+
+/// Readings that come later.
+fn later(mut series: Series, late_s: f64) -> Series {
+    series.time_s.iter_mut().for_each(|time_s| *time_s += late_s);
+    series
 }
 
 impl TestShift {

@@ -25,6 +25,8 @@ const KISS_PA: f64 = 10e3;
 /// Scale and noise of a pressure sensor.
 const SENSOR_SCALE: f64 = 0.008;
 const SENSOR_PA: f64 = 3e3;
+/// Of the volume of each piston's stroke.
+const FILL: f64 = 0.25;
 /// Of the drag of each open element.
 const DRAG: f64 = 0.5;
 /// Of mass, rolling resistance, air drag, engine inertia, stiffness of the drive shafts and slip of the tyres.
@@ -102,6 +104,8 @@ pub(crate) struct Drawn {
     pub(crate) seed: u64,
     draw: ShiftDraw,
     kiss_pa: Vec<f64>,
+    /// Volume of the stroke of each element of the gearbox over that of the file.
+    pub(crate) fill: Vec<f64>,
     /// What the file's inertias are multiplied with to be true, by pairs of gears.
     inertia: Vec<([usize; 2], f64)>,
     /// The same of mass, rolling resistance, air drag and engine inertia.
@@ -163,7 +167,16 @@ impl Drawn {
         let kiss_pa: Vec<f64> = truth.clutches.iter().map(|_| within(KISS_PA)).collect();
         for (clutch, kiss_pa) in truth.clutches.iter_mut().zip(&kiss_pa) {
             let Some(clutch) = clutch else { continue };
+            let preload = clutch.cylinder.preload_pa / clutch.cylinder.kiss_pa;
             clutch.clutch.return_spring_n += kiss_pa * clutch.clutch.piston_area_m2;
+            clutch.cylinder.kiss_pa = clutch.clutch.kiss_pressure();
+            clutch.cylinder.preload_pa = preload * clutch.cylinder.kiss_pa;
+        }
+        let mut fills = Random(!seed ^ TIMING_STREAM);
+        let fill: Vec<f64> =
+            truth.clutches.iter().map(|_| 1.0 + share * FILL * (2.0 * fills.uniform() - 1.0)).collect();
+        for (clutch, fill) in truth.clutches.iter_mut().zip(&fill) {
+            clutch.iter_mut().for_each(|clutch| clutch.cylinder.stroke_m3 *= fill);
         }
         for clutch in truth.clutches.iter_mut().flatten() {
             clutch.drag_n_m *= 1.0 + share * DRAG * (2.0 * drags.uniform() - 1.0);
@@ -193,7 +206,7 @@ impl Drawn {
         file.engine.inertia_kg_m2 /= vehicle[3];
         file.driveline.shaft_stiffness_n_m_rad /= factor(STIFFNESS);
         file.tyre.slip_scale /= factor(TYRE);
-        Self { file, truth, seed, draw, kiss_pa, inertia, vehicle, reported: None }
+        Self { file, truth, seed, draw, kiss_pa, fill, inertia, vehicle, reported: None }
     }
 
     /// With a mass in its file that is known to a percent.
@@ -219,7 +232,7 @@ impl Drawn {
         let element = |place: usize| (0..self.file.clutches.len()).find(|at| tables.place(*at) == Some(place)).unwrap();
         match quantity {
             Quantity::Input if self.file.converter.is_some() => self.draw.converter.ln(),
-            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) | Quantity::Drag => 0.0,
+            Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) => 0.0,
             Quantity::Lag(place) => self.draw.timing[element(place)].map_or(0.0, |timing| timing.lag.ln()),
             Quantity::InputDelay | Quantity::PressureScale => 0.0,
             Quantity::Mass => self.vehicle[0].ln(),
@@ -229,6 +242,10 @@ impl Drawn {
             Quantity::ReportedScale => -self.reported.map_or(1.0, |reported| reported.factor).ln(),
             Quantity::ReportedDelay => self.reported.map_or(0.0, |reported| reported.ahead_s) / 0.01,
             Quantity::Gain(place) => self.draw.valve_gain[element(place)].ln(),
+            Quantity::Drag(place) => {
+                let [truth, file] = [&self.truth, &self.file].map(|car| car.clutches[element(place)].unwrap().drag_n_m);
+                truth - file
+            }
             Quantity::Torque(place) => {
                 let at = element(place);
                 (self.draw.friction[at] * self.draw.valve_gain[at]).ln()
@@ -330,8 +347,8 @@ pub(crate) fn every_fifth(shifts: Vec<ShiftLog>) -> [Vec<ShiftLog>; 2] {
 /// True torques of the clutches of the shifts.
 #[derive(Default)]
 pub(crate) struct Truth {
-    torque_n_m: [Series; 2],
-    pressure_pa: [Series; 2],
+    pub(crate) torque_n_m: [Series; 2],
+    pub(crate) pressure_pa: [Series; 2],
 }
 
 impl Truth {
@@ -351,9 +368,11 @@ impl Truth {
         for log in shifts {
             let row = rows.shift(log.gears[0], log.gears[1]).unwrap();
             let Some(clutch) = row.clutches.iter().position(|clutch| clutch.element == place) else { continue };
-            for time_s in &log.turbine.time_s {
+            // A sensor is read during the whole command, as a recorder takes it.
+            let during = log.turbine.between([log.command_s[0], log.command_s[1]]);
+            for (time_s, _) in during.collect::<Vec<_>>() {
                 let noise_pa = SENSOR_PA * (2.0 * random.uniform() - 1.0);
-                log.pressure[clutch].push(*time_s, scale * self.pressure_pa[clutch].at(*time_s) + noise_pa);
+                log.pressure[clutch].push(time_s, scale * self.pressure_pa[clutch].at(time_s) + noise_pa);
             }
         }
     }

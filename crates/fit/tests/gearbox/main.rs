@@ -9,7 +9,7 @@ use std::path::Path;
 
 use config::{Car, Source};
 use design::ShiftErrors;
-use drawn::{Case, Drawn, car, city, every_fifth, tables};
+use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
 use observer::Reading;
@@ -43,7 +43,7 @@ fn held(drawn: &Drawn, fit: &GearboxFit) -> f64 {
         .all
         .iter()
         .copied()
-        .filter(|quantity| !matches!(quantity, Quantity::Drag | Quantity::Gain(_)))
+        .filter(|quantity| !matches!(quantity, Quantity::Drag(_) | Quantity::Gain(_)))
         .collect();
     let inside = known.iter().filter(|quantity| {
         let truth = drawn.true_unknown(&tables, &fit.quantities, **quantity);
@@ -315,4 +315,35 @@ fn a_measured_pressure_tells_friction_and_gain_apart() {
     let said = [&without, &with].map(|fit| fit.statements().join("\n").contains("gain apart of C"));
     assert_eq!(said, [false, true]);
     assert!(with.report().iter().any(|row| row.name == "C: valve gain"), "{:?}", with.report());
+}
+
+/// The pressure of an element tells the volume of its stroke, and only of that one.
+#[test]
+fn a_measured_pressure_tells_a_fill_volume() {
+    let drawn = Drawn::of(car("eight_speed_stroke.toml"), 2, Case::Usual);
+    let (recorded, truth) = drawn.driven(&hilly(&city(3), 2));
+    let tables = drawn.tables();
+    let at = drawn.file.gearbox.elements.iter().position(|element| element.name == "C").unwrap();
+    let place = tables.place(at).unwrap();
+    let mut with = recorded.shifts.clone();
+    truth.measure(&mut with, &tables, place, 1);
+    let [without, with] = [&recorded.shifts, &with].map(|shifts| fitted(&drawn, shifts));
+    let fill = with.fills[place].unwrap();
+    let error = fill.log_volume - drawn.fill[at].ln();
+    assert!(
+        fill.shifts > 0 && fill.verdict() != Verdict::NotTold && error.abs() < 2.0 * fill.sd[0],
+        "{fill:?} {error}"
+    );
+    assert!(without.fills.iter().all(|fill| fill.unwrap().verdict() == Verdict::NotTold), "{:?}", without.fills);
+    let said = without.statements().join("\n");
+    assert!(said.contains("for the fill volume of ") && said.contains("measure the pressure"), "{said}");
+    let volume = |car: &Car| car.clutches[at].unwrap().cylinder.stroke_m3;
+    let [kept, found] =
+        [&without, &with].map(|fit| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap());
+    assert!((volume(&kept) / volume(&drawn.file) - 1.0).abs() < 1e-4);
+    assert!((volume(&found) / volume(&drawn.file) / fill.log_volume.exp() - 1.0).abs() < 1e-3);
+    // The kiss point of the fitted file stays above the preload of its spring.
+    let cylinder = found.clutches[at].unwrap().cylinder;
+    assert!(cylinder.preload_pa < cylinder.kiss_pa);
+    assert!(with.report().iter().any(|row| row.name == "C: fill volume"));
 }

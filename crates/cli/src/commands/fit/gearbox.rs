@@ -29,14 +29,6 @@ const STEPS: u64 = 20_000;
 
 pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     let car = Car::read(&options.vehicle)?;
-    if let Some(name) = with_stroke(&car) {
-        return Err(FitError::Input(format!(
-            "{}: the piston of element {name} has a stroke, which the fit does not model\n\
-             hint: leave the `fill` tables out for the fit; a fill that has ended before the speeds change does little",
-            options.vehicle.display()
-        ))
-        .into());
-    }
     let tables = LoggedDrive::tables(&car)?;
     let ages = options.sensors.as_deref().map(sensors).transpose()?.map(|sensors| ReadingAges::of(&sensors));
     let bar = progress();
@@ -72,13 +64,6 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     output::line(&checked.as_ref().map_or_else(nothing_held_out, said_of))?;
     said_of_file(options, found.shifts, against);
     Ok(())
-}
-
-/// The first element whose piston has a stroke.
-fn with_stroke(car: &Car) -> Option<&str> {
-    let elements = car.gearbox.elements.iter().zip(&car.clutches);
-    let mut with = elements.filter(|(_, clutch)| clutch.as_ref().is_some_and(|clutch| clutch.has_stroke));
-    with.next().map(|(element, _)| element.name.as_str())
 }
 
 /// The shifts of all logs.

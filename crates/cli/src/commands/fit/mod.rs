@@ -31,7 +31,6 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         return gearbox::fit(options);
     }
     let vehicle = Vehicle::from_source(source)?;
-    fit::check_vehicle(&vehicle)?;
     let ages = match options.sensors.as_deref() {
         Some(path) => ReadingAges::of(&sensors(path)?),
         None => ReadingAges::default(),

@@ -4,6 +4,7 @@ use config::Car;
 use design::ShiftTables;
 use drivetrain::road::GRAVITY_M_S2;
 use nalgebra::{DMatrix, DVector};
+use observer::any_shift::MAX_ELEMENTS;
 
 use super::stretch::{Driving, FINE_S, HalfStep, STEP_S, Stretch, means};
 use super::whitening::{Passing, Step, Whitening};
@@ -59,6 +60,8 @@ pub(crate) struct DrivingModel<'a> {
     car: &'a Car,
     /// Inertia of each gear at the output, and the pair of gears and part of the inertia that is its `M11`, kg m^2.
     gears: Vec<(f64, Option<(usize, f64)>)>,
+    /// Elements by their places in the gearbox and in the tables.
+    elements: Vec<(usize, usize)>,
     /// The balances that are used.
     uses: [bool; 2],
     /// Standard deviation of the mean speed of a step, rad/s.
@@ -145,6 +148,8 @@ impl<'a> DrivingModel<'a> {
         driving: &'a Driving,
         uses: [bool; 2],
     ) -> Self {
+        let elements = (0..car.clutches.len().min(MAX_ELEMENTS)).filter_map(|at| Some((at, tables.place(at)?)));
+        let elements = elements.collect();
         let tables = tables.tables();
         let gears = tables.gears.iter().enumerate().map(|(at, gear)| {
             let row = tables.shifts.iter().find(|row| row.from == at || row.to == at);
@@ -162,7 +167,7 @@ impl<'a> DrivingModel<'a> {
         let longer = (FINE_S / STEP_S).sqrt();
         let noise_n_m = [longer * at_input_n_m, longer * reported_n_m.hypot(of_steps(|half| half.pump_n_m))];
         let reading_rad_s = reading_rad_s.map(|noise| (longer * noise).max(READING_LEAST_RAD_S));
-        Self { driving, car, gears: gears.collect(), uses, reading_rad_s, noise_n_m }
+        Self { driving, car, gears: gears.collect(), elements, uses, reading_rad_s, noise_n_m }
     }
 
     /// The balances at unknowns.
@@ -285,7 +290,12 @@ impl<'a> DrivingModel<'a> {
         let steps = &stretch.halves;
         let (torque, later) = self.input_n_m(stretch, at.of(Quantity::InputDelay));
         let input = by_step(&|k| scale * (torque[k] + (above - 1.0) * steps[k].above_one_n_m));
-        let drag = |k: usize| steps[k].drag_n_m + at.of(Quantity::Drag) * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m;
+        let drag = |k: usize| {
+            let more = self.elements.iter().map(|(at_car, place)| {
+                at.of(Quantity::Drag(*place)) * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m[*at_car]
+            });
+            steps[k].drag_n_m + more.sum::<f64>()
+        };
         let roll = rolling * car.road.rolling_moment_n_m / line.final_ratio;
         let wind = by_step(&|k| {
             let rim_m_s = car.road.wheel_radius_m * steps[k].output_rad_s / line.final_ratio;
@@ -296,11 +306,14 @@ impl<'a> DrivingModel<'a> {
             (Quantity::Input, by_step(&|k| ratio * input[k] / inertia)),
             (Quantity::TorqueRatio, by_step(&|k| ratio * scale * above * steps[k].above_one_n_m / inertia)),
             (Quantity::InputDelay, by_step(&|k| ratio * scale * (later[k] - torque[k]) / (DELAY_STEP * inertia))),
-            (Quantity::Drag, by_step(&|k| ratio * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m / inertia)),
             (Quantity::Mass, by_step(&|k| -rate[k] * mass / inertia)),
             (Quantity::Rolling, by_step(&|_| -roll / inertia)),
             (Quantity::Air, by_step(&|k| -wind[k] / inertia)),
         ]);
+        for (at_car, place) in &self.elements {
+            let by_drag = by_step(&|k| ratio * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m[*at_car] / inertia);
+            by_parameter.extend(at.columns([(Quantity::Drag(*place), by_drag)]));
+        }
         if let Some(pair) = pair {
             by_parameter.extend(at.columns([(pair, by_step(&|k| -rate[k] * (m11 + of_m11) / inertia))]));
         }

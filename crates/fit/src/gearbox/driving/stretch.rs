@@ -2,6 +2,7 @@
 
 use config::Car;
 use drivetrain::clutch::drag_torque;
+use observer::any_shift::MAX_ELEMENTS;
 
 use crate::Series;
 
@@ -79,9 +80,9 @@ pub(crate) struct HalfStep {
     pub(crate) turbine_n_m: f64,
     pub(crate) above_one_n_m: f64,
     pub(crate) pump_n_m: f64,
-    /// Torque at the turbine by the drag of the open elements: by the file, and with a peak of 1 N m of each.
+    /// Torque at the turbine by the drag of the open elements: by the file, and by each with a peak of 1 N m.
     pub(crate) drag_n_m: f64,
-    pub(crate) drag_of_one_n_m: f64,
+    pub(crate) drag_of_one_n_m: [f64; MAX_ELEMENTS],
 }
 
 impl Stretch {
@@ -158,37 +159,31 @@ fn half(car: &Car, open: &OpenElements, readings: &StretchReadings, span: [f64; 
             mean.pump_n_m += share * torques.pump_n_m;
             mean.above_one_n_m += share * (torques.turbine_n_m - torques.pump_n_m);
         }
-        let [drag_n_m, of_one] = open.drag(turbine);
-        mean.drag_n_m += share * drag_n_m;
-        mean.drag_of_one_n_m += share * of_one;
+        for (at, slip, drag_n_m) in &open.0 {
+            let of_one = -slip * drag_torque(1.0, slip * turbine);
+            mean.drag_n_m += share * drag_n_m * of_one;
+            mean.drag_of_one_n_m[*at] += share * of_one;
+        }
     }
     mean
 }
 
-/// The elements that are open in a gear: slip per turbine speed, and peak of the drag, N m.
-struct OpenElements(Vec<[f64; 2]>);
+/// The elements that are open in a gear, by their places in the gearbox: slip per turbine speed, and peak of the drag, N m.
+struct OpenElements(Vec<(usize, f64, f64)>);
 
 impl OpenElements {
     fn of(car: &Car, gear: usize) -> Option<Self> {
         let train = car.gearbox.train.as_ref()?;
         let gear = car.gearbox.gears.get(gear)?;
         let is_held = |at: usize| gear.holding.iter().any(|holding| holding.element == at);
-        let elements = car.clutches.iter().enumerate().filter(|(at, _)| !is_held(*at));
+        let elements = car.clutches.iter().enumerate().take(MAX_ELEMENTS).filter(|(at, _)| !is_held(*at));
         let slipping = elements.filter_map(|(at, clutch)| {
             let row = train.slip_row(at);
             // An idle shaft turns as it likes, and nothing is known of its drag.
             let turned = row.iter().zip(&gear.shaft_speeds).filter(|(factor, _)| **factor != 0.0);
             let slip = turned.map(|(factor, speed)| speed.map(|speed| factor * speed)).sum::<Option<f64>>()?;
-            Some([slip, clutch.as_ref()?.drag_n_m])
+            Some((at, slip, clutch.as_ref()?.drag_n_m))
         });
         Some(Self(slipping.collect()))
-    }
-
-    /// Torque at the turbine by the drag of the file, and with a peak of 1 N m of each element.
-    fn drag(&self, turbine_rad_s: f64) -> [f64; 2] {
-        self.0.iter().fold([0.0; 2], |[file, one], [slip, drag_n_m]| {
-            let of_one = -slip * drag_torque(1.0, slip * turbine_rad_s);
-            [file + drag_n_m * of_one, one + of_one]
-        })
     }
 }
