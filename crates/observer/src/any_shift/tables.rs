@@ -7,7 +7,7 @@
 //! M12 w_t' + M22 w_o' = -T_o + i_off U_off + i_on U_on          slip of element c = alpha_c (w_t - i_c w_o)
 //! ```
 
-use drivetrain::{Clutch, Real, ReducedShift};
+use drivetrain::{Clutch, Cylinder, Real, ReducedShift};
 
 use crate::{Budget, ValveModel};
 
@@ -21,8 +21,19 @@ pub struct FrictionElement<T> {
     pub clutch: Clutch<T>,
     /// The valve as the filter knows it.
     pub valve: ValveModel<T>,
+    /// Its piston, if that has a stroke; without one the pressure at the valve's outlet acts on the plates.
+    pub piston: Option<Piston<T>>,
     /// Largest errors, for the guaranteed ranges; without it there are none.
     pub budget: Option<Budget<T>>,
+}
+
+/// A piston with a stroke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piston<T> {
+    /// The cylinder as the filter knows it.
+    pub cylinder: Cylinder<T>,
+    /// Standard deviation of the time that a fill takes, as a share: volume of the stroke and resistance of the passages.
+    pub fill_share: T,
 }
 
 /// A gear.
@@ -111,12 +122,20 @@ impl<T: Real> GearRow<T> {
     }
 }
 
+impl<T: Real> Piston<T> {
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> Piston<U> {
+        Piston { cylinder: self.cylinder.cast(), fill_share: U::of(self.fill_share.to_f64_exact()) }
+    }
+}
+
 impl<T: Real> FrictionElement<T> {
     /// The same in another precision.
     pub fn cast<U: Real>(&self) -> FrictionElement<U> {
         FrictionElement {
             clutch: self.clutch.cast(),
             valve: self.valve.cast(),
+            piston: self.piston.as_ref().map(Piston::cast),
             budget: self.budget.as_ref().map(Budget::cast),
         }
     }
