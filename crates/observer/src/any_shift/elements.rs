@@ -131,15 +131,11 @@ impl<T: Real> ElementState<T> {
         &mut self,
         element: &FrictionElement<T>,
         limits: &InputLimits<T>,
-        u: &ShiftUncertainty<T>,
         command: Option<Reading<T>>,
         dt_s: T,
     ) -> ChannelHealth {
-        if let Some(pistons) = &mut self.pistons {
-            pistons.rest();
-        }
         if dt_s > T::zero() {
-            self.pass(element, limits, u, dt_s);
+            self.pass(element, limits, dt_s);
         }
         let usable = command.filter(|reading| limits.usable_command(reading));
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
@@ -150,7 +146,7 @@ impl<T: Real> ElementState<T> {
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
             (Some(_), Some(reading)) => {
-                self.take(element, limits, u, &reading);
+                self.take(element, limits, &reading);
                 ChannelHealth::Good
             }
         }
@@ -158,7 +154,7 @@ impl<T: Real> ElementState<T> {
 
     /// Carries the valve on, unless it rests.
     #[inline]
-    fn pass(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, u: &ShiftUncertainty<T>, dt_s: T) {
+    fn pass(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
         if let Some(newest) = &mut self.newest {
             (newest.age_s, newest.alike_s) = (newest.age_s + dt_s, newest.alike_s + dt_s);
             if let Some(rests_s) = &mut newest.rests_s {
@@ -166,26 +162,19 @@ impl<T: Real> ElementState<T> {
                 return;
             }
         }
-        let pistons_rest = self.move_valve(element, limits, u, dt_s);
+        self.move_valve(element, limits, dt_s);
         if let Some(newest) = &mut self.newest {
             let end_pa = limits.possible_pressure(newest.settled_pa);
             let near = (self.valve_pa - end_pa).abs().at_least(self.per_lag_pa.abs()) <= T::of(RESTS_PA);
             if near && newest.alike_s - dt_s >= element.valve.delay_s {
                 (self.valve_pa, self.rate_pa_s, self.per_lag_pa) = (end_pa, T::zero(), T::zero());
-                newest.rests_s = pistons_rest.then(T::zero);
+                newest.rests_s = Some(T::zero());
             }
         }
     }
 
-    /// Carries valve and pistons on. Whether the pistons rest then.
-    fn move_valve(
-        &mut self,
-        element: &FrictionElement<T>,
-        limits: &InputLimits<T>,
-        u: &ShiftUncertainty<T>,
-        dt_s: T,
-    ) -> bool {
-        let (start_pa, before, mut rest) = (self.valve_pa, self.pistons, true);
+    fn move_valve(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+        let start_pa = self.valve_pa;
         let (pieces, piece_s) = pieces(dt_s);
         for _ in 0..pieces {
             self.commands.pass(piece_s);
@@ -194,27 +183,23 @@ impl<T: Real> ElementState<T> {
             let before_pa = self.valve_pa;
             self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
             self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
-            if let (Some(pistons), Some(piston)) = (&mut self.pistons, &element.piston) {
-                rest = pistons.advance(piston, [before_pa, self.valve_pa], u.above_kiss_pa(&element.clutch), piece_s);
-            }
         }
         self.rate_pa_s = (self.valve_pa - start_pa) / dt_s;
-        let moving_pa = self.deviation_pa(u);
-        if let (Some(pistons), Some(before)) = (&mut self.pistons, &before) {
-            pistons.conclude(before, moving_pa);
+    }
+
+    /// Lets time pass for the pistons, where they have a stroke, once there is a command: after [`Self::step`].
+    pub(super) fn move_pistons(&mut self, element: &FrictionElement<T>, u: &ShiftUncertainty<T>, dt_s: T) {
+        let Some(piston) = element.piston.as_ref().filter(|_| self.newest.is_some()) else { return };
+        let (error_pa, moving_pa) = (u.above_kiss_pa(&element.clutch), self.deviation_pa(u));
+        match &mut self.pistons {
+            None => self.pistons = Some(Pistons::settled(piston, self.valve_pa, error_pa, moving_pa)),
+            Some(pistons) => pistons.step(piston, self.valve_pa, [error_pa, moving_pa], dt_s),
         }
-        rest
     }
 
     /// Takes a usable command.
     #[inline]
-    fn take(
-        &mut self,
-        element: &FrictionElement<T>,
-        limits: &InputLimits<T>,
-        u: &ShiftUncertainty<T>,
-        reading: &Reading<T>,
-    ) {
+    fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
         let needed_s = element.valve.needed_s(T::of(PIECE_S));
         if let Some(newest) = &mut self.newest {
             // Commands arrive in their order.
@@ -233,9 +218,6 @@ impl<T: Real> ElementState<T> {
         if self.newest.is_none() {
             // The first command is taken to have stood for long.
             self.valve_pa = limits.possible_pressure(settled_pa);
-            let (error_pa, moving_pa) = (u.above_kiss_pa(&element.clutch), self.deviation_pa(u));
-            let settled = |piston| Pistons::settled(piston, self.valve_pa, error_pa, moving_pa);
-            self.pistons = element.piston.as_ref().map(settled);
         }
         let age_s = self.newest.map_or(reading.age_s, |newest| newest.age_s);
         self.commands.send(age_s, settled_pa, needed_s);
@@ -343,6 +325,7 @@ impl<T: Real> ElementState<T> {
 
 /// The pressure on the plates where the piston has a stroke. The error `x` of what presses them is one of the pressure, where they touch,
 /// and one of the fill: the parts that each has of its variance are those that each has of its mean.
+#[inline(never)]
 fn pressing_of_pistons<T: Real>(
     pistons: &Pistons<T>,
     clutch: &Clutch<T>,
@@ -428,7 +411,7 @@ mod tests {
 
     fn with_stroke() -> FrictionElement<f64> {
         let element = element();
-        let piston = Piston { cylinder: Cylinder::of_clutch(&element.clutch), fill_share: 0.16 };
+        let piston = Piston::new(Cylinder::of_clutch(&element.clutch), 0.16);
         FrictionElement { piston: Some(piston), ..element }
     }
 
@@ -448,8 +431,9 @@ mod tests {
             let age_s = if at == 0 { 0.025 } else { 0.0 };
             let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
             let health = [&mut rests, &mut moves]
-                .map(|valve: &mut ElementState<f64>| valve.step(element, &LIMITS, &UNCERTAINTY, command, 0.01));
+                .map(|valve: &mut ElementState<f64>| valve.step(element, &LIMITS, command, 0.01));
             assert_eq!(health[0], health[1]);
+            [&mut rests, &mut moves].into_iter().for_each(|valve| valve.move_pistons(element, &UNCERTAINTY, 0.01));
             // So it never begins to rest.
             moves.newest.iter_mut().for_each(|newest| newest.alike_s = 0.0);
             rested += usize::from(rests.rate_pa_s == 0.0);
@@ -501,7 +485,8 @@ mod tests {
         for (k, carried) in carried.iter_mut().enumerate() {
             let command = Some(Reading::now(if k < 5 { 0.0 } else { 0.25 }));
             let [stroke, none] = states.each_mut().map(|(element, state)| {
-                state.step(element, &LIMITS, &u, command, 0.01);
+                state.step(element, &LIMITS, command, 0.01);
+                state.move_pistons(element, &u, 0.01);
                 let torque = state.torque(element, &shift, &u, [50.0, 1.0], &wrong);
                 let all = torque.base_n_m + 0.3 * torque.per_kiss_n_m + 0.4 * torque.per_pressure_n_m;
                 // The static friction is larger.
@@ -528,11 +513,10 @@ mod tests {
         let element = element();
         let mut state = ElementState::new(&element, &LIMITS);
         (0..500).for_each(|_| {
-            state.step(&element, &LIMITS, &UNCERTAINTY, Some(Reading::now(0.3)), 0.01);
+            state.step(&element, &LIMITS, Some(Reading::now(0.3)), 0.01);
         });
         assert!(state.newest.is_some_and(|newest| newest.rests_s.is_some()));
-        let health: [ChannelHealth; 200] =
-            core::array::from_fn(|_| state.step(&element, &LIMITS, &UNCERTAINTY, None, 0.01));
+        let health: [ChannelHealth; 200] = core::array::from_fn(|_| state.step(&element, &LIMITS, None, 0.01));
         assert_eq!((health[0], health[199]), (ChannelHealth::Absent, ChannelHealth::Lost));
     }
 }

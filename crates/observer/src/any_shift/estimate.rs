@@ -102,8 +102,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             (_, _, true) => Health::ReadingRefused,
             _ => Health::Good,
         });
-        let valve_pa =
-            state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), ElementState::pressure_pa));
+        let mut valve_pa =
+            state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), |element| element.valve_pa));
+        if state.strokes {
+            valve_pa = state.elements.each_ref().map(|of| of.as_ref().map_or(T::zero(), ElementState::pressure_pa));
+        }
         let estimate = &mut state.estimate;
         *estimate = ShiftEstimate { valve_pa, channels: *channels, commands: *commands, ..ShiftEstimate::nothing() };
         match &state.running {

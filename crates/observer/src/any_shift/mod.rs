@@ -58,7 +58,8 @@ use turbine::InputSide;
 pub use estimate::{ClutchEstimate, ShiftEstimate};
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
-pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, Piston, ShiftClutch, ShiftRow};
+pub use pistons::Piston;
+pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
 const N: usize = 15;
@@ -207,6 +208,8 @@ pub struct AnyShiftFilter<'a, T> {
 pub struct AnyShiftState<T> {
     started: bool,
     elements: [Option<ElementState<T>>; MAX_ELEMENTS],
+    /// Whether the piston of an element has a stroke.
+    strokes: bool,
     engine: Option<Engine<T>>,
     /// Newest reported engine torque, N m, and its age, s.
     reported: Option<(T, T)>,
@@ -327,6 +330,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         AnyShiftState {
             started: false,
             elements,
+            strokes: self.tables.elements.iter().any(|element| element.piston.is_some()),
             engine: None,
             reported: None,
             newest: [None; SPEEDS],

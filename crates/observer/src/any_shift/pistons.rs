@@ -10,12 +10,11 @@
 use drivetrain::{Cylinder, Real};
 
 use super::square;
-use super::tables::Piston;
 
-/// The nominal piston, one that fills late, one that fills early, one with more and one with less pressure.
+/// Pistons that are carried.
 const POINTS: usize = 9;
-/// Deviations of the fill's time and of the pressure of each piston: the means of nine equal parts of a Gaussian, to
-/// three digits, each once in both columns, which are not correlated. The first piston is the nominal one.
+/// Deviations of the fill's time and of the pressure of each piston: the middles of nine equal parts of a Gaussian, each once in
+/// both columns, which are not correlated. The first piston is the nominal one.
 const AWAY: [[f64; 2]; POINTS] = [
     [0.0, 0.0],
     [PARTS[0], PARTS[2]],
@@ -27,13 +26,47 @@ const AWAY: [[f64; 2]; POINTS] = [
     [-PARTS[2], PARTS[0]],
     [-PARTS[3], -PARTS[1]],
 ];
-/// With a variance of one.
+/// To three digits, scaled to a variance of one.
 const PARTS: [f64; 4] = [0.303, 0.633, 1.039, 1.712];
 /// Step of the pistons, s \[chosen\]: about the lag of a filled cylinder with warm oil.
 const STEP_S: f64 = 2.5e-3;
-const MOST_STEPS: usize = 8;
+const MOST_STEPS: usize = 128;
 /// Change of the pressure over a step of the filter below which a piston that is not on its stroke rests, Pa.
 const RESTS_PA: f64 = 1.0;
+
+/// A piston with a stroke, as the filter knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piston<T> {
+    cylinder: Cylinder<T>,
+    /// Of each of the pistons that are carried the volume of the stroke, m^3, and the pressure in its deviations.
+    each: [[T; 2]; POINTS],
+}
+
+impl Piston<f64> {
+    /// A piston in this cylinder. `fill_share` is the standard deviation of the time that a fill takes, as a share: volume of the
+    /// stroke and resistance of the passages.
+    pub fn new(cylinder: Cylinder<f64>, fill_share: f64) -> Self {
+        let each = AWAY.map(|[late, more]| {
+            // A fill that is longer by a share has a longer stroke by it.
+            let longer = 1.0 + late.abs() * fill_share;
+            [cylinder.stroke_m3 * if late < 0.0 { longer.recip() } else { longer }, more]
+        });
+        Self { cylinder, each }
+    }
+}
+
+impl<T: Real> Piston<T> {
+    /// The cylinders of the pistons that are carried, and the errors of their pressures, Pa, with this deviation.
+    fn cylinders(&self, error_pa: T) -> [(Cylinder<T>, T); POINTS] {
+        self.each.map(|[stroke_m3, more]| (Cylinder { stroke_m3, ..self.cylinder }, more * error_pa))
+    }
+
+    /// The same in another precision.
+    pub fn cast<U: Real>(&self) -> Piston<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        Piston { cylinder: self.cylinder.cast(), each: self.each.map(|each| each.map(to)) }
+    }
+}
 
 /// One of the pistons.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,8 +75,9 @@ struct Point<T> {
     volume_m3: T,
     /// Pressure in the cylinder less its error, Pa.
     pressure_pa: T,
-    /// The same above the kiss point, where the plates touch; else zero.
+    /// The same above the kiss point, where the plates touch; else zero. Beside it that at the beginning of the step.
     pressed_pa: T,
+    pressed_before_pa: T,
     touches: bool,
 }
 
@@ -61,7 +95,7 @@ pub(super) struct Spread<T> {
 impl<T: Real> Spread<T> {
     fn of(points: &[Point<T>; POINTS], moving_pa: T) -> Self {
         let touches = mean(points, |point| if point.touches { T::one() } else { T::zero() });
-        let fill = covariance(points, points).at_least(T::zero());
+        let fill = covariance(points, |point| point.pressed_pa).at_least(T::zero());
         Self { touches, fill_pa: fill.sqrt(), all_pa: (fill + square(touches * moving_pa)).sqrt() }
     }
 }
@@ -71,58 +105,67 @@ impl<T: Real> Spread<T> {
 pub(super) struct Pistons<T> {
     points: [Point<T>; POINTS],
     pub(super) spread: Spread<T>,
-    /// Correlation of the error of what presses the plates with that at the step before.
+    /// Correlation of the error of what presses the plates with that at the beginning of the step.
     pub(super) lasts: T,
-    /// Deviation of the pressure at the last step, Pa.
+    /// Pressure at the valve, and its deviation, at the end of the last step, Pa.
+    valve_pa: T,
     moving_pa: T,
+    /// Whether they rest as long as the pressure at the valve does.
+    rest: bool,
 }
 
 impl<T: Real> Pistons<T> {
     /// With the valve at this pressure for ever. `error_pa` is the deviation of the pressure against the return spring.
     pub(super) fn settled(piston: &Piston<T>, valve_pa: T, error_pa: T, moving_pa: T) -> Self {
-        let point = |k: usize| {
-            let (cylinder, away_pa) = cylinder(piston, k, error_pa);
+        let points = piston.cylinders(error_pa).map(|(cylinder, away_pa)| {
             Point::new(&cylinder, cylinder.volume((valve_pa + away_pa).at_least(T::zero())), away_pa)
-        };
-        let points = core::array::from_fn(point);
-        Self { points, spread: Spread::of(&points, moving_pa), lasts: T::one(), moving_pa }
+        });
+        Self { points, spread: Spread::of(&points, moving_pa), lasts: T::one(), valve_pa, moving_pa, rest: false }
+    }
+
+    /// Carries the pistons over a step, at whose end the valve has this pressure. `error_pa` is the deviation of the pressure
+    /// against the return spring, `moving_pa` that of the pressure.
+    pub(super) fn step(&mut self, piston: &Piston<T>, valve_pa: T, [error_pa, moving_pa]: [T; 2], dt_s: T) {
+        self.lasts = T::one();
+        if dt_s <= T::zero() || self.rest && valve_pa == self.valve_pa {
+            return;
+        }
+        self.points.iter_mut().for_each(|point| point.pressed_before_pa = point.pressed_pa);
+        self.rest = self.advance(piston, [self.valve_pa, valve_pa], error_pa, dt_s);
+        self.conclude(moving_pa);
+        self.valve_pa = valve_pa;
     }
 
     /// Carries the pistons over `dt_s`, in which the pressure of the valve goes from one to another value. Whether they rest then.
-    pub(super) fn advance(&mut self, piston: &Piston<T>, [from_pa, to_pa]: [T; 2], error_pa: T, dt_s: T) -> bool {
+    fn advance(&mut self, piston: &Piston<T>, [from_pa, to_pa]: [T; 2], error_pa: T, dt_s: T) -> bool {
         let steps = (dt_s / T::of(STEP_S)).ceil().whole().clamp(1, MOST_STEPS);
         let step_s = dt_s / T::of(steps as f64);
         let rise_pa = (to_pa - from_pa) / T::of(steps as f64);
         let mut rest = true;
-        for (k, point) in self.points.iter_mut().enumerate() {
-            let (cylinder, away_pa) = cylinder(piston, k, error_pa);
+        for (point, (cylinder, away_pa)) in self.points.iter_mut().zip(piston.cylinders(error_pa)) {
             let before_pa = point.pressure_pa;
             let (mut volume_m3, mut valve_pa) = (point.volume_m3, from_pa + away_pa);
             for _ in 0..steps {
                 valve_pa = valve_pa + rise_pa;
                 volume_m3 = cylinder.carried(volume_m3, valve_pa.at_least(T::zero()), step_s);
             }
-            *point = Point::new(&cylinder, volume_m3, away_pa);
+            let pressed_before_pa = point.pressed_before_pa;
+            *point = Point { pressed_before_pa, ..Point::new(&cylinder, volume_m3, away_pa) };
             let on_stroke = volume_m3 > T::zero() && !point.touches;
             rest = rest && !on_stroke && (point.pressure_pa - before_pa).abs() <= T::of(RESTS_PA);
         }
         rest
     }
 
-    /// What follows at the end of a step that began with these pistons, with this deviation of the pressure.
-    pub(super) fn conclude(&mut self, before: &Self, moving_pa: T) {
+    /// What follows at the end of a step, with this deviation of the pressure.
+    fn conclude(&mut self, moving_pa: T) {
+        let then = self.spread;
         self.spread = Spread::of(&self.points, moving_pa);
-        let (now, then) = (&self.spread, &before.spread);
-        let by_pressure = now.touches * moving_pa * then.touches * before.moving_pa;
-        let both = now.all_pa * then.all_pa;
-        let lasts = (covariance(&self.points, &before.points) + by_pressure) / both;
+        let by_pressure = self.spread.touches * moving_pa * then.touches * self.moving_pa;
+        let both = self.spread.all_pa * then.all_pa;
+        let lasts = (covariance(&self.points, |point| point.pressed_before_pa) + by_pressure) / both;
         self.lasts = if both > T::zero() { lasts.at_least(T::zero()).at_most(T::one()) } else { T::zero() };
         self.moving_pa = moving_pa;
-    }
-
-    /// Nothing moves in this step.
-    pub(super) fn rest(&mut self) {
-        self.lasts = T::one();
     }
 
     /// Pressure of the nominal cylinder, Pa.
@@ -156,27 +199,18 @@ impl<T: Real> Point<T> {
         // On the stroke the return spring alone makes the pressure.
         let pressure_pa = if on_stroke { in_cylinder_pa } else { (in_cylinder_pa - away_pa).at_least(T::zero()) };
         let pressed_pa = if touches { (pressure_pa - cylinder.kiss_pa).at_least(T::zero()) } else { T::zero() };
-        Self { volume_m3, pressure_pa, pressed_pa, touches }
+        Self { volume_m3, pressure_pa, pressed_pa, pressed_before_pa: pressed_pa, touches }
     }
-}
-
-/// The cylinder of a point, and the error of its pressure, Pa. A fill that is longer by a share has a longer stroke by it.
-fn cylinder<T: Real>(piston: &Piston<T>, k: usize, error_pa: T) -> (Cylinder<T>, T) {
-    let [late, more] = AWAY.get(k).copied().unwrap_or_default();
-    let longer = T::one() + T::of(late.abs()) * piston.fill_share;
-    let factor = if late < 0.0 { longer.recip() } else { longer };
-    (Cylinder { stroke_m3: factor * piston.cylinder.stroke_m3, ..piston.cylinder }, T::of(more) * error_pa)
 }
 
 fn mean<T: Real>(points: &[Point<T>; POINTS], of: impl Fn(&Point<T>) -> T) -> T {
     points.iter().fold(T::zero(), |sum, point| sum + of(point)) / T::of(POINTS as f64)
 }
 
-/// Covariance of what presses the plates at two times, Pa^2.
-fn covariance<T: Real>(now: &[Point<T>; POINTS], then: &[Point<T>; POINTS]) -> T {
-    let [mean_now, mean_then] = [now, then].map(|points| mean(points, |point| point.pressed_pa));
-    let products = now.iter().zip(then).map(|(now, then)| (now.pressed_pa - mean_now) * (then.pressed_pa - mean_then));
-    products.fold(T::zero(), |sum, product| sum + product) / T::of(POINTS as f64)
+/// Covariance of what presses the plates with the same at this time, Pa^2.
+fn covariance<T: Real>(points: &[Point<T>; POINTS], then: impl Fn(&Point<T>) -> T) -> T {
+    let means = [mean(points, |point| point.pressed_pa), mean(points, &then)];
+    mean(points, |point| (point.pressed_pa - means[0]) * (then(point) - means[1]))
 }
 
 #[cfg(test)]
@@ -199,15 +233,16 @@ mod tests {
             friction: Table1::constant(0.13),
             static_friction: 0.14,
         };
-        Piston { cylinder: Cylinder::of_clutch(&clutch), fill_share: FILL_SHARE }
+        Piston::new(Cylinder::of_clutch(&clutch), FILL_SHARE)
     }
 
-    /// A pulse, a hold just above the kiss point, and a ramp, Pa.
-    fn valve_pa(time_s: f64) -> f64 {
-        match time_s {
-            t if t < 0.12 => 0.21e6,
-            t if t < 0.4 => 0.075e6,
-            t => 0.075e6 + 0.5e6 * (t - 0.4),
+    /// A pulse, a hold just above the kiss point, and a ramp: the pressure after so many steps of 10 ms, straight between them, Pa.
+    fn valve_pa(step: usize) -> f64 {
+        match step {
+            0 => 0.0,
+            1..=12 => 0.21e6,
+            13..=40 => 0.075e6,
+            _ => 0.075e6 + 5e3 * (step - 40) as f64,
         }
     }
 
@@ -217,10 +252,7 @@ mod tests {
         let mut pistons = Pistons::settled(piston, T::zero(), of(ERROR_PA), of(7e3));
         (0..80)
             .map(|k| {
-                let before = pistons;
-                let ends = [k, k + 1].map(|k| of(valve_pa(0.01 * f64::from(k) - 1e-9)));
-                pistons.advance(piston, ends, of(ERROR_PA), of(0.01));
-                pistons.conclude(&before, of(7e3));
+                pistons.step(piston, of(valve_pa(k + 1)), [of(ERROR_PA), of(7e3)], of(0.01));
                 pistons
             })
             .collect()
@@ -270,8 +302,9 @@ mod tests {
             let mut volume = 0.0;
             for (k, touching) in touching.iter_mut().enumerate() {
                 for part in 1..=10 {
-                    let time_s = 0.01 * k as f64 + 1e-3 * f64::from(part) - 1e-9;
-                    volume = cylinder.carried(volume, (valve_pa(time_s) + ERROR_PA * more).max(0.0), 1e-3);
+                    let [from_pa, to_pa] = [k, k + 1].map(valve_pa);
+                    let at_valve_pa = from_pa + 0.1 * f64::from(part) * (to_pa - from_pa);
+                    volume = cylinder.carried(volume, (at_valve_pa + ERROR_PA * more).max(0.0), 1e-3);
                 }
                 *touching += f64::from(u8::from(volume >= cylinder.stroke_m3)) / 441.0;
             }

@@ -22,7 +22,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let elements = state.elements.iter_mut().zip(self.tables.elements).zip(&input.commands);
         for (health, ((memory, element), command)) in health.iter_mut().zip(elements) {
             if let Some(memory) = memory {
-                *health = memory.step(element, &self.limits, &self.uncertainty, *command, dt_s);
+                *health = memory.step(element, &self.limits, *command, dt_s);
+            }
+        }
+        if state.strokes {
+            for (memory, element) in state.elements.iter_mut().flatten().zip(self.tables.elements) {
+                memory.move_pistons(element, &self.uncertainty, dt_s);
             }
         }
         health

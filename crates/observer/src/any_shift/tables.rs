@@ -7,8 +7,9 @@
 //! M12 w_t' + M22 w_o' = -T_o + i_off U_off + i_on U_on          slip of element c = alpha_c (w_t - i_c w_o)
 //! ```
 
-use drivetrain::{Clutch, Cylinder, Real, ReducedShift};
+use drivetrain::{Clutch, Real, ReducedShift};
 
+use super::pistons::Piston;
 use crate::{Budget, ValveModel};
 
 /// Most clutches and brakes of a gearbox.
@@ -25,15 +26,6 @@ pub struct FrictionElement<T> {
     pub piston: Option<Piston<T>>,
     /// Largest errors, for the guaranteed ranges; without it there are none.
     pub budget: Option<Budget<T>>,
-}
-
-/// A piston with a stroke.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piston<T> {
-    /// The cylinder as the filter knows it.
-    pub cylinder: Cylinder<T>,
-    /// Standard deviation of the time that a fill takes, as a share: volume of the stroke and resistance of the passages.
-    pub fill_share: T,
 }
 
 /// A gear.
@@ -119,13 +111,6 @@ impl<T: Real> GearRow<T> {
     pub fn cast<U: Real>(&self) -> GearRow<U> {
         let to = |x: T| U::of(x.to_f64_exact());
         GearRow { ratio: to(self.ratio), inertia_kg_m2: to(self.inertia_kg_m2) }
-    }
-}
-
-impl<T: Real> Piston<T> {
-    /// The same in another precision.
-    pub fn cast<U: Real>(&self) -> Piston<U> {
-        Piston { cylinder: self.cylinder.cast(), fill_share: U::of(self.fill_share.to_f64_exact()) }
     }
 }
 
