@@ -1,12 +1,13 @@
 //! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
 
 use config::{Car, ElementErrorBounds, Sensors};
-use drivetrain::{CommandKind, Real};
+use drivetrain::{CommandKind, Cylinder, Real};
 use geartrain::{Change, Gearbox};
 use observer::any_shift::{
-    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftRow, ShiftUncertainty, TurbineTorque,
+    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, Piston, ShiftRow, ShiftUncertainty,
+    TurbineTorque,
 };
-use observer::{Budget, InputLimits, ValveModel};
+use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
 use crate::kalman::{deviation_of, engine_noise, speed_reading};
 
@@ -25,6 +26,9 @@ const KISS_POINT_PA: f64 = 7e3;
 /// Standard deviation of the part of the turbine torque's error that does not last, as a share \[chosen\]: the shape of the
 /// converter's maps.
 const TURBINE_SHARE: f64 = 0.03;
+
+/// Pressure drop of a fast fill, Pa \[chosen\], for the flow of whose errors those of the time of a fill follow.
+const FILL_PA: f64 = 0.15e6;
 
 /// The tables of a gearbox, owned.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +55,7 @@ impl ShiftTables<f64> {
         let (mut elements, mut places) = (Vec::new(), Vec::new());
         for (at, element) in gearbox.elements.iter().enumerate() {
             let friction = element.pack.zip(valve(at)).map(|(clutch, (valve, budget))| {
-                elements.push(FrictionElement { clutch, valve, budget });
+                elements.push(FrictionElement { clutch, valve, piston: None, budget });
                 elements.len() - 1
             });
             places.push(friction);
@@ -242,14 +246,24 @@ impl ShiftTables<f64> {
             },
             on_input_kg_m2,
         )?;
-        // The friction over slip is the car's; the gearbox file has one coefficient.
+        // The friction over slip is the car's; the gearbox file has one coefficient. So are the strokes.
         for (element, place) in tables.places.clone().into_iter().enumerate() {
             if let (Some(place), Some(Some(clutch))) = (place, car.clutches.get(element)) {
+                let fill = clutch.standard_fill_budget(car.oil_temperature_degc);
                 tables.elements[place].clutch = clutch.clutch;
+                tables.elements[place].piston = fill.map(|fill| piston(&clutch.cylinder, &fill));
             }
         }
         Ok(tables)
     }
+}
+
+/// A piston whose stroke is within these limits, each the edge of a uniform distribution.
+fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
+    let share = |[least, most]: [f64; 2], value: f64| deviation_of(0.5 * (most - least)) / value;
+    let flow = |k: usize| fill.supply[k].flow(FILL_PA, fill.viscosity_m2_s[k]).min(cylinder.flow_max_m3_s);
+    let volume = share(fill.volume_m3, cylinder.stroke_m3);
+    Piston::new(*cylinder, volume.hypot(share([flow(1), flow(0)], cylinder.flow(FILL_PA))))
 }
 
 /// The highest pressure that a valve can give, Pa.

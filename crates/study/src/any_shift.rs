@@ -18,8 +18,9 @@ pub mod sensitivity;
 mod thinned;
 pub mod tour;
 
-use config::{Car, ElementErrorBounds, Sensors};
+use config::{Car, ElementErrorBounds, Sensors, ShiftClutch};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use drivetrain::{Cylinder, Passage};
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
 use plant::TrainError;
@@ -66,6 +67,21 @@ pub struct ShiftDraw {
     pub converter: f64,
     /// Lag, delay and hysteresis of each element's valve; none as in the known car.
     pub timing: Vec<Option<ValveTiming>>,
+    /// Stroke of each element's piston; none as in the known car.
+    pub strokes: Vec<Option<StrokeDraw>>,
+}
+
+/// How the stroke of a piston differs from that of the known car, each by a number from 0 to 1 between the limits of its budget.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StrokeDraw {
+    /// Of the volume.
+    pub volume: f64,
+    /// Of the pressures at both ends of the stroke.
+    pub plateau: f64,
+    /// Of the resistance of both passages.
+    pub resistance: f64,
+    /// Of the viscosity of the oil, of all elements alike.
+    pub viscosity: f64,
 }
 
 /// Lag, delay and hysteresis of a valve.
@@ -83,7 +99,8 @@ impl ShiftDraw {
     /// The known car.
     pub fn none(car: &Car) -> Self {
         let ones = vec![1.0; car.clutches.len()];
-        Self { timing: vec![None; ones.len()], friction: ones.clone(), valve_gain: ones, converter: 1.0 }
+        let (timing, strokes) = (vec![None; ones.len()], vec![None; ones.len()]);
+        Self { timing, strokes, friction: ones.clone(), valve_gain: ones, converter: 1.0 }
     }
 
     /// Friction, gain and converter within the bounds, those of the vehicle file first, each factor by a number from 0 to 1.
@@ -112,9 +129,28 @@ impl ShiftDraw {
         self
     }
 
+    /// The same with the strokes of the pistons of `car`, where they have one, within the budget of its cylinders too.
+    #[must_use]
+    pub fn with_strokes(mut self, car: &Car, mut uniform: impl FnMut() -> f64) -> Self {
+        let mut viscosity = None;
+        for (stroke, clutch) in self.strokes.iter_mut().zip(&car.clutches) {
+            if clutch.as_ref().is_none_or(|clutch| !clutch.has_stroke) {
+                continue;
+            }
+            let viscosity = *viscosity.get_or_insert_with(&mut uniform);
+            *stroke = Some(StrokeDraw { volume: uniform(), plateau: uniform(), resistance: uniform(), viscosity });
+        }
+        self
+    }
+
     /// The car that differs from this one so.
     pub fn car(&self, known: &Car) -> Car {
         let mut car = known.clone();
+        for (clutch, stroke) in car.clutches.iter_mut().zip(&self.strokes) {
+            if let (Some(clutch), Some(stroke)) = (clutch, stroke) {
+                stroke.change(clutch, known.oil_temperature_degc);
+            }
+        }
         let factors = self.friction.iter().zip(&self.valve_gain).zip(&self.timing);
         for (clutch, ((friction, gain), timing)) in car.clutches.iter_mut().zip(factors) {
             let Some(clutch) = clutch else { continue };
@@ -133,6 +169,29 @@ impl ShiftDraw {
             converter.capacity_n_m_s2 = converter.capacity_n_m_s2.scaled(self.converter);
         }
         car
+    }
+}
+
+impl StrokeDraw {
+    /// Gives a clutch this stroke. With the pressure at its end the force of the return spring there is another.
+    fn change(&self, clutch: &mut ShiftClutch, oil_degc: f64) {
+        let Some(budget) = clutch.standard_fill_budget(oil_degc) else { return };
+        let between = |[least, most]: [f64; 2], share: f64| least + share * (most - least);
+        let passage = |[wide, narrow]: [Passage<f64>; 2]| Passage {
+            laminar_pa_s2_m5: between([wide.laminar_pa_s2_m5, narrow.laminar_pa_s2_m5], self.resistance),
+            orifice_pa_s2_m6: between([wide.orifice_pa_s2_m6, narrow.orifice_pa_s2_m6], self.resistance),
+        };
+        let kiss_pa = between(budget.kiss_pressure_pa, self.plateau);
+        clutch.cylinder = Cylinder {
+            stroke_m3: between(budget.volume_m3, self.volume),
+            preload_pa: between(budget.preload_pressure_pa, self.plateau),
+            kiss_pa,
+            supply: passage(budget.supply),
+            exhaust: passage(budget.exhaust),
+            viscosity_m2_s: between(budget.viscosity_m2_s, self.viscosity),
+            ..clutch.cylinder
+        };
+        clutch.clutch.return_spring_n = kiss_pa * clutch.clutch.piston_area_m2;
     }
 }
 

@@ -265,7 +265,8 @@ pub(crate) struct Demo {
     /// Drive file in place of the drive through all gears
     #[arg(long, value_name = "FILE", requires = "vehicle")]
     pub(crate) drive: Option<PathBuf>,
-    /// Seed of the driven car, whose friction, valve gains and converter differ from those of the vehicle file, and of the noise
+    /// Seed of the driven car, whose friction, valve gains, converter and strokes of pistons differ from those of the vehicle
+    /// file, and of the noise
     #[arg(long, value_name = "N", default_value_t = 1, requires = "vehicle")]
     pub(crate) seed: u64,
     /// Folder for the report

@@ -60,7 +60,7 @@ pub(crate) struct Bench {
     /// Vehicle file with a gearbox: every shift between its neighbouring gears, in every kind
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Cars drawn for each shift, whose friction, valve gains and converter differ from those of the vehicle file
+    /// Cars drawn for each shift, whose friction, valve gains, converter and strokes of pistons differ from those of the vehicle file
     #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "vehicle")]
     pub(crate) draws: u32,

@@ -2,6 +2,7 @@
 
 use drivetrain::{Clutch, Real};
 
+use super::pistons::Pistons;
 use super::powertrain::ClutchTorque;
 use super::tables::{FrictionElement, ShiftClutch};
 use super::{PIECE_S, ShiftUncertainty, pieces, square};
@@ -24,6 +25,12 @@ pub(super) struct PressureError<T> {
 }
 
 impl<T: Real> PressureError<T> {
+    /// Variance of the error of the pressure above the kiss point, Pa^2, with these deviations of kiss point and pressure.
+    fn variance_pa(&self, [kiss_pa, moving_pa]: [T; 2]) -> T {
+        square(moving_pa) * self.variance[0] + square(kiss_pa) * self.variance[1]
+            - T::of(2.0) * moving_pa * kiss_pa * self.covariance
+    }
+
     /// Nothing but what is learnt of the kiss point.
     pub(super) fn unseen(kiss: T) -> Self {
         Self { pressure: T::zero(), kiss, variance: [T::one(); 2], covariance: T::zero() }
@@ -56,6 +63,25 @@ struct Pressing<T> {
     /// Deviations of kiss point and pressure by the budget.
     kiss_pa: T,
     moving_pa: T,
+    /// What it changes by the error of the fill, and per deviation of it.
+    by_fill_pa: T,
+    per_fill_pa: T,
+}
+
+impl<T: Real> Pressing<T> {
+    /// Nothing presses the plates, and nothing of what is not known changes it.
+    fn nothing() -> Self {
+        let zero = T::zero();
+        Self {
+            pressed_pa: zero,
+            slope: zero,
+            error_pa: zero,
+            kiss_pa: zero,
+            moving_pa: zero,
+            by_fill_pa: zero,
+            per_fill_pa: zero,
+        }
+    }
 }
 
 /// The newest command.
@@ -81,6 +107,8 @@ pub(super) struct ElementState<T> {
     /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
     per_lag_pa: T,
     newest: Option<NewestCommand<T>>,
+    /// Where the piston has a stroke, once a command has come.
+    pistons: Option<Pistons<T>>,
     range: Option<PressureRange<T>>,
 }
 
@@ -92,6 +120,7 @@ impl<T: Real> ElementState<T> {
             rate_pa_s: T::zero(),
             per_lag_pa: T::zero(),
             newest: None,
+            pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
         }
     }
@@ -158,6 +187,16 @@ impl<T: Real> ElementState<T> {
         self.rate_pa_s = (self.valve_pa - start_pa) / dt_s;
     }
 
+    /// Lets time pass for the pistons, where they have a stroke, once there is a command: after [`Self::step`].
+    pub(super) fn move_pistons(&mut self, element: &FrictionElement<T>, u: &ShiftUncertainty<T>, dt_s: T) {
+        let Some(piston) = element.piston.as_ref().filter(|_| self.newest.is_some()) else { return };
+        let (error_pa, moving_pa) = (u.above_kiss_pa(&element.clutch), self.deviation_pa(u));
+        match &mut self.pistons {
+            None => self.pistons = Some(Pistons::settled(piston, self.valve_pa, error_pa, moving_pa)),
+            Some(pistons) => pistons.step(piston, self.valve_pa, [error_pa, moving_pa], dt_s),
+        }
+    }
+
     /// Takes a usable command.
     #[inline]
     fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
@@ -193,9 +232,28 @@ impl<T: Real> ElementState<T> {
         (self.rate_pa_s, self.per_lag_pa) = (T::zero(), T::zero());
     }
 
+    /// Pressure in the cylinder by the models of valve and piston, Pa.
+    pub(super) fn pressure_pa(&self) -> T {
+        self.pistons.as_ref().map_or(self.valve_pa, Pistons::nominal_pa)
+    }
+
+    /// The error of that pressure, Pa, where `x` is that of the pressure in its deviations.
+    pub(super) fn error_pa(&self, u: &ShiftUncertainty<T>, x: T) -> T {
+        match &self.pistons {
+            None => self.deviation_pa(u) * x,
+            Some(pistons) => pistons.mean_pa() - pistons.nominal_pa() + pistons.spread.all_pa * x,
+        }
+    }
+
+    /// Correlation of the error of the pressure with that at the step before, beside its fading; `None` without a stroke: all of it
+    /// lasts.
+    pub(super) fn error_lasts(&self) -> Option<T> {
+        self.pistons.as_ref().map(|pistons| pistons.lasts)
+    }
+
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
-    pub(super) fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
+    fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
         let moving = square(u.valve_lag_share * self.per_lag_pa) + square(u.valve_delay_s * self.rate_pa_s);
         (moving + square(u.pressure_pa)).sqrt()
     }
@@ -205,11 +263,13 @@ impl<T: Real> ElementState<T> {
     #[inline]
     fn pressing(&self, clutch: &Clutch<T>, u: &ShiftUncertainty<T>, wrong: &PressureError<T>) -> Pressing<T> {
         let (kiss_pa, moving_pa) = (u.kiss_deviation_pa(clutch), self.deviation_pa(u));
+        if let Some(pistons) = &self.pistons {
+            return pressing_of_pistons(pistons, clutch, [kiss_pa, moving_pa], wrong);
+        }
         let error_pa = moving_pa * wrong.pressure - kiss_pa * wrong.kiss;
-        let variance = square(moving_pa) * wrong.variance[0] + square(kiss_pa) * wrong.variance[1]
-            - T::of(2.0) * moving_pa * kiss_pa * wrong.covariance;
+        let variance = wrong.variance_pa([kiss_pa, moving_pa]);
         let (pressed_pa, slope) = positive_part(self.valve_pa - clutch.kiss_pressure() + error_pa, variance);
-        Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa }
+        Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa, ..Pressing::nothing() }
     }
 
     /// Torque at the turbine while the element slips. `slip_rad_s` is the slip at the turbine, `w_t - i w_o`; `direction`
@@ -227,14 +287,15 @@ impl<T: Real> ElementState<T> {
         let slip = shift.alpha * slip_rad_s;
         let size = shift.alpha.abs() * direction;
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
-        let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa } = self.pressing(clutch, u, wrong);
+        let pressing = self.pressing(clutch, u, wrong);
+        let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa, by_fill_pa, per_fill_pa } = pressing;
         ClutchTorque {
             ratio: shift.ratio,
-            base_n_m: per_pa * (pressed_pa - slope * error_pa),
+            base_n_m: per_pa * (pressed_pa - slope * error_pa - by_fill_pa),
             per_friction_n_m: u.torque_share * per_pa * pressed_pa,
             per_kiss_n_m: -per_pa * slope * kiss_pa,
-            per_pressure_n_m: per_pa * slope * moving_pa,
-            open_loop_n_m: shift.alpha.abs() * direction.signum() * clutch.torque_capacity(self.valve_pa, slip),
+            per_pressure_n_m: per_pa * slope * moving_pa + per_pa * per_fill_pa,
+            open_loop_n_m: shift.alpha.abs() * direction.signum() * clutch.torque_capacity(self.pressure_pa(), slip),
         }
     }
 
@@ -262,14 +323,70 @@ impl<T: Real> ElementState<T> {
     }
 }
 
+/// The pressure on the plates where the piston has a stroke. The error `x` of what presses them is one of the pressure, where they touch,
+/// and one of the fill: the parts that each has of its variance are those that each has of its mean.
+#[inline(never)]
+fn pressing_of_pistons<T: Real>(
+    pistons: &Pistons<T>,
+    clutch: &Clutch<T>,
+    [kiss_pa, moving_pa]: [T; 2],
+    wrong: &PressureError<T>,
+) -> Pressing<T> {
+    let spread = &pistons.spread;
+    if spread.all_pa <= T::zero() {
+        // No plates touch.
+        return Pressing::nothing();
+    }
+    let part = spread.touches * moving_pa / spread.all_pa;
+    let seen_pa = part * moving_pa;
+    let error_pa = seen_pa * wrong.pressure - kiss_pa * wrong.kiss;
+    let unseen = square(moving_pa) * (T::one() - square(part)).at_least(T::zero());
+    let variance = wrong.variance_pa([kiss_pa, seen_pa]) + unseen;
+    let kissed_pa = clutch.kiss_pressure();
+    let ([mean_pa, slope], most_pa) =
+        pistons.pressed(|pressure_pa| positive_part(pressure_pa - kissed_pa + error_pa, variance));
+    let per_fill_pa = square(spread.fill_pa) / spread.all_pa;
+    let by_fill_pa = per_fill_pa * wrong.pressure;
+    Pressing {
+        pressed_pa: (mean_pa + by_fill_pa).at_least(T::zero()).at_most(most_pa),
+        slope,
+        error_pa,
+        kiss_pa,
+        moving_pa: seen_pa,
+        by_fill_pa,
+        per_fill_pa,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ValveModel;
-    use drivetrain::{Clutch, ClutchValve, Table1, ValveMaps};
+    use crate::any_shift::Piston;
+    use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 
     const LIMITS: InputLimits<f64> =
         InputLimits { speed_max_rad_s: 1e3, command_max: 1.2, pressure_max_pa: 1.1e6, shaft_torque_max_n_m: 1e4 };
+
+    const UNCERTAINTY: ShiftUncertainty<f64> = ShiftUncertainty {
+        torque_share: 0.12,
+        slow_part: 0.75,
+        torque_share_s: 3.0,
+        valve_gain: 0.06,
+        kiss_point_pa: 7e3,
+        valve_lag_share: 0.3,
+        valve_delay_s: 9e-3,
+        pressure_pa: 7e3,
+        pressure_s: 0.15,
+        turbine_share: 0.03,
+        turbine_share_s: 3.0,
+        inertia_share: 0.14,
+        stiffness_share: 0.12,
+        rate_rad_s: 0.1,
+        rate_walk: 0.01,
+        load_walk: 1500.0,
+        output_least_rad_s: 15.0,
+    };
 
     fn element() -> FrictionElement<f64> {
         let maps = ValveMaps {
@@ -287,15 +404,25 @@ mod tests {
                 static_friction: 0.14,
             },
             valve: ValveModel { valve: ClutchValve::Proportional(maps), delay_s: 0.015 },
+            piston: None,
             budget: None,
         }
+    }
+
+    fn with_stroke() -> FrictionElement<f64> {
+        let element = element();
+        let piston = Piston::new(Cylinder::of_clutch(&element.clutch), 0.16);
+        FrictionElement { piston: Some(piston), ..element }
     }
 
     /// With late and missing readings, and commands above what the supply gives.
     #[test]
     fn a_valve_that_rests_goes_on_as_one_that_never_does() {
-        let element = element();
-        let mut rests = ElementState::new(&element, &LIMITS);
+        [element(), with_stroke()].iter().for_each(rests_as_one_that_never_does);
+    }
+
+    fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
+        let mut rests = ElementState::new(element, &LIMITS);
         let (mut moves, mut rested) = (rests, 0);
         for k in 0..6000_usize {
             // Every new command is late, after two that were lost or out of order.
@@ -304,12 +431,15 @@ mod tests {
             let age_s = if at == 0 { 0.025 } else { 0.0 };
             let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
             let health = [&mut rests, &mut moves]
-                .map(|valve: &mut ElementState<f64>| valve.step(&element, &LIMITS, command, 0.01));
+                .map(|valve: &mut ElementState<f64>| valve.step(element, &LIMITS, command, 0.01));
             assert_eq!(health[0], health[1]);
+            [&mut rests, &mut moves].into_iter().for_each(|valve| valve.move_pistons(element, &UNCERTAINTY, 0.01));
             // So it never begins to rest.
             moves.newest.iter_mut().for_each(|newest| newest.alike_s = 0.0);
             rested += usize::from(rests.rate_pa_s == 0.0);
             assert!((rests.valve_pa - moves.valve_pa).abs() <= RESTS_PA, "{k}: {} {}", rests.valve_pa, moves.valve_pa);
+            let both = [rests, moves].map(|valve| valve.pressure_pa());
+            assert!((both[0] - both[1]).abs() <= 5.0 * RESTS_PA, "{k}: {both:?}");
             assert!((rests.per_lag_pa - moves.per_lag_pa).abs() <= RESTS_PA, "{k}");
             assert!((rests.rate_pa_s - moves.rate_pa_s).abs() <= 100.0 * RESTS_PA, "{k}");
         }
@@ -319,25 +449,7 @@ mod tests {
     /// Near the kiss point and above it, with errors that are known.
     #[test]
     fn an_element_holds_what_it_carries_by_the_estimate() {
-        let u = ShiftUncertainty {
-            torque_share: 0.12,
-            slow_part: 0.75,
-            torque_share_s: 3.0,
-            valve_gain: 0.06,
-            kiss_point_pa: 7e3,
-            valve_lag_share: 0.3,
-            valve_delay_s: 9e-3,
-            pressure_pa: 7e3,
-            pressure_s: 0.15,
-            turbine_share: 0.03,
-            turbine_share_s: 3.0,
-            inertia_share: 0.14,
-            stiffness_share: 0.12,
-            rate_rad_s: 0.1,
-            rate_walk: 0.01,
-            load_walk: 1500.0,
-            output_least_rad_s: 15.0,
-        };
+        let u = UNCERTAINTY;
         let (element, shift) = (element(), ShiftClutch { element: 0, alpha: -1.4, ratio: 2.0 });
         let mut state = ElementState::new(&element, &LIMITS);
         for (valve_pa, factor, pressure, kiss) in [
@@ -359,6 +471,41 @@ mod tests {
             assert!((holds + carries * 0.14 / 0.13).abs() < 1e-9, "{valve_pa}: {holds} {carries}");
             assert!((holds > 0.0) == (valve_pa > 1.5e4), "{valve_pa}: {holds}");
         }
+    }
+
+    /// While its piston strokes it carries nothing, whatever the pressure at the valve; then it is as one without a stroke.
+    #[test]
+    fn an_element_whose_plates_do_not_touch_carries_nothing() {
+        let u = UNCERTAINTY;
+        let (with, without) = (with_stroke(), element());
+        let shift = ShiftClutch { element: 0, alpha: 1.0, ratio: 2.0 };
+        let wrong = PressureError { pressure: 0.4, kiss: 0.3, variance: [0.8, 0.9], covariance: 0.0 };
+        let mut states = [with, without].map(|element| (element, ElementState::new(&element, &LIMITS)));
+        let mut carried = [0.0; 300];
+        for (k, carried) in carried.iter_mut().enumerate() {
+            let command = Some(Reading::now(if k < 5 { 0.0 } else { 0.25 }));
+            let [stroke, none] = states.each_mut().map(|(element, state)| {
+                state.step(element, &LIMITS, command, 0.01);
+                state.move_pistons(element, &u, 0.01);
+                let torque = state.torque(element, &shift, &u, [50.0, 1.0], &wrong);
+                let all = torque.base_n_m + 0.3 * torque.per_kiss_n_m + 0.4 * torque.per_pressure_n_m;
+                // The static friction is larger.
+                let holds = state.holds(element, &shift, &u, 0.0, &wrong);
+                assert!((holds - all * 0.14 / 0.13).abs() < 1e-9 || all < 0.0, "{k}: {holds} {all}");
+                (all, torque.open_loop_n_m, state.pressure_pa())
+            });
+            *carried = stroke.0;
+            if k < 20 {
+                assert_eq!((stroke.0, stroke.1), (0.0, 0.0), "{k}");
+            }
+            if k > 200 {
+                assert!((stroke.0 - none.0).abs() < 0.01 * none.0, "{k}: {stroke:?} {none:?}");
+                assert!((stroke.2 - none.2).abs() < 1e3, "{k}: the leak takes little");
+            }
+        }
+        assert!(carried.windows(2).all(|pair| pair[1] > pair[0] - 0.5) && carried[250] > 30.0);
+        // Both rest then.
+        assert!(states.iter().all(|(_, state)| state.newest.is_some_and(|newest| newest.rests_s.is_some())));
     }
 
     #[test]

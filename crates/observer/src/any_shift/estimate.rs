@@ -24,9 +24,9 @@ pub struct ClutchEstimate<T> {
     pub torque_n_m: T,
     /// Standard deviation of the torque, N m.
     pub deviation_n_m: T,
-    /// Pressure by the valve model alone, Pa.
+    /// Pressure by the models of valve and piston alone, Pa.
     pub valve_pa: T,
-    /// Torque by valve model and friction alone, N m; of a clutch that holds, the torque up to which it does, in the direction of
+    /// Torque by these models and friction alone, N m; of a clutch that holds, the torque up to which it does, in the direction of
     /// its load.
     pub open_loop_n_m: T,
     /// Whether it holds.
@@ -51,7 +51,7 @@ pub struct ShiftEstimate<T> {
     pub phase: Option<ShiftPhase>,
     /// The offgoing and the oncoming clutch of the shift; none in a gear.
     pub clutches: Option<[ClutchEstimate<T>; 2]>,
-    /// Pressures of all elements by their valve models, Pa.
+    /// Pressures of all elements by the models of their valves and pistons, Pa.
     pub valve_pa: [T; MAX_ELEMENTS],
     /// Slip of the offgoing clutch away from the new gear, at the turbine, rad/s, where the readings show one: a flare. Else
     /// zero.
@@ -102,8 +102,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             (_, _, true) => Health::ReadingRefused,
             _ => Health::Good,
         });
-        let valve_pa =
+        let mut valve_pa =
             state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), |element| element.valve_pa));
+        if state.strokes {
+            valve_pa = state.elements.each_ref().map(|of| of.as_ref().map_or(T::zero(), ElementState::pressure_pa));
+        }
         let estimate = &mut state.estimate;
         *estimate = ShiftEstimate { valve_pa, channels: *channels, commands: *commands, ..ShiftEstimate::nothing() };
         match &state.running {
@@ -178,7 +181,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 let (memory, element) = found;
                 let torque =
                     memory.torque(element, clutch, u, [slip.value, slip.direction()], &PressureError::unseen(k));
-                (torque, memory.valve_pa, u.gain_error(element, f, k), u.correlation_in_shift(element))
+                (torque, memory.pressure_pa(), u.gain_error(element, f, k), u.correlation_in_shift(element))
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
         ClutchEstimate {
@@ -219,10 +222,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let deviation = x.variance(&row).sqrt();
         let (valve_pa, correction, both) =
             self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
-                let gain = memory.valve_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
+                let modelled_pa = memory.pressure_pa();
+                let gain = modelled_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
-                let itself = memory.deviation_pa(u) * x.mean[PRESSURE[c]];
-                (memory.valve_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
+                let itself = memory.error_pa(u, x.mean[PRESSURE[c]]);
+                (modelled_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
             });
         let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();

@@ -10,14 +10,15 @@
 //! | `c` | fades in hours, unit variance | the part of that share that lasts |
 //! | `f_off`, `f_on` | random walk, unit variance | error of the clutch's torque: friction and valve gain, which show as one |
 //! | `k_off`, `k_on` | constant, unit variance | error of its kiss point |
-//! | `x_off`, `x_on` | fades in 0.15 s, unit variance | error of the valve model's pressure: lag and delay |
+//! | `x_off`, `x_on` | fades in 0.15 s, unit variance | error of the valve model's pressure: lag and delay; and of the fill, which ends with it |
 //! | `m` | constant, unit variance | error of the turbine-side inertia `M11` |
 //!
 //! Both clutches of a shift have the same equations, from [`GearboxTables`]; nothing is written for the oncoming one. A
 //! clutch that slips has the torque of its valve model, corrected by `f` and `x`; one that holds has the torque that this
 //! takes. Which of them hold, the measured slip decides ([`ShiftPhase`]). The shift command may change at any time: what
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
-//! elements run all the time.
+//! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; when that is, five
+//! pistons of each element say, with the probability of it.
 //!
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
@@ -32,6 +33,7 @@ mod estimate;
 mod learnt;
 mod newest;
 mod phases;
+mod pistons;
 mod powertrain;
 mod predict;
 mod readings;
@@ -56,6 +58,7 @@ use turbine::InputSide;
 pub use estimate::{ClutchEstimate, ShiftEstimate};
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
+pub use pistons::Piston;
 pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
@@ -205,6 +208,8 @@ pub struct AnyShiftFilter<'a, T> {
 pub struct AnyShiftState<T> {
     started: bool,
     elements: [Option<ElementState<T>>; MAX_ELEMENTS],
+    /// Whether the piston of an element has a stroke.
+    strokes: bool,
     engine: Option<Engine<T>>,
     /// Newest reported engine torque, N m, and its age, s.
     reported: Option<(T, T)>,
@@ -255,6 +260,11 @@ impl<T: Real> ShiftUncertainty<T> {
     fn kiss_deviation_pa(&self, clutch: &Clutch<T>) -> T {
         let by_gain_pa = self.valve_gain * clutch.kiss_pressure();
         ((square(self.kiss_point_pa) + square(by_gain_pa)) / self.slow_part).sqrt()
+    }
+
+    /// Standard deviation of the pressure at rest above the kiss point, Pa: what drives the piston of a slow fill.
+    fn above_kiss_pa(&self, clutch: &Clutch<T>) -> T {
+        (square(self.kiss_deviation_pa(clutch)) + square(self.pressure_pa)).sqrt()
     }
 
     /// Times in which the errors of turbine torque and pressure fade, s.
@@ -322,6 +332,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         AnyShiftState {
             started: false,
             elements,
+            strokes: self.tables.elements.iter().any(|element| element.piston.is_some()),
             engine: None,
             reported: None,
             newest: [None; SPEEDS],

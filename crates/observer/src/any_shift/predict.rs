@@ -69,6 +69,14 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) {
         let share = dt_s / (dt_s + T::of(SHARE_S));
         running.slow_n_m = running.slow_n_m + share * (torque.turbine_n_m - running.slow_n_m);
+        for (c, clutch) in running.shift.iter().flat_map(|shift| &shift.clutches).enumerate() {
+            let lasts = self.element(elements, clutch.element).and_then(|(memory, _)| memory.error_lasts());
+            if let Some(lasts) = lasts {
+                // An error of the fill ends with it.
+                running.x.fade(PRESSURE[c.min(1)], lasts);
+                running.x.add(PRESSURE[c.min(1)], PRESSURE[c.min(1)], T::one() - lasts * lasts);
+            }
+        }
         let now = self.torques(running, elements, torque, speeds);
         let mean = running.torques.map_or(now, |before| before.mean(&now)).without(running.phase.phase.holding());
         if dt_s > T::zero() {

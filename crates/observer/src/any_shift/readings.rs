@@ -25,6 +25,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 *health = memory.step(element, &self.limits, *command, dt_s);
             }
         }
+        if state.strokes {
+            for (memory, element) in state.elements.iter_mut().flatten().zip(self.tables.elements) {
+                memory.move_pistons(element, &self.uncertainty, dt_s);
+            }
+        }
         health
     }
 

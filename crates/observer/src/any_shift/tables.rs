@@ -9,6 +9,7 @@
 
 use drivetrain::{Clutch, Real, ReducedShift};
 
+use super::pistons::Piston;
 use crate::{Budget, ValveModel};
 
 /// Most clutches and brakes of a gearbox.
@@ -21,6 +22,8 @@ pub struct FrictionElement<T> {
     pub clutch: Clutch<T>,
     /// The valve as the filter knows it.
     pub valve: ValveModel<T>,
+    /// Its piston, if that has a stroke; without one the pressure at the valve's outlet acts on the plates.
+    pub piston: Option<Piston<T>>,
     /// Largest errors, for the guaranteed ranges; without it there are none.
     pub budget: Option<Budget<T>>,
 }
@@ -117,6 +120,7 @@ impl<T: Real> FrictionElement<T> {
         FrictionElement {
             clutch: self.clutch.cast(),
             valve: self.valve.cast(),
+            piston: self.piston.as_ref().map(Piston::cast),
             budget: self.budget.as_ref().map(Budget::cast),
         }
     }

@@ -45,15 +45,18 @@ impl Random {
     }
 }
 
-/// The car of a draw of a shift, with other friction, valve gains and converter: the same whatever else is drawn.
+/// The car of a draw of a shift, with other friction, valve gains, converter and strokes of pistons: the same whatever else is drawn.
 pub fn drawn_car(known: &Car, from: usize, to: usize, seed: u64) -> Car {
     draw(known, from, to, seed, false).car(known)
 }
 
 fn draw(known: &Car, from: usize, to: usize, seed: u64, timing: bool) -> ShiftDraw {
     let mut random = Random(seed.wrapping_mul(1000).wrapping_add(from as u64 * 37 + to as u64));
-    let draw = ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform());
-    if timing { draw.with_timing(known, &ShiftErrors::STANDARD, || random.uniform()) } else { draw }
+    let mut draw = ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform());
+    if timing {
+        draw = draw.with_timing(known, &ShiftErrors::STANDARD, || random.uniform());
+    }
+    draw.with_strokes(known, || random.uniform())
 }
 
 /// A shift of the matrix.

@@ -29,6 +29,17 @@ pub(crate) fn cars() -> Vec<Car> {
     ]
 }
 
+/// The same with pistons that have a stroke.
+pub(crate) fn cars_with_strokes() -> Vec<Car> {
+    vec![
+        car!("gearboxes/8hp.toml", "[fill]\n"),
+        car!("gearboxes/lepelletier_6.toml", "[fill]\n"),
+        car!("gearboxes/ravigneaux_4.toml", "[fill]\n"),
+        car!("gearboxes/10_speed.toml", "[fill]\n"),
+        car!("gearboxes/dual_clutch_7.toml", "launch = \"clutch\"\n[fill]\n[driveline]\nfinal_ratio = 1.0\n"),
+    ]
+}
+
 /// Neighbouring gears in both directions, with and without power.
 pub(crate) fn shifts(car: &Car) -> Vec<(usize, usize, f64)> {
     let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();

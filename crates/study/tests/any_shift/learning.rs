@@ -11,8 +11,8 @@ use study::shift_learning::{RecordedShift, filter, tables_with_inertia};
 use crate::cars::{Random, cars, sensors, shifts};
 use drivetrain::ShiftKind;
 
-/// Shifts of the first car, recorded once.
-struct Drive {
+/// Shifts of a car, recorded once.
+pub(crate) struct Drive {
     car: Car,
     shifts: Vec<RecordedShift>,
 }
@@ -24,7 +24,7 @@ impl Drive {
     }
 
     /// All shifts of the car `car` that truly is `truth`.
-    fn of(car: &Car, truth: &Car, seed: u64) -> Self {
+    pub(crate) fn of(car: &Car, truth: &Car, seed: u64) -> Self {
         let tables = tables_with_inertia(car, 1.0).unwrap();
         let record = |(k, (from, to, throttle))| {
             let shift = CarShift::usual(car, from, to, throttle);
@@ -35,7 +35,7 @@ impl Drive {
     }
 
     /// What is learnt in so many of its shifts in a random order, and the errors with it.
-    fn after(&self, count: usize, inertia: f64, seed: u64) -> (Learnt<f64>, Errors) {
+    pub(crate) fn after(&self, count: usize, inertia: f64, seed: u64) -> (Learnt<f64>, Errors) {
         let tables = tables_with_inertia(&self.car, inertia).unwrap();
         let nothing = *filter(&self.car, &tables, &sensors()).start().learnt();
         let learnt = self.learn(nothing, count, inertia, seed);
@@ -77,20 +77,20 @@ impl Drive {
 
 /// By kind, phase (torque, inertia) and clutch (controlling, other).
 #[derive(Default, Clone)]
-struct Errors {
+pub(crate) struct Errors {
     of: [[[SquaredErrors; 2]; 2]; 4],
     counts: MatrixCounts,
 }
 
 impl Errors {
-    fn add(&mut self, more: &Self) {
+    pub(crate) fn add(&mut self, more: &Self) {
         for (sum, more) in self.of.iter_mut().flatten().flatten().zip(more.of.iter().flatten().flatten()) {
             sum.add(more);
         }
         self.counts.add(&more.counts);
     }
 
-    fn all(&self) -> [f64; 2] {
+    pub(crate) fn all(&self) -> [f64; 2] {
         let mut all = SquaredErrors::default();
         self.of.iter().flatten().flatten().for_each(|sum| all.add(sum));
         all.rms_n_m()
@@ -104,7 +104,7 @@ impl Errors {
         estimate / open_loop
     }
 
-    fn show(&self) -> String {
+    pub(crate) fn show(&self) -> String {
         let [a, b] = self.all();
         let mut line = format!("all {a:.2}/{b:.2} N m; inertia");
         for kind in 0..4 {
@@ -140,11 +140,11 @@ const WRONG: [(&str, f64, f64); 4] = [
     ("valve gain -8 %", 1.0, 0.92),
     ("valve gain +8 %", 1.0, 1.08),
 ];
-const SHIFTS: usize = 30;
+pub(crate) const SHIFTS: usize = 30;
 
 /// How many orders of the shifts, and cars of the budget: two, or for the documentation `LEARNING_DRAWS=6 cargo test --release
 /// -p study --test any_shift learning -- --nocapture`.
-fn draws() -> u64 {
+pub(crate) fn draws() -> u64 {
     std::env::var("LEARNING_DRAWS").ok().map_or(2, |draws| draws.parse().unwrap())
 }
 
