@@ -255,29 +255,3 @@ fn check_warns_of_values_that_no_car_has_and_refuses_an_engine_without_torque() 
     let warned = said(&check("name = \"car\"\ngearbox = \"8hp.toml\"\n"));
     assert!(warned.contains("warning: gearbox: \"5\" engages the same elements as \"3\""), "{warned}");
 }
-
-#[test]
-fn a_wheel_speed_in_km_h_takes_the_radius_of_the_vehicle_file() {
-    let folder = Folder::new("radius");
-    let log = simulated(&folder, EXPERIMENT);
-    let estimate = |wheel: &str, out: &str| {
-        let channels = ["engine_speed", "turbine_speed", "output_speed"]
-            .map(|name| format!("[channel.{name}]\nname = \"{name}_rad_s\"\n"));
-        let command = "[channel.oncoming_current]\nname = \"oncoming_current_a\"\n";
-        let map = format!("{}{command}[channel.wheel_speed]\nname = \"wheel_speed_rad_s\"\n{wheel}", channels.concat());
-        std::fs::write(folder.path("map.toml"), map).unwrap();
-        let (map, out) = (folder.path("map.toml"), folder.path(out));
-        said(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE, "--map", &map, "-o", &out]))
-    };
-    // Wheels of 0.3 m: the speed of the car in km/h.
-    estimate("", "rad_s.csv");
-    estimate("unit = \"km/h\"\nscale = 1.08\n", "km_h.csv");
-    let pressures = |name: &str| -> Vec<f64> {
-        let text = folder.read(name);
-        let at = text.lines().next().unwrap().split(',').position(|column| column.contains("pressure_pa")).unwrap();
-        text.lines().skip(1).filter_map(|line| line.split(',').nth(at)?.parse().ok()).collect()
-    };
-    let (one, other) = (pressures("rad_s.csv"), pressures("km_h.csv"));
-    assert!(one.len() == other.len() && one.len() > 500, "{} {}", one.len(), other.len());
-    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 10.0));
-}
