@@ -11,10 +11,13 @@ use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::early_sync::EarlySync;
+
 /// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
 #[derive(Debug)]
 pub struct WholeFile {
     writer: BufWriter<File>,
+    sync: EarlySync,
     /// None if the bytes are written directly.
     replaces: Option<Replacement>,
 }
@@ -49,7 +52,7 @@ impl WholeFile {
         let permissions = match check_target(path)? {
             Some(there) if !there.is_file() => {
                 let file = OpenOptions::new().write(true).open(path)?;
-                return Ok(Self { writer: BufWriter::new(file), replaces: None });
+                return Ok(Self { writer: BufWriter::new(file), sync: EarlySync::default(), replaces: None });
             }
             there => there.map(|there| there.permissions()),
         };
@@ -65,7 +68,7 @@ impl WholeFile {
         let partial = target.with_file_name(partial);
         let writer = BufWriter::new(locked(&partial)?);
         unfinished().push(partial.clone());
-        let file = Self { writer, replaces: Some(Replacement { partial, target }) };
+        let file = Self { writer, sync: EarlySync::default(), replaces: Some(Replacement { partial, target }) };
         if let Some(permissions) = permissions {
             file.writer.get_ref().set_permissions(permissions)?;
         }
@@ -106,7 +109,11 @@ impl WholeFile {
     fn complete(&mut self) -> io::Result<()> {
         self.writer.flush()?;
         // A device or pipe has no disk to reach.
-        if self.replaces.is_some() { self.writer.get_ref().sync_all() } else { Ok(()) }
+        if self.replaces.is_none() {
+            return Ok(());
+        }
+        self.sync.end()?;
+        self.writer.get_ref().sync_all()
     }
 }
 
@@ -118,7 +125,11 @@ impl Seek for WholeFile {
 
 impl Write for WholeFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.writer.write(bytes)
+        let written = self.writer.write(bytes)?;
+        if self.replaces.is_some() {
+            self.sync.wrote(written, self.writer.get_ref());
+        }
+        Ok(written)
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -267,6 +278,19 @@ mod tests {
         assert!(failed.is_err());
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(folder.names(), ["out.txt"]);
+    }
+
+    #[test]
+    fn a_file_that_goes_to_the_disk_while_it_grows_is_whole_or_not_there() {
+        let folder = Folder::new("large");
+        let path = folder.0.join("large.bin");
+        let piece: Vec<u8> = (0..=255).cycle().take(1 << 20).collect();
+        let pieces = |w: &mut (dyn Write + Send), count: usize| (0..count).try_for_each(|_| w.write_all(&piece));
+        write_whole(&path, |w| pieces(w, 40)).unwrap();
+        assert!(fs::read(&path).unwrap() == piece.repeat(40));
+        let failed = write_whole(&path, |w| pieces(w, 35).and(Err(io::Error::other("no more"))));
+        assert!(failed.is_err() && fs::metadata(&path).unwrap().len() == 40 << 20);
+        assert_eq!(folder.names(), ["large.bin"]);
     }
 
     #[cfg(unix)]

@@ -6,6 +6,7 @@
 
 pub mod atomic;
 pub mod csv_file;
+mod early_sync;
 pub mod error;
 pub mod follow;
 pub mod last_line;
