@@ -37,6 +37,13 @@ fn joined(a: Extremes, b: Extremes) -> Extremes {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
+/// Joins the second to the first, in place: most values lie within those before.
+fn widen(extremes: &mut Extremes, [low, high]: Extremes) {
+    if !(extremes[0] <= low && high <= extremes[1]) {
+        *extremes = joined(*extremes, [low, high]);
+    }
+}
+
 impl Interval {
     fn joined(&self, other: &Self) -> Self {
         Self {
@@ -50,13 +57,12 @@ impl Interval {
     /// Joins a sample to it.
     fn take(&mut self, sample: &LogSample) {
         let LogSample { speeds_rad_s, estimate, .. } = sample;
-        // One that was not read changes nothing.
         for (extremes, speed) in self.speeds_rad_s.iter_mut().zip(speeds_rad_s) {
-            *extremes = joined(*extremes, [*speed; 2]);
+            widen(extremes, [*speed; 2]);
         }
-        self.pressure_pa = joined(self.pressure_pa, [estimate.pressure_pa; 2]);
+        widen(&mut self.pressure_pa, [estimate.pressure_pa; 2]);
         if let Some(bounds) = estimate.bounds {
-            self.range_pa = joined(self.range_pa, bounds.pressure_pa);
+            widen(&mut self.range_pa, bounds.pressure_pa);
         }
         self.healths[estimate.health as usize] |= sample.is_estimated();
     }

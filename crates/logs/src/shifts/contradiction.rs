@@ -34,6 +34,11 @@ impl SeenRatios {
         }
     }
 
+    /// Whether the gear signal has said a gear: without one no ratio contradicts it.
+    pub(super) fn has_gear(&self) -> bool {
+        self.gear.is_some()
+    }
+
     /// Takes the newest ratio of the speeds; one that was taken already does not count again.
     pub(super) fn ratio(&mut self, time_s: f64, ratio: f64) {
         // Numbers of gears are small: `gear_number` lets no others through.

@@ -296,10 +296,14 @@ impl ShiftFinder {
             let command_s = self.command(change.to, change.inertia_s[0] - COMMAND_S, change.inertia_s[1]);
             self.wait(change.from, change.to, command_s, Some(change.inertia_s), None);
         }
-        if let Some(point) = self.ratio.newest().filter(|_| !self.by_engine) {
+        if self.seen_ratios.has_gear()
+            && let Some(point) = self.ratio.newest().filter(|_| !self.by_engine)
+        {
             self.seen_ratios.ratio(point.time_s, point.ratio);
         }
-        self.settle(time_s - AFTER_S);
+        if !self.waiting.is_empty() {
+            self.settle(time_s - AFTER_S);
+        }
     }
 
     /// Takes back a reading of this time: load and quality of a shift do without it. The ratio of the speeds is the middle one of several
@@ -326,6 +330,10 @@ impl ShiftFinder {
 
     /// Takes out the shifts that nothing after `now_s` can change, in the order of their beginning; each is given once.
     pub fn take_settled(&mut self, now_s: f64) -> Vec<Shift> {
+        // Mostly there is none.
+        if self.found.is_empty() && self.by_signal.is_empty() {
+            return Vec::new();
+        }
         let is_open = |shift: &Shift| shift.end_s() + SETTLED_S >= now_s;
         let are_open = |shifts: &[Shift]| shifts.iter().all(is_open);
         if are_open(&self.found) && are_open(&self.by_signal) {
