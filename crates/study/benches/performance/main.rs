@@ -51,8 +51,10 @@ fn page() -> (String, Vec<Figure>) {
     let mut page = format!(
         "<!-- Written by `cargo bench -p study --bench performance -- --write`; do not edit. -->\n# Performance\n\n\
          Measured by `cargo bench -p study --bench performance` on {}.\nEach time is the fastest of many runs; what is compared was measured in \
-         turns. Times on such a machine\nchange by half from one run of the benchmark to the next: compare within one.\n",
-        machine()
+         turns. Times on such a machine\nchange by half from one run of the benchmark to the next: compare within one. Our code was built {}; libraries in C \
+         are\nthose of the system, which serve every processor.\n",
+        machine(),
+        instructions()
     );
     let mut figures = vec![observers::steps(&mut page)];
     controller::counts(&mut page);
@@ -71,6 +73,15 @@ fn machine() -> String {
     let compiler = Command::new("rustc").arg("--version").output().ok();
     let compiler = compiler.and_then(|output| String::from_utf8(output.stdout).ok()).unwrap_or_default();
     format!("{} cores of a shared server ({model}, {}, {})", threads(), std::env::consts::OS, compiler.trim())
+}
+
+/// The instructions that the compiler was allowed to use.
+fn instructions() -> &'static str {
+    if cfg!(all(target_feature = "avx2", target_feature = "fma")) {
+        "with AVX2 and FMA"
+    } else {
+        "without AVX2 and FMA"
+    }
 }
 
 fn threads() -> usize {
