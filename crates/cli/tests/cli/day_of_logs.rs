@@ -127,7 +127,10 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     let page = std::fs::metadata(folder.path("out_report.html")).unwrap().len();
     assert!(page < 5_000_000, "{page}");
     // Of the shifts of the simulated drive, all but those at walking speed are found by their ratio; no sample is called frozen.
-    let found = mdf.1[0].lines().filter(|line| line.contains(" to ") && (line.contains("upshift") || line.contains("downshift"))).count();
+    let found = mdf.1[0]
+        .lines()
+        .filter(|line| line.contains(" to ") && (line.contains("upshift") || line.contains("downshift")))
+        .count();
     assert!(found >= 15 * repetitions as usize, "{}", mdf.1[0]);
     assert!(!estimate[1].contains("frozen"), "{}", estimate[1]);
     // In other gears there is no estimate, and what an observer meets there does not spoil the next shift: all of them are alike.

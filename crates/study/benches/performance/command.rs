@@ -9,6 +9,8 @@ use crate::shared::root;
 /// What a run of the program took.
 pub(crate) struct Ran {
     pub(crate) seconds: f64,
+    /// Time of processors that it used, s; NaN where the system does not say.
+    pub(crate) processor_s: f64,
     /// Most memory at a time, MiB; NaN where the system does not say.
     pub(crate) peak_mib: f64,
 }
@@ -31,18 +33,30 @@ pub(crate) fn run(program: &Path, arguments: &[&str]) -> Ran {
     let mut command = Command::new(program);
     let command = command.args(arguments).current_dir(root()).stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = command.spawn().unwrap();
-    let mut peak_mib = f64::NAN;
+    let (mut peak_mib, mut used_s) = (f64::NAN, f64::NAN);
     loop {
-        // The kernel keeps the peak; what comes after the last look is the end of the program.
+        // The kernel keeps peak and time; what comes after the last look is the end of the program.
         if let Some(kib) = peak_kib(child.id()) {
             peak_mib = kib / 1024.0;
         }
+        used_s = processor_s(child.id()).unwrap_or(used_s);
         if let Some(status) = child.try_wait().unwrap() {
             assert!(status.success(), "wetclutch {}", arguments.join(" "));
-            return Ran { seconds: began.elapsed().as_secs_f64(), peak_mib };
+            return Ran { seconds: began.elapsed().as_secs_f64(), processor_s: used_s, peak_mib };
         }
         std::thread::sleep(LOOK);
     }
+}
+
+/// Time of processors of a process so far, in itself and in the kernel, s.
+fn processor_s(process: u32) -> Option<f64> {
+    /// What the kernel counts in.
+    const PER_S: f64 = 100.0;
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // Behind the name, which may hold anything: state, ten numbers, and both times.
+    let mut times = stat.rsplit_once(')')?.1.split_ascii_whitespace().skip(11);
+    let [own, kernel] = [times.next()?, times.next()?].map(|time| time.parse::<f64>().ok());
+    Some((own? + kernel?) / PER_S)
 }
 
 /// Peak of the resident memory of a process, KiB.

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 
 use crate::Figure;
 use crate::bars::{self, Bar};
-use crate::command::{program, run};
+use crate::command::{Ran, program, run};
 use crate::shared::write_log;
 
 /// Rows of the logs: one for the time, and ten times as many for the memory.
 const ROWS: [u32; 2] = [1_000_000, 10_000_000];
 /// The fastest of so many runs counts.
-const TRIES: usize = 3;
+const TRIES: usize = 5;
 
 /// A command over the log: name of the observer, what is written, its option, and the ending of its output.
 const COMMANDS: [(&str, &str, &str, &str); 7] = [
@@ -51,21 +51,26 @@ pub(crate) fn commands(page: &mut String) -> Figure {
     let log = LogFile::of(ROWS[0]);
     page.push_str(
         "\n## Estimates of logs\n\n`wetclutch estimate` of a log of a million rows in CSV, the same 3.3 s with a shift again and again, with the guaranteed range, shifts and page: read, \
-         estimated, written; one core.\n\n![Rows per second of each observer](figures/estimates.svg)\n\n| observer | output | rows per second |\n|---|---|---|\n",
+         estimated, written. A core is kept busy; by the clock the disk is waited for besides, which gets 200 MB of CSV.\n\n\
+         ![Rows per second and core of each observer](figures/estimates.svg)\n\n| observer | output | rows per second and core | by the clock |\n|---|---|---|---|\n",
     );
     let mut bars = Vec::new();
-    for (observer, written, columns, ending) in COMMANDS {
-        let seconds = (0..TRIES).map(|_| estimate(&program, &log, observer, columns, ending).0);
-        let rate = f64::from(ROWS[0]) / seconds.fold(f64::INFINITY, f64::min);
-        let _ = writeln!(page, "| {observer} | {written} | {rate:.0} |");
+    let run = |(observer, _, columns, ending)| estimate(&program, &log, observer, columns, ending);
+    // In turns: a slow time of the machine meets all of them.
+    let tries: Vec<_> = (0..TRIES).map(|_| COMMANDS.map(run)).collect();
+    for (at, (observer, written, ..)) in COMMANDS.into_iter().enumerate() {
+        let runs: Vec<&Ran> = tries.iter().map(|runs| &runs[at]).collect();
+        let best =
+            |time: fn(&Ran) -> f64| f64::from(ROWS[0]) / runs.iter().map(|ran| time(ran)).fold(f64::INFINITY, f64::min);
+        let (rate, by_clock) = (best(|ran| ran.processor_s), best(|ran| ran.seconds));
+        let _ = writeln!(page, "| {observer} | {written} | {rate:.0} | {by_clock:.0} |");
         bars.push(Bar { label: format!("{observer}, {}", written.replace('`', "")), parts: vec![1e-3 * rate] });
     }
     memory(page, &program, log);
-    ("estimates.svg", bars::svg("thousand rows per second", &[], &bars))
+    ("estimates.svg", bars::svg("thousand rows per second and core", &[], &bars))
 }
 
-/// Time, s, and peak of the memory, MiB.
-fn estimate(program: &Path, log: &LogFile, observer: &str, columns: &str, ending: &str) -> (f64, f64) {
+fn estimate(program: &Path, log: &LogFile, observer: &str, columns: &str, ending: &str) -> Ran {
     let output = log.0.with_file_name(format!("estimate.{ending}"));
     let (log, written) = (log.0.to_str().unwrap(), output.to_str().unwrap());
     let vehicle = "vehicles/two_speed_at.toml";
@@ -75,7 +80,7 @@ fn estimate(program: &Path, log: &LogFile, observer: &str, columns: &str, ending
     }
     let ran = run(program, &arguments);
     std::fs::remove_file(&output).unwrap();
-    (ran.seconds, ran.peak_mib)
+    ran
 }
 
 fn memory(page: &mut String, program: &Path, log: LogFile) {
@@ -87,7 +92,10 @@ fn memory(page: &mut String, program: &Path, log: LogFile) {
     };
     let mut of_log = |log: &LogFile, rows: &str| {
         for (output, ending) in [("CSV", "csv"), ("Parquet", "parquet")] {
-            row(&format!("`estimate` of {rows} rows to {output}"), estimate(program, log, "kalman", "", ending).1);
+            row(
+                &format!("`estimate` of {rows} rows to {output}"),
+                estimate(program, log, "kalman", "", ending).peak_mib,
+            );
         }
     };
     of_log(&log, "1,000,000");
