@@ -18,7 +18,8 @@ const MOST: usize = 40;
 /// Times are sums of periods, and differ in their last digits, s.
 const ROUNDING_S: f64 = 1e-6;
 /// Steps that differ by no more than this from the first of them are equal, s: in a window of them no time is further than forty times this
-/// from even ones, which changes a jerk by less than a millionth.
+/// from even ones, which changes a jerk by less than 0.001 m/s^3 where the car
+/// accelerates with 10 m/s^2.
 const EVEN_S: f64 = 1e-9;
 /// A window is whole if it is no shorter than this share: bins of uneven clocks.
 const WHOLE: f64 = 0.95;
