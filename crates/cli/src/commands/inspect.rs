@@ -230,7 +230,14 @@ fn page(
 }
 
 fn has_command(map: &ChannelMap) -> bool {
-    [Role::OncomingCurrent, Role::OncomingDuty, Role::OncomingPressureCommand].into_iter().any(|role| map.has(role))
+    let commands = [
+        Role::OncomingCurrent,
+        Role::OncomingDuty,
+        Role::OncomingPressureCommand,
+        Role::ElementCurrent,
+        Role::ElementDuty,
+    ];
+    commands.into_iter().any(|role| map.has(role))
 }
 
 /// What was met in the log, in sentences.

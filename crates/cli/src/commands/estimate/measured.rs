@@ -26,6 +26,9 @@ use crate::output;
 /// Steps of a followed log that are looked at before the first estimate.
 const FOLLOWED_LOOK: usize = 50;
 
+/// Said of a table whose last line was cut.
+pub(super) const CUT_LINE: &str = "warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells";
+
 /// A log with its shifts.
 pub(super) struct Measured<'a> {
     source: Source<'a>,
@@ -300,7 +303,7 @@ impl<'a> Measured<'a> {
                     say.note(&format!("warning: {note}"));
                 }
                 if rows.was_cut.load(Ordering::Relaxed) {
-                    say.note("warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells");
+                    say.note(CUT_LINE);
                 }
                 return rows.watched.check(Seen::All);
             }

@@ -25,6 +25,7 @@ use super::Messages;
 use super::measured::{check_step, slow_log};
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
+use super::ratios::check_wheel;
 use super::selection::Selection;
 use crate::args::{Estimate, ObserverChoice};
 use crate::commands::{JsonObject, channel_map_of_car, write_cells, write_json_list, write_text};
@@ -115,6 +116,7 @@ pub(super) fn estimate(
         say.note(&swapped);
     }
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
+    check_wheel(drive.output_over_wheel(), car.driveline.final_ratio)?;
     if let Some(warning) = slow_log(median_s) {
         say.note(&warning);
     }
