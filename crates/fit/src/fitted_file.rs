@@ -73,6 +73,9 @@ impl Fit {
             Parameter::Damping => times(text, &["driveline", "shaft_damping_n_m_s_rad"]),
             Parameter::Tyre => times(text, &["tyre", "slip_scale"]),
             Parameter::Mass => times(text, &["vehicle", "mass_kg"]),
+            Parameter::Rolling | Parameter::Air if self.verdict(parameter) == Verdict::NotTold => Ok(()),
+            Parameter::Rolling => times(text, &["vehicle", "rolling_moment_n_m"]),
+            Parameter::Air => times(text, &["vehicle", "drag_coefficient"]),
             Parameter::EngineInertia => times(text, &["engine", "inertia_kg_m2"]),
             // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
             _ => Ok(()),

@@ -87,6 +87,7 @@ impl Fit {
             );
         }
         lines.push(self.torque_said());
+        lines.push(self.said_of_driving());
         lines.extend(cautions(self.is_converged, self.shifts));
         lines.extend(self.channel_map());
         lines.extend(self.proposals());
@@ -131,6 +132,28 @@ impl Fit {
             text += ". These logs are too few, or tell too little, to show that the fitted file is better than the given one";
         }
         text
+    }
+
+    /// What driving between shifts says of mass and road load, or why it says nothing.
+    fn said_of_driving(&self) -> String {
+        let reasons = match self.driving_left_out.as_slice() {
+            [] => String::new(),
+            [first] => format!("; not used: {first}"),
+            [first, more @ ..] => format!("; not used: {first}, and of {} more logs", more.len()),
+        };
+        if self.driving_s == 0.0 {
+            return format!(
+                "driving between shifts is not fitted: no log has enough of it with the engine pulling in the gears of the file{reasons}. It would tell \
+                 of the mass"
+            );
+        }
+        let [_, mass] = self.combination_sd(&[(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)]);
+        format!(
+            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. Grade is not \
+             measured; rolling resistance is told apart from a mean grade by driving the same road both ways",
+            self.driving_s,
+            100.0 * SIDES * mass
+        )
     }
 
     fn misfits(&self) -> Vec<String> {

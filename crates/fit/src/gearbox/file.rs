@@ -6,7 +6,8 @@ use config::{Car, Source, toml_string};
 use drivetrain::{ClutchValve, Table1};
 
 use super::fitting::GearboxFit;
-use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use crate::driving::DRAG_UNIT_N_M;
 use crate::fitted_file::{SIDES, fill_comment};
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
 use crate::{FitError, Verdict};

@@ -6,12 +6,12 @@ use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
-use super::driving::{Driving, DrivingModel};
 use super::precision::stated;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
+use crate::driving::{DrivenCar, Driving, DrivingModel};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::pressure::Hydraulics;
 use crate::{FitError, Verdict};
@@ -67,7 +67,7 @@ pub fn fit(
     driving: &Driving,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<GearboxFit, FitError> {
-    let mut balances = Balances::of(car, driving);
+    let mut balances = Balances::of(&DrivenCar::with_gearbox(car, tables, &|_, _| None), driving);
     loop {
         let (fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
         if !balances.leave_out(scales) {
@@ -91,7 +91,8 @@ fn fit_with(
         return Err(FitError::input("there is no shift to fit"));
     }
     let problem = Problem::new(&quantities)?;
-    let of_driving = DrivingModel::new(car, tables, &quantities, driving, balances.used());
+    let driven = DrivenCar::with_gearbox(car, tables, &|from, to| quantities.pair(from, to));
+    let of_driving = DrivingModel::new(&driven, driving, balances.used());
     let all = Models { shifts: &models, driving: of_driving };
     let solved = problem.solve(&all, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
     let stated = stated(&problem, &models, &solved)?;

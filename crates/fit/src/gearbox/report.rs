@@ -2,9 +2,10 @@
 
 use drivetrain::ShiftKind;
 
-use super::driving::Balance;
 use super::fitting::GearboxFit;
-use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use crate::driving::Balance;
+use crate::driving::DRAG_UNIT_N_M;
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{cautions, fill_row};
