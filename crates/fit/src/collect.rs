@@ -238,15 +238,15 @@ impl BetweenShifts {
             Role::EngineSpeed => dated[0] = Some((reading.time_s, reading.value)),
             Role::TurbineSpeed => (dated[1], self.speeds[0]) = (Some((reading.time_s, reading.value)), reading.value),
             Role::OutputSpeed => (dated[2], self.speeds[1]) = (Some((reading.time_s, reading.value)), reading.value),
+            Role::WheelSpeed => dated[3] = Some((reading.time_s, reading.value)),
             Role::LockUpApplied => self.lock_up = reading.value > 0.5,
             role => {
                 let which = commands.iter().position(|command| *command == role);
                 return which.into_iter().for_each(|which| self.commands[which] = reading.value);
             }
         }
-        let [engine, turbine, output, torque] = dated;
         let state = RowState { gear: self.gear(reading.time_s), lock_up: self.lock_up };
-        self.recorder.push(reading.time_s, [engine, turbine, output], torque, state);
+        self.recorder.push(reading.time_s, dated, None, state);
     }
 
     /// The gear by the ratio of the speeds; none in a shift, or where the clutch of the other gear may carry torque.

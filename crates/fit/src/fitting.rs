@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 use crate::car::Car;
 use crate::drives::{DriveErrors, Drives, UsedDriving, driven_car};
-use crate::driving::Driving;
+use crate::driving::{BacklashFit, Driving, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
@@ -48,6 +48,8 @@ pub struct Fit {
     pub driving_s: f64,
     /// Why driving of a log is not fitted.
     pub driving_left_out: Vec<String>,
+    /// The backlash of the driveline, or what the logs lack for it.
+    pub backlash: Result<BacklashFit, String>,
     /// One-step scale of each channel, and its gain `g`; zero for a channel without readings.
     pub channels: Vec<(Channel, f64, f64)>,
     /// Whether the last step was small; otherwise the iterations were used up.
@@ -111,6 +113,7 @@ pub fn fit(
         fit.unusable = [left_out, fit.unusable].concat();
         fit.driving_s = used.time_s();
         fit.driving_left_out = used.left_out;
+        fit.backlash = fit_backlash(&driven, driving.iter());
         return Ok(fit);
     }
 }
@@ -172,6 +175,7 @@ fn fit_with(
         unusable,
         driving_s: 0.0,
         driving_left_out: Vec::new(),
+        backlash: Err(String::new()),
         is_converged,
         freed,
         misfits: grave(&misfits),

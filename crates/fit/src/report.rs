@@ -6,7 +6,7 @@ use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
-use crate::{Channel, Fit, Parameter, Verdict};
+use crate::{BacklashFit, Channel, Fit, Parameter, Verdict};
 
 /// A row of the table of parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +88,7 @@ impl Fit {
         }
         lines.push(self.torque_said());
         lines.push(self.said_of_driving());
+        lines.push(BacklashFit::statement(&self.backlash));
         lines.extend(cautions(self.is_converged, self.shifts));
         lines.extend(self.channel_map());
         lines.extend(self.proposals());
@@ -248,8 +249,7 @@ impl Fit {
         );
         when(
             true,
-            "for the backlash of the driveline, which shifts under load do not tell: press and release the pedal in one gear, so that the \
-             torque of the shafts changes its sign; for rolling resistance and air drag: coast down in neutral on a level road, both ways",
+            "for rolling resistance and air drag, coast down in neutral on a level road, both ways; a fit does not read it",
         );
         when(
             self.shifts < 15,

@@ -12,6 +12,7 @@
 //!
 //! Both fits use it: that of a car with a gearbox, and that of one shift. What they call an unknown, the balances know as a [`Term`].
 
+mod backlash;
 mod car;
 mod model;
 mod recorder;
@@ -19,6 +20,8 @@ mod stretch;
 mod usable;
 mod whitening;
 
+pub use backlash::BacklashFit;
+pub(crate) use backlash::fit_backlash;
 pub(crate) use car::DrivenCar;
 pub(crate) use model::{Balance, DrivingModel, DrivingWeights, Evaluated};
 pub(crate) use recorder::{DrivingRecorder, RowState, turns_by};

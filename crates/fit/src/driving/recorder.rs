@@ -1,6 +1,7 @@
 //! From the steps of a log to stretches of driving in which the engine pulls.
 
 use super::DrivenCar;
+use super::backlash::TwistRecorder;
 use super::stretch::{Driving, Stretch, StretchReadings};
 use crate::Series;
 
@@ -45,6 +46,7 @@ pub(crate) struct DrivingRecorder {
     readings: StretchReadings,
     open: Option<(usize, f64)>,
     unsettled_s: f64,
+    twist: TwistRecorder,
     found: Driving,
 }
 
@@ -55,12 +57,13 @@ impl DrivingRecorder {
             readings: StretchReadings::default(),
             open: None,
             unsettled_s: f64::NEG_INFINITY,
+            twist: TwistRecorder::default(),
             found: Driving::default(),
         }
     }
 
-    /// Takes a row: its time, the readings of engine, turbine and output speed, the reported engine torque, and its state.
-    pub(crate) fn push(&mut self, time_s: f64, speeds: [Dated; 3], reported: Dated, state: RowState) {
+    /// Takes a row: its time, the readings of engine, turbine, output and wheel speed, the reported engine torque, and its state.
+    pub(crate) fn push(&mut self, time_s: f64, speeds: [Dated; 4], reported: Dated, state: RowState) {
         let StretchReadings { engine, turbine, output, reported: torque } = &mut self.readings;
         for (series, reading) in [engine, turbine, output].into_iter().zip(speeds).chain([(torque, reported)]) {
             if let Some((time_s, value)) = reading {
@@ -68,6 +71,7 @@ impl DrivingRecorder {
             }
         }
         let gear = state.gear.filter(|_| !state.lock_up);
+        self.twist.push(&self.car, time_s, speeds, gear);
         if gear.is_none() || gear != self.open.map(|(gear, _)| gear).or(gear) {
             self.unsettled_s = time_s;
         }
@@ -93,6 +97,8 @@ impl DrivingRecorder {
     /// The stretches.
     pub(crate) fn finish(mut self) -> Driving {
         self.close();
+        self.twist.close(&self.car);
+        self.found.twists = self.twist.stretches;
         self.found
     }
 

@@ -3,6 +3,7 @@
 use drivetrain::clutch::drag_torque;
 use observer::any_shift::MAX_ELEMENTS;
 
+use super::backlash::Cell;
 use super::car::{CAPACITIES, DrivenCar, OpenElement};
 use crate::Series;
 
@@ -23,6 +24,8 @@ const STEPS_MIN: usize = 3;
 pub struct Driving {
     /// Stretches in their order.
     pub(crate) stretches: Vec<Stretch>,
+    /// Stretches with reversals of the torque.
+    pub(crate) twists: Vec<Vec<Cell>>,
     /// Whether the log was longer than what is kept.
     pub(crate) is_cut: bool,
 }
@@ -33,6 +36,8 @@ impl Driving {
         // The same drive says what it has to say once.
         let new = more.stretches.into_iter().filter(|stretch| !self.stretches.contains(stretch)).collect::<Vec<_>>();
         self.stretches.extend(new);
+        let new = more.twists.into_iter().filter(|twist| !self.twists.contains(twist)).collect::<Vec<_>>();
+        self.twists.extend(new);
         self.is_cut |= more.is_cut;
     }
 

@@ -97,6 +97,9 @@ impl GearboxFit {
                 text.put(&[table], key, &value, &self.comment(quantity))?;
             }
         }
+        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
+            text.put(&["driveline"], "backlash_rad", &number(backlash.rad), &backlash.comment())?;
+        }
         Ok(())
     }
 

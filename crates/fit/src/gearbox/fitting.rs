@@ -11,7 +11,7 @@ use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
-use crate::driving::{DrivenCar, Driving, DrivingModel};
+use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::pressure::Hydraulics;
 use crate::{FitError, Verdict};
@@ -50,6 +50,8 @@ pub struct GearboxFit {
     pub driving_s: [f64; 2],
     /// Fill volumes of the elements, by their places; none where a piston has no stroke.
     pub fills: Vec<Option<FillFit>>,
+    /// The backlash of the driveline, or what the logs lack for it.
+    pub backlash: Result<BacklashFit, String>,
     /// Which balances of it were fitted.
     pub(crate) balances: Balances,
     /// Names of the quantities that ended where nothing beyond is held possible.
@@ -117,6 +119,7 @@ fn fit_with(
         scale_and_gain: [solved.weights.turbine.scale, solved.weights.turbine.gain],
         is_converged: solved.is_converged,
         driving_s: [driving.time_s(), driving.reported_s()],
+        backlash: fit_backlash(&driven, std::iter::once(driving)),
         balances: balances.clone(),
         quantities,
     };

@@ -165,6 +165,7 @@ impl<'a> Recorder<'a> {
             dated(input.turbine_rad_s, ages.turbine_rad),
             dated(input.output_rad_s, ages.output_rad),
         ];
+        let wheel = dated(input.wheel_rad_s, ages.wheel_rad);
         let torque = dated(input.engine_n_m, 0.0);
         let readings = speeds.into_iter().chain([torque]).chain(input.commands.map(|reading| dated(reading, 0.0)));
         let series = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
@@ -176,7 +177,8 @@ impl<'a> Recorder<'a> {
         let GearCommand { from, to } = input.gear;
         let state = RowState { gear: (from == to).then_some(from), lock_up: input.lock_up_applied };
         let reported = dated(self.reported.take(), 0.0).or(torque);
-        self.driving.push(time_s, speeds, reported, state);
+        let [engine, turbine, output] = speeds;
+        self.driving.push(time_s, [engine, turbine, output, wheel], reported, state);
     }
 
     fn begin(&mut self, time_s: f64, gears: [usize; 2], lock_up: bool) {

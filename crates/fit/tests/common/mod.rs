@@ -56,6 +56,8 @@ pub(crate) struct TestCar {
     /// Factor on the time of the fill.
     pub(crate) fill: f64,
     seed: u64,
+    /// Whether the pedal is released now and then in its drives.
+    pub(crate) releases: bool,
     draw: Draw,
 }
 
@@ -187,8 +189,19 @@ impl TestCar {
         if file.oncoming.has_stroke {
             fill = draw_fill(&mut car.oncoming, &mut more);
         }
-        let mut drawn =
-            Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, pressure_late_s, fill, seed, draw };
+        let mut drawn = Self {
+            file,
+            car,
+            sensors,
+            truth,
+            torque_signal_scale,
+            pressure_scale,
+            pressure_late_s,
+            fill,
+            seed,
+            releases: false,
+            draw,
+        };
         drawn.tell_maps();
         drawn
     }
@@ -421,6 +434,14 @@ impl TestCar {
         self
     }
 
+    /// Gives the car a backlash of its own, of up to 0.08 rad, and releases the pedal now and then in its drives.
+    pub(crate) fn with_reversals(mut self) -> Self {
+        let mut draw = Draw::new(self.seed ^ 0xbac_0000);
+        self.car.backlash_rad = draw.between(0.0, 0.08);
+        self.releases = true;
+        self
+    }
+
     /// A log of so many parts of a minute each, on roads of other grades, with a shift in each; all with one mass of the car.
     pub(crate) fn driven(&self, parts: u32) -> Trace {
         self.driven_with(parts, |_, _| ())
@@ -434,7 +455,9 @@ impl TestCar {
         for part in 0..parts {
             let mut experiment = Experiment::e1().unwrap();
             let times: Vec<f64> = (0..20).map(|at| PART_S / 20.0 * (f64::from(at) + draw.between(0.0, 0.5))).collect();
-            let positions: Vec<f64> = times.iter().map(|_| draw.between(0.08, 0.5)).collect();
+            let releases = |at: usize| self.releases && at >= 10 && at % 4 < 2;
+            let position = |at: usize| if releases(at) { 0.0 } else { draw.between(0.08, 0.5) };
+            let positions: Vec<f64> = (0..times.len()).map(position).collect();
             experiment.throttle = Table1::new(&times, &positions).unwrap();
             experiment.initial_vehicle_m_s = draw.between(4.0, 8.0);
             experiment.initial_engine_rad_s = 30.0 * experiment.initial_vehicle_m_s;
