@@ -276,3 +276,38 @@ fn place(record: &mut ShiftRecord, role: Role, [oncoming, offgoing]: [Role; 2]) 
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use logs::ShiftQuality;
+
+    use super::*;
+
+    /// What a shift has told is not used again, and a clutch that may carry torque makes no gear.
+    #[test]
+    fn a_gear_is_one_outside_of_shifts_with_the_other_clutch_open() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let shift = Shift {
+            from: 1,
+            to: 2,
+            direction: Direction::Up,
+            load: Load::PowerOn,
+            command_s: None,
+            inertia_s: Some([20.0, 20.5]),
+            gear_s: None,
+            quality: ShiftQuality::default(),
+        };
+        let mut between = BetweenShifts::new(&vehicle, &[shift]).unwrap();
+        assert_eq!(between.gear(0.0), None);
+        between.speeds = [between.ratios[0] * 60.0, 60.0];
+        assert_eq!([17.9, 18.1, 21.9, 22.1].map(|time_s| between.gear(time_s)), [Some(0), None, None, Some(0)]);
+        between.speeds = [between.ratios[1] * 60.0, 60.0];
+        assert_eq!(between.gear(30.0), Some(1));
+        between.commands = [1.0, f64::NAN];
+        assert_eq!(between.gear(30.0), Some(1));
+        between.speeds = [between.ratios[0] * 60.0, 60.0];
+        assert_eq!(between.gear(30.0), None);
+        between.commands = [0.0, 1.0];
+        assert_eq!(between.gear(30.0), Some(0));
+    }
+}

@@ -150,8 +150,8 @@ impl Fit {
         }
         let [_, mass] = self.combination_sd(&[(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)]);
         format!(
-            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. Grade is not \
-             measured; rolling resistance is told apart from a mean grade by driving the same road both ways",
+            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. Grade is not measured, and a mean grade acts \
+             like rolling resistance: coasting down both ways on a straight of constant grade would tell it, and a fit does not read that",
             self.driving_s,
             100.0 * SIDES * mass
         )
@@ -249,7 +249,7 @@ impl Fit {
         );
         when(
             true,
-            "for rolling resistance and air drag, coast down in neutral on a level road, both ways; a fit does not read it",
+            "for rolling resistance and air drag, coast down in neutral both ways on a straight of constant grade; a fit does not read it",
         );
         when(
             self.shifts < 15,

@@ -113,7 +113,8 @@ impl GearboxFit {
         match self.balances.reason(Balance::Car) {
             None => lines.push(format!(
                 "mass and road load from {:.0} s in gear with the engine pulling: beside the common factor of all torques the mass is known within +- \
-                 {:.1} %. Grade is not measured; rolling resistance is told apart from a mean grade by driving the same road both ways",
+                 {:.1} %. Grade is not measured, and a mean grade acts \
+             like rolling resistance: coasting down both ways on a straight of constant grade would tell it, and a fit does not read that",
                 self.driving_s[0],
                 beside(Quantity::Mass)
             )),
