@@ -87,3 +87,16 @@ fn a_wheel_speed_that_is_off_is_covered_by_the_interval_or_tells_nothing() {
     let failed = found("failed", &|at, speed| if at % 1000 < 300 { f64::NAN } else { speed });
     assert!(failed.as_ref().map_or(true, is_covered), "{failed:?}");
 }
+
+/// The slip of the tyres is in the speed of the car, and the scatter shows it.
+#[test]
+fn the_speed_of_the_car_in_place_of_that_of_the_wheels_tells_no_backlash() {
+    let (car, shifts, mut log) = drawn();
+    let speeds = log.get(signal::VEHICLE_SPEED).unwrap().to_vec();
+    *column(&mut log, signal::WHEEL_SPEED) = speeds.iter().map(|speed| speed / car.file.road.wheel_radius_m).collect();
+    let fit = fitted(&car, &shifts, &car.collected(&log, "car").driving);
+    let found = fit.backlash.as_ref().unwrap();
+    assert!((found.rad - car.car.backlash_rad).abs() < 2.0 * found.sd_rad, "{found:?}");
+    assert_eq!(found.verdict(), Verdict::NotTold, "{found:?}");
+    assert!(fit.statements().iter().any(|line| line.starts_with("backlash of the driveline: not told, +- ")));
+}

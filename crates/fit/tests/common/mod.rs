@@ -488,7 +488,8 @@ impl TestCar {
 }
 
 /// Channels of a log.
-const LOGGED: [&str; 6] = [
+const LOGGED: [&str; 7] = [
+    signal::VEHICLE_SPEED,
     signal::ENGINE_SPEED,
     signal::TURBINE_SPEED,
     signal::OUTPUT_SPEED,
