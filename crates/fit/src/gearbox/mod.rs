@@ -12,7 +12,6 @@
 
 mod balances;
 mod budget;
-mod driving;
 mod file;
 mod fitting;
 mod precision;
@@ -24,7 +23,7 @@ mod shift_log;
 mod solver;
 mod validation;
 
-pub use driving::Driving;
+pub use crate::driving::Driving;
 pub use fitting::{GearboxFit, Progress, fit};
 pub use quantities::{Quantities, Quantity};
 pub use recorder::{Recorded, Recorder};

@@ -8,25 +8,21 @@ use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
 use observer::any_shift::ShiftRow;
 
-use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantities, Quantity};
-use super::recorder::part;
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift_log::ShiftLog;
 use crate::Series;
+use crate::driving::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_SHARE};
 use crate::pressure::{Grid, Hydraulics, pressures};
 
 /// Step of the integrals, s.
 const STEP_S: f64 = 0.002;
-/// Own unknowns of a shift: the turbine speed at its begin, rad/s, and an error of the torque at the turbine, N m.
+/// Own unknowns of a shift: the turbine speed at its begin, rad/s, and an error of the torque at the turbine, N m, whose deviation is that of the torque at
+/// the input.
 pub(crate) const OWN: usize = 2;
 /// Deviation of the first, rad/s: nothing is known of it.
 const START_SD_RAD_S: f64 = 50.0;
-/// Deviation of the second: what the drag of the open elements has beside its model, N m \[chosen\], and a share of the torque at the input by the shape of the
-/// converter's maps \[chosen, as in the filter\].
-pub(crate) const DRAG_SD_N_M: f64 = 1.0;
-pub(crate) const INPUT_SD_SHARE: f64 = 0.03;
-/// Steps for the derivatives by the logarithm of a lag and by a delay in its unit.
+/// Steps for the derivatives by the logarithm of a lag and of a gain.
 const LAG_STEP: f64 = 0.02;
-pub(crate) const DELAY_STEP: f64 = 0.1;
 const GAIN_STEP: f64 = 0.02;
 
 /// A clutch of the shift.
@@ -354,7 +350,7 @@ fn clutch(
     Some(ClutchModel {
         place: shift.element,
         commands: log.commands[which].clone(),
-        measured: part(&log.pressure[which], log.slip_s),
+        measured: log.pressure[which].part(log.slip_s),
         hydraulics: Hydraulics { cylinder: None, ..Hydraulics::of(known) },
         kiss_pa: known.clutch.kiss_pressure(),
         per_pa: per_pa.collect(),
