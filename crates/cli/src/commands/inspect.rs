@@ -8,7 +8,7 @@ use logs::{ChannelMap, Inspection, Log, Reading, Readings, Role, RoleSummary, Sh
 use report::SpeedsPage;
 use trace::units::rpm;
 
-use crate::args::Inspect;
+use crate::args::{Inspect, available_threads};
 use crate::commands::{channel_map, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -21,7 +21,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);
     }
-    let mut log = Log::open(&options.log, &map.open)?;
+    let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
     if options.suggest {
         let dbc = options.mapping.dbc.as_ref().map(|dbc| dbc.display().to_string());
         return Ok(output::line(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
