@@ -285,12 +285,20 @@ impl Log {
 
     /// Names a channel with a similar name, or some channels.
     fn nearest(&self, name: &str) -> String {
+        // One letter of three may be wrong, or stand before its neighbour.
+        const ALIKE: f64 = 2.0 / 3.0;
         let wanted = name.to_lowercase();
         let similar = |channel: &&Channel| {
             let name = channel.name.to_lowercase();
             name.contains(&wanted) || (!name.is_empty() && wanted.contains(&name))
         };
-        if let Some(channel) = self.channels.iter().find(similar) {
+        let alike = || {
+            let likeness =
+                |channel: &Channel| strsim::normalized_damerau_levenshtein(&channel.name.to_lowercase(), &wanted);
+            let all = self.channels.iter().map(|channel| (likeness(channel), channel));
+            all.filter(|(likeness, _)| *likeness >= ALIKE).max_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        if let Some(channel) = self.channels.iter().find(similar).or_else(|| Some(alike()?.1)) {
             return format!("`{}` has a similar name", error::shown(&channel.name));
         }
         const MOST: usize = 12;
