@@ -67,7 +67,7 @@ impl CsvLog {
         let dialect = Dialect::of(path, &beginning)?;
         let first = cells(beginning.lines().nth(dialect.first).unwrap_or_default(), dialect.delimiter);
         let stamp = |column: usize| first.get(column).and_then(|cell| StampForm::of(cell));
-        let mut input = Cursor::new(head).chain(rest);
+        let mut input = Beginning(Cursor::new(head)).chain(rest);
         skip(&mut input, start, dialect.preamble).map_err(LogError::io(path))?;
         let mut records = Records::new(Box::new(input), dialect.delimiter);
         read_row(path, &mut records, dialect.preamble)?;
@@ -126,11 +126,8 @@ impl CsvLog {
         let Some(records) = self.records.take() else {
             return Err(LogError::file(&self.path, "the log was read already"));
         };
-        let columns = (self.columns.iter().zip(wanted).enumerate())
-            .filter(|(_, (_, wanted))| **wanted)
-            .map(|(channel, (&column, _))| (channel, column));
         Ok(Box::new(Rows {
-            columns: columns.collect(),
+            channels: (0..self.columns.len()).filter(|channel| wanted[*channel]).collect(),
             log: self,
             records,
             text: Vec::new(),
@@ -148,12 +145,25 @@ impl CsvLog {
     }
 }
 
+/// The first bytes of a table, which are long where its lines are: freed when they were read.
+struct Beginning(Cursor<Vec<u8>>);
+
+impl Read for Beginning {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let read = self.0.read(bytes)?;
+        if read == 0 {
+            self.0 = Cursor::default();
+        }
+        Ok(read)
+    }
+}
+
 /// The rows of a table.
 struct Rows<'a> {
     log: &'a CsvLog,
     records: Records,
-    /// Channel and column.
-    columns: Vec<(usize, usize)>,
+    /// Those that are wanted.
+    channels: Vec<usize>,
     /// A cell with a point in place of its comma.
     text: Vec<u8>,
     midnight: Midnight,
@@ -215,8 +225,9 @@ impl Rows<'_> {
             self.without_time += 1;
             return;
         };
-        for i in 0..self.columns.len() {
-            let (channel, column) = self.columns[i];
+        for i in 0..self.channels.len() {
+            let channel = self.channels[i];
+            let column = self.log.columns[channel];
             if is_cut && column + 1 == cells {
                 self.cut = Some("counts without its last cell, of which digits may be missing");
                 continue;

@@ -1,10 +1,13 @@
 //! What is in a log: for each channel samples, rate, span, values, gaps.
 
-use crate::samples::{Quality, QualityCounts};
+use crate::samples::{Quality, QualityCounts, Sample};
 use crate::{Log, LogError};
 
-/// Intervals of which the middle one is the period of a channel.
+/// Intervals of which the middle one is the period of a channel: so many, of very many channels fewer, so that all have at most so many, but
+/// so many at least.
 const FIRST: usize = 512;
+const INTERVALS: usize = 4 << 20;
+const FEWEST: usize = 7;
 /// An interval of so many periods is a gap.
 pub const GAP: f64 = 5.0;
 
@@ -43,7 +46,7 @@ struct Watched {
 }
 
 impl Watched {
-    fn push(&mut self, time_s: f64, value: f64, quality: Quality) {
+    fn push(&mut self, first: usize, Sample { time_s, value, quality, .. }: Sample) {
         self.summary.counts.push(quality);
         if !matches!(quality, Quality::Repeated | Quality::Backward) {
             match &mut self.summary.span_s {
@@ -51,7 +54,7 @@ impl Watched {
                 Some([_, last_s]) => {
                     let interval_s = time_s - *last_s;
                     *last_s = time_s;
-                    self.interval(interval_s);
+                    self.interval(first, interval_s);
                 }
             }
         }
@@ -61,13 +64,13 @@ impl Watched {
         }
     }
 
-    fn interval(&mut self, interval_s: f64) {
+    fn interval(&mut self, first: usize, interval_s: f64) {
         self.summary.longest_s = self.summary.longest_s.max(interval_s);
         match self.summary.period_s {
             Some(period_s) => self.summary.gaps += u64::from(interval_s > GAP * period_s),
             None => {
                 self.intervals_s.push(interval_s);
-                if self.intervals_s.len() == FIRST {
+                if self.intervals_s.len() == first {
                     self.settle();
                 }
             }
@@ -99,9 +102,11 @@ pub fn inspect(log: &mut Log) -> Result<Inspection, LogError> {
     let all: Vec<usize> = (0..log.channels().len()).collect();
     let mut watched: Vec<Watched> = all.iter().map(|_| Watched::default()).collect();
     let mut samples = log.samples(&all)?;
+    drop(all);
+    let first = (INTERVALS / watched.len().max(1)).clamp(FEWEST, FIRST);
     for sample in &mut samples {
         let sample = sample?;
-        watched[sample.channel].push(sample.time_s, sample.value, sample.quality);
+        watched[sample.channel].push(first, sample);
     }
     let notes = samples.notes().to_vec();
     Ok(Inspection { channels: watched.into_iter().map(Watched::finish).collect(), notes })
