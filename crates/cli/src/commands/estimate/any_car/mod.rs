@@ -79,7 +79,8 @@ pub(super) fn estimate(
     let CarSetup { options, car, tables, .. } = setup;
     let mut opened = None;
     let stop = options.follow.then_some(&setup.stop);
-    let mut log = CarSource::open(CarReading { car, tables, map: &setup.map, stop }, path, &mut opened)?;
+    let reading = CarReading { car, tables, map: &setup.map, stop, threads: options.threads_of_log() };
+    let mut log = CarSource::open(reading, path, &mut opened)?;
     let mut drive = LoggedDrive::new(car, tables, setup.sensors.as_ref());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();

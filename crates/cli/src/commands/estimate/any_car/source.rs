@@ -26,6 +26,8 @@ pub(in crate::commands) struct CarReading<'a> {
     pub(in crate::commands) map: &'a ChannelMap,
     /// Set when a log that is followed is to end; none for one that is not followed.
     pub(in crate::commands) stop: Option<&'a Arc<AtomicBool>>,
+    /// How many threads read it.
+    pub(in crate::commands) threads: usize,
 }
 
 /// The steps of a log.
@@ -42,7 +44,7 @@ impl<'a> CarSource<'a> {
         path: &Path,
         opened: &'a mut Option<Log>,
     ) -> Result<Self, Failure> {
-        let CarReading { car, tables, map, stop } = reading;
+        let CarReading { car, tables, map, stop, threads } = reading;
         let stop = stop.map(Arc::clone);
         let is_pipe = path == Path::new("-");
         if map.channels.is_empty() && (is_pipe || !logs::needs_map(path)?) {
@@ -58,7 +60,7 @@ impl<'a> CarSource<'a> {
         }
         let log = match stop {
             Some(stop) => Log::follow(path, &map.open, stop)?,
-            None => Log::open(path, &map.open)?,
+            None => Log::open(path, &map.open)?.on_threads(threads),
         };
         let own;
         let map = if map.channels.is_empty() {
