@@ -301,7 +301,6 @@ pub fn any_shift_filter<'a>(
     errors: &ShiftErrors,
     sensors: Option<&Sensors>,
 ) -> AnyShiftFilter<'a, f64> {
-    let inertia = car.engine.inertia_kg_m2;
     let own = errors.of_car(car);
     AnyShiftFilter {
         tables: tables.tables(),
@@ -309,7 +308,7 @@ pub fn any_shift_filter<'a>(
         wheels_kg_m2: car.road.inertia_at_wheel() + car.driveline.wheel_inertia_kg_m2,
         turbine: TurbineTorque {
             converter: car.converter,
-            engine_inertia_kg_m2: inertia,
+            engine_inertia_kg_m2: car.engine.inertia_kg_m2,
             converter_share: deviation_of(own.converter),
             engine_share: deviation_of(own.engine),
         },
@@ -321,7 +320,7 @@ pub fn any_shift_filter<'a>(
         ],
         engine: (
             speed_reading(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
-            engine_noise(inertia, sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
+            engine_noise(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
         ),
         limits: InputLimits {
             speed_max_rad_s: SPEED_MOST_RAD_S,
