@@ -87,7 +87,6 @@ fn torque_errors(cars: &[Size]) -> [[f64; 3]; 2] {
 fn the_filter_of_a_short_file_is_better_than_the_valve_alone_in_small_middle_and_large_cars() {
     for (name, cars) in [("small", &SMALL[..]), ("middle", &MIDDLE), ("large", &LARGE)] {
         let [torque, inertia] = torque_errors(cars);
-        println!("{name}: torque phase {torque:.1?} N m, inertia phase {inertia:.1?} N m");
         for [kalman, maps, open_loop] in [torque, inertia] {
             assert!(kalman < 0.6 * open_loop && maps < open_loop, "{name}: {kalman} {maps} {open_loop}");
         }
