@@ -58,7 +58,7 @@ impl ScoredShift {
 
     /// How long a true phase lasts, s.
     pub fn length_s(&self, phase: TruePhase) -> f64 {
-        self.spans_s(phase).iter().map(|[from_s, to_s]| to_s - from_s).sum()
+        self.spans_s(phase).iter().fold(0.0, |length_s, [from_s, to_s]| length_s + (to_s - from_s))
     }
 
     /// Begin and end of every piece of a phase, s.
