@@ -12,6 +12,7 @@
 
 mod balances;
 mod budget;
+mod clutch;
 mod driving;
 mod file;
 mod fitting;
@@ -22,6 +23,7 @@ mod report;
 mod shift;
 mod shift_log;
 mod solver;
+mod unfitted;
 mod validation;
 
 pub use driving::Driving;

@@ -17,6 +17,7 @@ const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
 const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, backlash, hysteresis of the valves and the shapes of all maps. \
+     The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them. \
      Pressing and releasing the pedal in one gear would tell shafts and backlash; a fit does not read it";
 
 impl GearboxFit {
