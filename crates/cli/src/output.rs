@@ -32,19 +32,31 @@ pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
     lines(left, rows).iter().try_for_each(|line| self::line(line))
 }
 
+/// The same, of rows that may be very many: each is made twice, and none is kept.
+pub(crate) fn long_table<R: Iterator<Item = Vec<String>>>(left: usize, rows: impl Fn() -> R) -> io::Result<()> {
+    let mut widths = Vec::new();
+    for row in rows() {
+        widths.resize(row.len().max(widths.len()), 0);
+        widths.iter_mut().zip(row).for_each(|(width, cell)| *width = cell.chars().count().max(*width));
+    }
+    rows().try_for_each(|row| self::line(&line_of(left, &row, &widths)))
+}
+
 /// The lines of a table: the first `left` columns to the left, the others to the right.
 pub(crate) fn lines(left: usize, rows: &[Vec<String>]) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| cell.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells =
-            row.iter().zip(&widths).enumerate().map(|(j, (cell, &width))| {
-                if j < left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
-            });
-        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
-    };
-    rows.iter().map(line).collect()
+    rows.iter().map(|row| line_of(left, row, &widths)).collect()
+}
+
+/// A line of a table with columns of these widths.
+fn line_of(left: usize, row: &[String], widths: &[usize]) -> String {
+    let cells = row.iter().zip(widths).enumerate().map(|(j, (cell, &width))| match j < left {
+        true => format!("{cell:<width$}"),
+        false => format!("{cell:>width$}"),
+    });
+    cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
 }
 
 /// A line on standard output. A reader that has closed it, such as `head`, misses the rest: that is no error, and the files of the

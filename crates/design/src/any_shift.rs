@@ -132,10 +132,12 @@ pub struct ShiftErrors {
     pub hysteresis_pa: f64,
     /// Least and greatest delay of a valve, s.
     pub valve_delay_s: [f64; 2],
+    /// Greatest time between a command and the reading that first shows it, s: of the guaranteed range.
+    pub command_age_s: f64,
 }
 
 impl ShiftErrors {
-    /// Those of a car in series \[chosen\].
+    /// Those of a car in series \[chosen\], whose commands are read when they are sent.
     pub const STANDARD: Self = Self {
         friction: 0.15,
         valve_gain: 0.10,
@@ -146,7 +148,11 @@ impl ShiftErrors {
         stiffness: 0.20,
         hysteresis_pa: 10e3,
         valve_delay_s: [0.0, 0.03],
+        command_age_s: 0.0,
     };
+
+    /// The same where the commands stand in a log, whose rows may come more rarely than commands are sent: that of the two-speed cars.
+    pub const LOGGED: Self = Self { command_age_s: 0.05, ..Self::STANDARD };
 }
 
 /// Bounds of what is not known of an element and its valve.
@@ -203,6 +209,7 @@ impl ShiftErrors {
                 delays().map(|[least_s, _]| least_s).reduce(f64::min).unwrap_or(least_s),
                 delays().map(|[_, most_s]| most_s).reduce(f64::max).unwrap_or(most_s),
             ],
+            command_age_s: self.command_age_s,
         }
     }
 }
@@ -235,7 +242,7 @@ impl ShiftTables<f64> {
                     delay_s: own.valve_delay_s,
                     hysteresis_pa: own.valve_hysteresis_pa,
                     command: COMMAND_SHARE * command_max(car, errors),
-                    command_age_s: 0.0,
+                    command_age_s: errors.command_age_s,
                     line_pressure_pa: [pressure_max_pa; 2],
                     pressure_max_pa,
                     fill: clutch.standard_fill_budget(car.oil_temperature_degc),
@@ -294,7 +301,6 @@ pub fn any_shift_filter<'a>(
     errors: &ShiftErrors,
     sensors: Option<&Sensors>,
 ) -> AnyShiftFilter<'a, f64> {
-    let inertia = car.engine.inertia_kg_m2;
     let own = errors.of_car(car);
     AnyShiftFilter {
         tables: tables.tables(),
@@ -302,7 +308,7 @@ pub fn any_shift_filter<'a>(
         wheels_kg_m2: car.road.inertia_at_wheel() + car.driveline.wheel_inertia_kg_m2,
         turbine: TurbineTorque {
             converter: car.converter,
-            engine_inertia_kg_m2: inertia,
+            engine_inertia_kg_m2: car.engine.inertia_kg_m2,
             converter_share: deviation_of(own.converter),
             engine_share: deviation_of(own.engine),
         },
@@ -314,7 +320,7 @@ pub fn any_shift_filter<'a>(
         ],
         engine: (
             speed_reading(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
-            engine_noise(inertia, sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
+            engine_noise(sensors.map(|sensors| &sensors.engine), SPEED_QUANTUM_RAD_S),
         ),
         limits: InputLimits {
             speed_max_rad_s: SPEED_MOST_RAD_S,

@@ -16,13 +16,15 @@ const READING_RAD_S: f64 = 0.02;
 /// A quantum of the error budget over the standard deviation of one reading: five deviations of the difference of two.
 const QUANTUM: f64 = 5.0 * std::f64::consts::SQRT_2;
 
+/// Inertia of the engine that the three torques below are of, kg m^2: a 2.0 L engine with 190 N m. Inertia and torque of an
+/// engine grow together, so that another engine has the same accelerations, and torques in proportion to its inertia.
+const ENGINE_KG_M2: f64 = 0.17;
 /// Torque by which the engine's may change within [`ENGINE_CHANGE_S`], N m \[chosen\].
 const ENGINE_CHANGE_N_M: f64 = 50.0;
 /// Time of a fast change of the engine's torque, s \[chosen\].
 const ENGINE_CHANGE_S: f64 = 0.05;
 /// Largest torque that accelerates the engine, N m: twice what an engine of this size gives \[chosen\].
 const ENGINE_MOST_N_M: f64 = 400.0;
-
 /// Error of a reported engine torque beside its share, N m \[chosen\]: accessories, and friction that the temperature changes.
 const ENGINE_BESIDE_N_M: f64 = 5.0;
 
@@ -75,12 +77,12 @@ pub(crate) fn speed_reading(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) ->
     }
 }
 
-/// How the speed of an engine with this inertia changes, and is read.
-pub(crate) fn engine_noise(inertia_kg_m2: f64, sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> EngineNoise<f64> {
+/// How the speed of an engine changes, and is read.
+pub(crate) fn engine_noise(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> EngineNoise<f64> {
     EngineNoise {
         reading_rad_s: deviation_rad_s(sensor, quantum_rad_s),
-        acceleration_walk: ENGINE_CHANGE_N_M / inertia_kg_m2 / ENGINE_CHANGE_S.sqrt(),
-        acceleration_max_rad_s2: ENGINE_MOST_N_M / inertia_kg_m2,
+        acceleration_walk: ENGINE_CHANGE_N_M / ENGINE_KG_M2 / ENGINE_CHANGE_S.sqrt(),
+        acceleration_max_rad_s2: ENGINE_MOST_N_M / ENGINE_KG_M2,
     }
 }
 
@@ -92,11 +94,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
     let budget = &vehicle.error_bounds;
     let [delay_least_s, delay_most_s] = budget.valve_delay_s;
     let model = compliant_model(vehicle);
-    let engine = engine_noise(
-        vehicle.engine.inertia_kg_m2,
-        sensors.map(|sensors| &sensors.engine),
-        budget.turbine_quantum_rad_s,
-    );
+    let engine = engine_noise(sensors.map(|sensors| &sensors.engine), budget.turbine_quantum_rad_s);
     let valve_model = |valve| ValveModel { valve, delay_s: 0.5 * (delay_least_s + delay_most_s) };
     let offgoing = OffgoingClutch {
         valve: valve_model(vehicle.offgoing.valve),
@@ -106,7 +104,7 @@ pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilt
     let reported = ReportedTorque {
         engine_kg_m2: vehicle.engine.inertia_kg_m2,
         share: deviation_of(budget.engine_torque_share),
-        beside_n_m: ENGINE_BESIDE_N_M,
+        beside_n_m: ENGINE_BESIDE_N_M * (vehicle.engine.inertia_kg_m2 / ENGINE_KG_M2),
     };
     KalmanFilter::new(
         model,

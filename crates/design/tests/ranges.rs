@@ -18,14 +18,12 @@ fn rolling(vehicle: &Vehicle, command: f64) -> Input<f64> {
     let turbine_rad_s = 200.0;
     let output = turbine_rad_s / 2.5;
     Input {
-        dt_s: DT_S,
         engine_rad_s: Some(Reading::now(250.0)),
         turbine_rad_s: Some(Reading::now(turbine_rad_s)),
         output_rad_s: Some(Reading::now(output)),
         wheel_rad_s: Some(Reading::now(output / vehicle.driveline.final_ratio)),
         command: Some(Reading::now(command)),
-        offgoing_command: None,
-        engine_torque_n_m: None,
+        ..Input::none(DT_S)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Cars whose parameters are all off, fitted to 20 shifts behind sensors: prints the statistics of many of them.
 //!
 //! `FIT_CARS=200 cargo run --release -p fit --example draws`; `FIT_CASE=lossy` takes those of a case of `car_of`. The seeds of the
-//! cars are their numbers, from `FIT_FIRST` (0) on; `FIT_SHIFTS=4` fits so many, `FIT_REPORT=1` prints each car's values; `FIT_LOGS=torque` or `speeds` takes one kind of logs only.
+//! cars are their numbers, from `FIT_FIRST` (0) on; `FIT_DRIVING=6` adds a log of so many minutes of driving, with another rolling
+//! resistance and air drag than the file's; `FIT_WHEEL=off` leaves out the wheel speed; `FIT_SHIFTS=4` fits so many, `FIT_REPORT=1` prints each car's values; `FIT_LOGS=torque` or `speeds` takes one kind of logs only.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
 #[path = "../tests/common/mod.rs"]
@@ -11,7 +12,7 @@ use config::vehicle::short::{Facts, ValveKind, short_file};
 use config::{Source, Vehicle};
 
 use common::{Logs, TestCar, TestShift};
-use fit::Map;
+use fit::{Map, Parameter};
 
 /// Shifts that are held out: for the errors of the torque, and others with which the fit is checked as `wetclutch fit` does.
 const HELD_OUT: u64 = 8;
@@ -26,6 +27,8 @@ struct Outcome {
     pressure_pa: [f64; 2],
     /// Of each parameter the error in stated standard deviations.
     errors: Vec<(String, f64)>,
+    /// Error of the logarithm of mass over capacity of the converter, and its stated standard deviation.
+    mass: [f64; 2],
     cpu_s: f64,
     iterations: u32,
     /// Why the given file would be kept.
@@ -76,12 +79,21 @@ fn cpu_s() -> f64 {
 
 fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
     let mut car = car_of(case, seed);
+    let minutes = std::env::var("FIT_DRIVING").ok().map(|text| text.parse().unwrap());
+    if minutes.is_some() {
+        car = car.on_another_road();
+    }
+    let driving = minutes.filter(|minutes| *minutes > 0).map(|minutes| car.driven(minutes));
     let ages = if case == "sensors unknown" { fit::ReadingAges::default() } else { car.ages() };
     let shifts = std::env::var("FIT_SHIFTS").map_or(20, |text| text.parse().unwrap());
-    let records: Vec<_> = (0..shifts).map(|number| car.shift(number, logs).record).collect();
+    let mut records: Vec<_> = (0..shifts).map(|number| car.shift(number, logs).record).collect();
+    if std::env::var("FIT_WHEEL").is_ok_and(|text| text == "off") {
+        records.iter_mut().for_each(|record| record.wheel = fit::Series::default());
+    }
+    let driving = driving.map_or_else(Vec::new, |log| car.collected(&log, "draws").driving);
     let begin_s = cpu_s();
     let mut iterations = 0;
-    let fit = fit::fit(&car.file, &records, ages, &mut |_| iterations += 1).unwrap();
+    let fit = fit::fit(&car.file, &records, &driving, ages, &mut |_| iterations += 1).unwrap();
     let cpu_s = cpu_s() - begin_s;
     let fitted = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let held_out: Vec<TestShift> = (100..100 + HELD_OUT).map(|number| car.shift(number, logs)).collect();
@@ -109,9 +121,13 @@ fn outcome(case: &str, seed: u64, logs: Logs) -> Outcome {
             fill.verdict().name()
         );
     }
+    let of_capacity = [(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)];
+    let mass_error = of_capacity
+        .map(|(parameter, power)| power * (fit.unknowns[fit.place(parameter).unwrap()] - car.true_value(parameter)));
+    let mass = [mass_error.iter().sum(), fit.combination_sd(&of_capacity)[1]];
     let torque_n_m = [mean(&car.file, 0), mean(&fitted, 0)];
     let pressure_pa = [mean(&car.file, 1), mean(&fitted, 1)];
-    Outcome { fit, torque_n_m, pressure_pa, errors, cpu_s, iterations, reason_against }
+    Outcome { fit, torque_n_m, pressure_pa, errors, mass, cpu_s, iterations, reason_against }
 }
 
 fn print_car(seed: u64, o: &Outcome) {
@@ -141,6 +157,7 @@ fn print_car(seed: u64, o: &Outcome) {
             );
         }
         println!("  channels {:?}", o.fit.channels);
+        o.fit.statements().iter().for_each(|line| println!("  {line}"));
     }
 }
 
@@ -192,6 +209,13 @@ fn print_all(outcomes: &[Outcome]) {
         outcomes.iter().map(|o| o.cpu_s).sum::<f64>() / cars as f64,
         outcomes.iter().map(|o| o.cpu_s).fold(0.0, f64::max),
         outcomes.iter().map(|o| o.iterations).max().unwrap_or(0),
+    );
+    let outside = outcomes.iter().filter(|o| o.mass[0].abs() > 1.96 * o.mass[1]).count();
+    println!(
+        "mass over converter capacity: error {:.4}, stated {:.4}, outside of its 95 % {outside}; driving {:.0} s",
+        rms(&|o| o.mass[0]),
+        rms(&|o| o.mass[1]),
+        rms(&|o| o.fit.driving_s),
     );
     let count = |is: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| is(o)).count();
     println!(

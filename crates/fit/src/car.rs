@@ -145,6 +145,8 @@ impl Car {
             Parameter::Damping => self.driveline.shaft_damping_n_m_s_rad *= value,
             Parameter::Tyre => self.tyre.slip_scale *= value,
             Parameter::Mass => self.road.mass_kg *= value,
+            // Each shift has a load of its own, which takes what these would change.
+            Parameter::Rolling | Parameter::Air => {}
             Parameter::OffgoingFriction => self.offgoing.friction = self.offgoing.friction.scaled(value),
             Parameter::OutputDelay => self.output_delay_s = value,
             Parameter::WheelDelay => self.wheel_delay_s = value,

@@ -3,10 +3,16 @@
 use std::path::Path;
 
 use config::Vehicle;
-use drivetrain::CommandKind;
-use logs::{ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Readings, Role, Shift, ShiftFinder};
+use config::vehicle::ShiftClutch;
+use drivetrain::{ClutchValve, CommandKind};
+use logs::{
+    ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Reading, Readings, Role, Shift, ShiftFinder,
+};
 use trace::{Unit, signal};
 
+use crate::drives::driven_car;
+use crate::driving::{Driving, DrivingRecorder, RowState, turns_by};
+use crate::parameters::shafts;
 use crate::{FitError, Series, ShiftKinds, ShiftRecord};
 
 /// Readings are kept from so long before the inertia phase on, s: the commands of the torque phase and of the fill.
@@ -19,6 +25,8 @@ const AFTER_S: f64 = 1.5;
 pub struct Collected {
     /// The shifts.
     pub shifts: Vec<ShiftRecord>,
+    /// Driving between the shifts, of each log.
+    pub driving: Vec<Driving>,
     /// Shifts that are not used, each with the reason.
     pub skipped: Vec<String>,
     /// How many of which kind there are.
@@ -71,6 +79,7 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Colle
     needed(path, &map, commands[0])?;
     let (shifts, mut notes) = find(&mut log, &map)?;
     let mut collected = Collected::default();
+    let mut between = BetweenShifts::new(vehicle, &shifts)?;
     let mut usable = Vec::new();
     for shift in shifts {
         match reason_against(&shift) {
@@ -82,7 +91,7 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Colle
         }
     }
     collected.notes.append(&mut notes);
-    for (mut record, shift) in read(path, &map, commands, &usable)?.into_iter().zip(&usable) {
+    for (mut record, shift) in read(path, &map, commands, &usable, &mut between)?.into_iter().zip(&usable) {
         let found = record.find_segments(&vehicle.shift);
         collected.kinds.count(shift.direction, shift.load, found.is_ok());
         match found {
@@ -90,6 +99,7 @@ pub fn collect(path: &Path, map: &ChannelMap, vehicle: &Vehicle) -> Result<Colle
             Err(reason) => collected.skipped.push(format!("{}: {reason}", record.name)),
         }
     }
+    collected.driving.push(between.recorder.finish());
     Ok(collected)
 }
 
@@ -154,19 +164,25 @@ fn find(log: &mut Log, map: &ChannelMap) -> Result<(Vec<Shift>, Vec<String>), Fi
     Ok((finder.finish(), notes))
 }
 
-/// The readings around each of these shifts.
-fn read(path: &Path, map: &ChannelMap, commands: [Role; 2], shifts: &[Shift]) -> Result<Vec<ShiftRecord>, LogError> {
+/// The readings around each of these shifts, and between all.
+fn read(
+    path: &Path,
+    map: &ChannelMap,
+    commands: [Role; 2],
+    shifts: &[Shift],
+    between: &mut BetweenShifts,
+) -> Result<Vec<ShiftRecord>, LogError> {
     let mut log = Log::open(path, &map.open)?;
-    let inertia = |shift: &Shift| shift.inertia_s.unwrap_or([shift.start_s(), shift.end_s()]);
     let mut records: Vec<([f64; 2], ShiftRecord)> = (shifts.iter())
         .map(|shift| {
-            let [begin_s, end_s] = inertia(shift);
+            let [begin_s, end_s] = inertia_s(shift);
             let record = ShiftRecord { name: name(path, begin_s), lock_s: end_s - begin_s, ..ShiftRecord::default() };
             ([begin_s, end_s], record)
         })
         .collect();
     for reading in Readings::new(&mut log, map)? {
         let reading = reading?;
+        between.take(&reading, commands);
         for ([begin_s, end_s], record) in &mut records {
             if !(*begin_s - BEFORE_S..=*end_s + AFTER_S).contains(&reading.time_s) {
                 continue;
@@ -177,6 +193,73 @@ fn read(path: &Path, map: &ChannelMap, commands: [Role; 2], shifts: &[Shift]) ->
         }
     }
     Ok(records.into_iter().map(|(_, record)| record).collect())
+}
+
+fn inertia_s(shift: &Shift) -> [f64; 2] {
+    shift.inertia_s.unwrap_or([shift.start_s(), shift.end_s()])
+}
+
+/// Driving in the gears before and after the shift of the vehicle.
+struct BetweenShifts {
+    recorder: DrivingRecorder,
+    ratios: [f64; 2],
+    /// The clutch that is open in each gear: its valve, and its kiss point, Pa.
+    open: [(ClutchValve<f64>, f64); 2],
+    /// Times from which readings belong to shifts: none tells what it has to tell twice.
+    shifts_s: Vec<[f64; 2]>,
+    /// Newest readings of turbine and output speed and of the commands of the oncoming and the offgoing clutch.
+    speeds: [f64; 2],
+    commands: [f64; 2],
+    lock_up: bool,
+}
+
+impl BetweenShifts {
+    fn new(vehicle: &Vehicle, shifts: &[Shift]) -> Result<Self, FitError> {
+        let open = |clutch: &ShiftClutch| (clutch.valve, clutch.clutch.kiss_pressure());
+        let around = |shift: &Shift| {
+            let [begin_s, end_s] = inertia_s(shift);
+            [begin_s - BEFORE_S, end_s + AFTER_S]
+        };
+        Ok(Self {
+            recorder: DrivingRecorder::new(driven_car(vehicle, &shafts(vehicle)?)),
+            ratios: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
+            open: [open(&vehicle.oncoming), open(&vehicle.offgoing)],
+            shifts_s: shifts.iter().map(around).collect(),
+            speeds: [f64::NAN; 2],
+            commands: [f64::NAN; 2],
+            lock_up: false,
+        })
+    }
+
+    /// Takes a reading of the log.
+    fn take(&mut self, reading: &Reading, commands: [Role; 2]) {
+        let mut dated = [None; 4];
+        match reading.role {
+            Role::EngineSpeed => dated[0] = Some((reading.time_s, reading.value)),
+            Role::TurbineSpeed => (dated[1], self.speeds[0]) = (Some((reading.time_s, reading.value)), reading.value),
+            Role::OutputSpeed => (dated[2], self.speeds[1]) = (Some((reading.time_s, reading.value)), reading.value),
+            Role::WheelSpeed => dated[3] = Some((reading.time_s, reading.value)),
+            Role::LockUpApplied => self.lock_up = reading.value > 0.5,
+            role => {
+                let which = commands.iter().position(|command| *command == role);
+                return which.into_iter().for_each(|which| self.commands[which] = reading.value);
+            }
+        }
+        let state = RowState { gear: self.gear(reading.time_s), lock_up: self.lock_up };
+        self.recorder.push(reading.time_s, dated, None, state);
+    }
+
+    /// The gear by the ratio of the speeds; none in a shift, or where the clutch of the other gear may carry torque.
+    fn gear(&self, time_s: f64) -> Option<usize> {
+        let [turbine, output] = self.speeds;
+        let gear = self.ratios.iter().position(|ratio| turns_by(*ratio, turbine, output))?;
+        let is_shift = self.shifts_s.iter().any(|[from_s, to_s]| (*from_s..=*to_s).contains(&time_s));
+        let (valve, kiss_pa) = self.open[gear];
+        // A command that is not logged says nothing against it.
+        let command = Some(self.commands[gear]).filter(|command| command.is_finite());
+        let is_open = command.is_none_or(|command| valve.settled_pressure(command) < kiss_pa);
+        (!is_shift && is_open).then_some(gear)
+    }
 }
 
 /// Where the readings of a role belong; none if a fit does not use them.
@@ -191,5 +274,40 @@ fn place(record: &mut ShiftRecord, role: Role, [oncoming, offgoing]: [Role; 2]) 
         _ if role == oncoming => Some(&mut record.oncoming),
         _ if role == offgoing => Some(&mut record.offgoing),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use logs::ShiftQuality;
+
+    use super::*;
+
+    /// What a shift has told is not used again, and a clutch that may carry torque makes no gear.
+    #[test]
+    fn a_gear_is_one_outside_of_shifts_with_the_other_clutch_open() {
+        let vehicle = Vehicle::two_speed_at().unwrap();
+        let shift = Shift {
+            from: 1,
+            to: 2,
+            direction: Direction::Up,
+            load: Load::PowerOn,
+            command_s: None,
+            inertia_s: Some([20.0, 20.5]),
+            gear_s: None,
+            quality: ShiftQuality::default(),
+        };
+        let mut between = BetweenShifts::new(&vehicle, &[shift]).unwrap();
+        assert_eq!(between.gear(0.0), None);
+        between.speeds = [between.ratios[0] * 60.0, 60.0];
+        assert_eq!([17.9, 18.1, 21.9, 22.1].map(|time_s| between.gear(time_s)), [Some(0), None, None, Some(0)]);
+        between.speeds = [between.ratios[1] * 60.0, 60.0];
+        assert_eq!(between.gear(30.0), Some(1));
+        between.commands = [1.0, f64::NAN];
+        assert_eq!(between.gear(30.0), Some(1));
+        between.speeds = [between.ratios[0] * 60.0, 60.0];
+        assert_eq!(between.gear(30.0), None);
+        between.commands = [0.0, 1.0];
+        assert_eq!(between.gear(30.0), Some(0));
     }
 }

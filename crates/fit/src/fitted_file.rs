@@ -5,9 +5,11 @@ use config::{Source, Vehicle};
 use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
 use crate::parameters::HYSTERESIS_UNIT_PA;
-use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number, shaft_inertia};
+use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
 
+/// Greatest backlash that the error budget of a file may have, rad.
+const BACKLASH_MOST_RAD: f64 = 0.2;
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
 
@@ -27,6 +29,11 @@ impl Fit {
         }
         if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) {
             write_fill(&mut text, vehicle, &oncoming, &fill)?;
+        }
+        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
+            text.put(&["driveline"], "backlash_rad", backlash.rad, &backlash.comment())?;
+            let most_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(BACKLASH_MOST_RAD);
+            text.put(&["design", "error_bounds"], "backlash_rad", most_rad, BUDGET_COMMENT)?;
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
@@ -73,6 +80,9 @@ impl Fit {
             Parameter::Damping => times(text, &["driveline", "shaft_damping_n_m_s_rad"]),
             Parameter::Tyre => times(text, &["tyre", "slip_scale"]),
             Parameter::Mass => times(text, &["vehicle", "mass_kg"]),
+            Parameter::Rolling | Parameter::Air if self.verdict(parameter) == Verdict::NotTold => Ok(()),
+            Parameter::Rolling => times(text, &["vehicle", "rolling_moment_n_m"]),
+            Parameter::Air => times(text, &["vehicle", "drag_coefficient"]),
             Parameter::EngineInertia => times(text, &["engine", "inertia_kg_m2"]),
             // The shape goes in with the friction. That of the offgoing clutch is fitted only to what is left of its torque when it slips.
             _ => Ok(()),
@@ -221,16 +231,7 @@ pub(crate) fn fill_comment(fill: &FillFit) -> String {
 fn write_fill(text: &mut VehicleText, vehicle: &Vehicle, clutch: &str, fill: &FillFit) -> Result<(), FitError> {
     let words = &fill_comment(fill);
     let stroke_m = fill.factor() * vehicle.oncoming.cylinder.stroke_m3 / vehicle.oncoming.clutch.piston_area_m2;
-    let table = keys(&["clutch", clutch, "fill"]);
-    let path = [table.clone(), keys(&["stroke_m"])].concat();
-    if text.has(&path) {
-        return text.set(&path, &[stroke_m], Some(words));
-    }
-    let line = format!("{FITTED}{words}; the file had none\nstroke_m = {}\n", number(stroke_m));
-    if !text.add_to_table(&table, &line)? {
-        text.add_table(&table, &line);
-    }
-    Ok(())
+    text.put(&["clutch", clutch, "fill"], "stroke_m", stroke_m, words)
 }
 
 /// Writes gain or lag of its valve, and of the observer's.

@@ -4,10 +4,12 @@ use config::Vehicle;
 use nalgebra::DVector;
 
 use crate::car::Car;
+use crate::drives::{DriveErrors, Drives, UsedDriving, driven_car};
+use crate::driving::{BacklashFit, Driving, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
-use crate::parameters::{self, Available, DELAY_UNIT_S, Prior};
+use crate::parameters::{self, Available, DELAY_UNIT_S, Prior, Shaft};
 use crate::pressure::Hydraulics;
 use crate::record::OutputClock;
 use crate::shape::Map;
@@ -42,6 +44,12 @@ pub struct Fit {
     pub shifts: usize,
     /// Shifts that could not be used, each with the reason.
     pub unusable: Vec<String>,
+    /// Time of driving between shifts that was fitted, s.
+    pub driving_s: f64,
+    /// Why driving of a log is not fitted.
+    pub driving_left_out: Vec<String>,
+    /// The backlash of the driveline, or what the logs lack for it.
+    pub backlash: Result<BacklashFit, String>,
     /// One-step scale of each channel, and its gain `g`; zero for a channel without readings.
     pub channels: Vec<(Channel, f64, f64)>,
     /// Whether the last step was small; otherwise the iterations were used up.
@@ -77,47 +85,74 @@ pub fn available(shifts: &[ShiftRecord]) -> Available {
         pressure: some(|shift| !shift.pressure.is_empty()),
         engine_torque: some(|shift| !shift.engine_torque.is_empty()),
         offgoing: some(|shift| !shift.offgoing.is_empty()),
+        driving: false,
     }
 }
 
-/// Fits the parameters of a vehicle to shifts.
+/// Fits the parameters of a vehicle to shifts, and to the driving between them, of each log.
 ///
 /// # Errors
 /// There is no shift, or no minimum was found.
 pub fn fit(
     vehicle: &Vehicle,
     shifts: &[ShiftRecord],
+    driving: &[Driving],
     ages: ReadingAges,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Fit, FitError> {
-    let (shifts, mut left_out) = sound(shifts)?;
-    let available = available(&shifts);
+    let (shifts, left_out) = sound(shifts)?;
     let shafts = parameters::shafts(vehicle)?;
+    let driven = driven_car(vehicle, &shafts);
+    let mut used = UsedDriving::of(&driven, driving);
+    loop {
+        let drives = Drives::of(&driven, &used);
+        let (mut fit, errors) = fit_with(vehicle, (&shifts, &shafts), &drives, ages, progress)?;
+        if used.leave_out(&errors) {
+            continue;
+        }
+        fit.unusable = [left_out, fit.unusable].concat();
+        fit.driving_s = used.time_s();
+        fit.driving_left_out = used.left_out;
+        fit.backlash = fit_backlash(&driven, driving.iter());
+        return Ok(fit);
+    }
+}
+
+/// The fit to shifts and drives, and how far the drives are from what is expected.
+fn fit_with(
+    vehicle: &Vehicle,
+    (shifts, shafts): (&[ShiftRecord], &[Shaft]),
+    drives: &Drives<'_>,
+    ages: ReadingAges,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(Fit, Vec<DriveErrors>), FitError> {
+    let available = Available { driving: !drives.start().is_empty(), ..available(shifts) };
     let file = Car::of_file(vehicle, ages);
-    let bound = parameters::priors(vehicle, &shafts, available);
+    let bound = parameters::priors(vehicle, shafts, available);
     let with_shapes = |freed: &[Map]| {
         let mut priors = parameters::with_shapes(vehicle, &file.knots, &bound, freed);
         let held = if available.pressure { Vec::new() } else { hold(&mut priors) };
         (priors, held)
     };
     let (free, all_held) = with_shapes(file.knots.maps());
-    let problem = Problem { file: &file, shafts: &shafts, priors: &free };
-    let first = fit_some(&problem, &shifts, progress)?;
+    let problem = Problem { file: &file, shafts, priors: &free, drives };
+    let first = fit_some(&problem, shifts, progress)?;
     // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
-    let clock = OutputClock { delay_s: file.with(&shafts, &free, &first.at.shared).output_delay_s, ages };
-    let (models, unusable) = usable(vehicle, &file, &shifts, clock)?;
-    left_out.extend(unusable);
-    let at = Unknowns { shared: first.at.shared, own: models.iter().map(ShiftModel::start).collect() };
+    let clock = OutputClock { delay_s: file.with(shafts, &free, &first.at.shared).output_delay_s, ages };
+    let (models, unusable) = usable(vehicle, &file, shifts, clock)?;
+    let own = models.iter().map(ShiftModel::start).collect();
+    let at = Unknowns { own, ..first.at };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
     let solved = problem.solve(&models, at, first.weights, FREE, &mut say)?;
     let freed = freed(&problem, &models, &solved, &all_held)?;
     let (mut priors, held) = with_shapes(&freed);
-    let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
+    let problem = Problem { file: &file, shafts, priors: &priors, drives };
     let at = Unknowns { shared: taken_over(&free, &solved.at.shared, &priors), ..solved.at };
     let solved = problem.solve(&models, at, solved.weights, BOUND, &mut say)?;
     let (mut precision, misfits) = found(vehicle, &problem, &models, &solved, &all_held)?;
     release(&mut priors, &held);
     misfits.iter().for_each(|misfit| precision.with_move(&misfit.moves, &priors));
+    let errors = drives.errors(&priors, solved.at.of_driving(), &solved.weights.drives);
     let Solved { at, weights, is_converged, .. } = solved;
     let limited: Vec<usize> = (0..priors.len()).filter(|i| priors[*i].is_at_limit(at.shared[*i])).collect();
     if !limited.is_empty() {
@@ -125,19 +160,22 @@ pub fn fit(
         precision.forget_all(&priors);
     }
     let unknowns = scaled_by_priors(&priors, at.shared);
-    let fill = fill_of(vehicle, &file.with(&shafts, &priors, &unknowns), &models, &|parameter| {
+    let fill = fill_of(vehicle, &file.with(shafts, &priors, &unknowns), &models, &|parameter| {
         let place = priors.iter().position(|prior| prior.parameter == parameter)?;
         Some(precision.stated[(place, place)].sqrt())
     });
-    let torque_change = TorqueChange::of(&file, &shafts, &models, &priors, &unknowns, &precision);
-    Ok(Fit {
+    let torque_change = TorqueChange::of(&file, shafts, &models, &priors, &unknowns, &precision);
+    let fit = Fit {
         at_limit: limited.into_iter().map(|i| priors[i].name.clone()).collect(),
         channels: channels(&models, &weights),
         unknowns,
         precision,
         available,
         shifts: models.len(),
-        unusable: left_out,
+        unusable,
+        driving_s: 0.0,
+        driving_left_out: Vec::new(),
+        backlash: Err(String::new()),
         is_converged,
         freed,
         misfits: grave(&misfits),
@@ -145,7 +183,8 @@ pub fn fit(
         fill,
         weights,
         priors,
-    })
+    };
+    Ok((fit, errors))
 }
 
 /// The maps whose shape stays free after a fit with all shapes free.
@@ -262,7 +301,8 @@ fn fit_some(
     let few: Vec<ShiftModel> =
         spread_over(shifts, FIRST_SHIFTS).map(|record| ShiftModel::new(record, problem.file)).collect();
     let shared: Vec<f64> = problem.priors.iter().map(|prior| prior.mean).collect();
-    let start = Unknowns { shared, own: few.iter().map(ShiftModel::start).collect() };
+    let own = few.iter().map(ShiftModel::start).collect();
+    let start = Unknowns { shared, own, drives: problem.drives.start() };
     let mut say = |iteration| progress(Progress { shifts: few.len(), iteration });
     problem.solve(&few, start, Weights::START, FIRST, &mut say)
 }

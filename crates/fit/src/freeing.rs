@@ -90,9 +90,10 @@ pub(crate) fn misfits(
     let mut fitted = normal.information.view((0, 0), (known, known)).into_owned();
     (0..known).for_each(|j| fitted[(j, j)] += precision(j));
     let fitted = fitted.cholesky()?;
-    // What the priors pull is shared by all shifts, so that the gradients of what is fitted add up to none.
+    // What the priors and the driving between shifts pull is shared by all shifts, so that the gradients of what is fitted add up to none.
     let share = (normal.scores.len() as f64).recip();
-    let pulls = DVector::from_fn(known, |j, _| share * precision(j) * (unknowns[j] - priors[j].mean));
+    let pulls =
+        DVector::from_fn(known, |j, _| share * (precision(j) * (unknowns[j] - priors[j].mean) + normal.driving[j]));
     let mut found = Vec::new();
     for (i, map) in maps.iter().enumerate() {
         let place = known + 2 * i;
@@ -129,7 +130,7 @@ mod tests {
     use crate::Parameter;
 
     fn shape(map: Map, number: usize) -> Prior {
-        Prior { parameter: Parameter::Shape(map, number), name: String::new(), mean: 0.0, sd: 1.0 }
+        Prior { parameter: Parameter::Shape(map, number), name: String::new(), mean: 0.0, sd: 1.0, floor: 0.0 }
     }
 
     /// Friction is far from the file's shape. The lag seems to be, because it is correlated with a gain that is not.

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::Parameter;
+use crate::driving::WIND;
 use crate::fitting::Held;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA, Prior};
 use crate::shape::Map;
@@ -63,6 +64,7 @@ pub(crate) fn floor(parameter: Parameter) -> f64 {
         Parameter::Inertia(_) | Parameter::Stiffness => 0.015,
         Parameter::Damping | Parameter::Tyre | Parameter::Lag | Parameter::Shape(Map::Lag, _) => 0.02,
         Parameter::Hysteresis => 300.0 / HYSTERESIS_UNIT_PA,
+        Parameter::Air => WIND,
         Parameter::WheelScale => 1e-4,
         Parameter::PressureScale => 1e-3,
         _ if parameter.is_delay() => 0.3e-3 / DELAY_UNIT_S,
@@ -75,11 +77,11 @@ pub(crate) fn precision(priors: &[Prior], normal: &Normal, held: &[Held]) -> Opt
     let count = priors.len();
     let prior = DMatrix::from_diagonal(&DVector::from_iterator(count, priors.iter().map(|p| p.sd.powi(-2))));
     let mut auto = (&normal.information + &prior).cholesky()?.inverse();
-    let cluster = cluster(&auto, &normal.scores, &prior);
+    let cluster = cluster(&auto, &normal.all_scores(), &prior);
     let mut stated = auto.clone();
     // Each parameter takes the larger variance; the correlations are those of "auto".
     for (i, prior) in priors.iter().enumerate() {
-        let found = auto[(i, i)].max(cluster[(i, i)]).sqrt().hypot(floor(prior.parameter));
+        let found = auto[(i, i)].max(cluster[(i, i)]).sqrt().hypot(prior.floor);
         // No fit knows less than was known before.
         let scale = found.min(prior.sd) / auto[(i, i)].sqrt();
         stated.row_mut(i).scale_mut(scale);

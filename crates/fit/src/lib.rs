@@ -9,6 +9,8 @@ mod budget;
 mod car;
 pub mod collect;
 pub mod drive;
+mod drives;
+mod driving;
 pub mod error;
 mod fill;
 mod fitted_file;
@@ -36,6 +38,7 @@ mod weights;
 
 pub use car::ReadingAges;
 pub use collect::{Collected, collect};
+pub use driving::{BacklashFit, Driving};
 pub use error::FitError;
 pub use fill::FillFit;
 pub use fitting::{Fit, Progress, SHIFTS_MAX, available, fit};

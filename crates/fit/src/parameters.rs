@@ -2,9 +2,9 @@
 
 use config::Vehicle;
 
-use crate::FitError;
+use crate::driving::{AIR, ROLLING, rolling_floor};
 use crate::shape::{Knots, Map};
-use crate::vehicle_text;
+use crate::{FitError, intervals, vehicle_text};
 
 /// Delays are fitted in units of this, s, so that every unknown is of the order of 0.1 to 1.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
@@ -46,6 +46,10 @@ pub enum Parameter {
     Tyre,
     /// Factor on the mass of the vehicle.
     Mass,
+    /// Factor on the rolling resistance, in driving between shifts; each shift has a load of its own.
+    Rolling,
+    /// Factor on the air drag, in driving between shifts.
+    Air,
     /// Factor on the friction of the offgoing clutch.
     OffgoingFriction,
     /// Delay of the output speed against the turbine speed, s.
@@ -98,6 +102,7 @@ impl Parameter {
             Self::OffgoingFriction | Self::EngineInertia => 1.0,
             // A softer tyre for a greater force, and a signal that shows less of it.
             Self::Tyre | Self::EngineTorqueScale => -1.0,
+            // Nor do rolling resistance and air drag, whose ratios to the torques driving hardly tells: they would seem to tell the common factor.
             _ => 0.0,
         }
     }
@@ -117,10 +122,11 @@ impl Parameter {
         )
     }
 
-    /// Whether it acts on readings alone: the motion of the car stays as it is.
+    /// Whether it acts on readings alone, or between shifts: the motion of the car in a shift stays as it is.
     pub(crate) fn leaves_motion(self) -> bool {
         let is_of_pressure = matches!(self, Self::PressureScale | Self::PressureDelay);
-        is_of_pressure || matches!(self, Self::OutputDelay | Self::WheelDelay | Self::WheelScale)
+        let is_of_road = matches!(self, Self::Rolling | Self::Air);
+        is_of_pressure || is_of_road || matches!(self, Self::OutputDelay | Self::WheelDelay | Self::WheelScale)
     }
 
     /// The value in its own unit of the unknown `x`: a factor, s, or a relative change.
@@ -146,10 +152,12 @@ pub struct Prior {
     pub mean: f64,
     /// Standard deviation.
     pub sd: f64,
+    /// Least one that is stated after a fit: what the model leaves out does not shrink with more logs.
+    pub floor: f64,
 }
 
 /// Standard deviations from the mean that a value may be away \[chosen: a value that lies anywhere in a range is at most 1.7 away\].
-const POSSIBLE: f64 = 4.0;
+pub(crate) const POSSIBLE: f64 = 4.0;
 
 impl Prior {
     /// Least and greatest value that is held possible.
@@ -175,6 +183,8 @@ pub struct Available {
     pub engine_torque: bool,
     /// Command of the offgoing clutch's valve.
     pub offgoing: bool,
+    /// Driving between shifts.
+    pub driving: bool,
 }
 
 /// A shaft of the gear train with what it adds to the mass matrix of the shift.
@@ -261,10 +271,18 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         more.push((P::PressureScale, "pressure sensor, scale", 0.0, 0.005));
         more.push((P::PressureDelay, "pressure sensor, delay", 0.0, delay(uniform(budget.channel_skew_s))));
     }
+    if has.driving {
+        more.push((P::Rolling, "rolling resistance", 0.0, uniform(ROLLING)));
+        more.push((P::Air, "air drag", 0.0, uniform(AIR)));
+    }
     names.extend(more.iter().map(|(_, name, ..)| (*name).to_owned()));
     list.extend(more);
     (list.into_iter().zip(names))
-        .map(|((parameter, _, mean, sd), name)| Prior { parameter, name, mean, sd: sd.max(1e-4) })
+        .map(|((parameter, _, mean, sd), name)| {
+            let floor =
+                if parameter == P::Rolling { rolling_floor(&vehicle.road) } else { intervals::floor(parameter) };
+            Prior { parameter, name, mean, sd: sd.max(1e-4), floor }
+        })
         .collect()
 }
 
@@ -283,6 +301,7 @@ pub(crate) fn shape_priors(vehicle: &Vehicle, knots: &Knots, map: Map, numbers: 
         name: knots.name(map, *i),
         mean: 0.0,
         sd: (whole * knots.sd_share(map, *i)).max(1e-4),
+        floor: intervals::floor(Parameter::Shape(map, *i)),
     };
     numbers.iter().map(prior).collect()
 }

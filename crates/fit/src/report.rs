@@ -6,7 +6,7 @@ use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
-use crate::{Channel, Fit, Parameter, Verdict};
+use crate::{BacklashFit, Channel, Fit, Parameter, Verdict};
 
 /// A row of the table of parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,6 +87,8 @@ impl Fit {
             );
         }
         lines.push(self.torque_said());
+        lines.push(self.said_of_driving());
+        lines.push(BacklashFit::statement(&self.backlash));
         lines.extend(cautions(self.is_converged, self.shifts));
         lines.extend(self.channel_map());
         lines.extend(self.proposals());
@@ -131,6 +133,28 @@ impl Fit {
             text += ". These logs are too few, or tell too little, to show that the fitted file is better than the given one";
         }
         text
+    }
+
+    /// What driving between shifts says of mass and road load, or why it says nothing.
+    fn said_of_driving(&self) -> String {
+        let reasons = match self.driving_left_out.as_slice() {
+            [] => String::new(),
+            [first] => format!("; not used: {first}"),
+            [first, more @ ..] => format!("; not used: {first}, and of {} more logs", more.len()),
+        };
+        if self.driving_s == 0.0 {
+            return format!(
+                "driving between shifts is not fitted: no log has enough of it with the engine pulling in the gears of the file{reasons}. It would tell \
+                 of the mass"
+            );
+        }
+        let [_, mass] = self.combination_sd(&[(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)]);
+        format!(
+            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. Grade is not measured, and a mean grade acts \
+             like rolling resistance: coasting down both ways on a straight of constant grade would tell it, and a fit does not read that",
+            self.driving_s,
+            100.0 * SIDES * mass
+        )
     }
 
     fn misfits(&self) -> Vec<String> {
@@ -225,8 +249,7 @@ impl Fit {
         );
         when(
             true,
-            "for the backlash of the driveline, which shifts under load do not tell: press and release the pedal in one gear, so that the \
-             torque of the shafts changes its sign; for rolling resistance and air drag: coast down in neutral on a level road, both ways",
+            "for rolling resistance and air drag, coast down in neutral both ways on a straight of constant grade; a fit does not read it",
         );
         when(
             self.shifts < 15,

@@ -49,6 +49,12 @@ impl Series {
         points.take_while(move |(time_s, _)| *time_s <= to_s)
     }
 
+    /// The same readings as a series.
+    pub(crate) fn part(&self, span: [f64; 2]) -> Self {
+        let (time_s, value) = self.between(span).unzip();
+        Self { time_s, value }
+    }
+
     /// The longest time between two readings from one time to another, the ends included, s.
     pub fn longest_gap_s(&self, [from_s, to_s]: [f64; 2]) -> f64 {
         let mut last_s = from_s;

@@ -151,6 +151,11 @@ impl Knots {
         self.bend(map, number).sd_share()
     }
 
+    /// Relative change of a map at a point where a number of its shape changes by 1.
+    pub(crate) fn change_at(&self, map: Map, number: usize, x: f64) -> f64 {
+        self.bend(map, number).at(x)
+    }
+
     /// A map with a relative change of its shape, at points of its own where the file's axis has none.
     pub(crate) fn changed(&self, table: &Table1<f64>, map: Map, number: usize, change: f64) -> Table1<f64> {
         let bend = self.bend(map, number);

@@ -68,7 +68,7 @@ pub(crate) struct OwnUnknown {
 }
 
 /// Standard deviations \[chosen\] of what differs from shift to shift.
-const MASS_SHARE_SD: f64 = 0.035;
+pub(crate) const MASS_SHARE_SD: f64 = 0.035;
 const LOAD_UNIT_N: f64 = 500.0;
 const ENGINE_TORQUE_SHARE_SD: f64 = 0.01;
 /// The start of a segment is not known before: these are wide.

@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::FitError;
 use crate::car::Car;
+use crate::drives::{DriveNormal, Drives};
 use crate::parameters::{Prior, Shaft};
 use crate::shift_model::{Block, Linearised, ShiftModel};
 use crate::weights::{HUBER, Weights};
@@ -51,6 +52,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) file: &'a Car,
     pub(crate) shafts: &'a [Shaft],
     pub(crate) priors: &'a [Prior],
+    pub(crate) drives: &'a Drives<'a>,
 }
 
 /// The unknowns of a fit.
@@ -59,6 +61,15 @@ pub(crate) struct Unknowns {
     pub(crate) shared: Vec<f64>,
     /// Of each shift.
     pub(crate) own: Vec<Vec<f64>>,
+    /// Deviation of the mass in the driving of each log.
+    pub(crate) drives: Vec<f64>,
+}
+
+impl Unknowns {
+    /// Those that driving depends on.
+    pub(crate) fn of_driving(&self) -> [&[f64]; 2] {
+        [&self.shared, &self.drives]
+    }
 }
 
 /// Where a fit ended.
@@ -77,7 +88,17 @@ pub(crate) struct Normal {
     pub(crate) information: DMatrix<f64>,
     /// Half the gradient of the data by the parameters, of each shift.
     pub(crate) scores: Vec<DVector<f64>>,
+    /// That of the driving between them, of all logs.
+    pub(crate) driving: DVector<f64>,
     eliminated: Vec<Eliminated>,
+    drives: Vec<DriveNormal>,
+}
+
+impl Normal {
+    /// The gradients of shifts and drives.
+    pub(crate) fn all_scores(&self) -> Vec<DVector<f64>> {
+        self.scores.iter().chain(self.drives.iter().map(|drive| &drive.score)).cloned().collect()
+    }
 }
 
 /// What is needed to find the own unknowns of a shift when the parameters are known.
@@ -108,7 +129,8 @@ impl Problem<'_> {
             };
             own + shift.blocks.iter().map(of_block).sum::<f64>()
         });
-        0.5 * (prior + data.sum::<f64>())
+        let driving = self.drives.cost(self.priors, at.of_driving(), &weights.drives);
+        0.5 * (prior + data.sum::<f64>()) + driving
     }
 
     pub(crate) fn linearised(&self, shifts: &[ShiftModel], at: &Unknowns) -> Vec<Linearised> {
@@ -128,8 +150,15 @@ impl Problem<'_> {
         damping: f64,
     ) -> Result<Normal, FitError> {
         let count = self.priors.len();
-        let mut normal =
-            Normal { information: DMatrix::zeros(count, count), scores: Vec::new(), eliminated: Vec::new() };
+        let drives = self.drives.normal(self.priors, at.of_driving(), &weights.drives, damping)?;
+        let sum = |zero: DMatrix<f64>| drives.iter().fold(zero, |sum, drive| sum + &drive.information);
+        let mut normal = Normal {
+            information: sum(DMatrix::zeros(count, count)),
+            scores: Vec::new(),
+            driving: drives.iter().fold(DVector::zeros(count), |sum, drive| sum + &drive.score),
+            eliminated: Vec::new(),
+            drives,
+        };
         for ((shift, lines), own) in shifts.iter().zip(lines).zip(&at.own) {
             let mut all = DMatrix::zeros(shift.rows, count + own.len());
             all.columns_mut(0, count).copy_from(&lines.by_parameter);
@@ -185,6 +214,7 @@ impl Problem<'_> {
             // The first residuals are those of the file, whose scale says nothing of the readings.
             if (1..=iterations.scaled).contains(&iteration) {
                 weights = weights.following(shifts, &residuals);
+                weights.drives = self.drives.following(self.priors, at.of_driving());
             }
             lines = self.linearised(shifts, &at);
             let cost = self.cost(shifts, &at, &residuals, &weights);
@@ -217,7 +247,7 @@ impl Problem<'_> {
     /// The unknowns after a step, and its largest size in standard deviations after the fit.
     fn step(&self, at: &Unknowns, normal: &Normal, damping: f64) -> Result<(Unknowns, f64), FitError> {
         let mut matrix = normal.information.clone();
-        let mut gradient: DVector<f64> = normal.scores.iter().sum();
+        let mut gradient: DVector<f64> = normal.scores.iter().sum::<DVector<f64>>() + &normal.driving;
         for (j, (prior, x)) in self.priors.iter().zip(&at.shared).enumerate() {
             let precision = prior.sd.powi(-2);
             matrix[(j, j)] = (matrix[(j, j)] + precision) * (1.0 + damping);
@@ -237,7 +267,8 @@ impl Problem<'_> {
                 own.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect()
             })
             .collect();
-        Ok((Unknowns { shared, own }, size))
+        let drives = normal.drives.iter().zip(&at.drives).map(|(drive, x)| drive.stepped(*x, &step)).collect();
+        Ok((Unknowns { shared, own, drives }, size))
     }
 }
 

@@ -3,6 +3,7 @@
 use config::Vehicle;
 
 use crate::car::Car;
+use crate::drives::Drives;
 use crate::parameters::{self, HYSTERESIS_UNIT_PA, Prior};
 use crate::shift_model::ShiftModel;
 use crate::solver::{End, Iterations, Problem, Unknowns};
@@ -76,14 +77,15 @@ impl Fit {
         };
         let held = |(prior, x): (&Prior, &f64)| Prior { mean: of_file(prior, *x), sd: HELD_SD, ..prior.clone() };
         let priors: Vec<Prior> = self.priors.iter().zip(&self.unknowns).map(held).collect();
-        let problem = Problem { file: &file, shafts: &shafts, priors: &priors };
+        let problem = Problem { file: &file, shafts: &shafts, priors: &priors, drives: &Drives::NONE };
         let models: Vec<ShiftModel> = held_out.iter().map(|record| ShiftModel::new(record.clone(), &file)).collect();
         let start = Unknowns {
             shared: priors.iter().map(|prior| prior.mean).collect(),
             own: models.iter().map(ShiftModel::start).collect(),
+            drives: Vec::new(),
         };
         const STARTS: Iterations = Iterations { scaled: 0, most: 6, end: End::OF_FIT };
-        let at = problem.solve(&models, start, self.weights, STARTS, &mut |_| {})?.at;
+        let at = problem.solve(&models, start, self.weights.clone(), STARTS, &mut |_| {})?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {
             self.weights.errors(&model.blocks, rows.as_mut_slice());

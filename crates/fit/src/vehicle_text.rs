@@ -87,6 +87,19 @@ impl VehicleText {
         Ok(())
     }
 
+    /// Puts a number in place of another, or into its table where that does not have it.
+    pub(crate) fn put(&mut self, table: &[&str], key: &str, value: f64, comment: &str) -> Result<(), FitError> {
+        let path = keys(&[table, &[key]].concat());
+        if self.has(&path) {
+            return self.set(&path, &[value], Some(comment));
+        }
+        let line = format!("{FITTED}{comment}; the file had none\n{key} = {}\n", number(value));
+        if !self.add_to_table(&keys(table), &line)? {
+            self.add_table(&keys(table), &line);
+        }
+        Ok(())
+    }
+
     /// Puts any value, as it is written in TOML, in place of another.
     pub(crate) fn set_text(&mut self, path: &[Step], value: &str, comment: &str) -> Result<(), FitError> {
         let (span, key_at) = self.place(path)?;

@@ -6,6 +6,7 @@
 use nalgebra::DVector;
 
 use crate::Channel;
+use crate::driving::DrivingWeights;
 use crate::shift_model::{Block, ShiftModel};
 
 /// Beyond so many scales a residual counts linearly.
@@ -17,7 +18,7 @@ const CHANNELS: usize = Channel::ALL.len();
 const GAINS: [f64; 14] = [0.0, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8];
 
 /// Gain and scale of each channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Weights {
     /// `g`.
     pub(crate) gain: [f64; CHANNELS],
@@ -26,6 +27,8 @@ pub(crate) struct Weights {
     /// Factor by which the information of its readings is less than that of independent ones of a perfect model. The same one counts in
     /// the fit and in the intervals: otherwise what is known before would count too little in the fit.
     pub(crate) inflation: [f64; CHANNELS],
+    /// Of the driving of each log; where there is none, those of a start.
+    pub(crate) drives: Vec<DrivingWeights>,
 }
 
 /// Factor on standard deviations for what the model leaves out, from fits of cars whose parameters are known.
@@ -37,6 +40,7 @@ impl Weights {
         gain: [0.3, 0.03, 0.03, 0.3, 0.3],
         scale: [0.5, 0.3, 0.1, 1.0, 3e3],
         inflation: [FACTOR * FACTOR; CHANNELS],
+        drives: Vec::new(),
     };
 
     /// One-step errors of the residuals, or of a column of their derivatives, in scales.
@@ -65,6 +69,47 @@ impl Weights {
             }
         }
         weights
+    }
+}
+
+/// Gain and scale of the one-step errors of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ChannelWeights {
+    pub(crate) gain: f64,
+    pub(crate) scale: f64,
+    /// Factor by which the information of the readings is less than that of independent ones of a perfect model, in the fit as in the
+    /// intervals: otherwise what is known before would count too little in the fit.
+    pub(crate) inflation: f64,
+}
+
+impl ChannelWeights {
+    /// One-step errors of residuals, or of a column of their derivatives, in scales.
+    pub(crate) fn in_scales(&self, column: &mut [f64]) {
+        one_step(column, self.gain);
+        column.iter_mut().for_each(|error| *error /= self.scale);
+    }
+
+    pub(crate) fn weight(&self, error: f64) -> f64 {
+        (HUBER / error.abs()).min(1.0) / self.inflation
+    }
+
+    /// Half the robust sum of squares.
+    pub(crate) fn cost(&self, errors: &DVector<f64>) -> f64 {
+        let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
+        0.5 * errors.iter().map(loss).sum::<f64>() / self.inflation
+    }
+
+    /// For errors that are to be independent already.
+    pub(crate) fn of_independent(errors: &[f64], scale: f64) -> Self {
+        Self { gain: 0.0, scale, inflation: FACTOR * FACTOR * correlation(&[errors], 0.0, scale) }
+    }
+
+    /// Those that residuals ask for; without any they stay.
+    pub(crate) fn following(self, blocks: &[&[f64]]) -> Self {
+        gain_and_scale(blocks).map_or(self, |(gain, scale)| {
+            let inflation = FACTOR * FACTOR * correlation(blocks, gain, scale);
+            Self { gain, scale, inflation }
+        })
     }
 }
 

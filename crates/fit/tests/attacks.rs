@@ -11,7 +11,7 @@ fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
 }
 
 fn fitted(car: &TestCar, shifts: &[ShiftRecord]) -> Result<Fit, FitError> {
-    fit::fit(&car.file, shifts, car.ages(), &mut |_| {})
+    fit::fit(&car.file, shifts, &[], car.ages(), &mut |_| {})
 }
 
 /// Error of the open loop's torque on two other shifts, N m: given file, fitted file.

@@ -12,7 +12,7 @@ fn shifts(car: &mut TestCar, count: u64) -> Vec<ShiftRecord> {
 }
 
 fn fitted(car: &TestCar, shifts: &[ShiftRecord]) -> Fit {
-    fit::fit(&car.file, shifts, car.ages(), &mut |_| {}).unwrap()
+    fit::fit(&car.file, shifts, &[], car.ages(), &mut |_| {}).unwrap()
 }
 
 /// Text of a vehicle file without the values of its cylinder.
@@ -102,7 +102,7 @@ fn a_wrong_pressure_channel_is_not_believed() {
         ("of the other clutch", with_pressure(&good, other)),
     ];
     for (case, shifts) in cases {
-        let fit = match fit::fit(&car.file, &shifts, car.ages(), &mut |_| {}) {
+        let fit = match fit::fit(&car.file, &shifts, &[], car.ages(), &mut |_| {}) {
             Ok(fit) => fit,
             Err(error) => {
                 assert!(error.to_string().contains("hint"), "{case}: {error}");

@@ -10,7 +10,7 @@ use fit::{Fit, Parameter, Verdict};
 fn fitted(seed: u64, logs: Logs, count: u64) -> (TestCar, Fit, f64) {
     let mut car = TestCar::drawn(seed);
     let shifts: Vec<_> = (0..count).map(|number| car.shift(number, logs).record).collect();
-    let fit = fit::fit(&car.file, &shifts, car.ages(), &mut |_| {}).unwrap();
+    let fit = fit::fit(&car.file, &shifts, &[], car.ages(), &mut |_| {}).unwrap();
     let vehicle = fit.vehicle_file(&car.file, "a simulation").unwrap();
     let others: Vec<TestShift> = (100..103).map(|number| car.shift(number, logs)).collect();
     let [before, after] =

@@ -32,8 +32,9 @@ pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
     let Some(mut log) = open() else { return };
     let map = written(fuzzer, "suggested.toml", suggest(log.channels(), None).as_bytes());
     let inspected = inspect(&mut log).ok();
-    // In columns a log has the same samples.
-    if let (Some(inspection), Some(count)) = (inspected, open().and_then(in_columns)) {
+    // In columns, and on several threads, a log has the same samples.
+    let on_threads = open().map(|log| log.on_threads(3));
+    if let (Some(inspection), Some(count)) = (inspected, on_threads.and_then(in_columns)) {
         let total: u64 = inspection.channels.iter().map(|channel| channel.counts.total()).sum();
         assert_eq!(count, total);
     }

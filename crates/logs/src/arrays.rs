@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::LogError;
+use crate::ahead::Crew;
 use crate::columns::{Block, Memory, Said, Source, Stream};
 
 /// A log that was read as a whole.
@@ -14,6 +15,9 @@ pub struct Arrays {
     pub notes: Vec<String>,
 }
 
+/// Records of which some are read in the time that a thread takes to start.
+const WORTH_A_THREAD: usize = 1 << 15;
+
 /// What came of a stream, and the place of the stream in the file.
 type Whole = (usize, Said, Result<Vec<Block>, LogError>);
 
@@ -23,17 +27,29 @@ impl Arrays {
         Self::put_together(wholes(streams.into_iter().enumerate()))
     }
 
-    /// Reads streams side by side, on at most so many threads.
-    pub(crate) fn on_threads(streams: Vec<Box<dyn Stream + Send + '_>>, threads: usize) -> Result<Self, LogError> {
-        let threads = threads.min(streams.len());
+    /// Reads streams side by side, on at most so many threads. Those that have no more to read work for the others.
+    pub(crate) fn on_threads(
+        streams: Vec<Box<dyn Stream + Send + '_>>,
+        threads: usize,
+        crew: &Crew,
+    ) -> Result<Self, LogError> {
+        let records = streams.iter().fold(0_usize, |records, stream| records.saturating_add(stream.most_records()));
+        let threads = threads.min(1 + records / WORTH_A_THREAD);
         let mut waiting: Vec<_> = streams.into_iter().enumerate().collect();
         // The longest is taken first, so that the others fill the time beside it.
         waiting.sort_by_key(|(_, stream)| stream.most_records());
         let waiting = Mutex::new(waiting);
         let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let read = || wholes(std::iter::from_fn(next).map(|(at, stream)| (at, stream as Box<dyn Stream>)));
+        let read = || {
+            let reader = crew.reader();
+            let wholes = wholes(std::iter::from_fn(next).map(|(at, stream)| (at, stream as Box<dyn Stream>)));
+            reader.serve();
+            wholes
+        };
         let all = std::thread::scope(|scope| {
-            let others: Vec<_> = (1..threads).map(|_| scope.spawn(read)).collect();
+            // Fewer where the system has no more.
+            let start = |_| std::thread::Builder::new().spawn_scoped(scope, read).ok();
+            let others: Vec<_> = (1..threads).map_while(start).collect();
             let mut all = read();
             for other in others {
                 all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));

@@ -4,6 +4,7 @@
 //! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Times are numbers, clock times or dates.
 //! Rows are read one by one.
 
+use std::borrow::Cow;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
@@ -15,8 +16,9 @@ use crate::samples::{Quality, Sample};
 use crate::stamp::{Midnight, StampForm};
 use crate::{Channel, LogError, TimeColumn, error};
 
-/// Rows in a batch.
+/// Rows in a batch; of many columns fewer, so that it has at most so many cells, or is one row.
 const BATCH: usize = 64;
+const CELLS: usize = 1 << 16;
 
 /// An open comma-separated file.
 pub(crate) struct CsvLog {
@@ -65,7 +67,7 @@ impl CsvLog {
         let dialect = Dialect::of(path, &beginning)?;
         let first = cells(beginning.lines().nth(dialect.first).unwrap_or_default(), dialect.delimiter);
         let stamp = |column: usize| first.get(column).and_then(|cell| StampForm::of(cell));
-        let mut input = Cursor::new(head).chain(rest);
+        let mut input = Beginning(Cursor::new(head)).chain(rest);
         skip(&mut input, start, dialect.preamble).map_err(LogError::io(path))?;
         let mut records = Records::new(Box::new(input), dialect.delimiter);
         read_row(path, &mut records, dialect.preamble)?;
@@ -76,13 +78,16 @@ impl CsvLog {
         } else {
             Vec::new()
         };
-        let split: Vec<(String, String)> = titles.iter().map(|title| split_unit(title)).collect();
-        let unit = |i: usize| match units.get(i).filter(|unit| !unit.is_empty()) {
-            Some(unit) => unit.clone(),
-            None if !split[i].1.is_empty() => split[i].1.clone(),
-            None => Unit::of_name(&split[i].0).map_or(String::new(), |unit| unit.name.to_owned()),
+        let name_and_unit = |(i, title): (usize, &String)| {
+            let (name, own) = split_unit(title);
+            let unit = match units.get(i).filter(|unit| !unit.is_empty()) {
+                Some(unit) => unit.clone(),
+                None if !own.is_empty() => own,
+                None => Unit::of_name(&name).map_or(String::new(), |unit| unit.name.to_owned()),
+            };
+            (name, unit)
         };
-        let names: Vec<(String, String)> = (0..titles.len()).map(|i| (split[i].0.clone(), unit(i))).collect();
+        let names: Vec<(String, String)> = titles.iter().enumerate().map(name_and_unit).collect();
         let mut notes = Vec::new();
         // A column of clock times or dates is the time where no name says so.
         let named = names.iter().any(|(name, _)| is_time_name(name));
@@ -96,12 +101,15 @@ impl CsvLog {
         };
         let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
         let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
-        let channels = columns
-            .iter()
-            .map(|&i| Channel { name: names[i].0.clone(), unit: names[i].1.clone(), group: String::new() })
-            .collect();
-        let batch = if is_followed { 1 } else { BATCH };
         let (path, width) = (path.to_owned(), titles.len());
+        let batch = if is_followed { 1 } else { (CELLS / width.max(1)).clamp(1, BATCH) };
+        // There may be very many.
+        drop((titles, units));
+        let named = |(i, (name, unit)): (usize, (String, String))| {
+            let is_channel = i != time.0 && !name.is_empty();
+            is_channel.then(|| Channel { name, unit, group: String::new() })
+        };
+        let channels = names.into_iter().enumerate().filter_map(named).collect();
         let log = Self { path, dialect, records: Some(records), time, columns, width, batch, notes };
         Ok((log, channels))
     }
@@ -118,11 +126,8 @@ impl CsvLog {
         let Some(records) = self.records.take() else {
             return Err(LogError::file(&self.path, "the log was read already"));
         };
-        let columns = (self.columns.iter().zip(wanted).enumerate())
-            .filter(|(_, (_, wanted))| **wanted)
-            .map(|(channel, (&column, _))| (channel, column));
         Ok(Box::new(Rows {
-            columns: columns.collect(),
+            channels: (0..self.columns.len()).filter(|channel| wanted[*channel]).collect(),
             log: self,
             records,
             text: Vec::new(),
@@ -140,12 +145,25 @@ impl CsvLog {
     }
 }
 
+/// The first bytes of a table, which are long where its lines are: freed when they were read.
+struct Beginning(Cursor<Vec<u8>>);
+
+impl Read for Beginning {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let read = self.0.read(bytes)?;
+        if read == 0 {
+            self.0 = Cursor::default();
+        }
+        Ok(read)
+    }
+}
+
 /// The rows of a table.
 struct Rows<'a> {
     log: &'a CsvLog,
     records: Records,
-    /// Channel and column.
-    columns: Vec<(usize, usize)>,
+    /// Those that are wanted.
+    channels: Vec<usize>,
     /// A cell with a point in place of its comma.
     text: Vec<u8>,
     midnight: Midnight,
@@ -207,8 +225,9 @@ impl Rows<'_> {
             self.without_time += 1;
             return;
         };
-        for i in 0..self.columns.len() {
-            let (channel, column) = self.columns[i];
+        for i in 0..self.channels.len() {
+            let channel = self.channels[i];
+            let column = self.log.columns[channel];
             if is_cut && column + 1 == cells {
                 self.cut = Some("counts without its last cell, of which digits may be missing");
                 continue;
@@ -328,19 +347,15 @@ fn skip(input: &mut impl Read, bytes: usize, lines: usize) -> io::Result<()> {
 }
 
 /// The cells of a line; quotation marks are respected.
-fn cells(line: &str, delimiter: u8) -> Vec<String> {
-    let mut cells = vec![String::new()];
+fn cells(line: &str, delimiter: u8) -> Vec<Cow<'_, str>> {
     let mut quoted = false;
-    for c in line.chars() {
-        if c == '"' {
-            quoted = !quoted;
-        } else if c == char::from(delimiter) && !quoted {
-            cells.push(String::new());
-        } else if let Some(cell) = cells.last_mut() {
-            cell.push(c);
-        }
-    }
-    cells.iter().map(|cell| cell.trim().to_owned()).collect()
+    let ends_cell = |c: char| {
+        quoted ^= c == '"';
+        c == char::from(delimiter) && !quoted
+    };
+    let without_marks = |cell: &str| Cow::Owned(cell.replace('"', "").trim().to_owned());
+    let plain = |cell| if str::contains(cell, '"') { without_marks(cell) } else { Cow::Borrowed(cell.trim()) };
+    line.split(ends_cell).map(plain).collect()
 }
 
 fn is_number(cell: &str, decimal_comma: bool) -> bool {
@@ -358,16 +373,16 @@ impl Dialect {
         }
         // Of the delimiters that divide lines into numbers, the one with the most numbers; a comma may be decimal.
         let best = [b'\t', b';', b'|', b','].into_iter().filter_map(|delimiter| {
-            let decimal_comma = |cells: &[String]| {
+            let decimal_comma = |cells: &[Cow<str>]| {
                 delimiter != b','
                     && cells.iter().any(|cell| cell.matches(',').count() == 1 && is_number(cell, true))
                     && !cells.iter().any(|cell| cell.contains('.') && is_number(cell, false))
             };
-            let rows: Vec<Vec<String>> = lines.iter().map(|line| cells(line, delimiter)).collect();
+            let rows: Vec<Vec<Cow<str>>> = lines.iter().map(|line| cells(line, delimiter)).collect();
             let comma = rows.iter().any(|row| decimal_comma(row));
-            let numbers = |row: &Vec<String>| row.iter().filter(|cell| is_number(cell, comma)).count();
-            let filled = |row: &Vec<String>| row.iter().filter(|cell| !cell.is_empty()).count();
-            let is_data = |row: &Vec<String>| {
+            let numbers = |row: &Vec<Cow<str>>| row.iter().filter(|cell| is_number(cell, comma)).count();
+            let filled = |row: &Vec<Cow<str>>| row.iter().filter(|cell| !cell.is_empty()).count();
+            let is_data = |row: &Vec<Cow<str>>| {
                 row.len() >= 2 && numbers(row) >= 1 && (2 * numbers(row) >= filled(row) || !is_units(row))
             };
             let first = rows.iter().position(|row| is_data(row) && rows_after_agree(&rows, row.len()))?;
@@ -387,7 +402,7 @@ impl Dialect {
                 },
             ));
         };
-        let names = |row: &[String]| {
+        let names = |row: &[Cow<str>]| {
             row.len() >= 2
                 && row.iter().any(|cell| !cell.is_empty())
                 && !row.iter().any(|cell| is_number(cell, decimal_comma))
@@ -413,15 +428,15 @@ impl Dialect {
 }
 
 /// Whether the cells are units, or most of them.
-fn is_units(row: &[String]) -> bool {
-    let filled: Vec<&String> = row.iter().filter(|cell| !cell.is_empty()).collect();
+fn is_units(row: &[Cow<str>]) -> bool {
+    let filled: Vec<&Cow<str>> = row.iter().filter(|cell| !cell.is_empty()).collect();
     let bracketed = |cell: &str| cell.starts_with('[') || cell.starts_with('(');
     let units = filled.iter().filter(|cell| bracketed(cell) || Unit::parse(cell).is_some()).count();
     !filled.is_empty() && 2 * units >= filled.len()
 }
 
 /// Whether most of the rows have this many cells.
-fn rows_after_agree(rows: &[Vec<String>], width: usize) -> bool {
+fn rows_after_agree(rows: &[Vec<Cow<str>>], width: usize) -> bool {
     let filled = rows.iter().filter(|row| row.len() > 1 || row.iter().any(|cell| !cell.is_empty()));
     let (same, all) = filled.fold((0, 0), |(same, all), row| (same + usize::from(row.len() == width), all + 1));
     3 * same >= all

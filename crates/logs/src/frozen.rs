@@ -51,7 +51,7 @@ struct Still {
     value: f64,
     since_s: f64,
     samples: u32,
-    /// The other speeds when it began.
+    /// The other speeds when it was first seen to stand.
     others: Speeds,
     frozen: bool,
 }
@@ -71,9 +71,12 @@ impl FrozenSpeed {
                     self.longest_still = self.longest_still.max(before.samples);
                 }
             }
-            self.still = Some(Still { value, since_s: time_s, samples: 1, others: *speeds, frozen: false });
+            self.still = Some(Still { value, since_s: time_s, samples: 1, others: NO_SPEEDS, frozen: false });
             return false;
         };
+        if still.samples == 1 {
+            still.others = *speeds;
+        }
         still.samples += 1;
         let (limit_s, share) = match self.longest_still {
             0 => (FROZEN_FROM_START_S, FROZEN_CHANGE_FROM_START),

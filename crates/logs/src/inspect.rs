@@ -1,18 +1,19 @@
 //! What is in a log: for each channel samples, rate, span, values, gaps.
 
-use crate::samples::{Quality, QualityCounts};
-use crate::{Channel, Log, LogError};
+use crate::samples::{Quality, QualityCounts, Sample};
+use crate::{Log, LogError};
 
-/// Intervals of which the middle one is the period of a channel.
+/// Intervals of which the middle one is the period of a channel: so many, of very many channels fewer, so that all have at most so many, but
+/// so many at least.
 const FIRST: usize = 512;
+const INTERVALS: usize = 4 << 20;
+const FEWEST: usize = 7;
 /// An interval of so many periods is a gap.
 pub const GAP: f64 = 5.0;
 
 /// What is known of a channel after all samples.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ChannelSummary {
-    /// The channel.
-    pub channel: Channel,
     /// Samples of each quality.
     pub counts: QualityCounts,
     /// Middle interval between the first samples, s; none with fewer than two.
@@ -30,49 +31,46 @@ pub struct ChannelSummary {
 /// What is in a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inspection {
-    /// The channels, in the order of the log.
+    /// What is known of each of [`Log::channels`].
     pub channels: Vec<ChannelSummary>,
     /// What else is to be said.
     pub notes: Vec<String>,
 }
 
-/// A channel while it is read.
+/// A channel while it is read. A log may have very many.
 #[derive(Default)]
 struct Watched {
-    counts: QualityCounts,
-    first_s: Option<f64>,
-    last_s: f64,
-    range: Option<[f64; 2]>,
+    summary: ChannelSummary,
+    /// Those before the period is known.
     intervals_s: Vec<f64>,
-    period_s: Option<f64>,
-    gaps: u64,
-    longest_s: f64,
 }
 
 impl Watched {
-    fn push(&mut self, time_s: f64, value: f64, quality: Quality) {
-        self.counts.push(quality);
+    fn push(&mut self, first: usize, Sample { time_s, value, quality, .. }: Sample) {
+        self.summary.counts.push(quality);
         if !matches!(quality, Quality::Repeated | Quality::Backward) {
-            if self.first_s.is_none() {
-                self.first_s = Some(time_s);
-            } else {
-                self.interval(time_s - self.last_s);
+            match &mut self.summary.span_s {
+                None => self.summary.span_s = Some([time_s, time_s]),
+                Some([_, last_s]) => {
+                    let interval_s = time_s - *last_s;
+                    *last_s = time_s;
+                    self.interval(first, interval_s);
+                }
             }
-            self.last_s = time_s;
         }
         if quality == Quality::Good {
-            let [least, greatest] = self.range.unwrap_or([value, value]);
-            self.range = Some([least.min(value), greatest.max(value)]);
+            let [least, greatest] = self.summary.range.unwrap_or([value, value]);
+            self.summary.range = Some([least.min(value), greatest.max(value)]);
         }
     }
 
-    fn interval(&mut self, interval_s: f64) {
-        self.longest_s = self.longest_s.max(interval_s);
-        match self.period_s {
-            Some(period_s) => self.gaps += u64::from(interval_s > GAP * period_s),
+    fn interval(&mut self, first: usize, interval_s: f64) {
+        self.summary.longest_s = self.summary.longest_s.max(interval_s);
+        match self.summary.period_s {
+            Some(period_s) => self.summary.gaps += u64::from(interval_s > GAP * period_s),
             None => {
                 self.intervals_s.push(interval_s);
-                if self.intervals_s.len() == FIRST {
+                if self.intervals_s.len() == first {
                     self.settle();
                 }
             }
@@ -84,23 +82,15 @@ impl Watched {
         let mut intervals_s = std::mem::take(&mut self.intervals_s);
         intervals_s.sort_by(f64::total_cmp);
         let Some(&period_s) = intervals_s.get(intervals_s.len() / 2) else { return };
-        self.gaps += intervals_s.iter().filter(|interval_s| **interval_s > GAP * period_s).count() as u64;
-        self.period_s = Some(period_s);
+        self.summary.gaps += intervals_s.iter().filter(|interval_s| **interval_s > GAP * period_s).count() as u64;
+        self.summary.period_s = Some(period_s);
     }
 
-    fn finish(mut self, channel: Channel) -> ChannelSummary {
-        if self.period_s.is_none() {
+    fn finish(mut self) -> ChannelSummary {
+        if self.summary.period_s.is_none() {
             self.settle();
         }
-        ChannelSummary {
-            channel,
-            counts: self.counts,
-            period_s: self.period_s,
-            span_s: self.first_s.map(|first_s| [first_s, self.last_s]),
-            range: self.range,
-            gaps: self.gaps,
-            longest_s: self.longest_s,
-        }
+        self.summary
     }
 }
 
@@ -111,15 +101,13 @@ impl Watched {
 pub fn inspect(log: &mut Log) -> Result<Inspection, LogError> {
     let all: Vec<usize> = (0..log.channels().len()).collect();
     let mut watched: Vec<Watched> = all.iter().map(|_| Watched::default()).collect();
-    let channels = log.channels().to_vec();
     let mut samples = log.samples(&all)?;
+    drop(all);
+    let first = (INTERVALS / watched.len().max(1)).clamp(FEWEST, FIRST);
     for sample in &mut samples {
         let sample = sample?;
-        watched[sample.channel].push(sample.time_s, sample.value, sample.quality);
+        watched[sample.channel].push(first, sample);
     }
     let notes = samples.notes().to_vec();
-    Ok(Inspection {
-        channels: watched.into_iter().zip(channels).map(|(watched, channel)| watched.finish(channel)).collect(),
-        notes,
-    })
+    Ok(Inspection { channels: watched.into_iter().map(Watched::finish).collect(), notes })
 }

@@ -7,6 +7,7 @@
 //!
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
+mod ahead;
 pub mod arrays;
 pub mod can;
 pub mod columns;

@@ -9,6 +9,7 @@ use std::sync::atomic::AtomicBool;
 use trace::csv_file::LONGEST_ROW;
 use trace::{Following, shown_path};
 
+use crate::ahead::Crew;
 use crate::arrays::Arrays;
 use crate::can::{CanLog, Database};
 use crate::columns::{Columns, Stream};
@@ -53,6 +54,8 @@ pub struct Log {
     path: PathBuf,
     channels: Vec<Channel>,
     source: Source,
+    /// Threads that read, with the one that asks.
+    threads: usize,
 }
 
 enum Source {
@@ -146,7 +149,15 @@ impl Log {
             Format::Csv => CsvLog::open(path, head, reader, options.time.as_ref(), is_followed)
                 .map(|(log, channels)| (Source::Csv(Box::new(log)), channels))?,
         };
-        Ok(Self { path: path.to_owned(), channels, source })
+        Ok(Self { path: path.to_owned(), channels, source, threads: 1 })
+    }
+
+    /// Lets so many threads read [`Self::samples`] and [`Self::columns`]: the one that asks, and others that unpack the blocks of an MDF
+    /// file ahead, at most 32 MiB of them. They start with the second block of a clock, and end with the log. What is read is the same with
+    /// any number; without this it is one.
+    pub fn on_threads(mut self, threads: usize) -> Self {
+        self.threads = threads;
+        self
     }
 
     /// Where it was read from.
@@ -187,8 +198,8 @@ impl Log {
         Ok(Columns::new(self.streams(wanted)?))
     }
 
-    /// These channels as whole arrays, as they stand in the file: not merged, and with its time stamps. Each clock of an MDF file is read
-    /// on one of at most `threads` threads; other formats have one clock, and are read on this one. Tables and bus logs are read once: a
+    /// These channels as whole arrays, as they stand in the file: not merged, and with its time stamps. The clocks of an MDF file are read
+    /// on at most `threads` threads, which unpack blocks for each other; other formats have one clock, and are read on this one. Tables and bus logs are read once: a
     /// second call is an error.
     ///
     /// # Errors
@@ -196,7 +207,10 @@ impl Log {
     pub fn arrays(&mut self, wanted: &[usize], threads: usize) -> Result<Arrays, LogError> {
         let mask = self.mask(wanted);
         match &mut self.source {
-            Source::Mdf(log) => Arrays::on_threads(log.streams(&mask)?, threads),
+            Source::Mdf(log) => {
+                log.unpack_with(Crew::of_readers(threads));
+                Arrays::on_threads(log.streams(&mask)?, threads, log.crew())
+            }
             _ => Arrays::of(self.streams(wanted)?),
         }
     }
@@ -215,7 +229,10 @@ impl Log {
         Ok(match &mut self.source {
             Source::Csv(log) => vec![log.stream(&mask)?],
             Source::Parquet(log) => vec![log.stream(&mask)?],
-            Source::Mdf(log) => log.streams(&mask)?.into_iter().map(|stream| stream as Box<dyn Stream>).collect(),
+            Source::Mdf(log) => {
+                log.unpack_with(Crew::of(self.threads));
+                log.streams(&mask)?.into_iter().map(|stream| stream as Box<dyn Stream>).collect()
+            }
             Source::Can(log) => vec![log.stream(&mask)?],
         })
     }
@@ -268,12 +285,20 @@ impl Log {
 
     /// Names a channel with a similar name, or some channels.
     fn nearest(&self, name: &str) -> String {
+        // One letter of three may be wrong, or stand before its neighbour.
+        const ALIKE: f64 = 2.0 / 3.0;
         let wanted = name.to_lowercase();
         let similar = |channel: &&Channel| {
             let name = channel.name.to_lowercase();
             name.contains(&wanted) || (!name.is_empty() && wanted.contains(&name))
         };
-        if let Some(channel) = self.channels.iter().find(similar) {
+        let alike = || {
+            let likeness =
+                |channel: &Channel| strsim::normalized_damerau_levenshtein(&channel.name.to_lowercase(), &wanted);
+            let all = self.channels.iter().map(|channel| (likeness(channel), channel));
+            all.filter(|(likeness, _)| *likeness >= ALIKE).max_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        if let Some(channel) = self.channels.iter().find(similar).or_else(|| Some(alike()?.1)) {
             return format!("`{}` has a similar name", error::shown(&channel.name));
         }
         const MOST: usize = 12;

@@ -5,10 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use half::f16;
-use parquet::basic::{ConvertedType, Encoding, LogicalType, TimeUnit, Type as Physical};
+use parquet::basic::{Compression, ConvertedType, Encoding, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
-use parquet::data_type::{DataType, Int96};
+use parquet::data_type::{DataType, DoubleType, Int96};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
@@ -93,8 +93,39 @@ impl ParquetLog {
     }
 
     pub(crate) fn stream(&mut self, wanted: &[bool]) -> Result<Box<dyn Stream + '_>, LogError> {
-        let channels = (0..self.columns.len()).filter(|&channel| wanted[channel]).collect();
+        let channels: Vec<usize> = (0..self.columns.len()).filter(|&channel| wanted[channel]).collect();
+        self.check_compression(channels.iter().map(|&channel| self.columns[channel].0).chain([self.time.0]))?;
         Ok(Box::new(Groups { channels, log: self, group: 0, open: None, without_time: 0 }))
+    }
+
+    /// Checks that these columns can be unpacked.
+    fn check_compression(&self, mut columns: impl Iterator<Item = usize>) -> Result<(), LogError> {
+        let packed = |column: usize| {
+            let mut groups = self.reader.metadata().row_groups().iter();
+            groups.find_map(|group| {
+                let column = group.columns().get(column)?;
+                Some((column.column_path().string(), not_built_in(column.compression())?))
+            })
+        };
+        let Some((column, compression)) = columns.find_map(packed) else { return Ok(()) };
+        Err(LogError::file(
+            &self.path,
+            format!(
+                "the column `{}` is packed with {compression}, which is not read\n\
+                 hint: write the file with zstd, snappy, gzip, lz4 or no compression; with pyarrow: \
+                 `pq.write_table(pq.read_table(IN), OUT, compression=\"zstd\")`",
+                error::shown(&column)
+            ),
+        ))
+    }
+}
+
+/// The name of a compression that cannot be read.
+fn not_built_in(compression: Compression) -> Option<&'static str> {
+    match compression {
+        Compression::BROTLI(_) => Some("brotli"),
+        Compression::LZO => Some("LZO"),
+        _ => None,
     }
 }
 
@@ -119,11 +150,7 @@ fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -
 }
 
 fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
-    let hint = match error.to_string().contains("Disabled feature") {
-        true => "\nhint: this compression is not built in; write the file with zstd, snappy, gzip, lz4 or none",
-        false => "",
-    };
-    LogError::damaged(path, position, format!("{error}{hint}"))
+    LogError::damaged(path, position, error.to_string())
 }
 
 /// Name and unit of a column: by its title, by what it holds, or by the end of its name.
@@ -385,6 +412,44 @@ impl Groups<'_> {
     }
 }
 
+/// Appends the next values of a column, and the level of each row; the number of rows.
+fn records<D: DataType>(
+    column: &mut ColumnReaderImpl<D>,
+    rows: usize,
+    levels: &mut Vec<i16>,
+    values: &mut Vec<D::T>,
+) -> Result<usize, ParquetError> {
+    let mut got = 0;
+    // A call may end with a page.
+    while got < rows {
+        let (records, ..) = column.read_records(rows - got, Some(levels), None, values)?;
+        if records == 0 {
+            break;
+        }
+        got += records;
+    }
+    Ok(got)
+}
+
+/// Appends the next numbers of a column that holds them as they are, without a copy; NaN where there is none.
+fn doubles(column: &mut ColumnReaderImpl<DoubleType>, rows: usize, numbers: &mut Vec<f64>) -> Result<(), ParquetError> {
+    let (mut levels, first) = (Vec::new(), numbers.len());
+    let got = records(column, rows, &mut levels, numbers)?;
+    let mut from = numbers.len();
+    if from - first == got {
+        return Ok(());
+    }
+    // Where values are absent, their level is below the highest: those that are there go to their rows, the last one first.
+    let highest = levels.iter().copied().max().unwrap_or(0);
+    numbers.resize(first + levels.len(), f64::NAN);
+    for (row, level) in levels.iter().enumerate().rev() {
+        let is_there = *level == highest && from > first;
+        from -= usize::from(is_there);
+        numbers[first + row] = if is_there { numbers[from] } else { f64::NAN };
+    }
+    Ok(())
+}
+
 /// Appends the next numbers of a column; NaN where there is none.
 fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec<f64>) -> Result<(), ParquetError> {
     fn read<D: DataType>(
@@ -394,15 +459,7 @@ fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec
         number: impl Fn(&D::T) -> f64,
     ) -> Result<(), ParquetError> {
         let (mut levels, mut values) = (Vec::new(), Vec::new());
-        let mut got = 0;
-        // A call may end with a page.
-        while got < rows {
-            let (records, ..) = column.read_records(rows - got, Some(&mut levels), None, &mut values)?;
-            if records == 0 {
-                break;
-            }
-            got += records;
-        }
+        let got = records(column, rows, &mut levels, &mut values)?;
         if values.len() == got {
             numbers.extend(values.iter().map(number));
             return Ok(());
@@ -433,7 +490,7 @@ fn numbers(column: &mut ColumnReader, form: Form, rows: usize, numbers: &mut Vec
         (ColumnReader::Int64ColumnReader(column), _) => read(column, rows, numbers, |value| *value as f64),
         (ColumnReader::Int96ColumnReader(column), _) => read(column, rows, numbers, stamp96_ns),
         (ColumnReader::FloatColumnReader(column), _) => read(column, rows, numbers, |value| f64::from(*value)),
-        (ColumnReader::DoubleColumnReader(column), _) => read(column, rows, numbers, |value| *value),
+        (ColumnReader::DoubleColumnReader(column), _) => doubles(column, rows, numbers),
         (ColumnReader::FixedLenByteArrayColumnReader(column), Form::Half) => {
             read(column, rows, numbers, |value| match value.data() {
                 &[low, high] => f16::from_le_bytes([low, high]).to_f64(),

@@ -24,10 +24,10 @@ const TURBINE: &[&str] =
 const TORQUE: &[&str] = &["torque", "tq", "trq", "tqi", "moment", "drehmoment", "md", "m"];
 const OUTPUT: &[&str] = &["output", "abtrieb", "abtriebs*", "out", "nab", "getriebeausgang*"];
 const WHEEL: &[&str] = &["wheel", "whl", "rad", "raddrehzahl", "radgeschw*", "whlspd", "hr", "hl"];
-const CURRENT: &[&str] = &["current", "cur", "strom", "i", "ventilstrom", "solenoid", "sol", "amp"];
+const CURRENT: &[&str] = &["current", "cur", "strom", "curr", "i", "ventilstrom", "solenoid", "sol", "amp"];
 const CLUTCH: &[&str] = &["oncoming", "clutch", "kupplung", "kup", "cl", "solenoid", "sol", "ventil*", "valve", "vfs"];
 const GEAR: &[&str] = &["gear", "gang", "gr", "gearcurrent"];
-const TARGET: &[&str] = &["target", "soll", "ziel", "des", "desired", "cmd", "commanded", "req", "tar", "trg"];
+const TARGET: &[&str] = &["target", "soll", "ziel", "des", "desired", "cmd", "commanded", "req", "tar", "trg", "tgt"];
 const ACTUAL: &[&str] = &["actual", "ist", "cur", "current", "engaged", "act", "currentgear"];
 const SHIFT: &[&str] = &["shift", "schalt*", "shiftinprogress", "shifting"];
 
@@ -71,7 +71,7 @@ const TABLE: &[Words] = &[
             &["acc", "accel", "acceleration", "beschl", "beschleunigung", "ax", "a"],
             &["long", "longitudinal", "laengs", "x", "vehicle", "ax"],
         ],
-        none: &["pedal", "lat", "lateral"],
+        none: &["pedal", "ped", "lat", "lateral"],
         exact: &["ax", "a_x", "along", "laengsbeschleunigung"],
     },
     Words {
@@ -140,8 +140,20 @@ const TABLE: &[Words] = &[
     },
     Words {
         role: Role::Throttle,
-        all: &[&["throttle", "drossel*", "dk", "tps", "accelerator", "fahrpedal", "pedal", "wped", "app", "apps"]],
-        none: &["target", "soll", "brake", "kick"],
+        all: &[&[
+            "throttle",
+            "drossel*",
+            "dk",
+            "tps",
+            "accelerator",
+            "fahrpedal",
+            "pedal",
+            "ped",
+            "wped",
+            "app",
+            "apps",
+        ]],
+        none: &["target", "soll", "brake", "brk", "clutch", "kick"],
         exact: &["wped", "wdk", "tps"],
     },
     Words {
@@ -405,7 +417,7 @@ mod tests {
 
     #[test]
     fn usual_names_in_two_languages_are_found() {
-        let logs: [&[(&str, &str, &str)]; 7] = [
+        let logs: [&[(&str, &str, &str)]; 8] = [
             &[
                 ("N_Eng", "rpm", "engine_speed"),
                 ("N_Turb", "rpm", "turbine_speed"),
@@ -438,6 +450,14 @@ mod tests {
                 ("throttle", "", "throttle"),
             ],
             &[("I_ClA", "mA", "oncoming_current"), ("I_ClA_off", "mA", "offgoing_current"), ("APP", "%", "throttle")],
+            &[
+                ("SolCurr_A", "mA", "element_a_current"),
+                ("SolCurr_B", "mA", "element_b_current"),
+                ("SolCurr_C", "mA", "element_c_current"),
+                ("Gear_Tgt", "", "target_gear"),
+                ("AccPed", "%", "throttle"),
+                ("BrkPed", "%", ""),
+            ],
             &[
                 ("element_a_current_a", "A", "element_a_current"),
                 ("element_b_duty_percent", "%", "element_b_duty"),

@@ -50,6 +50,7 @@ fn columns_have_the_samples_that_are_merged() {
         "plain_400.mf4",
         "deflate.mf4",
         "transposed.mf4",
+        "blocks.mf4",
         "zstd.mf4",
         "lz4.mf4",
         "invalidation.mf4",

@@ -45,6 +45,7 @@ fn mdf_of_every_version_and_layout_gives_the_same_values() {
         "plain_420.mf4",
         "deflate.mf4",
         "transposed.mf4",
+        "blocks.mf4",
         "zstd.mf4",
         "lz4.mf4",
         "unsorted.mf4",
@@ -68,7 +69,7 @@ fn mdf_of_every_version_and_layout_gives_the_same_values() {
 
 #[test]
 fn mdf_conversions_give_physical_values() {
-    for file in ["deflate.mf4", "transposed.mf4", "zstd.mf4", "lz4.mf4"] {
+    for file in ["deflate.mf4", "transposed.mf4", "blocks.mf4", "zstd.mf4", "lz4.mf4"] {
         let (log, samples, _) = read(&data(file), &OpenOptions::default()).unwrap();
         let of = |name: &str| channel(&log, &samples, name);
         check(&of("Rational"), slow(|i| (2.0 * i + 6.0) / 4.0), "Rational");
@@ -179,6 +180,11 @@ fn what_holds_nothing_is_named() {
     assert!(message("names", b"time_s,a\n").ends_with("there are no rows"));
     let no_rows = std::fs::read(data("no_rows.parquet")).unwrap();
     assert!(message("no_rows", &no_rows).ends_with("there are no rows"));
+    let brotli = message("brotli", &std::fs::read(data("brotli.parquet")).unwrap());
+    assert!(
+        brotli.contains("` is packed with brotli, which is not read\nhint: write the file with zstd, snappy,"),
+        "{brotli}"
+    );
     let error = LogError::File { path: "-".into(), message: "the file is empty".to_owned() };
     assert_eq!(error.to_string(), "standard input: the file is empty");
 }

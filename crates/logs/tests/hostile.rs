@@ -5,7 +5,7 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use common::{Folder, data, read, with_dbc};
+use common::{Folder, data, read_on, with_dbc};
 use logs::OpenOptions;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -17,11 +17,12 @@ fn most_memory() -> Option<usize> {
     line.trim().strip_suffix(" kB")?.parse::<usize>().ok().map(|kilobytes| kilobytes << 10)
 }
 
-const FILES: [&str; 24] = [
+const FILES: [&str; 25] = [
     "plain_400.mf4",
     "plain_420.mf4",
     "deflate.mf4",
     "transposed.mf4",
+    "blocks.mf4",
     "zstd.mf4",
     "lz4.mf4",
     "invalidation.mf4",
@@ -56,13 +57,17 @@ fn attempt(folder: &Folder, name: &str, bytes: &[u8]) -> (usize, String) {
     };
     let start = Instant::now();
     let before = most_memory();
-    let result = match read(&path, &options) {
+    let on_threads = |threads| match read_on(&path, &options, threads) {
         Ok((_, samples, notes)) => {
             assert!(samples.iter().all(|sample| sample.time_s.is_finite()), "{name}");
             (samples.len(), notes.join("\n"))
         }
         Err(error) => (0, error.to_string()),
     };
+    let result = on_threads(1);
+    if name == "blocks.mf4" {
+        assert_eq!(on_threads(3), result);
+    }
     assert!(start.elapsed() < SLOWEST, "{name}: {:?}", start.elapsed());
     if let (Some(before), Some(after)) = (before, most_memory()) {
         // The system counts by thread and joins the counts now and then.

@@ -6,11 +6,13 @@ mod common;
 
 use std::io::Write as _;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use common::{Folder, channel, data, read};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
-use logs::{OpenOptions, Quality, Sample};
+use logs::{Log, OpenOptions, Quality, Sample};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -295,4 +297,125 @@ fn channels_that_are_not_over_time_are_named_with_their_group() {
     // Its master is an ordinary channel now.
     let notes = patched("remote.mf4", 2, 0, 0);
     assert!(notes[0].contains("N_Eng (group `") && notes[0].contains("`, no time)"), "{notes:?}");
+}
+
+/// The records of a group, as a writer divides them that fills blocks: in many, each with a number of whole records.
+fn in_many_blocks(bytes: Vec<u8>, record: usize, packing: impl Fn(usize) -> Packing) -> Vec<u8> {
+    let cuts: Vec<usize> = (1..40).map(|i| i * 16 * record).collect();
+    divided(bytes, &cuts, packing)
+}
+
+/// Everything that is read of a log on so many threads, in every way.
+fn in_every_way(path: &Path, threads: usize) -> String {
+    let open = || Log::open(path, &OpenOptions::default()).unwrap().on_threads(threads);
+    let mut log = open();
+    let all: Vec<usize> = (0..log.channels().len()).collect();
+    let mut samples = log.samples(&all).unwrap();
+    let read: Vec<_> = samples.by_ref().map(|sample| format!("{sample:?}")).collect();
+    let merged = format!("{read:?} {:?}", samples.notes());
+    let mut log = open();
+    let mut columns = log.columns(&all).unwrap();
+    let mut read = Vec::new();
+    while let Some(block) = columns.next_block().unwrap() {
+        read.push(format!("{block:?}"));
+    }
+    let in_columns = format!("{read:?} {:?}", columns.notes());
+    format!("{merged} {in_columns} {:?}", open().arrays(&all, threads).unwrap())
+}
+
+/// Two clocks with 1500 records each of 24 bytes, which are not packed.
+fn two_clocks(folder: &Folder) -> Vec<u8> {
+    let mut writer = Mf4Writer::new();
+    writer.set_compression(false);
+    for step_s in [0.01, 0.013] {
+        let times: Vec<f64> = (0..1500).map(|i| f64::from(i) * step_s).collect();
+        let group = writer.add_group(&times).unwrap();
+        for name in ["one", "two"] {
+            let values: Vec<f64> = times.iter().map(|time_s| (time_s * 3.0).sin() * 100.0).collect();
+            group.add_channel(name, "", &values).unwrap();
+        }
+    }
+    let path = folder.0.join("two.mf4");
+    writer.write_to_file(&path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+/// One of the tests with threads at a time, so that one can count its own.
+static ALONE: Mutex<()> = Mutex::new(());
+
+#[test]
+fn what_is_read_is_the_same_on_any_number_of_threads() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = Folder::new("threads");
+    let plain = two_clocks(&folder);
+    let whole = samples(&folder.write("plain.mf4", &plain));
+    assert_eq!(whole.0.len(), 6_000);
+    let packings: [fn(usize) -> Packing; 4] = [
+        |_| Packing::Deflated,
+        |_| Packing::Transposed(24),
+        |_| Packing::Transposed(7),
+        |i| [Packing::Plain, Packing::Deflated, Packing::Transposed(24)][i % 3],
+    ];
+    for (at, packing) in packings.into_iter().enumerate() {
+        let mut bytes = in_many_blocks(plain.clone(), 24, packing);
+        let good = folder.write("good.mf4", &bytes);
+        assert_eq!(format!("{:?}", samples(&good)), format!("{whole:?}"), "{at}");
+        // One block in the middle, whose contents, size, or place is wrong; or the file ends in it.
+        let deflated = places(&bytes, b"##DZ\0\0\0\0");
+        let middle = deflated[deflated.len() / 2];
+        let mut broken = vec![(folder.write("cut.mf4", &bytes[..middle + 60]), false)];
+        let damages: [(&str, usize, u64); 4] =
+            [("contents", 56, u64::MAX), ("long", 32, 100), ("huge", 32, 1 << 60), ("packed-huge", 40, 1 << 60)];
+        for (name, field, value) in damages {
+            let own = number(&bytes, middle + field).to_le_bytes();
+            bytes[middle + field..middle + field + 8].copy_from_slice(&value.to_le_bytes());
+            broken.push((folder.write(name, &bytes), true));
+            bytes[middle + field..middle + field + 8].copy_from_slice(&own);
+        }
+        for (path, is_noted) in broken.iter().chain([&(good, false)]) {
+            let Ok(_) = Log::open(path, &OpenOptions::default()) else { continue };
+            let alone = in_every_way(path, 1);
+            assert!(!is_noted || alone.contains("the log is read up to this place"), "{path:?}");
+            for threads in [0, 2, 3, 8] {
+                assert_eq!(in_every_way(path, threads), alone, "{path:?} {threads}");
+            }
+        }
+    }
+}
+
+/// Waits until so many threads of this process unpack blocks, where the system says it; false if that does not come.
+fn threads_become(count: usize) -> bool {
+    let start = Instant::now();
+    let is_own = |task: std::io::Result<std::fs::DirEntry>| {
+        let name = std::fs::read_to_string(task.ok()?.path().join("comm")).ok()?;
+        (name.trim() == "unpacking").then_some(())
+    };
+    while let Ok(tasks) = std::fs::read_dir("/proc/self/task") {
+        if tasks.filter_map(is_own).count() == count {
+            return true;
+        }
+        if start.elapsed() > Duration::from_secs(20) {
+            return false;
+        }
+        std::thread::yield_now();
+    }
+    true
+}
+
+#[test]
+fn a_log_that_is_left_in_the_middle_ends_its_threads() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = Folder::new("left");
+    let path = folder.write("left.mf4", in_many_blocks(two_clocks(&folder), 24, |_| Packing::Deflated));
+    for taken in [0, 1, 1000] {
+        let mut log = Log::open(&path, &OpenOptions::default()).unwrap().on_threads(3);
+        let all: Vec<usize> = (0..log.channels().len()).collect();
+        assert!(threads_become(0));
+        assert_eq!(log.samples(&all).unwrap().take(taken).filter(Result::is_ok).count(), taken);
+        assert!(threads_become(2));
+        // The same log again, from its beginning.
+        assert_eq!(log.samples(&all).unwrap().count(), 6_000);
+        assert!(threads_become(2));
+    }
+    assert!(threads_become(0));
 }

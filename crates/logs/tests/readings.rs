@@ -182,6 +182,11 @@ fn what_does_not_fit_says_what_to_do() {
             "there is no channel `Eng`\nhint: `N_Eng` has a similar name",
         ),
         (
+            "time_s,gear,N_Eng [rpm]\n0,1,1\n1,2,1\n",
+            "engine_speed=N_Egn",
+            "there is no channel `N_Egn`\nhint: `N_Eng` has a similar name",
+        ),
+        (
             "time_s,n [rad/s]\n0,800\n1,2500\n",
             "engine_speed=n",
             "engine_speed cannot be in rad/s: most values would be about",

@@ -44,6 +44,9 @@ pub struct Supervisor<T> {
     pub lock_hold_s: T,
 }
 
+/// The share by which a sum of steps may differ from the time that it is compared with: times of a log have few digits.
+const ROUNDING: f64 = 1e-3;
+
 /// Memory of the phase supervisor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SupervisorState<T> {
@@ -89,10 +92,22 @@ impl<T: Real> Supervisor<T> {
             Phase::TorquePhase if let_go => Phase::InertiaPhase,
             // A single noisy reading is no release, and a clutch can grip again.
             Phase::InertiaPhase if !let_go && !small => Phase::TorquePhase,
-            Phase::InertiaPhase if small && state.small_slip_s >= self.lock_hold_s => Phase::AfterShift,
+            Phase::InertiaPhase if small && self.is_held(state.small_slip_s) => Phase::AfterShift,
             same => same,
         };
         state.phase
+    }
+
+    /// Whether something has lasted for [`Self::lock_hold_s`]: for as many steps at any time of a log, and in any precision.
+    #[inline]
+    fn is_held(&self, lasted_s: T) -> bool {
+        lasted_s >= self.lock_hold_s * T::of(1.0 - ROUNDING)
+    }
+
+    /// Whether something has lasted for longer than [`Self::lock_hold_s`] and so much more, likewise.
+    #[inline]
+    pub(crate) fn is_held_longer(&self, lasted_s: T, more_s: T) -> bool {
+        lasted_s > (self.lock_hold_s + more_s) * T::of(1.0 + ROUNDING)
     }
 
     /// The phase whose equations hold at this sample. Where the slip is too small to tell its sign, the
@@ -167,5 +182,17 @@ mod tests {
     fn a_single_small_slip_does_not_count_as_lock_up() {
         let phases = walk(&[(70e3, 0.0, 300.0), (200e3, -6.0, 290.0), (300e3, -99.0, 1.0), (300e3, -99.0, 30.0)]);
         assert_eq!(phases[3], Phase::InertiaPhase);
+    }
+
+    #[test]
+    fn two_steps_are_two_steps_at_any_time_of_a_log_and_in_any_precision() {
+        let single = SUPERVISOR.cast::<f32>();
+        for row in 0..100_000 {
+            let time_s = |row: i32| f64::from(row) / 100.0;
+            let steps = [1, 2].map(|i| time_s(row + i) - time_s(row + i - 1));
+            let (lasted_s, in_single) = (steps[0] + steps[1], steps[0] as f32 + steps[1] as f32);
+            assert!(SUPERVISOR.is_held(lasted_s) && single.is_held(in_single), "{row}");
+            assert!(!SUPERVISOR.is_held_longer(lasted_s, 0.0) && !single.is_held_longer(in_single, 0.0), "{row}");
+        }
     }
 }

@@ -155,7 +155,7 @@ impl SpeedsPage<'_> {
         if self.converter.is_ok() {
             said.push("Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the input side's inertia as 0.04 to 0.16 kg m². Both are in the ranges.");
         }
-        if self.record.vehicle.len() > 1 && self.record.output.value.first() != self.record.vehicle.value.first() {
+        if self.record.output_is_of_car {
             said.push(
                 "The output speed is that of the car times a constant: slip of the tyres is part of the shift's slip.",
             );
@@ -271,7 +271,9 @@ impl SpeedsPage<'_> {
     }
 
     fn gears(&self, span_s: [f64; 2], most: usize) -> Panel {
-        let highest = self.ratios.len().max(4);
+        /// Forward gears of a car whose ratios are not given: larger numbers are codes for reverse and neutral.
+        const MOST_GEARS: usize = 10;
+        let highest = if self.ratios.is_empty() { MOST_GEARS } else { self.ratios.len() };
         #[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
         let highest = highest as f64;
         // Numbers beyond the forward gears stand for others.

@@ -17,6 +17,7 @@ pub mod log;
 pub mod observers;
 pub mod overview;
 pub mod passages;
+pub mod ratio_histogram;
 mod row_clock;
 pub mod run;
 pub mod sampling;

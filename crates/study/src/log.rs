@@ -34,6 +34,15 @@ struct TruthColumns {
     pressure: usize,
 }
 
+impl TruthColumns {
+    /// The truth in this row; none where its phase has no name.
+    fn of(self, rows: &CsvRows) -> Result<Option<Truth>, TraceError> {
+        let word = rows.text(self.phase);
+        let Some(phase) = Phase::ALL.into_iter().find(|phase| phase.name() == word) else { return Ok(None) };
+        Ok(Some(Truth { phase, pressure_pa: rows.number(self.pressure)? }))
+    }
+}
+
 /// What comes along with a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogRow {
@@ -43,6 +52,11 @@ pub struct LogRow {
     pub truth: Option<Truth>,
     /// What else the row holds.
     pub beside: Beside,
+}
+
+impl LogRow {
+    /// Before the first row.
+    pub const NONE: Self = Self { time_s: f64::NAN, truth: None, beside: Beside::NONE };
 }
 
 /// Signals that no observer reads; NaN where the log has none. They tell how a shift was and how far an estimate is off.
@@ -122,10 +136,9 @@ impl Log {
             looked_at,
             median_step_s: f64::NAN,
         };
-        while log.looked_at.len() < look
-            && let Some(sample) = log.read()?
-        {
-            log.looked_at.push_back(sample);
+        let (mut input, mut row) = (Input::none(0.0), LogRow::NONE);
+        while log.looked_at.len() < look && log.read(&mut input, &mut row)? {
+            log.looked_at.push_back((input, row));
         }
         let steps = log.looked_at.iter().skip(1).map(|(input, _)| input.dt_s);
         log.median_step_s = trace::median_step_s(steps.collect());
@@ -175,36 +188,48 @@ impl Log {
         Ok(notes)
     }
 
-    /// The next row of the file.
-    fn read(&mut self) -> Result<Option<(Input<f64>, LogRow)>, TraceError> {
-        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
+    /// Goes on to the next row, and puts its input and what came along there; false at the end.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the row is wrong.
+    #[inline]
+    pub fn advance(&mut self, input: &mut Input<f64>, row: &mut LogRow) -> Result<bool, TraceError> {
+        match self.looked_at.pop_front() {
+            Some(looked_at) => {
+                (*input, *row) = looked_at;
+                Ok(true)
+            }
+            None => self.read(input, row),
+        }
+    }
+
+    /// The next row of the file; false at its end.
+    fn read(&mut self, input: &mut Input<f64>, row: &mut LogRow) -> Result<bool, TraceError> {
+        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(false) };
         let rows = &self.rows;
-        let mut input = self.signals.input(dt_s, |column| rows.number(column))?;
-        let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
+        *input = self.signals.input(dt_s, |column| rows.number(column))?;
+        let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = input;
         self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
-        let truth = self.truth.and_then(|columns| {
-            let word = rows.text(columns.phase);
-            let phase = Phase::ALL.into_iter().find(|phase| phase.name() == word)?;
-            Some(rows.number(columns.pressure).map(|pressure_pa| Truth { phase, pressure_pa }))
-        });
+        row.time_s = time_s;
+        row.truth = match self.truth {
+            None => None,
+            Some(columns) => columns.of(rows)?,
+        };
         // A word in a signal that is not needed is no error.
-        let beside = self.beside.map_or(Beside::NONE, |columns| {
+        if let Some(columns) = self.beside {
             let [pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2] =
                 columns.map(|column| column.and_then(|column| rows.number(column).ok()).unwrap_or(f64::NAN));
-            Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 }
-        });
-        Ok(Some((input, LogRow { time_s, truth: truth.transpose()?, beside })))
+            row.beside = Beside { pressure_pa, torque_n_m, engine_n_m, throttle, vehicle_m_s, vehicle_m_s2 };
+        }
+        Ok(true)
     }
 }
 
 impl Iterator for Log {
     type Item = Result<(Input<f64>, LogRow), TraceError>;
 
-    #[inline]
     fn next(&mut self) -> Option<Self::Item> {
-        match self.looked_at.pop_front() {
-            Some(sample) => Some(Ok(sample)),
-            None => self.read().transpose(),
-        }
+        let (mut input, mut row) = (Input::none(0.0), LogRow::NONE);
+        self.advance(&mut input, &mut row).map(|is_there| is_there.then_some((input, row))).transpose()
     }
 }

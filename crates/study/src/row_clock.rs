@@ -23,6 +23,7 @@ pub(crate) struct RowTime {
 
 impl RowClock {
     /// Goes on to the next row that counts; `None` at the end.
+    #[inline]
     pub(crate) fn advance(&mut self, rows: &mut CsvRows) -> Result<Option<RowTime>, TraceError> {
         while rows.advance_in_any_order()? {
             self.rows += 1;

@@ -104,6 +104,13 @@ pub(crate) enum FormatChoice {
     Mf4,
 }
 
+impl Estimate {
+    /// How many threads read one of the logs.
+    pub(crate) fn threads_of_log(&self) -> usize {
+        (self.threads.count() / self.logs.len().max(1)).max(1)
+    }
+}
+
 impl From<FormatChoice> for TableFormat {
     fn from(choice: FormatChoice) -> Self {
         match choice {

@@ -13,7 +13,7 @@ pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
 pub(crate) use logs::{Estimate, Fit, FormatChoice, GearPair, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
-    WorstCaseOptions,
+    WorstCaseOptions, available_threads,
 };
 
 const EXAMPLES: &str = "\

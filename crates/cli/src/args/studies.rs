@@ -107,11 +107,15 @@ pub(crate) struct Threads {
     threads: Option<u16>,
 }
 
+/// As many threads as the machine has.
+pub(crate) fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
 impl Threads {
     /// The number of threads.
     pub(crate) fn count(&self) -> usize {
-        let available = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        self.threads.map_or_else(available, usize::from)
+        self.threads.map_or_else(available_threads, usize::from)
     }
 }
 

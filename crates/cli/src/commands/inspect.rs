@@ -4,11 +4,13 @@ use std::path::Path;
 
 use fit::drive::{DriveRecord, fit_converter};
 use logs::plausibility::likely_time_unit;
-use logs::{ChannelMap, Inspection, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder};
+use logs::{
+    Channel, ChannelMap, ChannelSummary, Inspection, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder,
+};
 use report::SpeedsPage;
 use trace::units::rpm;
 
-use crate::args::Inspect;
+use crate::args::{Inspect, available_threads};
 use crate::commands::{channel_map, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -21,7 +23,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     if !options.ratios.is_empty() {
         map.gearbox.ratios.clone_from(&options.ratios);
     }
-    let mut log = Log::open(&options.log, &map.open)?;
+    let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
     if options.suggest {
         let dbc = options.mapping.dbc.as_ref().map(|dbc| dbc.display().to_string());
         return Ok(output::line(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
@@ -39,7 +41,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     }
     let inspection = logs::inspect(&mut log)?;
     output::line(&format!("{}: {}, {} channels", trace::shown_path(&options.log), log.format(), log.channels().len()))?;
-    channels(&inspection)?;
+    channels(&log, &inspection)?;
     remarks(&inspection.notes);
     let steps_s = inspection.channels.iter().filter_map(|summary| summary.period_s);
     if let Some(unit) = likely_time_unit(steps_s.fold(f64::INFINITY, f64::min)) {
@@ -93,7 +95,7 @@ fn short(number: f64) -> String {
     }
 }
 
-fn channels(inspection: &Inspection) -> Result<(), Failure> {
+fn channels(log: &Log, inspection: &Inspection) -> Result<(), Failure> {
     let first_s = inspection
         .channels
         .iter()
@@ -102,7 +104,7 @@ fn channels(inspection: &Inspection) -> Result<(), Failure> {
         .fold(f64::INFINITY, f64::min);
     let origin_s = origin(if first_s.is_finite() { first_s } else { 0.0 });
     say_origin(origin_s)?;
-    let grouped = inspection.channels.iter().any(|summary| !summary.channel.group.is_empty());
+    let grouped = log.channels().iter().any(|channel| !channel.group.is_empty());
     let faulty = inspection.channels.iter().any(|summary| !summary.counts.faults().is_empty());
     let cells = |group: &str, rest: [String; 9], faults: String| {
         let group = grouped.then(|| group.to_owned());
@@ -115,34 +117,36 @@ fn channels(inspection: &Inspection) -> Result<(), Failure> {
             .collect::<Vec<_>>()
     };
     let titles = ["channel", "unit", "samples", "Hz", "from s", "to s", "least", "greatest", "longest gap s"];
-    let mut rows = vec![cells("group", titles.map(str::to_owned), "not usable".to_owned())];
-    for summary in &inspection.channels {
+    let row = |(channel, summary): (&Channel, &ChannelSummary)| {
         let span = |i: usize| summary.span_s.map_or(String::new(), |span_s| format!("{:.2}", span_s[i] - origin_s));
         let range = |i: usize| summary.range.map_or(String::new(), |range| short(range[i]));
         let gap = match summary.gaps {
             0 => String::new(),
             gaps => format!("{:.2} ({gaps})", summary.longest_s),
         };
-        rows.push(cells(
-            &cut(&summary.channel.group),
-            [
-                cut(&summary.channel.name),
-                cut(&summary.channel.unit),
-                output::grouped(summary.counts.total()),
-                summary.period_s.map_or(String::new(), |period_s| short((1.0 / period_s * 100.0).round() / 100.0)),
-                span(0),
-                span(1),
-                range(0),
-                range(1),
-                gap,
-            ],
-            summary.counts.faults(),
-        ));
-    }
-    Ok(output::table(if grouped { 3 } else { 2 }, &rows)?)
+        let numbers = [
+            cut(&channel.name),
+            cut(&channel.unit),
+            output::grouped(summary.counts.total()),
+            summary.period_s.map_or(String::new(), |period_s| short((1.0 / period_s * 100.0).round() / 100.0)),
+            span(0),
+            span(1),
+            range(0),
+            range(1),
+            gap,
+        ];
+        cells(&cut(&channel.group), numbers, summary.counts.faults())
+    };
+    let rows = || {
+        let head = cells("group", titles.map(str::to_owned), "not usable".to_owned());
+        std::iter::once(head).chain(log.channels().iter().zip(&inspection.channels).map(row))
+    };
+    Ok(output::long_table(if grouped { 3 } else { 2 }, rows)?)
 }
 
 fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Failure> {
+    // A channel that is not there is the reason for what the finder would miss.
+    map.resolve(log)?;
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
     let mut record = DriveRecord::default();
     let mut readings = Readings::new(log, map)?;
@@ -230,7 +234,14 @@ fn page(
 }
 
 fn has_command(map: &ChannelMap) -> bool {
-    [Role::OncomingCurrent, Role::OncomingDuty, Role::OncomingPressureCommand].into_iter().any(|role| map.has(role))
+    let commands = [
+        Role::OncomingCurrent,
+        Role::OncomingDuty,
+        Role::OncomingPressureCommand,
+        Role::ElementCurrent,
+        Role::ElementDuty,
+    ];
+    commands.into_iter().any(|role| map.has(role))
 }
 
 /// What was met in the log, in sentences.

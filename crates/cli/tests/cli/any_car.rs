@@ -511,3 +511,73 @@ fn a_reading_that_was_refused_is_no_flare() {
     assert!(flares.len() >= 3 && flares.iter().all(|flare| *flare < 20.0), "{flares:?}");
     assert!(folder.read("out.csv").contains("reading_refused"));
 }
+
+/// The first row of a table, and of the others every so many.
+fn every(table: &str, nth: usize) -> String {
+    let rows = table.lines().enumerate().filter(|(row, _)| *row == 0 || (row - 1).is_multiple_of(nth));
+    rows.map(|(_, line)| format!("{line}\n")).collect()
+}
+
+#[test]
+fn phases_last_as_long_and_ranges_hold_whatever_the_time_between_two_rows() {
+    let folder = simulated("rates-car");
+    let text = folder.read("sim/short.csv");
+    let mut lengths_s = Vec::new();
+    for nth in [1, 2, 5] {
+        folder.write("log.csv", every(&text, nth));
+        let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        assert!(said.contains("100 % of the pressures and torques of the shift clutches are within"), "{nth}: {said}");
+        lengths_s.push(numbers(&folder.read("out_shifts.csv"), "inertia_phase_s"));
+    }
+    for (nth, found) in [(2, &lengths_s[1]), (5, &lengths_s[2])] {
+        for (whole, found) in lengths_s[0].iter().zip(found).filter(|(whole, _)| **whole > 0.2) {
+            let rows_s = 0.01 * f64::from(nth);
+            assert!((whole - found).abs() <= 2.0 * rows_s + 1e-9, "{nth}: {whole} {found}");
+        }
+    }
+}
+
+#[test]
+fn a_gear_that_changes_without_a_target_is_told() {
+    let folder = simulated("untold-car");
+    let text = folder.read("sim/short_measured.csv");
+    let gears = column(&text, "gear");
+    let mut row = 0;
+    let log = with_column(&text, "target_gear", |_| {
+        row += 1;
+        gears[row - 1].clone()
+    });
+    folder.write("log.csv", log);
+    let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(told.contains("times without a target_gear that says so before"), "{told}");
+    let whole = said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("whole.csv")]));
+    assert!(!whole.contains("without a target_gear") && !whole.contains("output_speed over wheel_speed"), "{whole}");
+}
+
+#[test]
+fn a_wheel_speed_of_another_scale_is_told_or_refused() {
+    let folder = simulated("wheels-car");
+    let text = folder.read("sim/short_measured.csv");
+    let scaled = |factor: f64| {
+        with_column(&text, "wheel_speed_rad_s", |cell| {
+            cell.parse::<f64>().map_or(String::new(), |speed| (factor * speed).to_string())
+        })
+    };
+    folder.write("log.csv", scaled(0.98));
+    let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(told.contains("output_speed over wheel_speed is") && told.contains("from the final ratio"), "{told}");
+    folder.write("log.csv", scaled(2.8));
+    let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("refused.csv")]));
+    assert!(error.contains("output_speed over wheel_speed is") && error.contains("hint: "), "{error}");
+}
+
+#[test]
+fn a_drive_whose_last_line_is_cut_is_estimated_up_to_there() {
+    let folder = simulated("cut-car");
+    let text = folder.read("sim/short_measured.csv");
+    let end = text[..text.len() / 2].rfind('\n').unwrap();
+    folder.write("log.csv", &text[..end + 3]);
+    let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(told.contains("the last line has no end"), "{told}");
+    assert_eq!(folder.read("out.csv").lines().count(), text[..=end].lines().count());
+}

@@ -94,6 +94,21 @@ fn what_an_estimate_lacks_is_said_before_anything_is_written() {
 }
 
 #[test]
+fn a_misspelt_channel_is_named_before_what_the_shift_finder_lacks() {
+    let folder = Folder::new("misspelt");
+    let log = folder.write("log.csv", "time_s,Gear,N\n0,1,800\n0.01,1,900\n");
+    let output = wetclutch(&["inspect", &log, "--shifts", "--channel", "gear=Gaer"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains("there is no channel `Gaer`\nhint: `Gear` has a similar name"),
+        "{}",
+        stderr(&output)
+    );
+    let output = wetclutch(&["inspect", &log, "--shifts", "--channel", "engine_speed=N [rpm]"]);
+    assert!(stderr(&output).contains("nothing in the channel map tells a shift"), "{}", stderr(&output));
+}
+
+#[test]
 fn the_map_of_the_public_drive_is_in_order() {
     let maps = concat!(env!("CARGO_MANIFEST_DIR"), "/../../maps");
     let folder = Folder::new("public");

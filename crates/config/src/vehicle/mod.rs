@@ -111,7 +111,8 @@ pub struct FilterSettings {
     pub twist_rate_rad_s: f64,
     /// Time for which an error of the valve model persists, s.
     pub valve_rate_s: f64,
-    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second.
+    /// How fast the torque of the offgoing clutch changes while it holds, N m per root second: about 0.7 of what it holds at the
+    /// greatest engine torque.
     pub offgoing_n_m: f64,
     /// Time constant with which it goes once the clutch has let go, s.
     pub offgoing_release_s: f64,

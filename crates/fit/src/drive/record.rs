@@ -42,6 +42,8 @@ pub struct DriveRecord {
     pub gear: Series,
     /// Commanded gear.
     pub target_gear: Series,
+    /// Whether the output speed follows from the speed of the car.
+    pub output_is_of_car: bool,
     /// Whether a signal was longer than what is kept.
     pub is_cut: bool,
 }
@@ -96,6 +98,7 @@ impl DriveRecord {
     /// Without an output speed, that which follows from the speed of the car.
     pub fn complete(&mut self, output_rad_per_m: Option<f64>) {
         if let (true, Some(rad_per_m)) = (self.output.is_empty(), output_rad_per_m) {
+            self.output_is_of_car = true;
             self.output = self.vehicle.clone();
             self.output.value.iter_mut().for_each(|value| *value *= rad_per_m);
         }

@@ -1,18 +1,13 @@
 //! Which torque balances of driving between shifts are fitted, and why the others are not.
 
-use config::Car;
-
-use super::driving::{Balance, Driving, Usable, usable};
-
-/// Errors, in the deviations that they are expected to have, beyond which a balance is not that of the car \[chosen\].
-const MISFIT: f64 = 3.0;
+use crate::driving::{Balance, DrivenCar, Driving, Usable, misfit, usable};
 
 /// The balances of car and engine, each used or left out for a reason.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Balances([Result<(), String>; 2]);
 
 impl Balances {
-    pub(crate) fn of(car: &Car, driving: &Driving) -> Self {
+    pub(crate) fn of(car: &DrivenCar, driving: &Driving) -> Self {
         let Usable { car, engine } = usable(car, driving);
         Self([car, engine])
     }
@@ -32,12 +27,8 @@ impl Balances {
         let names = ["car", "engine"];
         let mut is_any = false;
         for ((balance, scale), name) in self.0.iter_mut().zip(scales).zip(names) {
-            // What is not a number does not fit either.
-            let fits = scale <= MISFIT;
-            if balance.is_ok() && !fits {
-                *balance = Err(format!(
-                    "the torques on the {name} do not explain its speed: the errors are {scale:.1} times what grade and maps explain"
-                ));
+            if let (Ok(()), Some(reason)) = (&balance, misfit(name, scale)) {
+                *balance = Err(reason);
                 is_any = true;
             }
         }

@@ -10,10 +10,10 @@ use nalgebra::{DMatrix, DVector};
 use observer::any_shift::ShiftRow;
 
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
-use super::recorder::part;
-use super::shift::{DELAY_STEP, MeasuredPressure, Unknowns};
+use super::shift::{MeasuredPressure, Unknowns};
 use super::shift_log::ShiftLog;
 use crate::Series;
+use crate::driving::DELAY_STEP;
 use crate::fill::FILL_DROP_PA;
 use crate::pressure::{Grid, Hydraulics, pressures};
 
@@ -73,7 +73,7 @@ impl ClutchModel {
             slip.signum() * shift.alpha.abs() * per_force * known.clutch.piston_area_m2
         });
         let (hydraulics, kiss_pa) = (Hydraulics::of(known), known.clutch.kiss_pressure());
-        let measured = part(&log.pressure[which], log.slip_s);
+        let measured = log.pressure[which].part(log.slip_s);
         let measured = match &hydraulics.cylinder {
             Some(cylinder) => {
                 let sd = quantities.place(Quantity::Kiss(shift.element)).map_or(0.0, |at| quantities.sd_before(at));

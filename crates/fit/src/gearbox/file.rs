@@ -6,7 +6,8 @@ use config::{Car, Source, toml_string};
 use drivetrain::{ClutchValve, Table1};
 
 use super::fitting::GearboxFit;
-use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use crate::driving::DRAG_UNIT_N_M;
 use crate::fitted_file::{SIDES, fill_comment};
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
 use crate::{FitError, Verdict};
@@ -95,6 +96,9 @@ impl GearboxFit {
                 let value = number(given * self.unknown(quantity).exp());
                 text.put(&[table], key, &value, &self.comment(quantity))?;
             }
+        }
+        if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
+            text.put(&["driveline"], "backlash_rad", &number(backlash.rad), &backlash.comment())?;
         }
         Ok(())
     }

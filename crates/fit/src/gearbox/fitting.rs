@@ -6,13 +6,13 @@ use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
-use super::driving::{Driving, DrivingModel};
 use super::precision::stated;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
 use super::unfitted::Unfitted;
+use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::pressure::Hydraulics;
 use crate::{FitError, Verdict};
@@ -51,6 +51,8 @@ pub struct GearboxFit {
     pub driving_s: [f64; 2],
     /// Fill volumes of the elements, by their places; none where a piston has no stroke.
     pub fills: Vec<Option<FillFit>>,
+    /// The backlash of the driveline, or what the logs lack for it.
+    pub backlash: Result<BacklashFit, String>,
     /// Which balances of it were fitted.
     pub(crate) balances: Balances,
     /// Names of the quantities that ended where nothing beyond is held possible.
@@ -68,7 +70,7 @@ pub fn fit(
     driving: &Driving,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<GearboxFit, FitError> {
-    let mut balances = Balances::of(car, driving);
+    let mut balances = Balances::of(&DrivenCar::with_gearbox(car, tables, &|_, _| None), driving);
     loop {
         let (fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
         if !balances.leave_out(scales) {
@@ -92,7 +94,8 @@ fn fit_with(
         return Err(FitError::input("there is no shift to fit"));
     }
     let problem = Problem::new(&quantities)?;
-    let of_driving = DrivingModel::new(car, tables, &quantities, driving, balances.used());
+    let driven = DrivenCar::with_gearbox(car, tables, &|from, to| quantities.pair(from, to));
+    let of_driving = DrivingModel::new(&driven, driving, balances.used());
     let all = Models { shifts: &models, driving: of_driving };
     let solved = problem.solve(&all, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
     let stated = stated(&problem, &models, &solved, &Unfitted::of(car, tables))?;
@@ -117,6 +120,7 @@ fn fit_with(
         scale_and_gain: [solved.weights.turbine.scale, solved.weights.turbine.gain],
         is_converged: solved.is_converged,
         driving_s: [driving.time_s(), driving.reported_s()],
+        backlash: fit_backlash(&driven, std::iter::once(driving)),
         balances: balances.clone(),
         quantities,
     };

@@ -13,7 +13,6 @@
 mod balances;
 mod budget;
 mod clutch;
-mod driving;
 mod file;
 mod fitting;
 mod precision;
@@ -26,7 +25,7 @@ mod solver;
 mod unfitted;
 mod validation;
 
-pub use driving::Driving;
+pub use crate::driving::Driving;
 pub use fitting::{GearboxFit, Progress, fit};
 pub use quantities::{Quantities, Quantity};
 pub use recorder::{Recorded, Recorder};

@@ -2,18 +2,17 @@
 
 use config::Car;
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
-use drivetrain::road::GRAVITY_M_S2;
 use nalgebra::DMatrix;
 use observer::any_shift::AnyShiftFilter;
 
 use super::shift_log::{ShiftLog, named_pair};
+use crate::driving::{AIR, DRAG_UNIT_N_M, ROLLING, Term, WIND, rolling_floor};
 
 /// Unit of the unknown of a delay, s.
 pub(crate) const DELAY_UNIT_S: f64 = 0.01;
 /// Unit of the unknown of a kiss point, Pa.
 pub(crate) const KISS_UNIT_PA: f64 = 1e4;
-/// Unit of the unknown of the drag, N m, and its standard deviation before \[chosen: the drag of an element with hot oil\].
-pub(crate) const DRAG_UNIT_N_M: f64 = 1.0;
+/// Standard deviation of the drag before, N m \[chosen: the drag of an element with hot oil\].
 const DRAG_N_M: f64 = 1.0;
 /// Part of the variance that friction elements, their drags, valves or inertias have in common \[chosen\]: oil, temperature, the shaft at the input, the
 /// channel of the currents.
@@ -25,14 +24,9 @@ const TORQUE_RATIO: f64 = 0.10;
 const INPUT_DELAY_S: f64 = 0.01;
 /// Bound of the delay of the reported engine torque beside a converter, s \[chosen: the torque that is asked for comes some strokes later\].
 const REPORTED_DELAY_S: f64 = 0.05;
-/// Bounds of mass \[chosen: an empty car with four people and luggage\], rolling resistance, air drag and inertia of the engine \[chosen\].
+/// Bounds of mass \[chosen: an empty car with four people and luggage\] and inertia of the engine \[chosen\].
 const MASS: f64 = 0.25;
-const ROLLING: f64 = 0.5;
-const AIR: f64 = 0.3;
 const ENGINE_INERTIA: f64 = 0.2;
-/// Least deviations of rolling resistance, as a mean grade over the weight, and of air drag, as a share \[chosen: a mean wind\].
-const MEAN_GRADE_RAD: f64 = 0.005;
-const WIND: f64 = 0.1;
 /// Error of the scale of a pressure sensor, as a standard deviation.
 const PRESSURE_SCALE: f64 = 0.005;
 
@@ -130,9 +124,7 @@ impl Quantities {
         named.sort_by_key(|(place, _)| *place);
         let pair_names = pairs.iter().map(|pair| named_pair(car, *pair)).collect();
         let elements = named.into_iter().map(|(_, name)| name).collect();
-        let road = &car.road;
-        let weight_n_m = road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m;
-        let rolling_floor = MEAN_GRADE_RAD * weight_n_m / road.rolling_moment_n_m.max(f64::MIN_POSITIVE);
+        let rolling_floor = rolling_floor(&car.road);
         Self { all, elements, pairs, pair_names, before, measured, has_converter, rolling_floor }
     }
 
@@ -144,6 +136,24 @@ impl Quantities {
     /// Place of the shifts between two gears among the pairs.
     pub fn pair(&self, from: usize, to: usize) -> Option<usize> {
         self.pairs.iter().position(|pair| [[from, to], [to, from]].contains(pair))
+    }
+
+    /// Place of a term of the balances of driving among the unknowns.
+    pub(crate) fn place_of(&self, term: Term) -> Option<usize> {
+        self.place(match term {
+            Term::Input => Quantity::Input,
+            Term::Capacity(_) => return None,
+            Term::TorqueRatio => Quantity::TorqueRatio,
+            Term::InputDelay => Quantity::InputDelay,
+            Term::Drag(at) => Quantity::Drag(at),
+            Term::Inertia(at) => Quantity::Inertia(at),
+            Term::Mass => Quantity::Mass,
+            Term::Rolling => Quantity::Rolling,
+            Term::Air => Quantity::Air,
+            Term::ReportedScale => Quantity::ReportedScale,
+            Term::ReportedDelay => Quantity::ReportedDelay,
+            Term::EngineInertia => Quantity::EngineInertia,
+        })
     }
 
     /// Least standard deviation of the unknown that is stated \[chosen, as of the one-shift fit\]: what the model leaves out does not

@@ -5,8 +5,8 @@ use design::ShiftTables;
 use observer::Reading;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 
-use super::driving::{Driving, DrivingRecorder, RowState};
 use super::shift_log::{ShiftLog, named_pair};
+use crate::driving::{DrivenCar, Driving, DrivingRecorder, RowState};
 use crate::{ReadingAges, Series};
 
 /// What is kept from before a shift at least, s: after this time a valve has forgotten where it was.
@@ -73,7 +73,7 @@ pub struct Recorder<'a> {
     commands: [Series; MAX_ELEMENTS],
     /// Of the shift that is open.
     pressure: [Series; 2],
-    driving: DrivingRecorder<'a>,
+    driving: DrivingRecorder,
     /// Longest time in which a piston of the car goes back, s; zero where none has a stroke.
     emptied_s: f64,
     /// Of the next step, what the filter of `estimate` is not shown.
@@ -97,7 +97,7 @@ impl<'a> Recorder<'a> {
             engine_torque: none(),
             commands: std::array::from_fn(|_| none()),
             pressure: [none(), none()],
-            driving: DrivingRecorder::new(car, tables),
+            driving: DrivingRecorder::new(DrivenCar::with_gearbox(car, tables, &|_, _| None)),
             emptied_s: emptied_s(car),
             reported: None,
             open: None,
@@ -168,6 +168,7 @@ impl<'a> Recorder<'a> {
             dated(input.turbine_rad_s, ages.turbine_rad),
             dated(input.output_rad_s, ages.output_rad),
         ];
+        let wheel = dated(input.wheel_rad_s, ages.wheel_rad);
         let torque = dated(input.engine_n_m, 0.0);
         let readings = speeds.into_iter().chain([torque]).chain(input.commands.map(|reading| dated(reading, 0.0)));
         let series = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
@@ -179,7 +180,8 @@ impl<'a> Recorder<'a> {
         let GearCommand { from, to } = input.gear;
         let state = RowState { gear: (from == to).then_some(from), lock_up: input.lock_up_applied };
         let reported = dated(self.reported.take(), 0.0).or(torque);
-        self.driving.push(time_s, speeds, reported, state);
+        let [engine, turbine, output] = speeds;
+        self.driving.push(time_s, [engine, turbine, output, wheel], reported, state);
     }
 
     fn begin(&mut self, time_s: f64, gears: [usize; 2], lock_up: bool) {
@@ -205,7 +207,7 @@ impl<'a> Recorder<'a> {
         let before_s = self.before_s();
         let speeds = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
         for series in speeds.into_iter().chain(&mut self.commands) {
-            *series = part(series, [time_s - before_s, f64::INFINITY]);
+            *series = series.part([time_s - before_s, f64::INFINITY]);
         }
     }
 
@@ -261,16 +263,16 @@ impl<'a> Recorder<'a> {
         let span = [open.begun_s - 0.1, ended_s + AFTER_S];
         let commands = row.clutches.map(|clutch| {
             let all = self.commands.get(clutch.element);
-            all.map(|all| part(all, [open.begun_s - self.before_s(), span[1]])).unwrap_or_default()
+            all.map(|all| all.part([open.begun_s - self.before_s(), span[1]])).unwrap_or_default()
         });
         Ok(ShiftLog {
             name: name.to_owned(),
             gears: open.gears,
             command_s: [open.begun_s, ended_s],
-            engine: part(&self.engine, span),
-            turbine: part(&self.turbine, span),
-            output: part(&self.output, span),
-            engine_torque: part(&self.engine_torque, span),
+            engine: self.engine.part(span),
+            turbine: self.turbine.part(span),
+            output: self.output.part(span),
+            engine_torque: self.engine_torque.part(span),
             commands,
             pressure: self.pressure.clone(),
             slip_s: [f64::NAN; 2],
@@ -284,10 +286,4 @@ fn emptied_s(car: &Car) -> f64 {
     let strokes = car.clutches.iter().flatten().filter(|clutch| clutch.has_stroke).map(|clutch| clutch.cylinder);
     // The slowest is the flow at the end, by the preload alone.
     strokes.map(|cylinder| cylinder.stroke_m3 / cylinder.flow(-cylinder.preload_pa).abs()).fold(0.0, f64::max)
-}
-
-/// The readings from one time to another.
-pub(super) fn part(series: &Series, span: [f64; 2]) -> Series {
-    let (time_s, value) = series.between(span).unzip();
-    Series { time_s, value }
 }

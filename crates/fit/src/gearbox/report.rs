@@ -2,13 +2,14 @@
 
 use drivetrain::ShiftKind;
 
-use super::driving::Balance;
 use super::fitting::GearboxFit;
-use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use crate::driving::Balance;
+use crate::driving::DRAG_UNIT_N_M;
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{cautions, fill_row};
-use crate::{ReportRow, Verdict};
+use crate::{BacklashFit, ReportRow, Verdict};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -16,9 +17,8 @@ const MISFIT: f64 = 2.0;
 const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
-const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, backlash, hysteresis of the valves and the shapes of all maps. \
-     The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them. \
-     Pressing and releasing the pedal in one gear would tell shafts and backlash; a fit does not read it";
+const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, hysteresis of the valves and the shapes of all maps. \
+     The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them";
 
 impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.
@@ -87,6 +87,7 @@ impl GearboxFit {
             self.said_of_gain(),
         ];
         lines.extend(self.said_of_driving());
+        lines.push(BacklashFit::statement(&self.backlash));
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
@@ -113,7 +114,8 @@ impl GearboxFit {
         match self.balances.reason(Balance::Car) {
             None => lines.push(format!(
                 "mass and road load from {:.0} s in gear with the engine pulling: beside the common factor of all torques the mass is known within +- \
-                 {:.1} %. Grade is not measured; rolling resistance is told apart from a mean grade by driving the same road both ways",
+                 {:.1} %. Grade is not measured, and a mean grade acts \
+             like rolling resistance: coasting down both ways on a straight of constant grade would tell it, and a fit does not read that",
                 self.driving_s[0],
                 beside(Quantity::Mass)
             )),

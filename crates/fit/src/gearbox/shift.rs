@@ -8,23 +8,19 @@ use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
 
 use super::clutch::{AtValve, ClutchModel};
-use super::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, KISS_UNIT_PA, Quantities, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift_log::ShiftLog;
 use crate::Series;
+use crate::driving::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_SHARE};
 use crate::pressure::{Grid, Hydraulics};
 
 /// Step of the integrals, s.
 const STEP_S: f64 = 0.002;
-/// Own unknowns of a shift: the turbine speed at its begin, rad/s, and an error of the torque at the turbine, N m.
+/// Own unknowns of a shift: the turbine speed at its begin, rad/s, and an error of the torque at the turbine, N m, whose deviation is that of the torque at
+/// the input.
 pub(crate) const OWN: usize = 2;
 /// Deviation of the first, rad/s: nothing is known of it.
 const START_SD_RAD_S: f64 = 50.0;
-/// Deviation of the second: what the drag of the open elements has beside its model, N m \[chosen\], and a share of the torque at the input by the shape of the
-/// converter's maps \[chosen, as in the filter\].
-pub(crate) const DRAG_SD_N_M: f64 = 1.0;
-pub(crate) const INPUT_SD_SHARE: f64 = 0.03;
-/// Step for the derivative by a delay in its unit.
-pub(crate) const DELAY_STEP: f64 = 0.1;
 
 /// A shift with what does not change during a fit.
 #[derive(Debug, Clone)]

@@ -5,11 +5,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 
-use super::driving::{DrivingModel, DrivingWeights, Evaluated};
 use super::quantities::Quantities;
 use super::shift::{Linearised, MeasuredPressure, OWN, ShiftModel};
 use crate::FitError;
-use crate::weights::{FACTOR, HUBER, correlation, gain_and_scale, one_step};
+use crate::driving::{DrivingModel, DrivingWeights, Evaluated};
+use crate::weights::{ChannelWeights, FACTOR};
 
 /// A step that changes no unknown by more than this share of its plain standard deviation ends the fit.
 const CONVERGED: f64 = 0.1;
@@ -39,47 +39,6 @@ impl Weights {
         pressure: ChannelWeights { gain: 0.3, scale: 3e3, inflation: FACTOR * FACTOR },
         driving: [DrivingWeights::START; 2],
     };
-}
-
-/// Gain and scale of the one-step errors of a channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ChannelWeights {
-    pub(crate) gain: f64,
-    pub(crate) scale: f64,
-    /// Factor by which the information of the readings is less than that of independent ones of a perfect model, in the fit as in the
-    /// intervals: otherwise what is known before would count too little in the fit.
-    pub(crate) inflation: f64,
-}
-
-impl ChannelWeights {
-    /// One-step errors of residuals, or of a column of their derivatives, in scales.
-    fn in_scales(&self, column: &mut [f64]) {
-        one_step(column, self.gain);
-        column.iter_mut().for_each(|error| *error /= self.scale);
-    }
-
-    pub(crate) fn weight(&self, error: f64) -> f64 {
-        (HUBER / error.abs()).min(1.0) / self.inflation
-    }
-
-    /// Half the robust sum of squares.
-    pub(crate) fn cost(&self, errors: &DVector<f64>) -> f64 {
-        let loss = |e: &f64| if e.abs() <= HUBER { e * e } else { HUBER * (2.0 * e.abs() - HUBER) };
-        0.5 * errors.iter().map(loss).sum::<f64>() / self.inflation
-    }
-
-    /// For errors that are to be independent already.
-    pub(crate) fn of_independent(errors: &[f64], scale: f64) -> Self {
-        Self { gain: 0.0, scale, inflation: FACTOR * FACTOR * correlation(&[errors], 0.0, scale) }
-    }
-
-    /// Those that residuals ask for; without any they stay.
-    fn following(self, blocks: &[&[f64]]) -> Self {
-        gain_and_scale(blocks).map_or(self, |(gain, scale)| {
-            let inflation = FACTOR * FACTOR * correlation(blocks, gain, scale);
-            Self { gain, scale, inflation }
-        })
-    }
 }
 
 /// Shifts and driving at unknowns.
@@ -220,7 +179,7 @@ impl<'a> Problem<'a> {
         let shift = |shift: &ShiftModel| profiled(shift, &shift.linearised(self.quantities, at), weights);
         Point {
             shifts: models.shifts.iter().map(shift).collect(),
-            driving: models.driving.evaluated(self.quantities, at, weights.driving),
+            driving: models.driving.evaluated(&|term| self.quantities.place_of(term), at, weights.driving),
         }
     }
 
@@ -240,7 +199,7 @@ impl<'a> Problem<'a> {
             progress(iteration);
             if iteration <= SCALED_ITERATIONS {
                 weights = following(&point, weights);
-                weights.driving = models.driving.following(self.quantities, &at);
+                weights.driving = models.driving.following(&|term| self.quantities.place_of(term), &at);
                 point = self.point(models, &at, weights);
             }
             let cost = self.cost(&point, &at);

@@ -55,6 +55,9 @@ pub(crate) struct TestCar {
     pressure_late_s: f64,
     /// Factor on the time of the fill.
     pub(crate) fill: f64,
+    seed: u64,
+    /// Whether the pedal is released now and then in its drives.
+    pub(crate) releases: bool,
     draw: Draw,
 }
 
@@ -164,6 +167,7 @@ impl TestCar {
         }
         truth.push((Parameter::CommandDelay, valve_late_s / 0.01));
         truth.push((Parameter::Hysteresis, 0.0));
+        truth.extend([(Parameter::Rolling, 0.0), (Parameter::Air, 0.0)]);
         sensors.output.delay_s = draw.between(0.0, 0.01);
         sensors.engine.delay_s = draw.between(0.0, 0.01);
         sensors.wheel.delay_s = draw.between(0.0, 0.03);
@@ -185,8 +189,19 @@ impl TestCar {
         if file.oncoming.has_stroke {
             fill = draw_fill(&mut car.oncoming, &mut more);
         }
-        let mut drawn =
-            Self { file, car, sensors, truth, torque_signal_scale, pressure_scale, pressure_late_s, fill, draw };
+        let mut drawn = Self {
+            file,
+            car,
+            sensors,
+            truth,
+            torque_signal_scale,
+            pressure_scale,
+            pressure_late_s,
+            fill,
+            seed,
+            releases: false,
+            draw,
+        };
         drawn.tell_maps();
         drawn
     }
@@ -401,6 +416,97 @@ impl TestCar {
             torque_n_m: series(signal::ONCOMING_TORQUE, whole),
             pressure_pa: series(signal::ONCOMING_PRESSURE, whole),
         })
+    }
+}
+
+/// A part of a drive: the throttle goes to and fro.
+const PART_S: f64 = 60.0;
+
+impl TestCar {
+    /// Gives the car another rolling resistance and air drag than the file has.
+    pub(crate) fn on_another_road(mut self) -> Self {
+        let mut draw = Draw::new(!self.sensors.seed ^ self.seed << 32);
+        let [rolling, air] = [0.3, 0.2].map(|share| draw.factor(share));
+        self.car.road.rolling_moment_n_m *= rolling;
+        self.car.road.drag_coefficient *= air;
+        self.truth.retain(|(parameter, _)| !matches!(parameter, Parameter::Rolling | Parameter::Air));
+        self.truth.extend([(Parameter::Rolling, rolling.ln()), (Parameter::Air, air.ln())]);
+        self
+    }
+
+    /// Gives the car a backlash of its own, of up to 0.08 rad, and releases the pedal now and then in its drives.
+    pub(crate) fn with_reversals(mut self) -> Self {
+        let mut draw = Draw::new(self.seed ^ 0xbac_0000);
+        self.car.backlash_rad = draw.between(0.0, 0.08);
+        self.releases = true;
+        self
+    }
+
+    /// A log of so many parts of a minute each, on roads of other grades, with a shift in each; all with one mass of the car.
+    pub(crate) fn driven(&self, parts: u32) -> Trace {
+        self.driven_with(parts, |_, _| ())
+    }
+
+    /// The same, where the car is changed in each part.
+    pub(crate) fn driven_with(&self, parts: u32, change: impl Fn(u32, &mut Vehicle)) -> Trace {
+        let mut draw = Draw::new(self.seed ^ 0xd0d0);
+        let mass = draw.factor(0.06);
+        let mut log: Option<Trace> = None;
+        for part in 0..parts {
+            let mut experiment = Experiment::e1().unwrap();
+            let times: Vec<f64> = (0..20).map(|at| PART_S / 20.0 * (f64::from(at) + draw.between(0.0, 0.5))).collect();
+            let releases = |at: usize| self.releases && at >= 10 && at % 4 < 2;
+            let position = |at: usize| if releases(at) { 0.0 } else { draw.between(0.08, 0.5) };
+            let positions: Vec<f64> = (0..times.len()).map(position).collect();
+            experiment.throttle = Table1::new(&times, &positions).unwrap();
+            experiment.initial_vehicle_m_s = draw.between(4.0, 8.0);
+            experiment.initial_engine_rad_s = 30.0 * experiment.initial_vehicle_m_s;
+            experiment.shift.request_s = draw.between(2.0, 12.0);
+            experiment.duration_s = PART_S;
+            let mut car = self.car.clone();
+            car.road.mass_kg *= mass;
+            car.road.grade_rad = draw.between(-0.03, 0.03);
+            change(part, &mut car);
+            let whole = study::simulate_drive(&car, &experiment).unwrap();
+            let sensors = Sensors { seed: self.sensors.seed + 1000 + u64::from(part), ..self.sensors };
+            let read = through_sensors(&whole, 0.01, &sensors, &self.file);
+            append(&mut log, read, (PART_S + 10.0) * f64::from(part));
+        }
+        let mut log = log.unwrap();
+        log.columns.retain(|column| LOGGED.contains(&column.name.as_str()));
+        log
+    }
+
+    /// What a fit collects of a log.
+    pub(crate) fn collected(&self, log: &Trace, name: &str) -> fit::Collected {
+        let path = std::env::temp_dir().join(format!("fit_{name}_{}_{}.csv", self.seed, std::process::id()));
+        trace::write_csv(&path, log).unwrap();
+        let collected = fit::collect(&path, &logs::ChannelMap::default(), &self.file);
+        std::fs::remove_file(&path).unwrap();
+        collected.unwrap()
+    }
+}
+
+/// Channels of a log.
+const LOGGED: [&str; 7] = [
+    signal::VEHICLE_SPEED,
+    signal::ENGINE_SPEED,
+    signal::TURBINE_SPEED,
+    signal::OUTPUT_SPEED,
+    signal::WHEEL_SPEED,
+    signal::ONCOMING_CURRENT,
+    signal::OFFGOING_CURRENT,
+];
+
+/// Appends a trace that begins at a time.
+fn append(log: &mut Option<Trace>, mut more: Trace, begin_s: f64) {
+    more.time_s.iter_mut().for_each(|time_s| *time_s += begin_s);
+    let Some(log) = log else { return *log = Some(more) };
+    log.time_s.extend(&more.time_s);
+    for (column, more) in log.columns.iter_mut().zip(more.columns) {
+        if let (trace::Values::Numbers(values), trace::Values::Numbers(more)) = (&mut column.values, more.values) {
+            values.extend(more);
+        }
     }
 }
 

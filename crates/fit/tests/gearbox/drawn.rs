@@ -46,6 +46,8 @@ const GRADE_RAD: f64 = 0.03;
 const MEAN_GRADE_RAD: f64 = 0.008;
 /// Sets random numbers of their own apart from those of the others.
 const ROAD_STREAM: u64 = 0x2545_f491_4f6c_dd1d;
+/// Sets the random number of the backlash apart from those of the others.
+const BACKLASH_STREAM: u64 = 0x9e37_79b9_7f4a_7c15;
 /// Sets the random numbers of the valves' timing apart from those of the others.
 const TIMING_STREAM: u64 = 0x5bf0_3635_dab2_c9e1;
 /// Time between two rows, s.
@@ -223,6 +225,12 @@ impl Drawn {
         let bounds = &mut self.file.error_bounds.elements;
         bounds.resize(self.file.clutches.len(), Default::default());
         bounds.iter_mut().for_each(|own| own.valve_hysteresis_pa = Some(0.0));
+        self
+    }
+
+    /// With a backlash of its own, of up to 0.08 rad at the wheels.
+    pub(crate) fn with_backlash(mut self) -> Self {
+        self.truth.backlash_rad = 0.08 * Random(self.seed ^ BACKLASH_STREAM).uniform();
         self
     }
 

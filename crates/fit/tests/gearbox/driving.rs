@@ -102,12 +102,17 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
     }
 }
 
-/// A mass that is known to a percent makes the common factor of all torques known better.
+/// A mass that is known to a percent makes the common factor of all torques known better. The reversals of the torque in town tell the backlash.
 #[test]
-fn a_weighed_car_tells_the_common_factor_of_all_torques() {
-    let drawn = Drawn::of(car("eight_speed.toml"), 23, Case::Usual);
+fn a_weighed_car_tells_the_common_factor_of_all_torques_and_reversals_the_backlash() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 23, Case::Usual).with_backlash();
     let (recorded, _) = drawn.driven(&hilly(&city(2), 23));
     let usual = fitted(&drawn, &recorded);
+    let backlash = usual.backlash.clone().unwrap();
+    let error = backlash.rad - drawn.truth.backlash_rad;
+    assert!(error.abs() < 2.0 * backlash.sd_rad && backlash.sd_rad < 0.006, "{error} {backlash:?}");
+    let file = usual.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+    assert!((file.backlash_rad - backlash.rad).abs() < 1e-4, "{}", file.backlash_rad);
     let drawn = drawn.weighed();
     let fits = [usual, fitted(&drawn, &recorded)];
     // A normal distribution of mass and factor given a mass: by their covariance in the first fit the factor follows the mass, and the rest stays.

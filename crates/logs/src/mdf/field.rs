@@ -307,20 +307,22 @@ fn is_by_text(channel: &MdfChannel) -> bool {
 #[cfg(test)]
 mod tests {
     use std::fs::File;
-    use std::sync::Mutex;
+    use std::sync::Arc;
 
     use falcon_mdf::write::WriteCodec;
     use falcon_mdf::{Mf4File, Mf4Writer, SignalValues};
     use rand_pcg::Pcg64Mcg;
     use rand_pcg::rand_core::{Rng, SeedableRng};
 
+    use super::super::blocks::Blocks;
     use super::super::group::numbers;
     use super::super::records::Records;
     use super::*;
+    use crate::ahead::Crew;
     use crate::columns::Memory;
 
     /// Records of a time and sixteen random bytes.
-    fn random(codec: Option<WriteCodec>) -> (Mf4File, Mutex<File>) {
+    fn random(codec: Option<WriteCodec>) -> (Mf4File, Arc<Blocks>) {
         let mut generator = Pcg64Mcg::seed_from_u64(7);
         let times: Vec<f64> = (0..3 * TILE + 5).map(|i| i as f64).collect();
         let mut writer = Mf4Writer::new();
@@ -333,7 +335,7 @@ mod tests {
         }
         let path = std::env::temp_dir().join(format!("wetclutch-fields-{}.mf4", std::process::id()));
         writer.write_to_file(&path).unwrap();
-        let open = (Mf4File::open(&path).unwrap(), Mutex::new(File::open(&path).unwrap()));
+        let open = (Mf4File::open(&path).unwrap(), Arc::new(Blocks::new(File::open(&path).unwrap())));
         let _ = std::fs::remove_file(path);
         open
     }
@@ -348,6 +350,7 @@ mod tests {
         ];
         let mut generator = Pcg64Mcg::seed_from_u64(8);
         let mut tile = Tile::new();
+        let crew = Crew::of(1);
         for codec in [None, Some(WriteCodec::Deflate), Some(WriteCodec::TransposedDeflate)] {
             let (file, blocks) = random(codec);
             let data = &file.data_groups()[0];
@@ -363,7 +366,7 @@ mod tests {
                 channel.byte_offset = generator.next_u32() % 24;
                 channel.conversion = conversions[case / 6 % 3].clone();
                 let Some(field) = Field::of(&channel, group, 0) else { continue };
-                let mut records = Records::of(&blocks, data, group).unwrap();
+                let mut records = Records::of(&blocks, &crew, data, group).unwrap();
                 let (mut memory, mut found) = (Memory::default(), Vec::new());
                 // Some records at once, of which the last are fewer.
                 loop {

@@ -49,7 +49,7 @@ impl<'a> Part<'a> {
         let (data, group) = log.group(at);
         let id_bytes = Records::id_bytes(data);
         let fields = channels.map(|channel| Field::of(channel, group, id_bytes)).collect::<Option<_>>()?;
-        Some(Self { records: Records::of(&log.blocks, data, group)?, fields })
+        Some(Self { records: Records::of(&log.blocks, &log.crew, data, group)?, fields })
     }
 }
 

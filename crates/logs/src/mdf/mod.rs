@@ -3,6 +3,7 @@
 //! `falcon_mdf` reads the structure of a file. Plain numbers in deflated or unpacked blocks are decoded here, column by column;
 //! what is rarer is decoded by the library.
 
+mod blocks;
 mod bus;
 mod field;
 mod group;
@@ -12,13 +13,15 @@ mod times;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::Arc;
 
 use falcon_mdf::{Channel as MdfChannel, ChannelGroup, DataGroup, Mf4Error, Mf4File, OpenOptions};
 
+use crate::ahead::Crew;
 use crate::can::{Database, Decoder};
 use crate::columns::{Batch, Stream};
 use crate::{Channel, LogError, error};
+use blocks::Blocks;
 use bus::Bus;
 use field::{Field, Tile};
 use group::{Decoding, Group, Part};
@@ -40,7 +43,9 @@ pub(crate) struct MdfLog {
     path: PathBuf,
     file: Mf4File,
     /// The same, for blocks of data.
-    blocks: Mutex<File>,
+    blocks: Arc<Blocks>,
+    /// Who unpacks them.
+    crew: Crew,
     /// How many groups have each name.
     names: HashMap<String, usize>,
     places: Vec<Place>,
@@ -67,11 +72,11 @@ impl MdfLog {
             ..OpenOptions::default()
         };
         let file = Mf4File::open_with_options(path, options).map_err(|error| damaged(path, "its structure", &error))?;
-        let blocks = Mutex::new(File::open(path).map_err(LogError::io(path))?);
+        let blocks = Arc::new(Blocks::new(File::open(path).map_err(LogError::io(path))?));
         let mut names = HashMap::new();
         groups(&file).for_each(|(_, group)| *names.entry(group.acquisition_name.clone()).or_default() += 1);
         let (path, places, notes) = (path.to_owned(), Vec::new(), Vec::new());
-        let mut log = Self { path, file, blocks, names, places, database, notes };
+        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, notes };
         let mut channels = log.find_channels();
         if log.file.unfinalized().is_some() {
             log.notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
@@ -130,25 +135,35 @@ impl MdfLog {
         format!("MDF {}", self.file.version())
     }
 
-    pub(crate) fn streams(&mut self, wanted: &[bool]) -> Result<Vec<Box<dyn Stream + Send + '_>>, LogError> {
-        let log: &Self = self;
+    /// Lets these threads unpack blocks ahead.
+    pub(crate) fn unpack_with(&mut self, crew: Crew) {
+        self.crew = crew;
+    }
+
+    pub(crate) fn crew(&self) -> &Crew {
+        &self.crew
+    }
+
+    pub(crate) fn streams(&self, wanted: &[bool]) -> Result<Vec<Box<dyn Stream + Send + '_>>, LogError> {
         let mut over: BTreeMap<GroupAt, BTreeMap<GroupAt, Vec<usize>>> = BTreeMap::new();
-        for (i, place) in log.places.iter().enumerate().filter(|(i, _)| wanted[*i]) {
+        for (i, place) in self.places.iter().enumerate().filter(|(i, _)| wanted[*i]) {
             over.entry(place.time).or_default().entry(place.group).or_default().push(i);
         }
         let mut streams: Vec<Box<dyn Stream + Send + '_>> = Vec::new();
         for (time, groups) in over {
-            streams.extend(log.streams_over(time, groups)?.into_iter().map(|group| Box::new(group) as Box<_>));
+            streams.extend(self.streams_over(time, groups)?.into_iter().map(|group| Box::new(group) as Box<_>));
         }
-        let own = log.places.len();
-        if let Some(database) = log.database.as_ref().filter(|_| wanted.len() > own) {
-            for group in log.file.can_frame_groups() {
-                let frames =
-                    log.file.can_frames(group).map_err(|error| damaged(&log.path, "the frames of its bus", &error))?;
+        let own = self.places.len();
+        if let Some(database) = self.database.as_ref().filter(|_| wanted.len() > own) {
+            for group in self.file.can_frame_groups() {
+                let frames = self
+                    .file
+                    .can_frames(group)
+                    .map_err(|error| damaged(&self.path, "the frames of its bus", &error))?;
                 streams.push(Box::new(Bus::new(frames, Decoder::new(database, &wanted[own..]), own)));
             }
         }
-        streams.push(Box::new(Remarks(&log.notes)));
+        streams.push(Box::new(Remarks(&self.notes)));
         Ok(streams)
     }
 

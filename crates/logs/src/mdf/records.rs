@@ -1,23 +1,21 @@
 //! The records of a channel group: its blocks of data, one after the other, unpacked.
 
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
-use std::sync::{Mutex, PoisonError};
+use std::collections::VecDeque;
+use std::sync::Arc;
 
 use falcon_mdf::blocks::data_block::CompressionType;
 use falcon_mdf::data_index::DataBlockInfo;
 use falcon_mdf::{ChannelGroup, DataGroup};
-use libdeflater::{DecompressionError, Decompressor};
 
-use super::{LARGEST_BLOCK, ON_TRUST};
+use super::ON_TRUST;
+use super::blocks::{Ahead, Blocks, Packed, can_unpack, in_rows};
+use crate::ahead::Crew;
 use crate::columns::Memory;
 
 /// Bytes of a block that is not packed that are read at once.
 const READ_AT_ONCE: usize = 4 << 20;
 /// Bytes of the head of a block.
 const HEAD: u64 = 24;
-/// Deflate makes at most so many bytes of one.
-const MOST_FROM_A_BYTE: u64 = 1032;
 
 /// Some records that follow each other.
 #[derive(Debug, Clone, Copy)]
@@ -106,14 +104,16 @@ struct Mixed {
 
 /// The records of a group, read block by block.
 pub(super) struct Records<'a> {
-    file: &'a Mutex<File>,
+    file: &'a Arc<Blocks>,
+    crew: &'a Crew,
     blocks: &'a [DataBlockInfo],
+    /// Those of them that are unpacked ahead, each at its place.
+    ahead: VecDeque<Option<Ahead>>,
     /// Bytes of the first of them that were read: it is not packed, and long.
     read: usize,
     layout: Layout,
     /// Bytes of a record.
     size: usize,
-    inflater: Decompressor,
     /// Of what was unpacked: its bytes, the records in it, whether they stand in planes, and how many were given.
     length: usize,
     held: usize,
@@ -134,7 +134,7 @@ impl<'a> Records<'a> {
     }
 
     /// The records of a group; none where its blocks are in a form that the library must read.
-    pub(super) fn of(file: &'a Mutex<File>, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
+    pub(super) fn of(file: &'a Arc<Blocks>, crew: &'a Crew, data: &'a DataGroup, group: &ChannelGroup) -> Option<Self> {
         let blocks = data.block_index().blocks();
         let id_bytes = data.rec_id_size();
         let (layout, size) = if data.is_unsorted() {
@@ -148,11 +148,12 @@ impl<'a> Records<'a> {
         };
         (size > 0 && blocks.iter().all(can_unpack)).then(|| Self {
             file,
+            crew,
             blocks,
+            ahead: VecDeque::new(),
             read: 0,
             layout,
             size,
-            inflater: Decompressor::new(),
             length: 0,
             held: 0,
             is_planes: false,
@@ -202,66 +203,105 @@ impl<'a> Records<'a> {
     }
 
     /// Reads the next bytes and finds the records in them; false at the end.
-    fn next_block(&mut self, Memory { packed, unpacked }: &mut Memory) -> Result<bool, String> {
-        let Some((block, others)) = self.blocks.split_first() else { return Ok(false) };
+    fn next_block(&mut self, memory: &mut Memory) -> Result<bool, String> {
+        let Some(block) = self.blocks.first() else { return Ok(false) };
         (self.given, self.held, self.is_planes) = (0, 0, false);
         let place = |message: String| format!("block at byte {}: {message}", block.offset);
         if let Some(invalid) = block.invalidation_block.as_deref() {
             let data = self.whole(block).map_err(place)?;
             let invalid =
                 self.whole(invalid).map_err(|message| format!("block at byte {}: {message}", invalid.offset))?;
-            self.blocks = others;
-            self.divide(&side_by_side(block, &data, &invalid), unpacked);
+            self.go_on();
+            self.divide(&side_by_side(block, &data, &invalid), &mut memory.unpacked);
             return Ok(true);
         }
-        match block.compression {
+        match Packed::of(block) {
+            Some(packed) => {
+                self.length = self.unpack(packed, memory).map_err(place)?;
+                self.go_on();
+                self.find_in(block, memory).map_err(place)?;
+            }
             None => {
                 let size = usize::try_from(block.original_size).unwrap_or(usize::MAX);
                 let length = (size - self.read).min(READ_AT_ONCE);
-                read(self.file, block.offset + HEAD + self.read as u64, length as u64, packed).map_err(place)?;
+                let at = block.offset + HEAD + self.read as u64;
+                self.file.read(at, length as u64, &mut memory.packed).map_err(place)?;
                 self.read += length;
                 if self.read == size {
-                    (self.read, self.blocks) = (0, others);
+                    self.read = 0;
+                    self.go_on();
                 }
-                self.divide(packed, unpacked);
-            }
-            Some(with) => {
-                read(self.file, with.data_offset, block.compressed_size, packed).map_err(place)?;
-                self.length = inflate(&mut self.inflater, packed, block.original_size, unpacked).map_err(place)?;
-                self.blocks = others;
-                let columns = with.parameter as usize;
-                let is_transposed = with.algorithm == CompressionType::TransposedDeflate;
-                let is_as_it_stands = self.rest.is_empty() && matches!(self.layout, Layout::Sorted);
-                let bytes = &unpacked[..self.length];
-                if is_as_it_stands && (!is_transposed || columns == self.size) {
-                    (self.is_planes, self.held) = (is_transposed, self.length / self.size);
-                    self.rest.extend_from_slice(&bytes[self.held * self.size..]);
-                } else if is_transposed {
-                    let rows = in_rows(bytes, columns).map_err(place)?;
-                    self.divide(&rows, unpacked);
-                } else {
-                    packed.clear();
-                    packed.extend_from_slice(bytes);
-                    self.divide(packed, unpacked);
-                }
+                self.divide(&memory.packed, &mut memory.unpacked);
             }
         }
         Ok(true)
     }
 
+    /// Goes on to the next block.
+    fn go_on(&mut self) {
+        self.blocks = self.blocks.get(1..).unwrap_or_default();
+        self.ahead.pop_front();
+    }
+
+    /// Unpacks the first block, here or from where it was unpacked ahead, and lets others unpack the next ones; its bytes.
+    fn unpack(&mut self, block: Packed, memory: &mut Memory) -> Result<usize, String> {
+        if self.ahead.is_empty() {
+            self.ahead.push_back(None);
+        }
+        while self.ahead.len() <= self.crew.ahead()
+            && let Some(next) = self.blocks.get(self.ahead.len())
+        {
+            let next = Packed::of(next).filter(|_| next.invalidation_block.is_none());
+            self.ahead.push_back(next.and_then(|next| Ahead::order(self.file, self.crew, next)));
+        }
+        match self.ahead.pop_front().flatten() {
+            Some(own) => {
+                let others = || self.ahead.iter().flatten().any(Ahead::run);
+                let length = own.result(memory, others);
+                self.ahead.push_front(None);
+                length
+            }
+            None => {
+                self.ahead.push_front(None);
+                self.file.unpack(block, memory)
+            }
+        }
+    }
+
+    /// Finds the records in a block that was unpacked.
+    fn find_in(&mut self, block: &DataBlockInfo, Memory { packed, unpacked }: &mut Memory) -> Result<(), String> {
+        let with = block.compression;
+        let is_transposed = with.is_some_and(|with| with.algorithm == CompressionType::TransposedDeflate);
+        let columns = with.map_or(0, |with| with.parameter as usize);
+        let is_as_it_stands = self.rest.is_empty() && matches!(self.layout, Layout::Sorted);
+        let bytes = &unpacked[..self.length];
+        if is_as_it_stands && (!is_transposed || columns == self.size) {
+            (self.is_planes, self.held) = (is_transposed, self.length / self.size);
+            self.rest.extend_from_slice(&bytes[self.held * self.size..]);
+        } else if is_transposed {
+            self.divide(&in_rows(bytes, columns)?, unpacked);
+        } else {
+            packed.clear();
+            packed.extend_from_slice(bytes);
+            self.divide(packed, unpacked);
+        }
+        Ok(())
+    }
+
     /// The bytes of a block, unpacked and row by row.
-    fn whole(&mut self, block: &DataBlockInfo) -> Result<Vec<u8>, String> {
-        let (mut packed, mut bytes) = (Vec::new(), Vec::new());
-        let Some(with) = block.compression else {
-            read(self.file, block.offset + HEAD, block.original_size, &mut bytes)?;
-            return Ok(bytes);
+    fn whole(&self, block: &DataBlockInfo) -> Result<Vec<u8>, String> {
+        let mut memory = Memory::default();
+        let Some(packed) = Packed::of(block) else {
+            self.file.read(block.offset + HEAD, block.original_size, &mut memory.unpacked)?;
+            return Ok(memory.unpacked);
         };
-        read(self.file, with.data_offset, block.compressed_size, &mut packed)?;
-        let length = inflate(&mut self.inflater, &packed, block.original_size, &mut bytes)?;
-        bytes.truncate(length);
-        match with.algorithm {
-            CompressionType::TransposedDeflate => in_rows(&bytes, with.parameter as usize),
-            _ => Ok(bytes),
+        let length = self.file.unpack(packed, &mut memory)?;
+        memory.unpacked.truncate(length);
+        match block.compression {
+            Some(with) if with.algorithm == CompressionType::TransposedDeflate => {
+                in_rows(&memory.unpacked, with.parameter as usize)
+            }
+            _ => Ok(memory.unpacked),
         }
     }
 
@@ -315,67 +355,6 @@ impl Mixed {
         }
         (at, None)
     }
-}
-
-/// Whether a block is not packed, or deflated.
-fn can_unpack(block: &DataBlockInfo) -> bool {
-    let is_known = |algorithm| matches!(algorithm, CompressionType::Deflate | CompressionType::TransposedDeflate);
-    block.compression.is_none_or(|with| is_known(with.algorithm))
-        && block.invalidation_block.as_deref().is_none_or(can_unpack)
-}
-
-/// Reads bytes of the file, in place of what is in `bytes`.
-fn read(file: &Mutex<File>, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), String> {
-    let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-    let of_file = file.metadata().map_err(|error| error.to_string())?.len();
-    let end = at.checked_add(length).filter(|end| *end <= of_file);
-    end.ok_or_else(|| format!("it goes on past the end of the file, byte {of_file}"))?;
-    if length > LARGEST_BLOCK {
-        return Err(format!("it has {length} packed bytes, expected at most {LARGEST_BLOCK}"));
-    }
-    let length = usize::try_from(length).map_err(|error| error.to_string())?;
-    bytes.resize(length, 0);
-    file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(bytes)).map_err(|error| error.to_string())
-}
-
-/// Unpacks a block to the beginning of the memory; its bytes.
-fn inflate(inflater: &mut Decompressor, packed: &[u8], size: u64, memory: &mut Vec<u8>) -> Result<usize, String> {
-    let most = LARGEST_BLOCK.min((packed.len() as u64).saturating_mul(MOST_FROM_A_BYTE));
-    if size > most {
-        return Err(format!("it says that it unpacks to {size} bytes, expected at most {most}"));
-    }
-    let size = usize::try_from(size).map_err(|error| error.to_string())?;
-    if memory.len() < size {
-        // Fresh memory is zero already.
-        *memory = vec![0; size];
-    }
-    match inflater.zlib_decompress(packed, &mut memory[..size]) {
-        Ok(unpacked) if unpacked == size => Ok(size),
-        Ok(unpacked) => Err(format!("it unpacks to {unpacked} bytes, and says {size}")),
-        Err(DecompressionError::BadData) => Err("what is packed in it is damaged".to_owned()),
-        Err(DecompressionError::InsufficientSpace) => {
-            Err(format!("it unpacks to more than the {size} bytes that it says"))
-        }
-    }
-}
-
-/// The bytes of a transposed block row by row; what is less than a row stands behind them.
-fn in_rows(transposed: &[u8], columns: usize) -> Result<Vec<u8>, String> {
-    let rows = transposed.len().checked_div(columns).ok_or("it has no columns")?;
-    let (planes, tail) = transposed.split_at(rows * columns);
-    let mut bytes = vec![0; planes.len()];
-    if rows > 0 {
-        // Rows that stay in the cache while all their columns are filled.
-        let at_once = (16_usize << 10).div_ceil(columns);
-        for (part, rows_of_part) in bytes.chunks_mut(at_once * columns).enumerate() {
-            for (column, plane) in planes.chunks_exact(rows).enumerate() {
-                let places = rows_of_part[column..].iter_mut().step_by(columns);
-                places.zip(&plane[part * at_once..]).for_each(|(place, byte)| *place = *byte);
-            }
-        }
-    }
-    bytes.extend_from_slice(tail);
-    Ok(bytes)
 }
 
 /// Records of which a block and the one with its invalidation bits hold a part each.

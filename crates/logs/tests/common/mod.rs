@@ -17,7 +17,16 @@ pub(crate) fn with_dbc() -> OpenOptions {
 
 /// Every sample of a log, and its notes.
 pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<(Log, Vec<Sample>, Vec<String>), LogError> {
-    let mut log = Log::open(path, options)?;
+    read_on(path, options, 1)
+}
+
+/// The same, read on so many threads.
+pub(crate) fn read_on(
+    path: &Path,
+    options: &OpenOptions,
+    threads: usize,
+) -> Result<(Log, Vec<Sample>, Vec<String>), LogError> {
+    let mut log = Log::open(path, options)?.on_threads(threads);
     let all: Vec<usize> = (0..log.channels().len()).collect();
     let mut samples = log.samples(&all)?;
     let mut read = Vec::new();

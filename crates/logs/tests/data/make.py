@@ -77,6 +77,9 @@ def mdf():
             file.append(group, acq_name="fast" if len(group) == 1 else "slow", common_timebase=True)
         file.save(HERE / "deflate.mf4", overwrite=True, compression=1)
         file.save(HERE / "transposed.mf4", overwrite=True, compression=2)
+        # Groups in several blocks each, as they are from 4 MiB on.
+        file.configure(write_fragment_size=128)
+        file.save(HERE / "blocks.mf4", overwrite=True, compression=2)
         for name, algorithm in [("zstd", v4c.CompressionAlgorithm.TRANSPOSED_ZSTD), ("lz4", v4c.CompressionAlgorithm.LZ4)]:
             file.save(HERE / f"{name}.mf4", overwrite=True, compression=algorithm)
     with MDF(version="4.10") as file:
@@ -232,6 +235,7 @@ def parquet():
     pq.write_table(table, HERE / "snappy.parquet", row_group_size=16)
     pq.write_table(table, HERE / "gzip.parquet", compression="gzip", use_dictionary=False, data_page_version="2.0")
     pq.write_table(table, HERE / "lz4.parquet", compression="lz4")
+    pq.write_table(table.slice(0, 3), HERE / "brotli.parquet", compression="brotli")
     # Zstandard is what polars takes by itself.
     pq.write_table(table, HERE / "zstd.parquet", compression="zstd")
     pq.write_table(table.slice(0, 0), HERE / "no_rows.parquet")

@@ -3,6 +3,7 @@
 use drivetrain::Real;
 
 use super::elements::{ElementState, PressureError};
+use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::{
     AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE, SHARE,
@@ -93,6 +94,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         input: &ShiftInput<T>,
         (channels, commands): (&Channels<ChannelHealth>, &[ChannelHealth; MAX_ELEMENTS]),
         mut health: Health,
+        turbine_n_m: Option<T>,
     ) -> ShiftEstimate<T> {
         let refused = channels.each().contains(&ChannelHealth::Refused);
         let lost = channels.each().contains(&ChannelHealth::Lost);
@@ -146,7 +148,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                             [0, 1].map(|c| {
                                 let clutch = &shift.clutches[c];
                                 let lasting = [learnt[c], learnt[c + 2]];
-                                let estimate = self.by_valve(&state.elements, clutch, then, lasting);
+                                let slip = self.slip(clutch.ratio, then);
+                                let direction = Self::direction_by_valve(&slip, turbine_n_m);
+                                let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
                                 self.in_range(estimate, &state.elements, clutch, &state.newest)
                             })
                         },
@@ -166,21 +170,30 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if away && slip.is_over() { slip.value.abs() } else { T::zero() }
     }
 
-    /// A clutch by its valve model and what is learnt of it, where the speeds cannot be used.
+    /// In which direction a clutch carries where the speeds cannot be used: that of its slip, and where none is seen that of the load.
+    /// The sign of a slip below the noise of the speeds would change from step to step.
+    fn direction_by_valve(slip: &Slip<T>, turbine_n_m: Option<T>) -> T {
+        match turbine_n_m {
+            Some(load) if !slip.is_over() => load.signum(),
+            _ => slip.value.signum(),
+        }
+    }
+
+    /// A clutch by its valve model and what is learnt of it, where the speeds cannot be used; `slip` is the slip at the turbine and the
+    /// direction of the torque.
     fn by_valve(
         &self,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
         clutch: &ShiftClutch<T>,
-        speeds: [T; 2],
+        slip: [T; 2],
         [f, k]: [T; 2],
     ) -> ClutchEstimate<T> {
-        let (u, slip) = (&self.uncertainty, self.slip(clutch.ratio, speeds));
+        let u = &self.uncertainty;
         let zero = T::zero();
         let (torque, valve_pa, gain, both) =
             self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
                 let (memory, element) = found;
-                let torque =
-                    memory.torque(element, clutch, u, [slip.value, slip.direction()], &PressureError::unseen(k));
+                let torque = memory.torque(element, clutch, u, slip, &PressureError::unseen(k));
                 (torque, memory.pressure_pa(), u.gain_error(element, f, k), u.correlation_in_shift(element))
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
@@ -209,7 +222,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (c, clutch) = (c.min(1), &shift.clutches[c.min(1)]);
         let Some(torques) = running.torques else {
             let lasting = [x.mean[FRICTION[c]], x.mean[KISS[c]]];
-            return self.by_valve(elements, clutch, [x.mean[0], x.mean[1]], lasting);
+            let slip = self.slip(clutch.ratio, [x.mean[0], x.mean[1]]);
+            return self.by_valve(elements, clutch, [slip.value, slip.direction()], lasting);
         };
         let own = torques.clutches[c];
         let holds = running.phase.phase.holding() == Some(c);

@@ -383,7 +383,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         health = health.max(self.settle(state, input, torque.as_ref()));
-        self.conclude(state, input, (&channels, &commands), health)
+        let turbine_n_m = torque.map(|torque| torque.turbine_n_m);
+        self.conclude(state, input, (&channels, &commands), health, turbine_n_m)
     }
 
     fn reject_time(&self, state: &mut AnyShiftState<T>) {

@@ -63,7 +63,7 @@ impl<T: Real> KalmanFilter<T> {
     /// Whether a flare lasts for longer than one wrong reading can show it.
     #[inline]
     pub(super) fn is_flare(&self, running: &Running<T>) -> bool {
-        running.flares_s > self.supervisor.lock_hold_s + T::of(FRESH_S)
+        self.supervisor.is_held_longer(running.flares_s, T::of(FRESH_S))
     }
 
     /// Whether the turbine runs away from the old gear in the direction of its torque.
@@ -81,7 +81,9 @@ impl<T: Real> KalmanFilter<T> {
         let forward = running.direction * slip;
         let least = self.supervisor.lock_slip_rad_s;
         running.turned_s = if forward < -least { running.turned_s + dt_s } else { T::zero() };
-        if running.turned_s > self.supervisor.lock_hold_s || phase == Phase::BeforeShift && forward < -least {
+        if self.supervisor.is_held_longer(running.turned_s, T::zero())
+            || phase == Phase::BeforeShift && forward < -least
+        {
             running.direction = -running.direction;
             running.turned_s = T::zero();
         }

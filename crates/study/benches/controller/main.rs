@@ -7,7 +7,7 @@
 //! - the counting is off: a loop of known length is counted with the steps;
 //! - an estimate on the controller is another than that of the same code here;
 //! - a routine for double precision is in the program of a step (`embedded/src/bin`);
-//! - a mean is more than 5 % above that in `controller.toml`. After a change that is meant, or with a new compiler, `-- --write`
+//! - a mean or a size is more than 5 % above that in `controller.toml`. After a change that is meant, or with a new compiler, `-- --write`
 //!   renews the file.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "a benchmark")]
@@ -23,6 +23,9 @@ use std::process::{Command, ExitCode};
 use cases::{Case, cases};
 use counts::Counts;
 
+/// What is counted.
+const INSTRUCTIONS: &str = "instructions";
+const BYTES: &str = "bytes";
 /// Highest pressure of the supply, Pa.
 const HIGHEST_PA: f32 = 1.2e6;
 /// Largest difference of an estimate here and there, Pa. Both are the same code in single precision, but for the routines of the
@@ -65,7 +68,7 @@ fn said(command: &mut Command) -> Result<String, String> {
 fn check(write: bool) -> Result<bool, String> {
     let toolchain = said(Command::new("rustc").arg("--version"))?.trim().to_owned();
     let mut counts = Counts::new("controller", toolchain, write)?;
-    let mut sound = programs::check()?;
+    let mut sound = programs::check(&mut counts)?;
     let program = programs::build("embedded/count/Cargo.toml")?.join("count");
     println!("\n{:>8} {:>8} {:>8}  instructions of a step: mean, worst, against the file", "mean", "worst", "");
     for case in cases() {
@@ -77,8 +80,11 @@ fn check(write: bool) -> Result<bool, String> {
             run.bytes[0],
             run.bytes[1]
         );
+        for (what, bytes) in ["parameters", "state"].into_iter().zip(run.bytes) {
+            counts.take(BYTES, &format!("{}: {what}", case.name), bytes);
+        }
         for (part, steps) in &run.parts {
-            let change = counts.take(&format!("{}: {part}", case.name), steps.mean);
+            let change = counts.take(INSTRUCTIONS, &format!("{}: {part}", case.name), steps.mean);
             println!("{:>8} {:>8} {change:>8}  {part}", steps.mean, steps.worst);
         }
         sound &= faithful(&case, &run);

@@ -5,7 +5,8 @@ use std::process::Command;
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
-use crate::{root, said};
+use crate::counts::Counts;
+use crate::{BYTES, root, said};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// The programs of a step that are looked into, with what they are called in the table.
@@ -32,13 +33,14 @@ pub(crate) fn build(manifest: &str) -> Result<PathBuf, String> {
 }
 
 /// Builds the programs of a step, prints their size, and looks for routines for double precision in all of them.
-pub(crate) fn check() -> Result<bool, String> {
+pub(crate) fn check(counts: &mut Counts) -> Result<bool, String> {
     let folder = build("embedded/Cargo.toml")?;
     let mut sound = true;
-    println!("   bytes  code and constants of `start` and `step`");
+    println!("   bytes          code and constants of `start` and `step`, against the file");
     for (program, name) in STEPS {
         let (bytes, doubles) = look_into(&folder.join(program))?;
-        println!("{bytes:>8}  {name}");
+        let change = counts.take(BYTES, &format!("{name}: code and constants"), bytes);
+        println!("{bytes:>8} {change:>8}  {name}");
         if !doubles.is_empty() {
             println!("routines for double precision in \"{program}\": {}", doubles.join(", "));
             sound = false;

@@ -1,4 +1,4 @@
-//! Counts of instructions, against those that were kept in a file.
+//! Counts of instructions and bytes, against those that were kept in a file.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,8 +13,12 @@ const TOLERANCE: f64 = 0.05;
 #[derive(Deserialize)]
 struct Kept {
     toolchain: String,
-    instructions: BTreeMap<String, u64>,
+    #[serde(flatten)]
+    counts: ByUnit,
 }
+
+/// Counts by their unit, which names a table of the file, then by what was counted.
+type ByUnit = BTreeMap<String, BTreeMap<String, u64>>;
 
 /// The counts of a benchmark.
 pub(crate) struct Counts {
@@ -22,7 +26,7 @@ pub(crate) struct Counts {
     toolchain: String,
     /// None where the file is to be renewed.
     kept: Option<Kept>,
-    found: BTreeMap<String, u64>,
+    found: ByUnit,
     grown: Vec<String>,
 }
 
@@ -30,17 +34,17 @@ impl Counts {
     /// None yet of this benchmark and toolchain; with `write` the file is renewed.
     pub(crate) fn new(bench: &'static str, toolchain: String, write: bool) -> Result<Self, String> {
         let kept = if write { None } else { Some(read(bench)?) };
-        Ok(Self { bench, toolchain, kept, found: BTreeMap::new(), grown: Vec::new() })
+        Ok(Self { bench, toolchain, kept, found: ByUnit::new(), grown: Vec::new() })
     }
 
-    /// Takes a count. Returns its change against the file, in %, as text.
-    pub(crate) fn take(&mut self, name: &str, count: u64) -> String {
-        let before = self.kept.as_ref().and_then(|kept| kept.instructions.get(name));
+    /// Takes a count of this unit. Returns its change against the file, in %, as text.
+    pub(crate) fn take(&mut self, unit: &str, name: &str, count: u64) -> String {
+        let before = self.kept.as_ref().and_then(|kept| kept.counts.get(unit)?.get(name));
         let change = before.map(|&before| count as f64 / before as f64 - 1.0);
         if self.kept.is_some() && change.is_none_or(|change| change > TOLERANCE) {
-            self.grown.push(name.to_owned());
+            self.grown.push(format!("{name}, {unit}"));
         }
-        self.found.insert(name.to_owned(), count);
+        self.found.entry(unit.to_owned()).or_default().insert(name.to_owned(), count);
         change.map_or_else(String::new, |change| format!("{:+.1} %", 100.0 * change))
     }
 
@@ -67,12 +71,13 @@ impl Counts {
     }
 
     fn text(&self) -> String {
-        let mut text = format!(
-            "# Instructions, see `benches/{}/main.rs`; do not edit.\ntoolchain = {:?}\n\n[instructions]\n",
-            self.bench, self.toolchain
-        );
-        for (name, count) in &self.found {
-            let _ = writeln!(text, "{name:?} = {count}");
+        let mut text =
+            format!("# Counts, see `benches/{}/main.rs`; do not edit.\ntoolchain = {:?}\n", self.bench, self.toolchain);
+        for (unit, counts) in &self.found {
+            let _ = writeln!(text, "\n[{unit}]");
+            for (name, count) in counts {
+                let _ = writeln!(text, "{name:?} = {count}");
+            }
         }
         text
     }

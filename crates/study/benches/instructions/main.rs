@@ -50,7 +50,7 @@ fn check(write: bool) -> Result<bool, String> {
     let mut counts = Counts::new("instructions", toolchain()?, write)?;
     for path in PATHS {
         let count = count(path)?;
-        let change = counts.take(path.name, count);
+        let change = counts.take("instructions", path.name, count);
         println!("{count:>12} {change:>12}  {}", path.name);
     }
     counts.conclude()

@@ -10,7 +10,7 @@ use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating}
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
 use super::recording::Recording;
 use super::thinned::thinned;
-use super::{AnyShiftError, ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase, row};
+use super::{AnyShiftError, ClutchRow, ShiftScoreRow, TruePhase, row};
 
 /// The drive at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,15 +57,26 @@ impl ScoredShift {
     }
 
     /// How long a true phase lasts, s.
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn length_s(&self, phase: TruePhase) -> f64 {
-        self.rows.iter().filter(|row| row.phase() == Some(phase)).count() as f64 * SAMPLE_S
+        self.spans_s(phase).iter().map(|[from_s, to_s]| to_s - from_s).sum()
     }
 
     /// Begin and end of every piece of a phase, s.
     pub fn spans_s(&self, phase: TruePhase) -> Vec<[f64; 2]> {
-        let pieces = self.rows.split(|row| row.phase() != Some(phase));
-        pieces.filter_map(|piece| Some([piece.first()?.time_s, piece.last()?.time_s + SAMPLE_S])).collect()
+        // A row lasts until the next one; the last one as long as the one before it.
+        let last_s = match self.rows.as_slice() {
+            [.., before, last] => last.time_s - before.time_s,
+            _ => 0.0,
+        };
+        let end_s = |at: usize| self.rows.get(at + 1).map_or(self.rows[at].time_s + last_s, |next| next.time_s);
+        let mut spans: Vec<[f64; 2]> = Vec::new();
+        for (at, row) in self.rows.iter().enumerate().filter(|(_, row)| row.phase() == Some(phase)) {
+            match spans.last_mut().filter(|[_, to_s]| *to_s == row.time_s) {
+                Some(span) => span[1] = end_s(at),
+                None => spans.push([row.time_s, end_s(at)]),
+            }
+        }
+        spans
     }
 
     /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without rows.
@@ -123,13 +134,13 @@ impl ScoredShift {
     }
 }
 
-/// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`SAMPLE_S`].
+/// States that a drive keeps, unless more than half of them lie around its shifts: more than an hour every [`super::SAMPLE_S`].
 pub const MOST_STATES: u32 = 400_000;
 
 /// A drive with its shifts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScoredDrive {
-    /// Every [`SAMPLE_S`]; of a drive of more than [`MOST_STATES`] those that are kept: fewer where nothing happens.
+    /// Every [`super::SAMPLE_S`]; of a drive of more than [`MOST_STATES`] those that are kept: fewer where nothing happens.
     pub states: Vec<DriveState>,
     /// Its shifts.
     pub shifts: Vec<ScoredShift>,

@@ -18,6 +18,7 @@ use super::contradictions::CommandCheck;
 use super::drive::{DriveState, PassingShifts, ScoredDrive};
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
+use crate::ratio_histogram::RatioHistogram;
 use crate::row_clock::{RowClock, RowTime};
 use crate::shift_estimates::is_refused;
 use crate::swapped_speeds::SwappedSpeeds;
@@ -28,6 +29,9 @@ const STICKS_RAD_S: f64 = 0.05;
 /// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
 const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_SHARE: f64 = 0.1;
+
+/// Share of the final ratio by which output over wheel speed may differ in the middle of a drive \[chosen\]: slip of the tyres is less.
+const WHEEL_SHARE: f64 = 0.01;
 
 /// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;
@@ -269,6 +273,12 @@ pub struct LoggedDrive<'c> {
     /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
     in_gear: [u64; 2],
     swapped: SwappedSpeeds,
+    /// Newest wheel speed, rad/s, and output over wheel speed in a gear at speed.
+    wheel_rad_s: f64,
+    output_over_wheel: RatioHistogram<1000>,
+    /// The gear of the row before, and changes of the gear which no target gear announced.
+    gear: Option<usize>,
+    unannounced: u64,
     commands: CommandCheck<'c>,
     holes: Holes,
 }
@@ -308,7 +318,7 @@ impl Holes {
 impl<'c> LoggedDrive<'c> {
     /// The filter of a car with these tables, for readings of these sensors.
     pub fn new(car: &'c Car, tables: &'c ShiftTables<f64>, sensors: Option<&Sensors>) -> Self {
-        let filter = any_shift_filter(car, tables, &ShiftErrors::STANDARD, sensors);
+        let filter = any_shift_filter(car, tables, &ShiftErrors::LOGGED, sensors);
         let state = filter.start();
         Self {
             car,
@@ -321,6 +331,10 @@ impl<'c> LoggedDrive<'c> {
             begun_s: f64::NAN,
             in_gear: [0; 2],
             swapped: SwappedSpeeds::default(),
+            wheel_rad_s: f64::NAN,
+            output_over_wheel: RatioHistogram::default(),
+            gear: None,
+            unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
             holes: Holes::default(),
         }
@@ -331,7 +345,7 @@ impl<'c> LoggedDrive<'c> {
     /// # Errors
     /// The gearbox has more clutches than the filter has room for.
     pub fn tables(car: &Car) -> Result<ShiftTables<f64>, AnyShiftError> {
-        ShiftTables::of_car(car, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)
+        ShiftTables::of_car(car, &ShiftErrors::LOGGED).map_err(AnyShiftError::TooManyElements)
     }
 
     /// Takes a row and returns the estimate for it.
@@ -368,11 +382,18 @@ impl<'c> LoggedDrive<'c> {
         } else if self.passing.ends(gears) {
             self.end(step.time_s, from);
         }
+        self.wheel_rad_s = input.wheel_rad_s.map_or(self.wheel_rad_s, |wheel| wheel.value);
+        let is_announced = self.gear.is_none_or(|before| before == from || before == NO_GEAR || from == NO_GEAR);
         match gears {
             Some(_) if self.holes.cut.is_some() => {}
             Some(_) => self.during(step, &estimate),
-            None => self.compare_ratio(from),
+            None => {
+                self.unannounced += u64::from(!is_announced);
+                self.compare_ratio(from);
+            }
         }
+        // In a shift the gear may be the new one already.
+        self.gear = gears.map_or(Some(from), |_| None);
         let [_, turbine, output] = self.came_rad_s;
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         estimate
@@ -385,12 +406,18 @@ impl<'c> LoggedDrive<'c> {
             self.swapped.push(engine, turbine, &[by_output]);
             self.in_gear[0] += 1;
             self.in_gear[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
+            self.output_over_wheel.push(output / self.wheel_rad_s);
         }
     }
 
     /// Rows in a gear at speed, and those whose turbine and output speed do not fit the ratio of that gear.
     pub fn rows_in_gear(&self) -> [u64; 2] {
         self.in_gear
+    }
+
+    /// Output over wheel speed in a gear at speed, in the middle; not a number without.
+    pub fn output_over_wheel(&self) -> f64 {
+        self.output_over_wheel.middle()
     }
 
     /// What contradicts the channels of engine and turbine speed, in a sentence.
@@ -450,6 +477,24 @@ impl<'c> LoggedDrive<'c> {
             warnings.push(format!(
                 "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",
                 self.holes.count
+            ));
+        }
+        if self.unannounced > 0 {
+            warnings.push(format!(
+                "warning: gear changes {} times without a target_gear that says so before: these shifts are not estimated. target_gear has to \
+                 change when a shift is requested, gear when it is done",
+                self.unannounced
+            ));
+        }
+        let final_ratio = self.car.driveline.final_ratio;
+        let off = self.output_over_wheel() / final_ratio - 1.0;
+        if off.abs() > WHEEL_SHARE {
+            warnings.push(format!(
+                "warning: output_speed over wheel_speed is {:.3} in the middle, {:+.1} % from the final ratio {final_ratio:.3}: the filter takes what \
+                 is more than slip of the tyres for twist of the drive shafts, and may be worse than without wheel_speed. Correct the scale of \
+                 wheel_speed or `driveline.final_ratio`, or leave wheel_speed out",
+                self.output_over_wheel(),
+                100.0 * off
             ));
         }
         ScoredDrive { warnings, ..self.passing.drive }

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use super::records::READ_AT_ONCE;
-use super::writer::push_number;
+use super::writer::put_number;
 use super::*;
 use crate::signal;
 
@@ -37,8 +37,8 @@ fn numbers_survive_a_round_trip_to_the_last_bit() {
 fn numbers_are_as_short_as_those_of_display_and_read_back_the_same() {
     let written = |number: f64| {
         let mut row = Vec::new();
-        push_number(&mut row, number);
-        String::from_utf8(row).unwrap()
+        let end = put_number(&mut row, 0, number);
+        String::from_utf8(row[..end].to_vec()).unwrap()
     };
     let some = [0.0, -0.0, 1.0, -1.5, 1e-5, 1.2e-5, 9e15, 1e16, 1.5e300, -5e-324, f64::INFINITY, f64::MIN_POSITIVE];
     // All sizes, by a generator that needs no crate.

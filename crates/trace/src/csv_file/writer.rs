@@ -1,6 +1,7 @@
 //! Comma-separated files, written row by row.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
 use crate::signal;
 
@@ -24,7 +25,7 @@ pub enum Cell<'a> {
 pub struct CsvWriter<W: Write> {
     writer: W,
     /// The row before, and the rows that are not yet with the writer.
-    rows: Vec<u8>,
+    rows: Text,
     /// Bytes of these that are with the writer, and where the row before begins.
     handed_on: usize,
     before: usize,
@@ -69,16 +70,14 @@ impl<W: Write> CsvWriter<W> {
     /// # Errors
     /// What the writer meets.
     pub fn without_time<'a>(writer: W, names: impl IntoIterator<Item = &'a str>) -> io::Result<Self> {
-        let mut rows = Vec::with_capacity(WRITTEN_AT_ONCE + 4096);
+        let mut rows = Text::default();
         let mut columns = 0;
         for name in names {
-            if columns > 0 {
-                rows.push(b',');
-            }
-            push_word(&mut rows, name);
+            rows.push_all(if columns > 0 { b"," } else { b"" });
+            rows.filled = put_word(&mut rows.bytes, rows.filled, name);
             columns += 1;
         }
-        rows.push(b'\n');
+        rows.push_all(b"\n");
         let (handed_on, before, written) = (0, 0, vec![Written::NONE; columns]);
         Ok(Self { writer, rows, handed_on, before, written, columns })
     }
@@ -117,30 +116,34 @@ impl<W: Write> CsvWriter<W> {
         self.end_row(finished)
     }
 
-    /// Ends a row that begins here, has so many cells, and has all that the row before should have given.
-    fn end_row(&mut self, (begin, count, is_whole): (usize, usize, bool)) -> io::Result<()> {
+    /// Ends a row.
+    fn end_row(&mut self, Finished { begin, end, count, is_whole }: Finished) -> io::Result<()> {
+        self.rows.filled = end;
         if count != self.columns || !is_whole {
-            self.rows.truncate(begin);
+            self.rows.filled = begin;
             self.written.fill(Written::NONE);
             return Err(io::Error::other(match is_whole {
                 true => format!("a row of {count} cells for {} columns", self.columns),
                 false => "a cell repeats that of the row before, and there is none".to_owned(),
             }));
         }
-        if self.rows.len() == begin {
+        if self.rows.filled == begin {
             // A row of one empty cell is no empty line.
-            self.rows.extend_from_slice(b"\"\"");
+            self.rows.push_all(b"\"\"");
         }
-        self.rows.push(b'\n');
+        self.rows.push_all(b"\n");
         self.before = begin;
-        if self.rows.len() >= WRITTEN_AT_ONCE { self.hand_on() } else { Ok(()) }
+        if self.rows.filled >= WRITTEN_AT_ONCE { self.hand_on() } else { Ok(()) }
     }
 
     /// Hands on all rows. The last one stays, as long as the next one may repeat its cells.
     fn hand_on(&mut self) -> io::Result<()> {
-        let handed = self.writer.write_all(&self.rows[self.handed_on..]);
-        self.rows.drain(..std::mem::take(&mut self.before));
-        self.handed_on = self.rows.len();
+        let Text { bytes, filled } = &mut self.rows;
+        let handed = self.writer.write_all(&bytes[self.handed_on..*filled]);
+        let before = std::mem::take(&mut self.before);
+        bytes.copy_within(before..*filled, 0);
+        *filled -= before;
+        self.handed_on = *filled;
         handed
     }
 
@@ -164,13 +167,54 @@ impl<W: Write> CsvWriter<W> {
     }
 }
 
+/// Text, and room behind it.
+#[derive(Default)]
+struct Text {
+    bytes: Vec<u8>,
+    filled: usize,
+}
+
+/// Room that each cell finds behind the text: of a comma, and of a number without an exponent that is not odd.
+const ROOM: usize = 32;
+
+impl Text {
+    fn push_all(&mut self, text: &[u8]) {
+        self.filled = put(&mut self.bytes, self.filled, text);
+    }
+}
+
+/// Puts a text at a place, and says where it ends. What it needs of room is made, and some behind it.
+fn put(bytes: &mut Vec<u8>, at: usize, text: &[u8]) -> usize {
+    let end = at + text.len();
+    make_room(bytes, end);
+    bytes[at..end].copy_from_slice(text);
+    end
+}
+
+/// Makes room behind a place.
+#[inline]
+fn make_room(bytes: &mut Vec<u8>, at: usize) {
+    if bytes.len() < at + ROOM {
+        grow(bytes, at + ROOM);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn grow(bytes: &mut Vec<u8>, least: usize) {
+    bytes.resize(least.max(2 * bytes.len()).max(WRITTEN_AT_ONCE + 4096), 0);
+}
+
 /// A row while it is written. Cells one after the other that are those of the row before are copied together.
+///
+/// The place at which it is written stands here and not with the text: a loop over cells then holds it in a register.
 struct Row<'a> {
-    rows: &'a mut Vec<u8>,
+    bytes: &'a mut Vec<u8>,
     written: &'a mut [Written],
-    /// Where the row before begins, and this one.
+    /// Where the row before begins, this one, and where this one is written on.
     before: usize,
     begin: usize,
+    at: usize,
     /// Cells so far, and how many of them are in the row; the others wait to be copied.
     count: usize,
     done: usize,
@@ -179,10 +223,21 @@ struct Row<'a> {
     is_whole: bool,
 }
 
+/// A row that was written.
+struct Finished {
+    /// Where it begins and ends.
+    begin: usize,
+    end: usize,
+    /// Its cells.
+    count: usize,
+    /// Whether it has all that the row before should have given.
+    is_whole: bool,
+}
+
 impl<'a> Row<'a> {
-    fn behind(rows: &'a mut Vec<u8>, written: &'a mut [Written], before: usize) -> Self {
-        let begin = rows.len();
-        Self { rows, written, before, begin, count: 0, done: 0, done_before: 0, is_whole: true }
+    fn behind(rows: &'a mut Text, written: &'a mut [Written], before: usize) -> Self {
+        let (begin, is_whole) = (rows.filled, true);
+        Self { bytes: &mut rows.bytes, written, before, begin, at: begin, count: 0, done: 0, done_before: 0, is_whole }
     }
 
     /// Takes a cell. Most are those of the row before, and wait: that part stands in the loop over the cells.
@@ -218,64 +273,72 @@ impl<'a> Row<'a> {
 
     /// Writes a number that is not the one of the row before.
     #[inline(always)]
-    fn number(&mut self, at: usize, number: f64, bits: u64) {
-        self.begin_cell(at);
-        push_number(self.rows, number);
-        self.end_cell(at, bits);
+    fn number(&mut self, cell: usize, number: f64, bits: u64) {
+        self.begin_cell(cell);
+        self.at = put_number(self.bytes, self.at, number);
+        self.end_cell(cell, bits);
     }
 
     /// Writes a word, or a whole number.
-    #[inline(never)]
-    fn word(&mut self, at: usize, word: &str, bits: u64) {
-        self.begin_cell(at);
-        push_word(self.rows, word);
-        self.end_cell(at, bits);
+    #[inline(always)]
+    fn word(&mut self, cell: usize, word: &str, bits: u64) {
+        self.begin_cell(cell);
+        self.at = put_word(self.bytes, self.at, word);
+        self.end_cell(cell, bits);
     }
 
-    #[inline]
-    fn begin_cell(&mut self, at: usize) {
-        if self.done < at {
-            self.copy_until(at);
+    #[inline(always)]
+    fn begin_cell(&mut self, cell: usize) {
+        if self.done < cell {
+            self.copy_until(cell);
         }
-        if at > 0 {
-            self.rows.push(b',');
-        }
+        make_room(self.bytes, self.at);
+        self.bytes[self.at] = b',';
+        self.at += usize::from(cell > 0);
     }
 
-    #[inline]
-    fn end_cell(&mut self, at: usize, bits: u64) {
-        let end = self.rows.len() - self.begin;
-        if let Some(written) = self.written.get_mut(at) {
+    #[inline(always)]
+    fn end_cell(&mut self, cell: usize, bits: u64) {
+        let end = self.at - self.begin;
+        if let Some(written) = self.written.get_mut(cell) {
             self.done_before = std::mem::replace(written, Written { bits, end }).end;
         }
-        self.done = at + 1;
+        self.done = cell + 1;
     }
 
     /// Copies the cells that wait, all before this one.
-    #[inline(never)]
+    #[inline(always)]
     fn copy_until(&mut self, end: usize) {
         let Some(cells) = self.written.get_mut(self.done..end) else { return };
         let Some(last) = cells.last() else { return };
         // With the comma before them.
         let (from, to) = (self.done_before, last.end);
-        let moved = (self.rows.len() - self.begin).wrapping_sub(from);
-        self.rows.extend_from_within(self.before + from..self.before + to);
+        let moved = (self.at - self.begin).wrapping_sub(from);
+        self.at = put_again(self.bytes, self.at, self.before + from..self.before + to);
         for cell in cells {
             cell.end = cell.end.wrapping_add(moved);
         }
         (self.done, self.done_before) = (end, to);
     }
 
-    /// Where it begins, how many cells it has, and whether all were there.
-    fn finish(mut self) -> (usize, usize, bool) {
+    fn finish(mut self) -> Finished {
         self.copy_until(self.count.min(self.written.len()));
-        (self.begin, self.count, self.is_whole)
+        Finished { begin: self.begin, end: self.at, count: self.count, is_whole: self.is_whole }
     }
 }
 
-/// A number; NaN leaves the cell empty.
-#[inline]
-pub(super) fn push_number(row: &mut Vec<u8>, number: f64) {
+/// Puts a part of the text before a place there, and says where it ends.
+#[inline(never)]
+fn put_again(bytes: &mut Vec<u8>, at: usize, part: Range<usize>) -> usize {
+    let end = at + part.len();
+    make_room(bytes, end);
+    bytes.copy_within(part, at);
+    end
+}
+
+/// Puts a number at a place, and says where it ends; NaN leaves the cell empty.
+#[inline(never)]
+pub(super) fn put_number(bytes: &mut Vec<u8>, at: usize, number: f64) -> usize {
     let size = number.abs();
     let mut digits = zmij::Buffer::new();
     if (1e-5..1e16).contains(&size) {
@@ -283,46 +346,48 @@ pub(super) fn push_number(row: &mut Vec<u8>, number: f64) {
         let text = digits.format_finite(number).as_bytes();
         #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "exact if it is whole")]
         let is_whole = number as i64 as f64 == number;
-        return push_digits(row, &text[..text.len() - if is_whole { 2 } else { 0 }]);
+        return put_digits(bytes, at, &text[..text.len() - if is_whole { 2 } else { 0 }]);
     }
-    push_odd_number(row, number);
+    put_odd_number(bytes, at, number)
+}
+
+/// The text of a number. Two copies of 16 bytes, which may overlap, take less time than one copy of any length.
+#[inline(always)]
+fn put_digits(bytes: &mut Vec<u8>, at: usize, text: &[u8]) -> usize {
+    let end = at + text.len();
+    if let (Some(first), Some(last)) = (text.first_chunk::<16>(), text.last_chunk::<16>())
+        && text.len() <= 32
+        && let Some(room) = bytes.get_mut(at..end)
+        && let Some(begin) = room.first_chunk_mut()
+    {
+        *begin = *first;
+        if let Some(end) = room.last_chunk_mut() {
+            *end = *last;
+        }
+        return end;
+    }
+    put(bytes, at, text)
 }
 
 /// A number that is zero, none, or of a size whose text may have an exponent.
 #[inline(never)]
-fn push_odd_number(row: &mut Vec<u8>, number: f64) {
+fn put_odd_number(bytes: &mut Vec<u8>, at: usize, number: f64) -> usize {
     if number == 0.0 {
-        return row.extend_from_slice(if number.is_sign_negative() { b"-0" } else { b"0" });
+        return put(bytes, at, if number.is_sign_negative() { b"-0" } else { b"0" });
     }
     if number.is_nan() {
-        return;
+        return at;
     }
     let mut digits = zmij::Buffer::new();
     match digits.format(number).split_once('e') {
-        None => row.extend_from_slice(digits.format(number).as_bytes()),
-        Some((mantissa, exponent)) => push_expanded(row, mantissa, exponent.parse().unwrap_or(0)),
-    }
-}
-
-/// The text of a number. Two copies of 16 bytes, which may overlap, take less time than one copy of any length.
-#[inline]
-fn push_digits(row: &mut Vec<u8>, text: &[u8]) {
-    const ROOM: usize = 32;
-    let count = text.len();
-    match (text.first_chunk::<16>(), text.last_chunk::<16>()) {
-        (Some(first), Some(last)) if count <= ROOM => {
-            let begin = row.len();
-            row.extend_from_slice(&[0; ROOM]);
-            row[begin..begin + 16].copy_from_slice(first);
-            row[begin + count - 16..begin + count].copy_from_slice(last);
-            row.truncate(begin + count);
-        }
-        _ => row.extend_from_slice(text),
+        None => put(bytes, at, digits.format(number).as_bytes()),
+        Some((mantissa, exponent)) => put(bytes, at, &expanded(mantissa, exponent.parse().unwrap_or(0))),
     }
 }
 
 /// A number without its exponent: `-1.25` and `-7` give `-0.000000125`.
-fn push_expanded(row: &mut Vec<u8>, mantissa: &str, exponent: i32) {
+fn expanded(mantissa: &str, exponent: i32) -> Vec<u8> {
+    let mut row = Vec::new();
     let (sign, size) = mantissa.strip_prefix('-').map_or(("", mantissa), |size| ("-", size));
     let (whole, fraction) = size.split_once('.').unwrap_or((size, ""));
     let mut push = |text: &str, zeros: usize| {
@@ -339,17 +404,17 @@ fn push_expanded(row: &mut Vec<u8>, mantissa: &str, exponent: i32) {
         push(whole, 0);
         push(fraction, places.saturating_sub(fraction.len()));
     }
+    row
 }
 
-/// A word, in quotation marks where it needs them.
-fn push_word(row: &mut Vec<u8>, word: &str) {
+/// Puts a word at a place, in quotation marks where it needs them, and says where it ends.
+#[inline(never)]
+fn put_word(bytes: &mut Vec<u8>, at: usize, word: &str) -> usize {
     // No letter is below the comma, as all signs are that need the marks.
     let is_plain =
         word.bytes().all(|byte| byte > b',') || !word.bytes().any(|byte| matches!(byte, b',' | b'"' | b'\n' | b'\r'));
     if is_plain {
-        return row.extend_from_slice(word.as_bytes());
+        return put(bytes, at, word.as_bytes());
     }
-    row.push(b'"');
-    row.extend_from_slice(word.replace('"', "\"\"").as_bytes());
-    row.push(b'"');
+    put(bytes, at, format!("\"{}\"", word.replace('"', "\"\"")).as_bytes())
 }

@@ -88,7 +88,7 @@ fn open<'a>(setup: &Setup<'_>, path: &Path, opened: &'a mut Option<Log>) -> Resu
     let is_followed = stop.is_some();
     let log = match stop {
         Some(stop) => Log::follow(path, &map.open, stop)?,
-        None => Log::open(path, &map.open)?,
+        None => Log::open(path, &map.open)?.on_threads(options.threads_of_log()),
     };
     Measured::channels(path, opened.insert(log), map, vehicle, is_followed)
 }

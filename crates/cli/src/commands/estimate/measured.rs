@@ -26,6 +26,9 @@ use crate::output;
 /// Steps of a followed log that are looked at before the first estimate.
 const FOLLOWED_LOOK: usize = 50;
 
+/// Said of a table whose last line was cut.
+pub(super) const CUT_LINE: &str = "warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells";
+
 /// A log with its shifts.
 pub(super) struct Measured<'a> {
     source: Source<'a>,
@@ -49,6 +52,8 @@ enum Source<'a> {
 
 struct Rows {
     log: study::log::Log,
+    /// What came along with the input of the newest row.
+    row: LogRow,
     /// Values of the signals in their columns, to tell wrong units.
     watched: WatchedColumns,
     /// Rows that were looked at before the first estimate and not read since.
@@ -95,15 +100,11 @@ impl Step {
         Self::new(f64::NAN, Input::none(0.0), 0)
     }
 
-    /// A row of a table with the names of the program.
-    fn of_row(input: Input<f64>, row: &LogRow, resets: u32) -> Self {
+    /// Takes what came along with the input in a row of a table with the names of the program.
+    fn take_row(&mut self, row: &LogRow, resets: u32) {
         let now = |value: f64| Some(Measurement::now(value)).filter(|_| value.is_finite());
-        Self {
-            truth: row.truth,
-            pressure_pa: now(row.beside.pressure_pa),
-            torque_n_m: now(row.beside.torque_n_m),
-            ..Self::new(row.time_s, input, resets)
-        }
+        (self.time_s, self.truth, self.resets) = (row.time_s, row.truth, resets);
+        (self.pressure_pa, self.torque_n_m) = (now(row.beside.pressure_pa), now(row.beside.torque_n_m));
     }
 
     /// A step of channels with these readings.
@@ -179,7 +180,7 @@ impl<'a> Measured<'a> {
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&log, role))?;
         let ahead = watched.rows();
-        let source = Source::Rows(Box::new(Rows { log, watched, ahead, was_cut }));
+        let source = Source::Rows(Box::new(Rows { log, row: LogRow::NONE, watched, ahead, was_cut }));
         Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
     }
 
@@ -302,7 +303,7 @@ impl<'a> Measured<'a> {
                     say.note(&format!("warning: {note}"));
                 }
                 if rows.was_cut.load(Ordering::Relaxed) {
-                    say.note("warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells");
+                    say.note(CUT_LINE);
                 }
                 return rows.watched.check(Seen::All);
             }
@@ -442,15 +443,17 @@ fn values(input: &Input<f64>) -> [Option<f64>; 5] {
 impl Rows {
     /// Reads the next step; `see` gets its readings, with the resets of the clock so far. False at the end.
     fn read(&mut self, step: &mut Step, mut see: impl FnMut(u32, &Reading)) -> Result<bool, Failure> {
-        let Some(row) = self.log.next() else { return Ok(false) };
-        let (input, row) = row?;
+        let Self { log, row, .. } = self;
+        if !log.advance(&mut step.input, row)? {
+            return Ok(false);
+        }
         match self.ahead.checked_sub(1) {
             Some(ahead) => self.ahead = ahead,
-            None => self.watched.push(values(&input)),
+            None => self.watched.push(values(&step.input)),
         }
         let resets = self.log.resets();
-        each_reading(&input, &row, |reading| see(resets, reading));
-        *step = Step::of_row(input, &row, resets);
+        each_reading(&step.input, &self.row, |reading| see(resets, reading));
+        step.take_row(&self.row, resets);
         Ok(true)
     }
 }

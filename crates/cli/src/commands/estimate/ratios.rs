@@ -1,9 +1,8 @@
 //! Whether the speeds of a log are those of the vehicle file's car: ratios that a wrong scale changes.
 
-use std::ops::Range;
-
 use config::Vehicle;
 use observer::{Input, Reading};
+use study::ratio_histogram::RatioHistogram;
 use study::swapped_speeds::SwappedSpeeds;
 
 use crate::failure::Failure;
@@ -16,6 +15,8 @@ const IN_GEAR: f64 = 0.05;
 const IN_GEAR_SHARE: f64 = 0.1;
 /// Wheels differ by so much: tyres, scale and slip are a part of it.
 const WHEEL: f64 = 0.15;
+/// Bins of the ratios for a factor of e: of a hundredth.
+const PER_CENT: u32 = 100;
 /// Steps that are needed to judge, and time, s.
 const STEPS: u64 = 200;
 const TIME_S: f64 = 3.0;
@@ -29,8 +30,8 @@ pub(super) struct Ratios {
     moving_s: f64,
     moving: u64,
     in_gear: u64,
-    turbine_over_output: Histogram,
-    output_over_wheel: Histogram,
+    turbine_over_output: RatioHistogram<PER_CENT>,
+    output_over_wheel: RatioHistogram<PER_CENT>,
     /// Newest engine speed, rad/s.
     engine_rad_s: f64,
     swapped: SwappedSpeeds,
@@ -45,8 +46,8 @@ impl Ratios {
             moving_s: 0.0,
             moving: 0,
             in_gear: 0,
-            turbine_over_output: Histogram::default(),
-            output_over_wheel: Histogram::default(),
+            turbine_over_output: RatioHistogram::default(),
+            output_over_wheel: RatioHistogram::default(),
             engine_rad_s: f64::NAN,
             swapped: SwappedSpeeds::default(),
         }
@@ -101,90 +102,17 @@ impl Ratios {
                 100.0 * share,
             )));
         }
-        let wheel = self.output_over_wheel.middle();
-        if (wheel / self.final_ratio - 1.0).abs() > WHEEL {
-            return Err(Failure::Input(format!(
-                "output_speed over wheel_speed is {wheel:.2} in the middle, and the final ratio of the vehicle file is {:.2}\n\
-                 hint: check unit and scale of wheel_speed and output_speed, and `driveline.final_ratio`",
-                self.final_ratio,
-            )));
-        }
-        Ok(())
+        check_wheel(self.output_over_wheel.middle(), self.final_ratio)
     }
 }
 
-/// Counts of ratios from 1/20 to 20 by their logarithm.
-struct Histogram {
-    counts: Vec<u32>,
-    /// The bin of the ratio before, and ratios that are in it for certain: a car keeps its ratio for long.
-    last: usize,
-    within: Range<f64>,
-}
-
-impl Default for Histogram {
-    fn default() -> Self {
-        Self { counts: vec![0; Self::BINS], last: 0, within: 0.0..0.0 }
+/// Refuses wheels that do not turn with the output: their middle ratio is far from that of the vehicle file.
+pub(super) fn check_wheel(output_over_wheel: f64, final_ratio: f64) -> Result<(), Failure> {
+    if (output_over_wheel / final_ratio - 1.0).abs() > WHEEL {
+        return Err(Failure::Input(format!(
+            "output_speed over wheel_speed is {output_over_wheel:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}\n\
+             hint: check unit and scale of wheel_speed and output_speed, and `driveline.final_ratio`",
+        )));
     }
-}
-
-impl Histogram {
-    const BINS: usize = 600;
-    /// Bins for a factor of e.
-    const FINE: f64 = 100.0;
-
-    fn push(&mut self, ratio: f64) {
-        /// Share by which a ratio near the end of a bin may be taken for one in the next.
-        const ROUNDING: f64 = 1e-9;
-        if !self.within.contains(&ratio) {
-            let place = ratio.ln() * Self::FINE + 300.0;
-            if !(0.0..600.0).contains(&place) {
-                return;
-            }
-            // From the ratio to an end of the bin: of the exponential of less than a hundredth, these two powers stay within it.
-            let factor = |way: f64| 1.0 + way + 0.5 * way * way;
-            let [down, up] = [place.floor() - place, place.floor() + 1.0 - place].map(|way| factor(way / Self::FINE));
-            self.within = ratio * down * (1.0 + ROUNDING)..ratio * up * (1.0 - ROUNDING);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place among the bins")]
-            let bin = place as usize;
-            self.last = bin;
-        }
-        self.counts[self.last] = self.counts[self.last].saturating_add(1);
-    }
-
-    /// The middle ratio, to half a per cent; not a number without any.
-    fn middle(&self) -> f64 {
-        let all: u64 = self.counts.iter().map(|count| u64::from(*count)).sum();
-        let mut below = 0;
-        for (place, count) in (0_u32..).zip(&self.counts) {
-            below += u64::from(*count);
-            if 2 * below > all {
-                return ((f64::from(place) + 0.5 - 300.0) / Self::FINE).exp();
-            }
-        }
-        f64::NAN
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_ratio_is_counted_in_the_bin_of_its_logarithm_whatever_the_one_before_was() {
-        // Slow changes, jumps, and the ends of bins from both sides.
-        let slow = (0..100_000).map(|i| 0.9 + 2e-6 * f64::from(i));
-        let ends = (-310_i32..310).map(|bin| (f64::from(bin) / Histogram::FINE).exp());
-        let near = ends.flat_map(|end| [end, end * (1.0 - 1e-12), end * (1.0 + 1e-12), end * (1.0 - 1e-15), 2.5]);
-        let odd = [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300, 1e300];
-        let mut histogram = Histogram::default();
-        let mut expected = vec![0_u32; Histogram::BINS];
-        for ratio in slow.chain(near).chain(odd) {
-            histogram.push(ratio);
-            let place = ratio.ln() * Histogram::FINE + 300.0;
-            if (0.0..600.0).contains(&place) {
-                expected[place as usize] += 1;
-            }
-        }
-        assert_eq!(histogram.counts, expected);
-    }
+    Ok(())
 }

@@ -94,7 +94,7 @@ fn record_one(
     bar: &ProgressBar,
 ) -> Result<Recorded, Failure> {
     let mut opened = None;
-    let mut steps = CarSource::open(CarReading { car, tables, map, stop: None }, log, &mut opened)?;
+    let mut steps = CarSource::open(CarReading { car, tables, map, stop: None, threads: 1 }, log, &mut opened)?;
     let mut count = 0_u64;
     while let Some(step) = steps.next_step()? {
         recorder.push_reported(step.reported_n_m);

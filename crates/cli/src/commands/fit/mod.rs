@@ -47,7 +47,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
         bar.finish_and_clear();
         return Err(no_shift(&vehicle, options, &kinds));
     }
-    let found = fit::fit(&vehicle, &fitted_shifts, ages, &mut |progress| {
+    let found = fit::fit(&vehicle, &fitted_shifts, &collected.driving, ages, &mut |progress| {
         bar.set_message(format!("{} shifts, iteration {}", progress.shifts, progress.iteration + 1));
         bar.tick();
     })?;
@@ -121,6 +121,7 @@ fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collec
         bar.tick();
         let mut one = fit::collect(log, &map, vehicle)?;
         all.shifts.append(&mut one.shifts);
+        all.driving.append(&mut one.driving);
         all.skipped.append(&mut one.skipped);
         all.kinds.add(one.kinds);
         all.notes.extend(one.notes.iter().map(|note| format!("{}: {note}", log.display())));

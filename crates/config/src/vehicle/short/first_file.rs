@@ -156,6 +156,54 @@ mod tests {
     }
 
     #[test]
+    fn a_file_with_the_numbers_of_the_two_speed_car_has_its_bounds_and_cylinders() {
+        let numbers = Facts {
+            mass_kg: 1500.0,
+            wheel_radius_m: 0.3,
+            ratio_before: 2.5,
+            ratio_after: 1.0,
+            final_ratio: 3.0,
+            engine_torque_n_m: 190.0,
+            ..facts(2.5, 1.0)
+        };
+        let (short, shipped) = (vehicle(&numbers).unwrap(), Vehicle::two_speed_at().unwrap());
+        assert_eq!((short.filter, short.error_bounds), (shipped.filter, shipped.error_bounds));
+        assert_eq!(short.engine, shipped.engine);
+        let supply = |vehicle: &Vehicle| vehicle.offgoing.cylinder.supply;
+        assert_eq!(supply(&short), supply(&shipped));
+        assert_eq!(short.output_inertia_kg_m2, shipped.output_inertia_kg_m2);
+    }
+
+    /// With torques, inertias and clutches of twice the size a car has the same speeds, so that all bounds on torques are twice as
+    /// large, and its cylinders fill in the same time.
+    #[test]
+    fn what_bounds_a_torque_grows_with_the_torques_of_the_car() {
+        let one = vehicle(&facts(3.0, 2.0)).unwrap();
+        let two = vehicle(&Facts { engine_torque_n_m: 700.0, mass_kg: 3600.0, ..facts(3.0, 2.0) }).unwrap();
+        let twice = |a: f64, b: f64| assert!((b / a - 2.0).abs() < 1e-3, "{a} {b}");
+        twice(one.engine.inertia_kg_m2, two.engine.inertia_kg_m2);
+        twice(one.filter.offgoing_n_m, two.filter.offgoing_n_m);
+        twice(one.error_bounds.offgoing_torque_n_m, two.error_bounds.offgoing_torque_n_m);
+        twice(one.error_bounds.output_torque_n_m, two.error_bounds.output_torque_n_m);
+        twice(one.error_bounds.shaft_torque_n_m, two.error_bounds.shaft_torque_n_m);
+        for (a, b) in one.shift.mass_kg_m2.as_flattened().iter().zip(two.shift.mass_kg_m2.as_flattened()) {
+            twice(*a, *b);
+        }
+        let fill_s = |vehicle: &Vehicle| {
+            let cylinder = &vehicle.oncoming.cylinder;
+            cylinder.stroke_m3 / cylinder.supply.flow(0.15e6, cylinder.viscosity_m2_s)
+        };
+        assert!((fill_s(&two) / fill_s(&one) - 1.0).abs() < 1e-3, "{} {}", fill_s(&one), fill_s(&two));
+    }
+
+    /// A car has the same drive shafts whichever of its shifts the file describes.
+    #[test]
+    fn the_drive_shafts_do_not_depend_on_the_gears_of_the_shift() {
+        let [low, high] = [(4.7, 3.13), (0.84, 0.67)].map(|(before, after)| vehicle(&facts(before, after)).unwrap());
+        assert_eq!(low.driveline, high.driveline);
+    }
+
+    #[test]
     fn what_is_no_upshift_or_no_car_is_refused() {
         assert!(vehicle(&facts(1.0, 2.0)).unwrap_err().to_string().contains("no upshift"));
         assert!(vehicle(&facts(2.0, f64::NAN)).is_err());

@@ -10,6 +10,7 @@ mod first_file;
 mod train;
 mod uncertainty;
 
+use drivetrain::cylinder::{CAPACITY_M3_PA, FLOW_MAX_M3_S, LEAK_M3_S_PA, PASSAGE};
 use toml::de::DeValue;
 
 use super::budget;
@@ -121,7 +122,16 @@ const STIFFNESS_N_M_RAD: f64 = 13_000.0;
 const DAMPING_N_M_S_RAD: f64 = 20.0;
 const SHAFT_TORQUE_N_M: f64 = 800.0;
 const TURBINE_ERROR_N_M: f64 = 20.0;
+const OUTPUT_ERROR_N_M: f64 = 175.0;
 const ENGINE_INERTIA_KG_M2: f64 = 0.17;
+const TURBINE_INERTIA_KG_M2: f64 = 0.06;
+const OUTPUT_INERTIA_KG_M2: f64 = 0.15;
+const RATIO_BEFORE: f64 = 2.5;
+/// How fast the torque of its offgoing clutch changes, N m per root second: 0.7 of the 285 N m that it holds at the greatest engine
+/// torque. From half of them it falls to zero in a torque phase of 0.25 s.
+const OFFGOING_N_M: f64 = 200.0;
+/// What is left of that torque when the clutch is open, N m.
+const OFFGOING_OPEN_N_M: f64 = 10.0;
 const LOWER_GEAR: f64 = 2.5 * 3.0;
 /// Its mass error over the mass, and its rolling resistance over the weight.
 const MASS_SHARE: f64 = 0.15;
@@ -140,36 +150,31 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
     let lower_gear = torque * facts.ratio_before * facts.final_ratio / LOWER_GEAR;
     let mass = facts.mass_kg / MASS_KG;
     let radius = facts.wheel_radius_m / WHEEL_RADIUS_M;
+    // Drive shafts are made for what the tyres transmit: that of the lowest gear is not known from a shift between two others.
+    let adhesion = mass * radius;
     let scaled = |values: Vec<f64>| numbers(&values.into_iter().map(|value| torque * value).collect::<Vec<_>>());
     let map = &given.engine.torque_n_m;
     let row = |speed: &f64| scaled(map.columns().iter().map(|throttle| map.at(*speed, *throttle)).collect());
     let rows = map.rows().iter().map(|speed| format!("  {},\n", row(speed))).collect::<String>();
     let elements =
-        train::elements([facts.ratio_before, facts.ratio_after]).map_err(|wrong| facts.wrong_ratios(wrong))?;
-    // A clutch that is larger in all directions has a torque by the third power of its length.
-    let length = |i: usize| (torque * elements[i].torque_share / TORQUE_SHARES[i]).cbrt();
-    let plates = |i: usize| length(i) * PLATE_RADII_M[i];
-    let area = |i: usize| length(i).powi(2) * PISTON_AREAS_M2[i];
+        train::elements([facts.ratio_before, facts.ratio_after], torque).map_err(|wrong| facts.wrong_ratios(wrong))?;
+    let carried = [0, 1].map(|i| torque * elements[i].torque_share / TORQUE_SHARES[i]);
     let weight_n = facts.mass_kg * drivetrain::road::GRAVITY_M_S2;
     let mut fields = vec![
         ("before", toml_number(facts.ratio_before)),
         ("after", toml_number(facts.ratio_after)),
         ("engine_inertia", toml_number(torque * ENGINE_INERTIA_KG_M2)),
+        ("turbine_inertia", toml_number(torque * TURBINE_INERTIA_KG_M2)),
+        ("output_inertia", toml_number(torque * OUTPUT_INERTIA_KG_M2)),
         ("engine_torque", toml_number(facts.engine_torque_n_m)),
         ("engine_map", format!("[\n{rows}]")),
         ("capacity", scaled(given.converter.capacity_n_m_s2.values().to_vec())),
         ("train", elements.iter().map(|element| element.text.as_str()).collect()),
         ("sides_a", elements[0].sides.clone()),
         ("sides_b", elements[1].sides.clone()),
-        ("plates_a", toml_number(plates(0))),
-        ("plates_b", toml_number(plates(1))),
-        ("area_a", toml_number(area(0))),
-        ("area_b", toml_number(area(1))),
-        ("spring_a", toml_number(KISS_PA * area(0))),
-        ("spring_b", toml_number(KISS_PA * area(1))),
         ("final_ratio", toml_number(facts.final_ratio)),
-        ("stiffness", toml_number(lower_gear * STIFFNESS_N_M_RAD)),
-        ("damping", toml_number(lower_gear * DAMPING_N_M_S_RAD)),
+        ("stiffness", toml_number(adhesion * STIFFNESS_N_M_RAD)),
+        ("damping", toml_number(adhesion * DAMPING_N_M_S_RAD)),
         ("wheel_inertia", toml_number(mass * radius * radius * WHEEL_INERTIA_KG_M2)),
         ("max_force", toml_number(mass * TYRE_FORCE_N)),
         ("mass", toml_number(facts.mass_kg)),
@@ -178,7 +183,11 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
         ("turbine_torque", toml_number(torque * TURBINE_ERROR_N_M)),
         ("mass_error", toml_number(MASS_SHARE * facts.mass_kg)),
         ("shaft_torque", toml_number(lower_gear * SHAFT_TORQUE_N_M)),
+        ("output_torque", toml_number(torque * facts.ratio_before / RATIO_BEFORE * OUTPUT_ERROR_N_M)),
+        ("offgoing", toml_number(carried[0] * OFFGOING_N_M)),
+        ("offgoing_torque", toml_number(carried[0] * OFFGOING_OPEN_N_M)),
     ];
+    fields.extend(clutch_fields(carried));
     let of_valve = facts.valve.fields();
     let is_of_valve = |key: &str| of_valve.iter().any(|(name, _)| *name == key);
     fields.extend(
@@ -188,4 +197,40 @@ fn text_of(facts: &Facts) -> Result<String, ConfigError> {
     // The name goes in last, so that braces in it stay what they are.
     fields.push(("name", crate::toml_string(&facts.name)));
     Ok(fields.into_iter().fold(DEFAULTS.to_owned(), |text, (key, value)| text.replace(&format!("{{{key}}}"), &value)))
+}
+
+/// Plates, piston, spring and fill of both clutches, which carry torques over those of the car that is scaled.
+fn clutch_fields(carried: [f64; 2]) -> [(&'static str, String); 8] {
+    // A clutch that is larger in all directions has a torque by the third power of its length.
+    let length = carried.map(f64::cbrt);
+    let plates = |i: usize| toml_number(length[i] * PLATE_RADII_M[i]);
+    let area = |i: usize| length[i].powi(2) * PISTON_AREAS_M2[i];
+    let spring = |i: usize| toml_number(KISS_PA * area(i));
+    let fill = |i: usize| fill_text(length[i].powi(2));
+    [
+        ("plates_a", plates(0)),
+        ("plates_b", plates(1)),
+        ("area_a", toml_number(area(0))),
+        ("area_b", toml_number(area(1))),
+        ("spring_a", spring(0)),
+        ("spring_b", spring(1)),
+        ("fill_a", fill(0)),
+        ("fill_b", fill(1)),
+    ]
+}
+
+/// How a cylinder fills whose piston has this area over that of the car that is scaled: passages, pump, leak and what yields in
+/// proportion to the area, so that the fill takes the same time.
+fn fill_text(area: f64) -> String {
+    let passage = PASSAGE.with_flow_factor(area);
+    [
+        ("home_capacity_m3_pa", area * CAPACITY_M3_PA),
+        ("capacity_m3_pa", area * CAPACITY_M3_PA),
+        ("laminar_pa_s2_m5", passage.laminar_pa_s2_m5),
+        ("orifice_pa_s2_m6", passage.orifice_pa_s2_m6),
+        ("flow_max_m3_s", area * FLOW_MAX_M3_S),
+        ("leak_m3_s_pa", area * LEAK_M3_S_PA),
+    ]
+    .map(|(key, value)| format!("{key} = {}\n", toml_number(value)))
+    .concat()
 }

@@ -17,17 +17,17 @@ const RING_MAX: f64 = 500.0;
 const DIRECT: f64 = 2e-3;
 /// Least share of the turbine torque that a clutch is made for: in a shift it carries more than in its gear.
 const SHARE_MIN: f64 = 0.3;
-/// Inertia of a braked shaft, as it counts at the turbine, kg m^2.
+/// Inertia of a braked shaft, as it counts at the turbine, kg m^2, of the car that is scaled.
 const BRAKED_KG_M2: f64 = 0.0044;
 const INERTIA_MIN_KG_M2: f64 = 1e-4;
 
-/// The elements of the gears before and after the shift.
-pub(super) fn elements(ratios: [f64; 2]) -> Result<[Element; 2], String> {
+/// The elements of the gears before and after the shift, with inertias for a torque over that of the car that is scaled.
+pub(super) fn elements(ratios: [f64; 2], torque: f64) -> Result<[Element; 2], String> {
     let [before, after] = ratios;
-    Ok([element(before, "brake_a")?, element(after, "brake_b")?])
+    Ok([element(before, "brake_a", torque)?, element(after, "brake_b", torque)?])
 }
 
-fn element(ratio: f64, shaft: &str) -> Result<Element, String> {
+fn element(ratio: f64, shaft: &str, torque: f64) -> Result<Element, String> {
     if (ratio - 1.0).abs() < DIRECT {
         let sides = "input = \"turbine\"\noutput = \"output\"".to_owned();
         return Ok(Element { text: String::new(), sides, torque_share: 1.0 });
@@ -40,7 +40,7 @@ fn element(ratio: f64, shaft: &str) -> Result<Element, String> {
     };
     let (sun_teeth, ring_teeth) =
         numbers_of_teeth(teeth).ok_or_else(|| format!("no planetary set has the ratio {ratio}"))?;
-    let inertia = (BRAKED_KG_M2 * (ratio - 1.0).powi(2)).max(INERTIA_MIN_KG_M2);
+    let inertia = (torque * BRAKED_KG_M2 * (ratio - 1.0).powi(2)).max(INERTIA_MIN_KG_M2);
     let text = format!(
         "[[gear_train.shaft]]\nname = \"{shaft}\"\ninertia_kg_m2 = {inertia:.5}\n\n\
          [[gear_train.planetary_set]]\nsun = \"{sun}\"\nring = \"{ring}\"\ncarrier = \"{carrier}\"\n\

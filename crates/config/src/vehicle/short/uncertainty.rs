@@ -17,13 +17,19 @@ pub struct Uncertainty {
 
 /// Shares by which defaults of a car may be off, where the error budget has none [chosen]: what differs between cars of one size
 /// and power, and between data sheet and car. `*` is any name.
-const SHARES: [(&str, f64); 20] = [
+const SHARES: [(&str, f64); 26] = [
     ("engine.inertia_kg_m2", 0.2),
     ("converter.torque_ratio", 0.1),
     ("gear_train.shaft.*.inertia_kg_m2", 0.3),
     ("clutch.*.mean_radius_m", 0.1),
     ("clutch.*.piston_area_m2", 0.2),
     ("clutch.*.return_spring_n", 0.3),
+    ("clutch.*.fill.home_capacity_m3_pa", 0.5),
+    ("clutch.*.fill.capacity_m3_pa", 0.5),
+    ("clutch.*.fill.laminar_pa_s2_m5", 0.25),
+    ("clutch.*.fill.orifice_pa_s2_m6", 0.25),
+    ("clutch.*.fill.flow_max_m3_s", 0.5),
+    ("clutch.*.fill.leak_m3_s_pa", 0.5),
     ("clutch.*.valve.flow_sqrt_pa_s", 0.3),
     ("clutch.*.valve.line_pressure_pa", 0.1),
     ("driveline.shaft_damping_n_m_s_rad", 0.5),

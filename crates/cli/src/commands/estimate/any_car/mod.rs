@@ -25,6 +25,7 @@ use super::Messages;
 use super::measured::{check_step, slow_log};
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
+use super::ratios::check_wheel;
 use super::selection::Selection;
 use crate::args::{Estimate, ObserverChoice};
 use crate::commands::{JsonObject, channel_map_of_car, write_cells, write_json_list, write_text};
@@ -78,7 +79,8 @@ pub(super) fn estimate(
     let CarSetup { options, car, tables, .. } = setup;
     let mut opened = None;
     let stop = options.follow.then_some(&setup.stop);
-    let mut log = CarSource::open(CarReading { car, tables, map: &setup.map, stop }, path, &mut opened)?;
+    let reading = CarReading { car, tables, map: &setup.map, stop, threads: options.threads_of_log() };
+    let mut log = CarSource::open(reading, path, &mut opened)?;
     let mut drive = LoggedDrive::new(car, tables, setup.sensors.as_ref());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
@@ -115,6 +117,7 @@ pub(super) fn estimate(
         say.note(&swapped);
     }
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
+    check_wheel(drive.output_over_wheel(), car.driveline.final_ratio)?;
     if let Some(warning) = slow_log(median_s) {
         say.note(&warning);
     }

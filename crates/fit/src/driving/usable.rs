@@ -1,7 +1,6 @@
 //! Whether the driving of a log can say something, before it is fitted.
 
-use config::Car;
-
+use super::DrivenCar;
 use super::stretch::{Driving, STEP_S, means};
 
 /// Least time of driving, s.
@@ -24,7 +23,7 @@ pub(crate) struct Usable {
 }
 
 /// Looks at the driving of a car.
-pub(crate) fn usable(car: &Car, driving: &Driving) -> Usable {
+pub(crate) fn usable(car: &DrivenCar, driving: &Driving) -> Usable {
     let enough = |time_s: f64, what: &str| match time_s {
         time_s if time_s >= TIME_S => Ok(()),
         time_s => {
@@ -42,7 +41,7 @@ pub(crate) fn usable(car: &Car, driving: &Driving) -> Usable {
 }
 
 /// Whether the reported torque follows that which converter and engine take.
-fn follows(car: &Car, driving: &Driving) -> Result<(), String> {
+fn follows(car: &DrivenCar, driving: &Driving) -> Result<(), String> {
     let slopes = DELAYS_S.map(|late_s| slope(car, driving, late_s));
     let (change_n_m, _) = slopes[0];
     if change_n_m < CHANGE_N_M {
@@ -63,14 +62,14 @@ fn follows(car: &Car, driving: &Driving) -> Result<(), String> {
 }
 
 /// Standard deviation of the reported torque, N m, and by how much the torque taken rises with it.
-fn slope(car: &Car, driving: &Driving, late_s: f64) -> (f64, f64) {
+fn slope(car: &DrivenCar, driving: &Driving, late_s: f64) -> (f64, f64) {
     let (mut count, mut sums) = (0.0, [0.0; 4]);
     for stretch in driving.stretches.iter().filter(|stretch| stretch.has_reported()) {
         let engine = means(&stretch.halves, |half| half.engine_rad_s);
         let pump = means(&stretch.halves, |half| half.pump_n_m);
         let reported = means(&stretch.reported_n_m(&stretch.halves, STEP_S, late_s), |torque| *torque);
         for ((speeds, pump_n_m), reported) in engine.windows(3).zip(&pump[1..]).zip(&reported[1..]) {
-            let taken = pump_n_m + car.engine.inertia_kg_m2 * (speeds[2] - speeds[0]) / (2.0 * STEP_S);
+            let taken = pump_n_m + car.engine_inertia_kg_m2 * (speeds[2] - speeds[0]) / (2.0 * STEP_S);
             count += 1.0;
             let more = [*reported, taken, reported * reported, reported * taken];
             sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);

@@ -1,17 +1,14 @@
 //! The torque balances of car and engine along stretches of driving.
 
-use config::Car;
-use design::ShiftTables;
 use drivetrain::road::GRAVITY_M_S2;
 use nalgebra::{DMatrix, DVector};
-use observer::any_shift::MAX_ELEMENTS;
 
+use super::car::{CAPACITIES, DrivenCar};
 use super::stretch::{Driving, FINE_S, HalfStep, STEP_S, Stretch, means};
 use super::whitening::{Passing, Step, Whitening};
-use crate::gearbox::quantities::{DELAY_UNIT_S, DRAG_UNIT_N_M, Quantities, Quantity};
-use crate::gearbox::shift::{DELAY_STEP, DRAG_SD_N_M, INPUT_SD_SHARE};
-use crate::gearbox::solver::ChannelWeights;
-use crate::weights::{FACTOR, HUBER};
+use super::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_SHARE, Places, Term};
+use crate::parameters::DELAY_UNIT_S;
+use crate::weights::{ChannelWeights, FACTOR, HUBER};
 
 /// Standard deviation of the grade, rad, and the way over which it changes, m \[chosen: roads of hilly land; after twice that way 0.4 of a
 /// grade is left\].
@@ -57,11 +54,7 @@ impl Balance {
 /// Driving with what does not change during a fit.
 pub(crate) struct DrivingModel<'a> {
     driving: &'a Driving,
-    car: &'a Car,
-    /// Inertia of each gear at the output, and the pair of gears and part of the inertia that is its `M11`, kg m^2.
-    gears: Vec<(f64, Option<(usize, f64)>)>,
-    /// Elements by their places in the gearbox and in the tables.
-    elements: Vec<(usize, usize)>,
+    car: &'a DrivenCar,
     /// The balances that are used.
     uses: [bool; 2],
     /// Standard deviation of the mean speed of a step, rad/s.
@@ -119,45 +112,29 @@ impl Lines {
     }
 }
 
-/// The unknowns, by quantity.
+/// The unknowns, by term.
 struct At<'a> {
-    quantities: &'a Quantities,
+    place: Places<'a>,
     at: &'a [f64],
 }
 
 impl At<'_> {
-    fn of(&self, quantity: Quantity) -> f64 {
-        self.quantities.place(quantity).map_or(0.0, |place| self.at[place])
+    fn of(&self, term: Term) -> f64 {
+        (self.place)(term).map_or(0.0, |place| self.at[place])
     }
 
-    fn factor(&self, quantity: Quantity) -> f64 {
-        self.of(quantity).exp()
+    fn factor(&self, term: Term) -> f64 {
+        self.of(term).exp()
     }
 
-    /// Columns of the quantities that the car has.
-    fn columns<const N: usize>(&self, all: [(Quantity, Vec<f64>); N]) -> Vec<(usize, Vec<f64>)> {
-        all.into_iter().filter_map(|(quantity, column)| Some((self.quantities.place(quantity)?, column))).collect()
+    /// Columns of the terms that the fit has.
+    fn columns<const N: usize>(&self, all: [(Term, Vec<f64>); N]) -> Vec<(usize, Vec<f64>)> {
+        all.into_iter().filter_map(|(term, column)| Some(((self.place)(term)?, column))).collect()
     }
 }
 
 impl<'a> DrivingModel<'a> {
-    pub(crate) fn new(
-        car: &'a Car,
-        tables: &ShiftTables<f64>,
-        quantities: &Quantities,
-        driving: &'a Driving,
-        uses: [bool; 2],
-    ) -> Self {
-        let elements = (0..car.clutches.len().min(MAX_ELEMENTS)).filter_map(|at| Some((at, tables.place(at)?)));
-        let elements = elements.collect();
-        let tables = tables.tables();
-        let gears = tables.gears.iter().enumerate().map(|(at, gear)| {
-            let row = tables.shifts.iter().find(|row| row.from == at || row.to == at);
-            let m11 = row.and_then(|row| {
-                Some((quantities.pair(row.from, row.to)?, gear.ratio * gear.ratio * row.mass_kg_m2[0][0]))
-            });
-            (gear.inertia_kg_m2, m11)
-        });
+    pub(crate) fn new(car: &'a DrivenCar, driving: &'a Driving, uses: [bool; 2]) -> Self {
         let noise = |of: &dyn Fn(&Stretch) -> Vec<f64>| noise(&driving.stretches, of);
         let of_steps = |of: fn(&HalfStep) -> f64| noise(&|stretch| means(&stretch.fine, of));
         let reading_rad_s = [of_steps(|half| half.output_rad_s), of_steps(|half| half.engine_rad_s)];
@@ -167,11 +144,11 @@ impl<'a> DrivingModel<'a> {
         let longer = (FINE_S / STEP_S).sqrt();
         let noise_n_m = [longer * at_input_n_m, longer * reported_n_m.hypot(of_steps(|half| half.pump_n_m))];
         let reading_rad_s = reading_rad_s.map(|noise| (longer * noise).max(READING_LEAST_RAD_S));
-        Self { driving, car, gears: gears.collect(), elements, uses, reading_rad_s, noise_n_m }
+        Self { driving, car, uses, reading_rad_s, noise_n_m }
     }
 
     /// The balances at unknowns.
-    pub(crate) fn evaluated(&self, quantities: &Quantities, at: &[f64], weights: [DrivingWeights; 2]) -> Evaluated {
+    pub(crate) fn evaluated(&self, place: Places<'_>, at: &[f64], weights: [DrivingWeights; 2]) -> Evaluated {
         let mut all = Evaluated {
             score: DVector::zeros(at.len()),
             information: DMatrix::zeros(at.len(), at.len()),
@@ -180,7 +157,7 @@ impl<'a> DrivingModel<'a> {
             groups: Vec::new(),
         };
         for balance in Balance::ALL.into_iter().filter(|balance| self.uses[*balance as usize]) {
-            let lines = self.lines(balance, &At { quantities, at });
+            let lines = self.lines(balance, &At { place, at });
             let mut places: Vec<usize> =
                 lines.iter().flat_map(|(_, lines)| lines.by_parameter.iter().map(|(place, _)| *place)).collect();
             places.sort_unstable();
@@ -194,12 +171,12 @@ impl<'a> DrivingModel<'a> {
     }
 
     /// Weights that the errors ask for.
-    pub(crate) fn following(&self, quantities: &Quantities, at: &[f64]) -> [DrivingWeights; 2] {
+    pub(crate) fn following(&self, place: Places<'_>, at: &[f64]) -> [DrivingWeights; 2] {
         Balance::ALL.map(|balance| {
             if !self.uses[balance as usize] {
                 return DrivingWeights::START;
             }
-            let lines = self.lines(balance, &At { quantities, at });
+            let lines = self.lines(balance, &At { place, at });
             let found = LASTING.map(|lasting| {
                 let mut errors = Vec::new();
                 let take = |_: usize, rows: &DMatrix<f64>| errors.extend(rows.row(0).iter().copied());
@@ -276,24 +253,27 @@ impl<'a> DrivingModel<'a> {
     /// The balance of the car.
     fn of_car(&self, stretch: &Stretch, at: &At<'_>) -> Lines {
         let (car, line) = (self.car, &self.car.driveline);
-        let ratio = car.gearbox.gears[stretch.gear].ratio;
+        let gear = &car.gears[stretch.gear];
+        let ratio = gear.ratio;
         let [body, wheels] = [car.road.inertia_at_wheel(), line.wheel_inertia_kg_m2]
             .map(|inertia| inertia / (line.final_ratio * line.final_ratio));
-        let (gear, m11) = self.gears[stretch.gear];
-        let (pair, m11) = m11.map_or((None, 0.0), |(pair, m11)| (Some(Quantity::Inertia(pair)), m11));
-        let of_m11 = pair.map_or(0.0, |pair| m11 * (at.factor(pair) - 1.0));
-        let mass = at.factor(Quantity::Mass) * body;
-        let inertia = mass + wheels + gear + of_m11;
-        let [scale, above] = [Quantity::Input, Quantity::TorqueRatio].map(|quantity| at.factor(quantity));
-        let [rolling, air] = [Quantity::Rolling, Quantity::Air].map(|quantity| at.factor(quantity));
+        let more = |(term, part): &(Term, f64)| part * (at.factor(*term) - 1.0);
+        let of_parts = gear.parts.iter().map(more).sum::<f64>();
+        let mass = at.factor(Term::Mass) * body;
+        let inertia = mass + wheels + gear.inertia_kg_m2 + of_parts;
+        let [scale, above] = [Term::Input, Term::TorqueRatio].map(|term| at.factor(term));
+        let [rolling, air] = [Term::Rolling, Term::Air].map(|term| at.factor(term));
         let by_step = |of: &dyn Fn(usize) -> f64| (0..stretch.halves.len()).map(of).collect::<Vec<f64>>();
         let steps = &stretch.halves;
-        let (torque, later) = self.input_n_m(stretch, at.of(Quantity::InputDelay));
-        let input = by_step(&|k| scale * (torque[k] + (above - 1.0) * steps[k].above_one_n_m));
+        let (torque, later) = self.input_n_m(stretch, at.of(Term::InputDelay));
+        let changes: [f64; CAPACITIES] = std::array::from_fn(|number| at.of(Term::Capacity(number)));
+        let shape = |k: usize| changes.iter().zip(steps[k].by_capacity_n_m).map(|(x, by)| x * by).sum::<f64>();
+        let input = by_step(&|k| scale * (torque[k] + (above - 1.0) * steps[k].above_one_n_m + shape(k)));
         let drag = |k: usize| {
-            let more = self.elements.iter().map(|(at_car, place)| {
-                at.of(Quantity::Drag(*place)) * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m[*at_car]
-            });
+            let more = car
+                .elements
+                .iter()
+                .map(|(at_car, place)| at.of(Term::Drag(*place)) * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m[*at_car]);
             steps[k].drag_n_m + more.sum::<f64>()
         };
         let roll = rolling * car.road.rolling_moment_n_m / line.final_ratio;
@@ -303,19 +283,24 @@ impl<'a> DrivingModel<'a> {
         });
         let rate = by_step(&|k| (ratio * (input[k] + drag(k)) - roll - wind[k]) / inertia);
         let mut by_parameter = at.columns([
-            (Quantity::Input, by_step(&|k| ratio * input[k] / inertia)),
-            (Quantity::TorqueRatio, by_step(&|k| ratio * scale * above * steps[k].above_one_n_m / inertia)),
-            (Quantity::InputDelay, by_step(&|k| ratio * scale * (later[k] - torque[k]) / (DELAY_STEP * inertia))),
-            (Quantity::Mass, by_step(&|k| -rate[k] * mass / inertia)),
-            (Quantity::Rolling, by_step(&|_| -roll / inertia)),
-            (Quantity::Air, by_step(&|k| -wind[k] / inertia)),
+            (Term::Input, by_step(&|k| ratio * input[k] / inertia)),
+            (Term::TorqueRatio, by_step(&|k| ratio * scale * above * steps[k].above_one_n_m / inertia)),
+            (Term::InputDelay, by_step(&|k| ratio * scale * (later[k] - torque[k]) / (DELAY_STEP * inertia))),
+            (Term::Mass, by_step(&|k| -rate[k] * mass / inertia)),
+            (Term::Rolling, by_step(&|_| -roll / inertia)),
+            (Term::Air, by_step(&|k| -wind[k] / inertia)),
         ]);
-        for (at_car, place) in &self.elements {
+        for (at_car, place) in &car.elements {
             let by_drag = by_step(&|k| ratio * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m[*at_car] / inertia);
-            by_parameter.extend(at.columns([(Quantity::Drag(*place), by_drag)]));
+            by_parameter.extend(at.columns([(Term::Drag(*place), by_drag)]));
         }
-        if let Some(pair) = pair {
-            by_parameter.extend(at.columns([(pair, by_step(&|k| -rate[k] * (m11 + of_m11) / inertia))]));
+        for (term, part) in &gear.parts {
+            let now = part + more(&(*term, *part));
+            by_parameter.extend(at.columns([(*term, by_step(&|k| -rate[k] * now / inertia))]));
+        }
+        for number in 0..CAPACITIES {
+            let by_shape = by_step(&|k| ratio * scale * steps[k].by_capacity_n_m[number] / inertia);
+            by_parameter.extend(at.columns([(Term::Capacity(number), by_shape)]));
         }
         let weight = GRAVITY_M_S2 * line.final_ratio / car.road.wheel_radius_m * body / inertia;
         Lines {
@@ -363,9 +348,9 @@ impl<'a> DrivingModel<'a> {
     fn of_engine(&self, stretch: &Stretch, at: &At<'_>) -> Lines {
         let steps = &stretch.halves;
         let by_step = |of: &dyn Fn(usize) -> f64| (0..steps.len()).map(of).collect::<Vec<f64>>();
-        let inertia = self.car.engine.inertia_kg_m2 * at.factor(Quantity::EngineInertia);
-        let [scale, capacity] = [Quantity::ReportedScale, Quantity::Input].map(|quantity| at.factor(quantity));
-        let late = at.of(Quantity::ReportedDelay);
+        let inertia = self.car.engine_inertia_kg_m2 * at.factor(Term::EngineInertia);
+        let [scale, capacity] = [Term::ReportedScale, Term::Input].map(|term| at.factor(term));
+        let late = at.of(Term::ReportedDelay);
         let [torque, later] =
             [late, late + DELAY_STEP].map(|late| stretch.reported_n_m(&stretch.halves, STEP_S, DELAY_UNIT_S * late));
         let pump = by_step(&|k| capacity * steps[k].pump_n_m);
@@ -377,10 +362,10 @@ impl<'a> DrivingModel<'a> {
             white_rad_s2: self.noise_n_m[1] / inertia,
             sd_rad_s2: [by_step(&|_| 0.0), by_step(&error_n_m)],
             by_parameter: at.columns([
-                (Quantity::Input, by_step(&|k| -pump[k] / inertia)),
-                (Quantity::ReportedScale, by_step(&|k| scale * torque[k] / inertia)),
-                (Quantity::ReportedDelay, by_step(&|k| scale * (later[k] - torque[k]) / (DELAY_STEP * inertia))),
-                (Quantity::EngineInertia, by_step(&|k| -rate[k])),
+                (Term::Input, by_step(&|k| -pump[k] / inertia)),
+                (Term::ReportedScale, by_step(&|k| scale * torque[k] / inertia)),
+                (Term::ReportedDelay, by_step(&|k| scale * (later[k] - torque[k]) / (DELAY_STEP * inertia))),
+                (Term::EngineInertia, by_step(&|k| -rate[k])),
             ]),
             rate,
         }

@@ -1,8 +1,7 @@
 //! From the steps of a log to stretches of driving in which the engine pulls.
 
-use config::Car;
-use design::ShiftTables;
-
+use super::DrivenCar;
+use super::backlash::TwistRecorder;
 use super::stretch::{Driving, Stretch, StretchReadings};
 use crate::Series;
 
@@ -41,32 +40,30 @@ pub(crate) struct RowState {
 pub(crate) type Dated = Option<(f64, f64)>;
 
 /// Takes the steps of a log one after the other.
-pub(crate) struct DrivingRecorder<'a> {
-    car: &'a Car,
-    /// Gears whose inertia is known.
-    is_known: Vec<bool>,
+pub(crate) struct DrivingRecorder {
+    car: DrivenCar,
     /// Of the stretch that is open.
     readings: StretchReadings,
     open: Option<(usize, f64)>,
     unsettled_s: f64,
+    twist: TwistRecorder,
     found: Driving,
 }
 
-impl<'a> DrivingRecorder<'a> {
-    pub(crate) fn new(car: &'a Car, tables: &ShiftTables<f64>) -> Self {
-        let known = |gear: &observer::any_shift::GearRow<f64>| gear.ratio > 0.0 && gear.inertia_kg_m2.is_finite();
+impl DrivingRecorder {
+    pub(crate) fn new(car: DrivenCar) -> Self {
         Self {
             car,
-            is_known: tables.tables().gears.iter().map(known).collect(),
             readings: StretchReadings::default(),
             open: None,
             unsettled_s: f64::NEG_INFINITY,
+            twist: TwistRecorder::default(),
             found: Driving::default(),
         }
     }
 
-    /// Takes a row: its time, the readings of engine, turbine and output speed, the reported engine torque, and its state.
-    pub(crate) fn push(&mut self, time_s: f64, speeds: [Dated; 3], reported: Dated, state: RowState) {
+    /// Takes a row: its time, the readings of engine, turbine, output and wheel speed, the reported engine torque, and its state.
+    pub(crate) fn push(&mut self, time_s: f64, speeds: [Dated; 4], reported: Dated, state: RowState) {
         let StretchReadings { engine, turbine, output, reported: torque } = &mut self.readings;
         for (series, reading) in [engine, turbine, output].into_iter().zip(speeds).chain([(torque, reported)]) {
             if let Some((time_s, value)) = reading {
@@ -74,6 +71,7 @@ impl<'a> DrivingRecorder<'a> {
             }
         }
         let gear = state.gear.filter(|_| !state.lock_up);
+        self.twist.push(&self.car, time_s, speeds, gear);
         if gear.is_none() || gear != self.open.map(|(gear, _)| gear).or(gear) {
             self.unsettled_s = time_s;
         }
@@ -99,6 +97,8 @@ impl<'a> DrivingRecorder<'a> {
     /// The stretches.
     pub(crate) fn finish(mut self) -> Driving {
         self.close();
+        self.twist.close(&self.car);
+        self.found.twists = self.twist.stretches;
         self.found
     }
 
@@ -110,9 +110,8 @@ impl<'a> DrivingRecorder<'a> {
             last_s.and_then(|_| series.value.last().copied())
         };
         let (Some(turbine), Some(output)) = (newest(turbine), newest(output)) else { return false };
-        let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio * output);
-        let is_in_gear = self.is_known.get(gear) == Some(&true)
-            && (turbine - by_output).abs() <= RATIO_RAD_S + RATIO_SHARE * by_output.abs();
+        let gear = self.car.gears.get(gear).filter(|gear| gear.is_known());
+        let is_in_gear = gear.is_some_and(|gear| turns_by(gear.ratio, turbine, output));
         let is_driven = match &self.car.converter {
             Some(_) => newest(engine).is_some_and(|engine| engine > ENGINE_LEAST_RAD_S && turbine < slower * engine),
             None => newest(reported).is_some_and(|torque| torque > least_n_m),
@@ -135,7 +134,7 @@ impl<'a> DrivingRecorder<'a> {
             self.found.is_cut = true;
             return;
         }
-        if let Some(stretch) = Stretch::of(self.car, gear, readings, span) {
+        if let Some(stretch) = Stretch::of(&self.car, gear, readings, span) {
             self.found.stretches.push(stretch);
         }
     }
@@ -148,8 +147,14 @@ impl<'a> DrivingRecorder<'a> {
             let from_s = series.time_s.last().map_or(f64::NAN, |last_s| last_s - BEFORE_S);
             // At least half of it goes, so that a fast log is not copied in every row.
             if series.len() > KEPT && series.time_s[series.len() / 2] < from_s {
-                *series = super::super::recorder::part(series, [from_s, f64::INFINITY]);
+                *series = series.part([from_s, f64::INFINITY]);
             }
         }
     }
+}
+
+/// Whether turbine and output turn by a ratio.
+pub(crate) fn turns_by(ratio: f64, turbine_rad_s: f64, output_rad_s: f64) -> bool {
+    let by_output = ratio * output_rad_s;
+    (turbine_rad_s - by_output).abs() <= RATIO_RAD_S + RATIO_SHARE * by_output.abs()
 }

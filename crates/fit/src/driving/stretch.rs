@@ -1,9 +1,10 @@
 //! A stretch of driving in one gear, reduced to steps.
 
-use config::Car;
 use drivetrain::clutch::drag_torque;
 use observer::any_shift::MAX_ELEMENTS;
 
+use super::backlash::Cell;
+use super::car::{CAPACITIES, DrivenCar, OpenElement};
 use crate::Series;
 
 /// Length of a step, s: over some periods of the oscillation of the drive shafts, which the model leaves out and which acts back on the torque of
@@ -23,6 +24,8 @@ const STEPS_MIN: usize = 3;
 pub struct Driving {
     /// Stretches in their order.
     pub(crate) stretches: Vec<Stretch>,
+    /// Stretches with reversals of the torque.
+    pub(crate) twists: Vec<Vec<Cell>>,
     /// Whether the log was longer than what is kept.
     pub(crate) is_cut: bool,
 }
@@ -33,6 +36,8 @@ impl Driving {
         // The same drive says what it has to say once.
         let new = more.stretches.into_iter().filter(|stretch| !self.stretches.contains(stretch)).collect::<Vec<_>>();
         self.stretches.extend(new);
+        let new = more.twists.into_iter().filter(|twist| !self.twists.contains(twist)).collect::<Vec<_>>();
+        self.twists.extend(new);
         self.is_cut |= more.is_cut;
     }
 
@@ -80,6 +85,8 @@ pub(crate) struct HalfStep {
     pub(crate) turbine_n_m: f64,
     pub(crate) above_one_n_m: f64,
     pub(crate) pump_n_m: f64,
+    /// By how much the torque at the turbine changes with the numbers of the shape of the capacity, N m.
+    pub(crate) by_capacity_n_m: [f64; CAPACITIES],
     /// Torque at the turbine by the drag of the open elements: by the file, and by each with a peak of 1 N m.
     pub(crate) drag_n_m: f64,
     pub(crate) drag_of_one_n_m: [f64; MAX_ELEMENTS],
@@ -87,13 +94,18 @@ pub(crate) struct HalfStep {
 
 impl Stretch {
     /// The stretch of these readings in a gear; none if it is too short.
-    pub(crate) fn of(car: &Car, gear: usize, readings: StretchReadings, [begin_s, end_s]: [f64; 2]) -> Option<Self> {
-        let open = OpenElements::of(car, gear)?;
+    pub(crate) fn of(
+        car: &DrivenCar,
+        gear: usize,
+        readings: StretchReadings,
+        [begin_s, end_s]: [f64; 2],
+    ) -> Option<Self> {
+        let open = &car.gears.get(gear)?.open;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "seconds over a step")]
         let count = |step_s: f64| ((end_s - begin_s).max(0.0) / step_s) as usize;
         let [halves, fine] = [STEP_S, FINE_S].map(|step_s| {
             let span = |at: usize| [begin_s + step_s * at as f64, step_s];
-            let of_step = |at: usize| WEIGHTS.map(|weight| half(car, &open, &readings, span(at), weight));
+            let of_step = |at: usize| WEIGHTS.map(|weight| half(car, open, &readings, span(at), weight));
             (0..count(step_s)).flat_map(of_step).collect()
         });
         (count(STEP_S) >= STEPS_MIN).then_some(Self { gear, halves, fine, reported: readings.reported })
@@ -146,7 +158,7 @@ fn points([begin_s, step_s]: [f64; 2], weight: Weight) -> impl Iterator<Item = (
     })
 }
 
-fn half(car: &Car, open: &OpenElements, readings: &StretchReadings, span: [f64; 2], weight: Weight) -> HalfStep {
+fn half(car: &DrivenCar, open: &[OpenElement], readings: &StretchReadings, span: [f64; 2], weight: Weight) -> HalfStep {
     let mut mean = HalfStep { time_s: span[0] + 0.5 * span[1], ..HalfStep::default() };
     for (time_s, share) in points(span, weight) {
         let [engine, turbine, output] =
@@ -158,32 +170,16 @@ fn half(car: &Car, open: &OpenElements, readings: &StretchReadings, span: [f64; 
             mean.turbine_n_m += share * torques.turbine_n_m;
             mean.pump_n_m += share * torques.pump_n_m;
             mean.above_one_n_m += share * (torques.turbine_n_m - torques.pump_n_m);
+            let changes = car.capacity_changes(turbine / engine);
+            for (sum, change) in mean.by_capacity_n_m.iter_mut().zip(changes) {
+                *sum += share * change * torques.turbine_n_m;
+            }
         }
-        for (at, slip, drag_n_m) in &open.0 {
+        for OpenElement { at, slip, drag_n_m } in open {
             let of_one = -slip * drag_torque(1.0, slip * turbine);
             mean.drag_n_m += share * drag_n_m * of_one;
             mean.drag_of_one_n_m[*at] += share * of_one;
         }
     }
     mean
-}
-
-/// The elements that are open in a gear, by their places in the gearbox: slip per turbine speed, and peak of the drag, N m.
-struct OpenElements(Vec<(usize, f64, f64)>);
-
-impl OpenElements {
-    fn of(car: &Car, gear: usize) -> Option<Self> {
-        let train = car.gearbox.train.as_ref()?;
-        let gear = car.gearbox.gears.get(gear)?;
-        let is_held = |at: usize| gear.holding.iter().any(|holding| holding.element == at);
-        let elements = car.clutches.iter().enumerate().take(MAX_ELEMENTS).filter(|(at, _)| !is_held(*at));
-        let slipping = elements.filter_map(|(at, clutch)| {
-            let row = train.slip_row(at);
-            // An idle shaft turns as it likes, and nothing is known of its drag.
-            let turned = row.iter().zip(&gear.shaft_speeds).filter(|(factor, _)| **factor != 0.0);
-            let slip = turned.map(|(factor, speed)| speed.map(|speed| factor * speed)).sum::<Option<f64>>()?;
-            Some((at, slip, clutch.as_ref()?.drag_n_m))
-        });
-        Some(Self(slipping.collect()))
-    }
 }
