@@ -3,7 +3,7 @@
 //! `FIT_CARS=20 cargo run --release -p fit --example gearbox_draws`; `FIT_FIRST` is the first seed, `FIT_DRIVES` how often the drive of
 //! three minutes is driven (5), on a road with hills unless `FIT_ROAD=level`; with `FIT_TORQUE=1` the engine torque is reported, with
 //! `FIT_WEIGHED=1` the mass is known to a percent, with `FIT_BACKLASH=1` each car has a backlash of its own, and with `FIT_DRIVING=off` driving between shifts is not fitted; `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
-//! sensor; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
+//! sensor; `FIT_HYSTERESIS=none` says in the error bounds of the file that no valve has a hysteresis; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
 //! the WLTC with the given file, with the fitted one without its error bounds, and with it.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
@@ -192,12 +192,14 @@ fn main() {
         Ok(other) => panic!("FIT_CASE={other}"),
     };
     let (is_hilly, is_reported) = (std::env::var("FIT_ROAD").is_err(), std::env::var("FIT_TORQUE").is_ok());
+    let has_hysteresis = std::env::var("FIT_HYSTERESIS").is_err();
     let has_backlash = std::env::var("FIT_BACKLASH").is_ok();
     let is_weighed = std::env::var("FIT_WEIGHED").is_ok();
     let of_car = |seed: u64| {
         let drawn = Drawn::of(drawn::car(&vehicle), seed, case);
         let drawn = if is_reported { drawn.with_reported(case) } else { drawn };
         let drawn = if is_weighed { drawn.weighed() } else { drawn };
+        let drawn = if has_hysteresis { drawn } else { drawn.without_hysteresis() };
         let drawn = if has_backlash { drawn.with_backlash() } else { drawn };
         let drive = if is_hilly { drawn::hilly(&drive, seed) } else { level(&drive) };
         outcome(&drawn, case, &drive)

@@ -76,8 +76,8 @@ impl Car {
                 ..vehicle.oncoming.clutch
             },
             offgoing: vehicle.offgoing.clutch,
-            hydraulics: Hydraulics::filled(&vehicle.oncoming),
-            offgoing_hydraulics: Hydraulics::filled(&vehicle.offgoing),
+            hydraulics: Hydraulics::of(&vehicle.oncoming).filled(),
+            offgoing_hydraulics: Hydraulics::of(&vehicle.offgoing).filled(),
             cylinder: Hydraulics::of(&vehicle.oncoming).cylinder,
             command_delay_s: 0.0,
             shift: vehicle.shift,

@@ -17,7 +17,7 @@ use crate::weights::FACTOR;
 use crate::{Series, Verdict};
 
 /// Pressure drop over the passages in a fast fill at which flows are compared, Pa \[chosen: as production gearboxes command it\].
-const FILL_DROP_PA: f64 = 0.15e6;
+pub(crate) const FILL_DROP_PA: f64 = 0.15e6;
 /// Least standard deviation of a fitted fill volume: of slow and of fast flows, as passages and oil may be, one law has not both. Within 10 % of an
 /// orifice's area and 15 K the ratio of the flows at 20 and at 150 kPa has a deviation of 2 and of 4 %.
 const FILL_FLOOR: f64 = 0.04;
@@ -181,7 +181,7 @@ impl FillLog<'_> {
 
 /// Standard deviation of the logarithm of the volume of a stroke by the flow of the file: limits of volume, of passages and of the oil's
 /// viscosity, as uniform distributions.
-fn fill_sd(cylinder: &Cylinder<f64>, budget: &FillBudget<f64>) -> f64 {
+pub(crate) fn fill_sd(cylinder: &Cylinder<f64>, budget: &FillBudget<f64>) -> f64 {
     let volume = budget.volume_m3.map(|volume_m3| volume_m3 / cylinder.stroke_m3);
     let [wide, narrow] = budget.supply;
     let [thin, thick] = budget.viscosity_m2_s;

@@ -20,16 +20,15 @@ impl Hydraulics {
         Self { valve: clutch.valve, hysteresis_pa: clutch.hysteresis_pa, cylinder }
     }
 
-    /// Those of a clutch of a vehicle file whose piston has ended its stroke: the pressure is that of the valve, but for what the oil needs to flow.
-    pub(crate) fn filled(clutch: &config::ShiftClutch) -> Self {
-        let all = Self::of(clutch);
+    /// The same with a piston that has ended its stroke: the pressure is that of the valve, but for what the oil needs to flow.
+    pub(crate) fn filled(&self) -> Self {
         let filled = |cylinder: Cylinder<f64>| Cylinder {
             stroke_m3: 0.0,
             preload_pa: cylinder.kiss_pa,
             home_capacity_m3_pa: cylinder.capacity_m3_pa,
             ..cylinder
         };
-        Self { cylinder: all.cylinder.map(filled), ..all }
+        Self { cylinder: self.cylinder.map(filled), ..*self }
     }
 
     /// With these logarithms of factors on lag and gain of the valve.

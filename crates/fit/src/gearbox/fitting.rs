@@ -11,6 +11,7 @@ use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
+use super::unfitted::Unfitted;
 use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::pressure::Hydraulics;
@@ -97,7 +98,7 @@ fn fit_with(
     let of_driving = DrivingModel::new(&driven, driving, balances.used());
     let all = Models { shifts: &models, driving: of_driving };
     let solved = problem.solve(&all, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
-    let stated = stated(&problem, &models, &solved)?;
+    let stated = stated(&problem, &models, &solved, &Unfitted::of(car, tables))?;
     let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
     let mut elements_seen = vec![false; quantities.elements.len()];
     for model in &models {

@@ -12,6 +12,7 @@
 
 mod balances;
 mod budget;
+mod clutch;
 mod file;
 mod fitting;
 mod precision;
@@ -21,6 +22,7 @@ mod report;
 mod shift;
 mod shift_log;
 mod solver;
+mod unfitted;
 mod validation;
 
 pub use crate::driving::Driving;

@@ -8,14 +8,21 @@ use nalgebra::{DMatrix, DVector};
 
 use super::shift::ShiftModel;
 use super::solver::{Problem, Solved};
+use super::unfitted::Unfitted;
 use crate::{FitError, intervals};
 
 /// Covariance of the unknowns as it is stated.
-pub(crate) fn stated(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved) -> Result<DMatrix<f64>, FitError> {
+pub(crate) fn stated(
+    problem: &Problem<'_>,
+    models: &[ShiftModel],
+    solved: &Solved,
+    unfitted: &[Unfitted],
+) -> Result<DMatrix<f64>, FitError> {
     let count = solved.at.len();
     let (information, _) = solved.point.normal();
     let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
-    let auto = (information + &problem.precision).cholesky().ok_or_else(singular)?.inverse();
+    let curvature = (information + &problem.precision).cholesky().ok_or_else(singular)?;
+    let auto = curvature.inverse();
     let cluster = intervals::cluster(&auto, &scores(models, solved), &problem.precision);
     let mut stated = with_deviations(&auto, |j| {
         let found = auto[(j, j)].max(cluster[(j, j)]).sqrt().hypot(problem.quantities.floor(problem.quantities.all[j]));
@@ -26,7 +33,8 @@ pub(crate) fn stated(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solv
         let only = DVector::from_fn(count, |j, _| f64::from(u8::from(j == place)));
         intervals::forget(&mut stated, &only, problem.quantities.before[(place, place)]);
     }
-    // Nor does one with what is held.
+    unfitted.iter().for_each(|error| error.add_to(&mut stated, problem, models, solved, &curvature));
+    // Nor does one with what is held or not fitted.
     Ok(with_deviations(&stated, |j| stated[(j, j)].sqrt().min(problem.quantities.sd_before(j))))
 }
 

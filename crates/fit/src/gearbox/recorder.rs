@@ -9,7 +9,7 @@ use super::shift_log::{ShiftLog, named_pair};
 use crate::driving::{DrivenCar, Driving, DrivingRecorder, RowState};
 use crate::{ReadingAges, Series};
 
-/// What is kept from before a shift, s: after this time a valve has forgotten where it was.
+/// What is kept from before a shift at least, s: after this time a valve has forgotten where it was.
 const BEFORE_S: f64 = 2.0;
 /// What is kept from after it, s: a gear signal may change before the ratio does.
 const AFTER_S: f64 = 0.5;
@@ -74,6 +74,8 @@ pub struct Recorder<'a> {
     /// Of the shift that is open.
     pressure: [Series; 2],
     driving: DrivingRecorder,
+    /// Longest time in which a piston of the car goes back, s; zero where none has a stroke.
+    emptied_s: f64,
     /// Of the next step, what the filter of `estimate` is not shown.
     reported: Option<Reading<f64>>,
     open: Option<Open>,
@@ -96,6 +98,7 @@ impl<'a> Recorder<'a> {
             commands: std::array::from_fn(|_| none()),
             pressure: [none(), none()],
             driving: DrivingRecorder::new(DrivenCar::with_gearbox(car, tables, &|_, _| None)),
+            emptied_s: emptied_s(car),
             reported: None,
             open: None,
             last_output: f64::NAN,
@@ -201,9 +204,10 @@ impl<'a> Recorder<'a> {
         if self.open.is_some() || self.turbine.len().max(self.commands[0].len()) < READINGS_KEPT {
             return;
         }
+        let before_s = self.before_s();
         let speeds = [&mut self.engine, &mut self.turbine, &mut self.output, &mut self.engine_torque];
         for series in speeds.into_iter().chain(&mut self.commands) {
-            *series = series.part([time_s - BEFORE_S, f64::INFINITY]);
+            *series = series.part([time_s - before_s, f64::INFINITY]);
         }
     }
 
@@ -219,6 +223,7 @@ impl<'a> Recorder<'a> {
         let rows = self.tables.tables();
         let Some(row) = rows.shift(gears[0], gears[1]) else { return };
         let found = log.find_slip(row).and_then(|()| match (&self.car.converter, lock_up) {
+            _ if self.begins_within(&log) => Err("its commands begin too late to say how much oil its pistons had"),
             (Some(_), true) => Err("the lock-up clutch of the converter was applied"),
             (Some(_), false) if log.engine.between(log.slip_s).count() < 2 => Err("the engine speed is missing"),
             (None, _) if log.engine_torque.between(log.slip_s).count() < 2 => Err("the engine torque is missing"),
@@ -228,6 +233,18 @@ impl<'a> Recorder<'a> {
             Ok(()) => self.found.shifts.push(log),
             Err(reason) => self.found.skipped.push(format!("{name}: {reason}")),
         }
+    }
+
+    /// How long before a shift readings are kept, s.
+    fn before_s(&self) -> f64 {
+        BEFORE_S.max(self.emptied_s)
+    }
+
+    /// Whether the commands of a shift of pistons with a stroke begin so late that the pistons may have moved before.
+    fn begins_within(&self, log: &ShiftLog) -> bool {
+        let is_late =
+            |commands: &Series| commands.time_s.first().is_none_or(|first_s| *first_s > log.slip_s[0] - self.emptied_s);
+        self.emptied_s > 0.0 && log.commands.iter().any(is_late)
     }
 
     /// The readings of a shift.
@@ -246,7 +263,7 @@ impl<'a> Recorder<'a> {
         let span = [open.begun_s - 0.1, ended_s + AFTER_S];
         let commands = row.clutches.map(|clutch| {
             let all = self.commands.get(clutch.element);
-            all.map(|all| all.part([open.begun_s - BEFORE_S, span[1]])).unwrap_or_default()
+            all.map(|all| all.part([open.begun_s - self.before_s(), span[1]])).unwrap_or_default()
         });
         Ok(ShiftLog {
             name: name.to_owned(),
@@ -262,4 +279,11 @@ impl<'a> Recorder<'a> {
             lock_up: open.lock_up,
         })
     }
+}
+
+/// Longest time in which a piston of a car goes back to its stop under no pressure of its valve, s.
+fn emptied_s(car: &Car) -> f64 {
+    let strokes = car.clutches.iter().flatten().filter(|clutch| clutch.has_stroke).map(|clutch| clutch.cylinder);
+    // The slowest is the flow at the end, by the preload alone.
+    strokes.map(|cylinder| cylinder.stroke_m3 / cylinder.flow(-cylinder.preload_pa).abs()).fold(0.0, f64::max)
 }

@@ -17,7 +17,8 @@ const MISFIT: f64 = 2.0;
 const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
-const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, hysteresis of the valves and the shapes of all maps";
+const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, hysteresis of the valves and the shapes of all maps. \
+     The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them";
 
 impl GearboxFit {
     /// The table: each quantity of which a fitted shift can tell something.

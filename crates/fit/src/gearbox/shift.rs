@@ -6,13 +6,13 @@ use drivetrain::ShiftKind;
 use drivetrain::clutch::drag_torque;
 use geartrain::Change;
 use nalgebra::{DMatrix, DVector};
-use observer::any_shift::ShiftRow;
 
+use super::clutch::{AtValve, ClutchModel};
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
 use super::shift_log::ShiftLog;
 use crate::Series;
 use crate::driving::{DELAY_STEP, DRAG_SD_N_M, DRAG_UNIT_N_M, INPUT_SD_SHARE};
-use crate::pressure::{Grid, Hydraulics, pressures};
+use crate::pressure::{Grid, Hydraulics};
 
 /// Step of the integrals, s.
 const STEP_S: f64 = 0.002;
@@ -21,23 +21,6 @@ const STEP_S: f64 = 0.002;
 pub(crate) const OWN: usize = 2;
 /// Deviation of the first, rad/s: nothing is known of it.
 const START_SD_RAD_S: f64 = 50.0;
-/// Steps for the derivatives by the logarithm of a lag and of a gain.
-const LAG_STEP: f64 = 0.02;
-const GAIN_STEP: f64 = 0.02;
-
-/// A clutch of the shift.
-#[derive(Debug, Clone)]
-struct ClutchModel {
-    place: usize,
-    commands: Series,
-    /// Measured pressure while both clutches slip, Pa.
-    measured: Series,
-    /// Without a cylinder: a fill is over before both clutches slip.
-    hydraulics: Hydraulics,
-    kiss_pa: f64,
-    /// Torque at the turbine per pressure above the kiss point, at the points of the grid, N m/Pa.
-    per_pa: Vec<f64>,
-}
 
 /// A shift with what does not change during a fit.
 #[derive(Debug, Clone)]
@@ -81,14 +64,14 @@ pub(crate) struct MeasuredPressure {
 }
 
 /// The unknowns of a fit, and the derivatives of a shift's angular momentum by them.
-struct Unknowns<'a> {
-    quantities: &'a Quantities,
-    at: &'a [f64],
+pub(super) struct Unknowns<'a> {
+    pub(super) quantities: &'a Quantities,
+    pub(super) at: &'a [f64],
     by_momentum: DMatrix<f64>,
 }
 
 impl Unknowns<'_> {
-    fn of(&self, quantity: Quantity) -> f64 {
+    pub(super) fn of(&self, quantity: Quantity) -> f64 {
         self.quantities.place(quantity).map_or(0.0, |place| self.at[place])
     }
 
@@ -113,7 +96,7 @@ impl ShiftModel {
         let times = || (0..points).map(|i| grid.time_s(i));
         let torques = times().map(|time_s| input(car, log, time_s));
         let (input_n_m, above_one_n_m): (Vec<f64>, Vec<f64>) = torques.unzip();
-        let clutches = [0, 1].map(|which| clutch(car, tables, row, log, which, grid));
+        let clutches = [0, 1].map(|which| ClutchModel::new((car, tables, quantities), row, (log, which), grid));
         let [Some(offgoing), Some(oncoming)] = clutches else { return None };
         let (time_s, reading): (Vec<f64>, Vec<f64>) = log.turbine.between(log.slip_s).unzip();
         let start = log.output.at(begin_s);
@@ -144,6 +127,14 @@ impl ShiftModel {
     /// Places of its elements in the tables.
     pub(crate) fn elements(&self) -> [usize; 2] {
         self.clutches.each_ref().map(|clutch| clutch.place)
+    }
+
+    /// The same shift with another way to the pressure of an element; none where that element is not one of its clutches.
+    pub(crate) fn with_hydraulics(&self, place: usize, change: impl Fn(&mut Hydraulics)) -> Option<Self> {
+        let which = self.clutches.iter().position(|clutch| clutch.place == place)?;
+        let mut other = self.clone();
+        other.clutches[which].change(change);
+        Some(other)
     }
 
     /// Residuals and derivatives at unknowns.
@@ -206,11 +197,9 @@ impl ShiftModel {
         unknowns: &mut Unknowns<'_>,
     ) -> (Vec<f64>, Option<MeasuredPressure>) {
         let place = clutch.place;
-        let quantities = [Quantity::Lag(place), Quantity::Gain(place), Quantity::Delay(place)];
-        let [lag, gain, late] = quantities.map(|quantity| unknowns.of(quantity));
-        let kiss_pa = clutch.kiss_pa + KISS_UNIT_PA * unknowns.of(Quantity::Kiss(place));
+        let found = clutch.with_derivatives(self.grid, unknowns);
+        let (pressure, kiss_pa) = (&found.pressure_pa, found.kiss_pa);
         let factor = unknowns.of(Quantity::Torque(place)).exp();
-        let pressure = clutch.pressures(self.grid, lag, gain, late);
         let slope = |i: usize| if pressure[i] > kiss_pa { -factor * clutch.per_pa[i] } else { 0.0 };
         let scaled = |by: &dyn Fn(usize) -> f64| -> Vec<f64> {
             self.integral(&(0..pressure.len()).map(|i| slope(i) * by(i)).collect::<Vec<_>>())
@@ -218,17 +207,8 @@ impl ShiftModel {
         let momentum = scaled(&|i| pressure[i] - kiss_pa);
         unknowns.put(Quantity::Torque(place), &momentum);
         unknowns.put(Quantity::Kiss(place), &scaled(&|_| -KISS_UNIT_PA));
-        let change = |other: Vec<f64>, step: f64| -> Vec<f64> {
-            other.iter().zip(&pressure).map(|(other, pressure)| (other - pressure) / step).collect()
-        };
-        let changes = [
-            change(clutch.pressures(self.grid, lag + LAG_STEP, gain, late), LAG_STEP),
-            change(clutch.pressures(self.grid, lag, gain + GAIN_STEP, late), GAIN_STEP),
-            change(clutch.pressures(self.grid, lag, gain, late + DELAY_STEP), DELAY_STEP),
-        ];
-        let by: Vec<(Quantity, Vec<f64>)> = quantities.into_iter().zip(changes).collect();
-        by.iter().for_each(|(quantity, change)| unknowns.put(*quantity, &scaled(&|i| change[i])));
-        let measured = clutch.measured(self.grid, unknowns, &pressure, &by);
+        found.by.iter().for_each(|(quantity, change)| unknowns.put(*quantity, &scaled(&|i| change[i])));
+        let measured = clutch.measured(self.grid, unknowns, &found);
         (momentum, measured)
     }
 
@@ -248,46 +228,6 @@ impl ShiftModel {
             sums.push(sum);
         }
         self.time_s.iter().map(|time_s| self.grid.at(&sums, *time_s)).collect()
-    }
-}
-
-impl ClutchModel {
-    /// Pressures by the gain of the file: the true ones, at which the valve has its lag, over the factor of the gain.
-    fn pressures(&self, grid: Grid, log_lag: f64, log_gain: f64, late: f64) -> Vec<f64> {
-        let of = self.hydraulics.with_valve(log_lag, log_gain);
-        let mut pressures = pressures(&of, DELAY_UNIT_S * late, &self.commands, grid);
-        pressures.iter_mut().for_each(|pressure| *pressure *= (-log_gain).exp());
-        pressures
-    }
-
-    /// Residuals of the measured pressure, and derivatives of its prediction; `pressure` is that by the gain of the file, with derivatives.
-    fn measured(
-        &self,
-        grid: Grid,
-        Unknowns { quantities, at, .. }: &Unknowns<'_>,
-        pressure: &[f64],
-        by: &[(Quantity, Vec<f64>)],
-    ) -> Option<MeasuredPressure> {
-        let rows = self.measured.len();
-        let scale = quantities.place(Quantity::PressureScale).filter(|_| rows > 0)?;
-        let gain = quantities.place(Quantity::Gain(self.place))?;
-        let factor = (at[scale] + at[gain]).exp();
-        let predicted = |values: &[f64]| -> DVector<f64> {
-            let times = self.measured.time_s.iter();
-            DVector::from_iterator(rows, times.map(|time_s| factor * grid.at(values, *time_s)))
-        };
-        let all = predicted(pressure);
-        let mut by_parameter = DMatrix::zeros(rows, at.len());
-        by_parameter.column_mut(scale).copy_from(&all);
-        by_parameter.column_mut(gain).copy_from(&all);
-        for (quantity, change) in by {
-            if let Some(place) = quantities.place(*quantity) {
-                let mut column = by_parameter.column_mut(place);
-                column += predicted(change);
-            }
-        }
-        let residuals = DVector::from_column_slice(&self.measured.value) - all;
-        Some(MeasuredPressure { residuals, by_parameter })
     }
 }
 
@@ -329,34 +269,6 @@ fn drag(
     Some((file_n_m, each))
 }
 
-/// The model of the offgoing (0) or oncoming (1) clutch.
-fn clutch(
-    car: &Car,
-    tables: &ShiftTables<f64>,
-    row: &ShiftRow<f64>,
-    log: &ShiftLog,
-    which: usize,
-    grid: Grid,
-) -> Option<ClutchModel> {
-    let shift = row.clutches[which];
-    let element = (0..car.clutches.len()).find(|at| tables.place(*at) == Some(shift.element))?;
-    let known = car.clutches[element].as_ref()?;
-    let per_pa = (0..grid.points).map(|i| {
-        let time_s = grid.time_s(i);
-        let slip = log.turbine.at(time_s) - shift.ratio * log.output.at(time_s);
-        let per_force = known.clutch.torque_per_force(shift.alpha * slip);
-        slip.signum() * shift.alpha.abs() * per_force * known.clutch.piston_area_m2
-    });
-    Some(ClutchModel {
-        place: shift.element,
-        commands: log.commands[which].clone(),
-        measured: log.pressure[which].part(log.slip_s),
-        hydraulics: Hydraulics { cylinder: None, ..Hydraulics::of(known) },
-        kiss_pa: known.clutch.kiss_pressure(),
-        per_pa: per_pa.collect(),
-    })
-}
-
 /// Torque of both clutches of a shift by the valve models of a file alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenLoop {
@@ -374,7 +286,7 @@ pub fn open_loop(car: &Car, tables: &ShiftTables<f64>, log: &ShiftLog) -> Vec<Op
     let rows = tables.tables();
     let row = rows.shift(log.gears[0], log.gears[1]);
     let (Some(model), Some(row)) = (ShiftModel::new(car, tables, &quantities, log), row) else { return Vec::new() };
-    let pressure = model.clutches.each_ref().map(|clutch| clutch.pressures(model.grid, 0.0, 0.0, 0.0));
+    let pressure = model.clutches.each_ref().map(|clutch| clutch.pressures(model.grid, &AtValve::default()));
     let of_reading = |time_s: &f64| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
         let i = ((time_s - model.grid.begin_s) / model.grid.step_s).round() as usize;

@@ -170,6 +170,11 @@ impl<'a> Problem<'a> {
         Ok(Self { quantities, precision: before.cholesky().ok_or_else(not_finite)?.inverse() })
     }
 
+    /// Half the gradient of a shift by the parameters, with the sign of a step.
+    pub(crate) fn score(&self, shift: &ShiftModel, at: &[f64], weights: Weights) -> DVector<f64> {
+        profiled(shift, &shift.linearised(self.quantities, at), weights).score
+    }
+
     fn point(&self, models: &Models<'_>, at: &[f64], weights: Weights) -> Point {
         let shift = |shift: &ShiftModel| profiled(shift, &shift.linearised(self.quantities, at), weights);
         Point {

@@ -100,6 +100,7 @@ pub(crate) enum Case {
 }
 
 /// A car as its file has it, and as it is.
+#[derive(Clone)]
 pub(crate) struct Drawn {
     pub(crate) file: Car,
     pub(crate) truth: Car,
@@ -216,6 +217,14 @@ impl Drawn {
         self.file.road.mass_kg = self.truth.road.mass_kg;
         self.file.error_bounds.mass_share = Some(0.01);
         self.vehicle[0] = 1.0;
+        self
+    }
+
+    /// With a file whose error bounds say that no valve has a hysteresis.
+    pub(crate) fn without_hysteresis(mut self) -> Self {
+        let bounds = &mut self.file.error_bounds.elements;
+        bounds.resize(self.file.clutches.len(), Default::default());
+        bounds.iter_mut().for_each(|own| own.valve_hysteresis_pa = Some(0.0));
         self
     }
 

@@ -115,8 +115,15 @@ fn a_weighed_car_tells_the_common_factor_of_all_torques_and_reversals_the_backla
     assert!((file.backlash_rad - backlash.rad).abs() < 1e-4, "{}", file.backlash_rad);
     let drawn = drawn.weighed();
     let fits = [usual, fitted(&drawn, &recorded)];
-    let sd = fits.each_ref().map(|fit| fit.torque_scale_sd());
-    assert!(sd[1] < 0.95 * sd[0], "{sd:?}");
+    // A normal distribution of mass and factor given a mass: by their covariance in the first fit the factor follows the mass, and the rest stays.
+    let [scale, weighed] = fits.each_ref().map(|fit| fit.torque_scale_sd());
+    let (mass, beside) = (fits[0].sd(Quantity::Mass), fits[0].sd_beside_scale(Quantity::Mass));
+    let covariance = 0.5 * (mass * mass + scale * scale - beside * beside);
+    let known = fits[1].sd(Quantity::Mass);
+    let follows = covariance / (mass * mass);
+    let expected = (scale * scale - follows * covariance + (follows * known).powi(2)).sqrt();
+    // What is stated has floors beside, 1.5 % of the mass among them.
+    assert!((weighed / expected - 1.0).abs() < 0.1 && expected < 0.85 * scale, "{scale} {weighed} {expected}");
     let error = fits.each_ref().map(|fit| {
         fit.unknown(Quantity::Input) - drawn.true_unknown(&drawn.tables(), &fit.quantities, Quantity::Input)
     });

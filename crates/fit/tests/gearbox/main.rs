@@ -4,6 +4,7 @@
 mod drawn;
 mod driving;
 mod estimated;
+mod pressures;
 
 use std::path::Path;
 

@@ -1,0 +1,187 @@
+//! A clutch of a shift: the pressure on its plates from the commands of its valve.
+//!
+//! A piston with a stroke is carried from the commands that were kept from before the shift: an element that is applied again before it is empty has
+//! oil left, and kisses earlier.
+
+use config::Car;
+use design::ShiftTables;
+use drivetrain::Cylinder;
+use nalgebra::{DMatrix, DVector};
+use observer::any_shift::ShiftRow;
+
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
+use super::shift::{MeasuredPressure, Unknowns};
+use super::shift_log::ShiftLog;
+use crate::Series;
+use crate::driving::DELAY_STEP;
+use crate::fill::FILL_DROP_PA;
+use crate::pressure::{Grid, Hydraulics, pressures};
+
+/// Steps for the derivatives by the logarithms of lag and gain, and by a kiss point in its unit.
+const LAG_STEP: f64 = 0.02;
+const GAIN_STEP: f64 = 0.02;
+const KISS_STEP: f64 = 0.02;
+/// Standard deviations of what is known of a kiss point above which a reading is beyond it.
+const SURELY: f64 = 3.0;
+/// Lags of a cylinder at the end of a fast fill after which the end is forgotten: 5 % are left.
+const LAGS: f64 = 3.0;
+
+/// A clutch of a shift.
+#[derive(Debug, Clone)]
+pub(super) struct ClutchModel {
+    pub(super) place: usize,
+    commands: Series,
+    /// Measured pressure while both clutches slip, Pa; of a piston with a stroke where that has surely ended.
+    measured: Series,
+    hydraulics: Hydraulics,
+    pub(super) kiss_pa: f64,
+    /// Torque at the turbine per pressure above the kiss point, at the points of the grid, N m/Pa.
+    pub(super) per_pa: Vec<f64>,
+}
+
+/// The unknowns that make the pressure.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct AtValve {
+    lag: f64,
+    gain: f64,
+    late: f64,
+    kiss: f64,
+}
+
+/// Pressures at the points of a grid, Pa, the kiss point, both by the gain of the file, and derivatives of the pressures.
+pub(super) struct Pressures {
+    pub(super) pressure_pa: Vec<f64>,
+    pub(super) kiss_pa: f64,
+    pub(super) by: Vec<(Quantity, Vec<f64>)>,
+}
+
+impl ClutchModel {
+    /// The model of the offgoing (0) or oncoming (1) clutch.
+    pub(super) fn new(
+        (car, tables, quantities): (&Car, &ShiftTables<f64>, &Quantities),
+        row: &ShiftRow<f64>,
+        (log, which): (&ShiftLog, usize),
+        grid: Grid,
+    ) -> Option<Self> {
+        let shift = row.clutches[which];
+        let element = (0..car.clutches.len()).find(|at| tables.place(*at) == Some(shift.element))?;
+        let known = car.clutches[element].as_ref()?;
+        let per_pa = (0..grid.points).map(|i| {
+            let time_s = grid.time_s(i);
+            let slip = log.turbine.at(time_s) - shift.ratio * log.output.at(time_s);
+            let per_force = known.clutch.torque_per_force(shift.alpha * slip);
+            slip.signum() * shift.alpha.abs() * per_force * known.clutch.piston_area_m2
+        });
+        let (hydraulics, kiss_pa) = (Hydraulics::of(known), known.clutch.kiss_pressure());
+        let measured = log.pressure[which].part(log.slip_s);
+        let measured = match &hydraulics.cylinder {
+            Some(cylinder) => {
+                let sd = quantities.place(Quantity::Kiss(shift.element)).map_or(0.0, |at| quantities.sd_before(at));
+                filled_part(&measured, kiss_pa + SURELY * KISS_UNIT_PA * sd, cylinder)
+            }
+            None => measured,
+        };
+        Some(Self {
+            place: shift.element,
+            commands: log.commands[which].clone(),
+            measured,
+            hydraulics,
+            kiss_pa,
+            per_pa: per_pa.collect(),
+        })
+    }
+
+    /// Changes the way to the pressure.
+    pub(super) fn change(&mut self, change: impl Fn(&mut Hydraulics)) {
+        change(&mut self.hydraulics);
+    }
+
+    /// Pressures on the plates at the points of a grid, by the gain of the file, Pa.
+    pub(super) fn pressures(&self, grid: Grid, at: &AtValve) -> Vec<f64> {
+        self.pressures_of(&self.hydraulics, grid, at)
+    }
+
+    /// By the gain of the file: the true pressures, at which the valve has its lag and the piston its stroke, over the factor of the gain.
+    fn pressures_of(&self, hydraulics: &Hydraulics, grid: Grid, at: &AtValve) -> Vec<f64> {
+        let mut of = hydraulics.with_valve(at.lag, at.gain);
+        of.set_kiss(self.kiss_at(at) * at.gain.exp());
+        let mut pressures = pressures(&of, DELAY_UNIT_S * at.late, &self.commands, grid);
+        pressures.iter_mut().for_each(|pressure| *pressure *= (-at.gain).exp());
+        pressures
+    }
+
+    fn kiss_at(&self, at: &AtValve) -> f64 {
+        self.kiss_pa + KISS_UNIT_PA * at.kiss
+    }
+
+    /// Pressures on the plates at unknowns, with derivatives.
+    pub(super) fn with_derivatives(&self, grid: Grid, unknowns: &Unknowns<'_>) -> Pressures {
+        self.derived(&self.hydraulics, grid, unknowns)
+    }
+
+    fn derived(&self, hydraulics: &Hydraulics, grid: Grid, unknowns: &Unknowns<'_>) -> Pressures {
+        let place = self.place;
+        let quantities = [Quantity::Lag(place), Quantity::Gain(place), Quantity::Delay(place), Quantity::Kiss(place)];
+        let [lag, gain, late, kiss] = quantities.map(|quantity| unknowns.of(quantity));
+        let here = AtValve { lag, gain, late, kiss };
+        let moved = [
+            (LAG_STEP, AtValve { lag: lag + LAG_STEP, ..here }),
+            (GAIN_STEP, AtValve { gain: gain + GAIN_STEP, ..here }),
+            (DELAY_STEP, AtValve { late: late + DELAY_STEP, ..here }),
+            (KISS_STEP, AtValve { kiss: kiss + KISS_STEP, ..here }),
+        ];
+        let pressure_pa = self.pressures_of(hydraulics, grid, &here);
+        let change = |(step, other): &(f64, AtValve)| -> Vec<f64> {
+            let other = self.pressures_of(hydraulics, grid, other);
+            other.iter().zip(&pressure_pa).map(|(other, pressure)| (other - pressure) / step).collect()
+        };
+        // Without a stroke the pressure does not depend on the kiss point.
+        let count = if hydraulics.cylinder.is_some() { moved.len() } else { moved.len() - 1 };
+        let by = quantities.into_iter().zip(&moved).take(count).map(|(quantity, moved)| (quantity, change(moved)));
+        Pressures { kiss_pa: self.kiss_at(&here), by: by.collect(), pressure_pa }
+    }
+
+    /// Residuals of the measured pressure, and derivatives of its prediction; `found` is what acts on the plates at the same unknowns.
+    pub(super) fn measured(&self, grid: Grid, unknowns: &Unknowns<'_>, found: &Pressures) -> Option<MeasuredPressure> {
+        let Unknowns { quantities, at, .. } = unknowns;
+        let rows = self.measured.len();
+        let scale = quantities.place(Quantity::PressureScale).filter(|_| rows > 0)?;
+        let gain = quantities.place(Quantity::Gain(self.place))?;
+        // The readings are of an ended stroke, whenever the model ends it.
+        let filled = self.hydraulics.cylinder.map(|_| self.derived(&self.hydraulics.filled(), grid, unknowns));
+        let found = filled.as_ref().unwrap_or(found);
+        let factor = (at[scale] + at[gain]).exp();
+        let predicted = |values: &[f64]| -> DVector<f64> {
+            let times = self.measured.time_s.iter();
+            DVector::from_iterator(rows, times.map(|time_s| factor * grid.at(values, *time_s)))
+        };
+        let all = predicted(&found.pressure_pa);
+        let mut by_parameter = DMatrix::zeros(rows, at.len());
+        by_parameter.column_mut(scale).copy_from(&all);
+        by_parameter.column_mut(gain).copy_from(&all);
+        for (quantity, change) in &found.by {
+            if let Some(place) = quantities.place(*quantity) {
+                let mut column = by_parameter.column_mut(place);
+                column += predicted(change);
+            }
+        }
+        let residuals = DVector::from_column_slice(&self.measured.value) - all;
+        Some(MeasuredPressure { residuals, by_parameter })
+    }
+}
+
+/// The readings at which a piston has surely ended its stroke: above any kiss point that is held possible, and for so long that the pressure is that of
+/// the valve again.
+fn filled_part(readings: &Series, kiss_most_pa: f64, cylinder: &Cylinder<f64>) -> Series {
+    let (by_volume, _) = cylinder.volume_rate_slopes(cylinder.stroke_m3, cylinder.kiss_pa + FILL_DROP_PA);
+    let forgotten_s = -LAGS / by_volume;
+    let (mut filled, mut since_s) = (Series::default(), None);
+    for (time_s, pressure_pa) in readings.time_s.iter().zip(&readings.value) {
+        if *pressure_pa < kiss_most_pa {
+            since_s = None;
+        } else if time_s - *since_s.get_or_insert(*time_s) >= forgotten_s {
+            filled.push(*time_s, *pressure_pa);
+        }
+    }
+    filled
+}
