@@ -271,10 +271,8 @@ pub(crate) fn priors(vehicle: &Vehicle, shafts: &[Shaft], has: Available) -> Vec
         more.push((P::PressureScale, "pressure sensor, scale", 0.0, 0.005));
         more.push((P::PressureDelay, "pressure sensor, delay", 0.0, delay(uniform(budget.channel_skew_s))));
     }
-    if has.driving {
-        more.push((P::Rolling, "rolling resistance", 0.0, uniform(ROLLING)));
-        more.push((P::Air, "air drag", 0.0, uniform(AIR)));
-    }
+    let road = [(P::Rolling, "rolling resistance", 0.0, uniform(ROLLING)), (P::Air, "air drag", 0.0, uniform(AIR))];
+    more.extend(road.into_iter().filter(|_| has.driving));
     names.extend(more.iter().map(|(_, name, ..)| (*name).to_owned()));
     list.extend(more);
     (list.into_iter().zip(names))

@@ -128,7 +128,7 @@ impl At<'_> {
     }
 
     /// Columns of the terms that the fit has.
-    fn columns<const N: usize>(&self, all: [(Term, Vec<f64>); N]) -> Vec<(usize, Vec<f64>)> {
+    fn columns(&self, all: impl IntoIterator<Item = (Term, Vec<f64>)>) -> Vec<(usize, Vec<f64>)> {
         all.into_iter().filter_map(|(term, column)| Some(((self.place)(term)?, column))).collect()
     }
 }
@@ -290,18 +290,18 @@ impl<'a> DrivingModel<'a> {
             (Term::Rolling, by_step(&|_| -roll / inertia)),
             (Term::Air, by_step(&|k| -wind[k] / inertia)),
         ]);
-        for (at_car, place) in &car.elements {
+        let of_drag = car.elements.iter().map(|(at_car, place)| {
             let by_drag = by_step(&|k| ratio * DRAG_UNIT_N_M * steps[k].drag_of_one_n_m[*at_car] / inertia);
-            by_parameter.extend(at.columns([(Term::Drag(*place), by_drag)]));
-        }
-        for (term, part) in &gear.parts {
+            (Term::Drag(*place), by_drag)
+        });
+        let of_parts = gear.parts.iter().map(|(term, part)| {
             let now = part + more(&(*term, *part));
-            by_parameter.extend(at.columns([(*term, by_step(&|k| -rate[k] * now / inertia))]));
-        }
-        for number in 0..CAPACITIES {
-            let by_shape = by_step(&|k| ratio * scale * steps[k].by_capacity_n_m[number] / inertia);
-            by_parameter.extend(at.columns([(Term::Capacity(number), by_shape)]));
-        }
+            (*term, by_step(&|k| -rate[k] * now / inertia))
+        });
+        let of_shape = (0..CAPACITIES).map(|number| {
+            (Term::Capacity(number), by_step(&|k| ratio * scale * steps[k].by_capacity_n_m[number] / inertia))
+        });
+        by_parameter.extend(at.columns(of_drag.chain(of_parts).chain(of_shape)));
         let weight = GRAVITY_M_S2 * line.final_ratio / car.road.wheel_radius_m * body / inertia;
         Lines {
             reading: self.body_speed(stretch, ratio, &torque, [body, wheels].map(|part| part / inertia)),
