@@ -62,7 +62,7 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
 
 /// The signals that a car measures: exact ones as they come, or what its sensors read of the whole drive.
 enum Measured<'a> {
-    Exact(Table),
+    Exact(Box<Table>),
     Sensed { path: PathBuf, recording: Box<Recording>, sensors: &'a Sensors, row_s: f64, vehicle: &'a Vehicle },
 }
 
@@ -70,7 +70,7 @@ impl<'a> Measured<'a> {
     fn create(path: PathBuf, vehicle: &'a Vehicle, experiment: &'a Experiment) -> Result<Self, Failure> {
         let Some(sensors) = &experiment.sensors else {
             let table = Table::create(path, vehicle, |name| signal::MEASURABLE.contains(&name))?;
-            return Ok(Self::Exact(table));
+            return Ok(Self::Exact(Box::new(table)));
         };
         // Teeth are counted in the whole drive.
         experiment.check_size()?;
