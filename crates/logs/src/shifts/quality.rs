@@ -71,7 +71,7 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Optio
         _ => return None,
     };
     let around_s = AROUND_S + 0.5 * WINDOW_S;
-    let (mut jerk, mut before_s) = (PeakJerk::default(), None);
+    let (mut jerk, mut strays, mut before_s) = (PeakJerk::default(), Strays::default(), None);
     for (time_s, value) in track.between(shift.start_s() - around_s, shift.end_s() + around_s) {
         // A hole would leave the parabola free.
         if before_s.replace(time_s).is_some_and(|before_s| time_s - before_s > APART_S) {
@@ -79,8 +79,74 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Optio
         }
         match acceleration {
             Some(_) => jerk.acceleration(time_s, value),
-            None => jerk.speed(time_s, factor * value),
+            None => {
+                if let Some((time_s, speed_m_s)) = strays.next(time_s, factor * value) {
+                    jerk.speed(time_s, speed_m_s);
+                }
+            }
         }
     }
+    strays.last().into_iter().for_each(|(time_s, speed_m_s)| jerk.speed(time_s, speed_m_s));
     jerk.peak_m_s3()
+}
+
+/// Leaves single wrong speeds out: those from which the car would have to come back faster than it can.
+#[derive(Default)]
+struct Strays {
+    /// The newest speed that counts, and the one after it, which waits for the next: time, s, and m/s.
+    kept: Option<(f64, f64)>,
+    waiting: Option<(f64, f64)>,
+}
+
+impl Strays {
+    /// Takes a speed, and returns the one before it, if that counts.
+    fn next(&mut self, time_s: f64, speed_m_s: f64) -> Option<(f64, f64)> {
+        /// An acceleration that no car has, m/s^2 \[chosen\]: five times what tyres transmit.
+        const IMPOSSIBLE_M_S2: f64 = 50.0;
+        let (at_s, value) = self.waiting.replace((time_s, speed_m_s))?;
+        let is_stray = self.kept.is_some_and(|(before_s, before)| {
+            let [from, to] = [(value - before) / (at_s - before_s), (value - speed_m_s) / (time_s - at_s)];
+            from.signum() == to.signum() && from.abs().min(to.abs()) > IMPOSSIBLE_M_S2
+        });
+        if is_stray {
+            return None;
+        }
+        self.kept = Some((at_s, value));
+        self.kept
+    }
+
+    /// The last speed, of which nothing says that it is wrong.
+    fn last(self) -> Option<(f64, f64)> {
+        self.waiting
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_wrong_speed_is_left_out_and_no_other() {
+        let speed = |at: u32| 10.0 + 0.02 * f64::from(at);
+        for (wrong, by_m_s) in [(3, 20.0), (7, -300.0), (5, 0.6), (1, 5.0)] {
+            let (mut strays, mut kept) = (Strays::default(), Vec::new());
+            for at in 0..10 {
+                let value = speed(at) + if at == wrong { by_m_s } else { 0.0 };
+                kept.extend(strays.next(0.01 * f64::from(at), value));
+            }
+            kept.extend(strays.last());
+            let expected: Vec<_> =
+                (0..10).filter(|at| *at != wrong).map(|at| (0.01 * f64::from(at), speed(at))).collect();
+            assert_eq!(kept, expected, "{by_m_s}");
+        }
+        // A jump that lasts, and steps of a coarse speed on a bus, 0.1 km/h.
+        let jump = (0..10).map(|at| (0.01 * f64::from(at), if at < 5 { 10.0 } else { 12.0 }));
+        let coarse = (0..10).map(|at| (0.01 * f64::from(at), 10.0 + f64::from(at % 2) / 36.0));
+        for speeds in [jump.collect::<Vec<_>>(), coarse.collect()] {
+            let mut strays = Strays::default();
+            let mut kept: Vec<_> = speeds.iter().filter_map(|(time_s, speed)| strays.next(*time_s, *speed)).collect();
+            kept.extend(strays.last());
+            assert_eq!(kept, speeds);
+        }
+    }
 }
