@@ -32,7 +32,12 @@ fn town() -> (Folder, String) {
 fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
     let (folder, log) = town();
     let fitted = folder.path("fitted.toml");
-    let output = wetclutch(&["fit", &log, "--vehicle", CAR, "-o", &fitted]);
+    // The valves are known to have no hysteresis: one of 10 kPa could do what these few shifts show of a friction.
+    let text = std::fs::read_to_string(CAR).unwrap().replace("../gearboxes", &format!("{ROOT}gearboxes"));
+    let known =
+        ["A", "B", "C", "D", "E"].map(|name| format!("[clutch.{name}.error_bounds]\nvalve_hysteresis_pa = 0\n"));
+    let given = folder.write("given.toml", format!("{text}\n{}", known.concat()));
+    let output = wetclutch(&["fit", &log, "--vehicle", &given, "-o", &fitted]);
     let (table, notes) = (printed(&output), stderr(&output));
     let [clutch_e, clutch_c] = ["E", "C"].map(|name| factor(&table, &format!("{name}: friction x valve gain")));
     for ([_, least, most], truth) in [(clutch_e, 1.15), (clutch_c, 1.0)] {
