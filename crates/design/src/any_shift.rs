@@ -151,8 +151,9 @@ impl ShiftErrors {
         command_age_s: 0.0,
     };
 
-    /// The same where the commands stand in a log, whose rows may come more rarely than commands are sent: that of the two-speed cars.
-    pub const LOGGED: Self = Self { command_age_s: 0.05, ..Self::STANDARD };
+    /// The same where the commands stand in a log, whose rows may come more rarely than commands are sent: a command may be older than its row by
+    /// the time between two rows of a log at 10 Hz, and by no more than one such time.
+    pub const LOGGED: Self = Self { command_age_s: 0.1, ..Self::STANDARD };
 }
 
 /// Bounds of what is not known of an element and its valve.

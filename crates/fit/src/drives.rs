@@ -19,13 +19,15 @@ const USES: [bool; 2] = [true, false];
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct UsedDriving<'a> {
     logs: Vec<&'a Driving>,
+    /// Those of another car.
+    others: Vec<&'a Driving>,
     pub(crate) left_out: Vec<String>,
 }
 
 impl<'a> UsedDriving<'a> {
     /// Of logs that are long enough. The same drive says what it has to say once.
     pub(crate) fn of(car: &DrivenCar, logs: &'a [Driving]) -> Self {
-        let mut used = Self { logs: Vec::new(), left_out: Vec::new() };
+        let mut used = Self { logs: Vec::new(), others: Vec::new(), left_out: Vec::new() };
         for log in logs.iter().filter(|log| log.time_s() > 0.0) {
             match usable(car, log).car {
                 Err(reason) => used.left_out.push(reason),
@@ -41,6 +43,11 @@ impl<'a> UsedDriving<'a> {
         self.logs.iter().map(|log| log.time_s()).sum()
     }
 
+    /// Whether a log has turned out to be of another car.
+    pub(crate) fn is_of_other_car(&self, log: &Driving) -> bool {
+        self.others.contains(&log)
+    }
+
     /// Leaves out the logs that are not of the car of the shifts; whether there is one.
     pub(crate) fn leave_out(&mut self, errors: &[DriveErrors]) -> bool {
         let before = self.logs.len();
@@ -48,7 +55,10 @@ impl<'a> UsedDriving<'a> {
         for (log, errors) in self.logs.drain(..).zip(errors) {
             match errors.reason_against() {
                 None => kept.push(log),
-                Some(reason) => self.left_out.push(reason),
+                Some(reason) => {
+                    self.others.push(log);
+                    self.left_out.push(reason);
+                }
             }
         }
         self.logs = kept;

@@ -4,12 +4,11 @@ use config::{Source, Vehicle};
 
 use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
+use crate::driving::backlash;
 use crate::parameters::HYSTERESIS_UNIT_PA;
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
 use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
 
-/// Greatest backlash that the error budget of a file may have, rad.
-const BACKLASH_MOST_RAD: f64 = 0.2;
 /// Standard deviations on either side of a stated interval.
 pub(crate) const SIDES: f64 = 2.0;
 
@@ -32,7 +31,7 @@ impl Fit {
         }
         if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
             text.put(&["driveline"], "backlash_rad", backlash.rad, &backlash.comment())?;
-            let most_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(BACKLASH_MOST_RAD);
+            let most_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(backlash::MOST_RAD);
             text.put(&["design", "error_bounds"], "backlash_rad", most_rad, BUDGET_COMMENT)?;
         }
         self.write_budget(&mut text, vehicle)?;

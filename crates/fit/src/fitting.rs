@@ -112,8 +112,8 @@ pub fn fit(
         }
         fit.unusable = [left_out, fit.unusable].concat();
         fit.driving_s = used.time_s();
+        fit.backlash = fit_backlash(&driven, driving.iter().filter(|log| !used.is_of_other_car(log)));
         fit.driving_left_out = used.left_out;
-        fit.backlash = fit_backlash(&driven, driving.iter());
         return Ok(fit);
     }
 }

@@ -47,6 +47,8 @@ const OVERRUN_SHARE: f64 = 0.3;
 const BEFORE_RAD: f64 = 0.1 / 3.464;
 const FREE_RAD: f64 = 1.0;
 const TURNS: u32 = 5;
+/// Greatest backlash that the error budget of a file may have, rad.
+pub(crate) const MOST_RAD: f64 = 0.2;
 /// Scale, delay, compliance, backlash.
 const UNKNOWNS: usize = 4;
 
@@ -98,7 +100,7 @@ impl BacklashFit {
             Ok(found) => {
                 format!("backlash of the driveline: not told, +- {:.3} rad; {BACKLASH_TOLD_BY}", SIDES * found.sd_rad)
             }
-            Err(reason) => format!("backlash of the driveline: not told: {reason}; {BACKLASH_TOLD_BY}"),
+            Err(reason) => format!("backlash of the driveline: not told: {reason}"),
         }
     }
 }
@@ -159,7 +161,8 @@ impl TwistRecorder {
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a minute over a step")]
         let count = ((span[1] - span[0]).max(0.0) / CELL_S) as usize;
-        let cells = (0..count).filter_map(|at| cell(car, gear, &speeds, span[0] + CELL_S * at as f64));
+        // What comes behind a cell without speeds is not its neighbour.
+        let cells = (0..count).map_while(|at| cell(car, gear, &speeds, span[0] + CELL_S * at as f64));
         let cells: Vec<Cell> = cells.collect();
         if self.stretches.len() < STRETCHES
             && rests(&cells).windows(2).any(|pair| cells[pair[0]].sign() != cells[pair[1]].sign())
@@ -262,6 +265,9 @@ pub(crate) fn fit_backlash<'a>(
     car: &DrivenCar,
     logs: impl Iterator<Item = &'a Driving>,
 ) -> Result<BacklashFit, String> {
+    if car.converter.is_none() {
+        return Err("the torque of a car without converter is not computed for it".to_owned());
+    }
     let mut stretches: Vec<&Vec<Cell>> = Vec::new();
     for stretch in logs.flat_map(|log| &log.twists) {
         // The same drive says what it has to say once.
@@ -273,12 +279,16 @@ pub(crate) fn fit_backlash<'a>(
     let reversals = changes.iter().filter(|change| change.is_reversal).count();
     if reversals < REVERSALS {
         return Err(format!(
-            "{reversals} reversals of the torque in a gear with a wheel speed, {REVERSALS} are needed"
+            "{reversals} reversals of the torque in a gear with a wheel speed, {REVERSALS} are needed; {BACKLASH_TOLD_BY}"
         ));
     }
     let stiffness = car.driveline.shaft_stiffness_n_m_rad;
     let found = Regression::of(&changes, stiffness).filter(|(value, sd)| value.is_finite() && sd.is_finite());
-    let (rad, sd_rad) = found.ok_or("the speeds of output and wheels do not fit together")?;
+    let (rad, sd_rad) =
+        found.ok_or_else(|| format!("the speeds of output and wheels do not fit together; {BACKLASH_TOLD_BY}"))?;
+    if rad > MOST_RAD {
+        return Err(format!("it would be {rad:.2} rad at the wheels, and more than {MOST_RAD} rad is none of a car"));
+    }
     let torques = stretches.iter().copied().flatten().map(|cell| cell.wheels_n_m);
     let (count, sum) =
         torques.filter(|torque| *torque < 0.0).fold((0.0, 0.0), |(n, sum), torque| (n + 1.0, sum - torque));

@@ -12,7 +12,7 @@
 //!
 //! Both fits use it: that of a car with a gearbox, and that of one shift. What they call an unknown, the balances know as a [`Term`].
 
-mod backlash;
+pub(crate) mod backlash;
 mod car;
 mod model;
 mod recorder;

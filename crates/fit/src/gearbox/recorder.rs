@@ -283,7 +283,12 @@ impl<'a> Recorder<'a> {
 
 /// Longest time in which a piston of a car goes back to its stop under no pressure of its valve, s.
 fn emptied_s(car: &Car) -> f64 {
+    /// A piston with hardly any preload takes longer; its shifts would have no beginning \[chosen\].
+    const LONGEST_S: f64 = 5.0;
     let strokes = car.clutches.iter().flatten().filter(|clutch| clutch.has_stroke).map(|clutch| clutch.cylinder);
     // The slowest is the flow at the end, by the preload alone.
-    strokes.map(|cylinder| cylinder.stroke_m3 / cylinder.flow(-cylinder.preload_pa).abs()).fold(0.0, f64::max)
+    strokes
+        .map(|cylinder| cylinder.stroke_m3 / cylinder.flow(-cylinder.preload_pa).abs())
+        .fold(0.0, f64::max)
+        .min(LONGEST_S)
 }

@@ -170,12 +170,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if away && slip.is_over() { slip.value.abs() } else { T::zero() }
     }
 
-    /// In which direction a clutch carries where the speeds cannot be used: that of its slip, and where none is seen that of the load.
-    /// The sign of a slip below the noise of the speeds would change from step to step.
+    /// In which direction a clutch carries where the speeds cannot be used: that of its slip, and where none is seen that of the load, as far
+    /// as it is known. The sign of a slip below the noise of the speeds changes from step to step.
     fn direction_by_valve(slip: &Slip<T>, turbine_n_m: Option<T>) -> T {
         match turbine_n_m {
             Some(load) if !slip.is_over() => load.signum(),
-            _ => slip.value.signum(),
+            _ => slip.direction(),
         }
     }
 

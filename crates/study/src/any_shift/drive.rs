@@ -63,12 +63,16 @@ impl ScoredShift {
 
     /// Begin and end of every piece of a phase, s.
     pub fn spans_s(&self, phase: TruePhase) -> Vec<[f64; 2]> {
-        // A row lasts until the next one; the last one as long as the one before it.
-        let last_s = match self.rows.as_slice() {
-            [.., before, last] => last.time_s - before.time_s,
-            _ => 0.0,
+        // A row lasts until the next one; the last one, and one behind which rows are missing, as long as is usual.
+        const MISSING: f64 = 2.5;
+        let steps_s = self.rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
+        let usual_s =
+            Some(trace::median_step_s(steps_s)).filter(|step_s| step_s.is_finite()).unwrap_or(super::SAMPLE_S);
+        let end_s = |at: usize| {
+            let next = self.rows.get(at + 1).map(|next| next.time_s);
+            next.filter(|next| *next <= self.rows[at].time_s + MISSING * usual_s)
+                .unwrap_or(self.rows[at].time_s + usual_s)
         };
-        let end_s = |at: usize| self.rows.get(at + 1).map_or(self.rows[at].time_s + last_s, |next| next.time_s);
         let mut spans: Vec<[f64; 2]> = Vec::new();
         for (at, row) in self.rows.iter().enumerate().filter(|(_, row)| row.phase() == Some(phase)) {
             match spans.last_mut().filter(|[_, to_s]| *to_s == row.time_s) {

@@ -273,9 +273,9 @@ pub struct LoggedDrive<'c> {
     /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
     in_gear: [u64; 2],
     swapped: SwappedSpeeds,
-    /// Newest wheel speed, rad/s, and output over wheel speed in a gear at speed.
-    wheel_rad_s: f64,
+    /// Output over wheel speed in the rows in a gear at speed that have both; how many there are, and how long they are, s.
     output_over_wheel: RatioHistogram<1000>,
+    wheel_rows: (u64, f64),
     /// The gear of the row before, and changes of the gear which no target gear announced.
     gear: Option<usize>,
     unannounced: u64,
@@ -331,8 +331,8 @@ impl<'c> LoggedDrive<'c> {
             begun_s: f64::NAN,
             in_gear: [0; 2],
             swapped: SwappedSpeeds::default(),
-            wheel_rad_s: f64::NAN,
             output_over_wheel: RatioHistogram::default(),
+            wheel_rows: (0, 0.0),
             gear: None,
             unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
@@ -382,14 +382,14 @@ impl<'c> LoggedDrive<'c> {
         } else if self.passing.ends(gears) {
             self.end(step.time_s, from);
         }
-        self.wheel_rad_s = input.wheel_rad_s.map_or(self.wheel_rad_s, |wheel| wheel.value);
-        let is_announced = self.gear.is_none_or(|before| before == from || before == NO_GEAR || from == NO_GEAR);
+        let is_same = self.gear.is_none_or(|before| before == from || before == NO_GEAR || from == NO_GEAR);
         match gears {
             Some(_) if self.holes.cut.is_some() => {}
             Some(_) => self.during(step, &estimate),
             None => {
-                self.unannounced += u64::from(!is_announced);
-                self.compare_ratio(from);
+                // What happens in a hole is not seen.
+                self.unannounced += u64::from(!is_same && !is_hole);
+                self.compare_ratio(from, input);
             }
         }
         // In a shift the gear may be the new one already.
@@ -399,14 +399,18 @@ impl<'c> LoggedDrive<'c> {
         estimate
     }
 
-    fn compare_ratio(&mut self, gear: usize) {
+    fn compare_ratio(&mut self, gear: usize, input: &ShiftInput<f64>) {
         let [engine, turbine, output] = self.came_rad_s;
         let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output;
         if output > RATIO_FROM_RAD_S {
             self.swapped.push(engine, turbine, &[by_output]);
             self.in_gear[0] += 1;
             self.in_gear[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
-            self.output_over_wheel.push(output / self.wheel_rad_s);
+            if let (Some(output), Some(wheel)) = (input.output_rad_s, input.wheel_rad_s) {
+                self.output_over_wheel.push(output.value / wheel.value);
+                self.wheel_rows.0 += 1;
+                self.wheel_rows.1 += input.dt_s.clamp(0.0, 1.0);
+            }
         }
     }
 
@@ -415,9 +419,12 @@ impl<'c> LoggedDrive<'c> {
         self.in_gear
     }
 
-    /// Output over wheel speed in a gear at speed, in the middle; not a number without.
+    /// Output over wheel speed in a gear at speed, in the middle; not a number where too few rows have both.
     pub fn output_over_wheel(&self) -> f64 {
-        self.output_over_wheel.middle()
+        /// Rows that are needed to judge, and their time, s \[chosen\].
+        const ENOUGH: (u64, f64) = (200, 3.0);
+        let (rows, time_s) = self.wheel_rows;
+        if rows < ENOUGH.0 || time_s < ENOUGH.1 { f64::NAN } else { self.output_over_wheel.middle() }
     }
 
     /// What contradicts the channels of engine and turbine speed, in a sentence.
@@ -481,7 +488,7 @@ impl<'c> LoggedDrive<'c> {
         }
         if self.unannounced > 0 {
             warnings.push(format!(
-                "warning: gear changes {} times without a target_gear that says so before: these shifts are not estimated. target_gear has to \
+                "warning: gear changes without a target_gear that says so before (so often: {}): these shifts are not estimated. target_gear has to \
                  change when a shift is requested, gear when it is done",
                 self.unannounced
             ));
