@@ -139,3 +139,34 @@ fn a_drive_that_lacks_something_says_what() {
         assert!(fit_converter(&record, &record.moments()).is_err());
     }
 }
+
+/// A test of what is looked at: with every 20 ms between the first and the last reading, it would not end.
+#[test]
+fn a_clock_that_jumps_by_years_costs_nothing() {
+    let whole = drive(1, 0.0);
+    let mut jumped = DriveRecord::default();
+    let later = |time_s: f64| if time_s < 30.0 { time_s } else { time_s + 1.7e9 };
+    for (role, series) in [
+        (Role::EngineSpeed, &whole.engine),
+        (Role::TurbineSpeed, &whole.turbine),
+        (Role::EngineTorque, &whole.engine_torque),
+    ] {
+        for (time_s, value) in series.between([0.0, f64::INFINITY]) {
+            jumped.push(&Reading { role, time_s: later(time_s), stamp_s: later(time_s), value });
+        }
+    }
+    let (all, found) = (whole.moments(), jumped.moments());
+    // On each side of the jump, speeds are known up to 0.1 s from the last reading, which is five moments.
+    assert!(found.len().abs_diff(all.len()) <= 10, "{} of {}", found.len(), all.len());
+    let before = |moments: &[Moment]| moments.iter().filter(|moment| moment.time_s < 29.8).copied().collect::<Vec<_>>();
+    assert_eq!(before(&found), before(&all));
+}
+
+#[test]
+fn a_torque_with_which_the_converter_would_drive_the_engine_is_refused() {
+    let mut record = drive(1, 3.0);
+    // An engine torque in % that is taken as N m, and its friction in N m.
+    record.engine_torque.value.iter_mut().for_each(|n_m| *n_m = *n_m / 4.5 - 60.0);
+    let error = fit_converter(&record, &record.moments()).unwrap_err();
+    assert!(error.starts_with("engine_torque does not fit the speeds: ") && error.contains("unit"), "{error}");
+}

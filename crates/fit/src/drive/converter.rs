@@ -99,16 +99,33 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
         sd_n_m_s2: sd[i].hypot(bends[i]),
         time_s: per_moment_s * shares(&some, &knots, i),
     };
+    let all: Vec<Knot> = knots.iter().enumerate().map(knot).collect();
+    drives_no_engine(&all)?;
     let coupled = Knot { speed_ratio: 1.0, capacity_n_m_s2: 0.0, sd_n_m_s2: 0.0, time_s: 0.0 };
     #[expect(clippy::cast_precision_loss, reason = "a count of moments")]
     Ok(ConverterFit {
-        knots: knots.iter().enumerate().map(knot).chain([coupled]).collect(),
+        knots: all.into_iter().chain([coupled]).collect(),
         inertia_kg_m2: solution.unknowns[knots.len()],
         inertia_sd_kg_m2: sd[knots.len()],
         delay_s,
         scale_n_m: solution.scale_n_m,
         fitted_s: 0.02 * slipping.len() as f64,
     })
+}
+
+/// Refuses capacities that are negative by more than their range: below a speed ratio of 1 a converter takes torque from the engine.
+fn drives_no_engine(knots: &[Knot]) -> Result<(), String> {
+    let is_negative = |knot: &&Knot| knot.capacity_n_m_s2 + 2.0 * knot.sd_n_m_s2 < 0.0;
+    match knots.iter().find(is_negative) {
+        None => Ok(()),
+        Some(knot) => Err(format!(
+            "engine_torque does not fit the speeds: at speed ratio {} the converter would drive the engine (capacity {:.2} ± {:.2} 10⁻³ N m s²); \
+             check unit and scale of engine_torque, and whether its friction is taken off once (engine_friction_torque)",
+            knot.speed_ratio,
+            1e3 * knot.capacity_n_m_s2,
+            2e3 * knot.sd_n_m_s2
+        )),
+    }
 }
 
 impl ConverterFit {
