@@ -193,9 +193,12 @@ impl ChannelMap {
     /// Finds the channels in a log and their units.
     ///
     /// # Errors
-    /// A channel is not there or there twice, or its unit is not known, or not of its role.
+    /// A channel is not there or there twice, or is the speed of two shafts, or its unit is not known, or not of its role.
     pub fn resolve(&self, log: &Log) -> Result<Vec<Resolved>, LogError> {
-        self.channels.iter().map(|entry| Resolved::of(entry, log, &self.gearbox)).collect()
+        let resolved: Vec<Resolved> =
+            self.channels.iter().map(|entry| Resolved::of(entry, log, &self.gearbox)).collect::<Result<_, _>>()?;
+        one_shaft_each(&resolved, log)?;
+        Ok(resolved)
     }
 }
 
@@ -320,6 +323,22 @@ impl Resolved {
     pub fn in_si(&self, value: f64) -> f64 {
         value * self.size + self.zero
     }
+}
+
+/// Refuses a channel that is the speed of two shafts: between them it has no slip. The speed of the car may be that of its wheels.
+fn one_shaft_each(resolved: &[Resolved], log: &Log) -> Result<(), LogError> {
+    let shafts: Vec<&Resolved> = resolved.iter().filter(|one| one.entry.role.is_shaft_speed()).collect();
+    for (i, one) in shafts.iter().enumerate() {
+        for other in &shafts[i + 1..] {
+            let Some(&both) = one.channels.iter().find(|channel| other.channels.contains(channel)) else { continue };
+            let (name, one, other) = (error::shown(&log.channels()[both].name), one.entry.key(), other.entry.key());
+            return Err(LogError::map(format!(
+                "channel `{name}` is both {one} and {other}\n\
+                 hint: these are speeds of two shafts; name the channel of each, and leave out the one that the log has not"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Name, size and zero of the unit of a role.

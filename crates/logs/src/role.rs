@@ -138,12 +138,14 @@ impl Role {
         )
     }
 
+    /// Whether it is the speed of a shaft.
+    pub fn is_shaft_speed(self) -> bool {
+        matches!(self, Self::EngineSpeed | Self::TurbineSpeed | Self::OutputSpeed | Self::WheelSpeed)
+    }
+
     /// Whether it is the speed of a shaft or of the car.
     pub fn is_speed(self) -> bool {
-        matches!(
-            self,
-            Self::EngineSpeed | Self::TurbineSpeed | Self::OutputSpeed | Self::WheelSpeed | Self::VehicleSpeed
-        )
+        self.is_shaft_speed() || self == Self::VehicleSpeed
     }
 }
 

@@ -210,6 +210,31 @@ fn what_does_not_fit_says_what_to_do() {
 }
 
 #[test]
+fn a_channel_is_the_speed_of_one_shaft() {
+    let text = "time_s,n [rad/s],l [rad/s],r [rad/s],v [km/h]\n0,300,20,21,22\n0.01,301,20,21,22\n";
+    for (one, other) in [
+        ("engine_speed=n", "turbine_speed=n"),
+        ("turbine_speed=n", "output_speed=n"),
+        ("output_speed=l", "wheel_speed=l"),
+    ] {
+        let error = readings(text, &map(&[one, other])).map(|_| ()).unwrap_err().to_string();
+        let [one, other] = [one, other].map(|entry| entry.split('=').next().unwrap());
+        assert!(
+            error.contains(&format!(" is both {one} and {other}\nhint: these are speeds of two shafts")),
+            "{error}"
+        );
+    }
+    // Two wheels are one signal, and the speed of the car may be that of its wheels.
+    let mut wheels = map(&["output_speed=n", "wheel_speed=l", "vehicle_speed=v"]);
+    wheels.channels[1].names.push("r".to_owned());
+    let mut by_wheels = map(&["wheel_speed=v", "vehicle_speed=v"]);
+    by_wheels.gearbox.wheel_radius_m = Some(0.3);
+    for map in [wheels, by_wheels] {
+        assert!(!readings(text, &map).unwrap().0.is_empty());
+    }
+}
+
+#[test]
 fn a_wrong_map_is_refused_with_its_key() {
     let folder = Folder::new("maps");
     for (text, message) in [
