@@ -28,6 +28,9 @@ const SMALL_RAD_S: f64 = 60.0;
 /// Wheels of a car that drives at all turn faster, rad/s: 4 m/s.
 const MOVING_RAD_S: f64 = 13.0;
 
+/// An engine that is driven is mostly slower, rad/s: 6000 rpm.
+const ENGINE_RAD_S: f64 = 630.0;
+
 /// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has.
 const SIZES: usize = 64;
 
@@ -127,11 +130,26 @@ pub enum Seen {
     All,
 }
 
-/// The unit that a time is in by all appearances, where it was taken as s and this is the time between two rows: rows of a car's
-/// log are 0.1 ms to 1 s apart.
+/// Rows of a car's log are so far apart, s \[chosen\]: speeds and commands are recorded every 1 ms to 100 ms, and one more decade on each side.
+const ROWS_APART_S: std::ops::Range<f64> = 1e-4..1.0;
+
+/// The unit that a time is in by all appearances, where it was taken as s and this is the time between two rows.
 pub fn likely_time_unit(step_s: f64) -> Option<&'static str> {
     let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
-    units.into_iter().find(|(_, size)| step_s >= 1.0 && (1e-4..1.0).contains(&(step_s * size))).map(|(unit, _)| unit)
+    let is_slow = step_s >= ROWS_APART_S.end;
+    units.into_iter().find(|(_, size)| is_slow && ROWS_APART_S.contains(&(step_s * size))).map(|(unit, _)| unit)
+}
+
+/// What is wrong with a time whose rows are closer together than those of any car's log, all of them within less than a second: a shift
+/// with what is needed before it takes longer. In a sentence with a hint.
+pub fn too_fast_a_time(step_s: f64, span_s: f64) -> Option<String> {
+    (step_s > 0.0 && step_s < ROWS_APART_S.start && span_s < 1.0).then(|| {
+        format!(
+            "the middle time between two rows is {step_s:.1e} s, and all of them lie within {span_s:.3} s\n\
+             hint: the time looks like a larger unit than the one given; check it (`unit` under [time] in the channel map, or the \
+             ending of the column's name)"
+        )
+    })
 }
 
 /// What cannot be right.
@@ -209,10 +227,8 @@ fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
         Quantity::Current if unit == "A" && size > 10.0 => {
             say(format!("its greatest value would be {size:.0} A"), "mA")
         }
-        Quantity::Rotation
-            if unit == "rad/s" && (size > 2000.0 || entry.role == Role::EngineSpeed && middle > 630.0) =>
-        {
-            say(format!("most values would be about {:.0} rpm", rpm(middle)), "rpm")
+        Quantity::Rotation if size > 2000.0 || entry.role == Role::EngineSpeed && middle > ENGINE_RAD_S => {
+            say(format!("most values would be about {:.0} rpm", rpm(middle)), slower(unit, middle))
         }
         Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
             say(format!("its greatest value is {size:.1}"), "%")
@@ -251,6 +267,16 @@ fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
             say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
         }
         _ => None,
+    }
+}
+
+/// What is likely where speeds are too fast for a car in this unit; of those in Hz the middle one tells, rad/s.
+fn slower(unit: &str, middle_rad_s: f64) -> &'static str {
+    match unit {
+        "rad/s" => "rpm",
+        "Hz" if middle_rad_s / std::f64::consts::TAU > ENGINE_RAD_S => "rpm",
+        "Hz" => "rad/s",
+        _ => "a raw value; give `scale`",
     }
 }
 
@@ -297,6 +323,11 @@ mod tests {
             // Idle to 4000 rpm, read as rad/s and the other way round.
             (Role::EngineSpeed, "rad/s", vec![800.0, 2000.0, 4000.0], "rpm"),
             (Role::EngineSpeed, "rpm", vec![8.4, 20.0, 44.0], "rad/s"),
+            // 80 to 420 rad/s, and 800 to 4000 rpm, both as revolutions per second.
+            (Role::EngineSpeed, "Hz", [80.0, 200.0, 420.0].map(|hz| hz * std::f64::consts::TAU).to_vec(), "rad/s"),
+            (Role::EngineSpeed, "Hz", [800.0, 2000.0, 4000.0].map(|hz| hz * std::f64::consts::TAU).to_vec(), "rpm"),
+            // Quarters of rpm without their scale.
+            (Role::EngineSpeed, "rpm", vec![335.0, 838.0, 1676.0], "a raw value; give `scale`"),
             (Role::OncomingCurrent, "A", vec![0.0, 350.0, 900.0], "mA"),
             (Role::OncomingCurrent, "mA", vec![0.0, 0.35e-3, 0.9e-3], "A"),
             (Role::Throttle, "1", vec![0.0, 35.0], "%"),

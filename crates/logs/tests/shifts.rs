@@ -268,6 +268,68 @@ fn an_engine_stands_for_a_turbine_that_is_not_measured() {
 }
 
 #[test]
+fn a_gear_signal_contradicts_what_the_engine_alone_shows() {
+    let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
+    let drive = Drive::new(5, &[(2.0, 6), (8.0, 7)]);
+    let roles = [Role::EngineSpeed, Role::OutputSpeed, Role::Gear];
+    let mut readings = drive.readings(&roles);
+    for reading in &mut readings {
+        match reading.role {
+            // The converter is locked.
+            Role::EngineSpeed => reading.value /= 1.06,
+            // The change of the ratio at 8 s is none of the gearbox.
+            Role::Gear if reading.value == 7.0 => reading.value = 6.0,
+            _ => {}
+        }
+    }
+    assert_eq!(gears(&found(&gearbox, &roles, &readings)), [(5, 6)]);
+    let mut finder = ShiftFinder::new(&gearbox, |role| roles.contains(&role)).unwrap();
+    readings.iter().for_each(|reading| finder.push(reading));
+    finder.restart();
+    let notes = finder.notes();
+    assert!(notes[0].starts_with("no turbine speed is mapped: ") && notes[1].starts_with("1 changes of"), "{notes:?}");
+    assert_eq!(notes.len(), 2, "{notes:?}");
+}
+
+#[test]
+fn speeds_that_are_in_no_gear_are_told_with_their_ratio() {
+    let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
+    let drive = Drive::new(2, &[(3.0, 3)]);
+    let notes = |change: &dyn Fn(&mut Reading)| {
+        let mut readings = drive.readings(&SPEEDS);
+        readings.iter_mut().for_each(change);
+        let mut finder = ShiftFinder::new(&gearbox, |role| SPEEDS.contains(&role)).unwrap();
+        readings.iter().for_each(|reading| finder.push(reading));
+        let notes = finder.notes();
+        finder.restart();
+        assert_eq!(finder.notes(), notes, "a reset of the clock changes nothing");
+        notes.into_iter().next()
+    };
+    assert_eq!(notes(&|_| ()), None);
+    // A turbine in rad/s with an output in rpm, a car in km/h as m/s, a time in ms as s, a car that stands.
+    let output = |factor: f64| {
+        move |reading: &mut Reading| {
+            if reading.role == Role::OutputSpeed {
+                reading.value *= factor;
+            }
+        }
+    };
+    let cases: [(&dyn Fn(&mut Reading), &str); 4] = [
+        (&output(9.549), "are in no gear, the middle one of them 0.3"),
+        (&output(3.6), "are in no gear, the middle one of them 0.8"),
+        (
+            &|reading| (reading.time_s, reading.stamp_s) = (1e3 * reading.time_s, 1e3 * reading.stamp_s),
+            "never turn fast enough",
+        ),
+        (&output(0.01), "never turn fast enough for a ratio at the same time\nhint: check"),
+    ];
+    for (change, expected) in cases {
+        let note = notes(change).unwrap();
+        assert!(note.contains(expected) && note.contains("\nhint: "), "{note} | {expected}");
+    }
+}
+
+#[test]
 fn flare_is_the_turbine_above_the_old_gear() {
     let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
     let drive = Drive::new(2, &[(3.0, 3)]);

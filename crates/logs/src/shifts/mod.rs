@@ -12,6 +12,7 @@ mod inside;
 mod quality;
 mod ratio;
 mod track;
+mod unfit;
 
 use drivetrain::ShiftKind;
 use trace::Quantity;
@@ -199,6 +200,10 @@ pub struct ShiftFinder {
     output_rad_per_m: Option<f64>,
     /// Whether the turbine speed comes from the engine.
     by_engine: bool,
+    /// Shifts by the engine speed that the gear signal contradicts.
+    left_out: usize,
+    /// Whether speeds are there that can show shifts.
+    has_speeds: bool,
     tracks: [Track; ROLES],
     ratio: RatioWatch,
     gear: Steady,
@@ -235,6 +240,8 @@ impl ShiftFinder {
         Ok(Self {
             output_rad_per_m,
             by_engine: !has(Role::TurbineSpeed),
+            left_out: 0,
+            has_speeds: speeds,
             tracks: std::array::from_fn(|_| Track::new(HELD_S)),
             ratio: RatioWatch::new(&gearbox.ratios, HELD_S),
             gear: Steady::default(),
@@ -302,7 +309,8 @@ impl ShiftFinder {
             self.seen_ratios.ratio(point.time_s, point.ratio);
         }
         if !self.waiting.is_empty() {
-            self.settle(time_s - AFTER_S);
+            // The gear signal may change later than an engine that stands for the turbine.
+            self.settle(time_s - if self.by_engine { SAME_S } else { AFTER_S });
         }
     }
 
@@ -319,11 +327,36 @@ impl ShiftFinder {
         self.seen_ratios.contradiction(&self.ratios)
     }
 
+    /// What is to be said of the shifts and of those that are missing, in sentences, some with a hint; complete after [`Self::restart`].
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.contradiction().into_iter().collect();
+        let by_engine = self.has_speeds && self.by_engine;
+        // While the converter slips, the engine is rightly in no gear.
+        let unfit = self.ratio.unfit();
+        if self.has_speeds && (!self.by_engine || !unfit.engaged) {
+            notes.extend(unfit.reason(&self.ratios, if self.by_engine { "engine" } else { "turbine" }));
+        }
+        if by_engine {
+            notes.push(
+                "no turbine speed is mapped: the engine speed stands for it, which shows a shift only while the converter is locked; inertia phase \
+                 and flare are wrong where it slips"
+                    .to_owned(),
+            );
+        }
+        if self.left_out > 0 {
+            notes.push(format!(
+                "{} changes of the ratio of engine and output speed are left out: the gear signal has no such shift",
+                self.left_out
+            ));
+        }
+        notes
+    }
+
     /// Forgets what came before, as after a reset of the clock. The shifts so far stay.
     pub fn restart(&mut self) {
         self.settle(f64::INFINITY);
         self.tracks.iter_mut().for_each(Track::clear);
-        self.ratio = RatioWatch::new(&self.ratios, HELD_S);
+        self.ratio.restart(&self.ratios, HELD_S);
         (self.gear, self.target, self.active) = Default::default();
         self.commands.clear();
     }
@@ -405,10 +438,25 @@ impl ShiftFinder {
         self.waiting.push(Shift { from, to, direction, load: Load::Unknown, command_s, inertia_s, gear_s, quality });
     }
 
+    /// Whether the gear signal was in forward gears around a shift, and not in both of its gears.
+    fn gear_signal_contradicts(&self, shift: &Shift) -> bool {
+        let around = self.tracks[Role::Gear as usize].between(shift.start_s() - SAME_S, shift.end_s() + SAME_S);
+        let (mut any, mut both) = (false, [false; 2]);
+        for gear in around.filter_map(|(_, value)| self.gear_number(value)) {
+            any = true;
+            both = [both[0] || gear == shift.from, both[1] || gear == shift.to];
+        }
+        any && both != [true; 2]
+    }
+
     /// Finds load and quality of the shifts that ended before a time.
     fn settle(&mut self, before_s: f64) {
         while let Some(at) = self.waiting.iter().position(|shift| shift.end_s() < before_s) {
             let mut shift = self.waiting.swap_remove(at);
+            if self.by_engine && shift.inertia_s.is_some() && self.gear_signal_contradicts(&shift) {
+                self.left_out += 1;
+                continue;
+            }
             shift.load = quality::load(&shift, &self.tracks);
             shift.quality = quality::quality(&shift, &self.ratios, &self.tracks, &self.ratio, self.output_rad_per_m);
             match shift.inertia_s {

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::held::Held;
 use super::track::Track;
+use super::unfit::Unfit;
 
 /// Below this output speed a ratio says nothing, rad/s.
 const OUTPUT_MIN_RAD_S: f64 = 8.0;
@@ -79,6 +80,7 @@ pub(super) struct RatioWatch {
     before: Option<InGear>,
     now: Option<InGear>,
     changes: VecDeque<RatioChange>,
+    unfit: Unfit,
 }
 
 impl RatioWatch {
@@ -100,7 +102,19 @@ impl RatioWatch {
             before: None,
             now: None,
             changes: VecDeque::new(),
+            unfit: Unfit::default(),
         }
+    }
+
+    /// Forgets what came before, but for what tells that the speeds are in no gear.
+    pub(super) fn restart(&mut self, ratios: &[f64], held_s: f64) {
+        let unfit = std::mem::take(&mut self.unfit);
+        *self = Self { unfit, ..Self::new(ratios, held_s) };
+    }
+
+    /// The ratios so far, those in a gear and the others.
+    pub(super) fn unfit(&self) -> &Unfit {
+        &self.unfit
     }
 
     pub(super) fn turbine(&mut self, time_s: f64, rad_s: f64) {
@@ -174,6 +188,7 @@ impl RatioWatch {
             self.points.pop_front();
         }
         let gear = self.gears.iter().position(|(_, [low, high])| (*low..=*high).contains(&point.ratio));
+        self.unfit.push(point.ratio, gear.is_some());
         match (gear, &mut self.now) {
             (Some(gear), Some(now)) if now.gear == gear => {
                 let counted = now.counts();
@@ -200,6 +215,7 @@ impl RatioWatch {
 
     /// The ratio has been in a gear for long enough.
     fn engaged(&mut self, gear: usize) {
+        self.unfit.engaged = true;
         let (Some(before), Some(now)) = (self.before, self.now) else { return };
         if before.gear != gear && now.first_s - before.last_s <= LONGEST_S {
             let number = |gear: usize| u32::try_from(gear + 1).unwrap_or(u32::MAX);
