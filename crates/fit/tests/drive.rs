@@ -167,6 +167,13 @@ fn a_torque_with_which_the_converter_would_drive_the_engine_is_refused() {
     let mut record = drive(1, 3.0);
     // An engine torque in % that is taken as N m, and its friction in N m.
     record.engine_torque.value.iter_mut().for_each(|n_m| *n_m = *n_m / 4.5 - 60.0);
-    let error = fit_converter(&record, &record.moments()).unwrap_err();
-    assert!(error.starts_with("engine_torque does not fit the speeds: ") && error.contains("unit"), "{error}");
+    let refused = |record: &DriveRecord| {
+        let error = fit_converter(record, &record.moments()).unwrap_err();
+        assert!(error.starts_with("engine_torque does not fit the speeds: ") && error.contains("unit"), "{error}");
+    };
+    refused(&record);
+    // As much that no single capacity is negative by more than its range.
+    let mut record = drive(1, 60.0);
+    record.engine_torque.value.iter_mut().for_each(|n_m| *n_m = *n_m / 4.5 - 30.0);
+    refused(&record);
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use fit::drive::{DriveRecord, fit_converter};
-use logs::plausibility::likely_time_unit;
+use logs::plausibility::{likely_time_unit, too_fast_a_time};
 use logs::{
     Channel, ChannelMap, ChannelSummary, Inspection, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder,
 };
@@ -11,6 +11,7 @@ use report::SpeedsPage;
 use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
+use crate::commands::written::{is_page, replaces_only};
 use crate::commands::{channel_map, check_output, not_an_input, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -25,7 +26,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     }
     let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
     if options.suggest {
-        let dbc = options.mapping.dbc.as_ref().map(|dbc| dbc.display().to_string());
+        // The map may be put into any folder.
+        let dbc = options.mapping.dbc.as_ref();
+        let dbc = dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).display().to_string());
         return Ok(output::line(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
     }
     if options.shifts {
@@ -36,7 +39,8 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
             ));
         }
         check_output(options.output.as_ref())?;
-        not_an_input(options.output.as_ref(), options.mapping.map.iter().chain([&options.log]))?;
+        not_an_input(options.output.as_ref(), options.mapping.files().chain([&options.log]))?;
+        options.output.as_deref().map(|page| replaces_only("page in HTML", page, is_page)).transpose()?;
         return shifts(options, &mut log, &map);
     }
     let inspection = logs::inspect(&mut log)?;
@@ -44,17 +48,65 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     channels(&log, &inspection)?;
     remarks(&inspection.notes);
     let steps_s = inspection.channels.iter().filter_map(|summary| summary.period_s);
-    if let Some(unit) = likely_time_unit(steps_s.fold(f64::INFINITY, f64::min)) {
-        output::note(&format!(
-            "warning: no channel has a sample more often than once in a second: the time looks like {unit}\n\
-             hint: set its `name` and `unit = \"{unit}\"` under [time] in the channel map"
-        ));
+    let spans_s = || inspection.channels.iter().filter_map(|summary| summary.span_s);
+    let first_s = spans_s().map(|[first_s, _]| first_s).fold(f64::INFINITY, f64::min);
+    let last_s = spans_s().map(|[_, last_s]| last_s).fold(f64::NEG_INFINITY, f64::max);
+    remarks(wrong_time(steps_s.fold(f64::INFINITY, f64::min), last_s - first_s).as_slice());
+    if map.channels.is_empty() { Ok(()) } else { check_map(options, &log, &map) }
+}
+
+/// Refuses a map that does not fit the log, or by whose units its values cannot be right, as an estimate does.
+fn check_map(options: &Inspect, log: &Log, map: &ChannelMap) -> Result<(), Failure> {
+    map.resolve(log)?;
+    if options.log == Path::new("-") {
+        output::note(
+            "the channel map fits the names and units of the log; values of standard input are not compared with them",
+        );
+        return Ok(());
     }
-    if !map.channels.is_empty() {
-        map.resolve(&log)?;
-        output::note("the channel map fits the log");
-    }
+    // A log is read once.
+    let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
+    let mut readings = Readings::new(&mut log, map)?;
+    readings.by_ref().try_for_each(|reading| reading.map(drop))?;
+    readings.check()?;
+    output::note("the channel map fits the log");
     Ok(())
+}
+
+/// What is wrong with the unit of the time, of a log with this time between rows and from the first to the last, s.
+fn wrong_time(step_s: f64, span_s: f64) -> Option<String> {
+    let too_slow = likely_time_unit(step_s).map(|unit| {
+        format!(
+            "no channel has a sample more often than once in a second: the time looks like {unit}\n\
+             hint: set its `name` and `unit = \"{unit}\"` under [time] in the channel map"
+        )
+    });
+    too_slow.or_else(|| too_fast_a_time(step_s, span_s))
+}
+
+/// The middle time between the first readings of each entry of a map.
+#[derive(Default)]
+struct Rates(Vec<(f64, Vec<f64>)>);
+
+impl Rates {
+    /// Takes the time stamp of a reading of an entry.
+    fn push(&mut self, entry: usize, stamp_s: f64) {
+        const FIRST: usize = 512;
+        if self.0.len() <= entry {
+            self.0.resize(entry + 1, (f64::NAN, Vec::new()));
+        }
+        let (last_s, steps_s) = &mut self.0[entry];
+        if steps_s.len() < FIRST && last_s.is_finite() {
+            steps_s.push(stamp_s - *last_s);
+        }
+        *last_s = stamp_s;
+    }
+
+    /// That of the entry with the highest rate, s; infinite without two readings of one.
+    fn step_s(self) -> f64 {
+        let steps_s = self.0.into_iter().map(|(_, steps_s)| steps_s).filter(|steps_s| !steps_s.is_empty());
+        steps_s.map(trace::median_step_s).fold(f64::INFINITY, f64::min)
+    }
 }
 
 fn remarks(notes: &[String]) {
@@ -150,7 +202,8 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
     let mut finder = ShiftFinder::new(&map.gearbox, |role| map.has(role))?;
     let mut record = DriveRecord::default();
     let mut readings = Readings::new(log, map)?;
-    let (mut first_s, mut last_s, mut resets) = (f64::NAN, f64::NAN, 0);
+    let (mut first_s, mut last_s, mut origin_s, mut resets) = (f64::NAN, f64::NAN, None, 0);
+    let mut rates = Rates::default();
     while let Some(reading) = readings.next() {
         let reading = reading?;
         if readings.resets() > resets {
@@ -159,20 +212,22 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
         }
         first_s = first_s.min(reading.time_s);
         last_s = reading.time_s;
+        rates.push(readings.entry(), reading.stamp_s);
         finder.push(&reading);
+        let origin_s = *origin_s.get_or_insert_with(|| origin(first_s));
         if options.output.is_some() {
-            record.push(&Reading { time_s: reading.time_s - origin(first_s), ..reading });
+            record.push(&Reading { time_s: reading.time_s - origin_s, ..reading });
         }
     }
     readings.check()?;
-    let origin_s = origin(first_s);
-    let contradiction = finder.contradiction();
-    let found: Vec<Shift> = finder.finish().iter().map(|shift| shift.earlier_by(origin_s)).collect();
+    let origin_s = origin_s.unwrap_or(0.0);
     let mut notes = notes(&readings);
-    notes.extend(contradiction);
-    for note in &notes {
-        output::note(&format!("warning: {note}"));
-    }
+    notes.extend(wrong_time(rates.step_s(), last_s - first_s));
+    // The log ends here.
+    finder.restart();
+    let found: Vec<Shift> = finder.take_settled(f64::INFINITY).iter().map(|shift| shift.earlier_by(origin_s)).collect();
+    notes.extend(finder.notes());
+    remarks(&notes);
     say_origin(origin_s)?;
     output::line(&format!("{} shifts from {:.2} to {:.2} s", found.len(), first_s - origin_s, last_s - origin_s))?;
     if !found.is_empty() {

@@ -19,6 +19,7 @@ mod simulate;
 mod simulate_drive;
 mod study;
 mod worst_case;
+mod written;
 
 pub(crate) use bench::bench;
 pub(crate) use check::check;
@@ -180,6 +181,12 @@ fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
     }
     if options.dbc.is_some() {
         map.open.dbc.clone_from(&options.dbc);
+    } else if let (Some(path), Some(dbc)) = (&options.map, map.open.dbc.as_ref().filter(|dbc| !dbc.exists())) {
+        return Err(Failure::Input(format!(
+            "{}: `dbc` leads to {}, which does not exist\nhint: a path in a map counts from the folder of the map; --dbc replaces it",
+            path.display(),
+            dbc.display()
+        )));
     }
     Ok(map)
 }

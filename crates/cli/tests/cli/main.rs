@@ -19,3 +19,4 @@ mod measured;
 mod own_car;
 mod studies;
 mod support;
+mod wrong_maps;

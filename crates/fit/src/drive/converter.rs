@@ -113,17 +113,18 @@ pub fn fit_converter(record: &DriveRecord, moments: &[Moment]) -> Result<Convert
     })
 }
 
-/// Refuses capacities that are negative by more than their range: below a speed ratio of 1 a converter takes torque from the engine.
+/// Refuses capacities of which one is negative by more than its range, or the mean is: a converter that slips takes torque from the engine.
 fn drives_no_engine(knots: &[Knot]) -> Result<(), String> {
-    let is_negative = |knot: &&Knot| knot.capacity_n_m_s2 + 2.0 * knot.sd_n_m_s2 < 0.0;
-    match knots.iter().find(is_negative) {
+    let is_negative = |knot: &Knot| knot.capacity_n_m_s2 + 2.0 * knot.sd_n_m_s2 < 0.0;
+    let sum: f64 = knots.iter().map(|knot| knot.capacity_n_m_s2).sum();
+    let least = knots.iter().min_by(|one, other| one.capacity_n_m_s2.total_cmp(&other.capacity_n_m_s2));
+    match least.filter(|_| sum < 0.0 || knots.iter().any(is_negative)) {
         None => Ok(()),
-        Some(knot) => Err(format!(
-            "engine_torque does not fit the speeds: at speed ratio {} the converter would drive the engine (capacity {:.2} ± {:.2} 10⁻³ N m s²); \
+        Some(least) => Err(format!(
+            "engine_torque does not fit the speeds: by it the converter would drive the engine (capacity {:.2}e-3 N m s² at speed ratio {}); \
              check unit and scale of engine_torque, and whether its friction is taken off once (engine_friction_torque)",
-            knot.speed_ratio,
-            1e3 * knot.capacity_n_m_s2,
-            2e3 * knot.sd_n_m_s2
+            1e3 * least.capacity_n_m_s2,
+            least.speed_ratio
         )),
     }
 }

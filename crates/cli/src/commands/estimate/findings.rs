@@ -99,6 +99,11 @@ impl Findings {
         }
     }
 
+    /// From the first step to the last, s.
+    pub(super) fn span_s(&self) -> f64 {
+        self.last_s - self.first_s
+    }
+
     /// Refuses a log of which a channel is unusable in most samples, or that does not belong to the vehicle.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ use study::LogSample;
 use study::shift_estimates::no_estimate;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step, slow_log};
+use super::measured::{Measured, Step, check_span, slow_log};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
@@ -51,6 +51,7 @@ pub(super) fn estimate(
         say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
     }
     let Rows { table, shifts, findings, .. } = rows;
+    check_span(path, log.median_step_s(), findings.span_s())?;
     check_findings(&findings, vehicle, &log, observer.kind)?;
     if let Some(warning) = slow_log(log.median_step_s()) {
         say.note(&warning);

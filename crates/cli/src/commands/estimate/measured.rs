@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use config::Vehicle;
 use drivetrain::CommandKind;
-use logs::plausibility::{Seen, likely_time_unit};
+use logs::plausibility::{Seen, likely_time_unit, too_fast_a_time};
 use logs::{
     ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
 };
@@ -352,6 +352,12 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
          hint: if the time is in {unit}, {hint}",
         shown_path(path)
     )))
+}
+
+/// Refuses a log whose time passes too fast, once its last row is known.
+pub(super) fn check_span(path: &Path, median_s: f64, span_s: f64) -> Result<(), Failure> {
+    let wrong = too_fast_a_time(median_s, span_s);
+    wrong.map_or(Ok(()), |wrong| Err(Failure::Input(format!("{}: {wrong}", shown_path(path)))))
 }
 
 /// Says that a log has too few rows for its shifts.

@@ -1,6 +1,7 @@
 //! `wetclutch estimate`: one log, or several at a time.
 
 pub(super) mod any_car;
+mod earlier;
 mod findings;
 mod job;
 mod measured;
@@ -20,6 +21,7 @@ use std::sync::{Mutex, PoisonError};
 use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
 
+use self::earlier::replaces_only_estimates;
 use crate::args::{Estimate, FormatChoice};
 use crate::commands::{channel_map_of_car, check_output, not_an_input};
 use crate::failure::Failure;
@@ -91,7 +93,7 @@ fn each_log<S: Sync>(
     for written in output.iter().filter_map(|output| outputs::beside(output)).flatten().chain(output.clone()) {
         not_an_input(Some(&written), inputs(options).chain([log]))?;
     }
-    output.as_deref().map(outputs::only_own_beside).transpose()?;
+    output.as_deref().map(replaces_only_estimates).transpose()?;
     estimate(&prepare()?, log, output.as_deref(), &mut Messages::at_once())
 }
 
@@ -140,7 +142,7 @@ fn several<S: Sync>(
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;
-        outputs::only_own_beside(output)?;
+        replaces_only_estimates(output)?;
         for output in outputs::beside(output).iter().flatten().chain([output]) {
             not_an_input(Some(output), logs.iter().chain(inputs(options)))?;
         }

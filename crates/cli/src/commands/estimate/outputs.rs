@@ -1,7 +1,6 @@
 //! Where estimates are written.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use observer::{ChannelHealth, Channels, Estimate, Health, Phase};
@@ -203,27 +202,6 @@ pub(super) fn beside(output: &Path) -> Option<[PathBuf; 3]> {
         name.push(ending);
         output.with_file_name(name)
     }))
-}
-
-/// Refuses an output beside which there are files of these names that no estimate wrote.
-pub(super) fn only_own_beside(output: &Path) -> Result<(), Failure> {
-    let foreign = beside(output).into_iter().flatten().find(|place| place.is_file() && !is_own(place));
-    foreign.map_or(Ok(()), |foreign| {
-        Err(Failure::Input(format!(
-            "{}: no estimate wrote this file, and one into {} would replace it\nhint: choose another name after -o, or move the file",
-            foreign.display(),
-            output.display()
-        )))
-    })
-}
-
-/// Whether a file begins as the table or the page of an estimate does; one that cannot be read is none.
-fn is_own(path: &Path) -> bool {
-    const MARKS: [&str; 2] = ["| wetclutch</title>", "from_gear"];
-    let mut begin = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut begin));
-    let begin = String::from_utf8_lossy(&begin);
-    read.is_ok() && (begin.is_empty() || MARKS.iter().any(|mark| begin.contains(mark)))
 }
 
 /// Removes the files beside an output that an earlier estimate left: they are not of this one, which has no shift.

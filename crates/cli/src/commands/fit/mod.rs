@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Fit;
 use crate::commands::estimate::observer::sensors;
+use crate::commands::written::replaces_only;
 use crate::commands::{channel_map_of_car, check_output, not_an_input, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
@@ -25,7 +26,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     check_output(Some(&options.output))?;
     let inputs = options.logs.iter().chain(&options.sensors).chain([&options.vehicle]).chain(options.mapping.files());
     not_an_input(Some(&options.output), inputs)?;
-    only_a_vehicle_file(&options.output)?;
+    replaces_only("vehicle file", &options.output, is_vehicle_file)?;
     let source = Source::read(&options.vehicle)?;
     if source.kind()? == Kind::Car {
         return gearbox::fit(options);
@@ -97,19 +98,9 @@ fn print(found: &fit::Fit) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses an output that is there and no vehicle file: it may be a measurement.
-fn only_a_vehicle_file(output: &Path) -> Result<(), Failure> {
-    let is_vehicle = || {
-        Source::read(output)
-            .and_then(|source| source.kind())
-            .is_ok_and(|kind| matches!(kind, Kind::Vehicle | Kind::Car))
-    };
-    if output.is_file() && !is_vehicle() {
-        let message =
-            format!("{}: exists and is no vehicle file\nhint: choose another name after -o", output.display());
-        return Err(Failure::Input(message));
-    }
-    Ok(())
+fn is_vehicle_file(path: &Path) -> bool {
+    let kind = Source::read(path).and_then(|source| source.kind());
+    kind.is_ok_and(|kind| matches!(kind, Kind::Vehicle | Kind::Car))
 }
 
 /// The shifts of all logs.

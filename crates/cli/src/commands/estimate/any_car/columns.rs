@@ -118,6 +118,16 @@ pub(super) fn columns(places: &[(usize, &str)]) -> Vec<Column> {
     columns
 }
 
+/// Whether the estimate of some car may have a column of this name.
+pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
+    let of_element = || {
+        name.strip_suffix(CLUTCH[6])
+            .and_then(|rest| rest.strip_suffix('_'))
+            .is_some_and(|rest| rest.starts_with("element_"))
+    };
+    columns(&[]).iter().any(|column| column.name == name) || of_element()
+}
+
 fn of(value: Option<f64>) -> Cell<'static> {
     Cell::Number(value.unwrap_or(f64::NAN))
 }

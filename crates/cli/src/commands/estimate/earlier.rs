@@ -1,0 +1,75 @@
+//! What an earlier estimate wrote, which a new one may replace.
+
+use std::path::Path;
+
+use logs::{Log, OpenOptions};
+use study::EstimateColumns;
+use trace::signal;
+
+use super::any_car::is_car_column;
+use super::outputs::beside;
+use crate::commands::written::{head, holds_something, replaces_only};
+use crate::failure::Failure;
+
+/// Refuses an output that would replace what no estimate wrote, itself or with the files beside it.
+pub(super) fn replaces_only_estimates(output: &Path) -> Result<(), Failure> {
+    replaces_only("estimate of this program", output, is_estimate)?;
+    let foreign = |place: &std::path::PathBuf| holds_something(place) && !is_beside_an_estimate(place);
+    match beside(output).into_iter().flatten().find(foreign) {
+        None => Ok(()),
+        Some(foreign) => Err(Failure::Input(format!(
+            "{}: no estimate wrote this file, and one into {} would replace it\nhint: choose another name after -o, or move the file",
+            foreign.display(),
+            output.display()
+        ))),
+    }
+}
+
+/// Whether a file begins as the table of shifts or the page of an estimate does.
+fn is_beside_an_estimate(path: &Path) -> bool {
+    let head = head(path);
+    ["| wetclutch</title>", "from_gear"].iter().any(|mark| head.contains(mark))
+}
+
+/// Whether all columns of a table are those of estimates. One that cannot be read is none.
+fn is_estimate(path: &Path) -> bool {
+    let head = head(path);
+    let names: Vec<String> = if head.starts_with("MDF") || head.starts_with("PAR1") {
+        let log = Log::open(path, &OpenOptions::default());
+        log.map_or(Vec::new(), |log| log.channels().iter().map(|channel| channel.name.clone()).collect())
+    } else {
+        let mut names = head.lines().next().unwrap_or_default().split(',');
+        if names.next() != Some(signal::TIME) {
+            return false;
+        }
+        names.map(str::to_owned).collect()
+    };
+    // A log may have both gears, and nothing else.
+    let is_gear = |name: &str| [signal::GEAR, signal::TARGET_GEAR].contains(&name);
+    names.iter().all(|name| is_estimate_column(name)) && names.iter().any(|name| !is_gear(name))
+}
+
+/// Whether an estimate of any observer and of any car may have a column of this name.
+fn is_estimate_column(name: &str) -> bool {
+    let all = EstimateColumns { shaft: true, range: true, shaft_range: true };
+    all.columns().iter().any(|column| column.name == name) || is_car_column(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_of_estimates_are_told_from_those_of_logs() {
+        let estimates =
+            ["oncoming_pressure_estimate_pa", "offgoing_torque_least_n_m", "element_k1_valve_model_pressure_pa"];
+        assert!(
+            estimates
+                .iter()
+                .chain(&["phase", "health", "turbine_torque_estimate_n_m"])
+                .all(|name| is_estimate_column(name))
+        );
+        let logs = ["element_k1_current_a", "turbine_speed_rad_s", "oncoming_pressure_pa", "N_Eng"];
+        assert!(!signal::MEASURABLE.iter().chain(&logs).any(|name| is_estimate_column(name)));
+    }
+}
