@@ -142,10 +142,10 @@ fn several<S: Sync>(
     crate::commands::writable(folder, &[])?;
     for output in &outputs {
         check_output(Some(output))?;
-        replaces_only_estimates(output)?;
         for output in outputs::beside(output).iter().flatten().chain([output]) {
             not_an_input(Some(output), logs.iter().chain(inputs(options)))?;
         }
+        replaces_only_estimates(output)?;
     }
     let setup = prepare()?;
     let next = AtomicUsize::new(0);
