@@ -291,11 +291,14 @@ fn a_gear_signal_contradicts_what_the_engine_alone_shows() {
     assert_eq!(notes.len(), 2, "{notes:?}");
 }
 
+/// What is wrong with the readings of a drive.
+type Change<'a> = &'a dyn Fn(&mut Reading);
+
 #[test]
 fn speeds_that_are_in_no_gear_are_told_with_their_ratio() {
     let gearbox = Gearbox { ratios: RATIOS.to_vec(), ..Gearbox::default() };
     let drive = Drive::new(2, &[(3.0, 3)]);
-    let notes = |change: &dyn Fn(&mut Reading)| {
+    let notes = |change: Change<'_>| {
         let mut readings = drive.readings(&SPEEDS);
         readings.iter_mut().for_each(change);
         let mut finder = ShiftFinder::new(&gearbox, |role| SPEEDS.contains(&role)).unwrap();
@@ -314,7 +317,7 @@ fn speeds_that_are_in_no_gear_are_told_with_their_ratio() {
             }
         }
     };
-    let cases: [(&dyn Fn(&mut Reading), &str); 4] = [
+    let cases: [(Change<'_>, &str); 4] = [
         (&output(9.549), "are in no gear, the middle one of them 0.3"),
         (&output(3.6), "are in no gear, the middle one of them 0.8"),
         (
