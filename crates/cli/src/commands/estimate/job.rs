@@ -52,8 +52,7 @@ pub(super) fn estimate(
     }
     let Rows { table, shifts, findings, .. } = rows;
     let median_s = log.median_step_s();
-    check_span(path, median_s, findings.span_s())?;
-    check_findings(&findings, vehicle, &log, observer.kind)?;
+    check_findings(path, &findings, vehicle, &log, observer.kind)?;
     let warnings = [slow_log(median_s), old_commands(median_s, vehicle.error_bounds.command_age_s)];
     warnings.into_iter().flatten().for_each(|warning| say.note(&warning));
     shifts.check()?;
@@ -138,11 +137,13 @@ fn pass<'log, 'rows>(
 
 /// Refuses a log that the observer cannot use, or that is of another car.
 fn check_findings(
+    path: &Path,
     findings: &Findings,
     vehicle: &Vehicle,
     log: &Measured<'_>,
     observer: ObserverKind,
 ) -> Result<(), Failure> {
+    check_span(path, log.median_step_s(), findings.span_s())?;
     let commands = match vehicle.observer_valve.command_kind() {
         CommandKind::Current => [Role::OncomingCurrent, Role::OffgoingCurrent],
         CommandKind::DutyCycle => [Role::OncomingDuty, Role::OffgoingDuty],

@@ -1,5 +1,7 @@
 //! Whether a table can be a drive of its vehicle.
 
+use std::path::Path;
+
 use config::Car;
 use design::ShiftTables;
 use drivetrain::CommandKind;
@@ -9,8 +11,38 @@ use study::any_shift::logged::{LogStep, element_commands};
 use study::log::FIRST_LOOK;
 use trace::signal;
 
+use super::super::measured::{check_span, check_step};
 use super::super::watched::{WatchedColumn, WatchedColumns};
 use crate::failure::Failure;
+
+/// The times of the rows of a log.
+#[derive(Default)]
+pub(super) struct RowTimes {
+    /// Between the first rows, s.
+    steps_s: Vec<f64>,
+    /// Of the first and the last row, s.
+    ends_s: Option<[f64; 2]>,
+}
+
+impl RowTimes {
+    pub(super) fn push(&mut self, step: &LogStep) {
+        if self.steps_s.len() < FIRST_LOOK {
+            self.steps_s.push(step.input.dt_s);
+        }
+        self.ends_s = Some([self.ends_s.map_or(step.time_s, |[first_s, _]| first_s), step.time_s]);
+    }
+
+    /// The middle time between two rows, s.
+    ///
+    /// # Errors
+    /// The time is in another unit by all appearances.
+    pub(super) fn check(self, path: &Path, is_mapped: bool) -> Result<f64, Failure> {
+        let median_s = trace::median_step_s(self.steps_s);
+        check_step(path, median_s, is_mapped)?;
+        check_span(path, median_s, self.ends_s.map_or(f64::NAN, |[first_s, last_s]| last_s - first_s))?;
+        Ok(median_s)
+    }
+}
 
 /// The columns of a table of a drive, to tell wrong units and empty columns.
 pub(super) struct Columns {

@@ -15,15 +15,15 @@ use logs::ChannelMap;
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
-use study::log::FIRST_LOOK;
 use trace::{Cell, shown_path};
 
+use self::checks::RowTimes;
 pub(super) use self::columns::is_car_column;
 use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
 use super::Messages;
-use super::measured::{check_span, check_step, slow_log};
+use super::measured::slow_log;
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::ratios::check_wheel;
@@ -92,13 +92,9 @@ pub(super) fn estimate(
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
     let mut checks = log.columns(car, tables);
-    let mut steps_s = Vec::new();
-    let mut span_s = [f64::NAN; 2];
+    let mut times = RowTimes::default();
     while let Some(step) = log.next_step()? {
-        if steps_s.len() < FIRST_LOOK {
-            steps_s.push(step.input.dt_s);
-        }
-        span_s = [span_s[0].min(step.time_s), step.time_s];
+        times.push(&step);
         if let Some(checks) = &mut checks {
             checks.push(&step);
         }
@@ -112,9 +108,7 @@ pub(super) fn estimate(
             table.flush()?;
         }
     }
-    let median_s = trace::median_step_s(steps_s);
-    check_step(path, median_s, !setup.map.channels.is_empty())?;
-    check_span(path, median_s, span_s[1] - span_s[0])?;
+    let median_s = times.check(path, !setup.map.channels.is_empty())?;
     log.finish(say)?;
     checks.map_or(Ok(()), |checks| checks.check())?;
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
