@@ -172,8 +172,8 @@ fn a_torque_with_which_the_converter_would_drive_the_engine_is_refused() {
         assert!(error.starts_with("engine_torque does not fit the speeds: ") && error.contains("unit"), "{error}");
     };
     refused(&record);
-    // As much that no single capacity is negative by more than its range.
-    let mut record = drive(1, 60.0);
-    record.engine_torque.value.iter_mut().for_each(|n_m| *n_m = *n_m / 4.5 - 30.0);
+    // With errors so large that no single capacity is negative by more than its range.
+    let mut record = drive(1, 200.0);
+    record.engine_torque.value.iter_mut().for_each(|n_m| *n_m = *n_m / 4.5 - 35.0);
     refused(&record);
 }
