@@ -295,7 +295,7 @@ fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
 /// The filter of a car with these tables, for readings of these sensors; without them the readings are taken to be of the
 /// moment, with the noise of usual sensors.
 ///
-/// A bound of the errors counts as the edge of a uniform distribution.
+/// A bound of the errors counts as the edge of a uniform distribution, those of friction and valves times the scale that the file has of its own.
 pub fn any_shift_filter<'a>(
     car: &Car,
     tables: &'a ShiftTables<f64>,
@@ -313,7 +313,7 @@ pub fn any_shift_filter<'a>(
             converter_share: deviation_of(own.converter),
             engine_share: deviation_of(own.engine),
         },
-        uncertainty: uncertainty(&own),
+        uncertainty: uncertainty(&own, car.error_bounds.valve_error_scale.unwrap_or(1.0)),
         readings: [
             speed_reading(sensors.map(|sensors| &sensors.turbine), SPEED_QUANTUM_RAD_S),
             speed_reading(sensors.map(|sensors| &sensors.output), SPEED_QUANTUM_RAD_S),
@@ -341,20 +341,25 @@ fn shaft_n_m(car: &Car) -> f64 {
     engine * converter * ratio * car.driveline.final_ratio
 }
 
-/// What the filter does not know.
-fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
+/// What the filter of a car does not know by the bounds alone, whatever scale of the errors of its valves the file has of its own.
+pub fn shift_uncertainty(car: &Car, errors: &ShiftErrors) -> ShiftUncertainty<f64> {
+    uncertainty(&errors.of_car(car), 1.0)
+}
+
+/// What the filter does not know; friction and valve err by this scale times the bounds.
+fn uncertainty(errors: &ShiftErrors, scale: f64) -> ShiftUncertainty<f64> {
     let parts = [deviation_of(errors.friction), deviation_of(errors.valve_gain), MAP_SHARE];
     let square: f64 = parts.iter().map(|part| part * part).sum();
     let slow_part = 1.0 - parts[2] * parts[2] / square;
     ShiftUncertainty {
-        torque_share: square.sqrt(),
+        torque_share: scale * square.sqrt(),
         slow_part,
         torque_share_s: 3.0,
-        valve_gain: parts[1],
-        kiss_point_pa: KISS_POINT_PA,
-        valve_lag_share: deviation_of(errors.valve_lag),
-        valve_delay_s: deviation_of(0.5 * (errors.valve_delay_s[1] - errors.valve_delay_s[0])),
-        pressure_pa: PRESSURE_PA,
+        valve_gain: scale * parts[1],
+        kiss_point_pa: scale * KISS_POINT_PA,
+        valve_lag_share: scale * deviation_of(errors.valve_lag),
+        valve_delay_s: scale * deviation_of(0.5 * (errors.valve_delay_s[1] - errors.valve_delay_s[0])),
+        pressure_pa: scale * PRESSURE_PA,
         pressure_s: 0.15,
         turbine_share: TURBINE_SHARE,
         turbine_share_s: 3.0,

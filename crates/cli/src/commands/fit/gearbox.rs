@@ -45,8 +45,10 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
         bar.tick();
     })?;
     let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
-    let fitted = found.vehicle_file(&car, &options.output, &names.join(", "))?;
+    let file = |checked: Option<&HeldOut>| found.vehicle_file(&car, &options.output, &names.join(", "), checked);
+    let fitted = file(None)?;
     let checked = found.validate((&car, &tables), (&fitted, &LoggedDrive::tables(&fitted)?), &held_out);
+    let fitted = file(checked.as_ref())?;
     bar.finish_and_clear();
     let against = found.reason_against(checked.as_ref());
     let written = match &against {
@@ -138,7 +140,8 @@ fn said_of(checked: &HeldOut) -> String {
     let [given, fitted] = checked.turbine_rad_s;
     format!(
         "{} shifts held out: turbine speed while both clutches slip, by the torques of the given file off by {given:.2} rad/s, of the fitted one \
-         by {fitted:.2} rad/s; the fitted file is the better one in {}",
-        checked.shifts, checked.better
+         by {fitted:.2} rad/s; the fitted file is the better one in {}. That is {:.2} of what the error bounds of the fitted file say of friction and \
+         valves: `estimate` trusts the valves by as much",
+        checked.shifts, checked.better, checked.valve_error_scale
     )
 }
