@@ -19,7 +19,7 @@ pub struct HeldOut {
     pub turbine_rad_s: [f64; 2],
     /// In how many of them the fitted file is the better one.
     pub better: usize,
-    /// By how much the torques of the fitted file err, over what its error bounds say of friction and valves: of [`LEAST_SCALE`] to [`MOST_SCALE`].
+    /// By how much the torques of the fitted file err, over what its error bounds say of friction and valves, from a third to 3.
     pub valve_error_scale: f64,
 }
 
