@@ -270,7 +270,32 @@ pub(super) mod tests {
 
     #[test]
     fn the_tangent_is_the_derivative_of_the_step() {
-        let step = step();
+        // From -13 N m s on a step carries the turbine beyond its balance.
+        for slope_n_m_s in [-6.0, -40.0] {
+            let mut step = step();
+            step.turbine[1] = slope_n_m_s;
+            assert_tangent_is_derivative(step);
+        }
+    }
+
+    /// An error of the turbine speed fades to the same side of its balance, however fast the turbine torque falls with the speed.
+    #[test]
+    fn a_stiff_turbine_torque_does_not_make_the_speed_alternate() {
+        for slope_n_m_s in [-1.0, -6.0, -13.0, -20.0, -100.0, -1e4] {
+            let mut step = step();
+            step.turbine[1] = slope_n_m_s;
+            let x = [0.0; N];
+            let mut other = x;
+            other[TURBINE] = 1.0;
+            let at_balance = step.propagate(&x)[TURBINE];
+            step.turbine[0] += slope_n_m_s;
+            let left = step.propagate(&other)[TURBINE] - at_balance;
+            // The output speed takes some of it along.
+            assert!((-0.05..1.0).contains(&left), "{slope_n_m_s}: {left}");
+        }
+    }
+
+    fn assert_tangent_is_derivative(step: Step<f64>) {
         let mut x = [0.0; N];
         for (state, value) in [
             (TURBINE, 300.0),

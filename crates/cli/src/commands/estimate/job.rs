@@ -61,6 +61,12 @@ pub(super) fn estimate(
     sentences.iter().for_each(|sentence| say.note(sentence));
     report_shifts(&shifts, say);
     say.note(&format!("observer: {}", observer.name));
+    if !vehicle.defaults_taken.is_empty() {
+        say.note(
+            "gear train: one with the two ratios of the short vehicle file, not that of the car. The clutch torque is that of its clutch; in the car's \
+             train the torque of a clutch in another place differs by a constant factor",
+        );
+    }
     let Some(output) = output else {
         say.note("estimate: on standard output");
         return Ok(());
