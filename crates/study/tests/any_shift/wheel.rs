@@ -105,7 +105,8 @@ fn driven(known: &Car, seed: u64) -> Vec<Vec<MatrixRow>> {
     drive_tour(&model, known, |sample| recording.push(sample), || ()).unwrap();
     let drive = |(_, wheel): (&str, Wheel)| {
         let mut scorer = DriveScorer::new(known, &model, &tables, &filter);
-        let inputs = recording.inputs(known, &tables, &wheel.sensors(), seed);
+        let sensors = wheel.sensors();
+        let inputs = recording.inputs(known, &tables, &sensors, seed);
         for (sample, mut input) in recording.samples.iter().zip(inputs) {
             wheel.tell(&mut input);
             scorer.push(sample, &input);
