@@ -17,6 +17,8 @@ pub struct CarErrorBounds {
     pub inertia_share: Option<f64>,
     /// Of the stiffness of the drive shafts, as a share.
     pub shaft_stiffness_share: Option<f64>,
+    /// Of the scale of the wheel speed, as a share.
+    pub wheel_scale_share: Option<f64>,
     /// Of the mass of the car as it is driven, as a share.
     pub mass_share: Option<f64>,
     /// Of each element, in the order of the gearbox's elements.
@@ -46,6 +48,7 @@ pub(super) struct RawCarErrorBounds {
     engine_torque_share: Option<Number>,
     inertia_share: Option<Number>,
     shaft_stiffness_share: Option<Number>,
+    wheel_scale_share: Option<Number>,
     mass_share: Option<Number>,
 }
 
@@ -74,6 +77,7 @@ pub(super) fn of_car(
         engine_torque_share: share("engine_torque_share", &raw.engine_torque_share)?,
         inertia_share: share("inertia_share", &raw.inertia_share)?,
         shaft_stiffness_share: share("shaft_stiffness_share", &raw.shaft_stiffness_share)?,
+        wheel_scale_share: share("wheel_scale_share", &raw.wheel_scale_share)?,
         mass_share: share("mass_share", &raw.mass_share)?,
         elements,
     })
