@@ -27,6 +27,9 @@ const KISS_POINT_PA: f64 = 7e3;
 /// converter's maps.
 const TURBINE_SHARE: f64 = 0.03;
 
+/// Time after which the scale of the wheel speed is another, by as much as it can be known at best, s \[chosen\]: a tyre that gets warm.
+const WHEEL_SCALE_S: f64 = 60.0;
+
 /// Pressure drop of a fast fill, Pa \[chosen\], for the flow of whose errors those of the time of a fill follow.
 const FILL_PA: f64 = 0.15e6;
 
@@ -366,7 +369,9 @@ fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
         inertia_share: deviation_of(errors.inertia / (1.0 - errors.inertia)),
         stiffness_share: deviation_of(errors.stiffness),
         wheel_scale: deviation_of(errors.wheel_scale).max(SCALE_LEAST),
-        wheel_walk: 0.01,
+        wheel_scale_walk: SCALE_LEAST / WHEEL_SCALE_S.sqrt(),
+        rate_rad_s: 0.1,
+        rate_walk: 0.01,
         load_walk: 1500.0,
         output_least_rad_s: OUTPUT_LEAST_RAD_S,
     }

@@ -3,8 +3,8 @@
 use super::running::TURBINE_ACTS;
 use super::{
     AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N, OUTPUT,
-    PhaseMemory, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput, ShiftPhase,
-    TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+    PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput,
+    ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
 
@@ -119,6 +119,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         deviations[WHEEL] = T::of(WHEEL_START_RAD_S);
         deviations[SPRING] = at_start(SHAFT_START, shaft);
         deviations[LOAD] = at_start(LOAD_START, shaft);
+        deviations[RATE] = u.rate_rad_s;
         deviations[SHARE] = u.turbine_share;
         let mut x = Gaussian::of(mean, deviations);
         let [scale, scale_variance] = state.learnt.known_wheel_scale();

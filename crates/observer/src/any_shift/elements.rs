@@ -383,7 +383,9 @@ mod tests {
         inertia_share: 0.14,
         stiffness_share: 0.12,
         wheel_scale: 0.0115,
-        wheel_walk: 0.01,
+        wheel_scale_walk: 4e-5,
+        rate_rad_s: 0.1,
+        rate_walk: 0.01,
         load_walk: 1500.0,
         output_least_rad_s: 15.0,
     };

@@ -28,8 +28,8 @@
 //! was learnt before is forgotten. What comes from another drive begins with even odds. Some of what a bad log leaves is in
 //! directions that no shift shows, turbine torque against stiffness: so it also begins with the covariance of both together.
 //!
-//! **Wheel speed.** Its scale shows in a gear within a second, because the twist of the drive shafts is bounded. It acts in no shift's
-//! measurements: the filter goes on with its own state of it from gear to gear, and what is kept here is where another run begins.
+//! **Wheel speed.** Its scale shows in a gear, because the twist of the drive shafts is bounded. It acts in no shift's measurements:
+//! the filter goes on with its own state of it from gear to gear, and what is kept here is where another run begins.
 //!
 //! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
 //! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.

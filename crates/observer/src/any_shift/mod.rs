@@ -3,9 +3,10 @@
 //! | state | law | meaning |
 //! |---|---|---|
 //! | `w_t`, `w_o`, `w_w` | momentum | speeds of turbine, output and driven wheels, rad/s |
-//! | `T_s` | `K_s (w_o/i_df - w_w)` | torque of the shafts' spring, N m |
+//! | `T_s` | `K_s (w_o/i_df - w_w + r)` | torque of the shafts' spring, N m |
 //! | `T_L` | random walk | load at the wheels: road, grade, mass, brake, tyre, N m |
-//! | `s` | random walk | error of the scale of the wheel speed, as a share: its reading is that of `(1 + s) w_w` |
+//! | `r` | random walk | error of the rate of twist: what a scale leaves of the wheel speed's error, as by a delay, rad/s |
+//! | `s` | constant | error of the scale of the wheel speed, as a share: its reading is that of `(1 + s) w_w` |
 //! | `b` | fades in seconds | share by which the turbine torque differs from its sources |
 //! | `c` | fades in hours, unit variance | the part of that share that lasts |
 //! | `f_off`, `f_on` | random walk, unit variance | error of the clutch's torque: friction and valve gain, which show as one |
@@ -62,23 +63,24 @@ pub use pistons::Piston;
 pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
-const N: usize = 15;
+const N: usize = 16;
 /// The first of them are all that moves in a gear.
-const IN_GEAR: usize = 8;
+const IN_GEAR: usize = 9;
 const TURBINE: usize = 0;
 const OUTPUT: usize = 1;
 const WHEEL: usize = 2;
 const SPEEDS: usize = 3;
 const SPRING: usize = 3;
 const LOAD: usize = 4;
-const SCALE: usize = 5;
-const SHARE: usize = 6;
-const SLOW_SHARE: usize = 7;
+const RATE: usize = 5;
+const SCALE: usize = 6;
+const SHARE: usize = 7;
+const SLOW_SHARE: usize = 8;
 /// Of the offgoing and of the oncoming clutch.
-const FRICTION: [usize; 2] = [8, 9];
-const KISS: [usize; 2] = [10, 11];
-const PRESSURE: [usize; 2] = [12, 13];
-const INERTIA: usize = 14;
+const FRICTION: [usize; 2] = [9, 10];
+const KISS: [usize; 2] = [11, 12];
+const PRESSURE: [usize; 2] = [13, 14];
+const INERTIA: usize = 15;
 /// The states that are learnt.
 const LASTING: [usize; ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_SHARE];
 
@@ -145,8 +147,12 @@ pub struct ShiftUncertainty<T> {
     pub stiffness_share: T,
     /// Of the scale of the wheel speed, as a share.
     pub wheel_scale: T,
-    /// Random walk of what a scale leaves of the wheel speed's error, rad/s per root second.
-    pub wheel_walk: T,
+    /// Its random walk, per root second.
+    pub wheel_scale_walk: T,
+    /// Of the rate of twist at the start, rad/s: what a scale leaves of the wheel speed's error.
+    pub rate_rad_s: T,
+    /// Its random walk, rad/s per root second.
+    pub rate_walk: T,
     /// Random walk of the load at the wheels, N m per root second.
     pub load_walk: T,
     /// Output speed below which readings of toothed wheels are too old to be used, rad/s.
@@ -295,7 +301,9 @@ impl<T: Real> ShiftUncertainty<T> {
             inertia_share: to(self.inertia_share),
             stiffness_share: to(self.stiffness_share),
             wheel_scale: to(self.wheel_scale),
-            wheel_walk: to(self.wheel_walk),
+            wheel_scale_walk: to(self.wheel_scale_walk),
+            rate_rad_s: to(self.rate_rad_s),
+            rate_walk: to(self.rate_walk),
             load_walk: to(self.load_walk),
             output_least_rad_s: to(self.output_least_rad_s),
         }

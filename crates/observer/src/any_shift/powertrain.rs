@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! (w_t', w_o') = G (X, Y)         X = (1 + b + c) T_t - m M11 w_t' - U_off - U_on,   Y = -T_o + i_off U_off + i_on U_on
-//! T_o = (T_s + C_s (w_o/i_df - w_w))/i_df
-//! w_w' = (i_df T_o - T_L)/J       T_s' = K_s (w_o/i_df - w_w)
+//! T_o = (T_s + C_s (w_o/i_df - w_w + r))/i_df
+//! w_w' = (i_df T_o - T_L)/J       T_s' = K_s (w_o/i_df - w_w + r)
 //! ```
 //!
 //! `G` is the inverse of the mass while no clutch holds; while one holds with the ratio `i`, the torques of turbine and
@@ -12,13 +12,16 @@
 use drivetrain::{Driveline, Real};
 
 use super::covariance::Gaussian;
-use super::{FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, SHARE, SLOW_SHARE, SPEEDS, SPRING, TURBINE, WHEEL};
+use super::{
+    FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SLOW_SHARE, SPEEDS, SPRING, TURBINE, WHEEL,
+};
 
 /// States with a law of their own.
 pub(super) const CORE: usize = 4;
-/// What drives them: torque on the turbine side, on the output side, load at the wheels.
-const DRIVES: usize = 3;
+/// What drives them: torque on the turbine side, on the output side, load at the wheels, rate error of the twist.
+const DRIVES: usize = 4;
 const LOAD_DRIVES: usize = 2;
+const RATE_DRIVES: usize = 3;
 /// Terms of the series of the exponential: a step is at most [`super::PIECE_S`] long, which is less than a quarter of the
 /// fastest swing of the shafts, so the terms left out are below 1e-7.
 const TERMS: usize = 14;
@@ -158,15 +161,16 @@ impl<T: Real> Equations<T> {
             a[k][SPRING] = per_shaft_torque;
             a[k][OUTPUT] = per_shaft_torque * damping / i;
             a[k][WHEEL] = -per_shaft_torque * damping;
-            b[k] = [g[k][0], g[k][1], zero];
+            b[k] = [g[k][0], g[k][1], zero, per_shaft_torque * damping];
         }
         let per_wheel_torque = wheels_kg_m2.recip();
         a[WHEEL][SPRING] = per_wheel_torque;
         a[WHEEL][OUTPUT] = per_wheel_torque * damping / i;
         a[WHEEL][WHEEL] = -per_wheel_torque * damping;
-        b[WHEEL] = [zero, zero, -per_wheel_torque];
+        b[WHEEL] = [zero, zero, -per_wheel_torque, per_wheel_torque * damping];
         a[SPRING][OUTPUT] = stiffness / i;
         a[SPRING][WHEEL] = -stiffness;
+        b[SPRING][RATE_DRIVES] = stiffness;
         equations
     }
 }
@@ -176,6 +180,7 @@ fn row<T: Real>(of: &[T; CORE], drives: &[T; DRIVES], torques: &Torques<T>) -> (
     let (mut row, rest) = torques.row([drives[0], drives[1]]);
     row[..CORE].copy_from_slice(of);
     row[LOAD] = drives[LOAD_DRIVES];
+    row[RATE] = drives[RATE_DRIVES];
     (row, rest)
 }
 
@@ -318,7 +323,7 @@ mod tests {
     }
 
     fn state() -> [f64; N] {
-        [300.0, 70.0, 23.2, 900.0, 700.0, 0.05, -0.04, 0.4, 0.5, -0.7, 0.2, -0.3, 0.3, 1.1, 0.6]
+        [300.0, 70.0, 23.2, 900.0, 700.0, 0.05, 0.01, -0.04, 0.4, 0.5, -0.7, 0.2, -0.3, 0.3, 1.1, 0.6]
     }
 
     /// A step as a whole is what many small ones by the rates are.
@@ -332,7 +337,7 @@ mod tests {
             for _ in 0..100_000 {
                 let speeds: [f64; SPEEDS] = core::array::from_fn(|k| rates.of(k, &x));
                 let x = &mut x.mean;
-                let twist = x[OUTPUT] / LINE.final_ratio - x[WHEEL];
+                let twist = x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE];
                 for k in 0..SPEEDS {
                     x[k] += 1e-7 * speeds[k];
                 }
@@ -363,7 +368,7 @@ mod tests {
         let x = states.mean;
         let kinetic = x[TURBINE] * (MASS[0][0] * turbine + MASS[0][1] * output)
             + x[OUTPUT] * (MASS[1][0] * turbine + MASS[1][1] * output);
-        let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL]);
+        let shaft = x[SPRING] + LINE.shaft_damping_n_m_s_rad * (x[OUTPUT] / LINE.final_ratio - x[WHEEL] + x[RATE]);
         let input = torques.turbine_n_m + x[SHARE] * torques.share_n_m + x[SLOW_SHARE] * torques.slow_share_n_m;
         let input = (input - x[INERTIA] * torques.inertia_n_m) * x[TURBINE];
         let heat: f64 = (0..2)

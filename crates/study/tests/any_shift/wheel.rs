@@ -139,8 +139,8 @@ fn print(columns: &[Vec<MatrixRow>]) {
     }
 }
 
-/// A scale within its bound is known after a second, to a tenth of what made the error larger by a twentieth before it was learnt; what is
-/// further off is refused. Whatever it is, the guaranteed ranges hold: they rest on turbine and output speed and the commands.
+/// A scale within its bound is known after a second as well as the twist tells it, so that it costs less than a twentieth; what is further
+/// off is refused. Whatever it is, the guaranteed ranges hold: they rest on turbine and output speed and the commands.
 fn is_as_good_with_another_scale(columns: &[Vec<MatrixRow>]) {
     for (rows, (name, wheel)) in columns.iter().zip(ALL) {
         assert_eq!(Pooled::of(rows, |_| true).counts.outside, 0, "{name}: guaranteed");
@@ -213,8 +213,8 @@ fn learnt(filter: &AnyShiftFilter<'_, f64>, state: &AnyShiftState<f64>) -> [f64;
     filter.learnt_wheel_scale(state.learnt())
 }
 
-/// The twist of the shafts is bounded by some 0.2 rad: over ten seconds at 20 rad/s that is a share of 0.001.
-const LITTLE: f64 = 1e-3;
+/// A rate of twist of 0.1 rad/s may be no error of the scale: at 33 rad/s that is this share, and a drive of 18 s does not tell them apart.
+const LITTLE: f64 = 3e-3;
 
 #[test]
 fn the_scale_of_the_wheel_speed_is_learnt_and_kept() {
