@@ -27,6 +27,9 @@ pub struct ReportRow {
 const CORRELATED: f64 = 0.8;
 /// A one-step gain of the turbine speed above this says that the model does not fit.
 const MISFIT_GAIN: f64 = 0.6;
+/// What driving does not tell of road load.
+pub(crate) const MEAN_GRADE: &str = "Grade is not measured, and a mean grade acts like rolling resistance: coasting down both ways on a straight of \
+     constant grade would tell it, and a fit does not read that";
 
 impl Fit {
     /// The table: combinations first, then each parameter.
@@ -140,7 +143,7 @@ impl Fit {
         let reasons = match self.driving_left_out.as_slice() {
             [] => String::new(),
             [first] => format!("; not used: {first}"),
-            [first, more @ ..] => format!("; not used: {first}, and of {} more logs", more.len()),
+            [first, more @ ..] => format!("; not used: {first} (and those of {} more logs)", more.len()),
         };
         if self.driving_s == 0.0 {
             return format!(
@@ -150,8 +153,7 @@ impl Fit {
         }
         let [_, mass] = self.combination_sd(&[(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)]);
         format!(
-            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. Grade is not measured, and a mean grade acts \
-             like rolling resistance: coasting down both ways on a straight of constant grade would tell it, and a fit does not read that",
+            "driving between shifts: {:.0} s in gear with the engine pulling{reasons}. Mass over converter capacity is known within +- {:.1} %. {MEAN_GRADE}",
             self.driving_s,
             100.0 * SIDES * mass
         )

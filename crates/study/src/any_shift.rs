@@ -15,6 +15,7 @@ pub mod measured;
 mod nominal;
 pub mod recording;
 pub mod sensitivity;
+mod still_commands;
 mod thinned;
 pub mod tour;
 

@@ -110,8 +110,8 @@ impl RecentSamples {
         while self.first < self.samples.len() && is_old(self.first) {
             self.first += 1;
         }
-        // Each sample is moved at most once for one that is taken.
-        if 2 * self.first > self.samples.len() {
+        // A sample is moved at most once for three that are taken.
+        if 4 * self.first > 3 * self.samples.len() {
             self.samples.drain(..self.first);
             self.first = 0;
         }

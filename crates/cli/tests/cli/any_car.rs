@@ -310,6 +310,15 @@ fn swapped(text: &str, [one, other]: [&str; 2]) -> String {
     names.collect::<Vec<_>>().join(",") + "\n" + rows
 }
 
+/// When the drive is in second gear for the first time, s.
+fn second_gear_s(text: &str) -> f64 {
+    let in_second = column(text, "gear")
+        .iter()
+        .zip(column(text, "target_gear"))
+        .position(|(gear, target)| gear == "2" && target == "2");
+    numbers(text, "time_s")[in_second.unwrap()]
+}
+
 #[test]
 fn channels_that_contradict_the_gear_are_named() {
     let folder = simulated("swapped-car");
@@ -324,6 +333,23 @@ fn channels_that_contradict_the_gear_are_named() {
     let commands = warnings(&swapped(&text, ["element_int_current_a", "element_dir_current_a"]));
     assert!(commands.iter().any(|line| line.contains("the channels of INT and DIR may be swapped")), "{commands:?}");
     assert!(folder.read("out_report.html").contains("the channels of INT and DIR may be swapped"));
+    // A command that freezes while it holds the second gear.
+    let (mut row, times) = (0, numbers(&text, "time_s"));
+    let begin = second_gear_s(&text);
+    let mut kept = String::new();
+    let frozen = with_column(&text, "element_int_current_a", |cell| {
+        row += 1;
+        if times[row - 1] < begin + 0.5 {
+            kept = cell.to_owned()
+        }
+        kept.clone()
+    });
+    let frozen = warnings(&frozen);
+    assert!(
+        frozen.iter().any(|line| line.contains("that apply or release INT, its command does not change")),
+        "{frozen:?}"
+    );
+    assert!(!frozen.iter().any(|line| line.contains("release DIR, its command")), "{frozen:?}");
     folder.write("log.csv", swapped(&text, ["engine_speed_rad_s", "turbine_speed_rad_s"]));
     let speeds = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
     assert!(speeds.contains("warning: engine_speed and turbine_speed may be swapped"), "{speeds}");
@@ -531,9 +557,9 @@ fn phases_last_as_long_and_ranges_hold_whatever_the_time_between_two_rows() {
         assert!(words[0] == words[2] && words[0] != "0", "{nth}: {line}");
         lengths_s.push(numbers(&folder.read("out_shifts.csv"), "inertia_phase_s"));
     }
-    assert!(lengths_s[0].len() == 3 && lengths_s[0].iter().all(|length_s| *length_s > 0.2), "{lengths_s:?}");
+    assert!(lengths_s[0].len() == 5 && lengths_s[0].iter().all(|length_s| *length_s > 0.2), "{lengths_s:?}");
     for (nth, found) in [(2, &lengths_s[1]), (5, &lengths_s[2])] {
-        assert_eq!(found.len(), 3);
+        assert_eq!(found.len(), 5);
         for (whole, found) in lengths_s[0].iter().zip(found) {
             let rows_s = 0.01 * f64::from(nth);
             assert!((whole - found).abs() <= 2.0 * rows_s + 1e-9, "{nth}: {whole} {found}");
@@ -570,9 +596,11 @@ fn a_wheel_speed_of_another_scale_is_told_or_refused() {
     folder.write("log.csv", scaled(0.96));
     let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
     assert!(told.contains("output_speed over wheel_speed is") && told.contains("from the final ratio"), "{told}");
-    folder.write("log.csv", scaled(2.8));
-    let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("refused.csv")]));
-    assert!(error.contains("output_speed over wheel_speed is") && error.contains("hint: "), "{error}");
+    for (factor, expected) in [(2.8, "output_speed over wheel_speed is"), (-1.0, "wheel_speed is negative")] {
+        folder.write("log.csv", scaled(factor));
+        let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("refused.csv")]));
+        assert!(error.contains(expected) && error.contains("hint: "), "{factor}: {error}");
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::driving::Balance;
 use crate::driving::DRAG_UNIT_N_M;
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
-use crate::report::{cautions, fill_row};
+use crate::report::{MEAN_GRADE, cautions, fill_row};
 use crate::{BacklashFit, ReportRow, Verdict};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
@@ -114,8 +114,7 @@ impl GearboxFit {
         match self.balances.reason(Balance::Car) {
             None => lines.push(format!(
                 "mass and road load from {:.0} s in gear with the engine pulling: beside the common factor of all torques the mass is known within +- \
-                 {:.1} %. Grade is not measured, and a mean grade acts \
-             like rolling resistance: coasting down both ways on a straight of constant grade would tell it, and a fit does not read that",
+                 {:.1} %. {MEAN_GRADE}",
                 self.driving_s[0],
                 beside(Quantity::Mass)
             )),

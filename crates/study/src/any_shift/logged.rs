@@ -16,6 +16,7 @@ use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
 use super::drive::{DriveState, PassingShifts, ScoredDrive};
+use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
 use crate::ratio_histogram::RatioHistogram;
@@ -277,6 +278,7 @@ pub struct LoggedDrive<'c> {
     gear: Option<usize>,
     unannounced: u64,
     commands: CommandCheck<'c>,
+    still: StillCommands,
     holes: Holes,
 }
 
@@ -333,6 +335,7 @@ impl<'c> LoggedDrive<'c> {
             gear: None,
             unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
+            still: StillCommands::default(),
             holes: Holes::default(),
         }
     }
@@ -393,6 +396,7 @@ impl<'c> LoggedDrive<'c> {
         self.gear = gears.map_or(Some(from), |_| None);
         let [_, turbine, output] = self.came_rad_s;
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
+        self.still.push(&input.commands);
         estimate
     }
 
@@ -439,6 +443,7 @@ impl<'c> LoggedDrive<'c> {
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;
+            self.still.begin();
         }
         let Some(shift) = &mut self.passing.open else { return };
         shift.time_s[1] = step.time_s;
@@ -466,6 +471,9 @@ impl<'c> LoggedDrive<'c> {
     fn end(&mut self, time_s: f64, gear: usize) {
         let Some(shift) = &self.passing.open else { return };
         let complete_s = (gear == shift.to).then_some(time_s - self.begun_s);
+        if let Some(row) = self.tables.tables().shift(shift.from, shift.to).filter(|_| complete_s.is_some()) {
+            self.still.end(row.clutches.map(|clutch| clutch.element));
+        }
         // A log has no acceleration of its own, and of the held elements no slip.
         let unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
@@ -477,6 +485,7 @@ impl<'c> LoggedDrive<'c> {
         // A shift that the log cuts off is not complete.
         self.end(f64::NAN, usize::MAX);
         let mut warnings: Vec<String> = self.swapped.warning().into_iter().chain(self.commands.warnings()).collect();
+        warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {
             warnings.push(format!(
                 "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",

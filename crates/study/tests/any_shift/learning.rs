@@ -142,40 +142,57 @@ const WRONG: [(&str, f64, f64); 4] = [
 ];
 pub(crate) const SHIFTS: usize = 30;
 
-/// How many orders of the shifts, and cars of the budget: two, or for the documentation `LEARNING_DRAWS=6 cargo test --release
+/// How many orders of the shifts with their noise, and cars of the budget: two, or for the documentation `LEARNING_DRAWS=6 cargo test --release
 /// -p study --test any_shift learning -- --nocapture`.
 pub(crate) fn draws() -> u64 {
     std::env::var("LEARNING_DRAWS").ok().map_or(2, |draws| draws.parse().unwrap())
 }
 
-/// The errors after so many shifts, over some orders of the shifts.
-fn after(drive: &Drive, count: usize, inertia: f64) -> Errors {
+/// The errors after so many shifts, over cars with other noise, each with another order of the shifts.
+fn after(drives: &[Drive], count: usize) -> Errors {
     let mut sum = Errors::default();
-    (1..=draws()).for_each(|order| sum.add(&drive.after(count, inertia, 10 * order).1));
+    drives.iter().zip(1..).for_each(|(drive, order)| sum.add(&drive.after(count, 1.0, 10 * order).1));
     sum
+}
+
+/// The same shifts with a filter that is told what the car truly is. The controller is told nothing.
+fn told(drives: &[Drive], truth: &Car) -> Vec<Drive> {
+    drives.iter().map(|drive| Drive { car: truth.clone(), shifts: drive.shifts.clone() }).collect()
 }
 
 #[test]
 fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
     let converters: &[f64] = if draws() > 2 { &[1.0, 0.9, 1.1] } else { &[1.0] };
     for &converter in converters {
-        let drive = |friction, gain| Drive::new(uniform(friction, gain, converter), 1);
-        let known = drive(1.0, 1.0);
-        let [before, bar] = [0, SHIFTS].map(|count| after(&known, count, 1.0));
+        let drives =
+            |draw: &dyn Fn(&Car) -> ShiftDraw| (1..=draws()).map(|seed| Drive::new(draw, seed)).collect::<Vec<_>>();
+        let known = drives(&uniform(1.0, 1.0, converter));
+        let [before, bar] = [0, SHIFTS].map(|count| after(&known, count));
         println!("converter {converter}, known clutches: unlearnt {}", before.show());
         println!("  after {SHIFTS} shifts {}", bar.show());
         let mut sums = [Errors::default(), Errors::default()];
         for (name, friction, gain) in WRONG {
-            let wrong = drive(friction, gain);
-            let [before, learnt] = [0, SHIFTS].map(|count| after(&wrong, count, 1.0));
-            let (found, best) = (learnt.all()[0], bar.all()[0]);
-            let unlearnt = before.all()[0] / bar.all()[0];
-            println!("{name}: {:.2} of the known car's, unlearnt {unlearnt:.2}: {}", found / best, before.show());
+            let draw = uniform(friction, gain, converter);
+            let wrong = drives(&draw);
+            let [before, learnt] = [0, SHIFTS].map(|count| after(&wrong, count));
+            let over_known = |errors: &Errors| errors.all()[0] / bar.all()[0];
+            println!(
+                "{name}: {:.2} of the known car's, unlearnt {:.2}: {}",
+                over_known(&learnt),
+                over_known(&before),
+                before.show()
+            );
             println!("  after {SHIFTS} shifts {}", learnt.show());
+            if draws() > 2 {
+                let told = told(&wrong, &draw(&wrong[0].car).car(&wrong[0].car));
+                let [before, after] = [0, SHIFTS].map(|count| over_known(&after(&told, count)));
+                println!("  told what the car is: {before:.2} of the known car's, after {SHIFTS} shifts {after:.2}");
+            }
             // Asked for is 1.2, which not every car meets (docs/any_shift.md). Far from the valve model they all are.
             // A converter that is off beside all clutches is a scale of all torques, which only the stiffness of the shafts shows.
             let most = if converter == 1.0 { 0.6 } else { 0.7 };
-            assert!(found < most * learnt.all()[1], "{name}, converter {converter}: {found} {}", learnt.all()[1]);
+            let [found, open_loop] = learnt.all();
+            assert!(found < most * open_loop, "{name}, converter {converter}: {found} {open_loop}");
             sums[0].add(&before);
             sums[1].add(&learnt);
         }
@@ -298,8 +315,8 @@ fn wrong_stiffness_is_not_learnt_as_another_converter() {
         let car = cars().remove(0);
         let mut truth = car.clone();
         truth.driveline.shaft_stiffness_n_m_rad *= stiffness;
-        let drive = Drive::of(&car, &truth, 1);
-        let [before, learnt, long] = [0, SHIFTS, 5 * SHIFTS].map(|count| after(&drive, count, 1.0).all()[0]);
+        let drives: Vec<Drive> = (1..=draws()).map(|seed| Drive::of(&car, &truth, seed)).collect();
+        let [before, learnt, long] = [0, SHIFTS, 5 * SHIFTS].map(|count| after(&drives, count).all()[0]);
         println!(
             "stiffness times {stiffness}: unlearnt {before:.2}, learnt {learnt:.2}, after five times as many {long:.2}"
         );

@@ -54,7 +54,7 @@ const WHOLE: u64 = u64::MAX - 2;
 const NOT_YET: u64 = u64::MAX - 3;
 
 /// Bytes that are handed on at once.
-const WRITTEN_AT_ONCE: usize = 64 << 10;
+const WRITTEN_AT_ONCE: usize = 256 << 10;
 
 impl<W: Write> CsvWriter<W> {
     /// Writes the names: time first, then these.
