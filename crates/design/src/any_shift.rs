@@ -9,7 +9,7 @@ use observer::any_shift::{
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
-use crate::kalman::{deviation_of, engine_noise, speed_reading};
+use crate::kalman::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
 
 /// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the two-speed car's budget.
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;
@@ -26,6 +26,9 @@ const KISS_POINT_PA: f64 = 7e3;
 /// Standard deviation of the part of the turbine torque's error that does not last, as a share \[chosen\]: the shape of the
 /// converter's maps.
 const TURBINE_SHARE: f64 = 0.03;
+
+/// Time after which the scale of the wheel speed is another, by as much as it can be known at best, s \[chosen\]: a tyre that gets warm.
+const WHEEL_SCALE_S: f64 = 60.0;
 
 /// Pressure drop of a fast fill, Pa \[chosen\], for the flow of whose errors those of the time of a fill follow.
 const FILL_PA: f64 = 0.15e6;
@@ -128,6 +131,8 @@ pub struct ShiftErrors {
     pub inertia: f64,
     /// Of the stiffness of the drive shafts.
     pub stiffness: f64,
+    /// Of the scale of the wheel speed: size, wear and pressure of the tyres.
+    pub wheel_scale: f64,
     /// Half-width of the hysteresis of a valve, Pa.
     pub hysteresis_pa: f64,
     /// Least and greatest delay of a valve, s.
@@ -146,6 +151,7 @@ impl ShiftErrors {
         engine: 0.08,
         inertia: 0.20,
         stiffness: 0.20,
+        wheel_scale: 0.02,
         hysteresis_pa: 10e3,
         valve_delay_s: [0.0, 0.03],
         command_age_s: 0.0,
@@ -205,6 +211,7 @@ impl ShiftErrors {
             engine: own.engine_torque_share.unwrap_or(self.engine),
             inertia: own.inertia_share.unwrap_or(self.inertia),
             stiffness: own.shaft_stiffness_share.unwrap_or(self.stiffness),
+            wheel_scale: own.wheel_scale_share.unwrap_or(self.wheel_scale),
             hysteresis_pa: self.hysteresis_pa,
             valve_delay_s: [
                 delays().map(|[least_s, _]| least_s).reduce(f64::min).unwrap_or(least_s),
@@ -366,6 +373,8 @@ fn uncertainty(errors: &ShiftErrors, scale: f64) -> ShiftUncertainty<f64> {
         // What is low by a share is exceeded by more than that share.
         inertia_share: deviation_of(errors.inertia / (1.0 - errors.inertia)),
         stiffness_share: deviation_of(errors.stiffness),
+        wheel_scale: deviation_of(errors.wheel_scale).max(SCALE_LEAST),
+        wheel_scale_walk: SCALE_LEAST / WHEEL_SCALE_S.sqrt(),
         rate_rad_s: 0.1,
         rate_walk: 0.01,
         load_walk: 1500.0,

@@ -252,7 +252,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
 fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     let given = car("eight_speed.toml");
     let gearbox = Source::read(&given.source.path.parent().unwrap().join("../gearboxes/8hp.toml")).unwrap();
-    let more = "[clutch.E.error_bounds]\nvalve_lag_factor = [0.9, 1.2]\n[error_bounds]\nconverter_share = 0.04\n";
+    let more = "[clutch.E.error_bounds]\nvalve_lag_factor = [0.9, 1.2]\n[error_bounds]\nconverter_share = 0.04\nwheel_scale_share = 0.01\n";
     let source = Source { text: format!("{}\n{more}", given.source.text), ..given.source.clone() };
     let own = Car::from_sources(source, gearbox).unwrap();
     let at = own.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
@@ -261,7 +261,7 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     assert_eq!(standard.of_element(&own, at).friction_factor, standard.of_element(&given, at).friction_factor);
     assert_eq!(standard.of_car(&given), standard);
     // Of the elements the widest.
-    assert_eq!(standard.of_car(&own), ShiftErrors { converter: 0.04, ..standard });
+    assert_eq!(standard.of_car(&own), ShiftErrors { converter: 0.04, wheel_scale: 0.01, ..standard });
     let tables = [&given, &own].map(tables);
     let budget = |car: usize| tables[car].tables().elements[tables[car].place(at).unwrap()].budget.unwrap();
     assert_eq!((budget(0).lag_factor, budget(1).lag_factor), ([0.5, 1.5], [0.9, 1.2]));
