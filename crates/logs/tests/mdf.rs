@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use common::mdf::{HEAD, block, number, places};
 use common::{Folder, channel, data, read};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
@@ -58,19 +59,6 @@ enum Packing {
     Transposed(usize),
 }
 
-const HEAD: usize = 24;
-
-fn number(bytes: &[u8], at: usize) -> usize {
-    usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap()
-}
-
-fn block(id: &[u8; 4], links: &[usize], content: &[u8]) -> Vec<u8> {
-    let length = HEAD + 8 * links.len() + content.len();
-    let words = [length, links.len()].into_iter().chain(links.iter().copied());
-    let words = words.flat_map(|word| (word as u64).to_le_bytes());
-    [id.as_slice(), &[0; 4]].concat().into_iter().chain(words).chain(content.iter().copied()).collect()
-}
-
 fn packed(content: &[u8], packing: Packing, id: &[u8; 2]) -> Vec<u8> {
     let (kind, columns) = match packing {
         Packing::Plain => return block(&[b'#', b'#', id[0], id[1]], &[], content),
@@ -86,11 +74,6 @@ fn packed(content: &[u8], packing: Packing, id: &[u8; 2]) -> Vec<u8> {
     let columns = u32::try_from(columns).unwrap().to_le_bytes();
     let sizes = [content.len(), deflated.len()].map(|size| (size as u64).to_le_bytes()).concat();
     block(b"##DZ", &[], &[id, [kind, 0].as_slice(), &columns, &sizes, &deflated].concat())
-}
-
-/// The blocks of a file with this id.
-fn places(bytes: &[u8], id: &[u8; 8]) -> Vec<usize> {
-    (0..bytes.len() - HEAD).filter(|at| bytes[*at..].starts_with(id)).collect()
 }
 
 /// What stands in the plain block of data to which a link leads, itself or over a list of one.

@@ -5,6 +5,7 @@
 
 mod blocks;
 mod bus;
+mod conversion;
 mod field;
 mod group;
 mod records;
@@ -23,6 +24,7 @@ use crate::columns::{Batch, Stream};
 use crate::{Channel, LogError, error};
 use blocks::Blocks;
 use bus::Bus;
+use conversion::unreadable;
 use field::{Field, Tile};
 use group::{Decoding, Group, Part};
 use records::Records;
@@ -90,7 +92,7 @@ impl MdfLog {
     /// Finds the channels that hold numbers over time, and notes which do not.
     fn find_channels(&mut self) -> Vec<Channel> {
         let (mut places, mut channels) = (Vec::new(), Vec::new());
-        let (mut left_out, mut without_time) = (Vec::new(), Vec::new());
+        let mut left_out = LeftOut::default();
         let times = Times::of(&self.file);
         for (group, data) in groups(&self.file) {
             let name = self.group_name(group);
@@ -100,33 +102,28 @@ impl MdfLog {
                     Ok(time) => time,
                     Err(why) => {
                         let group = error::shown(&name);
-                        without_time.push(format!("{} (group `{group}`, {})", error::shown(&own.name), why.name()));
+                        left_out.without_time.push(format!(
+                            "{} (group `{group}`, {})",
+                            error::shown(&own.name),
+                            why.name()
+                        ));
                         continue;
                     }
                 };
                 let kind = not_numbers(own).or_else(|| self.not_beside(time, group, own));
                 if let Some(kind) = kind {
-                    left_out.push(format!("{} ({kind})", error::shown(&own.name)));
+                    left_out.no_numbers.push(format!("{} ({kind})", error::shown(&own.name)));
+                    continue;
+                }
+                if let Some(reason) = unreadable(&own.conversion) {
+                    left_out.unread.push(format!("{} ({})", error::shown(&own.name), error::shown(reason)));
                     continue;
                 }
                 places.push(Place { group, channel, time });
                 channels.push(Channel { name: own.name.clone(), unit: own.unit.clone(), group: name.clone() });
             }
         }
-        if !without_time.is_empty() {
-            self.notes.push(format!(
-                "{} channels are not over time and are left out: {}\nhint: let the recorder write a time into their group, or name a group that has one",
-                without_time.len(),
-                error::some(&without_time)
-            ));
-        }
-        if !left_out.is_empty() {
-            self.notes.push(format!(
-                "{} channels do not hold single numbers and are left out: {}",
-                left_out.len(),
-                error::some(&left_out)
-            ));
-        }
+        self.notes.extend(left_out.notes());
         self.places = places;
         channels
     }
@@ -228,6 +225,30 @@ impl MdfLog {
     /// A group as messages show it.
     fn place_of(&self, at: GroupAt) -> String {
         format!("group `{}`", self.group_name(at))
+    }
+}
+
+/// Channels that are left out, each with the reason.
+#[derive(Default)]
+struct LeftOut {
+    without_time: Vec<String>,
+    no_numbers: Vec<String>,
+    /// Their conversions cannot be read.
+    unread: Vec<String>,
+}
+
+impl LeftOut {
+    fn notes(&self) -> impl Iterator<Item = String> {
+        const HINT: &str = "\nhint: let the recorder write a time into their group, or name a group that has one";
+        let kinds = [
+            (&self.without_time, "are not over time", HINT),
+            (&self.no_numbers, "do not hold single numbers", ""),
+            (&self.unread, "have a conversion that cannot be read", ""),
+        ];
+        let some = kinds.into_iter().filter(|(names, ..)| !names.is_empty());
+        some.map(|(names, what, hint)| {
+            format!("{} channels {what} and are left out: {}{hint}", names.len(), error::some(names))
+        })
     }
 }
 
