@@ -6,6 +6,7 @@
 mod blocks;
 mod bus;
 mod conversion;
+mod cut;
 mod field;
 mod group;
 mod records;
@@ -54,6 +55,8 @@ pub(crate) struct MdfLog {
     /// Signals on a logged bus, behind the channels of the file.
     database: Option<Database>,
     notes: Vec<String>,
+    /// The first place of a file that is cut, and what it lacks.
+    cut: Option<(String, String)>,
 }
 
 /// Where a channel is, and the group with its time.
@@ -73,12 +76,20 @@ impl MdfLog {
             max_decompressed: LARGEST_BLOCK,
             ..OpenOptions::default()
         };
-        let file = Mf4File::open_with_options(path, options).map_err(|error| damaged(path, "its structure", &error))?;
+        let (file, cut) = match Mf4File::open_with_options(path, options.clone()) {
+            Ok(file) => (file, None),
+            Err(error) => {
+                let is_cut = matches!(error, Mf4Error::TruncatedFile { .. });
+                let mended = if is_cut { cut::open(path, options) } else { None };
+                let (file, place, what) = mended.ok_or_else(|| damaged(path, "its structure", &error))?;
+                (file, Some((place, what)))
+            }
+        };
         let blocks = Arc::new(Blocks::new(File::open(path).map_err(LogError::io(path))?));
         let mut names = HashMap::new();
         groups(&file).for_each(|(_, group)| *names.entry(group.acquisition_name.clone()).or_default() += 1);
         let (path, places, notes) = (path.to_owned(), Vec::new(), Vec::new());
-        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, notes };
+        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, notes, cut };
         let mut channels = log.find_channels();
         if log.file.unfinalized().is_some() {
             log.notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
@@ -146,7 +157,8 @@ impl MdfLog {
         for (i, place) in self.places.iter().enumerate().filter(|(i, _)| wanted[*i]) {
             over.entry(place.time).or_default().entry(place.group).or_default().push(i);
         }
-        let mut streams: Vec<Box<dyn Stream + Send + '_>> = Vec::new();
+        let cut = self.cut.as_ref().map(|(place, what)| LogError::damaged(&self.path, place, what));
+        let mut streams: Vec<Box<dyn Stream + Send + '_>> = vec![Box::new(Remarks { notes: &self.notes, cut })];
         for (time, groups) in over {
             streams.extend(self.streams_over(time, groups)?.into_iter().map(|group| Box::new(group) as Box<_>));
         }
@@ -160,7 +172,6 @@ impl MdfLog {
                 streams.push(Box::new(Bus::new(frames, Decoder::new(database, &wanted[own..]), own)));
             }
         }
-        streams.push(Box::new(Remarks(&self.notes)));
         Ok(streams)
     }
 
@@ -279,14 +290,17 @@ fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
 }
 
 /// What was seen when the file was opened.
-struct Remarks<'a>(&'a [String]);
+struct Remarks<'a> {
+    notes: &'a [String],
+    cut: Option<LogError>,
+}
 
 impl Stream for Remarks<'_> {
     fn next_batch(&mut self, _: &mut Batch) -> Result<bool, LogError> {
-        Ok(false)
+        self.cut.take().map_or(Ok(false), Err)
     }
 
     fn notes(&self) -> Vec<String> {
-        self.0.to_vec()
+        self.notes.to_vec()
     }
 }
