@@ -54,8 +54,9 @@ impl<'a> Table<'a> {
     /// None where the delimiter makes no rows of numbers.
     fn of(lines: &[&'a str], delimiter: u8) -> Option<Self> {
         let rows: Vec<Vec<Cow<str>>> = lines.iter().map(|line| cells(line, delimiter)).collect();
-        let has_comma =
-            |row: &Vec<Cow<str>>| row.iter().any(|cell| has_decimal(cell, b',')) && !row.iter().any(has_point);
+        let has_comma = |row: &Vec<Cow<str>>| {
+            row.iter().any(|cell| has_decimal(cell, b',')) && !row.iter().any(|cell| has_decimal(cell, b'.'))
+        };
         let decimal_comma = delimiter != b',' && rows.iter().any(has_comma);
         let numbers = |row: &Vec<Cow<str>>| row.iter().filter(|cell| is_number(cell, decimal_comma)).count();
         let filled = |row: &Vec<Cow<str>>| row.iter().filter(|cell| !cell.is_empty()).count();
@@ -159,13 +160,9 @@ fn is_number(cell: &str, decimal_comma: bool) -> bool {
     plain.parse::<f64>().is_ok()
 }
 
-/// Whether a cell is a number with this sign.
+/// Whether a cell is a number with this decimal sign.
 fn has_decimal(cell: &str, sign: u8) -> bool {
     cell.bytes().filter(|byte| *byte == sign).count() == 1 && is_number(cell, sign == b',')
-}
-
-fn has_point(cell: &Cow<str>) -> bool {
-    has_decimal(cell, b'.')
 }
 
 /// Whether a row has the name of a time: then it is the row of names, whatever else stands in it. A single letter may be a value.

@@ -324,7 +324,7 @@ fn text(bytes: &[u8]) -> String {
 /// as well be a little more than one.
 fn has_groups(text: &str) -> bool {
     let text = text.trim().trim_start_matches(['+', '-']);
-    let groups: Vec<&str> = text.split(|c: char| matches!(c, '.' | ',' | '\'' | ' ' | '\u{a0}' | '\u{202f}')).collect();
+    let groups: Vec<&str> = text.split(['.', ',', '\'', ' ', '\u{a0}', '\u{202f}']).collect();
     let are_digits = groups.iter().all(|group| !group.is_empty() && group.bytes().all(|byte| byte.is_ascii_digit()));
     // Behind the last sign may be decimals. A date has groups of two digits.
     let between = groups.get(1..groups.len().saturating_sub(1).max(2)).unwrap_or_default();

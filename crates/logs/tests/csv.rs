@@ -1,7 +1,5 @@
 //! Tables whose numbers or names can be taken for something else.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
-
 mod common;
 
 use common::{Folder, channel, read};
