@@ -65,7 +65,9 @@ impl<'a> Table<'a> {
             row.len() >= 2 && numbers(row) >= 1 && are_most && !has_time_name(row)
         };
         let first = rows.iter().position(|row| is_data(row) && rows_after_agree(&rows, row.len()))?;
-        let count = rows.iter().skip(first).map(numbers).sum();
+        // Numbers with either sign tell the delimiter, also those that are then refused.
+        let of_either = |row: &Vec<Cow<str>>| row.iter().filter(|cell| is_number(cell, delimiter != b',')).count();
+        let count = rows[first..].iter().map(of_either).sum();
         // One in the lines before says nothing of the numbers.
         let decimal_comma = decimal_comma && rows[first..].iter().any(has_comma);
         Some(Self { delimiter, decimal_comma, rows, first, numbers: count })

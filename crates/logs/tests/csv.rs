@@ -22,6 +22,10 @@ fn commas_and_points_in_one_table_are_not_both_decimal() {
     let error = values(&folder, &text, "N").unwrap_err();
     let said = "log.csv: line 3: some numbers have a comma (`1,800`) and some a point (`0.01`)\nhint: write all with one decimal sign, and without a sign between thousands";
     assert!(error.ends_with(said), "{error}");
+    // Where every row has both, no comma is decimal, and there is no time.
+    let text = "Zeit [s];N [1/min];U [V]\n0,00;1.800;1,5\n0,01;1.801;1,5\n";
+    let error = values(&folder, text, "N").unwrap_err();
+    assert!(error.contains("2 of 2 rows have no time, the first is `0,00`"), "{error}");
     // A point that comes late is no decimal sign either.
     let rows: String = (0..40_000).map(|i| format!("{i};8{:02},5;1\n", i % 100)).collect();
     let (found, notes) = values(&folder, &format!("{head}{rows}40000;1.800;1\n40001;0.5;1\n"), "N").unwrap();
