@@ -189,3 +189,38 @@ fn the_range_grows_from_a_new_command_to_the_next() {
     let last: Vec<f64> = widths.skip(2000).map(f64::round).collect();
     assert_eq!([last[0], last[3], last[8]], [225.0, 457.0, 700.0]);
 }
+
+/// The true torque is the middle of the range of right readings.
+#[test]
+fn one_wrong_speed_does_not_turn_the_range_of_the_torque_around() {
+    let vehicle = with_stroke();
+    let estimator = range(&vehicle);
+    let slipping =
+        Input { output_rad_s: Some(Reading::now(70.0)), ..rolling(&vehicle, vehicle.oncoming.valve.command_for(3e5)) };
+    let add = |reading: Reading<f64>, by: f64| Reading { value: reading.value + by, ..reading };
+    // Turbine and output speed in each row, or in turns.
+    for in_turns in [false, true] {
+        let (mut right, mut wrong) = (estimator.start(), estimator.start());
+        for k in 0..400 {
+            let mut input = slipping;
+            if in_turns {
+                input.turbine_rad_s = input.turbine_rad_s.filter(|_| k % 2 == 0);
+                input.output_rad_s = input.output_rad_s.filter(|_| k % 2 == 1);
+            }
+            let [least, greatest] = estimator.step(&mut right, &input).clutch_torque_n_m;
+            match k {
+                300 | 340 => input.turbine_rad_s = input.turbine_rad_s.map(|reading| add(reading, -150.0)),
+                320 => input.turbine_rad_s = input.turbine_rad_s.map(|reading| add(reading, 1e3)),
+                361 => input.output_rad_s = input.output_rad_s.map(|reading| add(reading, 150.0)),
+                381 => input.output_rad_s = input.output_rad_s.map(|reading| add(reading, -60.0)),
+                _ => (),
+            }
+            let found = estimator.step(&mut wrong, &input).clutch_torque_n_m;
+            if k >= 200 {
+                assert!(least > 50.0, "{in_turns} {k}: {least} {greatest}");
+                let middle = 0.5 * (least + greatest);
+                assert!((found[0]..=found[1]).contains(&middle), "{in_turns} {k}: {found:?} {middle}");
+            }
+        }
+    }
+}

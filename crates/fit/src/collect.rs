@@ -35,6 +35,26 @@ pub struct Collected {
     pub notes: Vec<String>,
 }
 
+impl Collected {
+    /// Adds what another log has. A shift tells what it has to tell once: copies are left out, and of a log that is a copy the driving too.
+    pub fn add(&mut self, more: Self) {
+        let before = self.shifts.len();
+        let count = more.shifts.len();
+        for record in more.shifts {
+            match record.copied_from(&self.shifts) {
+                Some(first) => self.skipped.push(format!("{}: the same readings as {}", record.name, first.name)),
+                None => self.shifts.push(record),
+            }
+        }
+        if count == 0 || self.shifts.len() > before {
+            self.driving.extend(more.driving);
+        }
+        self.skipped.extend(more.skipped);
+        self.kinds.add(more.kinds);
+        self.notes.extend(more.notes);
+    }
+}
+
 /// The map of a log whose channels have the names of the program: a role and a unit, such as `engine_speed_rad_s`.
 ///
 /// # Errors

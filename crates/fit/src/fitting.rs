@@ -276,7 +276,7 @@ fn taken_over(from: &[Prior], unknowns: &[f64], to: &[Prior]) -> Vec<f64> {
 fn sound(shifts: &[ShiftRecord]) -> Result<(Vec<ShiftRecord>, Vec<String>), FitError> {
     let (mut sound, mut left_out): (Vec<ShiftRecord>, Vec<String>) = (Vec::new(), Vec::new());
     for record in shifts {
-        let first = sound.iter().find(|other| other.engine == record.engine && other.turbine == record.turbine);
+        let first = record.copied_from(&sound);
         if let Some(role) = record.not_finite() {
             left_out.push(format!("{}: readings of {role} are not finite numbers", record.name));
         } else if let Some(first) = first {

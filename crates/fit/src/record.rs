@@ -78,6 +78,11 @@ pub(crate) struct OutputClock {
 }
 
 impl ShiftRecord {
+    /// The first of the shifts that has the same readings, whatever their times.
+    pub(crate) fn copied_from<'a>(&self, shifts: &'a [Self]) -> Option<&'a Self> {
+        shifts.iter().find(|other| other.engine.value == self.engine.value && other.turbine.value == self.turbine.value)
+    }
+
     /// The first of the signals with times or values that are not finite.
     pub(crate) fn not_finite(&self) -> Option<&'static str> {
         let signals = [

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Logs, TestCar};
-use fit::{Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
+use fit::{Collected, Driving, Fit, FitError, HeldOut, Map, Parameter, Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64, logs: Logs) -> Vec<ShiftRecord> {
     (0..count).map(|number| car.shift(number, logs).record).collect()
@@ -32,6 +32,26 @@ fn a_shift_that_is_given_again_and_again_counts_once() {
     assert!(fit.unusable[0].contains("the same readings as"), "{:?}", fit.unusable);
     assert!(fit.freed.is_empty() && fit.statements().iter().any(|line| line.starts_with("one shift only")));
     fit.vehicle_file(&car.file, "a simulation").unwrap();
+}
+
+#[test]
+fn a_log_that_is_given_again_tells_nothing_new_and_checks_nothing() {
+    let mut car = TestCar::drawn(2);
+    let one = || Driving::default();
+    let shifts = shifts(&mut car, 3, Logs::SpeedsAndCurrent);
+    let mut again = shifts.clone();
+    for record in &mut again {
+        for series in [&mut record.engine, &mut record.turbine] {
+            series.time_s.iter_mut().for_each(|time_s| *time_s += 100.0);
+        }
+    }
+    let mut all = Collected { shifts: shifts.clone(), driving: vec![one()], ..Collected::default() };
+    all.add(Collected { shifts: again, driving: vec![one()], ..Collected::default() });
+    assert_eq!((all.shifts.len(), all.driving.len(), all.skipped.len()), (3, 1, 3));
+    assert!(all.skipped.iter().all(|reason| reason.contains("the same readings as")), "{:?}", all.skipped);
+    // A log without shifts has driving that is its own.
+    all.add(Collected { driving: vec![one()], ..Collected::default() });
+    assert_eq!(all.driving.len(), 2);
 }
 
 #[test]

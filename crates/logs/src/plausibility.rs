@@ -203,6 +203,11 @@ fn finding(entry: &RoleSummary, found: &str, why: &str, likely: &'static str) ->
 /// What cannot be right by the values of the signal alone.
 fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
     let middle = entry.extremes.middle()?;
+    if entry.role == Role::EngineSpeed && entry.extremes.is_backward() {
+        let (role, name) = (entry.role, entry.name.clone());
+        let message = format!("{name} is negative: an engine does not turn backwards");
+        return Some(Finding { role, name, message, likely: Likely::OtherSign });
+    }
     let (size, unit) = (entry.extremes.size(), entry.unit_name.as_str());
     let say = |text: String, likely| Some(finding(entry, unit, &format!("{text}; it looks like {likely}"), likely));
     match entry.role.quantity()? {
@@ -406,5 +411,7 @@ mod tests {
         assert_eq!((log("rad/s", None), log("rpm", None)), (Vec::new(), Vec::new()));
         let found = log("rad/s", Some((Role::OutputSpeed, -1.0)));
         assert_eq!((found[0].role, found[0].likely), (Role::OutputSpeed, Likely::OtherSign));
+        let found = log("rad/s", Some((Role::EngineSpeed, -1.0)));
+        assert_eq!((found[0].role, found[0].likely), (Role::EngineSpeed, Likely::OtherSign));
     }
 }

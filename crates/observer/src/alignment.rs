@@ -56,6 +56,12 @@ impl<T: Real> AlignmentState<T> {
         let none = Speed { last: None, change: [T::zero(); 2] };
         Self { engine: none, turbine: none, output: none, wheel: none, command: None }
     }
+
+    /// How far turbine and output speed now are from their last reading but one, rad/s; none before the second one of each.
+    #[inline]
+    pub(crate) fn since_the_one_before(&self) -> Option<[T; 2]> {
+        Some([self.turbine.since_the_one_before()?, self.output.since_the_one_before()?])
+    }
 }
 
 impl<T: Real> Default for AlignmentState<T> {
@@ -70,6 +76,13 @@ impl<T: Real> Speed<T> {
     fn rate(&self) -> T {
         let [change, time_s] = self.change;
         if time_s > T::zero() && time_s <= T::of(CARRIED_S) { change / time_s } else { T::zero() }
+    }
+
+    #[inline]
+    fn since_the_one_before(&self) -> Option<T> {
+        let [change, time_s] = self.change;
+        let last = self.last.filter(|_| time_s > T::zero())?;
+        Some(change + last.age_s * self.rate())
     }
 
     /// Takes what came of it, `dt_s` after the step before. Returns its value now, NaN if there is none.

@@ -77,8 +77,8 @@ pub struct RangeState<T> {
     /// The range of the pressure.
     pub pressure: PressureRange<T>,
     alignment: AlignmentState<T>,
-    /// For how long turbine or output speed has not been read, s.
-    unread_s: T,
+    /// For how long turbine and output speed have not been read, s.
+    unread_s: [T; 2],
     tracker: TrackerState<T>,
     shaft: ShaftMemory<T>,
 }
@@ -103,7 +103,7 @@ struct Seen<'a, T> {
     phase: Option<Phase>,
     /// The signals at the time of the step.
     sample: &'a Sample<T>,
-    /// Slip of the oncoming clutch, and its largest error, rad/s.
+    /// Least and greatest slip of the oncoming clutch, rad/s, if it is known.
     slip_rad_s: Option<[T; 2]>,
     /// Whether turbine, output and wheel speed were read in this step.
     read: bool,
@@ -121,7 +121,7 @@ impl<T: Real> RangeEstimator<T> {
         RangeState {
             pressure: PressureRange::unknown(&self.budget, self.tracker.limits.command_max),
             alignment: AlignmentState::new(),
-            unread_s: T::zero(),
+            unread_s: [T::zero(); 2],
             tracker: TrackerState::new(),
             shaft: ShaftMemory::new(),
         }
@@ -184,14 +184,29 @@ impl<T: Real> RangeEstimator<T> {
             (state.tracker.time_step(sample), None)
         };
         let command = input.command.filter(|reading| limits.usable_command(reading));
-        let fresh = channels.turbine == ChannelHealth::Good && channels.output == ChannelHealth::Good;
-        state.unread_s = if fresh { zero } else { state.unread_s + dt_s.unwrap_or_else(T::infinity) };
+        for (unread_s, channel) in state.unread_s.iter_mut().zip([channels.turbine, channels.output]) {
+            let is_read = channel == ChannelHealth::Good;
+            *unread_s = if is_read { zero } else { *unread_s + dt_s.unwrap_or_else(T::infinity) };
+        }
+        let unread_s = state.unread_s[0].at_least(state.unread_s[1]);
+        let fresh = unread_s <= zero;
         // A slip carried on by its rate may be wrong by what it changes at most, twice: once that it does, once that it did.
-        let carried = T::one() + (state.unread_s + state.unread_s) / self.age_s;
+        let carried = T::one() + (unread_s + unread_s) / self.age_s;
         let error = self.budget.slip_rad_s * if fresh { T::one() } else { carried };
-        let slip_rad_s = usable.then_some([sample.slip_rad_s, error]);
+        let slip_rad_s =
+            self.slips(&state.alignment, sample).filter(|_| usable).map(|[low, high]| [low - error, high + error]);
         let read = fresh && channels.wheel == ChannelHealth::Good;
         Seen { dt_s, command, phase, sample, slip_rad_s, read }
+    }
+
+    /// Least and greatest slip by the newest readings, and by those with the one before in place of turbine or output speed. A single
+    /// wrong reading would turn the sign of the torque around; so it makes the range wider.
+    #[inline]
+    fn slips(&self, alignment: &AlignmentState<T>, sample: &Sample<T>) -> Option<[T; 2]> {
+        let (shift, zero, slip) = (&self.tracker.shift, T::zero(), sample.slip_rad_s);
+        let [turbine, output] = alignment.since_the_one_before()?;
+        let others = [slip - shift.oncoming_slip(turbine, zero), slip - shift.oncoming_slip(zero, output)];
+        Some([slip.at_most(others[0]).at_most(others[1]), slip.at_least(others[0]).at_least(others[1])])
     }
 
     /// The same in another precision.
@@ -206,7 +221,7 @@ impl<T: Real> RangeEstimator<T> {
     }
 }
 
-/// The ranges of pressure and clutch torque, with the slip and the error of its reading if that is usable.
+/// The ranges of pressure and clutch torque, with the least and greatest slip if it is known.
 #[inline]
 pub(crate) fn pressure_and_torque<T: Real>(
     clutch: &Clutch<T>,
@@ -222,9 +237,10 @@ pub(crate) fn pressure_and_torque<T: Real>(
     }
     let [least, most] = budget.friction_factor;
     // The sign of a slip that may be zero is not known, nor whether the clutch holds.
-    let slip = slip_rad_s.filter(|[slip, error]| slip.abs() > *error);
+    let slip = slip_rad_s.filter(|[low, high]| *low > zero || *high < zero);
     let (lowest, highest) = match slip {
-        Some([slip, error]) => clutch.friction.range_within(slip.abs() - error, slip.abs() + error),
+        Some([low, high]) if low > zero => clutch.friction.range_within(low, high),
+        Some([low, high]) => clutch.friction.range_within(-high, -low),
         None => {
             let (lowest, highest) = clutch.friction.range();
             (lowest.at_most(clutch.static_friction), highest.at_least(clutch.static_friction))
@@ -234,7 +250,7 @@ pub(crate) fn pressure_and_torque<T: Real>(
     let at_least = least * lowest * clutch.lever() * lowest_force;
     let torque = match slip {
         None => [-at_most, at_most],
-        Some([slip, _]) if slip > zero => [at_least, at_most],
+        Some([low, _]) if low > zero => [at_least, at_most],
         Some(_) => [-at_most, -at_least],
     };
     ([lower_pa, upper_pa], torque)

@@ -143,7 +143,7 @@ pub(crate) enum Command {
     ///
     /// Rows are read and written one by one: a log may have any length, or be a pipe. Methods that design
     /// gains for a sample time use the median time step of the first 10,000 rows. A file given with -o
-    /// appears when it contains all rows; it may be the log itself. A log of which a signal is unusable in most samples,
+    /// appears when it contains all rows; it cannot be the log itself. A log of which a signal is unusable in most samples,
     /// or in another unit by all appearances, is an error.
     #[command(verbatim_doc_comment)]
     Estimate(Estimate),

@@ -205,6 +205,7 @@ fn a_signal_in_another_unit_than_its_name_says_is_an_error_with_the_likely_one()
         ("wheel_speed_rad_s", rpm, "call it `wheel_speed_rpm`"),
         ("oncoming_current_a", 1000.0, "call it `oncoming_current_ma`"),
         ("output_speed_rad_s", -1.0, "its sign is the other way round"),
+        ("engine_speed_rad_s", -1.0, "engine_speed is negative: an engine does not turn backwards"),
         ("oncoming_current_a", -1.0, "oncoming_current is never positive: its sign is the other way round"),
     ];
     let map = folder.path("map.toml");

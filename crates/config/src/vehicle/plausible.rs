@@ -3,7 +3,7 @@
 //! A range that no car leaves makes a value an error; the usual ranges here are narrower, and relative to the size of the car.
 
 use drivetrain::road::GRAVITY_M_S2;
-use drivetrain::{Converter, Driveline, Engine, RoadLoad, Tyre};
+use drivetrain::{ClutchValve, Converter, Driveline, Engine, RoadLoad, Tyre};
 use geartrain::Finding;
 
 use super::{Car, ShiftClutch, Vehicle};
@@ -50,6 +50,36 @@ impl Vehicle {
             pressure_max_pa: self.limits.pressure_max_pa,
         }
         .implausible()
+        .into_iter()
+        .chain(self.of_pressures().iter().filter_map(Judged::sentence))
+        .collect()
+    }
+
+    fn of_pressures(&self) -> [Judged; 2] {
+        let valve = &self.oncoming.valve;
+        let full = match valve {
+            ClutchValve::Proportional(maps) => maps.gain_pa_a.axis().last().copied().unwrap_or(0.0),
+            ClutchValve::NormallyHigh { .. } => 0.0,
+            ClutchValve::PulseWidth { .. } => 100.0,
+        };
+        let hysteresis_pa = self.error_bounds.valve_hysteresis_pa;
+        [
+            Judged {
+                key: "design.error_bounds.pressure_max_pa".to_owned(),
+                what: "over the pressure of the valve at the end of its maps",
+                value: self.limits.pressure_max_pa / valve.settled_pressure(full),
+                usual: [1.0, 10.0],
+                hint: "no pressure above it is held possible: it is the highest one that the supply gives, in Pa; 1 MPa is 1e6 Pa",
+            },
+            Judged {
+                key: "design.error_bounds.valve_hysteresis_pa".to_owned(),
+                what: "half-width of the hysteresis, Pa",
+                // A valve without one.
+                value: if hysteresis_pa == 0.0 { 1e4 } else { hysteresis_pa },
+                usual: [50.0, 0.3e6],
+                hint: "1 kPa is 1e3 Pa, 1 MPa is 1e6 Pa",
+            },
+        ]
     }
 }
 
@@ -275,6 +305,8 @@ mod tests {
             ("return_spring_n = 600", "return_spring_n = 6", "return spring and piston area of the offgoing clutch"),
             ("piston_area_m2 = 0.012", "piston_area_m2 = 0.0004", "plates and piston of the offgoing clutch"),
             ("  4.3976e-3", "  4.3976e-4", "speed of the engine at its largest torque with the turbine at rest"),
+            ("pressure_max_pa = 1.25e6", "pressure_max_pa = 0.3e6", "`design.error_bounds.pressure_max_pa`"),
+            ("hysteresis_pa = 10e3 ", "hysteresis_pa = 0.01 ", "`design.error_bounds.valve_hysteresis_pa`"),
             ("  2.00, 1.88", "  1.00, 1.88", "`converter.torque_ratio` rises from 1 to 1.88 at a speed ratio of 0.1"),
         ] {
             let said = said(of, to);

@@ -319,6 +319,7 @@ impl<T: Real> ElementState<T> {
     /// Guaranteed ranges of pressure and torque at the element, with its slip and the error of the slip if it is known.
     pub(super) fn ranges(&self, element: &FrictionElement<T>, slip_rad_s: Option<[T; 2]>) -> Option<([T; 2], [T; 2])> {
         let (range, budget) = (self.range.as_ref()?, element.budget.as_ref()?);
+        let slip_rad_s = slip_rad_s.map(|[slip, error]| [slip - error, slip + error]);
         Some(pressure_and_torque(&element.clutch, budget, range, slip_rad_s))
     }
 }

@@ -151,6 +151,8 @@ struct Running<T> {
     unfaded_s: T,
     /// How fast the pressure moves or moved a while ago, Pa/s.
     motion_pa_s: T,
+    /// Whether no command has come for long.
+    is_unheard: bool,
     acting: Phase,
     /// Direction of the oncoming clutch's slip, 1 or -1, and for how long it has been the other one, s.
     direction: T,
@@ -267,6 +269,7 @@ impl<T: Real> KalmanFilter<T> {
                 engine.predict(&self.engine.1, piece_s);
             }
             if let (Some(running), Some(engine)) = (&mut state.running, &state.engine) {
+                running.is_unheard = !state.commands.is_fresh(T::of(predict::UNHEARD_S));
                 self.predict(running, engine, settled_pa, piece_s);
             }
         }

@@ -61,6 +61,14 @@ impl<T: Real> Step<T> {
         T::of(0.5) * self.stiffness * self.dt_s + self.damping
     }
 
+    /// Slope of the turbine torque with which a step is solved. Where the torque brings the turbine to its balance within the step,
+    /// the mean of both ends would carry it to the other side, and back in the next step: the end is weighed so that it stays there.
+    #[inline]
+    fn slope_in_step(&self, slope_n_m_s: T) -> T {
+        let step = (self.dt_s * self.rows[0].per_turbine_torque).recip();
+        slope_n_m_s.at_most(T::of(2.0) * (slope_n_m_s + step))
+    }
+
     /// Pressure at the end per share of the valve's gain, Pa.
     #[inline]
     fn per_gain(&self) -> T {
@@ -97,7 +105,7 @@ impl<T: Real> Step<T> {
                 + row.per_offgoing_torque * x[OFFGOING]
                 + row.per_output_torque * self.per_ratio * held)
         };
-        let implicit = self.implicit(x[SHARE], self.turbine[1]);
+        let implicit = self.implicit(x[SHARE], self.slope_in_step(self.turbine[1]));
         let [turbine, output] = implicit.solve([explicit(&self.rows[0]), explicit(&self.rows[1])]);
         let mean_rate = rate + half * self.per_ratio * output;
         let shaft = x[SPRING] + k * mean_rate;
@@ -119,8 +127,9 @@ impl<T: Real> Step<T> {
     pub(super) fn tangent(&self, x: &[T; N], next: &[T; N]) -> Tangent<T> {
         let (zero, one, half, dt) = (T::zero(), T::one(), T::of(0.5), self.dt_s);
         let slope_n_m_s = if self.held { zero } else { self.turbine[1] };
-        let mean_turbine_n_m = self.turbine[0] + half * self.turbine[1] * (next[TURBINE] - x[TURBINE]);
-        let implicit = self.implicit(x[SHARE], slope_n_m_s);
+        let in_step = self.slope_in_step(self.turbine[1]);
+        let mean_turbine_n_m = self.turbine[0] + half * in_step * (next[TURBINE] - x[TURBINE]);
+        let implicit = self.implicit(x[SHARE], self.slope_in_step(slope_n_m_s));
         let [t, o] = &self.rows;
         let per = |t: T, o: T| implicit.solve([dt * t, dt * o]);
         let Self { per_ratio, per_inertia, .. } = *self;
@@ -261,7 +270,32 @@ pub(super) mod tests {
 
     #[test]
     fn the_tangent_is_the_derivative_of_the_step() {
-        let step = step();
+        // From -13 N m s on a step carries the turbine beyond its balance.
+        for slope_n_m_s in [-6.0, -40.0] {
+            let mut step = step();
+            step.turbine[1] = slope_n_m_s;
+            assert_tangent_is_derivative(step);
+        }
+    }
+
+    /// An error of the turbine speed fades to the same side of its balance, however fast the turbine torque falls with the speed.
+    #[test]
+    fn a_stiff_turbine_torque_does_not_make_the_speed_alternate() {
+        for slope_n_m_s in [-1.0, -6.0, -13.0, -20.0, -100.0, -1e4] {
+            let mut step = step();
+            step.turbine[1] = slope_n_m_s;
+            let x = [0.0; N];
+            let mut other = x;
+            other[TURBINE] = 1.0;
+            let at_balance = step.propagate(&x)[TURBINE];
+            step.turbine[0] += slope_n_m_s;
+            let left = step.propagate(&other)[TURBINE] - at_balance;
+            // The output speed takes some of it along.
+            assert!((-0.05..1.0).contains(&left), "{slope_n_m_s}: {left}");
+        }
+    }
+
+    fn assert_tangent_is_derivative(step: Step<f64>) {
         let mut x = [0.0; N];
         for (state, value) in [
             (TURBINE, 300.0),

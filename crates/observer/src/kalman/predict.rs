@@ -25,6 +25,8 @@ const PRESSURE_START: f64 = 0.3;
 /// Time after which the shares fade that do so in seconds, s: not at every step, and no multiple of a usual sample time, so that
 /// rounding does not decide when.
 const FADING_S: f64 = 0.0487;
+/// After so long without a command the valve may have had any other, s \[chosen\]: rows of a slow log are 0.1 s apart.
+pub(super) const UNHEARD_S: f64 = 0.12;
 /// Deviation of the speeds' model over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 
@@ -83,6 +85,7 @@ impl<T: Real> KalmanFilter<T> {
             kept: 0,
             unfaded_s: zero,
             motion_pa_s: zero,
+            is_unheard: false,
             acting,
             direction: direction(model.shift.oncoming_slip(turbine, output)),
             turned_s: zero,
@@ -248,6 +251,10 @@ impl<T: Real> KalmanFilter<T> {
         let stiffness_share = if x[SPRING].abs() < u.backlash_n_m { one } else { u.stiffness_share };
         p.add(SPRING, two * dt * u.rate_s * square(stiffness_share * step.stiffness * twist_rate));
         p.add(PRESSURE, two * dt * u.rate_s * square(u.valve_share * running.motion_pa_s));
+        if running.is_unheard {
+            // Where the pressure goes is not known: what the speeds show is no error of the gain.
+            p.add(PRESSURE, square((one - step.valve.phi) * T::of(0.5) * self.limits.pressure_max_pa));
+        }
         if step.last < one {
             p.add(SHARE, square(u.turbine_share) * (one - square(step.stay)));
             for (state, deviation) in [(FRICTION, u.friction), (GAIN, u.valve_gain)] {

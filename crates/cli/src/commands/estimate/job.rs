@@ -14,7 +14,7 @@ use study::LogSample;
 use study::shift_estimates::no_estimate;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step, slow_log};
+use super::measured::{Measured, Step, old_commands, slow_log};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
@@ -52,15 +52,21 @@ pub(super) fn estimate(
     }
     let Rows { table, shifts, findings, .. } = rows;
     check_findings(&findings, vehicle, &log, observer.kind)?;
-    if let Some(warning) = slow_log(log.median_step_s()) {
-        say.note(&warning);
-    }
+    let median_s = log.median_step_s();
+    let warnings = [slow_log(median_s), old_commands(median_s, vehicle.error_bounds.command_age_s)];
+    warnings.into_iter().flatten().for_each(|warning| say.note(&warning));
     shifts.check()?;
     table.finish()?;
     let sentences = findings.sentences();
     sentences.iter().for_each(|sentence| say.note(sentence));
     report_shifts(&shifts, say);
     say.note(&format!("observer: {}", observer.name));
+    if !vehicle.defaults_taken.is_empty() {
+        say.note(
+            "gear train: one with the two ratios of the short vehicle file, not that of the car. The clutch torque is that of its clutch; in the car's \
+             train the torque of a clutch in another place differs by a constant factor",
+        );
+    }
     let Some(output) = output else {
         say.note("estimate: on standard output");
         return Ok(());

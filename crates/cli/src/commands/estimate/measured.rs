@@ -358,7 +358,7 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
 pub(super) fn slow_log(median_s: f64) -> Option<String> {
     /// Five rows in an inertia phase of half a second \[chosen\].
     const LONGEST_S: f64 = 0.1;
-    (median_s > LONGEST_S).then(|| {
+    (median_s > LONGEST_S * (1.0 + ROUNDING)).then(|| {
         format!(
             "warning: the middle time between two rows is {median_s:.3} s, too long for the estimate of a shift: an inertia phase takes 0.3 to 1 s, \
              and {} s without a reading count as a lost channel\nhint: record speeds and commands every {LONGEST_S} s or more often",
@@ -366,6 +366,20 @@ pub(super) fn slow_log(median_s: f64) -> Option<String> {
         )
     })
 }
+
+/// Says that commands may be older than the bounds of the vehicle file allow: a row shows a command that was sent since the row before.
+pub(super) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
+    (median_s > bound_s * (1.0 + ROUNDING)).then(|| {
+        format!(
+            "warning: the middle time between two rows is {median_s:.3} s, and by `command_age_s` of the vehicle file a command is at most {bound_s} s \
+             older than the row that shows it first: if commands may change at any time between rows, the guaranteed range is not that of such a log\n\
+             hint: set `command_age_s = {median_s:.3}` under [design.error_bounds], or record the commands more often"
+        )
+    })
+}
+
+/// Share by which times of rows are rounded.
+const ROUNDING: f64 = 1e-3;
 
 /// Says what was met in mapped channels, after their last step.
 ///

@@ -120,11 +120,8 @@ fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collec
         bar.set_message(format!("reading {}", log.display()));
         bar.tick();
         let mut one = fit::collect(log, &map, vehicle)?;
-        all.shifts.append(&mut one.shifts);
-        all.driving.append(&mut one.driving);
-        all.skipped.append(&mut one.skipped);
-        all.kinds.add(one.kinds);
-        all.notes.extend(one.notes.iter().map(|note| format!("{}: {note}", log.display())));
+        one.notes.iter_mut().for_each(|note| *note = format!("{}: {note}", log.display()));
+        all.add(one);
     }
     Ok(all)
 }
