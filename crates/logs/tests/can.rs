@@ -63,6 +63,9 @@ fn a_last_frame_without_the_end_of_its_line_is_left_out() {
             let cut = &text[..text.len() - cut];
             assert_eq!(read(cut), (3, vec!["the last line has no end and is left out".to_owned()]), "{name} {cut}");
         }
+        let one = &text[..text.find("00\n").unwrap() + 2];
+        let error = common::read(&folder.write("bus.log", one), &with_dbc()).map(|_| ()).unwrap_err().to_string();
+        assert!(error.ends_with("the only data frame stands in a last line without an end"), "{name}: {error}");
     }
 }
 

@@ -260,6 +260,9 @@ impl Frames for Lines {
                     self.unread, self.frames
                 ),
             )),
+            _ if self.frames == 0 && self.is_cut => {
+                Err(LogError::file(&self.path, "the only data frame stands in a last line without an end"))
+            }
             _ if self.frames == 0 => Err(LogError::file(&self.path, "there are no data frames")),
             _ => Ok(None),
         }
