@@ -36,7 +36,7 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     format!(
         "# What the filter for any shift has learnt of a car. Each number is in units of the deviation that the quantity has\n\
          # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input, stiffness\n\
-         # of the drive shafts.\n\
+         # of the drive shafts, scale of the wheel speed.\n\
          gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\nmean = [{}]\ncovariance = [\n{}]\n",
         toml_string(&gearbox.name),
         elements.join(", "),
@@ -68,7 +68,8 @@ pub fn read_learnt(gearbox: &Gearbox, source: &Source) -> Result<Learnt<f64>, Co
     }
     let size = |key: &str, offset: usize, count: usize, expected: usize| {
         let message = format!("has {count} numbers, expected {expected}");
-        (count == expected).then_some(()).ok_or_else(|| check.meaning(key, offset, message, None))
+        let hint = "the file is cut, or of another version of the program: start without it".to_owned();
+        (count == expected).then_some(()).ok_or_else(|| check.meaning(key, offset, message, Some(hint)))
     };
     let (mean, covariance) = (raw.mean.get_ref(), raw.covariance.get_ref());
     size("mean", raw.mean.span().start, mean.len(), LEARNT)?;
@@ -131,7 +132,12 @@ mod tests {
             |text: &str| read_learnt(&gearbox, &Source::built_in("learnt.toml", text)).unwrap_err().to_string();
         let other = refused(&text.replace("\"E\"", "\"F\""));
         assert!(other.starts_with("learnt.toml:4: `gearbox`: was learnt of the gearbox"), "{other}");
-        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains("has 35 numbers, expected 34"));
+        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains("has 36 numbers, expected 35"));
+        // Of a version before the scale of the wheel speed was learnt.
+        let (end, of_wheel) = (text.find("]\ncovariance").unwrap(), ", ");
+        let earlier = format!("{}{}", &text[..text[..end].rfind(of_wheel).unwrap()], &text[end..]);
+        let earlier = refused(&earlier);
+        assert!(earlier.contains("has 34 numbers, expected 35") && earlier.contains("another version"), "{earlier}");
         assert!(refused(&text.replace("7e-1", "-7e-1")).contains("no covariance"));
         assert!(refused(&text.replace("7e-1", "nan")).contains("no covariance"));
         // Cut anywhere in the middle.

@@ -9,7 +9,7 @@ use observer::any_shift::{
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
-use crate::kalman::{deviation_of, engine_noise, speed_reading};
+use crate::kalman::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
 
 /// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the two-speed car's budget.
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;
@@ -26,6 +26,9 @@ const KISS_POINT_PA: f64 = 7e3;
 /// Standard deviation of the part of the turbine torque's error that does not last, as a share \[chosen\]: the shape of the
 /// converter's maps.
 const TURBINE_SHARE: f64 = 0.03;
+
+/// Time after which the scale of the wheel speed is another, by as much as it can be known at best, s \[chosen\]: a tyre that gets warm.
+const WHEEL_SCALE_S: f64 = 60.0;
 
 /// Pressure drop of a fast fill, Pa \[chosen\], for the flow of whose errors those of the time of a fill follow.
 const FILL_PA: f64 = 0.15e6;
@@ -128,6 +131,8 @@ pub struct ShiftErrors {
     pub inertia: f64,
     /// Of the stiffness of the drive shafts.
     pub stiffness: f64,
+    /// Of the scale of the wheel speed: size, wear and pressure of the tyres.
+    pub wheel_scale: f64,
     /// Half-width of the hysteresis of a valve, Pa.
     pub hysteresis_pa: f64,
     /// Least and greatest delay of a valve, s.
@@ -146,6 +151,7 @@ impl ShiftErrors {
         engine: 0.08,
         inertia: 0.20,
         stiffness: 0.20,
+        wheel_scale: 0.02,
         hysteresis_pa: 10e3,
         valve_delay_s: [0.0, 0.03],
         command_age_s: 0.0,
@@ -205,6 +211,7 @@ impl ShiftErrors {
             engine: own.engine_torque_share.unwrap_or(self.engine),
             inertia: own.inertia_share.unwrap_or(self.inertia),
             stiffness: own.shaft_stiffness_share.unwrap_or(self.stiffness),
+            wheel_scale: own.wheel_scale_share.unwrap_or(self.wheel_scale),
             hysteresis_pa: self.hysteresis_pa,
             valve_delay_s: [
                 delays().map(|[least_s, _]| least_s).reduce(f64::min).unwrap_or(least_s),
@@ -295,7 +302,7 @@ fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
 /// The filter of a car with these tables, for readings of these sensors; without them the readings are taken to be of the
 /// moment, with the noise of usual sensors.
 ///
-/// A bound of the errors counts as the edge of a uniform distribution.
+/// A bound of the errors counts as the edge of a uniform distribution, those of friction and valves times the scale that the file has of its own.
 pub fn any_shift_filter<'a>(
     car: &Car,
     tables: &'a ShiftTables<f64>,
@@ -313,7 +320,7 @@ pub fn any_shift_filter<'a>(
             converter_share: deviation_of(own.converter),
             engine_share: deviation_of(own.engine),
         },
-        uncertainty: uncertainty(&own),
+        uncertainty: uncertainty(&own, car.error_bounds.valve_error_scale.unwrap_or(1.0)),
         readings: [
             speed_reading(sensors.map(|sensors| &sensors.turbine), SPEED_QUANTUM_RAD_S),
             speed_reading(sensors.map(|sensors| &sensors.output), SPEED_QUANTUM_RAD_S),
@@ -341,26 +348,33 @@ fn shaft_n_m(car: &Car) -> f64 {
     engine * converter * ratio * car.driveline.final_ratio
 }
 
-/// What the filter does not know.
-fn uncertainty(errors: &ShiftErrors) -> ShiftUncertainty<f64> {
+/// What the filter of a car does not know by the bounds alone, whatever scale of the errors of its valves the file has of its own.
+pub fn shift_uncertainty(car: &Car, errors: &ShiftErrors) -> ShiftUncertainty<f64> {
+    uncertainty(&errors.of_car(car), 1.0)
+}
+
+/// What the filter does not know; friction and valve err by this scale times the bounds.
+fn uncertainty(errors: &ShiftErrors, scale: f64) -> ShiftUncertainty<f64> {
     let parts = [deviation_of(errors.friction), deviation_of(errors.valve_gain), MAP_SHARE];
     let square: f64 = parts.iter().map(|part| part * part).sum();
     let slow_part = 1.0 - parts[2] * parts[2] / square;
     ShiftUncertainty {
-        torque_share: square.sqrt(),
+        torque_share: scale * square.sqrt(),
         slow_part,
         torque_share_s: 3.0,
-        valve_gain: parts[1],
-        kiss_point_pa: KISS_POINT_PA,
-        valve_lag_share: deviation_of(errors.valve_lag),
-        valve_delay_s: deviation_of(0.5 * (errors.valve_delay_s[1] - errors.valve_delay_s[0])),
-        pressure_pa: PRESSURE_PA,
+        valve_gain: scale * parts[1],
+        kiss_point_pa: scale * KISS_POINT_PA,
+        valve_lag_share: scale * deviation_of(errors.valve_lag),
+        valve_delay_s: scale * deviation_of(0.5 * (errors.valve_delay_s[1] - errors.valve_delay_s[0])),
+        pressure_pa: scale * PRESSURE_PA,
         pressure_s: 0.15,
         turbine_share: TURBINE_SHARE,
         turbine_share_s: 3.0,
         // What is low by a share is exceeded by more than that share.
         inertia_share: deviation_of(errors.inertia / (1.0 - errors.inertia)),
         stiffness_share: deviation_of(errors.stiffness),
+        wheel_scale: deviation_of(errors.wheel_scale).max(SCALE_LEAST),
+        wheel_scale_walk: SCALE_LEAST / WHEEL_SCALE_S.sqrt(),
         rate_rad_s: 0.1,
         rate_walk: 0.01,
         load_walk: 1500.0,

@@ -39,7 +39,7 @@ const CLUTCH_S: f64 = 20.0;
 
 /// The scale is known no better than this \[chosen\]: scale and delay of the wheel trade with each other while the
 /// acceleration stands. A test of the combined study holds the errors after a launch against it.
-const SCALE_LEAST: f64 = 3e-4;
+pub(crate) const SCALE_LEAST: f64 = 3e-4;
 /// The same of a delay, s.
 const DELAY_LEAST_S: f64 = 1.3e-3;
 

@@ -4,7 +4,7 @@
 //! three minutes is driven (5), on a road with hills unless `FIT_ROAD=level`; with `FIT_TORQUE=1` the engine torque is reported, with
 //! `FIT_WEIGHED=1` the mass is known to a percent, with `FIT_BACKLASH=1` each car has a backlash of its own, and with `FIT_DRIVING=off` driving between shifts is not fitted; `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
 //! sensor; `FIT_HYSTERESIS=none` says in the error bounds of the file that no valve has a hysteresis; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
-//! the WLTC with the given file, with the fitted one without its error bounds, and with it.
+//! the WLTC with the given file, with the fitted one without its error bounds, without the check of its valves, and with all of it.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
 
 #[path = "../tests/gearbox/drawn.rs"]
@@ -52,11 +52,13 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let mut iterations = 0;
     let fit = fit::gearbox::fit(&drawn.file, &tables, &fitted, &driving, &mut |_| iterations += 1).unwrap();
     let seconds = begin.elapsed().as_secs_f64();
-    let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a simulation").unwrap();
-    let torque_n_m = [&drawn.file, &file].map(|car| truth.squared_error(car, &held_out).sqrt());
-    let checked = fit.validate((&drawn.file, &tables), (&file, &drawn::tables(&file)), &held_out).unwrap();
+    let file = |checked| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a simulation", checked).unwrap();
+    let unchecked = file(None);
+    let torque_n_m = [&drawn.file, &unchecked].map(|car| truth.squared_error(car, &held_out).sqrt());
+    let checked = fit.validate((&drawn.file, &tables), (&unchecked, &drawn::tables(&unchecked)), &held_out).unwrap();
+    let file = file(Some(&checked));
     println!(
-        "car {}: {number} shifts, {} skipped, torque N m {:.2} -> {:.2} ({:.2}), turbine rad/s {:.2} -> {:.2} (better {}/{}), g {:.2}, misfit {:.2}, \
+        "car {}: {number} shifts, {} skipped, torque N m {:.2} -> {:.2} ({:.2}), turbine rad/s {:.2} -> {:.2} (better {}/{}), valve errors {:.2}, g {:.2}, misfit {:.2}, \
          {iterations} iterations, {seconds:.1} s, converged {}, given file possible {}, kept {}",
         drawn.seed,
         recorded.skipped.len(),
@@ -67,6 +69,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         checked.turbine_rad_s[1],
         checked.better,
         checked.shifts,
+        checked.valve_error_scale,
         fit.scale_and_gain[1],
         fit.torque_misfit,
         fit.is_converged,
@@ -119,7 +122,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         Ok(_) => {
             let without = Car { error_bounds: drawn.file.error_bounds.clone(), ..file.clone() };
             let cycle = Drive::read(&drawn::root().join("drives/wltc_3b.toml")).unwrap();
-            estimated(drawn, &cycle, &[drawn.file.clone(), without, file])
+            estimated(drawn, &cycle, &[drawn.file.clone(), without, unchecked, file])
         }
         Err(_) => Vec::new(),
     };
@@ -163,15 +166,18 @@ fn print_quantities(outcomes: &[Outcome]) {
 }
 
 fn print_estimates(outcomes: &[Outcome]) {
-    for (at, name) in ["given file", "fitted file, bounds of the given one", "fitted file"].into_iter().enumerate() {
+    let names =
+        ["given file", "fitted file, bounds of the given one", "fitted file, valves not checked", "fitted file"];
+    for (at, name) in names.into_iter().enumerate() {
         let of = |value: fn(&Estimated) -> f64| -> f64 {
             outcomes.iter().filter_map(|outcome| outcome.estimates.get(at)).map(value).sum()
         };
         let rows = of(|sum| sum.rows);
         if rows > 0.0 {
             println!(
-                "{name}: torque estimated {:.2} N m RMS, range {:.1} N m and {:.1} kPa wide, pressure outside in {} and torque in {} of {rows} rows",
+                "{name}: torque estimated {:.2} N m RMS, by the valves alone {:.2}, range {:.1} N m and {:.1} kPa wide, pressure outside in {} and torque in {} of {rows} rows",
                 (of(|sum| sum.square) / rows).sqrt(),
+                (of(|sum| sum.square_of_valves) / rows).sqrt(),
                 of(|sum| sum.width_n_m) / rows,
                 1e-3 * of(|sum| sum.width_pa) / rows,
                 of(|sum| sum.outside[0]),

@@ -1,10 +1,8 @@
 //! Comma-separated files of any dialect.
 //!
-//! Delimiter, decimal comma and the row of names are told from the first lines. Lines before the names are passed over. Units stand
-//! in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Times are numbers, clock times or dates.
-//! Rows are read one by one.
+//! Lines before the names are passed over. Units stand in the names (`N_Eng [rpm]`), in a row below them, or at their ends (`_rpm`). Times
+//! are numbers, clock times or dates. Rows are read one by one.
 
-use std::borrow::Cow;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
@@ -12,6 +10,7 @@ use trace::csv_file::{LONGEST_ROW, number};
 use trace::{Quantity, RecordError, Records, Unit};
 
 use crate::columns::{Batch, Stream};
+use crate::csv_dialect::{Dialect, cells};
 use crate::samples::{Quality, Sample};
 use crate::stamp::{Midnight, StampForm};
 use crate::{Channel, LogError, TimeColumn, error};
@@ -41,17 +40,6 @@ enum TimeForm {
     /// Numbers of a unit of this size, s.
     Numbers(f64),
     Stamps(StampForm),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Dialect {
-    delimiter: u8,
-    decimal_comma: bool,
-    /// Lines before the row of names.
-    preamble: usize,
-    units_row: bool,
-    /// Line of the first row.
-    first: usize,
 }
 
 impl CsvLog {
@@ -139,7 +127,7 @@ impl CsvLog {
             long: 0,
             no_numbers: 0,
             first_text: None,
-            has_groups: false,
+            hint: "",
             cut: None,
         }))
     }
@@ -174,8 +162,8 @@ struct Rows<'a> {
     long: u64,
     no_numbers: u64,
     first_text: Option<String>,
-    /// Whether its digits stand in groups.
-    has_groups: bool,
+    /// What to do about it.
+    hint: &'static str,
     /// What became of a last line without an end.
     cut: Option<&'static str>,
 }
@@ -186,6 +174,10 @@ impl Rows<'_> {
         let cell = self.records.cell(column).unwrap_or_default();
         if !self.log.dialect.decimal_comma {
             return number(cell);
+        }
+        // A point is no second decimal sign: it may stand between thousands.
+        if cell.contains(&b'.') {
+            return None;
         }
         self.text.clear();
         self.text.extend(cell.iter().map(|&byte| if byte == b',' { b'.' } else { byte }));
@@ -242,7 +234,13 @@ impl Rows<'_> {
                     if self.first_text.is_none() {
                         let line = self.records.line() + self.log.dialect.preamble as u64;
                         let cell = text(self.records.cell(column).unwrap_or_default());
-                        self.has_groups = has_groups(&cell);
+                        self.hint = match () {
+                            () if has_groups(&cell) => "\nhint: write numbers without a sign between their thousands",
+                            () if number(cell.trim().as_bytes()).is_some() => {
+                                "\nhint: the decimal sign of the other numbers is a comma"
+                            }
+                            () => "",
+                        };
                         self.first_text = Some(format!("line {line}: `{}`", error::shown(&cell)));
                     }
                     (f64::NAN, Quality::Missing)
@@ -293,11 +291,9 @@ impl Stream for Rows<'_> {
             notes.push(format!("the last line has no end and {cut}"));
         }
         if let Some(first) = &self.first_text {
-            let hint =
-                if self.has_groups { "\nhint: write numbers without a sign between their thousands" } else { "" };
             notes.push(format!(
-                "{} cells are not numbers and count as missing, the first in {first}{hint}",
-                self.no_numbers
+                "{} cells are not numbers and count as missing, the first in {first}{}",
+                self.no_numbers, self.hint
             ));
         }
         notes
@@ -327,10 +323,12 @@ fn text(bytes: &[u8]) -> String {
 /// Whether a text is a number with thousands apart: `1,007.25`, `1.007,25`, `1 007,25`, `1'007.25`. Such a number is not read: `1,007` may
 /// as well be a little more than one.
 fn has_groups(text: &str) -> bool {
-    let text = text.trim();
-    let plain: String = text.chars().filter(|c| c.is_ascii_digit()).collect();
-    let is_sign = |c: char| matches!(c, '.' | ',' | '\'' | ' ' | '\u{a0}' | '\u{202f}' | '+' | '-');
-    plain.len() > 3 && text.chars().all(|c| c.is_ascii_digit() || is_sign(c))
+    let text = text.trim().trim_start_matches(['+', '-']);
+    let groups: Vec<&str> = text.split(['.', ',', '\'', ' ', '\u{a0}', '\u{202f}']).collect();
+    let are_digits = groups.iter().all(|group| !group.is_empty() && group.bytes().all(|byte| byte.is_ascii_digit()));
+    // Behind the last sign may be decimals. A date has groups of two digits.
+    let between = groups.get(1..groups.len().saturating_sub(1).max(2)).unwrap_or_default();
+    are_digits && groups[0].len() <= 3 && !between.is_empty() && between.iter().all(|group| group.len() == 3)
 }
 
 /// Passes over some bytes and then some lines.
@@ -344,102 +342,6 @@ fn skip(input: &mut impl Read, bytes: usize, lines: usize) -> io::Result<()> {
         lines -= usize::from(byte[0] == b'\n');
     }
     Ok(())
-}
-
-/// The cells of a line; quotation marks are respected.
-fn cells(line: &str, delimiter: u8) -> Vec<Cow<'_, str>> {
-    let mut quoted = false;
-    let ends_cell = |c: char| {
-        quoted ^= c == '"';
-        c == char::from(delimiter) && !quoted
-    };
-    let without_marks = |cell: &str| Cow::Owned(cell.replace('"', "").trim().to_owned());
-    let plain = |cell| if str::contains(cell, '"') { without_marks(cell) } else { Cow::Borrowed(cell.trim()) };
-    line.split(ends_cell).map(plain).collect()
-}
-
-fn is_number(cell: &str, decimal_comma: bool) -> bool {
-    let plain = if decimal_comma { cell.replacen(',', ".", 1) } else { cell.to_owned() };
-    plain.parse::<f64>().is_ok()
-}
-
-impl Dialect {
-    /// Tells the dialect from the first lines.
-    fn of(path: &Path, head: &str) -> Result<Self, LogError> {
-        let mut lines: Vec<&str> = head.lines().collect();
-        // The head may end within a line.
-        if !head.ends_with('\n') && lines.len() > 1 {
-            lines.pop();
-        }
-        // Of the delimiters that divide lines into numbers, the one with the most numbers; a comma may be decimal.
-        let best = [b'\t', b';', b'|', b','].into_iter().filter_map(|delimiter| {
-            let decimal_comma = |cells: &[Cow<str>]| {
-                delimiter != b','
-                    && cells.iter().any(|cell| cell.matches(',').count() == 1 && is_number(cell, true))
-                    && !cells.iter().any(|cell| cell.contains('.') && is_number(cell, false))
-            };
-            let rows: Vec<Vec<Cow<str>>> = lines.iter().map(|line| cells(line, delimiter)).collect();
-            let comma = rows.iter().any(|row| decimal_comma(row));
-            let numbers = |row: &Vec<Cow<str>>| row.iter().filter(|cell| is_number(cell, comma)).count();
-            let filled = |row: &Vec<Cow<str>>| row.iter().filter(|cell| !cell.is_empty()).count();
-            let is_data = |row: &Vec<Cow<str>>| {
-                row.len() >= 2 && numbers(row) >= 1 && (2 * numbers(row) >= filled(row) || !is_units(row))
-            };
-            let first = rows.iter().position(|row| is_data(row) && rows_after_agree(&rows, row.len()))?;
-            let count: usize = rows.iter().skip(first).map(numbers).sum();
-            Some((count, delimiter, comma, first))
-        });
-        let Some((_, delimiter, decimal_comma, first)) =
-            best.max_by_key(|(count, delimiter, ..)| (*count, *delimiter != b','))
-        else {
-            let only = lines.iter().filter(|line| !line.trim().is_empty()).count();
-            return Err(LogError::file(
-                path,
-                if only == 1 && !head.contains('\0') {
-                    "there are no rows"
-                } else {
-                    "this is no format that is known\nhint: logs are CSV (with a row of names and at least two columns, `,` `;` `|` or a tab between them), Parquet, MDF 4, candump, ASC or BLF"
-                },
-            ));
-        };
-        let names = |row: &[Cow<str>]| {
-            row.len() >= 2
-                && row.iter().any(|cell| !cell.is_empty())
-                && !row.iter().any(|cell| is_number(cell, decimal_comma))
-        };
-        let above =
-            |i: usize| lines.get(i).map(|line| cells(line, delimiter)).filter(|row| names(row) || is_units(row));
-        let filled: Vec<usize> = (0..first).rev().filter(|&i| !lines[i].trim().is_empty()).collect();
-        let line = |nth: usize| filled.get(nth).and_then(|&i| above(i).map(|row| (i, row)));
-        match (line(0), line(1).filter(|(_, row)| names(row))) {
-            (Some((_, units)), Some((names_at, _))) if is_units(&units) => {
-                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: true, first })
-            }
-            (Some((names_at, row)), _) if names(&row) => {
-                Ok(Self { delimiter, decimal_comma, preamble: names_at, units_row: false, first })
-            }
-            _ => Err(LogError::damaged(
-                path,
-                format!("line {}", first + 1),
-                "there is no row of names above the first row of numbers\nhint: add one, with a time and a unit for each column",
-            )),
-        }
-    }
-}
-
-/// Whether the cells are units, or most of them.
-fn is_units(row: &[Cow<str>]) -> bool {
-    let filled: Vec<&Cow<str>> = row.iter().filter(|cell| !cell.is_empty()).collect();
-    let bracketed = |cell: &str| cell.starts_with('[') || cell.starts_with('(');
-    let units = filled.iter().filter(|cell| bracketed(cell) || Unit::parse(cell).is_some()).count();
-    !filled.is_empty() && 2 * units >= filled.len()
-}
-
-/// Whether most of the rows have this many cells.
-fn rows_after_agree(rows: &[Vec<Cow<str>>], width: usize) -> bool {
-    let filled = rows.iter().filter(|row| row.len() > 1 || row.iter().any(|cell| !cell.is_empty()));
-    let (same, all) = filled.fold((0, 0), |(same, all), row| (same + usize::from(row.len() == width), all + 1));
-    3 * same >= all
 }
 
 /// A unit without its brackets.

@@ -11,6 +11,7 @@ mod ahead;
 pub mod arrays;
 pub mod can;
 pub mod columns;
+mod csv_dialect;
 pub mod csv_log;
 pub mod error;
 pub mod frozen;

@@ -105,6 +105,10 @@ fn broken_files_give_errors_or_what_can_be_read() {
                     _ => generator.next_u32() as u8,
                 };
             }
+            // Some are cut besides.
+            if generator.next_u32() % 4 == 0 {
+                broken.truncate(generator.next_u64() as usize % broken.len());
+            }
             attempt(&folder, name, &broken);
         }
         // Absurd lengths: every field of eight bytes in turn becomes huge.

@@ -4,11 +4,13 @@
 
 mod common;
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use common::mdf::{HEAD, append, block, number, places, set};
 use common::{Folder, channel, data, read};
 use falcon_mdf::Mf4Writer;
 use falcon_mdf::write::WriteCodec;
@@ -58,19 +60,6 @@ enum Packing {
     Transposed(usize),
 }
 
-const HEAD: usize = 24;
-
-fn number(bytes: &[u8], at: usize) -> usize {
-    usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap()
-}
-
-fn block(id: &[u8; 4], links: &[usize], content: &[u8]) -> Vec<u8> {
-    let length = HEAD + 8 * links.len() + content.len();
-    let words = [length, links.len()].into_iter().chain(links.iter().copied());
-    let words = words.flat_map(|word| (word as u64).to_le_bytes());
-    [id.as_slice(), &[0; 4]].concat().into_iter().chain(words).chain(content.iter().copied()).collect()
-}
-
 fn packed(content: &[u8], packing: Packing, id: &[u8; 2]) -> Vec<u8> {
     let (kind, columns) = match packing {
         Packing::Plain => return block(&[b'#', b'#', id[0], id[1]], &[], content),
@@ -86,11 +75,6 @@ fn packed(content: &[u8], packing: Packing, id: &[u8; 2]) -> Vec<u8> {
     let columns = u32::try_from(columns).unwrap().to_le_bytes();
     let sizes = [content.len(), deflated.len()].map(|size| (size as u64).to_le_bytes()).concat();
     block(b"##DZ", &[], &[id, [kind, 0].as_slice(), &columns, &sizes, &deflated].concat())
-}
-
-/// The blocks of a file with this id.
-fn places(bytes: &[u8], id: &[u8; 8]) -> Vec<usize> {
-    (0..bytes.len() - HEAD).filter(|at| bytes[*at..].starts_with(id)).collect()
 }
 
 /// What stands in the plain block of data to which a link leads, itself or over a list of one.
@@ -112,19 +96,19 @@ fn divided(mut bytes: Vec<u8>, cuts: &[usize], packing: impl Fn(usize) -> Packin
         let mut ends: Vec<usize> =
             cuts.iter().map(|cut| (cut + 61 * nth) % content.len()).chain([content.len()]).collect();
         ends.sort_unstable();
+        // The list stands before its blocks, as recorders write it.
         let (mut from, mut links, mut offsets) = (0, vec![0], Vec::new());
+        let count = u32::try_from(ends.len()).unwrap().to_le_bytes();
+        let list_of = |links: &[usize], offsets: &[u8]| block(b"##DL", links, &[&[0; 4], &count, offsets].concat());
+        let list = append(&mut bytes, &list_of(&vec![0; 1 + ends.len()], &vec![0; 8 * ends.len()]));
         for (i, end) in ends.into_iter().enumerate() {
-            bytes.resize(bytes.len().next_multiple_of(8), 0);
-            links.push(bytes.len());
+            links.push(append(&mut bytes, &packed(&content[from..end], packing(i), b"DT")));
             offsets.extend((from as u64).to_le_bytes());
-            bytes.extend(packed(&content[from..end], packing(i), b"DT"));
             from = end;
         }
-        bytes.resize(bytes.len().next_multiple_of(8), 0);
-        let list = bytes.len();
-        let count = u32::try_from(links.len() - 1).unwrap().to_le_bytes();
-        bytes.extend(block(b"##DL", &links, &[[0; 4], count].concat().into_iter().chain(offsets).collect::<Vec<u8>>()));
-        bytes[link..link + 8].copy_from_slice(&(list as u64).to_le_bytes());
+        let filled = list_of(&links, &offsets);
+        bytes[list..list + filled.len()].copy_from_slice(&filled);
+        set(&mut bytes, link, list);
     }
     bytes
 }
@@ -198,13 +182,6 @@ fn a_damaged_block_is_told_by_its_place_and_what_is_before_it_is_read() {
     );
 }
 
-/// Appends a block where one may begin; its place.
-fn put(bytes: &mut Vec<u8>, block: &[u8]) -> usize {
-    bytes.resize(bytes.len().next_multiple_of(8), 0);
-    bytes.extend_from_slice(block);
-    bytes.len() - block.len()
-}
-
 /// The file with the data of each group, which must be one plain block, in two blocks of data and two of invalidation bits.
 fn with_bits_apart(mut bytes: Vec<u8>, packing: impl Fn(usize, usize) -> Packing) -> Vec<u8> {
     const FLAGS: u32 = 0x8000_0001;
@@ -221,20 +198,21 @@ fn with_bits_apart(mut bytes: Vec<u8>, packing: impl Fn(usize, usize) -> Packing
         let parts = |from: usize, to: usize| {
             content.chunks(data + bits).flat_map(|record| record[from..to].to_vec()).collect::<Vec<u8>>()
         };
+        let equal = (content.len() / (data + bits) / 2 * data) as u64;
+        let own = [FLAGS.to_le_bytes(), 2_u32.to_le_bytes()].concat();
+        let list_of = |links: &[usize]| block(b"##LD", links, &[own.as_slice(), &equal.to_le_bytes()].concat());
+        let list = append(&mut bytes, &list_of(&[0; 5]));
         let mut links = vec![0];
         for (nth, (part, width)) in [(parts(0, data), data), (parts(data, data + bits), bits)].into_iter().enumerate() {
             let cut = part.len() / width / 2 * width;
             for half in [&part[..cut], &part[cut..]] {
                 let id = if nth == 0 { b"DV" } else { b"DI" };
-                let block = packed(half, packing(nth, width), id);
-                links.push(put(&mut bytes, &block));
+                links.push(append(&mut bytes, &packed(half, packing(nth, width), id)));
             }
         }
-        let equal = (content.len() / (data + bits) / 2 * data) as u64;
-        let own = [FLAGS.to_le_bytes(), 2_u32.to_le_bytes()].concat();
-        let list = block(b"##LD", &links, &[own, equal.to_le_bytes().to_vec()].concat());
-        let list = put(&mut bytes, &list);
-        bytes[link..link + 8].copy_from_slice(&(list as u64).to_le_bytes());
+        let filled = list_of(&links);
+        bytes[list..list + filled.len()].copy_from_slice(&filled);
+        set(&mut bytes, link, list);
     }
     bytes
 }
@@ -421,4 +399,65 @@ fn a_log_that_is_left_in_the_middle_ends_its_threads() {
         assert!(threads_become(2));
     }
     assert!(threads_become(0));
+}
+
+/// The samples of each channel, as text: what is no number is not the same as itself.
+fn by_channel(samples: &[Sample]) -> BTreeMap<usize, Vec<String>> {
+    let mut channels: BTreeMap<usize, Vec<String>> = BTreeMap::new();
+    samples.iter().for_each(|sample| channels.entry(sample.channel).or_default().push(format!("{sample:?}")));
+    channels
+}
+
+#[test]
+fn a_file_that_is_cut_within_its_data_is_read_up_to_that_place() {
+    let folder = Folder::new("cut-data");
+    let packings: [fn(usize, usize) -> Packing; 2] = [|_, _| Packing::Plain, |_, width| Packing::Transposed(width)];
+    for (name, is_apart) in
+        [("plain_410.mf4", false), ("unsorted.mf4", false), ("remote.mf4", false), ("invalidation.mf4", true)]
+    {
+        let own = std::fs::read(data(name)).unwrap();
+        for packing in packings {
+            let whole = match is_apart {
+                true => with_bits_apart(own.clone(), packing),
+                false => divided(own.clone(), &[100, 300, 500], |i| packing(i, 9)),
+            };
+            let (all, notes) = samples(&folder.write("whole.mf4", &whole));
+            assert_eq!(notes, Vec::<String>::new());
+            let by_channel_of_all = by_channel(&all);
+            let mut most = 0;
+            for end in (own.len()..whole.len()).step_by(7).chain([whole.len() - 1]) {
+                let said = format!("it goes on past the end of the file, byte {end}");
+                let found = match read(&folder.write("cut.mf4", &whole[..end]), &OpenOptions::default()) {
+                    Ok((_, found, notes)) => {
+                        assert!(notes.iter().any(|note| note.contains(&said)), "{name} {end}: {notes:?}");
+                        found
+                    }
+                    Err(error) => {
+                        assert!(error.to_string().contains(&said), "{name} {end}: {error}");
+                        Vec::new()
+                    }
+                };
+                for (channel, own) in by_channel(&found) {
+                    assert_eq!(own, by_channel_of_all[&channel][..own.len()], "{name} {end}");
+                }
+                assert!(
+                    found.len() >= most && found.len() < all.len(),
+                    "{name} {end}: {} of {}",
+                    found.len(),
+                    all.len()
+                );
+                most = found.len();
+            }
+            assert!(2 * most > all.len(), "{name}: {most} of {}", all.len());
+        }
+    }
+}
+
+#[test]
+fn a_file_whose_description_is_cut_is_refused_with_the_place() {
+    let folder = Folder::new("cut-description");
+    let bytes = std::fs::read(data("plain_410.mf4")).unwrap();
+    let cut = *places(&bytes, b"##CN\0\0\0\0").last().unwrap() + 30;
+    let error = read(&folder.write("cut.mf4", &bytes[..cut]), &OpenOptions::default()).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("its structure: File is truncated: expected"), "{error}");
 }

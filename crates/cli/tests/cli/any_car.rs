@@ -593,7 +593,7 @@ fn a_wheel_speed_of_another_scale_is_told_or_refused() {
             cell.parse::<f64>().map_or(String::new(), |speed| (factor * speed).to_string())
         })
     };
-    folder.write("log.csv", scaled(0.98));
+    folder.write("log.csv", scaled(0.96));
     let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
     assert!(told.contains("output_speed over wheel_speed is") && told.contains("from the final ratio"), "{told}");
     for (factor, expected) in [(2.8, "output_speed over wheel_speed is"), (-1.0, "wheel_speed is negative")] {

@@ -17,8 +17,12 @@ pub struct CarErrorBounds {
     pub inertia_share: Option<f64>,
     /// Of the stiffness of the drive shafts, as a share.
     pub shaft_stiffness_share: Option<f64>,
+    /// Of the scale of the wheel speed, as a share.
+    pub wheel_scale_share: Option<f64>,
     /// Of the mass of the car as it is driven, as a share.
     pub mass_share: Option<f64>,
+    /// By how much the torques of the valve models err, over what the bounds of the elements say.
+    pub valve_error_scale: Option<f64>,
     /// Of each element, in the order of the gearbox's elements.
     pub elements: Vec<ElementErrorBounds>,
 }
@@ -46,7 +50,9 @@ pub(super) struct RawCarErrorBounds {
     engine_torque_share: Option<Number>,
     inertia_share: Option<Number>,
     shaft_stiffness_share: Option<Number>,
+    wheel_scale_share: Option<Number>,
     mass_share: Option<Number>,
+    valve_error_scale: Option<Number>,
 }
 
 /// `[clutch.NAME.error_bounds]`.
@@ -69,12 +75,15 @@ pub(super) fn of_car(
     let share = |key: &str, value: &Option<Number>| {
         value.as_ref().map(|value| check.number(format_args!("error_bounds.{key}"), value, 0.0..=0.9)).transpose()
     };
+    let scale = |value: &Number| check.number("error_bounds.valve_error_scale", value, 0.1..=10.0);
     Ok(CarErrorBounds {
         converter_share: share("converter_share", &raw.converter_share)?,
         engine_torque_share: share("engine_torque_share", &raw.engine_torque_share)?,
         inertia_share: share("inertia_share", &raw.inertia_share)?,
         shaft_stiffness_share: share("shaft_stiffness_share", &raw.shaft_stiffness_share)?,
+        wheel_scale_share: share("wheel_scale_share", &raw.wheel_scale_share)?,
         mass_share: share("mass_share", &raw.mass_share)?,
+        valve_error_scale: raw.valve_error_scale.as_ref().map(scale).transpose()?,
         elements,
     })
 }

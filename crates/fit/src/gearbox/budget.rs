@@ -6,6 +6,7 @@ use design::ShiftErrors;
 use super::file::{Written, list};
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, Quantity};
+use super::validation::HeldOut;
 use crate::FitError;
 use crate::budget::{BUDGET_COMMENT, BUDGET_SIDES, delays, factors};
 use crate::fitted_file::SIDES;
@@ -13,13 +14,18 @@ use crate::vehicle_text::number;
 
 impl GearboxFit {
     /// Writes the bounds of the car and of the elements that slipped in a fitted shift; the others keep theirs.
-    pub(super) fn write_budget(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
+    pub(super) fn write_budget(
+        &self,
+        text: &mut Written,
+        car: &Car,
+        checked: Option<&HeldOut>,
+    ) -> Result<(), FitError> {
         let given = ShiftErrors::STANDARD.of_car(car);
         // The filter takes these as the edge of a uniform distribution.
         let edge = |sd: f64| 3.0_f64.sqrt() * sd;
         let comment = "what the fit leaves open: the edge of a uniform distribution of the stated deviation";
         if car.converter.is_some() {
-            let share = edge(self.sd(Quantity::Input).hypot(self.sd(Quantity::TorqueRatio))).min(given.converter);
+            let share = edge(self.input_sd()).min(given.converter);
             text.put(&["error_bounds"], "converter_share", &number(share), comment)?;
         }
         if self.is_told(Quantity::Mass) {
@@ -30,6 +36,13 @@ impl GearboxFit {
         let inertias = (0..self.quantities.pairs.len()).map(|at| edge(self.sd(Quantity::Inertia(at))));
         let share = inertias.fold(0.0, f64::max).min(given.inertia);
         text.put(&["error_bounds"], "inertia_share", &number(share), comment)?;
+        // Without a check the scale of an earlier fit is not that of this one.
+        let unchecked =
+            car.error_bounds.valve_error_scale.map(|_| (1.0, "not checked on shifts that were held out".to_owned()));
+        let scale = checked.map(|checked| (checked.valve_error_scale, checked.comment())).or(unchecked);
+        if let Some((scale, comment)) = scale {
+            text.put(&["error_bounds"], "valve_error_scale", &number(scale), &comment)?;
+        }
         for (place, name) in self.quantities.elements.iter().enumerate() {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             let seen = element.filter(|_| self.elements_seen[place]);

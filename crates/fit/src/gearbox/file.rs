@@ -7,6 +7,7 @@ use drivetrain::{ClutchValve, Table1};
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
+use super::validation::HeldOut;
 use crate::driving::DRAG_UNIT_N_M;
 use crate::fitted_file::{SIDES, fill_comment};
 use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
@@ -18,11 +19,12 @@ const STATIC_OVER_SLIDING: f64 = 1.0001;
 impl GearboxFit {
     /// The vehicle file with the fitted values, as it is to stand at `path`. Elements and pairs of gears without a fitted shift stay as they
     /// are. What is not told singly changes too: its ratio to the others may be told. Every value that changes has a comment with its
-    /// interval. `logs` are named at the head of the file.
+    /// interval. An inertia that the logs do not tell and draw far off stays too. `logs` are named at the head of the file.
+    /// Where shifts were held out, `checked` says how far the filter of `estimate` may trust the valves.
     ///
     /// # Errors
     /// The file has a value at another place than the program writes them, or a fitted value is outside its range.
-    pub fn vehicle_file(&self, car: &Car, path: &Path, logs: &str) -> Result<Car, FitError> {
+    pub fn vehicle_file(&self, car: &Car, path: &Path, logs: &str, checked: Option<&HeldOut>) -> Result<Car, FitError> {
         let mut text = Written::new(&car.source.text)?;
         self.write_converter(&mut text, car)?;
         self.write_drag(&mut text, car)?;
@@ -36,7 +38,7 @@ impl GearboxFit {
         for (at, pair) in self.quantities.pairs.iter().enumerate() {
             let shift = car.gearbox.shift(pair[0], pair[1]).or_else(|| car.gearbox.shift(pair[1], pair[0]));
             let Some(reduced) = shift.and_then(|shift| shift.reduced.as_ref()) else { continue };
-            if self.is_seen(Quantity::Inertia(at)) {
+            if self.is_seen(Quantity::Inertia(at)) && !self.drawn_off.iter().any(|(pair, _)| *pair == at) {
                 let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
                 let all_kg_m2 = reduced.mass_kg_m2[0][0] + on_input_kg_m2;
                 let value = all_kg_m2 * self.unknown(Quantity::Inertia(at)).exp() - on_input_kg_m2;
@@ -44,7 +46,7 @@ impl GearboxFit {
                 text.put(&["turbine_inertia_kg_m2"], &self.quantities.pair_names[at], &number(value), &comment)?;
             }
         }
-        self.write_budget(&mut text, car)?;
+        self.write_budget(&mut text, car, checked)?;
         let logs = logs.replace(char::is_control, " ");
         let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
         written(text, car, path, &head)

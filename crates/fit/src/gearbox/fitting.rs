@@ -14,6 +14,7 @@ use super::solver::{Models, Problem};
 use super::unfitted::Unfitted;
 use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
+use crate::fitted_file::SIDES;
 use crate::pressure::Hydraulics;
 use crate::{FitError, Verdict};
 
@@ -53,6 +54,10 @@ pub struct GearboxFit {
     pub fills: Vec<Option<FillFit>>,
     /// The backlash of the driveline, or what the logs lack for it.
     pub backlash: Result<BacklashFit, String>,
+    /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
+    pub(crate) above_one_share: f64,
+    /// Pairs of gears whose inertia is taken to be that of the file, and the unknown that the logs draw it to.
+    pub(crate) drawn_off: Vec<(usize, f64)>,
     /// Which balances of it were fitted.
     pub(crate) balances: Balances,
     /// Names of the quantities that ended where nothing beyond is held possible.
@@ -98,7 +103,10 @@ fn fit_with(
     let of_driving = DrivingModel::new(&driven, driving, balances.used());
     let all = Models { shifts: &models, driving: of_driving };
     let solved = problem.solve(&all, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
-    let stated = stated(&problem, &models, &solved, &Unfitted::of(car, tables))?;
+    let mut stated = stated(&problem, &models, &solved, &Unfitted::of(car, tables))?;
+    let at_limit = problem.at_limit(&solved.at);
+    let mut unknowns = solved.at;
+    let drawn_off = drawn_off(&quantities, &mut unknowns, &mut stated);
     let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
     let mut elements_seen = vec![false; quantities.elements.len()];
     for model in &models {
@@ -111,8 +119,10 @@ fn fit_with(
     let mut fit = GearboxFit {
         fills: Vec::new(),
         torque_misfit: (squares / models.len() as f64).sqrt(),
-        at_limit: problem.at_limit(&solved.at),
-        unknowns: solved.at,
+        above_one_share: above_one_share(&models),
+        at_limit,
+        unknowns,
+        drawn_off,
         stated,
         shifts: models.len(),
         by_pair,
@@ -126,6 +136,33 @@ fn fit_with(
     };
     fit.fills = (0..fit.quantities.elements.len()).map(|place| fit.fill_of(car, tables, shifts, place)).collect();
     Ok((fit, scales))
+}
+
+/// Takes the inertias that the logs do not tell and draw out of the 95 % known before to be those of the file, with what was known before; says which these are.
+/// Where the turbine changes its speed slowly the inertia is what small errors of large torques leave, such as those of a hysteresis. All else stays: an
+/// inertia that is held in the fit would take these errors to the common factor of all torques.
+fn drawn_off(quantities: &Quantities, at: &mut [f64], stated: &mut DMatrix<f64>) -> Vec<(usize, f64)> {
+    let mut found = Vec::new();
+    for pair in 0..quantities.pairs.len() {
+        let Some(place) = quantities.place(Quantity::Inertia(pair)) else { continue };
+        let before = quantities.sd_before(place);
+        let verdict = Verdict::of(stated[(place, place)].sqrt(), before);
+        if verdict == Verdict::NotTold && at[place].abs() > SIDES * before {
+            found.push((pair, at[place]));
+            at[place] = 0.0;
+            stated.row_mut(place).fill(0.0);
+            stated.column_mut(place).fill(0.0);
+            stated[(place, place)] = before * before;
+        }
+    }
+    found
+}
+
+/// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the shifts.
+fn above_one_share(models: &[ShiftModel]) -> f64 {
+    let squares = models.iter().map(|model| model.input_squares());
+    let [all, above] = squares.fold([0.0; 2], |[all, above], more| [all + more[0], above + more[1]]);
+    if all > 0.0 { (above / all).sqrt() } else { 0.0 }
 }
 
 impl GearboxFit {
@@ -173,6 +210,15 @@ impl GearboxFit {
     /// Standard deviation of the unknown of a quantity as it is stated.
     pub fn sd(&self, quantity: Quantity) -> f64 {
         self.quantities.place(quantity).map_or(f64::INFINITY, |place| self.stated[(place, place)].sqrt())
+    }
+
+    /// Standard deviation of the logarithm of the torque at the gearbox input in shifts: the torque ratio acts on what is above 1 alone.
+    pub(crate) fn input_sd(&self) -> f64 {
+        let mut along = DVector::zeros(self.unknowns.len());
+        for (quantity, weight) in [(Quantity::Input, 1.0), (Quantity::TorqueRatio, self.above_one_share)] {
+            self.quantities.place(quantity).into_iter().for_each(|place| along[place] = weight);
+        }
+        along.dot(&(&self.stated * &along)).max(0.0).sqrt()
     }
 
     /// What the logs tell of a quantity.
@@ -234,5 +280,39 @@ impl GearboxFit {
     pub fn torque_scale_sd(&self) -> f64 {
         let weights = self.torque_scale_weights();
         weights.dot(&(&self.stated * &weights)).max(0.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use design::ShiftErrors;
+
+    #[test]
+    fn an_inertia_that_is_far_off_and_not_told_is_that_of_the_file() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let car = Car::read(&root.join("vehicles/eight_speed.toml")).unwrap();
+        let tables = ShiftTables::of_car(&car, &ShiftErrors::STANDARD).unwrap();
+        let quantities = Quantities::of(&car, &tables, &[], [false; 2]);
+        let place = quantities.place(Quantity::Inertia(3)).unwrap();
+        let before = quantities.sd_before(place);
+        // The unknown, and its deviation after the fit, in deviations of before.
+        let found = |x: f64, after: f64| {
+            let (mut at, mut stated) = (vec![0.1; quantities.all.len()], quantities.before.clone());
+            at[place] = x * before;
+            stated[(place, place)] *= after * after;
+            let found = drawn_off(&quantities, &mut at, &mut stated);
+            assert_eq!(at[place + 1], 0.1);
+            (found, at[place], stated)
+        };
+        let (drawn_off, x, stated) = found(3.4, 0.9);
+        assert_eq!((drawn_off, x), (vec![(3, 3.4 * before)], 0.0));
+        assert_eq!(stated[(place, place)], before * before);
+        assert_eq!(stated.column(place).iter().filter(|value| **value != 0.0).count(), 1);
+        // What is told, and what lies within what was known before, stays.
+        for (x, after) in [(3.4, 0.5), (1.9, 1.0), (-1.9, 1.0)] {
+            assert_eq!((found(x, after).0, found(x, after).1), (Vec::new(), x * before));
+        }
+        assert_eq!(found(-2.1, 1.0).0.len(), 1);
     }
 }

@@ -91,6 +91,7 @@ impl GearboxFit {
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
+        lines.extend(self.said_of_kept());
         lines.extend(self.warnings());
         lines.extend(self.proposals());
         lines.push(NOT_FITTED.to_owned());
@@ -178,6 +179,20 @@ impl GearboxFit {
         car.all(|quantity| self.unknown(quantity).abs() <= SIDES_OF_ALL * self.sd(quantity))
             && torques
                 .all(|quantity| (self.unknown(quantity) - scale).abs() <= SIDES_OF_ALL * self.sd_beside_scale(quantity))
+    }
+
+    /// What is said of inertias that stay those of the file.
+    fn said_of_kept(&self) -> Option<String> {
+        let name = |(pair, x): &(usize, f64)| format!("{} (x {:.2})", self.quantities.pair_names[*pair], x.exp());
+        let kept: Vec<String> = self.drawn_off.iter().map(name).collect();
+        (!kept.is_empty()).then(|| {
+            format!(
+                "M11 of {} stays as in the given file: these logs do not tell it, and what they draw it to is outside of what was known before. Where the \
+                 turbine changes its speed slowly it is what small errors of large torques leave, as of a hysteresis. A smaller \
+                 `valve_hysteresis_pa` in the error bounds, where it is known, or quicker shifts would tell it",
+                kept.join(", ")
+            )
+        })
     }
 
     fn warnings(&self) -> Vec<String> {

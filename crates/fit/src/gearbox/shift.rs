@@ -124,6 +124,11 @@ impl ShiftModel {
         })
     }
 
+    /// Sums of the squares of the torque at the input, and of the part of it by the torque ratio above 1.
+    pub(crate) fn input_squares(&self) -> [f64; 2] {
+        [&self.input_n_m, &self.above_one_n_m].map(|torques| torques.iter().map(|torque| torque * torque).sum())
+    }
+
     /// Places of its elements in the tables.
     pub(crate) fn elements(&self) -> [usize; 2] {
         self.clutches.each_ref().map(|clutch| clutch.place)

@@ -87,7 +87,7 @@ fn mass_and_the_scale_of_the_reported_torque_lie_in_their_intervals() {
         let most = with_half_of(anchor, without.torque_scale_sd());
         assert!(with.torque_scale_sd() < most && with.is_converged, "{} {most}", with.torque_scale_sd());
         assert!(without.report().iter().all(|row| row.name != "mass") && without.unknown(Quantity::Mass) == 0.0);
-        let file = with.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+        let file = with.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
         let factor = with.unknown(Quantity::Mass).exp();
         assert!((file.road.mass_kg / drawn.file.road.mass_kg / factor - 1.0).abs() < 1e-3);
         assert!(file.error_bounds.mass_share.is_some_and(|share| share < 0.25), "{:?}", file.error_bounds);
@@ -111,7 +111,7 @@ fn a_weighed_car_tells_the_common_factor_of_all_torques_and_reversals_the_backla
     let backlash = usual.backlash.clone().unwrap();
     let error = backlash.rad - drawn.truth.backlash_rad;
     assert!(error.abs() < 2.0 * backlash.sd_rad && backlash.sd_rad < 0.006, "{error} {backlash:?}");
-    let file = usual.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+    let file = usual.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
     assert!((file.backlash_rad - backlash.rad).abs() < 1e-4, "{}", file.backlash_rad);
     let drawn = drawn.weighed();
     let fits = [usual, fitted(&drawn, &recorded)];

@@ -16,6 +16,8 @@ pub(crate) struct Estimated {
     pub(crate) rows: f64,
     /// Squared error of the torque, N m squared.
     pub(crate) square: f64,
+    /// The same of the torque by the valve model alone.
+    pub(crate) square_of_valves: f64,
     /// Widths of the ranges.
     pub(crate) width_n_m: f64,
     pub(crate) width_pa: f64,
@@ -53,6 +55,7 @@ fn summed(drive: &ScoredDrive) -> Estimated {
         let (Some(torque), Some(pressure)) = (clutch.torque_range_n_m, clutch.pressure_range_pa) else { continue };
         sum.rows += 1.0;
         sum.square += (clutch.torque_n_m[1] - clutch.torque_n_m[0]).powi(2);
+        sum.square_of_valves += (clutch.torque_n_m[2] - clutch.torque_n_m[0]).powi(2);
         sum.width_n_m += torque[1] - torque[0];
         sum.width_pa += pressure[1] - pressure[0];
         let is_outside = |[least, most]: [f64; 2], value: f64, room: f64| value < least - room || value > most + room;

@@ -8,8 +8,8 @@ mod pressures;
 
 use std::path::Path;
 
-use config::{Car, Source};
-use design::ShiftErrors;
+use config::{Car, CarErrorBounds, Source};
+use design::{ShiftErrors, any_shift_filter, shift_uncertainty};
 use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
@@ -62,7 +62,7 @@ fn fitted_files_of_drawn_cars_have_smaller_torque_errors_on_shifts_that_were_hel
         let [fitted_shifts, held_out] = every_fifth(recorded.shifts);
         assert!(fitted_shifts.len() >= 20, "{vehicle}: {}", fitted_shifts.len());
         let fit = fitted(&drawn, &fitted_shifts);
-        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
         let [given, found] = [&drawn.file, &file].map(|car| truth.squared_error(car, &held_out).sqrt());
         assert!(found < 0.6 * given, "{vehicle}: {given} {found}");
         let share = held(&drawn, &fit);
@@ -81,7 +81,7 @@ fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
     let drawn = Drawn::of(car("eight_speed.toml"), 3, Case::Usual);
     let (recorded, _) = drawn.driven(&city(1));
     let fit = fitted(&drawn, &recorded.shifts);
-    let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+    let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
     let text = &file.source.text;
     // Every line of the given file that has no fitted value stands in the new one.
     let changed = ["capacity_n_m_s2", "torque_ratio", "4.3976e-3", "2.0482e-3", "2.00, 1.88", "]"];
@@ -99,11 +99,11 @@ fn the_fitted_file_keeps_the_text_and_has_the_values_of_the_fit() {
     let again = fit::gearbox::fit(&file, &tables(&file), &recorded.shifts, &Driving::default(), &mut |_| ()).unwrap();
     let torque = Quantity::Torque(place);
     assert!(again.unknown(torque).abs() < fit.sd(torque), "{} {}", again.unknown(torque), fit.sd(torque));
-    let twice = again.vehicle_file(&file, &file.source.path, "a drive").unwrap().source.text;
+    let twice = again.vehicle_file(&file, &file.source.path, "a drive", None).unwrap().source.text;
     assert_eq!(twice.matches("[clutch.E]").count(), 1, "{twice}");
     // In another folder the gearbox file is named anew.
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fitted.toml");
-    let moved = fit.vehicle_file(&drawn.file, &folder, "a drive").unwrap();
+    let moved = fit.vehicle_file(&drawn.file, &folder, "a drive", None).unwrap();
     std::fs::write(&folder, &moved.source.text).unwrap();
     assert_eq!(Car::read(&folder).unwrap().clutches, moved.clutches);
 }
@@ -240,6 +240,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
         ("[clutch.E.error_bounds]\nvalve_hysteresis_pa = -1", "clutch.E.error_bounds.valve_hysteresis_pa"),
         ("[clutch.E.error_bounds]\nfriction = 0.1", "unknown field"),
         ("[error_bounds]\nconverter_share = 2", "error_bounds.converter_share"),
+        ("[error_bounds]\nvalve_error_scale = 0", "error_bounds.valve_error_scale"),
     ] {
         let error = with(text).unwrap_err().to_string();
         assert!(error.contains(words), "{text}: {error}");
@@ -251,7 +252,7 @@ fn the_file_of_a_car_can_have_its_own_springs_and_inertias() {
 fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     let given = car("eight_speed.toml");
     let gearbox = Source::read(&given.source.path.parent().unwrap().join("../gearboxes/8hp.toml")).unwrap();
-    let more = "[clutch.E.error_bounds]\nvalve_lag_factor = [0.9, 1.2]\n[error_bounds]\nconverter_share = 0.04\n";
+    let more = "[clutch.E.error_bounds]\nvalve_lag_factor = [0.9, 1.2]\n[error_bounds]\nconverter_share = 0.04\nwheel_scale_share = 0.01\n";
     let source = Source { text: format!("{}\n{more}", given.source.text), ..given.source.clone() };
     let own = Car::from_sources(source, gearbox).unwrap();
     let at = own.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
@@ -260,10 +261,20 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     assert_eq!(standard.of_element(&own, at).friction_factor, standard.of_element(&given, at).friction_factor);
     assert_eq!(standard.of_car(&given), standard);
     // Of the elements the widest.
-    assert_eq!(standard.of_car(&own), ShiftErrors { converter: 0.04, ..standard });
+    assert_eq!(standard.of_car(&own), ShiftErrors { converter: 0.04, wheel_scale: 0.01, ..standard });
     let tables = [&given, &own].map(tables);
     let budget = |car: usize| tables[car].tables().elements[tables[car].place(at).unwrap()].budget.unwrap();
     assert_eq!((budget(0).lag_factor, budget(1).lag_factor), ([0.5, 1.5], [0.9, 1.2]));
+    // What the valves err by over their bounds is for the filter alone, and not for the ranges.
+    let bounds = CarErrorBounds { valve_error_scale: Some(0.5), ..own.error_bounds.clone() };
+    let trusted = Car { error_bounds: bounds, ..own.clone() };
+    let filter = |car: &Car| any_shift_filter(car, &tables[1], &standard, None).uncertainty;
+    let [usual, half] = [&own, &trusted].map(filter);
+    assert_eq!([half.torque_share, half.kiss_point_pa], [0.5 * usual.torque_share, 0.5 * usual.kiss_point_pa]);
+    assert_eq!([half.valve_delay_s, half.pressure_pa], [0.5 * usual.valve_delay_s, 0.5 * usual.pressure_pa]);
+    assert_eq!((half.slow_part, half.inertia_share), (usual.slow_part, usual.inertia_share));
+    assert_eq!(shift_uncertainty(&trusted, &standard), usual);
+    assert_eq!(crate::tables(&trusted), tables[1]);
 }
 
 #[test]
@@ -271,15 +282,25 @@ fn the_ranges_of_a_fitted_file_hold_and_are_narrower() {
     for (case, seed) in [(Case::Usual, 9), (Case::WithTiming, 10)] {
         let drawn = Drawn::of(car("eight_speed.toml"), seed, case);
         let (recorded, _) = drawn.driven(&city(2));
-        let fit = fitted(&drawn, &recorded.shifts);
-        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+        let [fitted_shifts, held_out] = every_fifth(recorded.shifts);
+        let fit = fitted(&drawn, &fitted_shifts);
+        let file = |checked| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", checked).unwrap();
+        let unchecked = file(None);
+        let both = ((&drawn.file, &drawn.tables()), (&unchecked, &tables(&unchecked)));
+        let checked = fit.validate(both.0, both.1, &held_out).unwrap();
+        let file = file(Some(&checked));
+        assert_eq!(file.error_bounds.valve_error_scale.is_some(), unchecked.error_bounds.valve_error_scale.is_none());
+        assert!(checked.valve_error_scale < 0.8, "{checked:?}");
         for (place, name) in fit.quantities.elements.iter().enumerate() {
             let table = format!("[clutch.{name}.error_bounds]");
             assert_eq!(file.source.text.contains(&table), fit.elements_seen[place], "{name}");
         }
         let bounds = [&drawn.file, &file].map(|car| ShiftErrors::STANDARD.of_car(car));
         assert!(bounds[1].converter <= bounds[0].converter && bounds[1].inertia <= bounds[0].inertia, "{bounds:?}");
-        let found = estimated::estimated(&drawn, &city(1), &[drawn.file.clone(), file]);
+        let found = estimated::estimated(&drawn, &city(1), &[drawn.file.clone(), file, unchecked]);
+        // Where held-out shifts say that the valves err less than the bounds, the filter is better for it.
+        assert!(found[1].square < found[2].square && found[1].square < found[0].square, "{found:?}");
+        assert!(found[1].square < 1.2 * found[1].square_of_valves, "{found:?}");
         assert!(found[1].rows > 500.0, "{found:?}");
         found.iter().for_each(|found| assert_eq!(found.outside, [0.0; 2], "{found:?}"));
         if case == Case::Usual {
@@ -305,7 +326,7 @@ fn a_measured_pressure_tells_friction_and_gain_apart() {
     assert!(error.abs() < 2.0 * with.sd(gain) && with.sd(gain) < 0.01, "{error} {}", with.sd(gain));
     let [before, kept, found] = [None, Some(&without), Some(&with)].map(|fit| match fit {
         None => drawn.file.clone(),
-        Some(fit) => fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap(),
+        Some(fit) => fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap(),
     });
     let settled_pa = |car: &Car| car.clutches[at].unwrap().valve.settled_pressure(0.5);
     assert_eq!(settled_pa(&kept), settled_pa(&before));
@@ -340,7 +361,7 @@ fn a_measured_pressure_tells_a_fill_volume() {
     assert!(said.contains("for the fill volume of ") && said.contains("measure the pressure"), "{said}");
     let volume = |car: &Car| car.clutches[at].unwrap().cylinder.stroke_m3;
     let [kept, found] =
-        [&without, &with].map(|fit| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap());
+        [&without, &with].map(|fit| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap());
     assert!((volume(&kept) / volume(&drawn.file) - 1.0).abs() < 1e-4);
     assert!((volume(&found) / volume(&drawn.file) / fill.log_volume.exp() - 1.0).abs() < 1e-3);
     // The kiss point of the fitted file stays above the preload of its spring.

@@ -46,7 +46,7 @@ fn pistons_that_were_not_empty_leave_kiss_points_lags_and_friction_in_their_inte
         let fit = fitted(&drawn, &shifts);
         wrong.extend(outside(&drawn, &fit, is_asked));
         all += fit.quantities.all.iter().filter(|quantity| is_asked(quantity)).count();
-        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive").unwrap();
+        let file = fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap();
         let cars = [&drawn.file, &file].into_iter().zip(&mut squares);
         cars.for_each(|(car, sum)| *sum += truth.squared_error(car, &held_out));
         kiss[0] += squared_kiss_error(&drawn, &fit);

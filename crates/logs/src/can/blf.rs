@@ -174,10 +174,10 @@ impl Blf {
         let bytes = self.inner.get(start..start + object.size)?;
         let body = bytes.get(object.header..)?;
         // Head of version 1 or 2: flags, then the time in units of 10 us or 1 ns.
-        let (unit_s, stamp) =
-            (if u32_at(bytes, BASE) == 1 { 1e-5 } else { 1e-9 }, u64::from_le_bytes(bytes_at(bytes, 24)));
+        let (per_s, stamp) =
+            (if u32_at(bytes, BASE) == 1 { 1e5 } else { 1e9 }, u64::from_le_bytes(bytes_at(bytes, 24)));
         #[expect(clippy::cast_precision_loss, reason = "2^53 ns are 104 days")]
-        let time_s = stamp as f64 * unit_s;
+        let time_s = stamp as f64 / per_s;
         let (id, payload, remote) = match object.kind {
             CAN_MESSAGE | CAN_MESSAGE2 => {
                 let length = usize::from(*body.get(3)?).min(8);

@@ -208,20 +208,24 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
 
 /// When a signal is in force; none if always.
 fn multiplexed(dbc: &Dbc, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Option<Multiplexed> {
+    let extended = |name: &str| {
+        dbc.extended_multiplex.iter().find(|entry| entry.message_id == message.id && entry.signal_name == name)
+    };
+    // A multiplexor in another one is not marked as multiplexed by every writer: the ranges say it.
+    if let Some(extended) = extended(&signal.name) {
+        let by = message.signals.iter().position(|other| other.name == extended.multiplexor_signal_name);
+        let values = extended.mappings.iter().map(|mapping| (mapping.min_value, mapping.max_value)).collect();
+        return Some(Multiplexed { by: by.unwrap_or(usize::MAX), values });
+    }
     let value = match signal.multiplexer_indicator {
         MultiplexIndicator::Plain | MultiplexIndicator::Multiplexor => return None,
         MultiplexIndicator::MultiplexedSignal(value) | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value) => {
             value
         }
     };
-    let place = |name: &str| message.signals.iter().position(|signal| signal.name == name);
-    let extended =
-        dbc.extended_multiplex.iter().find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
-    if let Some(extended) = extended {
-        let values = extended.mappings.iter().map(|mapping| (mapping.min_value, mapping.max_value)).collect();
-        return Some(Multiplexed { by: place(&extended.multiplexor_signal_name).unwrap_or(usize::MAX), values });
-    }
-    let main =
-        message.signals.iter().position(|signal| signal.multiplexer_indicator == MultiplexIndicator::Multiplexor);
+    let is_main = |other: &can_dbc::Signal| {
+        other.multiplexer_indicator == MultiplexIndicator::Multiplexor && extended(&other.name).is_none()
+    };
+    let main = message.signals.iter().position(is_main);
     Some(Multiplexed { by: main.unwrap_or(usize::MAX), values: vec![(value, value)] })
 }

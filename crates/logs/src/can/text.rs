@@ -23,6 +23,8 @@ pub(crate) struct Lines {
     frames: u64,
     unread: u64,
     first_unread: Option<String>,
+    /// Whether a frame in a last line without an end was left out.
+    is_cut: bool,
     /// ASC: identifiers and data are hexadecimal.
     hex: bool,
     /// ASC: times count from the frame before.
@@ -55,6 +57,7 @@ impl Lines {
             frames: 0,
             unread: 0,
             first_unread: None,
+            is_cut: false,
             hex: true,
             relative: false,
             time_s: 0.0,
@@ -231,7 +234,10 @@ impl Frames for Lines {
                 CanKind::Asc => self.asc(&text),
                 _ => self.candump(&text),
             };
+            // Of a last line without an end digits or bytes may be missing.
+            let has_no_end = !self.line.ends_with(b"\n") && (self.line.len() as u64) < LONGEST_LINE;
             match line {
+                Line::Frame(_) | Line::Unread if has_no_end => self.is_cut = true,
                 Line::Frame(frame) => {
                     self.frames += 1;
                     self.watch(frame.time_s);
@@ -254,6 +260,9 @@ impl Frames for Lines {
                     self.unread, self.frames
                 ),
             )),
+            _ if self.frames == 0 && self.is_cut => {
+                Err(LogError::file(&self.path, "the only data frame stands in a last line without an end"))
+            }
             _ if self.frames == 0 => Err(LogError::file(&self.path, "there are no data frames")),
             _ => Ok(None),
         }
@@ -263,6 +272,9 @@ impl Frames for Lines {
         let note =
             |first: &String| format!("{} lines are no frames and are left out, the first is {first}", self.unread);
         let mut notes: Vec<String> = self.first_unread.iter().map(note).collect();
+        if self.is_cut {
+            notes.push("the last line has no end and is left out".to_owned());
+        }
         // Of times between frames nearly half are less than the one before, or all are the same; of stamps in two orders, few are.
         if 4 * self.falling > self.frames || self.rising == 0 && self.frames > 1 {
             notes.push(

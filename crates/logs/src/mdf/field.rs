@@ -3,8 +3,9 @@
 use half::f16;
 
 use falcon_mdf::blocks::channel::{ChannelType, DataType};
-use falcon_mdf::{Channel as MdfChannel, ChannelGroup, Conversion, blocks::conversion::ConversionOutput};
+use falcon_mdf::{Channel as MdfChannel, ChannelGroup, Conversion};
 
+use super::conversion::{is_by_text, keeps_numbers, unreadable};
 use super::records::Window;
 use crate::columns::{Column, are_finite};
 use crate::samples::Quality;
@@ -101,8 +102,7 @@ impl<'a> Field<'a> {
         let bytes = if kind == Kind::Index { 0 } else { (shift + bits).div_ceil(8) as usize };
         let byte = usize::try_from(channel.byte_offset).ok()?;
         let is_inside = kind == Kind::Index || byte.checked_add(bytes)? <= group.payload_size();
-        let is_known =
-            !matches!(channel.conversion.output(), ConversionOutput::Unsupported) && is_inside && !is_by_text(channel);
+        let is_known = is_inside && unreadable(&channel.conversion).is_none() && !is_by_text(&channel.conversion);
         let bit = channel.inval_bit_pos;
         let invalid = match (bit / 8) as usize {
             _ if channel.all_invalid => Invalid::Always,
@@ -284,24 +284,19 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Applies the conversion; where it makes text, the numbers before it.
+    /// Applies the conversion; where it makes only text, the numbers before it.
     #[inline(always)]
     fn convert(&self, numbers: impl Iterator<Item = f64>, values: &mut Vec<f64>) {
         match self.conversion {
             Conversion::None => values.extend(numbers),
             Conversion::Linear { offset, factor } => values.extend(numbers.map(|number| factor * number + offset)),
-            other if other.output() == ConversionOutput::Text => values.extend(numbers),
+            other if keeps_numbers(other) => values.extend(numbers),
             other => {
                 let is_float = self.kind == Kind::Float;
                 values.extend(numbers.map(|number| other.convert(number, is_float)));
             }
         }
     }
-}
-
-/// Whether a conversion takes texts.
-fn is_by_text(channel: &MdfChannel) -> bool {
-    matches!(channel.conversion, Conversion::TextToValue { .. } | Conversion::TextToText { .. })
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::path::Path;
 use falcon_mdf::blocks::channel::ChannelType;
 use falcon_mdf::{Channel as MdfChannel, Conversion, Mf4Error, Signal, SignalValues, SignalsChunks};
 
+use super::conversion::keeps_numbers;
 use super::field::{Field, Tile};
 use super::records::Records;
 use super::{BATCH, GroupAt, MdfLog, ON_TRUST};
@@ -134,7 +135,7 @@ fn fill(signal: &Signal, column: &mut Column, rows: usize) -> Result<(), Mf4Erro
     Ok(())
 }
 
-/// The values of a signal; where the conversion makes text of them, the numbers before it.
+/// The values of a signal; where the conversion makes only text of them, the numbers before it.
 pub(super) fn numbers(signal: &Signal) -> Result<Vec<f64>, Mf4Error> {
     let channel = signal.channel();
     if channel.is_float() && channel.bit_count == 16 {
@@ -149,10 +150,14 @@ pub(super) fn numbers(signal: &Signal) -> Result<Vec<f64>, Mf4Error> {
         values.iter_mut().for_each(|value| *value = factor * *value + offset);
         return Ok(values);
     }
-    match signal.values()? {
-        SignalValues::Str(_) => Ok(plain(signal.raw_values()?)),
-        values => Ok(plain(values)),
+    let values = match signal.values()? {
+        SignalValues::Str(_) => plain(signal.raw_values()?),
+        values => return Ok(plain(values)),
+    };
+    if keeps_numbers(&channel.conversion) {
+        return Ok(values);
     }
+    Ok(values.into_iter().map(|number| channel.conversion.convert(number, channel.is_float())).collect())
 }
 
 fn plain(values: SignalValues) -> Vec<f64> {

@@ -5,6 +5,8 @@
 
 mod blocks;
 mod bus;
+mod conversion;
+mod cut;
 mod field;
 mod group;
 mod records;
@@ -23,6 +25,7 @@ use crate::columns::{Batch, Stream};
 use crate::{Channel, LogError, error};
 use blocks::Blocks;
 use bus::Bus;
+use conversion::unreadable;
 use field::{Field, Tile};
 use group::{Decoding, Group, Part};
 use records::Records;
@@ -52,6 +55,8 @@ pub(crate) struct MdfLog {
     /// Signals on a logged bus, behind the channels of the file.
     database: Option<Database>,
     notes: Vec<String>,
+    /// The first place of a file that is cut, and what it lacks.
+    cut: Option<(String, String)>,
 }
 
 /// Where a channel is, and the group with its time.
@@ -71,12 +76,20 @@ impl MdfLog {
             max_decompressed: LARGEST_BLOCK,
             ..OpenOptions::default()
         };
-        let file = Mf4File::open_with_options(path, options).map_err(|error| damaged(path, "its structure", &error))?;
+        let (file, cut) = match Mf4File::open_with_options(path, options.clone()) {
+            Ok(file) => (file, None),
+            Err(error) => {
+                let is_cut = matches!(error, Mf4Error::TruncatedFile { .. });
+                let mended = if is_cut { cut::open(path, options) } else { None };
+                let (file, place, what) = mended.ok_or_else(|| damaged(path, "its structure", &error))?;
+                (file, Some((place, what)))
+            }
+        };
         let blocks = Arc::new(Blocks::new(File::open(path).map_err(LogError::io(path))?));
         let mut names = HashMap::new();
         groups(&file).for_each(|(_, group)| *names.entry(group.acquisition_name.clone()).or_default() += 1);
         let (path, places, notes) = (path.to_owned(), Vec::new(), Vec::new());
-        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, notes };
+        let mut log = Self { path, file, blocks, crew: Crew::of(1), names, places, database, notes, cut };
         let mut channels = log.find_channels();
         if log.file.unfinalized().is_some() {
             log.notes.push("the file was not finished by its recorder: what stands in it is read".to_owned());
@@ -90,7 +103,7 @@ impl MdfLog {
     /// Finds the channels that hold numbers over time, and notes which do not.
     fn find_channels(&mut self) -> Vec<Channel> {
         let (mut places, mut channels) = (Vec::new(), Vec::new());
-        let (mut left_out, mut without_time) = (Vec::new(), Vec::new());
+        let mut left_out = LeftOut::default();
         let times = Times::of(&self.file);
         for (group, data) in groups(&self.file) {
             let name = self.group_name(group);
@@ -100,33 +113,28 @@ impl MdfLog {
                     Ok(time) => time,
                     Err(why) => {
                         let group = error::shown(&name);
-                        without_time.push(format!("{} (group `{group}`, {})", error::shown(&own.name), why.name()));
+                        left_out.without_time.push(format!(
+                            "{} (group `{group}`, {})",
+                            error::shown(&own.name),
+                            why.name()
+                        ));
                         continue;
                     }
                 };
                 let kind = not_numbers(own).or_else(|| self.not_beside(time, group, own));
                 if let Some(kind) = kind {
-                    left_out.push(format!("{} ({kind})", error::shown(&own.name)));
+                    left_out.no_numbers.push(format!("{} ({kind})", error::shown(&own.name)));
+                    continue;
+                }
+                if let Some(reason) = unreadable(&own.conversion) {
+                    left_out.unread.push(format!("{} ({})", error::shown(&own.name), error::shown(reason)));
                     continue;
                 }
                 places.push(Place { group, channel, time });
                 channels.push(Channel { name: own.name.clone(), unit: own.unit.clone(), group: name.clone() });
             }
         }
-        if !without_time.is_empty() {
-            self.notes.push(format!(
-                "{} channels are not over time and are left out: {}\nhint: let the recorder write a time into their group, or name a group that has one",
-                without_time.len(),
-                error::some(&without_time)
-            ));
-        }
-        if !left_out.is_empty() {
-            self.notes.push(format!(
-                "{} channels do not hold single numbers and are left out: {}",
-                left_out.len(),
-                error::some(&left_out)
-            ));
-        }
+        self.notes.extend(left_out.notes());
         self.places = places;
         channels
     }
@@ -149,7 +157,8 @@ impl MdfLog {
         for (i, place) in self.places.iter().enumerate().filter(|(i, _)| wanted[*i]) {
             over.entry(place.time).or_default().entry(place.group).or_default().push(i);
         }
-        let mut streams: Vec<Box<dyn Stream + Send + '_>> = Vec::new();
+        let cut = self.cut.as_ref().map(|(place, what)| LogError::damaged(&self.path, place, what));
+        let mut streams: Vec<Box<dyn Stream + Send + '_>> = vec![Box::new(Remarks { notes: &self.notes, cut })];
         for (time, groups) in over {
             streams.extend(self.streams_over(time, groups)?.into_iter().map(|group| Box::new(group) as Box<_>));
         }
@@ -163,7 +172,6 @@ impl MdfLog {
                 streams.push(Box::new(Bus::new(frames, Decoder::new(database, &wanted[own..]), own)));
             }
         }
-        streams.push(Box::new(Remarks(&self.notes)));
         Ok(streams)
     }
 
@@ -231,6 +239,30 @@ impl MdfLog {
     }
 }
 
+/// Channels that are left out, each with the reason.
+#[derive(Default)]
+struct LeftOut {
+    without_time: Vec<String>,
+    no_numbers: Vec<String>,
+    /// Their conversions cannot be read.
+    unread: Vec<String>,
+}
+
+impl LeftOut {
+    fn notes(&self) -> impl Iterator<Item = String> {
+        const HINT: &str = "\nhint: let the recorder write a time into their group, or name a group that has one";
+        let kinds = [
+            (&self.without_time, "are not over time", HINT),
+            (&self.no_numbers, "do not hold single numbers", ""),
+            (&self.unread, "have a conversion that cannot be read", ""),
+        ];
+        let some = kinds.into_iter().filter(|(names, ..)| !names.is_empty());
+        some.map(|(names, what, hint)| {
+            format!("{} channels {what} and are left out: {}{hint}", names.len(), error::some(names))
+        })
+    }
+}
+
 /// What a channel holds in place of single numbers, in a word; none if it holds these.
 fn not_numbers(channel: &MdfChannel) -> Option<&'static str> {
     match () {
@@ -258,14 +290,17 @@ fn damaged(path: &Path, place: &str, error: &Mf4Error) -> LogError {
 }
 
 /// What was seen when the file was opened.
-struct Remarks<'a>(&'a [String]);
+struct Remarks<'a> {
+    notes: &'a [String],
+    cut: Option<LogError>,
+}
 
 impl Stream for Remarks<'_> {
     fn next_batch(&mut self, _: &mut Batch) -> Result<bool, LogError> {
-        Ok(false)
+        self.cut.take().map_or(Ok(false), Err)
     }
 
     fn notes(&self) -> Vec<String> {
-        self.0.to_vec()
+        self.notes.to_vec()
     }
 }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use falcon_mdf::blocks::SyncType;
 use falcon_mdf::{Channel as MdfChannel, ChannelGroup, Mf4File};
 
+use super::conversion::unreadable;
 use super::{GroupAt, groups};
 
 /// Bytes of the head of a block, its number of links in them, and the link of a channel group to the one with its time.
@@ -23,6 +24,8 @@ pub(super) struct Times(HashMap<u64, GroupAt>);
 pub(super) enum WithoutTime {
     /// Its channels are over something else.
     Over(&'static str),
+    /// Its time has a conversion that cannot be read.
+    Unreadable,
     /// Neither it nor another group has one for it.
     Nowhere,
 }
@@ -31,6 +34,7 @@ impl WithoutTime {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Over(what) => what,
+            Self::Unreadable => "its time has a conversion that cannot be read",
             Self::Nowhere => "no time",
         }
     }
@@ -43,7 +47,8 @@ pub(super) fn time_channel(group: &ChannelGroup) -> Option<&MdfChannel> {
 
 impl Times {
     pub(super) fn of(file: &Mf4File) -> Self {
-        let with_time = groups(file).filter(|(_, group)| time_channel(group).is_some());
+        let is_read = |time: &MdfChannel| unreadable(&time.conversion).is_none();
+        let with_time = groups(file).filter(|(_, group)| time_channel(group).is_some_and(is_read));
         Self(with_time.map(|(at, group)| (group.block_offset(), at)).collect())
     }
 
@@ -55,6 +60,7 @@ impl Times {
             Some(SyncType::Angle) => WithoutTime::Over("over an angle"),
             Some(SyncType::Distance) => WithoutTime::Over("over a distance"),
             Some(SyncType::Index) => WithoutTime::Over("over a number of the record"),
+            _ if time_channel(group).is_some() => WithoutTime::Unreadable,
             _ => WithoutTime::Nowhere,
         })
     }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used, reason = "a test may unwrap, and not every test uses all of it")]
 
+pub(crate) mod mdf;
+
 use std::path::{Path, PathBuf};
 
 use logs::{Log, LogError, OpenOptions, Quality, Sample};

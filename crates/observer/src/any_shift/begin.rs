@@ -3,8 +3,8 @@
 use super::running::TURBINE_ACTS;
 use super::{
     AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N, OUTPUT,
-    PhaseMemory, RATE, Running, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput, ShiftPhase,
-    TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+    PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput,
+    ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
 
@@ -33,6 +33,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 running.before = None;
             }
             let slips = state.unfit >= SLIPS_IN_GEAR;
+            if slow && possible {
+                self.keep_wheel_scale(running, &mut state.learnt);
+            }
             if blind || slow || !possible || slips {
                 state.lose();
                 state.lost = blind || !possible;
@@ -82,9 +85,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             return (None, false);
         }
         let phase = if shift.is_some() { phase } else { ShiftPhase::InGear };
-        let wheel = first(WHEEL).unwrap_or(output / self.driveline.final_ratio);
         let mut running = Running {
-            x: self.balanced(state, ratio, [output, wheel], torque),
+            x: self.balanced(state, ratio, output, torque),
             gear: gear.from,
             shift: None,
             phase: PhaseMemory::new(phase),
@@ -94,6 +96,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             rates: [T::zero(); SPEEDS],
             gates: [Gate::new(GATE); SPEEDS],
             silent_s: [T::zero(); SPEEDS],
+            wheel_off_rad_s: T::zero(),
             misfit: T::one(),
             before: None,
         };
@@ -105,17 +108,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     }
 
     /// Mean and covariance in a gear with this ratio, the drive shafts in balance with the torque at the gearbox input.
-    fn balanced(
-        &self,
-        state: &AnyShiftState<T>,
-        ratio: T,
-        [output, wheel]: [T; 2],
-        torque: &turbine::Found<T>,
-    ) -> Gaussian<T> {
+    fn balanced(&self, state: &AnyShiftState<T>, ratio: T, output: T, torque: &turbine::Found<T>) -> Gaussian<T> {
         let u = &self.uncertainty;
         let shaft = torque.turbine_n_m * ratio * self.driveline.final_ratio;
         let mut mean = [T::zero(); N];
-        (mean[TURBINE], mean[OUTPUT], mean[WHEEL]) = (ratio * output, output, wheel);
+        (mean[TURBINE], mean[OUTPUT], mean[WHEEL]) = (ratio * output, output, output / self.driveline.final_ratio);
         (mean[SPRING], mean[LOAD]) = (shaft, shaft);
         let mut deviations = [T::zero(); N];
         deviations[OUTPUT] = self.readings[OUTPUT].deviation_rad_s;
@@ -125,6 +122,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         deviations[RATE] = u.rate_rad_s;
         deviations[SHARE] = u.turbine_share;
         let mut x = Gaussian::of(mean, deviations);
+        let [scale, scale_variance] = state.learnt.known_wheel_scale();
+        x.renew(SCALE, u.wheel_scale * scale, square(u.wheel_scale) * scale_variance);
         let known = self.known(&state.learnt, &self.acting_in_gear());
         x.renew(SLOW_SHARE, known.mean[TURBINE_ACTS], known.covariance[TURBINE_ACTS][TURBINE_ACTS]);
         // Turbine and output are tied.

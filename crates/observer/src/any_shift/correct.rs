@@ -1,9 +1,10 @@
 //! Corrections by the readings of turbine, output and wheel speed.
 
 use super::{
-    AnyShiftFilter, ChannelHealth, Channels, GAP_S, MISFIT_S, Measured, OUTPUT, Rates, Reading, Running, SPEEDS,
-    ShiftInput, TOOTH, TURBINE, Verdict, WHEEL, square,
+    AnyShiftFilter, ChannelHealth, Channels, GAP_S, MISFIT_S, Measured, OUTPUT, Rates, Reading, Running, SCALE, SPEEDS,
+    ShiftInput, TOOTH, TURBINE, TWIST_RAD, Verdict, WHEEL, WHEEL_S, square,
 };
+use crate::any_shift::learnt::EDGE;
 use drivetrain::Real;
 
 impl<T: Real> AnyShiftFilter<'_, T> {
@@ -60,13 +61,21 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let age_s = self.age(sensor, reading);
         let pitch_s = sensor.pitch_rad / reading.value.abs().max(self.uncertainty.output_least_rad_s);
         let rate = rates.of(k, &running.x);
-        // The speed at the time of the reading: `w - age w'`.
-        let mut row = rates.rows[k].map(|x| -age_s * x);
-        row[k] = row[k] + T::one();
+        // The speed at the time of the reading: `w - age w'`, that of the wheels in its own scale.
+        let scale = if k == WHEEL { T::one() + running.x.mean[SCALE] } else { T::one() };
+        let then = running.x.mean[k] - age_s * rate;
+        let mut row = rates.rows[k].map(|x| -age_s * scale * x);
+        row[k] = row[k] + scale;
+        if k == WHEEL {
+            row[SCALE] = row[SCALE] + then;
+        }
         let bent = T::of(0.5) * age_s * (rate - running.rates[k]);
         let noise = square(sensor.deviation_rad_s) + square(T::of(TOOTH) * rate * pitch_s) + square(bent);
-        let innovation = reading.value - (running.x.mean[k] - age_s * rate);
+        let innovation = reading.value - scale * then;
         let measured = Measured { row, innovation, noise };
+        if k == WHEEL && !self.is_of_this_car(running, reading, age_s) {
+            return ChannelHealth::Refused;
+        }
         let mut look = running.x.look(&measured);
         let variance = look.variance;
         if k != WHEEL {
@@ -84,6 +93,18 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         running.x.correct(&look);
         running.silent_s[k] = T::zero();
         ChannelHealth::Good
+    }
+
+    /// Whether the wheel speed is that of the output within the bound of its scale, over more than a swing of the drive shafts. What is
+    /// further off is no speed of these wheels: of others that slip, or of a car with another final ratio.
+    fn is_of_this_car(&self, running: &mut Running<T>, reading: &Reading<T>, age_s: T) -> bool {
+        let share = running.silent_s[WHEEL] / (running.silent_s[WHEEL] + T::of(WHEEL_S));
+        running.silent_s[WHEEL] = T::zero();
+        let by_output = (running.x.mean[OUTPUT] - age_s * running.rates[OUTPUT]) / self.driveline.final_ratio;
+        let off = reading.value - by_output;
+        running.wheel_off_rad_s = running.wheel_off_rad_s + share * (off - running.wheel_off_rad_s);
+        let scale = T::of(EDGE) * self.uncertainty.wheel_scale * by_output.abs();
+        running.wheel_off_rad_s.abs() <= scale + T::of(TWIST_RAD / WHEEL_S)
     }
 }
 

@@ -383,6 +383,8 @@ mod tests {
         turbine_share_s: 3.0,
         inertia_share: 0.14,
         stiffness_share: 0.12,
+        wheel_scale: 0.0115,
+        wheel_scale_walk: 4e-5,
         rate_rad_s: 0.1,
         rate_walk: 0.01,
         load_walk: 1500.0,

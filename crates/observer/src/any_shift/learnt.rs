@@ -8,6 +8,7 @@
 //! | `c` | car | torque at the gearbox input: the converter's capacity |
 //!
 //! | `e` | car | stiffness of the drive shafts: it is in what is seen, and the filter has no state of it |
+//! | `s` | car | scale of the wheel speed |
 //!
 //! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the six of
 //! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`Shown`])
@@ -27,6 +28,9 @@
 //! was learnt before is forgotten. What comes from another drive begins with even odds. Some of what a bad log leaves is in
 //! directions that no shift shows, turbine torque against stiffness: so it also begins with the covariance of both together.
 //!
+//! **Wheel speed.** Its scale shows in a gear, because the twist of the drive shafts is bounded. It acts in no shift's measurements:
+//! the filter goes on with its own state of it from gear to gear, and what is kept here is where another run begins.
+//!
 //! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
 //! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.
 
@@ -38,13 +42,14 @@ use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
-/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness.
+/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed.
 const KISS_AT: usize = MAX_ELEMENTS;
 const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
 const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
 const STIFFNESS_AT: usize = TURBINE_AT + 1;
+const WHEEL_AT: usize = STIFFNESS_AT + 1;
 /// How many quantities are learnt.
-pub const LEARNT: usize = STIFFNESS_AT + 1;
+pub const LEARNT: usize = WHEEL_AT + 1;
 /// How many of them act in a shift.
 pub(super) const ACTING: usize = 6;
 
@@ -58,7 +63,7 @@ const REFUSED_MOST: u8 = 8;
 /// shifts. What is well known stays open to what comes, also in single precision.
 const PER_SHIFT: f64 = 2.5e-4;
 /// Bound of a quantity in its deviations: the edge of a uniform distribution, and of the sum of two.
-const EDGE: f64 = 1.732;
+pub(super) const EDGE: f64 = 1.732;
 const EDGE_OF_TWO: f64 = 2.449;
 /// Correlation of the torque factors of two elements unlearnt \[chosen\]: half of the variance of the friction is that of the oil,
 /// which all of them share, and friction is two thirds of that of the factor. Without it a friction that is wrong in all
@@ -76,7 +81,7 @@ const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the temperature of the
-/// oil, of which there is no channel; the inertia with nothing but a repair. Torque factor and kiss point have the gain in
+/// oil, of which there is no channel; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
 /// common, and fade together: else their correlation could not last.
 const WITH_OIL_S: f64 = 7200.0;
 const INERTIA_S: f64 = 3.6e6;
@@ -86,7 +91,7 @@ const INERTIA_S: f64 = 3.6e6;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt<T> {
     /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
-    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts.
+    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed.
     pub mean: [T; LEARNT],
     /// Their covariance, in the same units.
     pub covariance: [[T; LEARNT]; LEARNT],
@@ -193,6 +198,27 @@ impl<T: Real> Learnt<T> {
     pub(super) fn of_pair(&self, pair: usize) -> Option<[T; 2]> {
         let place = INERTIA_AT + pair.min(MAX_PAIRS - 1);
         (pair < MAX_PAIRS).then_some([self.mean[place], self.covariance[place][place].sqrt()])
+    }
+
+    /// Mean and variance of the scale of the wheel speed.
+    pub(super) fn of_wheel(&self) -> [T; 2] {
+        [self.mean[WHEEL_AT], self.covariance[WHEEL_AT][WHEEL_AT]]
+    }
+
+    /// The same by what is learnt and the budget together.
+    pub(super) fn known_wheel_scale(&self) -> [T; 2] {
+        let ([mean, variance], car) = (self.of_wheel(), self.probability());
+        let rest = T::one() - car;
+        [car * mean, car * variance + rest * (T::one() + car * mean * mean)]
+    }
+
+    /// Takes mean and variance of the scale of the wheel speed, within the bounds.
+    pub(super) fn keep_wheel(&mut self, mean: T, variance: T) {
+        if mean.is_finite() && variance.is_finite() {
+            let edge = T::of(EDGE);
+            self.mean[WHEEL_AT] = mean.max(-edge).min(edge);
+            self.covariance[WHEEL_AT][WHEEL_AT] = variance.max(T::of(PER_SHIFT)).min(T::one());
+        }
     }
 
     /// What the acting quantities are before a shift, by what is learnt alone.
@@ -320,7 +346,7 @@ impl<T: Real> Learnt<T> {
     pub(super) fn pass(&mut self, dt_s: T, correlations: &Correlations<T>) {
         let one = T::one();
         let [oil, inertia] = [WITH_OIL_S, INERTIA_S].map(|s| (-dt_s / T::of(s)).exp());
-        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || k == STIFFNESS_AT;
+        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || k >= STIFFNESS_AT;
         let stay = |k: usize| if lasts(k) { inertia } else { oil };
         for i in 0..LEARNT {
             self.mean[i] = stay(i) * self.mean[i];

@@ -5,7 +5,8 @@
 //! | `w_t`, `w_o`, `w_w` | momentum | speeds of turbine, output and driven wheels, rad/s |
 //! | `T_s` | `K_s (w_o/i_df - w_w + r)` | torque of the shafts' spring, N m |
 //! | `T_L` | random walk | load at the wheels: road, grade, mass, brake, tyre, N m |
-//! | `r` | random walk | error of the rate of twist: the scale of the wheel speed, rad/s |
+//! | `r` | random walk | error of the rate of twist: what a scale leaves of the wheel speed's error, as by a delay, rad/s |
+//! | `s` | constant | error of the scale of the wheel speed, as a share: its reading is that of `(1 + s) w_w` |
 //! | `b` | fades in seconds | share by which the turbine torque differs from its sources |
 //! | `c` | fades in hours, unit variance | the part of that share that lasts |
 //! | `f_off`, `f_on` | random walk, unit variance | error of the clutch's torque: friction and valve gain, which show as one |
@@ -22,7 +23,7 @@
 //!
 //! Torque is estimated, and pressure follows: it is the valve model's, with the gain of the valve that `f` and `k` speak for.
 //!
-//! `c`, `f`, `k` and `m` last longer than a shift. What a shift has shown of them is kept in [`Learnt`], which can be saved
+//! `s`, `c`, `f`, `k` and `m` last longer than a shift. What a shift or the time in a gear has shown of them is kept in [`Learnt`], which can be saved
 //! and given to another filter of the same car ([`AnyShiftFilter::start_with`]), which believes it as far as its shifts show it.
 
 mod begin;
@@ -62,9 +63,9 @@ pub use pistons::Piston;
 pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
-const N: usize = 15;
+const N: usize = 16;
 /// The first of them are all that moves in a gear.
-const IN_GEAR: usize = 8;
+const IN_GEAR: usize = 9;
 const TURBINE: usize = 0;
 const OUTPUT: usize = 1;
 const WHEEL: usize = 2;
@@ -72,13 +73,14 @@ const SPEEDS: usize = 3;
 const SPRING: usize = 3;
 const LOAD: usize = 4;
 const RATE: usize = 5;
-const SHARE: usize = 6;
-const SLOW_SHARE: usize = 7;
+const SCALE: usize = 6;
+const SHARE: usize = 7;
+const SLOW_SHARE: usize = 8;
 /// Of the offgoing and of the oncoming clutch.
-const FRICTION: [usize; 2] = [8, 9];
-const KISS: [usize; 2] = [10, 11];
-const PRESSURE: [usize; 2] = [12, 13];
-const INERTIA: usize = 14;
+const FRICTION: [usize; 2] = [9, 10];
+const KISS: [usize; 2] = [11, 12];
+const PRESSURE: [usize; 2] = [13, 14];
+const INERTIA: usize = 15;
 /// The states that are learnt.
 const LASTING: [usize; ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_SHARE];
 
@@ -93,13 +95,16 @@ const FIRST_S: f64 = 0.05;
 const SHARE_S: f64 = 0.06;
 /// How long the drive shafts twist in one direction, s: half a swing \[chosen\].
 const TWIST_S: f64 = 0.1;
+/// Time over which the wheel speed is compared with that of the output, s, and the largest twist of the drive shafts, rad \[chosen\].
+const WHEEL_S: f64 = 1.0;
+const TWIST_RAD: f64 = 0.3;
 /// Deviation of the age of the last tooth, in the time between two.
 const TOOTH: f64 = 0.6;
 /// Deviation of the model of the speeds over 10 ms, in deviations of a reading.
 const MODEL_SHARE: f64 = 0.1;
 /// Deviations of an innovation beyond which a reading is refused.
 const GATE: u8 = 5;
-/// Deviations at the start \[chosen\]: of the wheel speed about the output's, rad/s; of the shaft torque beside the share
+/// Deviations at the start \[chosen\]: of the rate of twist, as an error of the wheel speed, rad/s; of the shaft torque beside the share
 /// `b`, and of the load about the shaft torque, each as a share and beside it, N m: the car may accelerate or brake.
 const WHEEL_START_RAD_S: f64 = 0.3;
 const SHAFT_START: (f64, f64) = (0.3, 100.0);
@@ -140,7 +145,11 @@ pub struct ShiftUncertainty<T> {
     pub inertia_share: T,
     /// Of the stiffness of the drive shafts, as a share.
     pub stiffness_share: T,
-    /// Of the rate of twist at the start, rad/s.
+    /// Of the scale of the wheel speed, as a share.
+    pub wheel_scale: T,
+    /// Its random walk, per root second.
+    pub wheel_scale_walk: T,
+    /// Of the rate of twist at the start, rad/s: what a scale leaves of the wheel speed's error.
     pub rate_rad_s: T,
     /// Its random walk, rad/s per root second.
     pub rate_walk: T,
@@ -247,8 +256,10 @@ struct Running<T> {
     /// Rates of turbine, output and wheel speed, rad/s^2.
     rates: [T; SPEEDS],
     gates: [Gate; SPEEDS],
-    /// Time since a reading was taken, s.
+    /// Time since a reading was taken, s; of the wheel speed since one came.
     silent_s: [T; SPEEDS],
+    /// By how much the wheel speed is above that of the output, low-passed, rad/s.
+    wheel_off_rad_s: T,
     /// Mean squared innovation of turbine and output speed.
     misfit: T,
     /// What was known of the lasting states when the shift began; none if it cannot be learnt from.
@@ -289,6 +300,8 @@ impl<T: Real> ShiftUncertainty<T> {
             turbine_share_s: to(self.turbine_share_s),
             inertia_share: to(self.inertia_share),
             stiffness_share: to(self.stiffness_share),
+            wheel_scale: to(self.wheel_scale),
+            wheel_scale_walk: to(self.wheel_scale_walk),
             rate_rad_s: to(self.rate_rad_s),
             rate_walk: to(self.rate_walk),
             load_walk: to(self.load_walk),

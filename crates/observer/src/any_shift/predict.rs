@@ -2,8 +2,8 @@
 
 use super::{
     AnyShiftFilter, CORE, ClutchTorque, Contact, ElementState, FRICTION, FrictionElement, LOAD, MAX_ELEMENTS,
-    MODEL_SHARE, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SHARE, SHARE_S, SPRING, ShiftRow, TURBINE,
-    TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
+    MODEL_SHARE, Motion, N, OUTPUT, PRESSURE, RATE, Response, Running, SCALE, SHARE, SHARE_S, SPRING, ShiftRow,
+    TURBINE, TWIST_S, Torques, WHEEL, free, output_rate, pieces, square, tied, turbine,
 };
 use crate::any_shift::elements::positive_part;
 use drivetrain::Real;
@@ -101,9 +101,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let (rows, rest) = motion.rows(torques);
         let (by_torque, [share, pressure]) = (motion.per_turbine_torque(), motion.stay);
         let in_shift = running.shift.is_some();
-        let twist_rate =
-            self.driveline.twist_rate(running.x.mean[OUTPUT], running.x.mean[WHEEL]) + running.x.mean[RATE];
         let x = &mut running.x;
+        let twist_rate = self.driveline.twist_rate(x.mean[OUTPUT], x.mean[WHEEL]) + x.mean[RATE];
         x.pass(&rows, &rest);
         x.fade(SHARE, share);
         // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
@@ -120,7 +119,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 }
             }
         }
-        for (state, walk) in [(LOAD, u.load_walk), (RATE, u.rate_walk)] {
+        for (state, walk) in [(LOAD, u.load_walk), (RATE, u.rate_walk), (SCALE, u.wheel_scale_walk)] {
             x.add(state, state, walk * walk * dt_s);
         }
         x.add(SHARE, SHARE, u.turbine_share * u.turbine_share * (T::one() - share * share));

@@ -2,8 +2,8 @@
 
 use super::{
     ACTING, Acting, AnyShiftFilter, Correlations, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS, Known, LASTING,
-    Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SLOW_SHARE, ShiftPhase, ShiftRow,
-    ShiftUncertainty, Slip,
+    Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE, SLOW_SHARE, ShiftPhase,
+    ShiftRow, ShiftUncertainty, Slip,
 };
 use drivetrain::Real;
 
@@ -112,6 +112,20 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         Some(of.map(|value| self.uncertainty.inertia_share * value))
     }
 
+    /// What is learnt of the scale of the wheel speed: its error as a share, and the deviation.
+    pub fn learnt_wheel_scale(&self, learnt: &Learnt<T>) -> [T; 2] {
+        let [mean, variance] = learnt.of_wheel();
+        [mean, variance.sqrt()].map(|value| self.uncertainty.wheel_scale * value)
+    }
+
+    /// Keeps what the readings have shown of the scale of the wheel speed.
+    pub(super) fn keep_wheel_scale(&self, running: &Running<T>, learnt: &mut Learnt<T>) {
+        let per = self.uncertainty.wheel_scale.recip();
+        if per.is_finite() {
+            learnt.keep_wheel(per * running.x.mean[SCALE], per * per * running.x.covariance[SCALE][SCALE]);
+        }
+    }
+
     /// What is learnt and acts in a shift.
     pub(super) fn acting(&self, shift: &ShiftRow<T>) -> Acting<T> {
         let elements = shift.clutches.map(|clutch| clutch.element);
@@ -198,6 +212,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let from_gear = running.shift.is_none();
         if from_gear {
             self.learn_turbine(running, learnt);
+            if running.misfit <= T::of(MISFIT) {
+                self.keep_wheel_scale(running, learnt);
+            }
             self.enter_shift(running, shift, learnt);
             running.before = (running.misfit <= T::of(MISFIT)).then(|| self.known(learnt, &self.acting(&shift)));
         } else {

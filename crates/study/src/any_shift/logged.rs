@@ -31,9 +31,6 @@ const STICKS_RAD_S: f64 = 0.05;
 const RATIO_FROM_RAD_S: f64 = 20.0;
 const RATIO_SHARE: f64 = 0.1;
 
-/// Share of the final ratio by which output over wheel speed may differ in the middle of a drive \[chosen\]: slip of the tyres is less.
-const WHEEL_SHARE: f64 = 0.01;
-
 /// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;
 
@@ -503,14 +500,16 @@ impl<'c> LoggedDrive<'c> {
             ));
         }
         let final_ratio = self.car.driveline.final_ratio;
-        let off = self.output_over_wheel() / final_ratio - 1.0;
-        if off.abs() > WHEEL_SHARE {
+        let (off, bound) =
+            (self.output_over_wheel() / final_ratio - 1.0, ShiftErrors::LOGGED.of_car(self.car).wheel_scale);
+        if off.abs() > bound {
             warnings.push(format!(
-                "warning: output_speed over wheel_speed is {:.3} in the middle, {:+.1} % from the final ratio {final_ratio:.3}: the filter takes what \
-                 is more than slip of the tyres for twist of the drive shafts, and may be worse than without wheel_speed. Correct the scale of \
-                 wheel_speed or `driveline.final_ratio`, or leave wheel_speed out",
+                "warning: output_speed over wheel_speed is {:.3} in the middle, {:+.1} % from the final ratio {final_ratio:.3}: the filter learns the \
+                 scale of wheel_speed within {:.1} % and refuses what is further off. Correct the scale of wheel_speed or `driveline.final_ratio`, or \
+                 give its bound as `error_bounds.wheel_scale_share`",
                 self.output_over_wheel(),
-                100.0 * off
+                100.0 * off,
+                100.0 * bound
             ));
         }
         ScoredDrive { warnings, ..self.passing.drive }

@@ -414,7 +414,7 @@ fn single_precision_estimates_the_same() {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
-fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
+pub(crate) fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
     let to = |reading: Option<Reading<f64>>| {
         reading.map(|reading| Reading { value: reading.value as f32, age_s: reading.age_s as f32 })
     };

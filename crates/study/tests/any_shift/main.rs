@@ -10,6 +10,7 @@ mod learning;
 mod limits;
 mod sensitivity;
 mod strokes;
+mod wheel;
 
 use cars::{cars, sensors};
 use config::Car;

@@ -235,3 +235,30 @@ fn the_scale_of_all_torques_is_never_known_better_than_the_stiffness() {
     assert!(turbine < 0.7 && stiffness > 0.6, "{turbine} {stiffness}");
     assert!(learnt.covariance[TURBINE_AT][TURBINE_AT] > 0.3, "{}", learnt.covariance[TURBINE_AT][TURBINE_AT]);
 }
+
+#[test]
+fn the_scale_of_the_wheel_speed_is_kept_within_its_bounds_and_apart_from_all_else() {
+    let mut learnt = Learnt::nothing(&CORRELATIONS);
+    assert_eq!(learnt.of_wheel(), [0.0, 1.0]);
+    learnt.keep_wheel(0.8, 1e-9);
+    assert_eq!(learnt.of_wheel(), [0.8, PER_SHIFT]);
+    for wrong in [[f64::NAN, 0.1], [0.1, f64::NAN], [f64::INFINITY, 0.1]] {
+        learnt.keep_wheel(wrong[0], wrong[1]);
+        assert_eq!(learnt.of_wheel(), [0.8, PER_SHIFT], "{wrong:?}");
+    }
+    learnt.keep_wheel(-9.0, 7.0);
+    assert_eq!(learnt.of_wheel(), [-EDGE, 1.0]);
+    learnt.keep_wheel(0.8, 0.01);
+    // Shifts show nothing of it, and a day takes little away.
+    let mut seed = 7;
+    shown_by(|_| 0.5, &mut learnt, 8, &mut seed);
+    learnt.pass(24.0 * 3600.0, &CORRELATIONS);
+    let [mean, variance] = learnt.of_wheel();
+    assert!((mean - 0.8).abs() < 0.03 && variance < 0.06 && learnt.is_sound(), "{mean} {variance}");
+    // Another drive may be of another car, and another car has other tyres.
+    let [doubted, open] = learnt.doubted(&CORRELATIONS).of_wheel();
+    assert!((doubted - 0.5 * mean).abs() < 1e-12 && open > 0.5);
+    shown_by(|place| if place < INERTIA_AT { 1.2 } else { 0.0 }, &mut learnt, 40, &mut seed);
+    shown_by(|place| if place < INERTIA_AT { -1.2 } else { 0.0 }, &mut learnt, 8, &mut seed);
+    assert_eq!(learnt.of_wheel()[0], 0.0);
+}
