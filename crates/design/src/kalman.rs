@@ -90,6 +90,30 @@ pub(crate) fn engine_noise(sensor: Option<&SpeedSensor>, quantum_rad_s: f64) -> 
 /// moment, with the noise of the error budget.
 ///
 /// A bound of the budget counts as the edge of a uniform distribution.
+///
+/// With its guaranteed ranges, in single precision, for a controller (`docs/controller.md`):
+///
+/// ```
+/// # use observer::{Estimator, Input, Reading};
+/// # let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/two_speed_at.toml"));
+/// let vehicle = config::Vehicle::read(path)?;
+/// let observer = design::kalman_filter(&vehicle, None).cast::<f32>();
+/// let range = design::range(&vehicle).guaranteed().cast::<f32>();
+/// let for_the_controller = observer::Bounded { observer, range };
+///
+/// // On the controller, in each sample: what came since the one before.
+/// let mut state = for_the_controller.start();
+/// let input = Input {
+///     engine_rad_s: Some(Reading::now(250.0)),
+///     turbine_rad_s: Some(Reading { value: 200.0, age_s: 0.004 }),
+///     output_rad_s: Some(Reading { value: 80.0, age_s: 0.004 }),
+///     command: Some(Reading::now(0.0)),
+///     ..Input::none(0.01)
+/// };
+/// let estimate = for_the_controller.step(&mut state, &input);
+/// assert!(estimate.bounds.is_some());
+/// # Ok::<(), config::ConfigError>(())
+/// ```
 pub fn kalman_filter(vehicle: &Vehicle, sensors: Option<&Sensors>) -> KalmanFilter<f64> {
     let budget = &vehicle.error_bounds;
     let [delay_least_s, delay_most_s] = budget.valve_delay_s;
