@@ -165,7 +165,7 @@ fn said_of(checked: Option<&HeldOut>) -> String {
     if let Some([given, fitted]) = checked.pressure_pa.map(|errors| errors.map(|error| 1e-3 * error)) {
         text += &format!("; pressure of the valve maps against the measured one {given:.2} kPa, {fitted:.2} kPa");
         if fitted > given {
-            text += " (worse: the fitted valve serves the torque, not this pressure; check scale, unit and place of the sensor)";
+            text += " (worse with the fitted file: check scale, unit and place of the pressure sensor)";
         }
     }
     text
