@@ -28,6 +28,8 @@ const MOST_PIECES: usize = 8;
 const LOST: f64 = 1.5;
 /// Two readings more than this many usual periods apart have lost more than one.
 const GAP: f64 = 2.5;
+/// Share by which two equal times between rows differ by rounding.
+const ROUNDING: f64 = 1e-9;
 /// The next reading comes after at least this share of the shortest of these times \[chosen\]: clocks waver by a tenth.
 const SOONEST: f64 = 0.8;
 /// Times between readings of which the middle one is the usual period \[chosen\]: a slower channel counts as such after three of them, not
@@ -74,7 +76,8 @@ impl<T: Real> Periods<T> {
         let at = usize::from(self.at) % PERIODS;
         let oldest_s = core::mem::replace(&mut self.last_s[at], period_s);
         self.at = ((at + 1) % PERIODS) as u8;
-        if oldest_s == period_s {
+        // Times of even rows differ by their rounding alone.
+        if (oldest_s - period_s).abs() <= T::of(ROUNDING) * period_s {
             return;
         }
         let mut sorted = self.last_s;
