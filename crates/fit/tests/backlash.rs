@@ -1,11 +1,10 @@
 //! The backlash of a driveline from drives in which the accelerator is pressed and released.
-#![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
 
-use common::{Logs, TestCar};
-use fit::{BacklashFit, Driving, Fit, ShiftRecord, Verdict};
-use trace::{Trace, Values, signal};
+use common::{Logs, TestCar, column, fitted};
+use fit::{BacklashFit, ShiftRecord, Verdict};
+use trace::{Trace, signal};
 
 const SEED: u64 = 3;
 
@@ -15,17 +14,6 @@ fn drawn() -> (TestCar, Vec<ShiftRecord>, Trace) {
     let shifts = vec![car.shift(0, Logs::SpeedsAndCurrent).record];
     let log = car.driven(1);
     (car, shifts, log)
-}
-
-fn fitted(car: &TestCar, shifts: &[ShiftRecord], driving: &[Driving]) -> Fit {
-    fit::fit(&car.file, shifts, driving, car.ages(), &mut |_| {}).unwrap()
-}
-
-fn column<'a>(log: &'a mut Trace, name: &str) -> &'a mut Vec<f64> {
-    match &mut log.columns.iter_mut().find(|column| column.name == name).unwrap().values {
-        Values::Numbers(values) => values,
-        Values::Words(_) => unreachable!("a signal has numbers"),
-    }
 }
 
 #[test]

@@ -3,16 +3,12 @@
 
 mod common;
 
-use common::{Logs, TestCar};
+use common::{Logs, TestCar, fitted};
 use config::{Source, Vehicle};
-use fit::{Fit, Series, ShiftRecord, Verdict};
+use fit::{Series, ShiftRecord, Verdict};
 
 fn shifts(car: &mut TestCar, count: u64) -> Vec<ShiftRecord> {
     (0..count).map(|number| car.shift(number, Logs::TorqueAndOnePressure).record).collect()
-}
-
-fn fitted(car: &TestCar, shifts: &[ShiftRecord]) -> Fit {
-    fit::fit(&car.file, shifts, &[], car.ages(), &mut |_| {}).unwrap()
 }
 
 /// Text of a vehicle file without the values of its cylinder.
@@ -26,7 +22,7 @@ fn without_fill_tables(car: &TestCar) -> String {
 fn a_pressure_in_one_shift_tells_the_fill_volume_and_the_file_gets_it() {
     let mut car = TestCar::with_stroke(5);
     let shifts = shifts(&mut car, 3);
-    let fit = fitted(&car, &shifts);
+    let fit = fitted(&car, &shifts, &[]);
     let fill = fit.fill.unwrap();
     assert_eq!((fill.verdict() == Verdict::NotTold, fill.shifts, fill.is_misfit), (false, 1, false), "{fill:?}");
     let error = fill.log_volume - car.fill.ln();
@@ -53,7 +49,7 @@ fn without_a_measured_pressure_the_fill_volume_is_said_not_to_be_told() {
     let mut car = TestCar::with_stroke(5);
     let mut shifts = shifts(&mut car, 2);
     shifts.iter_mut().for_each(|shift| shift.pressure = Series::default());
-    let fit = fitted(&car, &shifts);
+    let fit = fitted(&car, &shifts, &[]);
     let fill = fit.fill.unwrap();
     assert_eq!((fill.verdict(), fill.log_volume, fill.sd[0]), (Verdict::NotTold, 0.0, fill.sd[1]));
     let said = fit.statements().join("\n");
@@ -119,5 +115,5 @@ fn a_wrong_pressure_channel_is_not_believed() {
         let (time_s, value) = pressure.between([-0.15, 9.0]).unzip();
         Series { time_s, value }
     });
-    assert_eq!(fitted(&car, &late).fill.unwrap().verdict(), Verdict::NotTold);
+    assert_eq!(fitted(&car, &late, &[]).fill.unwrap().verdict(), Verdict::NotTold);
 }

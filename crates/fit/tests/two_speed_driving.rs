@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{Logs, TestCar};
-use fit::{Driving, Fit, Parameter, ShiftRecord, Verdict};
+use common::{Logs, TestCar, column, fitted};
+use fit::{Driving, Fit, Parameter, Verdict};
 use trace::{Column, Trace, Values, signal};
 
 /// Of the logarithm of mass over capacity of the converter: error, and stated standard deviation.
@@ -12,17 +12,6 @@ fn mass(car: &TestCar, fit: &Fit) -> [f64; 2] {
     let error = |parameter| fit.unknowns[fit.place(parameter).unwrap()] - car.true_value(parameter);
     let of = [(Parameter::Mass, 1.0), (Parameter::Capacity, -1.0)];
     [error(Parameter::Mass) - error(Parameter::Capacity), fit.combination_sd(&of)[1]]
-}
-
-fn fitted(car: &TestCar, shifts: &[ShiftRecord], driving: &[Driving]) -> Fit {
-    fit::fit(&car.file, shifts, driving, car.ages(), &mut |_| {}).unwrap()
-}
-
-fn column<'a>(log: &'a mut Trace, name: &str) -> &'a mut Vec<f64> {
-    match &mut log.columns.iter_mut().find(|column| column.name == name).unwrap().values {
-        Values::Numbers(values) => values,
-        Values::Words(_) => unreachable!("a signal has numbers"),
-    }
 }
 
 fn driving_s(car: &TestCar, log: &Trace, name: &str) -> f64 {

@@ -11,7 +11,8 @@
 //! **What it assumes:** the entries of [`Budget`]; that the command stays between two neighbouring readings, also over
 //! one lost time step, and is the first of them until [`Budget::command_age_s`] before the second; the lag at a pressure is
 //! that of the budget's map times its factors; that two readings are not much closer in time than usual. Where steps came
-//! between two readings that are farther apart than usual, one is missing, and any command may have been sent.
+//! between two readings that are farther apart than usual, one is missing, and any command may have been sent. Usual is the middle one
+//! of the last five times between readings: at most two of five neighbouring ones may contain a lost reading.
 
 use drivetrain::Real;
 

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
 mod any_car;
+mod any_car_checks;
 mod any_car_logs;
 mod attacks;
 mod commands;

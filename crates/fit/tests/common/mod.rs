@@ -4,12 +4,25 @@
 use config::vehicle::ShiftClutch;
 use config::{Experiment, Sensors, Source, Vehicle};
 use drivetrain::{ClutchValve, Table1};
-use fit::{Map, Parameter, ReadingAges, Series, ShiftRecord};
+use fit::{Driving, Fit, Map, Parameter, ReadingAges, Series, ShiftRecord};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
 use study::sampling::through_sensors;
 use study::simulate_shift;
-use trace::{Trace, signal};
+use trace::{Trace, Values, signal};
+
+/// The fit of a car to shifts, and to driving between them.
+pub(crate) fn fitted(car: &TestCar, shifts: &[ShiftRecord], driving: &[Driving]) -> Fit {
+    fit::fit(&car.file, shifts, driving, car.ages(), &mut |_| {}).unwrap()
+}
+
+/// The numbers of a signal of a log.
+pub(crate) fn column<'a>(log: &'a mut Trace, name: &str) -> &'a mut Vec<f64> {
+    match &mut log.columns.iter_mut().find(|column| column.name == name).unwrap().values {
+        Values::Numbers(values) => values,
+        Values::Words(_) => unreachable!("a signal has numbers"),
+    }
+}
 
 /// Random numbers of one car.
 pub(crate) struct Draw(Pcg64Mcg);

@@ -316,10 +316,9 @@ impl<T: Real> ElementState<T> {
         per_pa * self.pressing(clutch, u, wrong).pressed_pa * (T::one() + u.torque_share * factor)
     }
 
-    /// Guaranteed ranges of pressure and torque at the element, with its slip and the error of the slip if it is known.
+    /// Guaranteed ranges of pressure and torque at the element, with its least and greatest slip if they are known.
     pub(super) fn ranges(&self, element: &FrictionElement<T>, slip_rad_s: Option<[T; 2]>) -> Option<([T; 2], [T; 2])> {
         let (range, budget) = (self.range.as_ref()?, element.budget.as_ref()?);
-        let slip_rad_s = slip_rad_s.map(|[slip, error]| [slip - error, slip + error]);
         Some(pressure_and_torque(&element.clutch, budget, range, slip_rad_s))
     }
 }

@@ -291,10 +291,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         clutch: &ShiftClutch<T>,
         newest: &[Option<Newest<T>>; SPEEDS],
     ) -> ClutchEstimate<T> {
-        let (alpha, slip) = (clutch.alpha, self.bounded_slip(clutch.ratio, newest));
-        let ranges = self.element(elements, clutch.element).and_then(|(memory, element)| {
-            memory.ranges(element, slip.map(|[slip, error]| [alpha * slip, alpha.abs() * error]))
+        let slip = self.bounded_slip(clutch.ratio, newest).map(|[slip, error]| {
+            let (middle, half) = (clutch.alpha * slip, clutch.alpha.abs() * error);
+            [middle - half, middle + half]
         });
+        let element = self.element(elements, clutch.element);
+        let ranges = element.and_then(|(memory, element)| memory.ranges(element, slip));
         if let Some((pressure, torque)) = ranges {
             let nearest = |[low, high]: [T; 2], value: T| value.max(low).min(high);
             estimate.pressure_pa = nearest(pressure, estimate.pressure_pa);
