@@ -92,6 +92,21 @@ fn an_error_of_a_reading_costs_little() {
     }
 }
 
+/// The command stands for what was last read, and the pressure goes elsewhere: what the speeds show of that is no gain of the valve.
+#[test]
+fn a_hole_in_the_commands_is_no_gain_of_the_valve() {
+    let field = Field::new();
+    let mut rows = field.rows("nominal");
+    let whole = rms(&rows, &field.kalman(&rows), Phase::AfterShift);
+    let inertia = rows.iter().position(|(_, phase, _)| *phase == Phase::InertiaPhase).unwrap();
+    for row in &mut rows[inertia - 10..inertia + 20] {
+        row.0.command = None;
+    }
+    let with_hole = rms(&rows, &field.kalman(&rows), Phase::AfterShift);
+    // Four times as much where the hole is learnt as a gain.
+    assert!(with_hole < 1.5 * whole, "{with_hole} {whole}");
+}
+
 #[test]
 fn what_is_missing_or_refused_is_said_of_its_channel() {
     let field = Field::new();

@@ -378,7 +378,7 @@ pub(super) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
     (median_s > bound_s * (1.0 + ROUNDING)).then(|| {
         format!(
             "warning: the middle time between two rows is {median_s:.3} s, and by `command_age_s` of the vehicle file a command is at most {bound_s} s \
-             older than the row that shows it first: if commands may change at any time between rows, the guaranteed range is not that of such a log\n\
+             older than the row that shows it first. The guaranteed range does not hold for commands that change at any time between two rows\n\
              hint: set `command_age_s = {median_s:.3}` under [design.error_bounds], or record the commands more often"
         )
     })
@@ -539,5 +539,22 @@ impl Measured<'_> {
         }
         step.shifts = self.finder.take_settled(step.time_s);
         Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_further_apart_than_commands_may_be_old_are_told() {
+        assert_eq!(
+            [0.01, 0.05, 0.050_000_001, f64::NAN].map(|median_s| old_commands(median_s, 0.05)),
+            [const { None }; 4]
+        );
+        let told = old_commands(0.06, 0.05).unwrap_or_default();
+        assert!(told.contains("at most 0.05 s") && told.contains("`command_age_s = 0.060`"), "{told}");
+        assert_eq!(slow_log(0.1 + 1e-9), None);
+        assert!(slow_log(0.11).is_some());
     }
 }
