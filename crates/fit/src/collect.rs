@@ -193,26 +193,51 @@ fn read(
     between: &mut BetweenShifts,
 ) -> Result<Vec<ShiftRecord>, LogError> {
     let mut log = Log::open(path, &map.open)?;
-    let mut records: Vec<([f64; 2], ShiftRecord)> = (shifts.iter())
-        .map(|shift| {
-            let [begin_s, end_s] = inertia_s(shift);
-            let record = ShiftRecord { name: name(path, begin_s), lock_s: end_s - begin_s, ..ShiftRecord::default() };
-            ([begin_s, end_s], record)
-        })
-        .collect();
+    let record = |shift: &Shift| {
+        let [begin_s, end_s] = inertia_s(shift);
+        ShiftRecord { name: name(path, begin_s), lock_s: end_s - begin_s, ..ShiftRecord::default() }
+    };
+    let mut records: Vec<ShiftRecord> = shifts.iter().map(record).collect();
+    let windows = Windows::of(shifts);
     for reading in Readings::new(&mut log, map)? {
         let reading = reading?;
         between.take(&reading, commands);
-        for ([begin_s, end_s], record) in &mut records {
-            if !(*begin_s - BEFORE_S..=*end_s + AFTER_S).contains(&reading.time_s) {
-                continue;
-            }
-            if let Some(series) = place(record, reading.role, commands) {
-                series.push(reading.time_s - *begin_s, reading.value);
+        for at in windows.around(reading.time_s) {
+            if let Some(series) = place(&mut records[at], reading.role, commands) {
+                series.push(reading.time_s - inertia_s(&shifts[at])[0], reading.value);
             }
         }
     }
-    Ok(records.into_iter().map(|(_, record)| record).collect())
+    Ok(records)
+}
+
+/// Times around shifts whose readings belong to them.
+struct Windows {
+    /// Begin and end of each, s.
+    spans_s: Vec<[f64; 2]>,
+    /// Whether both never fall: the clock of a log may go back.
+    is_sorted: bool,
+}
+
+impl Windows {
+    fn of(shifts: &[Shift]) -> Self {
+        let around = |shift: &Shift| {
+            let [begin_s, end_s] = inertia_s(shift);
+            [begin_s - BEFORE_S, end_s + AFTER_S]
+        };
+        let spans_s: Vec<[f64; 2]> = shifts.iter().map(around).collect();
+        let is_sorted = spans_s.windows(2).all(|pair| pair[0][0] <= pair[1][0] && pair[0][1] <= pair[1][1]);
+        Self { spans_s, is_sorted }
+    }
+
+    /// The places of the shifts to which a time belongs.
+    fn around(&self, time_s: f64) -> impl Iterator<Item = usize> + '_ {
+        let ended = |span: &[f64; 2]| span[1] < time_s;
+        let first = if self.is_sorted { self.spans_s.partition_point(ended) } else { 0 };
+        let last =
+            if self.is_sorted { self.spans_s.partition_point(|span| span[0] <= time_s) } else { self.spans_s.len() };
+        (first..last).filter(move |at| (self.spans_s[*at][0]..=self.spans_s[*at][1]).contains(&time_s))
+    }
 }
 
 fn inertia_s(shift: &Shift) -> [f64; 2] {
@@ -225,8 +250,8 @@ struct BetweenShifts {
     ratios: [f64; 2],
     /// The clutch that is open in each gear: its valve, and its kiss point, Pa.
     open: [(ClutchValve<f64>, f64); 2],
-    /// Times from which readings belong to shifts: none tells what it has to tell twice.
-    shifts_s: Vec<[f64; 2]>,
+    /// Readings that belong to shifts: none tells what it has to tell twice.
+    shifts: Windows,
     /// Newest readings of turbine and output speed and of the commands of the oncoming and the offgoing clutch.
     speeds: [f64; 2],
     commands: [f64; 2],
@@ -236,15 +261,11 @@ struct BetweenShifts {
 impl BetweenShifts {
     fn new(vehicle: &Vehicle, shifts: &[Shift]) -> Result<Self, FitError> {
         let open = |clutch: &ShiftClutch| (clutch.valve, clutch.clutch.kiss_pressure());
-        let around = |shift: &Shift| {
-            let [begin_s, end_s] = inertia_s(shift);
-            [begin_s - BEFORE_S, end_s + AFTER_S]
-        };
         Ok(Self {
             recorder: DrivingRecorder::new(driven_car(vehicle, &shafts(vehicle)?)),
             ratios: [vehicle.shift.ratio_offgoing(), vehicle.shift.ratio_oncoming()],
             open: [open(&vehicle.oncoming), open(&vehicle.offgoing)],
-            shifts_s: shifts.iter().map(around).collect(),
+            shifts: Windows::of(shifts),
             speeds: [f64::NAN; 2],
             commands: [f64::NAN; 2],
             lock_up: false,
@@ -273,7 +294,7 @@ impl BetweenShifts {
     fn gear(&self, time_s: f64) -> Option<usize> {
         let [turbine, output] = self.speeds;
         let gear = self.ratios.iter().position(|ratio| turns_by(*ratio, turbine, output))?;
-        let is_shift = self.shifts_s.iter().any(|[from_s, to_s]| (*from_s..=*to_s).contains(&time_s));
+        let is_shift = self.shifts.around(time_s).next().is_some();
         let (valve, kiss_pa) = self.open[gear];
         // A command that is not logged says nothing against it.
         let command = Some(self.commands[gear]).filter(|command| command.is_finite());
@@ -302,6 +323,19 @@ mod tests {
     use logs::ShiftQuality;
 
     use super::*;
+
+    #[test]
+    fn a_time_is_in_the_same_windows_whether_they_are_sorted_or_not() {
+        let spans_s: Vec<[f64; 2]> = (0..40_u8).map(|i| 2.5 * f64::from(i)).map(|at_s| [at_s, at_s + 4.0]).collect();
+        let sorted = Windows { spans_s: spans_s.clone(), is_sorted: true };
+        let any = Windows { spans_s, is_sorted: false };
+        for k in -20..1_100_i16 {
+            let time_s = 0.1 * f64::from(k);
+            let [one, other] = [&sorted, &any].map(|windows| windows.around(time_s).collect::<Vec<_>>());
+            assert_eq!(one, other, "{time_s}");
+        }
+        assert!(sorted.around(f64::NAN).next().is_none() && sorted.around(3.0).count() == 2);
+    }
 
     /// What a shift has told is not used again, and a clutch that may carry torque makes no gear.
     #[test]
