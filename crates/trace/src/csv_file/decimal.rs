@@ -115,13 +115,42 @@ fn quotient(digits: u64, places: usize) -> f64 {
     if digits >> f64::MANTISSA_DIGITS == 0 {
         return digits.cast_signed() as f64 / power.cast_signed() as f64;
     }
-    // From 61 to 63 bits: more than a number keeps. The lowest one says, too, whether something is left over.
+    // The highest bit of both is set. Their quotient times 2^62 has from 61 to 63 bits: more than a number keeps. The lowest one says, too,
+    // whether something is left over.
+    let (above, below) = (digits << digits.leading_zeros(), power << power.leading_zeros());
+    let (whole, rest) = divided(above >> 2, above << 62, below, RECIPROCALS[places]);
     let shift = 62 + digits.leading_zeros() - power.leading_zeros();
-    let above = u128::from(digits) << shift;
-    #[expect(clippy::cast_possible_truncation, reason = "at most 63 bits, and a rest below 64")]
-    let (whole, low) = ((above / u128::from(power)) as u64, above as u64);
-    let has_rest = low != whole.wrapping_mul(power);
-    (whole | u64::from(has_rest)).cast_signed() as f64 * f64::from_bits(u64::from(1023 - shift) << 52)
+    (whole | u64::from(rest != 0)).cast_signed() as f64 * f64::from_bits(u64::from(1023 - shift) << 52)
+}
+
+/// Reciprocals of the powers of ten whose highest bit was moved to the highest place: of each, what is above `2^64` of the whole part of
+/// `(2^128 - 1) / power`.
+const RECIPROCALS: [u64; MOST_DIGITS] = {
+    let mut reciprocals = [0; MOST_DIGITS];
+    let mut at = 0;
+    while at < MOST_DIGITS {
+        let power = POWERS[at] << POWERS[at].leading_zeros();
+        #[expect(clippy::cast_possible_truncation, reason = "the part above 2^64 is 1")]
+        let above = (u128::MAX / power as u128) as u64;
+        reciprocals[at] = above;
+        at += 1;
+    }
+    reciprocals
+};
+
+/// Whole part and rest of `2^64 high + low` over a number with its highest bit set, of which `high` is less. With the number's reciprocal
+/// it takes two multiplications in place of a division: N. Moeller and T. Granlund, "Improved division by invariant integers" (2011),
+/// algorithm 4.
+#[inline(always)]
+fn divided(high: u64, low: u64, by: u64, reciprocal: u64) -> (u64, u64) {
+    let guess = u128::from(reciprocal) * u128::from(high) + (u128::from(high) << 64 | u128::from(low));
+    #[expect(clippy::cast_possible_truncation, reason = "its two halves")]
+    let (whole, fraction) = (((guess >> 64) as u64).wrapping_add(1), guess as u64);
+    let rest = low.wrapping_sub(whole.wrapping_mul(by));
+    // The guess is too large by one more often than not, and very seldom too small.
+    let is_large = rest > fraction;
+    let (whole, rest) = (whole.wrapping_sub(u64::from(is_large)), rest.wrapping_add(if is_large { by } else { 0 }));
+    if rest >= by { (whole.wrapping_add(1), rest - by) } else { (whole, rest) }
 }
 
 #[cfg(test)]
@@ -177,6 +206,23 @@ mod tests {
             "9.0071992547409935",
         ] {
             assert_eq!(plain(text.as_bytes()).unwrap().to_bits(), text.parse::<f64>().unwrap().to_bits(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_quotient_by_a_reciprocal_is_that_of_a_division() {
+        let mut state = 3;
+        for i in 0..400_000 {
+            let at = i % MOST_DIGITS;
+            let by = POWERS[at] << POWERS[at].leading_zeros();
+            let random = bits(&mut state);
+            // Near the ends and near multiples too.
+            let high = [0, by - 1, random % by, (by - 1) & random][i / MOST_DIGITS % 4];
+            let low = [0, u64::MAX, bits(&mut state), random << 62][i / 7 % 4];
+            let number = u128::from(high) << 64 | u128::from(low);
+            let expected = (number / u128::from(by), number % u128::from(by));
+            let (whole, rest) = divided(high, low, by, RECIPROCALS[at]);
+            assert_eq!((u128::from(whole), u128::from(rest)), expected, "{number} over {by}");
         }
     }
 
