@@ -15,6 +15,8 @@ const BIN_S: f64 = 0.01;
 /// Points that a parabola needs, and most that there are.
 const LEAST: usize = 7;
 const MOST: usize = 40;
+/// Room for a window to move on.
+const ROOM: usize = 2 * MOST;
 /// Times are sums of periods, and differ in their last digits, s.
 const ROUNDING_S: f64 = 1e-6;
 /// Steps that differ by no more than this from the first of them are equal, s: in a window of them no time is further than forty times this
@@ -27,8 +29,9 @@ const WHOLE: f64 = 0.95;
 /// The greatest jerk of a motion that is shown time by time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakJerk {
-    /// Times, s, and speeds, m/s, of the window, the oldest first.
-    points: [(f64, f64); MOST],
+    /// Times, s, and speeds, m/s: those of the window stand one after the other, the oldest first, and move on with it.
+    points: [(f64, f64); ROOM],
+    first: usize,
     count: usize,
     /// The newest steps that are equal: their length, s, and how many there are.
     even: (f64, usize),
@@ -49,8 +52,8 @@ struct Bin {
 
 impl Default for PeakJerk {
     fn default() -> Self {
-        let points = [(0.0, 0.0); MOST];
-        Self { points, count: 0, even: (f64::NAN, 0), bin: Bin::default(), integral: None, peak_m_s3: None }
+        let points = [(0.0, 0.0); ROOM];
+        Self { points, first: 0, count: 0, even: (f64::NAN, 0), bin: Bin::default(), integral: None, peak_m_s3: None }
     }
 }
 
@@ -89,21 +92,24 @@ impl PeakJerk {
     }
 
     fn point(&mut self, time_s: f64, speed_m_s: f64) {
-        let points = &self.points[..self.count];
+        let points = &self.points[self.first..self.first + self.count];
         let old = points.iter().take_while(|(old_s, _)| *old_s < time_s - WINDOW_S - ROUNDING_S).count();
         let out = old.max((self.count + 1).saturating_sub(MOST));
-        self.points.copy_within(out..self.count, 0);
-        self.count -= out;
-        if let Some((last_s, _)) = self.points[..self.count].last() {
+        (self.first, self.count) = (self.first + out, self.count - out);
+        if self.first + self.count == ROOM {
+            self.points.copy_within(self.first.., 0);
+            self.first = 0;
+        }
+        if let Some((last_s, _)) = self.points[self.first..self.first + self.count].last() {
             let step_s = time_s - last_s;
             self.even = match self.even {
                 (even_s, steps) if (step_s - even_s).abs() <= EVEN_S => (even_s, steps + 1),
                 _ => (step_s, 1),
             };
         }
-        self.points[self.count] = (time_s, speed_m_s);
+        self.points[self.first + self.count] = (time_s, speed_m_s);
         self.count += 1;
-        let points = &self.points[..self.count];
+        let points = &self.points[self.first..self.first + self.count];
         let derivative = if self.even.1 + 1 >= self.count { even_second_derivative } else { second_derivative };
         if points.len() >= LEAST
             && time_s - points[0].0 >= WHOLE * WINDOW_S
