@@ -7,7 +7,7 @@ use config::Vehicle;
 use drivetrain::CommandKind;
 use minijinja::{Value, context};
 use observer::Health;
-use study::shift_estimates::{EstimatedShift, Ranged};
+use study::shift_estimates::{EstimatedShift, Ranged, thinned};
 use study::{LogSample, Overview, ShiftEstimate};
 use trace::units::{mpa, rpm};
 
@@ -271,9 +271,8 @@ type Points = Vec<(f64, f64)>;
 
 /// A shift with some time around it.
 fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> Figure {
-    let mut shift = shift.clone();
-    shift.thin(points.max(1));
-    let samples = Samples(&shift.samples);
+    let samples = thinned(&shift.samples, points);
+    let samples = Samples(&samples);
     let readings = |i: usize| samples.measured(&|sample| read(sample.speeds_rad_s[i]).map(rpm));
     let speeds = SPEEDS.iter().enumerate().map(|(i, (label, stroke))| Series {
         label: (*label).to_owned(),
@@ -295,7 +294,7 @@ fn shift_figure(shift: &ShiftEstimate, command: CommandKind, points: usize) -> F
         panels.extend(health_panel(&healths));
     }
     let [from_s, to_s] = shift.window_s;
-    Figure { x_label: "time (s)", x_range: (from_s, to_s), spans: phases(&shift), panels }
+    Figure { x_label: "time (s)", x_range: (from_s, to_s), spans: phases(shift), panels }
 }
 
 fn estimate(points: Points) -> Series {

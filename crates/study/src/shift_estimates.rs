@@ -190,6 +190,15 @@ pub struct ShiftEstimate {
     pub samples: Vec<LogSample>,
 }
 
+/// At most so many of these samples: of those that lie together the one with the worst health.
+pub fn thinned(samples: &[LogSample], most: usize) -> Vec<LogSample> {
+    let together = samples.len().div_ceil(most.max(1)).max(1);
+    let mut kept = Vec::with_capacity(samples.len().div_ceil(together));
+    let worst = |samples: &[LogSample]| samples.iter().max_by_key(|sample| sample.estimate.health).copied();
+    kept.extend(samples.chunks(together).filter_map(worst));
+    kept
+}
+
 /// Ratios this close are the same.
 const SAME_RATIO: f64 = 0.03;
 
@@ -210,17 +219,6 @@ impl ShiftEstimate {
         let end_s = estimated.as_ref().and_then(|e| e.lock_up_s).map_or(shift.end_s(), |s| s.max(shift.end_s()));
         let window_s = [begin_s - BEFORE_S, end_s + AFTER_S];
         Self { number, shift, estimated, of_vehicle, window_s, samples: Vec::new() }
-    }
-
-    /// Keeps at most so many samples, of those that lie together the one with the worst health.
-    pub fn thin(&mut self, most: usize) {
-        if most == 0 {
-            self.samples = Vec::new();
-            return;
-        }
-        let together = self.samples.len().div_ceil(most).max(1);
-        let worst = |samples: &[LogSample]| samples.iter().max_by_key(|sample| sample.estimate.health).copied();
-        self.samples = self.samples.chunks(together).filter_map(worst).collect();
     }
 
     /// When it began, s: with its command, else with the torque phase, else with what the finder saw first.

@@ -6,7 +6,7 @@ use std::path::Path;
 use config::Vehicle;
 use logs::Shift;
 use report::log_page::MOST_DRAWN;
-use study::shift_estimates::{self, is_of_vehicle};
+use study::shift_estimates::{self, is_of_vehicle, thinned};
 use study::{LogSample, Overview, RecentSamples, ShiftEstimate};
 use trace::{Cell, CsvWriter, WholeFile};
 
@@ -61,10 +61,12 @@ impl<'a> Shifts<'a> {
         let of_vehicle = is_of_vehicle(&shift, &self.ratios, self.vehicle);
         let mut found = ShiftEstimate::of(self.selection.seen, shift, of_vehicle, &self.recent, self.vehicle);
         let is_drawn = self.found.len() < MOST_DRAWN;
-        if is_drawn || self.is_selective() {
-            found.samples = self.recent.between(found.window_s).to_vec();
-            write(&found.samples)?;
-            found.thin(if is_drawn { KEPT } else { 0 });
+        let samples = self.recent.between(found.window_s);
+        if self.is_selective() {
+            write(samples)?;
+        }
+        if is_drawn {
+            found.samples = thinned(samples, KEPT);
         }
         self.found.push(found);
         Ok(())
