@@ -10,7 +10,7 @@ use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_shift};
 use report::gearbox_figure::{gear_figure, train_figure};
 use study::campaign::{factor_values, run_seed};
 use study::{Log, Row, RunColumns, simulate_shift};
-use trace::{ColumnKind, CsvRows, GrowingTable, LastLine, partial_path, read_csv, read_rows, write_csv, write_parquet};
+use trace::{ColumnKind, CsvRows, GrowingTable, partial_path, read_csv, read_rows, write_csv, write_parquet};
 
 use crate::{Depth, Fuzzer, samples};
 
@@ -82,8 +82,8 @@ pub(crate) fn log(fuzzer: &Fuzzer, input: &[u8]) {
 
 /// Reads a log as `estimate` does.
 fn row_by_row(fuzzer: &Fuzzer, input: &[u8]) {
-    let (lines, _) = LastLine::new(Box::new(Cursor::new(input.to_vec())));
-    let Ok(rows) = CsvRows::of(Path::new("input"), Box::new(lines)) else { return };
+    let input = Box::new(Cursor::new(input.to_vec()));
+    let Ok(rows) = CsvRows::of_log(Path::new("input"), input) else { return };
     let Ok(mut log) = Log::of(rows, &fuzzer.vehicle, 10) else { return };
     for (input, row) in log.by_ref().map_while(Result::ok) {
         assert!(input.dt_s >= 0.0 && row.time_s.is_finite());

@@ -71,6 +71,6 @@ impl RowClock {
                 signal::TIME
             )));
         }
-        Ok(notes.into_iter().chain(self.clock.notes()).collect())
+        Ok(notes.into_iter().chain(self.clock.notes()).chain(rows.cut().map(str::to_owned)).collect())
     }
 }

@@ -150,7 +150,7 @@ fn observer(kind: ObserverKind) -> AnyObserver {
 
 /// Reads such a log, runs an observer with its range, and writes all columns of its estimates as CSV.
 fn estimate(observer: &AnyObserver, vehicle: &Vehicle, log: &[u8]) {
-    let rows = CsvRows::of(Path::new("log.csv"), Box::new(io::Cursor::new(log.to_vec()))).unwrap();
+    let rows = CsvRows::of_log(Path::new("log.csv"), Box::new(io::Cursor::new(log.to_vec()))).unwrap();
     let log = Log::of(rows, vehicle, 1).unwrap();
     let columns = observer.columns(log.signals().has_wheel_speed()).columns();
     let mut writer = CsvWriter::new(io::sink(), columns.iter().map(|column| column.name)).unwrap();

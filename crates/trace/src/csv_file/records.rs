@@ -148,6 +148,18 @@ impl Records {
         self.row.has_no_end
     }
 
+    /// Empties the last cell of the record.
+    pub(super) fn empty_last(&mut self) {
+        let Row { start, ends, is_unquoted, .. } = &mut self.row;
+        if let Some((last, others)) = ends.split_last_mut() {
+            *last = match (others.last(), *is_unquoted) {
+                (Some(before), is_unquoted) => before + usize::from(!is_unquoted),
+                (None, false) => *start,
+                (None, true) => 0,
+            };
+        }
+    }
+
     /// Looks for the end of the record in the bytes that are there.
     fn scan(&mut self) -> Found {
         let text = &self.bytes[..self.filled];

@@ -20,6 +20,9 @@ pub struct CsvRows {
     pub(super) columns: Vec<(String, f64)>,
     pub(super) time_at: usize,
     time_s: Option<f64>,
+    /// Whether a last line without an end may have been cut, and what became of it.
+    may_be_cut: bool,
+    cut: Option<&'static str>,
 }
 
 impl CsvRows {
@@ -32,13 +35,19 @@ impl CsvRows {
         Self::of(path, Box::new(file))
     }
 
-    /// The same from anywhere; `path` is for messages.
+    /// A log from anywhere, which may end within a line; `path` is for messages. Nothing else shows that a number was cut: of a last line
+    /// without an end the last cell is empty, and without all cells, or without its time, the line is left out.
     ///
     /// # Errors
     /// See [`Self::open`].
-    pub fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
+    pub fn of_log(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
+        Ok(Self { may_be_cut: true, ..Self::of(path, input)? })
+    }
+
+    fn of(path: &Path, input: Box<dyn Read>) -> Result<Self, TraceError> {
         let records = Records::new(input, b',');
-        let mut rows = Self { path: path.to_owned(), records, columns: Vec::new(), time_at: 0, time_s: None };
+        let (path, columns) = (path.to_owned(), Vec::new());
+        let mut rows = Self { path, records, columns, time_at: 0, time_s: None, may_be_cut: false, cut: None };
         if !rows.read_row()? {
             return Err(TraceError::Table { path: rows.path, message: "the file is empty".to_owned() });
         }
@@ -95,7 +104,7 @@ impl CsvRows {
     /// # Errors
     /// See [`Self::advance`].
     pub fn advance_in_any_order(&mut self) -> Result<bool, TraceError> {
-        if !self.read_row()? {
+        if !self.read_row()? || self.records.has_no_end() && self.is_left_out() {
             return match self.time_s {
                 Some(_) => Ok(false),
                 None => Err(TraceError::Table { path: self.path.clone(), message: "there are no rows".to_owned() }),
@@ -114,6 +123,27 @@ impl CsvRows {
         }
         self.time_s = Some(time_s);
         Ok(true)
+    }
+
+    /// Takes what may be cut out of a row without an end; whether nothing of it is left.
+    #[cold]
+    fn is_left_out(&mut self) -> bool {
+        let (cells, names) = (self.records.len(), self.columns.len());
+        if !self.may_be_cut || cells > names {
+            return false;
+        }
+        if cells < names || self.time_at + 1 == names {
+            self.cut = Some("the last line has no end and is left out");
+            return true;
+        }
+        self.records.empty_last();
+        self.cut = Some("the last line has no end: its last cell, of which digits may be missing, is not used");
+        false
+    }
+
+    /// What became of a last line without an end, in a sentence; none where there is no such line.
+    pub fn cut(&self) -> Option<&'static str> {
+        self.cut
     }
 
     /// Time of the row, s; NaN before the first.

@@ -223,6 +223,47 @@ fn an_empty_cell_and_nan_are_readings_that_did_not_come() {
 }
 
 #[test]
+fn only_a_last_line_without_an_end_loses_what_may_be_cut() {
+    // Names, rows and what is said, of a log that comes in pieces of each of these sizes.
+    let rows = |text: &str, at_once: usize| {
+        let input = Box::new(crate::slow::Slow(text.as_bytes().to_vec(), at_once));
+        let mut rows = CsvRows::of_log(Path::new("log"), input).unwrap();
+        let mut read = Vec::new();
+        while rows.advance().unwrap() {
+            read.push(
+                [rows.time_s(), rows.number(0).unwrap(), rows.number(1).unwrap()]
+                    .map(|number| if number.is_nan() { None } else { Some(number) }),
+            );
+        }
+        (read, rows.cut().unwrap_or_default().contains("left out"), rows.cut().is_some())
+    };
+    let row = |time_s: f64, a: f64| [Some(time_s), Some(time_s), Some(a)];
+    let first = row(1.0, 2.0);
+    let emptied = [Some(3.0), Some(3.0), None];
+    for at_once in [1, 3, 1000] {
+        for (text, expected) in [
+            ("time_s,a\n1,2\n3,4\n", (vec![first, row(3.0, 4.0)], false, false)),
+            ("time_s,a\r\n1,2\r\n3,4\r", (vec![first, row(3.0, 4.0)], false, false)),
+            ("time_s,a\n1,2\n3,4", (vec![first, emptied], false, true)),
+            ("time_s,a\n1,2\n3,", (vec![first, emptied], false, true)),
+            ("time_s,a\n1,2\n\"3\",\"4\"", (vec![first, emptied], false, true)),
+            ("time_s,a\n1,2\n3", (vec![first], true, true)),
+            // Digits of the time may be missing.
+            ("a,time_s\n2,1\n4,3", (vec![[Some(1.0), Some(2.0), Some(1.0)]], true, true)),
+        ] {
+            assert_eq!(rows(text, at_once), expected, "{text:?} by {at_once}");
+        }
+    }
+    let mut more = CsvRows::of_log(Path::new("log"), Box::new("time_s,a\n1,2\n3,4,5".as_bytes())).unwrap();
+    assert!(more.advance().unwrap());
+    assert!(more.advance().unwrap_err().to_string().contains("the row has 3 cells"));
+    // A table that the program wrote is not taken for cut.
+    let path = file("whole", "time_s,a\n1,2\n3,4");
+    assert_eq!(read_csv(&path).unwrap().get("a").unwrap(), [2.0, 4.0]);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
 fn a_broken_file_says_where_it_is_broken() {
     assert_eq!(
         error("back", "time_s,a\n0,1\n0.2,1\n0.1,1\n"),

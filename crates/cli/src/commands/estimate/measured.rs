@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use config::Vehicle;
 use drivetrain::CommandKind;
@@ -16,7 +16,7 @@ use logs::{
 use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use study::shift_estimates::is_refused;
-use trace::{CsvRows, Following, LastLine, TraceError, shown_path, signal};
+use trace::{CsvRows, Following, TraceError, shown_path, signal};
 
 use super::Messages;
 use super::watched::{WatchedColumn, WatchedColumns};
@@ -25,9 +25,6 @@ use crate::output;
 
 /// Steps of a followed log that are looked at before the first estimate.
 const FOLLOWED_LOOK: usize = 50;
-
-/// Said of a table whose last line was cut.
-pub(super) const CUT_LINE: &str = "warning: the last line has no end: its last cell, of which digits may be missing, is not used, nor is a line without all cells";
 
 /// A log with its shifts.
 pub(super) struct Measured<'a> {
@@ -58,8 +55,6 @@ struct Rows {
     watched: WatchedColumns,
     /// Rows that were looked at before the first estimate and not read since.
     ahead: u64,
-    /// Whether the last line has no end.
-    was_cut: Arc<AtomicBool>,
 }
 
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
@@ -169,8 +164,7 @@ impl<'a> Measured<'a> {
             None if is_pipe => Box::new(io::stdin()),
             None => Box::new(File::open(path).map_err(opening)?),
         };
-        let (input, was_cut) = LastLine::new(input);
-        let rows = CsvRows::of(path, Box::new(input)).map_err(|error| other_delimiter(path, error))?;
+        let rows = CsvRows::of_log(path, input).map_err(|error| other_delimiter(path, error))?;
         let mut watched = watched(&rows, vehicle, look);
         let log = study::log::Log::of(rows, vehicle, look)?;
         log.looked_at().for_each(|(input, _)| watched.push(values(input)));
@@ -180,7 +174,7 @@ impl<'a> Measured<'a> {
         // Turbine and output speed are there, and tell shifts.
         let finder = ShiftFinder::new(&gearbox, |role| has(&log, role))?;
         let ahead = watched.rows();
-        let source = Source::Rows(Box::new(Rows { log, row: LogRow::NONE, watched, ahead, was_cut }));
+        let source = Source::Rows(Box::new(Rows { log, row: LogRow::NONE, watched, ahead }));
         Ok(Self { source, step: Step::none(), finder, ratios: gearbox.ratios, resets: 0, gears: None, waited_s: 0.0 })
     }
 
@@ -301,9 +295,6 @@ impl<'a> Measured<'a> {
             Source::Rows(rows) => {
                 for note in rows.log.check_readings()? {
                     say.note(&format!("warning: {note}"));
-                }
-                if rows.was_cut.load(Ordering::Relaxed) {
-                    say.note(CUT_LINE);
                 }
                 return rows.watched.check(Seen::All);
             }

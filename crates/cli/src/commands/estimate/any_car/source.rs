@@ -4,17 +4,17 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use config::Car;
 use design::ShiftTables;
 use logs::{ChannelMap, Log, LogError};
 use study::any_shift::channels::{CarChannels, own_map};
 use study::any_shift::logged::{CarLog, LogStep};
-use trace::{CsvRows, Following, LastLine, shown_path};
+use trace::{CsvRows, Following, shown_path};
 
 use super::super::Messages;
-use super::super::measured::{CUT_LINE, other_delimiter, report_readings};
+use super::super::measured::{other_delimiter, report_readings};
 use super::checks::Columns;
 use crate::failure::Failure;
 
@@ -32,8 +32,7 @@ pub(in crate::commands) struct CarReading<'a> {
 
 /// The steps of a log.
 pub(in crate::commands) enum CarSource<'a> {
-    /// With whether the last line has no end.
-    Rows(Box<CarLog<'a>>, Arc<AtomicBool>),
+    Rows(Box<CarLog<'a>>),
     Channels(Box<CarChannels<'a>>),
 }
 
@@ -54,9 +53,8 @@ impl<'a> CarSource<'a> {
                 None if is_pipe => Box::new(io::stdin()),
                 None => Box::new(File::open(path).map_err(opening)?),
             };
-            let (input, was_cut) = LastLine::new(input);
-            let rows = CsvRows::of(path, Box::new(input)).map_err(|error| other_delimiter(path, error))?;
-            return Ok(Self::Rows(Box::new(CarLog::of(rows, car, tables)?), was_cut));
+            let rows = CsvRows::of_log(path, input).map_err(|error| other_delimiter(path, error))?;
+            return Ok(Self::Rows(Box::new(CarLog::of(rows, car, tables)?)));
         }
         let log = match stop {
             Some(stop) => Log::follow(path, &map.open, stop)?,
@@ -82,14 +80,14 @@ impl<'a> CarSource<'a> {
     /// What watches the columns of a table; mapped channels are watched by their readings.
     pub(super) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
         match self {
-            Self::Rows(rows, _) => Some(Columns::of(car, tables, |name| rows.is_in_si(name))),
+            Self::Rows(rows) => Some(Columns::of(car, tables, |name| rows.is_in_si(name))),
             Self::Channels(_) => None,
         }
     }
 
     pub(in crate::commands) fn next_step(&mut self) -> Result<Option<LogStep>, Failure> {
         Ok(match self {
-            Self::Rows(rows, _) => rows.next_step()?,
+            Self::Rows(rows) => rows.next_step()?,
             Self::Channels(channels) => channels.next_step()?,
         })
     }
@@ -97,11 +95,8 @@ impl<'a> CarSource<'a> {
     /// Says what was met in the log, after its last step.
     pub(in crate::commands) fn finish(&self, say: &mut Messages) -> Result<(), Failure> {
         match self {
-            Self::Rows(rows, was_cut) => {
+            Self::Rows(rows) => {
                 rows.check_readings()?.iter().for_each(|note| say.note(&format!("warning: {note}")));
-                if was_cut.load(Ordering::Relaxed) {
-                    say.note(CUT_LINE);
-                }
                 Ok(())
             }
             Self::Channels(channels) => report_readings(channels.readings(), say),
