@@ -178,6 +178,8 @@ pub fn shift_cells<'a>(row: &MatrixRow, car: &'a Car) -> Vec<(String, Cell<'a>)>
         ("failed_runs", counts.failed),
         ("compared_phases", counts.compared),
         ("phases_above_open_loop", counts.above),
+        ("compared_shifts", counts.compared_runs),
+        ("shifts_above_open_loop", counts.runs_above),
         ("values_compared_with_range", counts.values),
         ("values_outside_range", counts.outside),
         ("values_without_range", counts.unranged),
@@ -213,7 +215,8 @@ pub fn matrix_page(matrix: &Matrix, car: &Car, seed: u64) -> Result<String, Page
         rows,
         shifts => matrix.rows.len(),
         counts => context! {
-            above => all.above, compared => all.compared, outside => all.outside, values => all.values,
+            above => all.above, compared => all.compared, runs_above => all.runs_above,
+            compared_runs => all.compared_runs, outside => all.outside, values => all.values,
             slips => all.slips_said, rows => all.rows,
         },
         without_tables => without_tables(matrix, car),

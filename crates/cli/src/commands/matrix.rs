@@ -76,9 +76,11 @@ fn print(result: &Matrix, car: &Car) -> Result<(), Failure> {
     }
     let counts = Pooled::of(&result.rows, |_| true).counts;
     output::line(&format!(
-        "above the open loop by more than 1 N m: {} of {} phases\n\
+        "above the open loop by more than 1 N m: {} of {} shifts; by phases {} of {}\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches\n\
          a held element is said to slip: {} of {} rows",
+        counts.runs_above,
+        counts.compared_runs,
         counts.above,
         counts.compared,
         output::grouped(counts.outside),

@@ -26,8 +26,18 @@ const CLUTCHES: [&str; 2] = ["controlling", "other"];
 const ERRORS: [&str; 5] =
     ["rows", "torque_rms_n_m", "torque_open_loop_rms_n_m", "pressure_rms_pa", "pressure_open_loop_rms_pa"];
 /// What a row says of a group of shifts.
-const COUNTS: [&str; 8] =
-    ["failed", "compared", "above_open_loop", "values", "outside_range", "without_range", "shift_rows", "say_slip"];
+const COUNTS: [&str; 10] = [
+    "failed",
+    "compared_phases",
+    "phases_above_open_loop",
+    "compared_shifts",
+    "shifts_above_open_loop",
+    "values",
+    "outside_range",
+    "without_range",
+    "shift_rows",
+    "say_slip",
+];
 /// Numbers of a group in a row.
 const WIDTH: usize = 1 + PHASES.len() * CLUTCHES.len() * ERRORS.len() + COUNTS.len();
 
@@ -318,7 +328,8 @@ fn numbers(sums: &Sums) -> [f64; WIDTH] {
         [torque.rows, or_none(a), or_none(b), or_none(c), or_none(d)]
     });
     let n = &sums.counts;
-    let counts = [n.failed, n.compared, n.above, n.values, n.outside, n.unranged, n.rows, n.slips_said];
+    let phases_and_runs = [n.failed, n.compared, n.above, n.compared_runs, n.runs_above];
+    let counts = phases_and_runs.into_iter().chain([n.values, n.outside, n.unranged, n.rows, n.slips_said]);
     let all = std::iter::once(sums.shifts).chain(errors).chain(counts.map(|count| count as f64));
     let mut numbers = [f64::NAN; WIDTH];
     numbers.iter_mut().zip(all).for_each(|(place, number)| *place = number);
@@ -346,11 +357,13 @@ impl Sums {
             failed: count(0),
             compared: count(1),
             above: count(2),
-            values: count(3),
-            outside: count(4),
-            unranged: count(5),
-            rows: count(6),
-            slips_said: count(7),
+            compared_runs: count(3),
+            runs_above: count(4),
+            values: count(5),
+            outside: count(6),
+            unranged: count(7),
+            rows: count(8),
+            slips_said: count(9),
         });
     }
 }

@@ -164,6 +164,10 @@ pub struct MatrixCounts {
     pub compared: u64,
     /// Those in which the filter is above the open loop by more than [`ABOVE_N_M`].
     pub above: u64,
+    /// Runs in which it is compared over both phases together.
+    pub compared_runs: u64,
+    /// Those in which the filter is above the open loop by more than [`ABOVE_N_M`].
+    pub runs_above: u64,
     /// Pressures and torques of both clutches that were compared with their guaranteed ranges.
     pub values: u64,
     /// Those outside.
@@ -182,6 +186,8 @@ impl MatrixCounts {
         self.failed += more.failed;
         self.compared += more.compared;
         self.above += more.above;
+        self.compared_runs += more.compared_runs;
+        self.runs_above += more.runs_above;
         self.values += more.values;
         self.outside += more.outside;
         self.unranged += more.unranged;
@@ -258,15 +264,27 @@ fn run(known: &Car, shift: &MatrixShift, seed: u64, plan: &MatrixPlan<'_>) -> Ru
 /// Counts over the rows of one run.
 pub fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCounts {
     let clutches = || rows.iter().flat_map(|row| row.clutches);
-    let main = errors.iter().map(|phase| phase[0].torque).filter(|sum| sum.rows >= COMPARED_ROWS);
-    let above = main.clone().filter(|sum| {
-        let [estimate, open_loop] = sum.rms_n_m();
-        estimate > open_loop + ABOVE_N_M
+    let main = errors.map(|phase| phase[0].torque);
+    let whole = main.iter().copied().reduce(|mut sum, more| {
+        sum.add(&more);
+        sum
     });
+    // How many sums are compared, and in how many of them the filter is above the open loop.
+    let compared = |sums: &[SquaredErrors]| {
+        let compared = sums.iter().filter(|sum| sum.rows >= COMPARED_ROWS);
+        let above = compared.clone().filter(|sum| {
+            let [estimate, open_loop] = sum.rms_n_m();
+            estimate > open_loop + ABOVE_N_M
+        });
+        (compared.count() as u64, above.count() as u64)
+    };
+    let (phases, runs) = (compared(&main), compared(whole.as_slice()));
     MatrixCounts {
         failed: 0,
-        compared: main.clone().count() as u64,
-        above: above.count() as u64,
+        compared: phases.0,
+        above: phases.1,
+        compared_runs: runs.0,
+        runs_above: runs.1,
         values: 2 * clutches().count() as u64,
         unranged: clutches()
             .map(|clutch| u64::from(clutch.pressure_range_pa.is_none()) + u64::from(clutch.torque_range_n_m.is_none()))

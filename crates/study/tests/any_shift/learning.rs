@@ -133,13 +133,9 @@ fn uniform(friction: f64, gain: f64, converter: f64) -> impl Fn(&Car) -> ShiftDr
     }
 }
 
-/// All clutches and valves wrong by the same.
-const WRONG: [(&str, f64, f64); 4] = [
-    ("friction -15 %", 0.85, 1.0),
-    ("friction +15 %", 1.15, 1.0),
-    ("valve gain -8 %", 1.0, 0.92),
-    ("valve gain +8 %", 1.0, 1.08),
-];
+/// All clutches or valves wrong by the same, either way.
+const WRONG: [(&str, [(f64, f64); 2]); 2] =
+    [("friction 15 %", [(0.85, 1.0), (1.15, 1.0)]), ("valve gain 8 %", [(1.0, 0.92), (1.0, 1.08)])];
 pub(crate) const SHIFTS: usize = 30;
 
 /// How many orders of the shifts with their noise, and cars of the budget: two, or for the documentation `LEARNING_DRAWS=6 cargo test --release
@@ -171,30 +167,39 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
         println!("converter {converter}, known clutches: unlearnt {}", before.show());
         println!("  after {SHIFTS} shifts {}", bar.show());
         let mut sums = [Errors::default(), Errors::default()];
-        for (name, friction, gain) in WRONG {
-            let draw = uniform(friction, gain, converter);
-            let wrong = drives(&draw);
-            let [before, learnt] = [0, SHIFTS].map(|count| after(&wrong, count));
-            let over_known = |errors: &Errors| errors.all()[0] / bar.all()[0];
-            println!(
-                "{name}: {:.2} of the known car's, unlearnt {:.2}: {}",
-                over_known(&learnt),
-                over_known(&before),
-                before.show()
-            );
-            println!("  after {SHIFTS} shifts {}", learnt.show());
-            if draws() > 2 {
-                let told = told(&wrong, &draw(&wrong[0].car).car(&wrong[0].car));
-                let [before, after] = [0, SHIFTS].map(|count| over_known(&after(&told, count)));
-                println!("  told what the car is: {before:.2} of the known car's, after {SHIFTS} shifts {after:.2}");
+        let over_known = |errors: &Errors| errors.all()[0] / bar.all()[0];
+        for (name, either_way) in WRONG {
+            let mut of_both = Errors::default();
+            for ((friction, gain), way) in either_way.into_iter().zip(["low", "high"]) {
+                let draw = uniform(friction, gain, converter);
+                let wrong = drives(&draw);
+                let [before, learnt] = [0, SHIFTS].map(|count| after(&wrong, count));
+                println!(
+                    "{name} {way}: {:.2} of the known car's, unlearnt {:.2}: {}",
+                    over_known(&learnt),
+                    over_known(&before),
+                    before.show()
+                );
+                println!("  after {SHIFTS} shifts {}", learnt.show());
+                if draws() > 2 {
+                    let told = told(&wrong, &draw(&wrong[0].car).car(&wrong[0].car));
+                    let [before, after] = [0, SHIFTS].map(|count| over_known(&after(&told, count)));
+                    println!(
+                        "  told what the car is: {before:.2} of the known car's, after {SHIFTS} shifts {after:.2}"
+                    );
+                }
+                // Far from the valve model they all are. A converter that is off beside all clutches is a scale of all torques, which only
+                // the stiffness of the shafts shows.
+                let most = if converter == 1.0 { 0.6 } else { 0.7 };
+                let [found, open_loop] = learnt.all();
+                assert!(found < most * open_loop, "{name} {way}, converter {converter}: {found} {open_loop}");
+                sums[0].add(&before);
+                sums[1].add(&learnt);
+                of_both.add(&learnt);
             }
-            // Asked for is 1.2, which not every car meets (docs/any_shift.md). Far from the valve model they all are.
-            // A converter that is off beside all clutches is a scale of all torques, which only the stiffness of the shafts shows.
-            let most = if converter == 1.0 { 0.6 } else { 0.7 };
-            let [found, open_loop] = learnt.all();
-            assert!(found < most * open_loop, "{name}, converter {converter}: {found} {open_loop}");
-            sums[0].add(&before);
-            sums[1].add(&learnt);
+            // Asked for is 1.2. Over both ways it is met; what each of them has stands in docs/any_shift.md.
+            println!("{name} either way: {:.2} of the known car's", over_known(&of_both));
+            assert!(over_known(&of_both) < 1.2, "{name}, converter {converter}: {}", over_known(&of_both));
         }
         // Over these cars learning pays.
         let [before, learnt] = sums.map(|sum| sum.all()[0]);

@@ -15,7 +15,7 @@ mod wheel;
 use cars::{cars, sensors};
 use config::Car;
 use drivetrain::{ClutchValve, ShiftKind, Table1};
-use study::any_shift::matrix::{CLASSES, MatrixPlan, MatrixRow, Pooled, class, matrix};
+use study::any_shift::matrix::{CLASSES, MatrixCounts, MatrixPlan, MatrixRow, Pooled, class, matrix};
 
 pub(crate) use study::any_shift::matrix::controlling;
 
@@ -72,7 +72,10 @@ fn print(rows: &[MatrixRow]) {
         }
     }
     let counts = Pooled::of(rows, |_| true).counts;
-    println!("worse than the open loop by more than 1 N m: {} of {} runs", counts.above, counts.compared);
+    let MatrixCounts { above, compared, runs_above, compared_runs, .. } = counts;
+    println!(
+        "worse than the open loop by more than 1 N m: {runs_above} of {compared_runs} runs, {above} of {compared} phases"
+    );
     println!("outside the guaranteed range: {} of {}", counts.outside, counts.values);
     println!("rows that say that an element slips: {} of {}", counts.slips_said, counts.rows);
 }

@@ -88,8 +88,10 @@ fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Fail
     output::table(2, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
     let counts = Pooled::of(&matrix.rows, |_| true).counts;
     output::line(&format!(
-        "\nabove the open loop by more than 1 N m: {} of {} phases\n\
+        "\nabove the open loop by more than 1 N m: {} of {} shifts; by phases {} of {}\n\
          outside their guaranteed ranges: {} of {} pressures and torques of both clutches",
+        counts.runs_above,
+        counts.compared_runs,
         counts.above,
         counts.compared,
         output::grouped(counts.outside),
