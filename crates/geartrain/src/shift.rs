@@ -58,6 +58,14 @@ impl Shift {
 }
 
 impl Change {
+    /// The element that opens and the one that closes, of a shift from one clutch to another.
+    pub fn single(&self) -> Option<[usize; 2]> {
+        match self {
+            Self::Single { offgoing, oncoming, .. } => Some([*offgoing, *oncoming]),
+            _ => None,
+        }
+    }
+
     /// What the trade calls it.
     pub fn name(&self) -> String {
         match self {

@@ -24,6 +24,10 @@ pub const OFFGOING_DUTY: &str = "offgoing_duty_percent";
 pub const REPORTED_ENGINE_TORQUE: &str = "reported_engine_torque_n_m";
 /// Whether the lock-up clutch of the converter carries torque, 0 or 1.
 pub const LOCK_UP_APPLIED: &str = "lock_up_applied";
+/// Torque of the lock-up clutch of the converter while it is applied, N m.
+pub const LOCK_UP_TORQUE: &str = "lock_up_torque_n_m";
+/// Torque of the clutch of the gear while there is no shift, N m, of a car without a converter, which it starts.
+pub const LAUNCH_CLUTCH_TORQUE: &str = "launch_clutch_torque_n_m";
 /// Gear, by its name; during a shift the one that is left.
 pub const GEAR: &str = "gear";
 /// Gear that is commanded, by its name.

@@ -9,7 +9,7 @@ use plant::car::{
 };
 use study::any_shift::logged::{command_age, element_commands};
 use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
-use study::any_shift::recording::{lock_up_is_applied, reported_engine_n_m};
+use study::any_shift::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
 use trace::units::{km_h, rpm};
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
@@ -242,6 +242,7 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         truth(signal::ENGINE_TORQUE, |_, s| Cell::Number(s.torques.engine_n_m)),
         truth(signal::TURBINE_TORQUE, |_, s| Cell::Number(s.turbine_n_m)),
         truth(signal::SHAFT_TORQUE, |_, s| Cell::Number(s.torques.shaft_n_m)),
+        truth(input_clutch_signal(car), |car, s| Cell::Number(input_clutch_n_m(car, s))),
         truth("grade_rad", |_, s| Cell::Number(s.driver.grade_rad)),
         truth(signal::VEHICLE_SPEED, |_, s| Cell::Number(s.vehicle_m_s)),
         truth(signal::VEHICLE_ACCELERATION, |_, s| Cell::Number(s.vehicle_m_s2)),
@@ -249,6 +250,11 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
     let commands = element_commands(car).into_iter();
     columns.extend(commands.map(|(element, name)| read(&name, DriveValue::Command(element, Reading::Value))));
     columns
+}
+
+/// The torque of the clutch between engine and gearbox.
+fn input_clutch_signal(car: &Car) -> &'static str {
+    if car.converter.is_some() { signal::LOCK_UP_TORQUE } else { signal::LAUNCH_CLUTCH_TORQUE }
 }
 
 fn gear_name(car: &Car, gear: usize) -> Cell<'_> {

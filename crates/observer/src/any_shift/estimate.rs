@@ -6,8 +6,8 @@ use super::elements::{ElementState, PressureError};
 use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::{
-    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE, SHARE,
-    SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, InputClutch, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE,
+    SHARE, SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -61,6 +61,8 @@ pub struct ShiftEstimate<T> {
     pub turbine_n_m: Option<T>,
     /// Torque of the drive shafts, N m.
     pub shaft_n_m: Option<T>,
+    /// The lock-up clutch of the converter while it is applied; without a converter, the clutch of the gear while there is no shift.
+    pub input_clutch: Option<InputClutch<T>>,
     /// Whether the input could be used, and whether the estimate can be believed.
     pub health: Health,
     /// What became of the reading of each channel; of the commands together a refused one, or a lost one
@@ -80,6 +82,7 @@ impl<T: Real> ShiftEstimate<T> {
             flare_rad_s: T::zero(),
             turbine_n_m: None,
             shaft_n_m: None,
+            input_clutch: None,
             health: Health::SpeedsRejected,
             channels: Channels::all(ChannelHealth::Lost),
             commands: [ChannelHealth::Lost; MAX_ELEMENTS],
@@ -95,7 +98,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         (channels, commands): (&Channels<ChannelHealth>, &[ChannelHealth; MAX_ELEMENTS]),
         mut health: Health,
         turbine_n_m: Option<T>,
-    ) -> ShiftEstimate<T> {
+    ) {
         let refused = channels.each().contains(&ChannelHealth::Refused);
         let lost = channels.each().contains(&ChannelHealth::Lost);
         health = health.max(match (channels.command == ChannelHealth::Refused, lost, refused) {
@@ -158,7 +161,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         state.estimate.health = health;
-        state.estimate
     }
 
     /// Slip of the offgoing clutch away from the new gear, where the readings show one.

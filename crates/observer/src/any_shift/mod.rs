@@ -31,6 +31,7 @@ mod correct;
 mod covariance;
 mod elements;
 mod estimate;
+mod input_clutch;
 mod learnt;
 mod newest;
 mod phases;
@@ -57,6 +58,7 @@ use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, out
 use turbine::InputSide;
 
 pub use estimate::{ClutchEstimate, ShiftEstimate};
+pub use input_clutch::InputClutch;
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;
@@ -383,7 +385,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         channels.engine = self.take_engine(state, input, dt_s);
         self.take_newest(state, input, dt_s, &mut channels);
         health = health.max(self.take_gear(state, input.gear));
-        let torque = self.input_torque(state, input);
+        let side = self.input_side(state, input);
+        let torque = side.as_ref().and_then(|side| self.turbine.at(side));
+        let input_clutch = side.as_ref().and_then(|side| self.input_clutch(state, input, side));
         if let Some(running) = &mut state.running {
             match &torque {
                 Some(torque) => {
@@ -397,7 +401,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         health = health.max(self.settle(state, input, torque.as_ref()));
         let turbine_n_m = torque.map(|torque| torque.turbine_n_m);
-        self.conclude(state, input, (&channels, &commands), health, turbine_n_m)
+        self.conclude(state, input, (&channels, &commands), health, turbine_n_m);
+        state.estimate.input_clutch = input_clutch.filter(|clutch| clutch.torque_n_m.is_finite());
+        state.estimate
     }
 
     fn reject_time(&self, state: &mut AnyShiftState<T>) {
@@ -413,6 +419,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         for clutch in state.estimate.clutches.iter_mut().flatten() {
             (clutch.pressure_range_pa, clutch.torque_range_n_m) = (None, None);
         }
+        state.estimate.input_clutch = None;
         state.estimate.health = Health::TimeRejected;
         state.estimate.channels = Channels::all(ChannelHealth::Refused);
         state.estimate.commands = [ChannelHealth::Refused; MAX_ELEMENTS];

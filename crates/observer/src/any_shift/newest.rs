@@ -101,6 +101,13 @@ impl<T: Real> Newest<T> {
         late.0
     }
 
+    /// Rate between the two newest readings, rad/s^2, and the time between them, s; none where they are far apart.
+    pub(super) fn rate(&self) -> Option<(T, T)> {
+        let (early, early_s) = self.before[0]?;
+        let span_s = early_s - self.age_s;
+        (span_s > T::zero() && span_s <= T::of(LONGEST_S)).then(|| ((self.value - early) / span_s, span_s))
+    }
+
     /// The speed now; `None` without a line, where the newest reading may be older than `longest_s`, where a toothed wheel may turn
     /// at less than half of it, or after a refused one: a clutch that grips hard looks so, and the line does not show it.
     ///

@@ -3,7 +3,7 @@
 use super::{
     AnyShiftFilter, AnyShiftState, ChannelHealth, Channels, Engine, FIRST_S, GearCommand, InputSide, LOST_S,
     MAX_ELEMENTS, Newest, OUTPUT, Reading, Running, SPEEDS, ShiftInput, Slip, SpeedReading, TURBINE, Verdict, pieces,
-    square, turbine,
+    square,
 };
 use drivetrain::Real;
 
@@ -186,8 +186,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         (slip.value.is_finite() && error.is_finite()).then_some([slip.value, error])
     }
 
-    /// The torque at the gearbox input now, if it is known.
-    pub(super) fn input_torque(&self, state: &AnyShiftState<T>, input: &ShiftInput<T>) -> Option<turbine::Found<T>> {
+    /// What is known in front of the gearbox now; none before the first turbine speed.
+    pub(super) fn input_side(&self, state: &AnyShiftState<T>, input: &ShiftInput<T>) -> Option<InputSide<T>> {
         let turbine = match (state.newest[TURBINE], &state.running) {
             (Some(newest), _) if newest.age_s <= T::of(FIRST_S) => newest.at(T::zero()),
             (_, Some(running)) => running.x.mean[TURBINE],
@@ -202,7 +202,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let deviation = self.readings[TURBINE].deviation_rad_s;
         let reported_n_m = state.reported.map(|(torque, _)| torque);
         let turbine = [turbine, deviation * deviation];
-        self.turbine.at(&InputSide { engine, turbine, reported_n_m, lock_up_applied: input.lock_up_applied })
+        Some(InputSide { engine, turbine, reported_n_m, lock_up_applied: input.lock_up_applied })
     }
 
     pub(super) fn slip(&self, ratio: T, [turbine, output]: [T; 2]) -> Slip<T> {

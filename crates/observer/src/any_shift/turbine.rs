@@ -11,8 +11,10 @@
 
 use drivetrain::{Converter, Real};
 
+use super::square;
+
 /// The torque below which an error is no longer a share of it, N m.
-const LEAST_N_M: f64 = 10.0;
+pub(super) const LEAST_N_M: f64 = 10.0;
 
 /// What is known of the torque at the gearbox input.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,13 +55,9 @@ impl<T: Real> TurbineTorque<T> {
         let Some(converter) = &self.converter else {
             return side.reported_n_m.map(|turbine_n_m| Found { turbine_n_m, noise: zero, share: self.engine_share });
         };
-        let square = |x: T| x * x;
         let [engine, engine_variance, acceleration, acceleration_variance] = side.engine?;
-        let [turbine, turbine_variance] = side.turbine;
-        let (by_maps, slope) = converter.turbine_with_slope(engine, turbine);
-        // The torque is of second degree in both speeds (Euler's theorem).
-        let per_engine = (T::of(2.0) * by_maps - turbine * slope) / engine.max(one);
-        let noise = square(slope) * turbine_variance + square(per_engine) * engine_variance;
+        let turbine = side.turbine[0];
+        let (by_maps, noise) = by_maps(converter, [engine, engine_variance], side.turbine);
         let maps = Found { turbine_n_m: by_maps, noise, share: self.converter_share };
         let Some(reported) = side.reported_n_m else {
             return (!side.lock_up_applied).then_some(maps);
@@ -94,4 +92,17 @@ impl<T: Real> TurbineTorque<T> {
             engine_share: to(self.engine_share),
         }
     }
+}
+
+/// The turbine torque by the maps, N m, and its variance from the noise of both speeds; each speed is given with its variance.
+#[inline]
+pub(super) fn by_maps<T: Real>(
+    converter: &Converter<T>,
+    [engine, engine_variance]: [T; 2],
+    [turbine, turbine_variance]: [T; 2],
+) -> (T, T) {
+    let (torque, slope) = converter.turbine_with_slope(engine, turbine);
+    // The torque is of second degree in both speeds (Euler's theorem).
+    let per_engine = (T::of(2.0) * torque - turbine * slope) / engine.max(T::one());
+    (torque, square(slope) * turbine_variance + square(per_engine) * engine_variance)
 }

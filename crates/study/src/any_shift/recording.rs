@@ -117,6 +117,23 @@ pub fn lock_up_is_applied(car: &Car, sample: &CarSample) -> bool {
     lock_up.is_some_and(|torque_n_m| torque_n_m.abs() > LOCK_UP_N_M)
 }
 
+/// The clutch between engine and gearbox, by its place among the elements: the lock-up clutch of the converter; without a converter, the
+/// clutch of the gear while there is no shift.
+pub fn input_clutch(car: &Car, sample: &CarSample) -> Option<usize> {
+    if car.converter.is_some() {
+        return lock_up_is_applied(car, sample).then_some(car.gearbox.elements.len());
+    }
+    let is_in_gear = sample.shift.is_none() && !sample.is_neutral;
+    let from_gear = car.gearbox.shifts.iter().filter(|shift| is_in_gear && shift.from == sample.gear);
+    from_gear.filter_map(|shift| shift.change.single()).map(|[offgoing, _]| offgoing).next()
+}
+
+/// Torque of the clutch between engine and gearbox, N m; not a number where there is none.
+pub fn input_clutch_n_m(car: &Car, sample: &CarSample) -> f64 {
+    let torque = input_clutch(car, sample).and_then(|element| sample.torques.elements_n_m.get(element));
+    torque.copied().unwrap_or(f64::NAN)
+}
+
 /// The engine torque as the engine's controller reports it, N m: at the clutch, less the drag of the engine.
 pub fn reported_engine_n_m(car: &Car, sample: &CarSample) -> f64 {
     sample.torques.engine_n_m - car.engine.drag_n_m_s * sample.torques.engine_rad_s

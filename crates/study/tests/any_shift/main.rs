@@ -6,6 +6,7 @@
 mod attacks;
 mod cars;
 mod drives;
+mod input_clutch;
 mod learning;
 mod limits;
 mod sensitivity;

@@ -88,8 +88,8 @@ pub(super) struct Column {
     pub(super) value: Value,
 }
 
-/// The columns of a car whose elements have these places in the filter's tables.
-pub(super) fn columns(places: &[(usize, &str)]) -> Vec<Column> {
+/// The columns of a car whose elements have these places in the filter's tables, with a converter or without.
+pub(super) fn columns(places: &[(usize, &str)], has_converter: bool) -> Vec<Column> {
     let word = |name: &str, value: for<'a> fn(&Row<'a>) -> Cell<'a>| Column {
         name: name.to_owned(),
         kind: ColumnKind::Word,
@@ -109,6 +109,15 @@ pub(super) fn columns(places: &[(usize, &str)]) -> Vec<Column> {
     }
     columns.push(number("turbine_torque_estimate_n_m".to_owned(), Value::Of(|row| of(row.estimate.turbine_n_m))));
     columns.push(number(trace::signal::SHAFT_ESTIMATE.to_owned(), Value::Of(|row| of(row.estimate.shaft_n_m))));
+    let clutch = if has_converter { "lock_up" } else { "launch_clutch" };
+    columns.push(number(
+        format!("{clutch}_torque_estimate_n_m"),
+        Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.torque_n_m))),
+    ));
+    columns.push(number(
+        format!("{clutch}_torque_deviation_n_m"),
+        Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.deviation_n_m))),
+    ));
     columns.extend(
         places
             .iter()
@@ -125,7 +134,7 @@ pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
             .and_then(|rest| rest.strip_suffix('_'))
             .is_some_and(|rest| rest.starts_with("element_"))
     };
-    columns(&[]).iter().any(|column| column.name == name) || of_element()
+    [true, false].into_iter().any(|with| columns(&[], with).iter().any(|column| column.name == name)) || of_element()
 }
 
 fn of(value: Option<f64>) -> Cell<'static> {

@@ -87,7 +87,7 @@ pub(super) fn estimate(
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
-    let columns = chosen(columns(&places), &options.columns)?;
+    let columns = chosen(columns(&places, car.converter.is_some()), &options.columns)?;
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
