@@ -247,7 +247,10 @@ fn a_gearbox_without_stick_diagram_or_plates_is_refused() {
     };
     let ratios =
         "name = \"g\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 3.0 }, { name = \"2\", ratio = 2.0 }]\n";
-    assert!(of(ratios).contains("no stick diagram\nhint: a simulated car needs"));
+    assert!(
+        of(ratios)
+            .contains("has ratios alone: no clutch has a torque or a pressure by them\nhint: describe its elements")
+    );
     let at = GEARBOX.find("pack = {").unwrap();
     let end = at + GEARBOX[at..].find('}').unwrap() + 1;
     let bare = format!("{}{}", &GEARBOX[..at], &GEARBOX[end..]);

@@ -99,7 +99,9 @@ pub enum TrainError {
     #[error("a torque, a speed or an inertia is not a finite number")]
     NotFinite,
     /// The gearbox is known by its ratios only.
-    #[error("the gearbox has no stick diagram")]
+    #[error(
+        "the gearbox has no stick diagram: it can be estimated, and not simulated\nhint: describe it with level = \"stick-diagram\""
+    )]
     NoDiagram,
     /// A clutch or brake is known by its name only.
     #[error("a clutch or brake of the gearbox has no `pack`")]

@@ -106,7 +106,7 @@ fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
             CAR.to_owned(),
             "is not the output speed times the ratio",
         ),
-        ("ratios alone", text.clone(), ratios, "has no stick diagram"),
+        ("ratios alone", text.clone(), ratios, "has ratios alone"),
     ] {
         let log = folder.write("log.csv", &text);
         let said = refused(&wetclutch(&["fit", &log, "--vehicle", &vehicle, "-o", &fitted]));

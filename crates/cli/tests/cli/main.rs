@@ -17,6 +17,7 @@ mod log_to_fit;
 mod logs;
 mod long_logs;
 mod measured;
+mod other_cars;
 mod own_car;
 mod studies;
 mod support;

@@ -55,7 +55,7 @@ pub struct Car {
     pub source: Source,
     /// Its name for people.
     pub name: String,
-    /// The gearbox; its stick diagram is known.
+    /// The gearbox. Without a stick diagram the car can be estimated, and not simulated.
     pub gearbox: Gearbox,
     /// The friction elements, in the order of the gearbox's elements; `None` for dogs and one-way clutches.
     pub clutches: Vec<Option<ShiftClutch>>,
@@ -129,10 +129,12 @@ impl Car {
         let raw: RawCar = Layers { source: defaults, over: Some(&source) }.parse()?;
         let check = Check { layers: Layers { source: defaults, over: Some(&source) } };
         let at = raw.gearbox.span().start;
-        if gearbox.train.is_none() {
-            let message = format!("\"{}\" has no stick diagram", raw.gearbox.get_ref());
-            let hint = "a simulated car needs a gearbox file with level = \"stick-diagram\"".to_owned();
-            return Err(check.meaning("gearbox", at, message, Some(hint)));
+        if gearbox.elements.is_empty() {
+            let message =
+                format!("\"{}\" has ratios alone: no clutch has a torque or a pressure by them", raw.gearbox.get_ref());
+            let hint = "describe its elements (level = \"stick-diagram\", or \"shares\"); with ratios alone `wetclutch inspect LOG --shifts` gives \
+                        torques at the turbine, with the ratios under [gearbox] of its channel map";
+            return Err(check.meaning("gearbox", at, message, Some(hint.to_owned())));
         }
         turbine_inertias(&check, &raw, &mut gearbox)?;
         let line_pressure_pa =

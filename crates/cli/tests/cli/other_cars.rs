@@ -1,0 +1,106 @@
+//! Estimates of cars with other parts than a converter that is open and a gearbox whose train is known.
+
+use crate::any_car::numbers;
+use crate::support::{Folder, ROOT, refused, said, wetclutch};
+
+/// Two shifts of a car with the two-speed gearbox.
+const TWO_SHIFTS: &str = "name = \"d\"\n[[shift]]\ntime_s = 6\ngear = \"2\"\n[[shift]]\ntime_s = 14\ngear = \"1\"\n\
+    [[segment]]\nduration_s = 12\nthrottle = 0.15\n[[segment]]\nduration_s = 8\nthrottle = 0.0\n";
+
+/// The two-speed gearbox by what `check gearboxes/two_speed.toml` prints of it.
+const SHARES: &str = r#"
+name = "two-speed gearbox by its shares"
+level = "shares"
+line_pressure_pa = 1.0e6
+gear = [
+  { name = "1", ratio = 2.5, shares = { A = 1.5 }, turbine_max_n_m = 300 },
+  { name = "2", ratio = 1.0, shares = { B = 0.6 }, turbine_max_n_m = 300 },
+]
+
+[[element]]
+name = "A"
+kind = "brake"
+pack = { friction_faces = 4, mean_radius_m = 0.14, piston_area_m2 = 0.012, return_spring_n = 600, friction_coefficient = 0.13 }
+
+[[element]]
+name = "B"
+kind = "clutch"
+pack = { friction_faces = 3, mean_radius_m = 0.13, piston_area_m2 = 0.01, return_spring_n = 600, friction_coefficient = 0.13 }
+
+[[shift_mass]]
+gears = ["1", "2"]
+turbine_kg_m2 = 0.0644
+coupling_kg_m2 = -0.0111
+output_kg_m2 = 0.1778
+"#;
+
+/// A vehicle file with a gearbox file.
+fn vehicle(folder: &Folder, name: &str, gearbox: &str, more: &str) -> String {
+    folder.write(&format!("{name}.toml"), format!("name = \"{name}\"\ngearbox = \"{gearbox}\"\n{more}"))
+}
+
+/// Simulates a drive of a car; the true and the measured signals.
+fn simulated(folder: &Folder, drive: &str, car: &str) -> [String; 2] {
+    let drive = folder.write("drive.toml", drive);
+    said(&wetclutch(&["simulate", &drive, "--vehicle", car, "-o", &folder.path("sim")]));
+    ["sim/d.csv", "sim/d_measured.csv"].map(|name| folder.path(name))
+}
+
+fn estimate(folder: &Folder, log: &str, car: &str, output: &str) -> String {
+    said(&wetclutch(&["estimate", log, "--vehicle", car, "-o", &folder.path(output)]));
+    folder.read(output)
+}
+
+#[test]
+fn a_gearbox_by_its_shares_has_the_estimates_of_its_stick_diagram() {
+    let folder = Folder::new("shares");
+    folder.write("box.toml", SHARES);
+    let pressure = "[hydraulics]\nline_pressure_pa = 1.0e6\n";
+    let train = vehicle(&folder, "train", &format!("{ROOT}gearboxes/two_speed.toml"), pressure);
+    let shares = vehicle(&folder, "shares", "box.toml", pressure);
+    let [_, log] = simulated(&folder, TWO_SHIFTS, &train);
+    let [by_train, by_shares] =
+        [(&train, "train.csv"), (&shares, "shares.csv")].map(|(car, output)| estimate(&folder, &log, car, output));
+    for (name, most) in [("oncoming_torque_estimate_n_m", 0.1), ("oncoming_pressure_estimate_pa", 100.0)] {
+        let pairs: Vec<_> = numbers(&by_train, name).into_iter().zip(numbers(&by_shares, name)).collect();
+        let compared = pairs.iter().filter(|(one, other)| one.is_finite() && other.is_finite());
+        assert!(compared.clone().count() > 100, "{name}");
+        assert!(compared.clone().all(|(one, other)| (one - other).abs() < most), "{name}");
+    }
+    // What cannot be simulated says so.
+    let output = wetclutch(&["simulate", &folder.path("drive.toml"), "--vehicle", &shares, "-o", &folder.path("no")]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && error.contains("no stick diagram: it can be estimated"), "{error}");
+    assert!(error.contains("hint: describe it with level"), "{error}");
+    // Ratios alone say nothing of a clutch.
+    folder.write("ratios.toml", "name = \"g\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 3.0 }]\n");
+    let alone = vehicle(&folder, "alone", "ratios.toml", "");
+    let error = refused(&wetclutch(&["estimate", &log, "--vehicle", &alone]));
+    assert!(error.contains("has ratios alone") && error.contains("wetclutch inspect LOG --shifts"), "{error}");
+}
+
+/// RMS of estimate minus truth, N m, and how many rows have both.
+fn rms(truth: &str, estimate: &str, clutch: &str) -> (f64, usize) {
+    let (truth, estimate) =
+        (numbers(truth, &format!("{clutch}_torque_n_m")), numbers(estimate, &format!("{clutch}_torque_estimate_n_m")));
+    let errors: Vec<f64> = truth.iter().zip(&estimate).map(|(a, b)| b - a).filter(|error| error.is_finite()).collect();
+    ((errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt(), errors.len())
+}
+
+#[test]
+fn lock_up_and_launch_clutch_have_a_torque() {
+    const DRIVE: &str =
+        "name = \"d\"\n[[segment]]\nduration_s = 14\nthrottle = 0.2\n[[segment]]\nduration_s = 6\nthrottle = 0.1\n";
+    let folder = Folder::new("input-clutch");
+    let lock_up = "[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\non_input_rad_s = 140\noff_input_rad_s = 110\nramp_s = 0.6\n";
+    let eight = vehicle(&folder, "eight", &format!("{ROOT}gearboxes/8hp.toml"), lock_up);
+    let dual = format!("{ROOT}vehicles/dual_clutch.toml");
+    for (car, clutch) in [(&eight, "lock_up"), (&dual, "launch_clutch")] {
+        let [truth, log] = simulated(&folder, DRIVE, car);
+        let found = estimate(&folder, &log, car, "out.csv");
+        let (error, rows) = rms(&std::fs::read_to_string(truth).unwrap(), &found, clutch);
+        assert!(error < 8.0 && rows > 400, "{clutch}: {error} N m in {rows} rows");
+        let deviations = numbers(&found, &format!("{clutch}_torque_deviation_n_m"));
+        assert!(deviations.iter().filter(|deviation| deviation.is_finite()).all(|deviation| *deviation > 0.0));
+    }
+}
