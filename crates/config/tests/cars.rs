@@ -74,6 +74,35 @@ fn a_valve_of_ones_own_that_is_not_whole_is_told_so() {
 }
 
 #[test]
+fn a_valve_of_one_element_and_a_lock_up_clutch_that_are_not_whole_are_told_so() {
+    let lock_up = "[lock_up]\ncapacity_n_m = 300\nfirst_gear = \"3\"\non_input_rad_s = 140\noff_input_rad_s = 110\n";
+    for (text, field, hint) in [
+        ("[clutch.C.valve]\nzero_pressure_a = 1.2\n", "`delay`", "hint: the valve of one element is given whole"),
+        (lock_up, "`ramp_s`", "hint: [lock_up] has `capacity_n_m`, `first_gear`"),
+        ("[lock_up]\n", "`capacity_n_m`", "hint: [lock_up] has "),
+    ] {
+        let message = car(text).unwrap_err();
+        assert!(message.contains(&format!("car.toml:3: missing field {field}\n{hint}")), "{message}");
+    }
+    // What is not missing has no such hint.
+    let message = car(&format!("{lock_up}ramp_s = 0.5\nramp = 1\n")).unwrap_err();
+    assert!(
+        message.contains("car.toml:9: unknown field `ramp`") && !message.contains("hint: [lock_up] has"),
+        "{message}"
+    );
+}
+
+#[test]
+fn the_lock_up_clutch_in_the_comments_of_the_shipped_file_is_right_and_has_every_key() {
+    let shipped = include_str!("../../../vehicles/eight_speed.toml");
+    let begin = shipped.find("# [lock_up]").unwrap();
+    let block = shipped[begin..].lines().take_while(|line| line.starts_with("# ")).map(|line| &line[2..]);
+    let lock_up = car(&block.collect::<Vec<_>>().join("\n")).unwrap().lock_up.unwrap();
+    let config::LockUp { capacity_n_m, first_gear, on_rad_s, off_rad_s, ramp_s, slip_rad_s } = lock_up;
+    assert_eq!((capacity_n_m, first_gear, on_rad_s, off_rad_s, ramp_s, slip_rad_s), (300.0, 3, 140.0, 110.0, 0.5, 4.0));
+}
+
+#[test]
 fn a_first_file_of_every_shipped_gearbox_is_short_and_a_car_of_its_numbers() {
     for (name, text) in SHIPPED {
         for engine_torque_n_m in [20.0, 190.0, 2000.0] {

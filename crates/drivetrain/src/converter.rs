@@ -1,10 +1,12 @@
 //! The torque converter, in drive and in overrun.
 
-use crate::{Real, Table1};
+use crate::{Engine, Real, Table1};
 
 /// Below this engine speed, rad/s, the speed ratio is formed with this speed instead, so that it
 /// stays finite for a stalled engine.
 const SLOWEST_ENGINE_RAD_S: f64 = 1.0;
+/// Halvings of the range in which a steady engine speed is sought: as many as the digits of the largest number type.
+const HALVINGS: usize = 53;
 
 /// Steady-state torque converter, Eq. (2.11) and (2.12).
 ///
@@ -64,6 +66,22 @@ impl<T: Real> Converter<T> {
             capacity * squares[at] * ratios[at]
         };
         [end(capacity.0, 0, 1), end(capacity.1, 1, 0)]
+    }
+
+    /// Turbine torque, N m, with this engine at full throttle and at a steady speed, and the turbine at this speed. The engine
+    /// turns no slower than the turbine and no faster than its torque map goes.
+    pub fn full_throttle_turbine_torque(&self, engine: &Engine<T>, turbine_rad_s: T) -> T {
+        let surplus = |speed: T| {
+            let pump_n_m = self.torques(speed, turbine_rad_s).pump_n_m;
+            engine.torque(speed, T::one()) - engine.drag_n_m_s * speed - pump_n_m
+        };
+        let fastest = engine.torque_n_m.rows().last().map_or(turbine_rad_s, |last| last.at_least(turbine_rad_s));
+        let (mut slow, mut fast) = (turbine_rad_s, fastest);
+        for _ in 0..HALVINGS {
+            let middle = T::of(0.5) * (slow + fast);
+            if surplus(middle) > T::zero() { slow = middle } else { fast = middle }
+        }
+        self.torques(fast, turbine_rad_s).turbine_n_m
     }
 
     /// The same converter in another precision.
@@ -140,6 +158,22 @@ mod tests {
             let stalled = engine[0] < 1.0;
             assert!(stalled || high - low < 1.2 * (most - least), "{low} {least} {most} {high}");
         }
+    }
+
+    #[test]
+    fn at_full_throttle_the_pump_takes_what_the_engine_gives() {
+        let map = |most: f64| crate::Table2::new(&[0.0, 400.0], &[0.0, 1.0], &[[0.0, most], [0.0, most]]).unwrap();
+        let engine = |most: f64| Engine { inertia_kg_m2: 0.2, drag_n_m_s: 0.0, torque_n_m: map(most) };
+        // 160 N m are 4e-3 N m s^2 times the square of 200 rad/s; at rest the turbine has twice that.
+        let stall = converter().full_throttle_turbine_torque(&engine(160.0), 0.0);
+        assert!((stall - 320.0).abs() < 1e-9, "{stall}");
+        // At the coupling point 80 N m are 2e-3 N m s^2 times that square.
+        let coupling = converter().full_throttle_turbine_torque(&engine(80.0), 180.0);
+        assert!((coupling - 80.0).abs() < 1e-9, "{coupling}");
+        // At the end of its map, 400 rad/s, a stronger engine has more than the pump takes, 640 N m.
+        assert!((converter().full_throttle_turbine_torque(&engine(1e3), 0.0) - 1280.0).abs() < 1e-9);
+        // Where the turbine turns faster than the engine can, there is no drive.
+        assert_eq!(converter().full_throttle_turbine_torque(&engine(160.0), 500.0), 0.0);
     }
 
     #[test]

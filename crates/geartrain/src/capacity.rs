@@ -17,6 +17,22 @@ pub struct Capacity {
 }
 
 impl Capacity {
+    /// An element that holds `capacity_n_m`, in the gear that asks most of it; of gears that ask the same in the first one.
+    /// `turbine_n_m` is the largest turbine torque in a gear, N m, where it is known. `None` where no gear asks anything.
+    pub fn where_most_is_asked(
+        element: usize,
+        capacity_n_m: f64,
+        gears: &[Gear],
+        turbine_n_m: impl Fn(usize) -> Option<f64>,
+    ) -> Option<Self> {
+        let asked = gears.iter().enumerate().filter_map(|(gear, of)| {
+            let holding = of.holding.iter().find(|holding| holding.element == element)?;
+            Some((gear, holding.per_turbine_torque.abs() * turbine_n_m(gear)?))
+        });
+        let (gear, wanted_n_m) = asked.rev().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (wanted_n_m > 0.0).then_some(Self { element, gear, capacity_n_m, wanted_n_m })
+    }
+
     /// Capacity over the torque asked.
     pub fn ratio(&self) -> f64 {
         self.capacity_n_m / self.wanted_n_m
@@ -31,13 +47,7 @@ impl Capacity {
 /// The element's capacity, where its plates, the line pressure and the torque asked are known.
 fn of_element(element: &GearboxElement, at: usize, gears: &[Gear], line_pressure_pa: f64) -> Option<Capacity> {
     let capacity_n_m = element.pack?.static_capacity(line_pressure_pa);
-    let asked = gears.iter().enumerate().filter_map(|(gear, of)| {
-        let holding = of.holding.iter().find(|holding| holding.element == at)?;
-        Some((gear, holding.per_turbine_torque.abs() * of.turbine_max_n_m?))
-    });
-    // Of equal torques the first gear.
-    let (gear, wanted_n_m) = asked.rev().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (wanted_n_m > 0.0).then_some(Capacity { element: at, gear, capacity_n_m, wanted_n_m })
+    Capacity::where_most_is_asked(at, capacity_n_m, gears, |gear| gears[gear].turbine_max_n_m)
 }
 
 /// The capacity of every element for which it is known; an error if one slips.

@@ -248,8 +248,9 @@ pub(crate) enum Command {
     /// pressure and clutch torque in the torque and inertia phase of a simulated upshift, where each default is off by as much as the
     /// error budget or a stated share allows. --all shows every one.
     ///
-    /// Of a gearbox file it prints the gears with ratios and holding torques, the capacity of the elements, and the
-    /// shifts with their elements. With -o it draws them:
+    /// Of a gearbox file, or of a vehicle file that names one, it prints the gears with ratios and holding torques, the capacity of
+    /// the elements, and the shifts with their elements. Warns of elements of a car that slip at full throttle. With -o it draws
+    /// the gearbox:
     ///
     ///   train.svg      shafts, planetary sets, gear pairs and elements
     ///   gear_NAME.svg  the same in a gear: engaged elements, shaft speeds, levers of the sets
@@ -297,7 +298,7 @@ pub(crate) struct Check {
     /// experiments/bench.toml
     #[arg(long, value_name = "SENSORS.toml")]
     pub(crate) sensors: Option<PathBuf>,
-    /// Folder for the diagrams of a gearbox file
+    /// Folder for the diagrams of a gearbox
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Show every default of a vehicle file

@@ -7,10 +7,11 @@ use design::{longest_step_of, unstable_corners};
 
 use report::tables::phase_name;
 
+use super::car::{describe_car, describe_gearbox};
 use super::check_defaults::{describe_car_values, describe_defaults};
 use super::gearbox;
 use super::matrix::sensors_or_bench;
-use super::simulate_drive::{describe_car, describe_drive};
+use super::simulate_drive::describe_drive;
 use crate::args::Check;
 use crate::failure::Failure;
 use crate::output;
@@ -18,8 +19,9 @@ use crate::output;
 pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     let source = Source::read(&options.file)?;
     let kind = source.kind()?;
-    if options.output.is_some() && kind != Kind::Gearbox {
-        let message = format!("{}: only a gearbox file is drawn\nhint: leave -o out", options.file.display());
+    if options.output.is_some() && !matches!(kind, Kind::Gearbox | Kind::Car) {
+        let what = "only a gearbox is drawn, of a gearbox file or of a vehicle file that names one";
+        let message = format!("{}: {what}\nhint: leave -o out", options.file.display());
         return Err(Failure::Input(message));
     }
     if options.sensors.is_some() && kind != Kind::Car {
@@ -31,6 +33,10 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
             let car = Car::read(&options.file)?;
             let sensors = sensors_or_bench(options.sensors.as_deref())?;
             describe_car(&car)?;
+            describe_gearbox(&car)?;
+            if let Some(folder) = &options.output {
+                gearbox::draw(&car.gearbox, folder)?;
+            }
             warn(&car.implausible());
             describe_car_values(&car, &sensors, options.all)
         }

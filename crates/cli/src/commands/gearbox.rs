@@ -4,7 +4,7 @@ use std::path::Path;
 
 use config::GearboxFile;
 use drivetrain::{PhaseOrder, ShiftKind};
-use geartrain::{Change, Gearbox, Shift};
+use geartrain::{Capacity, Change, Gearbox, Shift};
 use report::gearbox_figure::{gear_figure, train_figure};
 
 use crate::failure::Failure;
@@ -17,8 +17,9 @@ pub(super) fn describe(file: &GearboxFile, folder: Option<&Path>) -> Result<(), 
     }
     output::line(&head(gearbox))?;
     gears(gearbox)?;
-    capacities(gearbox)?;
+    capacities(gearbox, &gearbox.capacities)?;
     shifts(gearbox)?;
+    order_of_phases()?;
     for remark in remarks(gearbox) {
         output::line(&format!("\n{remark}"))?;
     }
@@ -55,7 +56,8 @@ fn short(value: f64, decimals: usize) -> String {
     text.strip_prefix('-').filter(|digits| digits.chars().all(|c| "0.".contains(c))).map(str::to_owned).unwrap_or(text)
 }
 
-fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
+/// Prints the gears with their ratios and holding torques.
+pub(super) fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
     let forward = gearbox.forward_gears();
     let mut rows = vec![["gear", "ratio", "step"].map(str::to_owned).to_vec()];
     rows[0].extend(gearbox.elements.iter().map(|element| element.name.clone()));
@@ -85,13 +87,14 @@ fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
     Ok(())
 }
 
-fn capacities(gearbox: &Gearbox) -> Result<(), Failure> {
-    if gearbox.capacities.is_empty() {
+/// Prints what elements hold beside what is asked of them.
+pub(super) fn capacities(gearbox: &Gearbox, capacities: &[Capacity]) -> Result<(), Failure> {
+    if capacities.is_empty() {
         return Ok(());
     }
     let mut rows =
         vec![["element", "kind", "faces", "holds N m", "asked N m", "in gear", "factor"].map(str::to_owned).to_vec()];
-    for capacity in &gearbox.capacities {
+    for capacity in capacities {
         let element = &gearbox.elements[capacity.element];
         rows.push(vec![
             element.name.clone(),
@@ -116,7 +119,8 @@ fn pairs(gearbox: &Gearbox) -> impl Iterator<Item = &Shift> {
     })
 }
 
-fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
+/// Prints the shifts with their elements, and those that need more than one element off and on.
+pub(super) fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
     let name = |element: usize| gearbox.elements[element].name.as_str();
     let names = |elements: &[usize]| elements.iter().map(|&element| name(element)).collect::<Vec<_>>().join(" ");
     let gear = |at: usize| gearbox.gears[at].name.as_str();
@@ -166,7 +170,7 @@ fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
         };
         output::line(&format!("{what}: {}", labels.join(" ")))?;
     }
-    order_of_phases()
+    Ok(())
 }
 
 /// Which phase comes first in each kind of shift.
@@ -215,7 +219,7 @@ fn remarks(gearbox: &Gearbox) -> Vec<String> {
 }
 
 /// Writes the diagrams of the train and of each gear.
-fn draw(gearbox: &Gearbox, folder: &Path) -> Result<(), Failure> {
+pub(super) fn draw(gearbox: &Gearbox, folder: &Path) -> Result<(), Failure> {
     let Some(train) = train_figure(gearbox) else {
         let message = "only a stick diagram can be drawn\nhint: leave -o out, or describe shafts, sets and elements";
         return Err(Failure::Input(message.to_owned()));

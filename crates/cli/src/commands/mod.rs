@@ -1,6 +1,7 @@
 //! One file for each subcommand.
 
 mod bench;
+mod car;
 mod check;
 mod check_defaults;
 mod demo;
@@ -21,6 +22,8 @@ mod study;
 mod worst_case;
 mod written;
 
+use car::read_car;
+
 pub(crate) use bench::bench;
 pub(crate) use check::check;
 pub(crate) use demo::demo;
@@ -39,7 +42,7 @@ pub(crate) use worst_case::worst_case;
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use config::{Car, Kind, Source};
+use config::Source;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
 use serde::{Serialize, Serializer};
@@ -56,17 +59,6 @@ fn write_trace(path: &Path, trace: &Trace) -> Result<(), Failure> {
 /// Writes a text file, whole or not at all.
 fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     trace::write_whole(path, |writer| writer.write_all(text.as_bytes())).map_err(|error| Failure::writing(path, &error))
-}
-
-/// Reads the vehicle file of a car with a gearbox.
-fn read_car(path: &Path) -> Result<Car, Failure> {
-    if Source::read(path)?.kind()? == Kind::Vehicle {
-        return Err(Failure::Input(format!(
-            "{}: this vehicle file describes one shift, and not a gearbox\nhint: use one with `gearbox`, such as vehicles/eight_speed.toml",
-            path.display()
-        )));
-    }
-    Ok(Car::read(path)?)
 }
 
 /// `--sensors` where nothing is read by sensors.

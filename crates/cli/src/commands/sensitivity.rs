@@ -12,7 +12,7 @@ use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
-use crate::commands::{sensors_without_effect, write_text};
+use crate::commands::{read_car, sensors_without_effect, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -80,7 +80,7 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
 
 /// The same for every shift of a car with a gearbox.
 fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
-    let car = Car::read(path)?;
+    let car = read_car(path)?;
     let shifts = car_sensitivity(&car, &sensors_or_bench(options.sensors.as_deref())?)?;
     if shifts.is_empty() {
         let message = format!(

@@ -13,6 +13,7 @@ use study::any_shift::recording::{input_clutch_n_m, lock_up_is_applied, reported
 use trace::units::{km_h, rpm};
 use trace::{Cell, CsvWriter, WholeFile, signal};
 
+use super::car::{describe_car, read_car, warn_of_slipping};
 use super::simulate::size_note;
 use crate::args::Simulate;
 use crate::failure::Failure;
@@ -24,8 +25,8 @@ const ROW_BYTES: f64 = 500.0;
 pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     let drive = Drive::read(&options.experiment)?;
     let car = match &options.vehicle {
-        Some(vehicle) => super::read_car(vehicle)?,
-        None => drive.read_vehicle()?,
+        Some(vehicle) => read_car(vehicle)?,
+        None => drive.read_vehicle().inspect(warn_of_slipping)?,
     };
     if options.scenario.is_some() {
         let message = format!("{}: a drive has no scenarios\nhint: leave --scenario out", options.experiment.display());
@@ -305,36 +306,6 @@ impl Table {
     }
 }
 
-/// Prints what a vehicle file with a gearbox describes.
-pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
-    let gears = car.gearbox.forward_gears();
-    let ratio = |gear: Option<&usize>| gear.map_or(f64::NAN, |&gear| car.gearbox.gears[gear].ratio);
-    output::line(&format!(
-        "vehicle \"{}\": gearbox \"{}\", {} forward gears, ratio {:.3} to {:.3}, final ratio {:.3}, {} kg, {}",
-        car.name,
-        car.gearbox.name,
-        gears.len(),
-        ratio(gears.first()),
-        ratio(gears.last()),
-        car.driveline.final_ratio,
-        car.road.mass_kg,
-        if car.converter.is_some() { "torque converter" } else { "no converter" },
-    ))?;
-    for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
-        if let Some(clutch) = clutch {
-            output::line(&format!(
-                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure{}{}",
-                element.name,
-                trace::units::mpa(clutch.clutch.kiss_pressure()),
-                clutch.clutch.static_capacity(car.line_pressure_pa),
-                if clutch.valve.falls() { ", valve normally high" } else { "" },
-                if clutch.has_stroke { ", with stroke" } else { "" },
-            ))?;
-        }
-    }
-    Ok(())
-}
-
 /// Prints what a drive file describes.
 pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> {
     let given = match &drive.trace {
@@ -348,7 +319,12 @@ pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> 
         drive.repetitions
     ))?;
     match drive.vehicle {
-        Some(_) => describe_car(&drive.read_vehicle()?),
+        Some(_) => {
+            let car = drive.read_vehicle()?;
+            describe_car(&car)?;
+            warn_of_slipping(&car);
+            Ok(())
+        }
         None => {
             output::line(&format!("use: wetclutch simulate {} --vehicle VEHICLE -o DIR", path.display()))?;
             Ok(())

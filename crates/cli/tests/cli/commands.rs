@@ -550,7 +550,7 @@ fn check_prints_the_gears_and_shifts_of_a_gearbox_and_draws_them() {
     }
     let refused = wetclutch(&["check", VEHICLE, "-o", &folder.path("out")]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("only a gearbox file is drawn"));
+    assert!(stderr(&refused).contains("only a gearbox is drawn"));
 }
 
 #[test]

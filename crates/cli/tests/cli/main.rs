@@ -6,6 +6,7 @@ mod any_car;
 mod any_car_checks;
 mod any_car_logs;
 mod attacks;
+mod car_check;
 mod commands;
 mod day_of_logs;
 mod drives;

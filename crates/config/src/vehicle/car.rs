@@ -30,6 +30,12 @@ const GEARBOX: (&str, &str) = ("gearboxes/8hp.toml", include_str!("../../../../g
 /// What to do about a `[valve]` of which a part is missing.
 const WHOLE_VALVE: &str =
     "a [valve] of your own is given whole, as in vehicles/eight_speed.toml: all of its keys, or none";
+/// The same of the valve of one element.
+const WHOLE_CLUTCH_VALVE: &str = "the valve of one element is given whole, with all keys that [valve] has in \
+                                  vehicles/eight_speed.toml; without [clutch.NAME.valve] it is as [valve]";
+/// The same of `[lock_up]`.
+const WHOLE_LOCK_UP: &str = "[lock_up] has `capacity_n_m`, `first_gear`, `on_input_rad_s`, `off_input_rad_s` and `ramp_s`, and \
+                             may have `slip_rad_s`: vehicles/eight_speed.toml explains them";
 
 /// The lock-up clutch of the converter, and when it is closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +106,9 @@ impl Car {
         let source = Source::read(path)?;
         let defaults = Source::built_in(DEFAULTS.0, DEFAULTS.1);
         let layers = Layers { source: &defaults, over: Some(&source) };
-        let raw: RawCar = layers.parse().map_err(|error| source.unless_other(Kind::Car, error))?;
+        let raw: RawCar = layers
+            .parse()
+            .map_err(|error| source.unless_other(Kind::Car, incomplete_table(&source).unwrap_or(error)))?;
         let own = source.parse::<toml::Table>()?.contains_key("gearbox");
         if !own {
             let hint = "gearbox = \"../gearboxes/8hp.toml\", a path from the folder of this file".to_owned();
@@ -126,7 +134,9 @@ impl Car {
 
     /// The car of a file over these defaults.
     fn over(defaults: &Source, source: Source, mut gearbox: Gearbox) -> Result<Self, ConfigError> {
-        let raw: RawCar = Layers { source: defaults, over: Some(&source) }.parse()?;
+        let raw: RawCar = Layers { source: defaults, over: Some(&source) }
+            .parse()
+            .map_err(|error| incomplete_table(&source).unwrap_or(error))?;
         let check = Check { layers: Layers { source: defaults, over: Some(&source) } };
         let at = raw.gearbox.span().start;
         if gearbox.elements.is_empty() {
@@ -214,6 +224,29 @@ struct RawCar {
 #[derive(Deserialize)]
 struct RawOwnValve {
     valve: Option<Spanned<RawClutchValve>>,
+}
+
+/// The valves of single elements as the file itself has them.
+#[derive(Deserialize)]
+struct RawOwnClutches {
+    #[serde(default, rename = "clutch")]
+    _clutch: BTreeMap<String, RawOwnValve>,
+}
+
+/// The lock-up clutch as the file itself has it.
+#[derive(Deserialize)]
+struct RawOwnLockUp {
+    #[serde(rename = "lock_up")]
+    _lock_up: Option<RawLockUp>,
+}
+
+/// The error of a table without defaults that the file gives in part, with what to do about it.
+fn incomplete_table(source: &Source) -> Option<ConfigError> {
+    let of_valve = source.parse::<RawOwnClutches>().err().map(|error| (error, WHOLE_CLUTCH_VALVE));
+    let of_lock_up = source.parse::<RawOwnLockUp>().err().map(|error| (error, WHOLE_LOCK_UP));
+    let is_missing = |error: &ConfigError| error.what().starts_with("missing field");
+    let (error, hint) = [of_valve, of_lock_up].into_iter().flatten().find(|(error, _)| is_missing(error))?;
+    Some(error.with_hint(hint))
 }
 
 /// What connects the engine with the gearbox.

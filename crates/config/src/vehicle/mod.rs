@@ -3,6 +3,7 @@
 mod budget;
 mod car;
 mod car_bounds;
+mod car_capacity;
 mod clutch;
 mod fill;
 mod fill_bounds;

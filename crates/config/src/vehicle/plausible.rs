@@ -100,6 +100,7 @@ impl Car {
         }
         .implausible()
         .into_iter()
+        .chain(self.slipping_elements())
         .chain(self.gearbox.warnings.iter().map(of_gearbox))
         .collect()
     }

@@ -10,6 +10,7 @@ use study::any_shift::matrix::Pooled;
 
 use super::part::{Part, Runs, lock, merged};
 use crate::args::{Merge, StudyOptions};
+use crate::commands::car::{describe_car, warn_of_slipping};
 use crate::commands::matrix::bench_sensors;
 use crate::commands::writable;
 use crate::failure::Failure;
@@ -59,6 +60,7 @@ pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
     let _lock = lock(&options.output)?;
     writable(&options.output, &["runs.csv", "runs.parquet"])?;
     let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
+    warn_of_slipping(&campaign.study.car);
     let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
     let mut summary = campaign.summary();
     part.make(options, |row| campaign.push(&mut summary, row))?;
@@ -119,5 +121,7 @@ pub(crate) fn describe(path: &Path) -> Result<(), Failure> {
         100.0 * errors.valve_gain,
         100.0 * errors.converter,
     ))?;
-    crate::commands::simulate_drive::describe_car(&study.car)
+    describe_car(&study.car)?;
+    warn_of_slipping(&study.car);
+    Ok(())
 }

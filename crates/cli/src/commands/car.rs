@@ -1,0 +1,81 @@
+//! A car with a gearbox, as the commands read and describe it.
+
+use std::path::Path;
+
+use config::{Car, Kind, Source};
+
+use super::gearbox;
+use crate::failure::Failure;
+use crate::output;
+
+/// Reads the vehicle file of a car with a gearbox that is to be simulated.
+pub(super) fn read_car(path: &Path) -> Result<Car, Failure> {
+    if Source::read(path)?.kind()? == Kind::Vehicle {
+        return Err(Failure::Input(format!(
+            "{}: this vehicle file describes one shift, and not a gearbox\nhint: use one with `gearbox`, such as vehicles/eight_speed.toml",
+            path.display()
+        )));
+    }
+    let car = Car::read(path)?;
+    warn_of_slipping(&car);
+    Ok(car)
+}
+
+/// Warns if the closed elements of a car that is to be simulated cannot hold what its engine gives: its shifts may not come to an end.
+pub(super) fn warn_of_slipping(car: &Car) {
+    if let Some(slipping) = car.slipping_elements() {
+        output::note(&format!("warning: {slipping}"));
+    }
+}
+
+/// Prints what a vehicle file with a gearbox describes.
+pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
+    let gears = car.gearbox.forward_gears();
+    let ratio = |gear: Option<&usize>| gear.map_or(f64::NAN, |&gear| car.gearbox.gears[gear].ratio);
+    output::line(&format!(
+        "vehicle \"{}\": gearbox \"{}\", {} forward gears, ratio {:.3} to {:.3}, final ratio {:.3}, {} kg, {}",
+        car.name,
+        car.gearbox.name,
+        gears.len(),
+        ratio(gears.first()),
+        ratio(gears.last()),
+        car.driveline.final_ratio,
+        car.road.mass_kg,
+        if car.converter.is_some() { "torque converter" } else { "no converter" },
+    ))?;
+    for (element, clutch) in car.gearbox.elements.iter().zip(&car.clutches) {
+        if let Some(clutch) = clutch {
+            output::line(&format!(
+                "  {:4} kiss point {:.3} MPa, holds {:.0} N m at line pressure{}{}",
+                element.name,
+                trace::units::mpa(clutch.clutch.kiss_pressure()),
+                clutch.clutch.static_capacity(car.line_pressure_pa),
+                if clutch.valve.falls() { ", valve normally high" } else { "" },
+                if clutch.has_stroke { ", with stroke" } else { "" },
+            ))?;
+        }
+    }
+    Ok(())
+}
+
+/// Prints the gears and shifts of a car's gearbox, and what its elements hold beside what the engine asks of them.
+pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
+    gearbox::gears(&car.gearbox)?;
+    gearbox::capacities(&car.gearbox, &car.capacities())?;
+    output::line(&torques_asked(car))?;
+    gearbox::shifts(&car.gearbox)
+}
+
+/// The turbine torque that is asked of the gears: `278 N m in R, 1; 203 N m in 2, 3`.
+fn torques_asked(car: &Car) -> String {
+    let mut asked: Vec<(String, Vec<&str>)> = Vec::new();
+    for (at, gear) in car.gearbox.gears.iter().enumerate() {
+        let torque = format!("{:.0} N m", car.greatest_turbine_torque(at));
+        match asked.iter_mut().find(|(of, _)| *of == torque) {
+            Some((_, gears)) => gears.push(&gear.name),
+            None => asked.push((torque, vec![&gear.name])),
+        }
+    }
+    let asked: Vec<String> = asked.iter().map(|(torque, gears)| format!("{torque} in {}", gears.join(", "))).collect();
+    format!("asked: the largest turbine torque at full throttle, {}", asked.join("; "))
+}

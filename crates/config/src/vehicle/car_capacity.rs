@@ -1,0 +1,173 @@
+//! What the closed elements of a car hold at line pressure, beside the most that its engine asks of them.
+//!
+//! The most that is asked of a gear \[chosen\] is the larger of two turbine torques: the greatest engine torque, as it comes with
+//! the lock-up clutch closed or without a converter; and the greatest one that the converter makes of full throttle at steady speeds,
+//! with the turbine at any speed that it has in this gear. In the lowest forward gear and in reverse a car starts: there the turbine may be at
+//! rest, where a converter multiplies most. In the other gears it turns at [`SLOWEST_TURBINE_RAD_S`] or faster, since a gearbox controller
+//! shifts down before.
+//!
+//! Left out: the torque of an engine that a shift slows down, and torque limits, with which a gearbox controller can protect an
+//! element. So an element that slips by this rule is a warning, not an error.
+
+use std::fmt::Write as _;
+
+use geartrain::Capacity;
+
+use super::Car;
+
+/// Slowest turbine in gears in which a car does not start, rad/s \[chosen\]: a little above idle speed, and below the downshifts of
+/// `drives/city.toml`.
+const SLOWEST_TURBINE_RAD_S: f64 = 100.0;
+/// Turbine speeds at which the greatest torque is sought, from the slowest to the end of the engine map.
+const TURBINE_SPEEDS: u32 = 40;
+/// Line pressure that is not proposed, Pa: no supply of a passenger car gives it \[chosen\].
+const MOST_LINE_PRESSURE_PA: f64 = 3e6;
+
+impl Car {
+    /// The greatest turbine torque in a gear, N m.
+    pub fn greatest_turbine_torque(&self, gear: usize) -> f64 {
+        let direct_n_m = self.engine.largest_torque();
+        let Some(converter) = &self.converter else { return direct_n_m };
+        let is_reverse = self.gearbox.gears.get(gear).is_some_and(|gear| gear.ratio < 0.0);
+        let starts = is_reverse || self.gearbox.forward_gears().first() == Some(&gear);
+        let slowest = if starts { 0.0 } else { SLOWEST_TURBINE_RAD_S };
+        let fastest = self.engine.torque_n_m.rows().last().map_or(slowest, |last| last.max(slowest));
+        let step = (fastest - slowest) / f64::from(TURBINE_SPEEDS);
+        (0..=TURBINE_SPEEDS)
+            .map(|n| converter.full_throttle_turbine_torque(&self.engine, slowest + step * f64::from(n)))
+            .fold(direct_n_m, f64::max)
+    }
+
+    /// What each element with plates holds at line pressure, in the gear that asks most of it.
+    pub fn capacities(&self) -> Vec<Capacity> {
+        let gears = &self.gearbox.gears;
+        let turbine_n_m: Vec<f64> = (0..gears.len()).map(|gear| self.greatest_turbine_torque(gear)).collect();
+        let of = |(element, clutch): (usize, &Option<super::ShiftClutch>)| {
+            let holds_n_m = clutch.as_ref()?.clutch.static_capacity(self.line_pressure_pa);
+            Capacity::where_most_is_asked(element, holds_n_m, gears, |gear| turbine_n_m.get(gear).copied())
+        };
+        self.clutches.iter().enumerate().filter_map(of).collect()
+    }
+
+    /// Says which closed elements slip at full throttle, with a hint; nothing where all of them hold.
+    pub fn slipping_elements(&self) -> Option<String> {
+        let slipping: Vec<Capacity> = self.capacities().into_iter().filter(|capacity| !capacity.holds()).collect();
+        let least = slipping.iter().map(Capacity::ratio).reduce(f64::min)?;
+        let mut said = format!("closed elements slip at full throttle, at {:.2} MPa: ", 1e-6 * self.line_pressure_pa);
+        for (at, capacity) in slipping.iter().enumerate() {
+            // Writing to a text cannot fail.
+            let _ = write!(
+                said,
+                "{}{} holds {:.0} N m, {:.0} N m are asked of it in gear {}",
+                if at == 0 { "" } else { "; " },
+                self.gearbox.elements[capacity.element].name,
+                capacity.capacity_n_m,
+                capacity.wanted_n_m,
+                self.gearbox.gears[capacity.gear].name
+            );
+        }
+        let pressure_pa = slipping.iter().map(|capacity| self.holding_pressure(capacity)).fold(0.0, f64::max);
+        Some(format!("{said}\nhint: {}", self.how_to_hold(least, pressure_pa)))
+    }
+
+    /// Line pressure at which an element holds what is asked of it, Pa.
+    fn holding_pressure(&self, capacity: &Capacity) -> f64 {
+        let kiss_pa = self.clutches[capacity.element].as_ref().map_or(0.0, |clutch| clutch.clutch.kiss_pressure());
+        kiss_pa + (self.line_pressure_pa - kiss_pa) / capacity.ratio()
+    }
+
+    /// What to change where elements hold the share `least` of what is asked of them, and all of it at this line pressure.
+    fn how_to_hold(&self, least: f64, pressure_pa: f64) -> String {
+        let map = "engine.torque.torque_n_m";
+        let is_default = self.defaults_taken.iter().any(|taken| taken.key == map);
+        let key = if is_default { "engine.max_torque_n_m" } else { map };
+        let most_n_m = self.engine.largest_torque();
+        let pressure = if pressure_pa <= MOST_LINE_PRESSURE_PA {
+            format!("they hold with `hydraulics.line_pressure_pa = {:.2}e6`; or ", 1e-2 * (1e-4 * pressure_pa).ceil())
+        } else {
+            String::new()
+        };
+        format!(
+            "{pressure}with an engine of {:.0} N m in place of {most_n_m:.0} N m (`{key}`); or with {:.1} times the friction faces or \
+             piston areas in the gearbox file, which `wetclutch init --gearbox` sizes for the engine",
+            (least * most_n_m).floor(),
+            (10.0 / least).ceil() / 10.0
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Source;
+    use crate::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
+
+    const GEARBOX: &str = include_str!("../../../../gearboxes/8hp.toml");
+
+    fn car(more: &str) -> Car {
+        let text = format!("name = \"car\"\ngearbox = \"8hp.toml\"\n{more}");
+        Car::from_sources(Source::built_in("car.toml", &text), Source::built_in("8hp.toml", GEARBOX)).unwrap()
+    }
+
+    #[test]
+    fn a_converter_multiplies_the_torque_of_a_gear_in_which_the_car_starts() {
+        let car = Car::eight_speed().unwrap();
+        let torque = |gear: &str| car.greatest_turbine_torque(car.gearbox.gear(gear).unwrap());
+        // At 177.8 rad/s the engine has 147.4 N m, 8.4 N m of drag, and the pump takes 4.3976e-3 N m s^2 times the square of it: 139.0 N m,
+        // of which the turbine at rest has twice that.
+        assert!((torque("1") - 278.0).abs() < 0.1, "{}", torque("1"));
+        assert_eq!(torque("R"), torque("1"));
+        // With the turbine at 100 rad/s the engine turns at 203.3 rad/s. It has 150.7 N m, 9.6 N m of drag, and the torque ratio is 1.440.
+        assert!((torque("2") - 203.2).abs() < 0.1, "{}", torque("2"));
+        let without = Car { converter: None, ..car.clone() };
+        assert_eq!(without.greatest_turbine_torque(1), 190.0);
+    }
+
+    #[test]
+    fn elements_that_slip_at_full_throttle_are_named_with_numbers_and_keys() {
+        assert_eq!(car("").slipping_elements(), None);
+        let said = car("[engine]\nmax_torque_n_m = 900\n").slipping_elements().unwrap();
+        for part in ["at 1.60 MPa: A holds 1190 N m, ", "C holds 582 N m, ", "in gear 1", "(`engine.max_torque_n_m`)"] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        // Far above what a supply gives.
+        assert!(!said.contains("line_pressure_pa"), "{said}");
+        let said = car("[hydraulics]\nline_pressure_pa = 0.4e6\n").slipping_elements().unwrap();
+        for part in ["at 0.40 MPa: ", "C holds 112 N m, ", "`hydraulics.line_pressure_pa = "] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    }
+
+    #[test]
+    fn with_what_the_hint_says_the_elements_hold() {
+        let pressure = "[hydraulics]\nline_pressure_pa = 0.4e6\n";
+        let said = car(pressure).slipping_elements().unwrap();
+        let enough = said.split("line_pressure_pa = ").nth(1).and_then(|rest| rest.split('`').next()).unwrap();
+        assert_eq!(car(&pressure.replace("0.4e6", enough)).slipping_elements(), None, "{said}");
+        let torque = "[engine]\nmax_torque_n_m = 900\n";
+        let said = car(torque).slipping_elements().unwrap();
+        let enough = said.split("an engine of ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        assert_eq!(car(&torque.replace("900", enough)).slipping_elements(), None, "{said}");
+    }
+
+    #[test]
+    fn a_first_file_of_a_small_and_of_a_large_engine_has_clutches_that_hold() {
+        for engine_torque_n_m in [50.0, 900.0] {
+            let facts = CarFacts {
+                name: "car".to_owned(),
+                gearbox: "8hp.toml".to_owned(),
+                has_converter: true,
+                has_stroke: false,
+                mass_kg: 10.0 * engine_torque_n_m,
+                wheel_radius_m: 0.3,
+                final_ratio: 3.0,
+                engine_torque_n_m,
+            };
+            let gearbox = sized_gearbox(&Source::built_in("8hp.toml", GEARBOX), engine_torque_n_m).unwrap();
+            let gearbox = Source::built_in("8hp.toml", &gearbox);
+            let text = short_car_file(&facts, &gearbox).unwrap();
+            let car = Car::from_sources(Source::built_in("car.toml", &text), gearbox).unwrap();
+            assert_eq!(car.slipping_elements(), None);
+        }
+    }
+}
