@@ -11,11 +11,11 @@ use observer::Reading;
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
 };
-use plant::car::CarShiftQuality;
+use plant::car::{CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
-use super::drive::{DriveState, PassingShifts, ScoredDrive};
+use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive};
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -34,9 +34,8 @@ const RATIO_SHARE: f64 = 0.1;
 /// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;
 
-/// Names for neither a forward gear nor reverse, and their place: that of no gear.
+/// Names for neither a forward gear nor reverse.
 const NEUTRAL: [&str; 2] = ["N", "P"];
-pub(super) const NO_GEAR: usize = usize::MAX;
 
 /// The columns with the commands of the valves: element of the gearbox, and name.
 pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
@@ -439,7 +438,7 @@ impl<'c> LoggedDrive<'c> {
         if self.passing.open.is_none() {
             let known = (0..self.car.gearbox.elements.len()).collect::<Vec<_>>();
             let of = |place: usize| known.iter().copied().find(|&element| self.tables.place(element) == Some(place));
-            let elements = elements.map_or([usize::MAX; 2], |places| places.map(|at| of(at).unwrap_or(usize::MAX)));
+            let elements = elements.map_or([NO_ELEMENT; 2], |places| places.map(|at| of(at).unwrap_or(NO_ELEMENT)));
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;

@@ -5,7 +5,7 @@ use design::ShiftTables;
 use drivetrain::Real;
 use observer::Reading;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
-use plant::car::CarSample;
+use plant::car::{CarSample, NO_GEAR};
 use plant::sensors::{Channel, Readings, Rows, read_speed};
 
 use super::{RECORD_S, SAMPLE_S};
@@ -90,10 +90,7 @@ pub(super) fn input(
             commands[place] = command(element);
         }
     }
-    let gear = match &sample.shift {
-        Some(shift) => GearCommand { from: shift.from, to: shift.to },
-        None => GearCommand { from: sample.gear, to: sample.gear },
-    };
+    let [from, to] = sample.gears().map(|gear| gear.unwrap_or(NO_GEAR));
     let lock_up_applied = lock_up_is_applied(car, sample);
     // Without a converter, or where it is locked, nothing else gives the torque at the gearbox input.
     let engine_n_m = reported_engine_n_m(car, sample);
@@ -107,7 +104,7 @@ pub(super) fn input(
         engine_n_m: (car.converter.is_none() || lock_up_applied).then_some(Reading::now(engine_n_m)),
         lock_up_applied,
         commands,
-        gear,
+        gear: GearCommand { from, to },
     }
 }
 
