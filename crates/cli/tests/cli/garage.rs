@@ -1,12 +1,15 @@
 //! Drives outside of the shifts from one clutch to another: neutral, reverse.
 
-use crate::any_car::{column, with_column};
-use crate::support::{Folder, ROOT, refused, said, wetclutch};
+use crate::any_car::{column, numbers, with_column};
+use crate::support::{BENCH, Folder, ROOT, refused, said, wetclutch};
 
 const GARAGE: &str = "name = \"garage\"\nstart = { gear = \"N\", vehicle_m_s = 0 }\nshift = [{ time_s = 1, gear = \"1\" }, \
                       { time_s = 3, gear = \"R\" }, { time_s = 6, gear = \"1\" }, { time_s = 9, gear = \"N\" }]\n[[segment]]\nduration_s = 10\n\
                       throttle = 0\nbrake = 0.3\n";
 const REVERSE: &str = "name = \"reverse\"\nstart = { gear = \"R\", vehicle_m_s = 0 }\nshift = []\n[[segment]]\nduration_s = 12\nthrottle = 0.2\n";
+
+const LAUNCH: &str = "name = \"launch\"\n[[segment]]\nduration_s = 2\nthrottle = 0\nbrake = 0.3\n[[segment]]\nduration_s = 14\nthrottle = 0.5\n\
+                      [[segment]]\nduration_s = 22\nthrottle = 0\nbrake = 0.15\n";
 
 /// A folder with the signals of a drive in `sim`, and what `simulate` said.
 fn simulated(name: &str, drive: &str, car: &str) -> (Folder, String) {
@@ -64,4 +67,56 @@ fn a_drive_in_reverse_is_estimated_and_a_wrong_sign_in_a_forward_gear_is_not() {
     folder.write("forward.csv", forward);
     let error = refused(&estimate(&folder, "forward.csv", car));
     assert!(error.contains("output_speed is negative and turbine_speed positive"), "{error}");
+}
+
+/// The healths of a log's rows in which this holds.
+fn healths(table: &str, log: &str, holds: impl Fn(&str, &str, f64) -> bool) -> Vec<String> {
+    let (gear, target) = (column(log, "gear"), column(log, "target_gear"));
+    let rows = gear.iter().zip(&target).zip(numbers(log, "output_speed_rad_s")).zip(column(table, "health"));
+    rows.filter(|(((gear, target), output), _)| holds(gear, target, *output)).map(|(_, health)| health).collect()
+}
+
+#[test]
+fn an_open_clutch_is_no_held_clutch_and_a_dog_change_no_shift() {
+    let (folder, _) = simulated("launch", LAUNCH, "dual_clutch");
+    let log = "sim/launch_measured.csv";
+    for sensors in [None, Some(BENCH)] {
+        let (log, car, out) = (folder.path(log), vehicle("dual_clutch"), folder.path("out.csv"));
+        let sensors = sensors.map(|file| vec!["--sensors", file]).unwrap_or_default();
+        let text = said(&wetclutch(&[&["estimate", &log, "--vehicle", &car, "-o", &out][..], &sensors].concat()));
+        assert!(!text.contains("without a target_gear"), "{text}");
+        let (table, log) = (folder.read("out.csv"), folder.read("sim/launch_measured.csv"));
+        let slow = healths(&table, &log, |_, _, output| output.abs() < 14.5);
+        assert!(slow.len() > 200 && slow.iter().all(|health| health == "too_slow"), "{slow:?}");
+        let in_gear = healths(&table, &log, |gear, target, output| gear == target && output > 15.5);
+        assert!(in_gear.iter().any(|health| health == "clutch_open"));
+        let wrong = in_gear.iter().filter(|health| *health == "held_clutch_slips" || *health == "speeds_rejected");
+        assert_eq!(wrong.count(), 0);
+    }
+    // A clutch that is commanded to hold and slips is said: the engine turns faster than the gear.
+    let text = folder.read(log);
+    let (gear, output) = (column(&text, "gear"), numbers(&text, "output_speed_rad_s"));
+    let mut row = 0;
+    let slips = with_column(&text, "turbine_speed_rad_s", |cell| {
+        row += 1;
+        let is_fast = output[row - 1] > 40.0 && gear[row - 1] == "4";
+        if is_fast { (cell.parse::<f64>().unwrap() + 30.0).to_string() } else { cell.to_owned() }
+    });
+    folder.write("slips.csv", &slips);
+    said(&estimate(&folder, "slips.csv", "dual_clutch"));
+    let slipping =
+        healths(&folder.read("out.csv"), &slips, |gear, target, output| gear == target && gear == "4" && output > 40.0);
+    let said = slipping.iter().filter(|health| *health == "held_clutch_slips").count();
+    assert!(2 * said > slipping.len() && slipping.len() > 20, "{said} of {}: {slipping:?}", slipping.len());
+}
+
+#[test]
+fn standing_and_neutral_have_their_words() {
+    let (folder, _) = simulated("words", GARAGE, "eight_speed");
+    said(&estimate(&folder, "sim/garage_measured.csv", "eight_speed"));
+    let (table, log) = (folder.read("out.csv"), folder.read("sim/garage_measured.csv"));
+    let neutral = healths(&table, &log, |gear, target, _| gear == "N" && target == "N");
+    assert!(neutral.len() > 100 && neutral.iter().all(|health| health == "clutch_open"), "{neutral:?}");
+    let others = healths(&table, &log, |_, target, _| target != "N");
+    assert!(others.iter().all(|health| health == "too_slow"), "{others:?}");
 }

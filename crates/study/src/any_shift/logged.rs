@@ -7,10 +7,10 @@
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::CommandKind;
-use observer::Reading;
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
 };
+use observer::{Health, Reading};
 use plant::car::{CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
@@ -386,8 +386,11 @@ impl<'c> LoggedDrive<'c> {
             Some(_) if self.holes.cut.is_some() => {}
             Some(_) => self.during(step, &estimate),
             None => {
+                // Without a converter dogs change while the clutch is open: this is no shift.
+                let is_open = matches!(estimate.health, Health::ClutchOpen | Health::TooSlow);
+                let are_dogs = self.car.converter.is_none() && is_open;
                 // What happens in a hole is not seen.
-                self.unannounced += u64::from(!is_same && !is_hole);
+                self.unannounced += u64::from(!is_same && !is_hole && !are_dogs);
                 self.compare_ratio(from, input);
             }
         }

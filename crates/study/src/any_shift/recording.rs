@@ -10,6 +10,9 @@ use plant::sensors::{Channel, Readings, Rows, read_speed};
 
 use super::{RECORD_S, SAMPLE_S};
 
+/// Cars and the filter have the same place for neutral.
+const _: () = assert!(NO_GEAR == GearCommand::NEUTRAL);
+
 /// Torque of the lock-up clutch from which on it counts as applied, N m.
 const LOCK_UP_N_M: f64 = 0.1;
 
