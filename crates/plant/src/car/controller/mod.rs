@@ -313,12 +313,26 @@ impl CarShiftController {
                 }
             }
         }
-        let message = format!(
-            "there is no way from gear {} to gear {} by shifts between two clutches",
-            self.name(from),
-            self.name(to)
-        );
-        Err(CarError::Request(message))
+        let (from_name, to_name) = (self.name(from), self.name(to));
+        let hint = [from, to].into_iter().find_map(|gear| self.one_way_hint(gear)).unwrap_or_else(|| {
+            "`wetclutch check` of the gearbox file lists its shifts, and the elements that open and close in each"
+                .to_owned()
+        });
+        let message = format!("there is no way from gear {from_name} to gear {to_name} by shifts between two clutches");
+        Err(CarError::Request(format!("{message}\nhint: {hint}")))
+    }
+
+    /// What to do about a gear that a one-way clutch holds.
+    fn one_way_hint(&self, gear: usize) -> Option<String> {
+        let elements =
+            self.car.gearbox.gears[gear].holding.iter().map(|holding| &self.car.gearbox.elements[holding.element]);
+        let one_way = elements.into_iter().find(|element| element.kind == ElementKind::OneWayClutch)?;
+        Some(format!(
+            "gear {} is held by the one-way clutch {}, and shifts from and to such a gear are not driven: in the gearbox file let the clutch or \
+             brake hold it that holds it for engine braking, or drive in the gears above with [start] and [[shift]]",
+            self.name(gear),
+            one_way.name
+        ))
     }
 
     /// A shift between two clutches.
