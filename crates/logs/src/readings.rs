@@ -64,6 +64,8 @@ pub struct Readings<'a> {
     /// Place of the last reading's entry in the map.
     entry: usize,
     speeds: Speeds,
+    /// Whether the newest gear is a negative number: reverse.
+    is_reverse: bool,
     /// Newest friction torque of the engine, N m; zero where it is not mapped, none before its first value.
     friction_n_m: Option<f64>,
 }
@@ -99,6 +101,7 @@ impl<'a> Readings<'a> {
             sample: None,
             entry: 0,
             speeds: NO_SPEEDS,
+            is_reverse: false,
             friction_n_m: (!map.has(Role::EngineFrictionTorque)).then_some(0.0),
         })
     }
@@ -234,7 +237,12 @@ impl<'a> Readings<'a> {
         if quality != Quality::Good {
             return None;
         }
-        channels.extremes.push(value);
+        if kind == Role::Gear {
+            self.is_reverse = value < 0.0;
+        }
+        // In reverse the car goes backwards: the sign of these speeds says nothing.
+        let is_backwards = self.is_reverse && matches!(kind, Role::OutputSpeed | Role::WheelSpeed);
+        channels.extremes.push(if is_backwards { value.abs() } else { value });
         Some(Reading { role: kind, time_s, stamp_s: sample.time_s, value })
     }
 }

@@ -340,3 +340,18 @@ fn a_saturated_signal_of_a_bus_is_not_a_reading() {
     let found = common::channel(&log, &samples, "N_Eng");
     assert_eq!((found[0].2, found[1].2, found[1].1), (Quality::Saturated, Quality::Good, 800.0));
 }
+
+#[test]
+fn an_output_speed_is_negative_in_reverse_and_nowhere_else() {
+    let text = |gear: i32| {
+        let mut text = "time_s,gear,turbine,output\n".to_owned();
+        for i in 0..400 {
+            writeln!(text, "{},{gear},{},{}", 0.01 * f64::from(i), 200 + i, -100 - i).unwrap();
+        }
+        text
+    };
+    let map = map(&["gear=gear", "turbine_speed=turbine [rad/s]", "output_speed=output [rad/s]"]);
+    assert!(readings(&text(-1), &map).is_ok());
+    let error = readings(&text(1), &map).unwrap_err().to_string();
+    assert!(error.contains("output_speed is negative and turbine_speed positive"), "{error}");
+}

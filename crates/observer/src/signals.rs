@@ -205,6 +205,11 @@ pub enum Health {
     /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
     /// limit.
     PressureLimited,
+    /// The gearbox output turns too slowly for its readings to be used: the estimate is from the valve model alone.
+    TooSlow,
+    /// No gear drives the car, and none has to: neutral, or the clutch of a car without a converter is open, or slips at a launch. The
+    /// estimate is from the valve model alone.
+    ClutchOpen,
     /// The speeds cannot be used: the estimate is from the valve model alone.
     SpeedsRejected,
     /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
@@ -217,7 +222,7 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
@@ -226,6 +231,8 @@ impl Health {
         Self::LimitedToRange,
         Self::CommandRejected,
         Self::PressureLimited,
+        Self::TooSlow,
+        Self::ClutchOpen,
         Self::SpeedsRejected,
         Self::HeldClutchSlips,
         Self::Restarted,
@@ -244,6 +251,8 @@ impl Health {
             Self::CommandRejected => "command_rejected",
             Self::PressureLimited => "pressure_limited",
             Self::HeldClutchSlips => "held_clutch_slips",
+            Self::TooSlow => "too_slow",
+            Self::ClutchOpen => "clutch_open",
             Self::SpeedsRejected => "speeds_rejected",
             Self::Restarted => "restarted",
             Self::TimeRejected => "time_rejected",

@@ -68,7 +68,7 @@ impl DrivePage<'_> {
                 number => shift.number,
                 title => title(shift, car),
                 at => number(shift.time_s[0], 2),
-                clutches => clutch_names(shift, car).join(" opens, ") + " closes",
+                clutches => clutch_words(shift, car),
                 svg => inline(&compact(&shift_figure(shift, drive, car).svg())),
             }
         });
@@ -120,13 +120,28 @@ fn gears(shift: &ScoredShift, car: &Car) -> String {
 }
 
 fn title(shift: &ScoredShift, car: &Car) -> String {
-    let kind = shift.kind.map_or("shift without torque", |kind| kind.name());
-    format!("{}, {kind}", gears(shift, car))
+    format!("{}, {}", gears(shift, car), kind_name(shift).unwrap_or("shift without torque"))
 }
 
-/// Offgoing and oncoming element.
+/// The kind of a shift that has one.
+fn kind_name(shift: &ScoredShift) -> Option<&'static str> {
+    if shift.is_garage { Some("garage shift") } else { shift.kind.map(|kind| kind.name()) }
+}
+
+/// How long a phase lasts, s; not a number in a garage shift, which has none.
+fn phase_s(shift: &ScoredShift, phase: TruePhase) -> f64 {
+    if shift.is_garage { f64::NAN } else { shift.length_s(phase) }
+}
+
+/// Offgoing and oncoming element; empty where the shift has none that is known.
 fn clutch_names<'a>(shift: &ScoredShift, car: &'a Car) -> [&'a str; 2] {
-    shift.elements.map(|at| car.gearbox.elements.get(at).map_or("?", |element| element.name.as_str()))
+    shift.elements.map(|at| car.gearbox.elements.get(at).map_or("", |element| element.name.as_str()))
+}
+
+/// What the clutches of a shift do, in words.
+fn clutch_words(shift: &ScoredShift, car: &Car) -> String {
+    let named = clutch_names(shift, car).into_iter().zip(["opens", "closes"]).filter(|(name, _)| !name.is_empty());
+    named.map(|(name, does)| format!("{name} {does}")).collect::<Vec<_>>().join(", ")
 }
 
 /// The largest RMS error of the controlling clutch's torque in a phase, N m.
@@ -166,27 +181,33 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     let rows = || shifts.iter().flat_map(|shift| &shift.rows);
     let good = rows().filter(|row| row.health == Health::Good).count();
     let mut sentences = drive.warnings.clone();
-    sentences.extend([
-        format!(
-            "{completed} of {} shifts were completed; the longest took {} s.",
-            shifts.len(),
-            number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
-        ),
-        format!(
+    sentences.extend([format!(
+        "{completed} of {} shifts were completed; the longest took {} s.",
+        shifts.len(),
+        number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
+    )]);
+    if shifts.iter().any(|shift| !shift.is_garage) {
+        sentences.push(format!(
             "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",
             number(most(|shift| shift.quality.flare_rad_s), 1),
             number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
-        ),
-        format!("Health is good in {good} of {} samples of the shifts.", rows().count()),
-    ]);
+        ));
+    }
+    sentences.extend([format!("Health is good in {good} of {} samples of the shifts.", rows().count())]);
     if drive.has_truth() {
         sentences.push(format!(
             "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
         ));
     }
-    let hidden = shifts.iter().filter(|shift| shift.rows.is_empty()).count();
-    if hidden > 0 {
-        sentences.push(format!("Of {hidden} shifts the filter has no tables: nothing is estimated."));
+    let hidden = |is_garage: bool| shifts.iter().filter(|s| s.rows.is_empty() && s.is_garage == is_garage).count();
+    if hidden(false) > 0 {
+        sentences.push(format!("Of {} shifts the filter has no tables: nothing is estimated.", hidden(false)));
+    }
+    if hidden(true) > 0 {
+        sentences.push(format!(
+            "Of {} garage shifts nothing is estimated: the filter has tables of shifts from one clutch to another only.",
+            hidden(true)
+        ));
     }
     sentences
 }
@@ -209,16 +230,16 @@ const COLUMNS: &[Column] = &[
     column("#", "number of the shift", |s, _| s.number.to_string()),
     column("shift", "old and new gear", gears),
     column("kind", "direction, and who drives: with power the engine, coasting the car", |s, _| {
-        s.kind.map_or("–", |kind| kind.name()).to_owned()
+        kind_name(s).unwrap_or("–").to_owned()
     }),
     column("begin s", "time of the request", |s, _| number(s.time_s[0], 2)),
     column("time s", "from the request until the shift is complete", |s, _| {
         number(s.quality.complete_s.unwrap_or(f64::NAN), 2)
     }),
     column("torque phase s", "one clutch holds and the other carries torque while it slips", |s, _| {
-        number(s.length_s(TruePhase::Torque), 2)
+        number(phase_s(s, TruePhase::Torque), 2)
     }),
-    column("inertia phase s", "both clutches slip", |s, _| number(s.length_s(TruePhase::Inertia), 2)),
+    column("inertia phase s", "both clutches slip", |s, _| number(phase_s(s, TruePhase::Inertia), 2)),
     column("flare rad/s", "largest slip of the old gear in the wrong direction, at the turbine", |s, _| {
         number(s.quality.flare_rad_s, 1)
     }),
@@ -330,12 +351,12 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         number("time_s", shift.time_s[0]),
         word("from_gear", name(car, shift.from)),
         word("to_gear", name(car, shift.to)),
-        word("kind", shift.kind.map_or("", |kind| kind.name())),
+        word("kind", kind_name(shift).unwrap_or_default()),
         word("offgoing", offgoing),
         word("oncoming", oncoming),
         number("complete_s", quality.complete_s.unwrap_or(f64::NAN)),
-        number("torque_phase_s", shift.length_s(TruePhase::Torque)),
-        number("inertia_phase_s", shift.length_s(TruePhase::Inertia)),
+        number("torque_phase_s", phase_s(shift, TruePhase::Torque)),
+        number("inertia_phase_s", phase_s(shift, TruePhase::Inertia)),
         number("flare_rad_s", quality.flare_rad_s),
         number("past_synchronous_rad_s", quality.past_synchronous_rad_s),
         number("held_slip_rad_s", quality.held_slip_rad_s),

@@ -35,6 +35,8 @@ pub fn health_meaning(health: Health) -> &'static str {
         }
         Health::CommandRejected => "an unusable valve command: the last usable command is used",
         Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
+        Health::TooSlow => "the gearbox output turns too slowly to be read: the estimate is from the valve model alone",
+        Health::ClutchOpen => "no gear drives the car: neutral, or a clutch that is open or slips at a launch",
         Health::SpeedsRejected => "an unusable speed: the estimate is from the valve model alone",
         Health::Restarted => "a restart: the observer lost its state and starts again",
         Health::TimeRejected => "an unusable time step: the estimate is that of the sample before",

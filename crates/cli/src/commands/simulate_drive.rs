@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use config::{Car, Drive, Sensors};
 use drivetrain::CommandKind;
 use plant::car::{
-    CarCalibration, CarError, CarModel, CarSample, OverSpeed, ShiftStage, ShiftUnderWay, simulate_car_drive,
+    CarCalibration, CarError, CarModel, CarSample, ElementSample, OverSpeed, ShiftStage, simulate_car_drive,
 };
 use study::any_shift::logged::{command_age, element_commands};
 use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
@@ -58,9 +58,10 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
     }
     let paths = tables.finish(&options.output)?;
     output::note(&format!(
-        "drive: {:.0} s, {:.2} km, {} shifts, at most {:.0} km/h",
+        "drive: {:.0} s, {:.2} km{}, {} shifts, at most {:.0} km/h",
         summary.duration_s,
         1e-3 * summary.distance_m,
+        backwards(1e-3 * summary.backwards_m),
         summary.shifts,
         km_h(summary.fastest_m_s),
     ));
@@ -79,6 +80,11 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         output::line(&path.display().to_string())?;
     }
     Ok(())
+}
+
+/// What of a distance was driven backwards, in words; nothing where it is too short to be shown.
+fn backwards(km: f64) -> String {
+    if km < 0.005 { String::new() } else { format!(" ({km:.2} km of it backwards)") }
 }
 
 /// What a drive asks of the engine that it cannot do.
@@ -148,7 +154,7 @@ enum DriveValue {
     /// The command of an element's valve as it is read, or its age.
     Command(usize, Reading),
     /// The command of the offgoing or oncoming clutch.
-    OfShift(fn(&ShiftUnderWay) -> usize),
+    OfShift(fn(&CarSample) -> Option<ElementSample>),
 }
 
 /// What of a reading.
@@ -166,8 +172,8 @@ impl DriveValue {
             Self::Speed(speed, what) => Cell::Number(of(row.speeds.get(speed), what)),
             Self::Command(element, what) => Cell::Number(of(row.commands.get(element), what)),
             Self::OfShift(which) => {
-                let element = row.sample.shift.as_ref().map(which);
-                Cell::Number(of(element.and_then(|element| row.commands.get(element)), Reading::Value))
+                let clutch = which(&row.sample);
+                Cell::Number(of(clutch.and_then(|clutch| row.commands.get(clutch.element)), Reading::Value))
             }
         }
     }
@@ -195,14 +201,14 @@ fn ages(car: &Car, (sensors, row_s): (&Sensors, f64)) -> Vec<DriveColumn> {
 /// A number of a shift clutch; an empty cell where no shift is under way.
 macro_rules! of_shift {
     ($clutch:ident, $field:ident) => {
-        |_, sample| Cell::Number(sample.shift.map_or(f64::NAN, |shift| shift.$clutch.$field))
+        |_, sample| Cell::Number($clutch(sample).map_or(f64::NAN, |clutch| clutch.$field))
     };
 }
 
 /// The columns in their order.
 fn columns(car: &Car) -> Vec<DriveColumn> {
     let kinds = || car.clutches.iter().flatten().map(|clutch| clutch.valve.command_kind());
-    let [offgoing, oncoming] = if kinds().all(|kind| kind == CommandKind::Current) {
+    let [offgoing_command, oncoming_command] = if kinds().all(|kind| kind == CommandKind::Current) {
         [signal::OFFGOING_CURRENT, signal::ONCOMING_CURRENT]
     } else if kinds().all(|kind| kind == CommandKind::DutyCycle) {
         [signal::OFFGOING_DUTY, signal::ONCOMING_DUTY]
@@ -223,17 +229,13 @@ fn columns(car: &Car) -> Vec<DriveColumn> {
         measured("engine_share", |_, s| Cell::Number(s.engine_share)),
         measured(signal::REPORTED_ENGINE_TORQUE, |car, s| Cell::Number(reported_engine_n_m(car, s))),
         measured(signal::LOCK_UP_APPLIED, |car, s| Cell::Whole(u64::from(lock_up_is_applied(car, s)))),
-        measured(signal::GEAR, |car, s| if s.is_neutral { Cell::Word("N") } else { gear_name(car, s.gear) }),
-        measured(signal::TARGET_GEAR, |car, s| match &s.shift {
-            None if s.is_neutral => Cell::Word("N"),
-            None => gear_name(car, s.gear),
-            Some(shift) => gear_name(car, shift.to),
-        }),
+        measured(signal::GEAR, |car, s| gear_name(car, s.gears()[0])),
+        measured(signal::TARGET_GEAR, |car, s| gear_name(car, s.gears()[1])),
         measured("shift_stage", |_, s| Cell::Word(s.shift.map_or("", |shift| stage_name(shift.stage)))),
-        measured("offgoing", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.offgoing.element))),
-        measured("oncoming", |car, s| s.shift.map_or(Cell::Word(""), |shift| element(car, shift.oncoming.element))),
-        read(offgoing, DriveValue::OfShift(|shift| shift.offgoing.element)),
-        read(oncoming, DriveValue::OfShift(|shift| shift.oncoming.element)),
+        measured("offgoing", |car, s| element_name(car, offgoing(s))),
+        measured("oncoming", |car, s| element_name(car, oncoming(s))),
+        read(offgoing_command, DriveValue::OfShift(offgoing)),
+        read(oncoming_command, DriveValue::OfShift(oncoming)),
         truth(signal::OFFGOING_PRESSURE, of_shift!(offgoing, pressure_pa)),
         truth(signal::ONCOMING_PRESSURE, of_shift!(oncoming, pressure_pa)),
         truth(signal::OFFGOING_TORQUE, of_shift!(offgoing, torque_n_m)),
@@ -258,12 +260,25 @@ fn input_clutch_signal(car: &Car) -> &'static str {
     if car.converter.is_some() { signal::LOCK_UP_TORQUE } else { signal::LAUNCH_CLUTCH_TORQUE }
 }
 
-fn gear_name(car: &Car, gear: usize) -> Cell<'_> {
+/// The name of a gear, or of neutral.
+fn gear_name(car: &Car, gear: Option<usize>) -> Cell<'_> {
+    let Some(gear) = gear else { return Cell::Word("N") };
     Cell::Word(car.gearbox.gears.get(gear).map_or("", |gear| gear.name.as_str()))
 }
 
-fn element(car: &Car, element: usize) -> Cell<'_> {
-    Cell::Word(car.gearbox.elements.get(element).map_or("", |element| element.name.as_str()))
+/// The clutch that opens in a shift; from neutral none does.
+fn offgoing(sample: &CarSample) -> Option<ElementSample> {
+    sample.shift.filter(|shift| !shift.is_from_neutral).map(|shift| shift.offgoing)
+}
+
+/// The clutch that closes in a shift.
+fn oncoming(sample: &CarSample) -> Option<ElementSample> {
+    sample.shift.map(|shift| shift.oncoming)
+}
+
+fn element_name(car: &Car, clutch: Option<ElementSample>) -> Cell<'_> {
+    let element = clutch.and_then(|clutch| car.gearbox.elements.get(clutch.element));
+    Cell::Word(element.map_or("", |element| element.name.as_str()))
 }
 
 fn stage_name(stage: ShiftStage) -> &'static str {

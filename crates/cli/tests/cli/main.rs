@@ -13,6 +13,7 @@ mod drives;
 mod equations;
 mod fit;
 mod fit_gearbox;
+mod garage;
 #[cfg(unix)]
 mod log_to_fit;
 mod logs;

@@ -2,9 +2,9 @@
 
 use super::running::TURBINE_ACTS;
 use super::{
-    AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, Health, LOAD, LOAD_START, LOST_S, MISFIT, N, OUTPUT,
-    PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS, SPRING, ShiftInput,
-    ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+    AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, GearCommand, Health, LOAD, LOAD_START, LOST_S,
+    MISFIT, N, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS,
+    SPRING, ShiftInput, ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
 };
 use drivetrain::Real;
 
@@ -18,6 +18,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) -> Health {
         let mut health = Health::Good;
         let speeds = self.measured(&state.newest, state.running.as_ref());
+        let opens = self.is_open(state, input.gear);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > lost;
@@ -29,7 +30,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             let unfit = ratio.is_some_and(|ratio| self.slip(ratio, speeds).is_over());
             state.unfit = if unfit { state.unfit.saturating_add(1) } else { 0 };
             if running.misfit > T::of(MISFIT) {
-                health = Health::HeldClutchSlips;
+                health = if opens { Health::ClutchOpen } else { Health::HeldClutchSlips };
                 running.before = None;
             }
             let slips = state.unfit >= SLIPS_IN_GEAR;
@@ -44,15 +45,42 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if state.running.is_none() {
             let (running, slips) = self.begin(state, input, torque);
             state.running = running.filter(|running| running.x.is_sound());
-            state.slips = state.running.is_none() && (state.slips || slips);
-            if state.slips {
-                health = Health::HeldClutchSlips;
-            }
+            let slow = self.is_slow(state);
+            let stands = state.running.is_none();
+            state.launches = stands && self.turbine.converter.is_none() && (state.launches || slow || opens);
+            state.slips = stands && !slow && !state.launches && (state.slips || slips);
+            let neutral = [input.gear.from, input.gear.to] == [GearCommand::NEUTRAL; 2];
+            health = match (stands && neutral, stands && slow, state.launches && slips, state.slips) {
+                (true, ..) => Health::ClutchOpen,
+                (_, true, ..) => Health::TooSlow,
+                (_, _, true, _) => Health::ClutchOpen,
+                (.., true) => Health::HeldClutchSlips,
+                _ => health,
+            };
             if state.running.is_some() && core::mem::take(&mut state.lost) {
                 health = Health::Restarted;
             }
         }
         health
+    }
+
+    /// Whether the newest reading of the output speed is too slow to be used.
+    fn is_slow(&self, state: &AnyShiftState<T>) -> bool {
+        let newest = state.newest[OUTPUT].filter(|newest| newest.age_s <= T::of(LOST_S));
+        newest.is_some_and(|newest| newest.value.abs() <= self.uncertainty.output_least_rad_s)
+    }
+
+    /// Whether the command opens the clutch that ties the engine of a car without a converter to a gear.
+    pub(super) fn is_open(&self, state: &AnyShiftState<T>, gear: GearCommand) -> bool {
+        if self.turbine.converter.is_some() || gear.from != gear.to {
+            return false;
+        }
+        let shift = self.tables.shifts.iter().find(|shift| shift.from == gear.from);
+        let found = shift.and_then(|shift| self.element(&state.elements, shift.clutches[0].element));
+        found.is_some_and(|(memory, element)| {
+            let kiss_pa = element.clutch.kiss_pressure();
+            memory.pressure_pa() < kiss_pa + self.uncertainty.above_kiss_pa(&element.clutch)
+        })
     }
 
     /// The first state, once the speeds are known and are those of a gear; and whether they are known and no gear fits.

@@ -142,7 +142,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 });
             }
             None => {
-                health = health.max(Health::SpeedsRejected);
+                if health < Health::TooSlow {
+                    health = Health::SpeedsRejected;
+                }
                 let then = self.measured(&state.newest, None);
                 estimate.clutches =
                     self.tables.shift(input.gear.from, input.gear.to).filter(|_| input.gear.from != input.gear.to).map(

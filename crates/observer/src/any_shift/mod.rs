@@ -170,6 +170,11 @@ pub struct GearCommand {
     pub to: usize,
 }
 
+impl GearCommand {
+    /// The place of neutral, which is in no table.
+    pub const NEUTRAL: usize = usize::MAX;
+}
+
 /// What came since the step before: of each channel the newest reading, or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftInput<T> {
@@ -235,6 +240,8 @@ pub struct AnyShiftState<T> {
     unfit: u8,
     /// Whether an element of the gear has slipped, and no gear has fitted since.
     slips: bool,
+    /// Without a converter: whether the clutch of the gear was open, or the car slow, and no gear has fitted since.
+    launches: bool,
     learnt: Learnt<T>,
     /// Time since what is learnt was last let fade, s.
     fading_s: T,
@@ -356,6 +363,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             lost: false,
             unfit: 0,
             slips: false,
+            launches: false,
             learnt: *learnt,
             fading_s: T::zero(),
             estimate: ShiftEstimate::nothing(),
@@ -427,6 +435,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
 
     /// Follows the shift command.
     fn take_gear(&self, state: &mut AnyShiftState<T>, command: GearCommand) -> Health {
+        let opens = self.is_open(state, command);
         let (learnt, fading_s) = (&mut state.learnt, &mut state.fading_s);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.from == command.to;
@@ -452,7 +461,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                     // No equations for this change: the valve models alone, until a gear fits.
                     state.lose();
                     state.lost = false;
-                    Health::SpeedsRejected
+                    if opens { Health::ClutchOpen } else { Health::SpeedsRejected }
                 }
             },
         }

@@ -23,11 +23,13 @@ const SAME_INSTANT_S: f64 = 1e-9;
 pub struct CarDriveSummary {
     /// Its length, s.
     pub duration_s: f64,
-    /// The way, m.
+    /// The way, forwards and backwards, m.
     pub distance_m: f64,
+    /// What of it was driven backwards, m.
+    pub backwards_m: f64,
     /// Shifts that were completed.
     pub shifts: usize,
-    /// Highest speed, m/s.
+    /// Highest speed, forwards or backwards, m/s.
     pub fastest_m_s: f64,
     /// How well the speed was followed, where the drive gives one.
     pub speed_error: Option<SpeedError>,
@@ -67,7 +69,7 @@ pub fn simulate_car_drive(
     let start = (driver, drive.sample_time_s);
     let mut run = CarRun::new(model, nominal, calibration, shifting.gear, state, start)?;
     if shifting.starts_in_neutral {
-        run.request_neutral()?;
+        run.start_in_neutral()?;
     }
     let duration_s = drive.duration_s();
     let mut summary = CarDriveSummary { duration_s, ..CarDriveSummary::default() };
@@ -88,8 +90,10 @@ pub fn simulate_car_drive(
         shifting.step(&mut run, &driver)?;
         run.advance(driver, |_| {}, &mut record)?;
         let vehicle_m_s = run.state().vehicle_m_s;
-        summary.distance_m += vehicle_m_s * (run.time_s() - now_s);
-        summary.fastest_m_s = summary.fastest_m_s.max(vehicle_m_s);
+        let dt_s = run.time_s() - now_s;
+        summary.distance_m += vehicle_m_s.abs() * dt_s;
+        summary.backwards_m += (-vehicle_m_s).max(0.0) * dt_s;
+        summary.fastest_m_s = summary.fastest_m_s.max(vehicle_m_s.abs());
     }
     summary.shifts = run.controller().completed();
     summary.speed_error = road.follower.map(|follower| follower.error());

@@ -114,7 +114,15 @@ impl<'m> CarRun<'m> {
     /// # Errors
     /// A shift is under way, or the gear is neither the lowest nor reverse.
     pub fn request_neutral(&mut self) -> Result<(), CarError> {
-        self.controller.request_neutral()
+        self.controller.request_neutral(self.time_s())
+    }
+
+    /// Starts in neutral: its clutch is open already.
+    ///
+    /// # Errors
+    /// The gear is neither the lowest nor reverse.
+    pub fn start_in_neutral(&mut self) -> Result<(), CarError> {
+        self.controller.request_neutral(f64::NEG_INFINITY)
     }
 
     /// Puts in the dogs of a gear that is expected next.
@@ -140,7 +148,7 @@ impl<'m> CarRun<'m> {
         self.valves.send(model, now_s, &self.commands.elements);
         self.periods += 1;
         let end_s = self.time_s();
-        let shown = (self.controller.gear(), self.controller.is_neutral(), self.controller.shift());
+        let shown = self.controller.shown(now_s);
         while self.plant.time_s < end_s - SAME_INSTANT_S {
             let inputs = inputs(model, &mut self.valves, &self.commands, driver, self.plant.time_s + SAME_INSTANT_S);
             let until_s = self.valves.next_arrival_s().map_or(end_s, |arrival| arrival.min(end_s));

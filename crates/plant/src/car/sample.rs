@@ -1,6 +1,6 @@
 //! What a simulated car shows at an instant.
 
-use super::controller::{CarCommands, ShiftProgress, ShiftStage};
+use super::controller::{CarCommands, GearShown, ShiftStage};
 use super::integrate::CarStep;
 use super::model::{CarModel, CarTorques};
 use super::run::Driver;
@@ -31,6 +31,8 @@ pub struct ShiftUnderWay {
     pub from: usize,
     /// The gear after.
     pub to: usize,
+    /// Whether it begins in neutral; `from` is then a gear of the other direction, whose clutch is open.
+    pub is_from_neutral: bool,
     /// What the controller is about.
     pub stage: ShiftStage,
     /// The clutch that opens.
@@ -48,6 +50,8 @@ pub struct CarSample {
     pub gear: usize,
     /// Whether no gear is engaged; `gear` is then one of those that follow by one clutch.
     pub is_neutral: bool,
+    /// The gear that is left for neutral, until its clutch is open.
+    pub left: Option<usize>,
     /// The shift, from its request to the end of its last ramp.
     pub shift: Option<ShiftUnderWay>,
     /// What the driver does.
@@ -76,6 +80,15 @@ pub struct CarSample {
 }
 
 impl CarSample {
+    /// The gear that is engaged or left, and the gear that is wanted; `None` is neutral.
+    pub fn gears(&self) -> [Option<usize>; 2] {
+        match &self.shift {
+            Some(shift) => [Some(shift.from).filter(|_| !shift.is_from_neutral), Some(shift.to)],
+            None if self.is_neutral => [self.left, None],
+            None => [Some(self.gear); 2],
+        }
+    }
+
     /// At a time within a step.
     pub(super) fn of(
         model: &CarModel,
@@ -83,7 +96,7 @@ impl CarSample {
         time_s: f64,
         commands: &CarCommands,
         driver: Driver,
-        (gear, is_neutral, shift): (usize, bool, Option<ShiftProgress>),
+        GearShown { gear, is_neutral, left, shift }: GearShown,
     ) -> Self {
         let x = step.at(time_s.clamp(step.start_s, step.end_s));
         let torques = model.torques(step.contacts, &x, step.inputs);
@@ -103,9 +116,11 @@ impl CarSample {
             time_s,
             gear,
             is_neutral,
+            left,
             shift: shift.map(|shift| ShiftUnderWay {
                 from: shift.from,
                 to: shift.to,
+                is_from_neutral: shift.is_from_neutral,
                 stage: shift.stage,
                 offgoing: element(shift.offgoing),
                 oncoming: element(shift.oncoming),

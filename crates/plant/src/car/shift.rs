@@ -97,6 +97,9 @@ pub fn simulate_car_shift(
     Ok(rating.quality())
 }
 
+/// The place of neutral among the gears: that of no gear.
+pub const NO_GEAR: usize = usize::MAX;
+
 /// A shift is rated until this time after its end, s.
 const RATED_AFTER_S: f64 = 0.5;
 
@@ -161,7 +164,7 @@ impl CarShiftRating {
         q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
         q.past_synchronous_rad_s = q.past_synchronous_rad_s.max(-slip(self.ratios[1]));
         let Some(shift) = &sample.shift else {
-            if sample.gear == self.shift.to {
+            if sample.gears() == [Some(self.shift.to).filter(|&to| to != NO_GEAR); 2] {
                 q.complete_s.get_or_insert(sample.time_s - self.shift.request_s);
             }
             return;

@@ -9,8 +9,9 @@ use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use plant::car::NO_GEAR;
 
-use super::logged::{LogStep, NO_GEAR, element_column, element_commands};
+use super::logged::{LogStep, element_column, element_commands};
 
 /// The newest reading of each entry of a map since the step before.
 #[derive(Debug, Clone)]

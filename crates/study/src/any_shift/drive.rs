@@ -5,12 +5,15 @@ use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
-use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating};
+use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
 use super::recording::Recording;
 use super::thinned::thinned;
 use super::{AnyShiftError, ClutchRow, ShiftScoreRow, TruePhase, row};
+
+/// The place of no element among those of the gearbox.
+pub(super) const NO_ELEMENT: usize = usize::MAX;
 
 /// The drive at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,9 +41,11 @@ pub struct ScoredShift {
     pub from: usize,
     /// The gear after.
     pub to: usize,
-    /// Direction and power at the request; `None` without torque.
+    /// Direction and power at the request; `None` without torque, and of a garage shift.
     pub kind: Option<ShiftKind>,
-    /// Places of the offgoing and the oncoming element in the gearbox.
+    /// Whether it is a garage shift: from or to neutral, or from one direction to the other. It has no old and new speed of the turbine.
+    pub is_garage: bool,
+    /// Places of the offgoing and the oncoming element in the gearbox; that of no element where there is none.
     pub elements: [usize; 2],
     /// Time of the request, and of the last row, s.
     pub time_s: [f64; 2],
@@ -202,7 +207,10 @@ impl PassingShifts {
         self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
     }
 
-    pub(super) fn end(&mut self, quality: CarShiftQuality) {
+    pub(super) fn end(&mut self, mut quality: CarShiftQuality) {
+        if self.open.as_ref().is_some_and(|open| open.is_garage) {
+            (quality.flare_rad_s, quality.past_synchronous_rad_s) = (f64::NAN, f64::NAN);
+        }
         self.drive.shifts.extend(self.open.take().map(|shift| ScoredShift { quality, ..shift }));
     }
 
@@ -220,12 +228,18 @@ impl PassingShifts {
             from,
             to,
             kind: ShiftKind::of(turbine_n_m, ratio(from), ratio(to)),
+            is_garage: !same_direction(ratio(from), ratio(to)),
             elements,
             time_s: [time_s; 2],
             quality: CarShiftQuality::default(),
             rows: Vec::new(),
         });
     }
+}
+
+/// Whether two ratios are of gears in one direction; neutral has no number.
+fn same_direction(one: f64, other: f64) -> bool {
+    one * other > 0.0
 }
 
 /// Lets the filter, which knows the car `known`, estimate a recorded drive of the car `model` through these sensors. One filter serves
@@ -280,14 +294,19 @@ impl<'a> DriveScorer<'a> {
         let estimate = self.filter.step(&mut self.state, input);
         passing.state(state_of(sample, estimate.health));
         self.last = Some(*sample);
-        let gears = sample.shift.as_ref().map(|shift| [shift.from, shift.to]);
+        let [from, to] = sample.gears().map(|gear| gear.unwrap_or(NO_GEAR));
+        let gears = (from != to).then_some([from, to]);
         if passing.ends(gears) {
             end(passing, rating, sample);
         }
-        let Some(under_way) = &sample.shift else { return };
-        let (from, to) = (under_way.from, under_way.to);
+        if gears.is_none() {
+            return;
+        }
         if passing.open.is_none() {
-            let elements = [under_way.offgoing.element, under_way.oncoming.element];
+            let elements = sample.shift.as_ref().map_or([NO_ELEMENT; 2], |under_way| {
+                let offgoing = if under_way.is_from_neutral { NO_ELEMENT } else { under_way.offgoing.element };
+                [offgoing, under_way.oncoming.element]
+            });
             passing.begin(known, [from, to], elements, (sample.time_s, sample.turbine_n_m));
             let begun = CarShift { request_s: sample.time_s, ..CarShift::usual(known, from, to, 0.0) };
             *rating = Some(CarShiftRating::new(self.model, &begun));
@@ -320,7 +339,7 @@ fn state_of(sample: &CarSample, health: Health) -> DriveState {
     let torques = &sample.torques;
     DriveState {
         time_s: sample.time_s,
-        gear: sample.gear,
+        gear: sample.gears()[0].unwrap_or(NO_GEAR),
         pedals: [sample.driver.throttle, sample.driver.brake],
         vehicle_m_s: sample.vehicle_m_s,
         speeds_rad_s: [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s],

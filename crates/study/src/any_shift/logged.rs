@@ -7,15 +7,15 @@
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::CommandKind;
-use observer::Reading;
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
 };
-use plant::car::CarShiftQuality;
+use observer::{Health, Reading};
+use plant::car::{CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
-use super::drive::{DriveState, PassingShifts, ScoredDrive};
+use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive};
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -34,9 +34,8 @@ const RATIO_SHARE: f64 = 0.1;
 /// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;
 
-/// Names for neither a forward gear nor reverse, and their place: that of no gear.
+/// Names for neither a forward gear nor reverse.
 const NEUTRAL: [&str; 2] = ["N", "P"];
-pub(super) const NO_GEAR: usize = usize::MAX;
 
 /// The columns with the commands of the valves: element of the gearbox, and name.
 pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
@@ -387,8 +386,11 @@ impl<'c> LoggedDrive<'c> {
             Some(_) if self.holes.cut.is_some() => {}
             Some(_) => self.during(step, &estimate),
             None => {
+                // Without a converter dogs change while the clutch is open: this is no shift.
+                let is_open = matches!(estimate.health, Health::ClutchOpen | Health::TooSlow);
+                let are_dogs = self.car.converter.is_none() && is_open;
                 // What happens in a hole is not seen.
-                self.unannounced += u64::from(!is_same && !is_hole);
+                self.unannounced += u64::from(!is_same && !is_hole && !are_dogs);
                 self.compare_ratio(from, input);
             }
         }
@@ -439,7 +441,7 @@ impl<'c> LoggedDrive<'c> {
         if self.passing.open.is_none() {
             let known = (0..self.car.gearbox.elements.len()).collect::<Vec<_>>();
             let of = |place: usize| known.iter().copied().find(|&element| self.tables.place(element) == Some(place));
-            let elements = elements.map_or([usize::MAX; 2], |places| places.map(|at| of(at).unwrap_or(usize::MAX)));
+            let elements = elements.map_or([NO_ELEMENT; 2], |places| places.map(|at| of(at).unwrap_or(NO_ELEMENT)));
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;

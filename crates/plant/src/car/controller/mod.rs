@@ -45,6 +45,9 @@ type Single<'c> = ([(usize, ShiftClutch); 2], &'c ReducedShift<f64>);
 /// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
 const AT_REST_RAD_S: f64 = 10.0;
 
+/// A clutch that opens into neutral counts as open after so long, s \[chosen\].
+const OPENS_S: f64 = 0.2;
+
 /// What the controller measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CarMeasured {
@@ -86,6 +89,21 @@ pub struct ShiftProgress {
     pub oncoming: usize,
     /// What the controller is about.
     pub stage: ShiftStage,
+    /// Whether it begins in neutral; `from` is then a gear of the other direction, whose clutch is open.
+    pub is_from_neutral: bool,
+}
+
+/// The gear that the controller has engaged, and what it changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct GearShown {
+    /// The gear, before and during a shift the one that is left.
+    pub(super) gear: usize,
+    /// Whether no gear is engaged; `gear` is then one of those that follow by one clutch.
+    pub(super) is_neutral: bool,
+    /// The gear that is left for neutral, until its clutch is open.
+    pub(super) left: Option<usize>,
+    /// The shift that is under way.
+    pub(super) shift: Option<ShiftProgress>,
 }
 
 /// The shift controller.
@@ -98,6 +116,8 @@ pub struct CarShiftController {
     /// Gears that follow the shift that is under way.
     route: VecDeque<usize>,
     is_neutral: bool,
+    /// The gear that was left for neutral, and when that was asked for, s.
+    left: Option<(usize, f64)>,
     completed: usize,
     preselected: Option<usize>,
     output: Track,
@@ -125,6 +145,7 @@ impl CarShiftController {
             active: None,
             route: VecDeque::new(),
             is_neutral: false,
+            left: None,
             completed: 0,
             preselected: None,
             output,
@@ -148,7 +169,15 @@ impl CarShiftController {
             offgoing: shift.offgoing.element,
             oncoming: shift.oncoming.element,
             stage: shift.stage,
+            is_from_neutral: shift.is_from_neutral(),
         })
+    }
+
+    /// What it shows at this time of its gears.
+    pub(super) fn shown(&self, time_s: f64) -> GearShown {
+        let left = self.left.filter(|(_, since_s)| self.is_neutral && time_s < since_s + OPENS_S);
+        let left = left.map(|(gear, _)| gear);
+        GearShown { gear: self.gear, is_neutral: self.is_neutral, left, shift: self.shift() }
     }
 
     /// Puts in the dogs of this gear beside those of the gear that is engaged.
@@ -207,11 +236,11 @@ impl CarShiftController {
         Ok(())
     }
 
-    /// Opens the clutch that distinguishes forward from reverse.
+    /// Opens the clutch that distinguishes forward from reverse, from this time on.
     ///
     /// # Errors
     /// A shift is under way, or the gear is neither the lowest nor reverse.
-    pub fn request_neutral(&mut self) -> Result<(), CarError> {
+    pub fn request_neutral(&mut self, time_s: f64) -> Result<(), CarError> {
         if self.is_neutral {
             return Ok(());
         }
@@ -222,7 +251,7 @@ impl CarShiftController {
             );
             return Err(CarError::Request(message));
         };
-        (self.gear, self.is_neutral) = (partner, true);
+        (self.gear, self.is_neutral, self.left) = (partner, true, Some((self.gear, time_s)));
         Ok(())
     }
 
@@ -284,12 +313,26 @@ impl CarShiftController {
                 }
             }
         }
-        let message = format!(
-            "there is no way from gear {} to gear {} by shifts between two clutches",
-            self.name(from),
-            self.name(to)
-        );
-        Err(CarError::Request(message))
+        let (from_name, to_name) = (self.name(from), self.name(to));
+        let hint = [from, to].into_iter().find_map(|gear| self.one_way_hint(gear)).unwrap_or_else(|| {
+            "`wetclutch check` of the gearbox file lists its shifts, and the elements that open and close in each"
+                .to_owned()
+        });
+        let message = format!("there is no way from gear {from_name} to gear {to_name} by shifts between two clutches");
+        Err(CarError::Request(format!("{message}\nhint: {hint}")))
+    }
+
+    /// What to do about a gear that a one-way clutch holds.
+    fn one_way_hint(&self, gear: usize) -> Option<String> {
+        let elements =
+            self.car.gearbox.gears[gear].holding.iter().map(|holding| &self.car.gearbox.elements[holding.element]);
+        let one_way = elements.into_iter().find(|element| element.kind == ElementKind::OneWayClutch)?;
+        Some(format!(
+            "gear {} is held by the one-way clutch {}, and shifts from and to such a gear are not driven: in the gearbox file let the clutch or \
+             brake hold it that holds it for engine braking, or drive in the gears above with [start] and [[shift]]",
+            self.name(gear),
+            one_way.name
+        ))
     }
 
     /// A shift between two clutches.

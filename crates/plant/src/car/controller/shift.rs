@@ -125,6 +125,11 @@ impl ActiveShift {
         Self { is_from_neutral: true, neutral_s, direction: 1.0, ..self }
     }
 
+    /// Whether it begins in neutral.
+    pub(super) fn is_from_neutral(&self) -> bool {
+        self.is_from_neutral && self.neutral_s == 0.0
+    }
+
     /// The way back to the gear `from` that is being left: offgoing and oncoming clutch change their roles. `None` where the new
     /// gear is nearly engaged.
     pub(super) fn withdrawn(&self, c: &CarCalibration, from: usize, time_s: f64) -> Option<Self> {

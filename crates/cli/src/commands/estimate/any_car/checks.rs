@@ -7,6 +7,8 @@ use design::ShiftTables;
 use drivetrain::CommandKind;
 use logs::Role;
 use logs::plausibility::Seen;
+use observer::Reading;
+use observer::any_shift::GearCommand;
 use study::any_shift::logged::{LogStep, element_commands};
 use study::log::FIRST_LOOK;
 use trace::signal;
@@ -50,6 +52,8 @@ pub(super) struct Columns {
     watched: WatchedColumns,
     /// Places of the commands in the filter's tables.
     places: Vec<usize>,
+    /// Whether each gear is a forward one.
+    is_forward: Vec<bool>,
 }
 
 impl Columns {
@@ -79,14 +83,20 @@ impl Columns {
             Some((tables.place(element)?, watched))
         });
         let (places, commands): (Vec<_>, Vec<_>) = commands.unzip();
-        Self { watched: WatchedColumns::new(FIRST_LOOK, others.into_iter().chain(commands)), places }
+        let is_forward = car.gearbox.gears.iter().map(|gear| gear.ratio > 0.0).collect();
+        Self { watched: WatchedColumns::new(FIRST_LOOK, others.into_iter().chain(commands)), places, is_forward }
     }
 
     pub(super) fn push(&mut self, step: &LogStep) {
         let input = &step.input;
-        let others = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s, input.wheel_rad_s, input.engine_n_m];
-        let readings = others.into_iter().chain(self.places.iter().map(|place| input.commands[*place]));
-        self.watched.push(readings.map(|reading| reading.map(|reading| reading.value)));
+        let value = |reading: Option<Reading<f64>>| reading.map(|reading| reading.value);
+        // Only in a forward gear the sign of these speeds tells whether it is right: in reverse the car goes backwards.
+        let GearCommand { from, to } = input.gear;
+        let is_forward = [from, to].into_iter().all(|gear| self.is_forward.get(gear) == Some(&true));
+        let [output, wheel] = [input.output_rad_s, input.wheel_rad_s]
+            .map(|reading| value(reading).map(|speed| if is_forward { speed } else { speed.abs() }));
+        let others = [value(input.engine_rad_s), value(input.turbine_rad_s), output, wheel, value(input.engine_n_m)];
+        self.watched.push(others.into_iter().chain(self.places.iter().map(|place| value(input.commands[*place]))));
     }
 
     /// Refuses a table in which a column that is needed has no value, or whose unit cannot be right.
