@@ -12,6 +12,7 @@ mod drives;
 mod equations;
 mod fit;
 mod fit_gearbox;
+mod learnt;
 #[cfg(unix)]
 mod log_to_fit;
 mod logs;
