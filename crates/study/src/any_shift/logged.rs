@@ -409,6 +409,11 @@ impl<'c> LoggedDrive<'c> {
         estimate
     }
 
+    /// Guaranteed range of the pressure of each element after the last row, Pa, by its place in the filter's tables.
+    pub fn pressure_ranges_pa(&self) -> [Option<[f64; 2]>; MAX_ELEMENTS] {
+        core::array::from_fn(|at| self.filter.pressure_range_pa(&self.state, at))
+    }
+
     /// The filter, what it has learnt up to now, and from how many shifts of the log.
     pub fn learnt(&self) -> (&AnyShiftFilter<'c, f64>, &Learnt<f64>, LearningCount) {
         (&self.filter, self.state.learnt(), self.learning)

@@ -104,7 +104,7 @@ pub(super) fn estimate(
         }
         let estimate = drive.push(&step);
         let gears = [step.input.gear.from, step.input.gear.to];
-        let row = Row { car, places: &places, gears, estimate };
+        let row = Row { car, places: &places, gears, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {
             table.cells(time_s, columns.iter().map(|column| column.value.cell(row)))
         })?;
