@@ -9,6 +9,7 @@ pub mod channels;
 mod contradictions;
 pub mod drive;
 pub mod influence;
+pub mod learning_count;
 pub mod logged;
 pub mod matrix;
 pub mod measured;

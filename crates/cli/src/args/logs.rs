@@ -75,6 +75,10 @@ pub(crate) struct Estimate {
     /// standard output, as CSV
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<PathBuf>,
+    /// File of what the filter of a car with a gearbox has learnt of it: read before the first row if it is there, written after the last.
+    /// Several logs are then estimated one after the other, each with what the logs before it have left
+    #[arg(long, value_name = "LEARNT.toml")]
+    pub(crate) learnt: Option<PathBuf>,
     /// Columns of the estimate, in this order; time_s is always the first
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub(crate) columns: Vec<String>,
@@ -105,9 +109,14 @@ pub(crate) enum FormatChoice {
 }
 
 impl Estimate {
+    /// How many logs are estimated at a time: with `--learnt` one begins with what the one before has left.
+    pub(crate) fn logs_at_a_time(&self) -> usize {
+        if self.learnt.is_some() { 1 } else { self.threads.count().min(self.logs.len()).max(1) }
+    }
+
     /// How many threads read one of the logs.
     pub(crate) fn threads_of_log(&self) -> usize {
-        (self.threads.count() / self.logs.len().max(1)).max(1)
+        (self.threads.count() / self.logs_at_a_time()).max(1)
     }
 }
 

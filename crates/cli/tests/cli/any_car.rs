@@ -105,6 +105,37 @@ fn the_bench_of_a_gearbox_has_every_shift_in_every_kind_on_any_number_of_threads
     assert!(folder.read("other/bench.csv") != table);
 }
 
+/// Every element has the range of its pressure in every row; in a shift it is that of the clutch.
+fn ranges_of_elements(estimates: &str) {
+    let header = estimates.lines().next().unwrap();
+    let elements: Vec<&str> =
+        header.split(',').filter_map(|name| name.strip_suffix("_valve_model_pressure_pa")).collect();
+    let elements: Vec<&str> = elements.into_iter().filter(|name| name.starts_with("element_")).collect();
+    assert!(elements.len() >= 4, "{header}");
+    for element in elements {
+        let [valve, least, greatest] = ["valve_model_pressure_pa", "pressure_least_pa", "pressure_greatest_pa"]
+            .map(|name| numbers(estimates, &format!("{element}_{name}")));
+        for row in 0..valve.len() {
+            // Once the first command has had its time.
+            let valve_pa = if row > 100 { valve[row] } else { least[row] };
+            assert!(least[row] <= valve_pa && valve_pa <= greatest[row], "{element} {row}");
+        }
+        for clutch in ["offgoing", "oncoming"] {
+            let own = column(estimates, clutch);
+            let [in_shift_least, in_shift_greatest] = ["pressure_least_pa", "pressure_greatest_pa"]
+                .map(|name| numbers(estimates, &format!("{clutch}_{name}")));
+            let rows = (0..own.len()).filter(|&row| format!("element_{}", own[row].to_lowercase()) == element);
+            for row in rows {
+                assert_eq!(
+                    [least[row], greatest[row]],
+                    [in_shift_least[row], in_shift_greatest[row]],
+                    "{element} {row}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the_truth() {
     let folder = simulated("estimate-car");
@@ -131,6 +162,15 @@ fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the
             assert!(within, "{clutch} {row}: {}", torque[row]);
             assert!((found[row] - truth[row]).abs() < 0.2e6, "{clutch} {row}: {} {}", found[row], truth[row]);
         }
+    }
+    ranges_of_elements(&estimates);
+    // Of a clutch of a shift it is said whether the speeds show its torque; in a gear there is none.
+    for clutch in ["offgoing", "oncoming"] {
+        let [names, hidden] = ["", "_hidden"].map(|end| column(&estimates, &format!("{clutch}{end}")));
+        assert!(names.iter().zip(&hidden).all(|(name, hidden)| name.is_empty() == hidden.is_empty()), "{clutch}");
+        let count = |cell: &str| hidden.iter().filter(|hidden| *hidden == cell).count();
+        assert!(count("0") > 100 && count("1") > 3, "{clutch}: {} {}", count("0"), count("1"));
+        assert_eq!(count("0") + count("1") + count(""), hidden.len());
     }
     let shifts = folder.read("whole_shifts.csv");
     assert!(shifts.lines().count() >= 4, "{shifts}");

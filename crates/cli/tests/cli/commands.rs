@@ -443,6 +443,10 @@ fn sensitivity_of_a_car_with_a_gearbox_says_which_shifts_hide_their_torque() {
     );
     let page = read(folder.path("out/sensitivity.html"));
     assert!(page.contains("Torque phase") && page.contains("AODE") && page.contains("bound, either way"));
+    let apart = page.split_once("<h2>What cannot be told apart</h2>").unwrap().1;
+    for errors in ["Friction and valve gain", "kiss point and gain", "stiffness of the drive shafts", "Lag and delay"] {
+        assert!(apart.contains(errors), "{errors}");
+    }
     let json: serde_json::Value = serde_json::from_str(&printed(&wetclutch(&["sensitivity", &car, "--json"]))).unwrap();
     assert_eq!(json.as_array().unwrap().len(), 12);
     assert!(json[0]["inertia_phase"]["deviation_n_m"][0].as_f64().unwrap() > 0.0, "{json}");

@@ -14,6 +14,7 @@ mod equations;
 mod fit;
 mod fit_gearbox;
 mod garage;
+mod learnt;
 #[cfg(unix)]
 mod log_to_fit;
 mod logs;

@@ -316,6 +316,11 @@ impl<T: Real> ElementState<T> {
         per_pa * self.pressing(clutch, u, wrong).pressed_pa * (T::one() + u.torque_share * factor)
     }
 
+    /// Guaranteed range of the pressure, Pa.
+    pub(super) fn pressure_range_pa(&self, element: &FrictionElement<T>) -> Option<[T; 2]> {
+        Some(self.range.as_ref()?.pressure_pa(element.budget.as_ref()?))
+    }
+
     /// Guaranteed ranges of pressure and torque at the element, with its least and greatest slip if they are known.
     pub(super) fn ranges(&self, element: &FrictionElement<T>, slip_rad_s: Option<[T; 2]>) -> Option<([T; 2], [T; 2])> {
         let (range, budget) = (self.range.as_ref()?, element.budget.as_ref()?);

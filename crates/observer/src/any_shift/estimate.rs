@@ -165,6 +165,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         state.estimate.health = health;
     }
 
+    /// Lowest and highest pressure of an element by its command alone, Pa, for errors within the budget, by its place in
+    /// [`super::GearboxTables::elements`]; in a gear as in a shift. `None` if there is no such element, or no budget of it.
+    pub fn pressure_range_pa(&self, state: &AnyShiftState<T>, at: usize) -> Option<[T; 2]> {
+        self.element(&state.elements, at).and_then(|(memory, element)| memory.pressure_range_pa(element))
+    }
+
     /// Slip of the offgoing clutch away from the new gear, where the readings show one.
     fn flare(&self, shift: &ShiftRow<T>, speeds: [T; 2]) -> T {
         let [off, on] = shift.clutches.map(|clutch| clutch.ratio);

@@ -8,7 +8,7 @@ use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::CommandKind;
 use observer::any_shift::{
-    AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
+    AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
 };
 use observer::{Health, Reading};
 use plant::car::{CarShiftQuality, NO_GEAR};
@@ -16,6 +16,7 @@ use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive};
+use super::learning_count::LearningCount;
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -262,6 +263,7 @@ pub struct LoggedDrive<'c> {
     tables: &'c ShiftTables<f64>,
     filter: AnyShiftFilter<'c, f64>,
     state: AnyShiftState<f64>,
+    learning: LearningCount,
     passing: PassingShifts,
     /// Newest speeds of engine, turbine and output, rad/s: as they came, and those that the filter did not refuse.
     came_rad_s: [f64; 3],
@@ -314,15 +316,21 @@ impl Holes {
 }
 
 impl<'c> LoggedDrive<'c> {
-    /// The filter of a car with these tables, for readings of these sensors.
-    pub fn new(car: &'c Car, tables: &'c ShiftTables<f64>, sensors: Option<&Sensors>) -> Self {
+    /// The filter of a car with these tables, for readings of these sensors, and with what was learnt in an earlier log.
+    pub fn new(
+        car: &'c Car,
+        tables: &'c ShiftTables<f64>,
+        sensors: Option<&Sensors>,
+        learnt: Option<&Learnt<f64>>,
+    ) -> Self {
         let filter = any_shift_filter(car, tables, &ShiftErrors::LOGGED, sensors);
-        let state = filter.start();
+        let state = learnt.map_or_else(|| filter.start(), |learnt| filter.start_with(learnt));
         Self {
             car,
             tables,
             filter,
             state,
+            learning: LearningCount::of(state.learnt()),
             passing: PassingShifts::default(),
             came_rad_s: [f64::NAN; 3],
             speeds_rad_s: [f64::NAN; 3],
@@ -351,6 +359,7 @@ impl<'c> LoggedDrive<'c> {
     pub fn push(&mut self, step: &LogStep) -> ShiftEstimate<f64> {
         let input = &step.input;
         let estimate = self.filter.step(&mut self.state, input);
+        self.learning.push(self.state.learnt());
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
         let channels = [estimate.channels.engine, estimate.channels.turbine, estimate.channels.output];
         for (at, (reading, health)) in readings.into_iter().zip(channels).enumerate() {
@@ -400,6 +409,16 @@ impl<'c> LoggedDrive<'c> {
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
         estimate
+    }
+
+    /// Guaranteed range of the pressure of each element after the last row, Pa, by its place in the filter's tables.
+    pub fn pressure_ranges_pa(&self) -> [Option<[f64; 2]>; MAX_ELEMENTS] {
+        core::array::from_fn(|at| self.filter.pressure_range_pa(&self.state, at))
+    }
+
+    /// The filter, what it has learnt up to now, and from how many shifts of the log.
+    pub fn learnt(&self) -> (&AnyShiftFilter<'c, f64>, &Learnt<f64>, LearningCount) {
+        (&self.filter, self.state.learnt(), self.learning)
     }
 
     fn compare_ratio(&mut self, gear: usize, input: &ShiftInput<f64>) {

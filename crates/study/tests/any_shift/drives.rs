@@ -1,6 +1,7 @@
 //! Whole drives: through all gears of every shipped gearbox.
 
 use config::Car;
+use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use observer::Health;
 use plant::car::CarModel;
 use study::any_shift::drive::{ScoredDrive, score_drive};
@@ -99,6 +100,43 @@ fn the_ranges_hold_while_pistons_move() {
     let car = Car::read(&vehicles.join("eight_speed_stroke.toml")).unwrap();
     for shift in driven(&car, 1).shifts {
         assert_eq!(shift.inside(), Some(1.0), "{} {}-{}", shift.number, shift.from, shift.to);
+    }
+}
+
+/// In a gear the range follows from the commands as in a shift, of elements that hold, fill or rest.
+#[test]
+fn the_pressure_of_every_element_is_within_its_range_in_gears_too() {
+    let vehicles = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles");
+    let with_strokes = Car::read(&vehicles.join("eight_speed_stroke.toml")).unwrap();
+    for known in cars().into_iter().chain([with_strokes]) {
+        let name = &known.gearbox.name;
+        let model = CarModel::new(drawn_car(&known, 0, 0, 1)).unwrap();
+        let mut recording = Recording::default();
+        drive_tour(&model, &known, |sample| recording.push(sample), || ()).unwrap();
+        let (errors, sensors) = (ShiftErrors::STANDARD, sensors());
+        let tables = ShiftTables::of_car(&known, &errors).unwrap();
+        let filter = any_shift_filter(&known, &tables, &errors, Some(&sensors));
+        let (mut state, mut in_gear, mut widths_pa) = (filter.start(), 0, Vec::new());
+        for (sample, input) in recording.samples.iter().zip(recording.inputs(&known, &tables, &sensors, 1)) {
+            let estimate = filter.step(&mut state, &input);
+            in_gear += u32::from(estimate.clutches.is_none());
+            for (element, pressure_pa) in sample.pressures_pa.iter().enumerate() {
+                let Some(place) = tables.place(element) else { continue };
+                let [low, high] = filter.pressure_range_pa(&state, place).unwrap();
+                let label = format!("{name} {:.2} s, element {element}", sample.time_s);
+                assert!((low - 1.0..=high + 1.0).contains(pressure_pa), "{label}: {low} {pressure_pa} {high}");
+                widths_pa.push(high - low);
+                let shifts = estimate.clutches.into_iter().flatten().find(|clutch| clutch.element == place);
+                assert!(shifts.is_none_or(|clutch| clutch.pressure_range_pa == Some([low, high])), "{label}");
+            }
+        }
+        widths_pa.sort_by(f64::total_cmp);
+        let middle_pa = widths_pa[widths_pa.len() / 2];
+        println!(
+            "{name}: {in_gear} of {} samples in a gear, width in the middle {middle_pa:.0} Pa",
+            recording.samples.len()
+        );
+        assert!(in_gear > 1000 && filter.pressure_range_pa(&state, usize::MAX).is_none());
     }
 }
 

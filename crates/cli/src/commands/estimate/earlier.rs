@@ -66,7 +66,13 @@ mod tests {
         assert!(
             estimates
                 .iter()
-                .chain(&["phase", "health", "turbine_torque_estimate_n_m"])
+                .chain(&[
+                    "phase",
+                    "health",
+                    "turbine_torque_estimate_n_m",
+                    "offgoing_hidden",
+                    "element_e_pressure_least_pa"
+                ])
                 .all(|name| is_estimate_column(name))
         );
         let logs = ["element_k1_current_a", "turbine_speed_rad_s", "oncoming_pressure_pa", "N_Eng"];

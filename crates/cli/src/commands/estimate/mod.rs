@@ -93,6 +93,7 @@ fn each_log<S: Sync>(
     for written in output.iter().filter_map(|output| outputs::beside(output)).flatten().chain(output.clone()) {
         not_an_input(Some(&written), inputs(options).chain([log]))?;
     }
+    not_the_learnt(options, output.as_slice())?;
     output.as_deref().map(replaces_only_estimates).transpose()?;
     estimate(&prepare()?, log, output.as_deref(), &mut Messages::at_once())
 }
@@ -104,7 +105,7 @@ fn ending(options: &Estimate) -> &'static str {
 
 /// The files that an estimate reads beside its logs.
 fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
-    options.sensors.iter().chain([&options.vehicle]).chain(options.mapping.files())
+    options.sensors.iter().chain([&options.vehicle]).chain(&options.learnt).chain(options.mapping.files())
 }
 
 fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
@@ -147,6 +148,7 @@ fn several<S: Sync>(
         }
         replaces_only_estimates(output)?;
     }
+    not_the_learnt(options, &outputs)?;
     let setup = prepare()?;
     let next = AtomicUsize::new(0);
     let failures: Mutex<Vec<(usize, Failure)>> = Mutex::new(Vec::new());
@@ -164,7 +166,7 @@ fn several<S: Sync>(
         }
     };
     std::thread::scope(|scope| {
-        for _ in 1..options.threads.count().min(logs.len()) {
+        for _ in 1..options.logs_at_a_time() {
             scope.spawn(work);
         }
         work();
@@ -180,6 +182,23 @@ fn several<S: Sync>(
         true => Failure::Work(message),
         false => Failure::Input(message),
     })
+}
+
+/// Refuses a file of `--learnt` that an estimate would go into. It need not be there yet.
+fn not_the_learnt(options: &Estimate, outputs: &[PathBuf]) -> Result<(), Failure> {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        (folder.canonicalize().unwrap_or_else(|_| folder.to_owned()), path.file_name().map(ToOwned::to_owned))
+    };
+    let Some(learnt) = &options.learnt else { return Ok(()) };
+    let written = |output: &PathBuf| outputs::beside(output).into_iter().flatten().chain([output.clone()]);
+    match outputs.iter().flat_map(written).any(|written| place(&written) == place(learnt)) {
+        false => Ok(()),
+        true => Err(Failure::Input(format!(
+            "{}: an estimate goes into this file\nhint: choose another name after --learnt",
+            learnt.display()
+        ))),
+    }
 }
 
 /// A file in the folder for each log, with the log's name.

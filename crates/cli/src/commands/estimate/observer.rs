@@ -31,6 +31,13 @@ pub(super) fn check_options(options: &Estimate) -> Result<(), Failure> {
                 .to_owned(),
         ));
     }
+    if options.learnt.is_some() {
+        return Err(Failure::Input(
+            "--learnt has no effect with the vehicle file of one shift\n\
+             hint: leave it out; the filter of a car with a gearbox, such as vehicles/eight_speed.toml, keeps what it learns"
+                .to_owned(),
+        ));
+    }
     // Without a wheel speed the best observer is another; that is told when the log is known.
     if options.sensors.is_some() && options.observer != ObserverChoice::Best && !is_filter(kind(options.observer)) {
         return Err(sensors_without_effect());

@@ -14,6 +14,8 @@ pub(super) struct Row<'a> {
     pub(super) places: &'a [(usize, &'a str)],
     pub(super) gears: [usize; 2],
     pub(super) estimate: ShiftEstimate<f64>,
+    /// Guaranteed ranges of the pressures of the elements, Pa.
+    pub(super) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
 }
 
 impl<'a> Row<'a> {
@@ -27,7 +29,7 @@ impl<'a> Row<'a> {
         Cell::Word(named.map_or("", |(_, name)| *name))
     }
 
-    /// Pressure, torque, their ranges, and both by the valve model, in the order of [`CLUTCH`].
+    /// Pressure, torque, their ranges, both by the valve model, and whether the speeds show nothing, in the order of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
         let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
         let end = |range: Option<[f64; 2]>, end: usize| range.map_or(f64::NAN, |range| range[end]);
@@ -39,7 +41,8 @@ impl<'a> Row<'a> {
             4 => end(clutch.torque_range_n_m, 0),
             5 => end(clutch.torque_range_n_m, 1),
             6 => clutch.valve_pa,
-            _ => clutch.open_loop_n_m,
+            7 => clutch.open_loop_n_m,
+            _ => f64::from(u8::from(clutch.hidden)),
         }
     }
 
@@ -50,7 +53,7 @@ impl<'a> Row<'a> {
 }
 
 /// The columns of a clutch, after `offgoing_` or `oncoming_`.
-const CLUTCH: [&str; 8] = [
+const CLUTCH: [&str; 9] = [
     "pressure_estimate_pa",
     "pressure_least_pa",
     "pressure_greatest_pa",
@@ -59,7 +62,10 @@ const CLUTCH: [&str; 8] = [
     "torque_greatest_n_m",
     "valve_model_pressure_pa",
     "valve_model_torque_n_m",
+    "hidden",
 ];
+/// The columns of an element, after its name: those of [`CLUTCH`] that its command alone gives.
+const ELEMENT: [&str; 3] = [CLUTCH[6], CLUTCH[1], CLUTCH[2]];
 const ROLES: [&str; 2] = ["offgoing", "oncoming"];
 
 /// Where the cells of a column come from.
@@ -69,6 +75,8 @@ pub(super) enum Value {
     Clutch(usize, usize),
     /// Pressure of an element by its valve model, by its place in the filter's tables.
     Valve(usize),
+    /// An end of the range of that pressure.
+    Range(usize, usize),
 }
 
 impl Value {
@@ -77,6 +85,7 @@ impl Value {
             Self::Of(value) => value(row),
             Self::Clutch(which, what) => row.clutch_cell(which, what),
             Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
+            Self::Range(place, end) => of(row.ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0)),
         }
     }
 }
@@ -118,23 +127,24 @@ pub(super) fn columns(places: &[(usize, &str)], has_converter: bool) -> Vec<Colu
         format!("{clutch}_torque_deviation_n_m"),
         Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.deviation_n_m))),
     ));
-    columns.extend(
-        places
-            .iter()
-            .map(|(place, name)| number(format!("{}_{}", element_column(name), CLUTCH[6]), Value::Valve(*place))),
-    );
+    for (place, name) in places {
+        let values = [Value::Valve(*place), Value::Range(*place, 0), Value::Range(*place, 1)];
+        columns.extend(
+            ELEMENT.iter().zip(values).map(|(what, value)| number(format!("{}_{what}", element_column(name)), value)),
+        );
+    }
     columns.push(word(trace::signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
     columns
 }
 
 /// Whether the estimate of some car may have a column of this name.
 pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
-    let of_element = || {
-        name.strip_suffix(CLUTCH[6])
-            .and_then(|rest| rest.strip_suffix('_'))
-            .is_some_and(|rest| rest.starts_with("element_"))
+    let of_element = |what: &str| {
+        let rest = name.strip_suffix(what).and_then(|rest| rest.strip_suffix('_'));
+        rest.is_some_and(|rest| rest.starts_with("element_"))
     };
-    [true, false].into_iter().any(|with| columns(&[], with).iter().any(|column| column.name == name)) || of_element()
+    let is_one = |with: bool| columns(&[], with).iter().any(|column| column.name == name);
+    is_one(true) || is_one(false) || ELEMENT.into_iter().any(of_element)
 }
 
 fn of(value: Option<f64>) -> Cell<'static> {

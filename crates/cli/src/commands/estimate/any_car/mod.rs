@@ -2,6 +2,7 @@
 
 mod checks;
 mod columns;
+mod learnt;
 mod passing;
 pub(in crate::commands) mod source;
 
@@ -20,6 +21,7 @@ use trace::{Cell, shown_path};
 use self::checks::RowTimes;
 pub(super) use self::columns::is_car_column;
 use self::columns::{Row, chosen, columns};
+use self::learnt::Kept;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
 use super::Messages;
@@ -66,6 +68,7 @@ impl<'a> CarSetup<'a> {
         let sensors = options.sensors.as_deref().map(sensors).transpose()?;
         let tables = LoggedDrive::tables(&car)?;
         let map = channel_map_of_car(&options.mapping, car.road.wheel_radius_m)?;
+        options.learnt.as_deref().map(|path| learnt::check(path, &car)).transpose()?;
         Ok(Self { options, car, tables, sensors, map, stop: super::stop(options)? })
     }
 }
@@ -82,7 +85,8 @@ pub(super) fn estimate(
     let stop = options.follow.then_some(&setup.stop);
     let reading = CarReading { car, tables, map: &setup.map, stop, threads: options.threads_of_log() };
     let mut log = CarSource::open(reading, path, &mut opened)?;
-    let mut drive = LoggedDrive::new(car, tables, setup.sensors.as_ref());
+    let before = options.learnt.as_deref().map(|path| learnt::read(path, car)).transpose()?.flatten();
+    let mut drive = LoggedDrive::new(car, tables, setup.sensors.as_ref(), before.as_ref());
     // Places of the elements in the filter's tables, by name.
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =
@@ -100,7 +104,7 @@ pub(super) fn estimate(
         }
         let estimate = drive.push(&step);
         let gears = [step.input.gear.from, step.input.gear.to];
-        let row = Row { car, places: &places, gears, estimate };
+        let row = Row { car, places: &places, gears, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {
             table.cells(time_s, columns.iter().map(|column| column.value.cell(row)))
         })?;
@@ -111,25 +115,33 @@ pub(super) fn estimate(
     let median_s = times.check(path, !setup.map.channels.is_empty())?;
     log.finish(say)?;
     checks.map_or(Ok(()), |checks| checks.check())?;
-    if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
-        say.note(&swapped);
-    }
-    check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
-    check_wheel(drive.output_over_wheel(), car.driveline.final_ratio)?;
+    check_speeds(&drive, setup, path, say)?;
     if let Some(warning) = slow_log(median_s) {
         say.note(&warning);
     }
+    let kept = options.learnt.as_deref().map(|path| Kept::of(path, car, tables, &drive));
     let mut drive = drive.finish();
     passing.check()?;
     drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
     table.finish()?;
     report(&drive, car, say);
-    let Some(output) = output else {
-        say.note("estimate: on standard output");
-        return Ok(());
-    };
-    say.note(&format!("estimate: {}", output.display()));
-    write_beside(&drive, car, path, output, say)
+    match output {
+        None => say.note("estimate: on standard output"),
+        Some(output) => {
+            say.note(&format!("estimate: {}", output.display()));
+            write_beside(&drive, car, path, output, say)?;
+        }
+    }
+    kept.map_or(Ok(()), |kept| kept.write(say))
+}
+
+/// Refuses a log whose speeds are not those of the car.
+fn check_speeds(drive: &LoggedDrive<'_>, setup: &CarSetup<'_>, path: &Path, say: &mut Messages) -> Result<(), Failure> {
+    if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
+        say.note(&swapped);
+    }
+    check_ratios(drive.rows_in_gear(), &setup.options.vehicle, path)?;
+    check_wheel(drive.output_over_wheel(), setup.car.driveline.final_ratio)
 }
 
 /// Whether the speeds of most rows in a gear are not those of that gear.
