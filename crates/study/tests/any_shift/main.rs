@@ -101,13 +101,58 @@ fn draws() -> u64 {
     std::env::var("MATRIX_DRAWS").ok().map_or(1, |draws| draws.parse().unwrap())
 }
 
-/// Lag, delay and hysteresis of the valves anywhere in the budget too: `MATRIX_DRAWS=10 cargo test --release -p study --test
+/// By how much a ratio of the inertia phase of few draws may be above that of forty \[chosen\].
+const BY_CHANCE: f64 = 0.05;
+/// One draw says too little: in the torque phase of coasting downshifts it is 1.00 where forty have 0.71, and with the whole budget 0.53 in
+/// place of 0.40 in the inertia phase.
+const ANY: f64 = f64::INFINITY;
+
+/// Ratios of torque and inertia phase by kind over all classes, with forty draws.
+type Ratios = [(ShiftKind, [f64; 2]); 4];
+
+const DOCUMENTED: Ratios = [
+    (ShiftKind::PowerOnUp, [0.77, 0.32]),
+    (ShiftKind::PowerOnDown, [0.53, 0.55]),
+    (ShiftKind::PowerOffUp, [0.52, 0.56]),
+    (ShiftKind::CoastDown, [0.71, 0.35]),
+];
+
+const DOCUMENTED_OF_WHOLE_BUDGET: Ratios = [
+    (ShiftKind::PowerOnUp, [0.73, 0.36]),
+    (ShiftKind::PowerOnDown, [0.72, 0.57]),
+    (ShiftKind::PowerOffUp, [0.56, 0.64]),
+    (ShiftKind::CoastDown, [0.67, 0.40]),
+];
+
+/// The matrix is that of the documentation: with its forty draws to the last digit, with fewer no ratio is above it by more than chance
+/// may do.
+fn is_as_documented(rows: &[MatrixRow], ratios: &Ratios, runs_above: f64, by_chance: [f64; 2]) {
+    let counts = Pooled::of(rows, |_| true).counts;
+    assert_eq!((counts.outside, counts.unranged), (0, 0), "guaranteed");
+    let is_all = draws() == 40;
+    for (kind, documented) in ratios {
+        let found = Pooled::of(rows, |shift| shift.kind == *kind).torque.map(|[main, _]| main.ratio().unwrap());
+        for (at, phase) in PHASES.iter().enumerate() {
+            let (found, documented) = (found[at], documented[at]);
+            println!("{kind:?}, {phase} phase, all classes: {found:.3}, with forty draws {documented:.2}");
+            let is_met = if is_all { (found - documented).abs() <= 0.005 } else { found < documented + by_chance[at] };
+            assert!(is_met, "{kind:?}, {phase} phase: {found:.3}, documented {documented}");
+        }
+    }
+    // Two deviations of the share that is counted.
+    let [above, runs] = [counts.runs_above, counts.compared_runs].map(|count| f64::from(u32::try_from(count).unwrap()));
+    let more = if is_all { 0.0 } else { 2.0 * (runs_above * (1.0 - runs_above) / runs).sqrt() };
+    assert!(above / runs <= runs_above + more, "{above} of {runs} runs above the valve model");
+}
+
+/// Lag, delay and hysteresis of the valves anywhere in the budget too: `MATRIX_DRAWS=40 cargo test --release -p study --test
 /// any_shift whole_budget -- --nocapture`.
 #[test]
 fn matrix_of_cars_of_the_whole_budget() {
     let rows = rows(&cars(), draws(), true);
     print(&rows);
     is_not_worse_than_the_open_loop(&rows);
+    is_as_documented(&rows, &DOCUMENTED_OF_WHOLE_BUDGET, 230.0 / 4960.0, [ANY; 2]);
 }
 
 /// All values are in their guaranteed ranges, and of no kind and no phase is the filter worse than the valve model, over all
@@ -124,26 +169,12 @@ fn is_not_worse_than_the_open_loop(rows: &[MatrixRow]) {
     }
 }
 
-/// The numbers of the documentation: `MATRIX_DRAWS=10 cargo test --release -p study --test any_shift matrix -- --nocapture`.
+/// The numbers of the documentation: `MATRIX_DRAWS=40 cargo test --release -p study --test any_shift matrix -- --nocapture`.
 #[test]
 fn matrix_of_shifts_and_kinds() {
     let rows = rows(&cars(), draws(), false);
     print(&rows);
-    let counts = Pooled::of(&rows, |_| true).counts;
-    assert_eq!(counts.outside, 0, "guaranteed");
-    assert_eq!(counts.unranged, 0, "every pressure and torque has a range");
-    // The bars are for ten draws and by class; over all classes one draw already says this.
-    for (kind, bar) in [
-        (ShiftKind::PowerOnUp, 0.45),
-        (ShiftKind::PowerOnDown, 0.6),
-        (ShiftKind::PowerOffUp, 0.8),
-        (ShiftKind::CoastDown, 0.55),
-    ] {
-        let [_, [main, _]] = Pooled::of(&rows, |shift| shift.kind == kind).torque;
-        let [estimate, open_loop] = main.rms_n_m();
-        println!("{kind:?}, inertia phase, all classes: {:.2}", estimate / open_loop);
-        assert!(estimate < bar * open_loop, "{kind:?}: {estimate} / {open_loop}");
-    }
+    is_as_documented(&rows, &DOCUMENTED, 246.0 / 4960.0, [ANY, BY_CHANCE]);
 }
 
 /// The same numbers on one thread and on three, and other cars with another seed.
