@@ -25,6 +25,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         map.gearbox.ratios.clone_from(&options.ratios);
     }
     let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
+    if log.channels().is_empty() {
+        return Err(nothing_in(&options.log, "channels"));
+    }
     if options.suggest {
         // The map may be put into any folder.
         let dbc = options.mapping.dbc.as_ref();
@@ -44,6 +47,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         return shifts(options, &mut log, &map);
     }
     let inspection = logs::inspect(&mut log)?;
+    if inspection.channels.iter().all(|summary| summary.counts.total() == 0) {
+        return Err(nothing_in(&options.log, "samples"));
+    }
     output::line(&format!("{}: {}, {} channels", trace::shown_path(&options.log), log.format(), log.channels().len()))?;
     channels(&log, &inspection)?;
     remarks(&inspection.notes);
@@ -53,6 +59,14 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     let last_s = spans_s().map(|[_, last_s]| last_s).fold(f64::NEG_INFINITY, f64::max);
     remarks(wrong_time(steps_s.fold(f64::INFINITY, f64::min), last_s - first_s).as_slice());
     if map.channels.is_empty() { Ok(()) } else { check_map(options, &log, &map) }
+}
+
+/// A log without channels or samples.
+fn nothing_in(log: &Path, what: &str) -> Failure {
+    let shown = trace::shown_path(log);
+    Failure::Input(format!(
+        "{shown}: there are no {what} in it\nhint: check that the recorder had channels to write, and has written them"
+    ))
 }
 
 /// Refuses a map that does not fit the log, or by whose units its values cannot be right, as an estimate does.
@@ -306,7 +320,7 @@ fn notes(readings: &Readings<'_>) -> Vec<String> {
         format!(
             "of {} samples of {} some are not used: {}",
             output::grouped(summary.counts.total()),
-            summary.role.name(),
+            summary.name,
             summary.counts.faults()
         )
     };

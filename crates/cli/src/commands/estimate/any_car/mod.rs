@@ -17,7 +17,7 @@ use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
 use trace::{Cell, shown_path};
 
-use self::checks::RowTimes;
+use self::checks::{RowTimes, refused};
 pub(super) use self::columns::is_car_column;
 use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
@@ -116,6 +116,7 @@ pub(super) fn estimate(
     }
     check_ratios(drive.rows_in_gear(), &options.vehicle, path)?;
     check_wheel(drive.output_over_wheel(), car.driveline.final_ratio)?;
+    drive.unusable().map_or(Ok(()), |unusable| Err(refused(unusable, path)))?;
     if let Some(warning) = slow_log(median_s) {
         say.note(&warning);
     }
