@@ -332,3 +332,35 @@ fn a_gear_that_the_gearbox_does_not_have_is_counted_and_the_gear_before_stands()
     assert!(few.contains("1 of 2,400 samples of element_int_current are not used: 1 missing"), "{few}");
     assert!(refused(&mapped(|row| row % 5 > 1)).contains("hint: gears are numbers from 1 to 4"));
 }
+
+#[cfg(unix)]
+#[test]
+fn a_followed_drive_that_becomes_shorter_ends_there_and_says_so() {
+    use std::io::{BufRead, BufReader};
+    let folder = simulated("followed-cut");
+    let text = folder.read("sim/short_measured.csv");
+    let growing = folder.write("growing.csv", &text);
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+        .args(["estimate", &growing, "--follow", "--vehicle", &format!("{ROOT}vehicles/four_speed.toml")])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut rows = BufReader::new(child.stdout.take().unwrap()).lines();
+    text.lines().for_each(|_| drop(rows.next().unwrap().unwrap()));
+    std::fs::OpenOptions::new().write(true).open(&growing).unwrap().set_len(1000).unwrap();
+    assert!(rows.next().is_none());
+    let said = said(&child.wait_with_output().unwrap());
+    assert!(said.contains("warning: the log became shorter or was replaced by another file"), "{said}");
+}
+
+#[test]
+fn a_map_without_any_command_of_a_valve_says_what_can_be_done_without() {
+    let folder = simulated("no-commands");
+    let map = ["engine_speed", "turbine_speed"].map(|role| format!("[channel.{role}]\nname = \"{role}_rad_s\"\n"));
+    let map = folder.write("map.toml", map.concat());
+    let error = refused(&estimate(&folder, "sim/short_measured.csv", &["--map", &map]));
+    assert!(error.contains("has no command of a valve: without them no pressure can be estimated"), "{error}");
+    assert!(error.contains("\nhint: an estimate of this car needs turbine_speed, output_speed, gear"), "{error}");
+    assert!(error.contains("`wetclutch inspect` with the map and --shifts finds the shifts"), "{error}");
+}

@@ -3,7 +3,6 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use ::observer::Estimate;
 use config::{ObserverKind, Vehicle};
@@ -18,7 +17,7 @@ use super::measured::{Measured, Step, check_span, old_commands, slow_log};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
-use super::{Messages, Setup, observer};
+use super::{Messages, Setup, observer, say_end_of_followed};
 use crate::commands::write_text;
 use crate::failure::Failure;
 use crate::output;
@@ -47,9 +46,7 @@ pub(super) fn estimate(
         rows.table.flush()?;
     }
     log.finish(say)?;
-    if options.follow && !setup.stop.load(Ordering::Relaxed) && path.is_file() {
-        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
-    }
+    say_end_of_followed(options, &setup.stop, path, say);
     let Rows { table, shifts, findings, .. } = rows;
     let median_s = log.median_step_s();
     check_findings(path, &findings, vehicle, &log, observer.kind)?;

@@ -22,12 +22,12 @@ pub(super) use self::columns::is_car_column;
 use self::columns::{Row, chosen, columns};
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
-use super::Messages;
 use super::measured::slow_log;
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::ratios::check_wheel;
 use super::selection::Selection;
+use super::{Messages, say_end_of_followed};
 use crate::args::{Estimate, ObserverChoice};
 use crate::commands::{JsonObject, channel_map_of_car, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
@@ -110,6 +110,7 @@ pub(super) fn estimate(
     }
     let median_s = times.check(path, !setup.map.channels.is_empty())?;
     log.finish(say)?;
+    say_end_of_followed(options, &setup.stop, path, say);
     checks.map_or(Ok(()), |checks| checks.check())?;
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say.note(&swapped);
