@@ -1,7 +1,7 @@
 //! What is said of a log of a drive that is not as it should be: channels, rows, gears.
 
 use crate::any_car::{column, estimate, numbers, simulated, with_column};
-use crate::support::{Folder, ROOT, refused, said, wetclutch};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, wetclutch};
 
 #[test]
 fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
@@ -363,4 +363,44 @@ fn a_map_without_any_command_of_a_valve_says_what_can_be_done_without() {
     assert!(error.contains("has no command of a valve: without them no pressure can be estimated"), "{error}");
     assert!(error.contains("\nhint: an estimate of this car needs turbine_speed, output_speed, gear"), "{error}");
     assert!(error.contains("`wetclutch inspect` with the map and --shifts finds the shifts"), "{error}");
+}
+
+#[test]
+fn times_of_a_clock_since_1970_are_shown_from_the_first_one_on() {
+    let folder = simulated("epoch");
+    let text = folder.read("sim/short_measured.csv");
+    let later = |text: &str| {
+        with_column(text, "time_s", |value| format!("{:.3}", 1_700_000_000.0 + value.parse::<f64>().unwrap()))
+    };
+    let lines = |text: &str, kept: &str| -> Vec<String> {
+        text.lines().filter(|line| line.contains(kept)).map(str::to_owned).collect()
+    };
+    let begins_s = |name: &str, column: &str| numbers(&folder.read(name), column);
+    // Of the car with a gearbox.
+    let near = said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("near.csv")]));
+    folder.write("log.csv", later(&text));
+    let far = said(&estimate(&folder, "log.csv", &["-o", &folder.path("far.csv")]));
+    let sentence = "times from 1700000000 s of the log's clock on; the tables in files keep that clock";
+    assert!(far.matches(sentence).count() == 1 && !near.contains("times from"), "{far}");
+    let shifts = lines(&near, "-on upshift");
+    assert!(shifts.len() > 1 && lines(&far, "-on upshift").len() == shifts.len(), "{far}");
+    for (near, far) in shifts.iter().zip(lines(&far, "-on upshift")) {
+        assert_eq!(near.split_whitespace().nth(4), far.split_whitespace().nth(4));
+    }
+    for (near, far) in begins_s("near_shifts.csv", "time_s").iter().zip(begins_s("far_shifts.csv", "time_s")) {
+        assert!((far - 1_700_000_000.0 - near).abs() < 1e-3, "{near} {far}");
+    }
+    // The labels of axes and the cells of tables.
+    let page = folder.read("far_report.html");
+    assert!(page.contains("times from 1700000000 s") && !page.contains(">17000000"));
+    // Of the two-speed car.
+    said(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("drive")]));
+    folder.write("log.csv", later(&folder.read("drive/e1_measured.csv")));
+    let out = folder.path("two.csv");
+    let far = said(&wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "-o", &out]));
+    assert!(far.matches(sentence).count() == 1 && far.contains("from 0.000 to 9.500 s"), "{far}");
+    assert!(!far.replace(sentence, "").contains("17000000"), "{far}");
+    assert!(begins_s("two_shifts.csv", "time_s")[0] > 1_700_000_000.0);
+    let page = folder.read("two_report.html");
+    assert!(page.contains("times from 1700000000 s") && !page.contains(">17000000"));
 }

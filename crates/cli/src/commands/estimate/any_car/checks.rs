@@ -35,6 +35,11 @@ impl RowTimes {
         self.ends_s = Some([self.ends_s.map_or(step.time_s, |[first_s, _]| first_s), step.time_s]);
     }
 
+    /// The time of the first row, s; zero without one.
+    pub(super) fn first_s(&self) -> f64 {
+        self.ends_s.map_or(0.0, |[first_s, _]| first_s)
+    }
+
     /// The middle time between two rows, s.
     ///
     /// # Errors

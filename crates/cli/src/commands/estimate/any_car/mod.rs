@@ -5,7 +5,7 @@ mod columns;
 mod passing;
 pub(in crate::commands) mod source;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -27,9 +27,9 @@ use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::ratios::check_wheel;
 use super::selection::Selection;
-use super::{Messages, say_end_of_followed};
+use super::{Messages, said_of_origin, say_end_of_followed};
 use crate::args::{Estimate, ObserverChoice};
-use crate::commands::{JsonObject, channel_map_of_car, write_cells, write_json_list, write_text};
+use crate::commands::{JsonObject, channel_map_of_car, shown_from_s, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -108,6 +108,7 @@ pub(super) fn estimate(
             table.flush()?;
         }
     }
+    let origin_s = shown_from_s(times.first_s());
     let median_s = times.check(path, !setup.map.channels.is_empty())?;
     log.finish(say)?;
     say_end_of_followed(options, &setup.stop, path, say);
@@ -125,13 +126,22 @@ pub(super) fn estimate(
     passing.check()?;
     drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
     table.finish()?;
+    let places = output.and_then(beside).filter(|_| !drive.shifts.is_empty());
+    if let Some([csv, json, _]) = &places {
+        write_tables(&drive, car, csv, json)?;
+    }
+    drive = drive.earlier_by(origin_s);
+    drive.warnings.splice(0..0, said_of_origin(origin_s));
     report(&drive, car, say);
     let Some(output) = output else {
         say.note("estimate: on standard output");
         return Ok(());
     };
     say.note(&format!("estimate: {}", output.display()));
-    write_beside(&drive, car, path, output, say)
+    match places {
+        Some(places) => write_page(&drive, car, path, &places, say),
+        None => beside(output).map_or(Ok(()), |old| remove_old(&old, |note| say.note(note))),
+    }
 }
 
 /// Whether the speeds of most rows in a gear are not those of that gear.
@@ -152,19 +162,24 @@ pub(in crate::commands) fn check_ratios(rows: [u64; 2], vehicle: &Path, log: &Pa
     )))
 }
 
-/// The table of shifts and the page.
-fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path, say: &mut Messages) -> Result<(), Failure> {
-    let Some(places) = beside(output) else { return Ok(()) };
-    if drive.shifts.is_empty() {
-        return remove_old(&places, |note| say.note(note));
-    }
-    let [csv, json, page] = places;
+/// The table of shifts.
+fn write_tables(drive: &ScoredDrive, car: &Car, csv: &Path, json: &Path) -> Result<(), Failure> {
     let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
-    write_cells(&csv, &cells)?;
-    write_json_list(&json, cells.into_iter().map(JsonObject::of))?;
+    write_cells(csv, &cells)?;
+    write_json_list(json, cells.into_iter().map(JsonObject::of))
+}
+
+/// The page, beside the table of shifts.
+fn write_page(
+    drive: &ScoredDrive,
+    car: &Car,
+    log: &Path,
+    [csv, json, page]: &[PathBuf; 3],
+    say: &mut Messages,
+) -> Result<(), Failure> {
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
-    write_text(&page, &html)?;
+    write_text(page, &html)?;
     say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
     say.note(&format!("report: {}", page.display()));
     Ok(())
