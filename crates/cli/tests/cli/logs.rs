@@ -306,8 +306,8 @@ fn a_log_with_nothing_in_it_and_one_that_is_cut_are_refused() {
     let folder = Folder::new("nothing");
     let table = |name: &str, rows: u32| {
         let (path, columns) = (folder.path(name), [("a", ColumnKind::Number)]);
-        let mut table = TableWriter::create(Path::new(&path), columns.into_iter()).unwrap();
-        (0..rows).for_each(|row| table.row(f64::from(row), [Cell::Number(1.0)].into_iter()).unwrap());
+        let mut table = TableWriter::create(Path::new(&path), columns).unwrap();
+        (0..rows).for_each(|row| table.row(f64::from(row), [Cell::Number(1.0)]).unwrap());
         table.finish().unwrap();
         path
     };
