@@ -55,11 +55,11 @@ impl ShiftKinds {
             });
             shifts.collect::<Vec<_>>().join(", ")
         };
-        let mut text = format!(
-            "shifts used: {} of {}",
-            self.upshifts[0],
-            named(&[(self.upshifts[0] + self.upshifts[1], ShiftKind::PowerOnUp.name())])
-        );
+        let upshifts = named(&[(self.upshifts[0] + self.upshifts[1], ShiftKind::PowerOnUp.name())]);
+        let mut text = match self.upshifts[0] + self.upshifts[1] {
+            0 => format!("shifts used: none, because no {} was found", ShiftKind::PowerOnUp.name()),
+            _ => format!("shifts used: {} of {upshifts}", self.upshifts[0]),
+        };
         if self.unknown_load > 0 {
             text += &format!(" ({} of them by direction alone: no channel tells the load)", self.unknown_load);
         }
@@ -87,6 +87,7 @@ mod tests {
     #[test]
     fn a_statement_has_every_kind_that_there_is_and_no_other() {
         let mut kinds = ShiftKinds::default();
+        assert_eq!(kinds.statement(), "shifts used: none, because no power-on upshift was found");
         for is_used in [true, true, false] {
             kinds.count(Direction::Up, Load::PowerOn, is_used);
         }

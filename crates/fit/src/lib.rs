@@ -8,6 +8,7 @@
 mod budget;
 mod car;
 pub mod collect;
+mod correlated;
 pub mod drive;
 mod drives;
 mod driving;

@@ -6,7 +6,7 @@ use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::freeing::LEVEL;
 use crate::parameters::{DELAY_UNIT_S, HYSTERESIS_UNIT_PA};
-use crate::{BacklashFit, Channel, Fit, Parameter, Verdict};
+use crate::{BacklashFit, Channel, Fit, Parameter, Verdict, correlated};
 
 /// A row of the table of parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,8 +23,6 @@ pub struct ReportRow {
     pub verdict: Verdict,
 }
 
-/// Correlations above this are stated.
-const CORRELATED: f64 = 0.8;
 /// A one-step gain of the turbine speed above this says that the model does not fit.
 const MISFIT_GAIN: f64 = 0.6;
 /// What driving does not tell of road load.
@@ -99,17 +97,7 @@ impl Fit {
     }
 
     fn correlations(&self) -> Option<String> {
-        let covariance = &self.precision.stated;
-        let of = |i: usize, j: usize| covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
-        let count = self.priors.len();
-        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
-        let mut strong: Vec<(usize, usize, f64)> =
-            pairs.map(|(i, j)| (i, j, of(i, j))).filter(|(.., c)| c.abs() > CORRELATED).collect();
-        strong.sort_by(|one, other| other.2.abs().total_cmp(&one.2.abs()));
-        let words =
-            strong.iter().map(|(i, j, c)| format!("{} and {} {c:+.2}", self.priors[*i].name, self.priors[*j].name));
-        let words: Vec<String> = words.collect();
-        (!words.is_empty()).then(|| format!("correlated: {}", words.join("; ")))
+        correlated::statement(&self.precision.stated, |at| self.priors.get(at).map(|prior| prior.name.clone()))
     }
 
     /// Whether the values of the given file lie in the region of the car's parameters that holds all in 95 %. The parameters count

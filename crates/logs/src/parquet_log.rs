@@ -41,7 +41,7 @@ impl ParquetLog {
     pub(crate) fn open(path: &Path, time: Option<&TimeColumn>) -> Result<(Self, Vec<Channel>), LogError> {
         let file = File::open(path).map_err(LogError::io(path))?;
         let length = file.metadata().map_err(LogError::io(path))?.len();
-        let reader = SerializedFileReader::new(file).map_err(|error| damaged(path, "its end", &error))?;
+        let reader = SerializedFileReader::new(file).map_err(|error| cut(path, length, &error))?;
         check_places(path, length, &reader)?;
         if reader.metadata().file_metadata().num_rows() == 0 {
             return Err(LogError::file(path, "there are no rows"));
@@ -151,6 +151,17 @@ fn check_places(path: &Path, length: u64, reader: &SerializedFileReader<File>) -
 
 fn damaged(path: &Path, position: &str, error: &ParquetError) -> LogError {
     LogError::damaged(path, position, error.to_string())
+}
+
+/// A file that begins as Parquet and does not end so.
+fn cut(path: &Path, length: u64, error: &ParquetError) -> LogError {
+    LogError::file(
+        path,
+        format!(
+            "the file of {length} bytes begins as Parquet and does not end as one ({error})\nhint: it is cut, or what wrote it did not close it: copy or \
+             record it again"
+        ),
+    )
 }
 
 /// Name and unit of a column: by its title, by what it holds, or by the end of its name.

@@ -8,6 +8,8 @@ pub mod campaign;
 pub mod channels;
 mod contradictions;
 pub mod drive;
+mod gear_signal;
+mod in_gear;
 pub mod influence;
 pub mod learning_count;
 pub mod logged;

@@ -19,6 +19,7 @@ pub mod overview;
 pub mod passages;
 pub mod ratio_histogram;
 mod row_clock;
+mod row_samples;
 pub mod run;
 pub mod sampling;
 pub mod score;

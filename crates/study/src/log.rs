@@ -1,6 +1,7 @@
 //! A measured log, read row by row.
 
 use std::collections::VecDeque;
+use std::convert::Infallible;
 use std::path::Path;
 
 use config::Vehicle;
@@ -10,6 +11,7 @@ use trace::{CsvRows, TraceError, signal};
 use crate::Signals;
 use crate::frozen_rows::FrozenRows;
 use crate::row_clock::{RowClock, RowTime};
+use crate::row_samples::RowSamples;
 
 /// Rows that are looked at before the first estimate: gains are designed for the median time between them.
 pub const FIRST_LOOK: usize = 10_000;
@@ -23,6 +25,7 @@ pub struct Log {
     beside: Option<[Option<usize>; BESIDE.len()]>,
     clock: RowClock,
     frozen: FrozenRows,
+    samples: RowSamples,
     looked_at: VecDeque<(Input<f64>, LogRow)>,
     median_step_s: f64,
 }
@@ -127,6 +130,7 @@ impl Log {
         let beside = Some(BESIDE.map(|name| rows.find(name))).filter(|columns| columns.iter().any(Option::is_some));
         let looked_at = VecDeque::with_capacity(look);
         let mut log = Self {
+            samples: RowSamples::new(&rows),
             rows,
             signals,
             truth,
@@ -178,12 +182,13 @@ impl Log {
         self.clock.resets()
     }
 
-    /// What was met in the time stamps and of frozen speeds, in sentences.
+    /// What was met in the time stamps, the samples and of frozen speeds, in sentences.
     ///
     /// # Errors
-    /// Most rows, or most readings of a speed, could not be used.
+    /// Most rows, or most samples of a column, could not be used.
     pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
         let mut notes = self.clock.notes(&self.rows)?;
+        notes.extend(self.samples.notes(&self.rows)?);
         notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
         Ok(notes)
     }
@@ -207,7 +212,8 @@ impl Log {
     fn read(&mut self, input: &mut Input<f64>, row: &mut LogRow) -> Result<bool, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(false) };
         let rows = &self.rows;
-        *input = self.signals.input(dt_s, |column| rows.number(column))?;
+        let Ok(signals) = self.signals.input(dt_s, |column| Ok::<f64, Infallible>(self.samples.number(rows, column)));
+        *input = signals;
         let Input { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = input;
         self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
         row.time_s = time_s;

@@ -103,6 +103,12 @@ impl Overview {
         self.intervals[at].take(sample);
     }
 
+    /// The same drive on a clock that began at this time of the log's, s.
+    pub fn earlier_by(mut self, origin_s: f64) -> Self {
+        self.first_s -= origin_s;
+        self
+    }
+
     /// The intervals with the times of their beginnings and ends, s.
     pub fn intervals(&self) -> impl Iterator<Item = ([f64; 2], &Interval)> {
         #[expect(clippy::cast_precision_loss, reason = "a small count")]

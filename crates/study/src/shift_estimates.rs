@@ -221,6 +221,17 @@ impl ShiftEstimate {
         Self { number, shift, estimated, of_vehicle, window_s, samples: Vec::new() }
     }
 
+    /// The same shift on a clock that began at this time of the log's, s.
+    pub fn earlier_by(mut self, origin_s: f64) -> Self {
+        self.shift = self.shift.earlier_by(origin_s);
+        if let Some(estimated) = &mut self.estimated {
+            estimated.torque_phase_s.iter_mut().chain(&mut estimated.lock_up_s).for_each(|time_s| *time_s -= origin_s);
+        }
+        self.window_s.iter_mut().for_each(|time_s| *time_s -= origin_s);
+        self.samples.iter_mut().for_each(|sample| sample.time_s -= origin_s);
+        self
+    }
+
     /// When it began, s: with its command, else with the torque phase, else with what the finder saw first.
     pub fn begin_s(&self) -> f64 {
         let torque_phase_s = self.estimated.as_ref().map(|estimated| estimated.torque_phase_s[0]);

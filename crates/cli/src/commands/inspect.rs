@@ -12,7 +12,7 @@ use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
 use crate::commands::written::{is_page, replaces_only};
-use crate::commands::{channel_map, check_output, not_an_input, write_text};
+use crate::commands::{channel_map, check_output, not_an_input, shown_from_s, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -25,6 +25,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         map.gearbox.ratios.clone_from(&options.ratios);
     }
     let mut log = Log::open(&options.log, &map.open)?.on_threads(available_threads());
+    if log.channels().is_empty() {
+        return Err(nothing_in(&options.log, "channels"));
+    }
     if options.suggest {
         // The map may be put into any folder.
         let dbc = options.mapping.dbc.as_ref();
@@ -44,6 +47,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
         return shifts(options, &mut log, &map);
     }
     let inspection = logs::inspect(&mut log)?;
+    if inspection.channels.iter().all(|summary| summary.counts.total() == 0) {
+        return Err(nothing_in(&options.log, "samples"));
+    }
     output::line(&format!("{}: {}, {} channels", trace::shown_path(&options.log), log.format(), log.channels().len()))?;
     channels(&log, &inspection)?;
     remarks(&inspection.notes);
@@ -53,6 +59,14 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     let last_s = spans_s().map(|[_, last_s]| last_s).fold(f64::NEG_INFINITY, f64::max);
     remarks(wrong_time(steps_s.fold(f64::INFINITY, f64::min), last_s - first_s).as_slice());
     if map.channels.is_empty() { Ok(()) } else { check_map(options, &log, &map) }
+}
+
+/// A log without channels or samples.
+fn nothing_in(log: &Path, what: &str) -> Failure {
+    let shown = trace::shown_path(log);
+    Failure::Input(format!(
+        "{shown}: there are no {what} in it\nhint: check that the recorder had channels to write, and has written them"
+    ))
 }
 
 /// Refuses a map that does not fit the log, or by whose units its values cannot be right, as an estimate does.
@@ -115,12 +129,6 @@ fn remarks(notes: &[String]) {
     }
 }
 
-/// Where the times of a table begin: times since 1970 are shown from the first one on.
-fn origin(first_s: f64) -> f64 {
-    const LONGEST_S: f64 = 1e7;
-    if first_s.abs() > LONGEST_S { first_s.floor() } else { 0.0 }
-}
-
 fn say_origin(origin_s: f64) -> Result<(), Failure> {
     if origin_s != 0.0 {
         output::line(&format!("times from {origin_s:.0} s of the log's clock on"))?;
@@ -154,7 +162,7 @@ fn channels(log: &Log, inspection: &Inspection) -> Result<(), Failure> {
         .filter_map(|channel| channel.span_s)
         .map(|[first_s, _]| first_s)
         .fold(f64::INFINITY, f64::min);
-    let origin_s = origin(if first_s.is_finite() { first_s } else { 0.0 });
+    let origin_s = shown_from_s(if first_s.is_finite() { first_s } else { 0.0 });
     say_origin(origin_s)?;
     let grouped = log.channels().iter().any(|channel| !channel.group.is_empty());
     let faulty = inspection.channels.iter().any(|summary| !summary.counts.faults().is_empty());
@@ -214,7 +222,7 @@ fn shifts(options: &Inspect, log: &mut Log, map: &ChannelMap) -> Result<(), Fail
         last_s = reading.time_s;
         rates.push(readings.entry(), reading.stamp_s);
         finder.push(&reading);
-        let origin_s = *origin_s.get_or_insert_with(|| origin(first_s));
+        let origin_s = *origin_s.get_or_insert_with(|| shown_from_s(first_s));
         if options.output.is_some() {
             record.push(&Reading { time_s: reading.time_s - origin_s, ..reading });
         }
@@ -306,7 +314,7 @@ fn notes(readings: &Readings<'_>) -> Vec<String> {
         format!(
             "of {} samples of {} some are not used: {}",
             output::grouped(summary.counts.total()),
-            summary.role.name(),
+            summary.name,
             summary.counts.faults()
         )
     };

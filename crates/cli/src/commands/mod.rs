@@ -209,3 +209,9 @@ fn progress(length: u64, done: u64) -> ProgressBar {
     bar.reset_eta();
     bar
 }
+
+/// From which time on the times of a log are shown, s: times of a clock since 1970 from the first one on.
+pub(crate) fn shown_from_s(first_s: f64) -> f64 {
+    const LONGEST_S: f64 = 1e7;
+    if first_s.abs() > LONGEST_S { first_s.floor() } else { 0.0 }
+}

@@ -1,7 +1,7 @@
 //! What is said of a log of a drive that is not as it should be: channels, rows, gears.
 
 use crate::any_car::{column, estimate, numbers, simulated, with_column};
-use crate::support::{refused, said};
+use crate::support::{EXPERIMENT, Folder, ROOT, VEHICLE, refused, said, wetclutch};
 
 #[test]
 fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
@@ -25,7 +25,7 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
         (text.replacen("target_gear", "goal", 1), "there is no column `target_gear`"),
         (
             first.replacen(",1,1,", ",9,1,", 1),
-            "log.csv:2: the gear `9`, which the gearbox does not have\nhint: its gears are",
+            "log.csv: 1 of 1 samples of gear are no gear of this gearbox (9) and are not used\nhint: its gears are",
         ),
         (first.replacen(",1,1,", ",,1,", 1), "log.csv:2: the gear is missing"),
         (String::new(), "the file is empty"),
@@ -241,4 +241,166 @@ fn a_drive_whose_last_line_is_cut_is_estimated_up_to_there() {
     let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
     assert!(told.contains("the last line has no end"), "{told}");
     assert_eq!(folder.read("out.csv").lines().count(), text[..=end].lines().count());
+}
+
+/// A log without the speed of the wheels, whose output speed has another factor.
+fn slow_output(text: &str, factor: f64) -> String {
+    let slow = |value: &str| value.parse::<f64>().map_or(value.to_owned(), |value| format!("{}", factor * value));
+    with_column(&text.replacen("wheel_speed_rad_s", "other", 1), "output_speed_rad_s", slow)
+}
+
+#[test]
+fn a_drive_of_which_no_estimate_can_be_used_is_refused() {
+    let folder = simulated("slow-output");
+    let text = folder.read("sim/short_measured.csv");
+    // In rad/s, and called rpm: the output is too slow for its own rows to count.
+    folder.write("log.csv", slow_output(&text, 0.104_72));
+    let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(error.contains("the turbine speed is not the output speed times the ratio of that gear"), "{error}");
+    assert!(error.contains("hint: check the units of both speeds"), "{error}");
+    assert!(!folder.names().iter().any(|name| name.starts_with("out")));
+    // Of a car without a converter the turbine turns at a standstill, too: there the health of the estimates tells.
+    let (drive, car) = (folder.path("drive.toml"), format!("{ROOT}vehicles/dual_clutch.toml"));
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+    folder.write("log.csv", slow_output(&folder.read("sim/short_measured.csv"), 0.104_72));
+    let error =
+        refused(&wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", &car, "-o", &folder.path("out.csv")]));
+    assert!(error.contains("with the car moving, can the estimate be used; most of them have"), "{error}");
+    assert!(!folder.names().iter().any(|name| name.starts_with("out")));
+}
+
+/// The estimate of a log in which some rows of a column have another cell.
+fn with_cells(
+    folder: &Folder,
+    text: &str,
+    name: &str,
+    cell: &str,
+    rows: impl Fn(usize) -> bool,
+) -> std::process::Output {
+    let mut row = 0;
+    let other = with_column(text, name, |value| {
+        row += 1;
+        if rows(row) { cell.to_owned() } else { value.to_owned() }
+    });
+    folder.write("log.csv", other);
+    estimate(folder, "log.csv", &["-o", &folder.path("out.csv")])
+}
+
+#[test]
+fn cells_that_are_no_numbers_are_counted_and_most_of_them_are_an_error() {
+    let folder = simulated("no-numbers");
+    let text = folder.read("sim/short_measured.csv");
+    for (name, cell) in
+        [("turbine_speed_rad_s", "garbage"), ("element_int_current_a", "inf"), ("reported_engine_torque_n_m", "n/a")]
+    {
+        let few = said(&with_cells(&folder, &text, name, cell, |row| row == 700));
+        let note = format!("warning: 1 of 2400 samples of {name} are text or infinite, and are not used");
+        assert!(few.contains(&note), "{few}");
+        let most = refused(&with_cells(&folder, &text, name, cell, |row| row % 5 > 1));
+        let note =
+            format!("log.csv: 1440 of 2400 samples of {name} are text or infinite, and are not used\nhint: look at");
+        assert!(most.contains(&note), "{most}");
+    }
+}
+
+#[test]
+fn a_gear_that_the_gearbox_does_not_have_is_counted_and_the_gear_before_stands() {
+    let folder = simulated("no-gear");
+    let text = folder.read("sim/short_measured.csv");
+    said(&with_cells(&folder, &text, "gear", "", |_| false));
+    let whole = folder.read("out.csv");
+    for name in ["gear", "target_gear"] {
+        let few = said(&with_cells(&folder, &text, name, "255", |row| row == 300));
+        let note = format!("warning: 1 of 2400 samples of {name} are no gear of this gearbox (255) and are not used");
+        assert!(few.contains(&note) && few.contains("`valid_range` of `channel."), "{few}");
+        assert!(folder.read("out.csv") == whole, "{name}");
+        let most = refused(&with_cells(&folder, &text, name, "255", |row| row % 5 > 1));
+        assert!(most.contains("are no gear of this gearbox (255) and are not used\nhint: its gears are"), "{most}");
+    }
+    // By a channel map, too.
+    let map = folder.path("map.toml");
+    std::fs::write(&map, wetclutch(&["inspect", &folder.path("log.csv"), "--suggest"]).stdout).unwrap();
+    let mapped = |rows: fn(usize) -> bool| {
+        with_cells(&folder, &text, "gear", "255", rows);
+        estimate(&folder, "log.csv", &["--map", &map, "-o", &folder.path("mapped.csv")])
+    };
+    let few = said(&mapped(|row| row == 300));
+    assert!(few.contains("warning: 1 of 2400 samples of gear are no gear of this gearbox (255)"), "{few}");
+    // A count of a command names its element.
+    with_cells(&folder, &text, "element_int_current_a", "inf", |row| row == 300);
+    let few = said(&estimate(&folder, "log.csv", &["--map", &map, "-o", &folder.path("mapped.csv")]));
+    assert!(few.contains("1 of 2,400 samples of element_int_current are not used: 1 missing"), "{few}");
+    assert!(refused(&mapped(|row| row % 5 > 1)).contains("hint: gears are numbers from 1 to 4"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_followed_drive_that_becomes_shorter_ends_there_and_says_so() {
+    use std::io::{BufRead, BufReader};
+    let folder = simulated("followed-cut");
+    let text = folder.read("sim/short_measured.csv");
+    let growing = folder.write("growing.csv", &text);
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_wetclutch"))
+        .args(["estimate", &growing, "--follow", "--vehicle", &format!("{ROOT}vehicles/four_speed.toml")])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut rows = BufReader::new(child.stdout.take().unwrap()).lines();
+    text.lines().for_each(|_| drop(rows.next().unwrap().unwrap()));
+    std::fs::OpenOptions::new().write(true).open(&growing).unwrap().set_len(1000).unwrap();
+    assert!(rows.next().is_none());
+    let said = said(&child.wait_with_output().unwrap());
+    assert!(said.contains("warning: the log became shorter or was replaced by another file"), "{said}");
+}
+
+#[test]
+fn a_map_without_any_command_of_a_valve_says_what_can_be_done_without() {
+    let folder = simulated("no-commands");
+    let map = ["engine_speed", "turbine_speed"].map(|role| format!("[channel.{role}]\nname = \"{role}_rad_s\"\n"));
+    let map = folder.write("map.toml", map.concat());
+    let error = refused(&estimate(&folder, "sim/short_measured.csv", &["--map", &map]));
+    assert!(error.contains("has no command of a valve: without them no pressure can be estimated"), "{error}");
+    assert!(error.contains("\nhint: an estimate of this car needs turbine_speed, output_speed, gear"), "{error}");
+    assert!(error.contains("`wetclutch inspect` with the map and --shifts finds the shifts"), "{error}");
+}
+
+#[test]
+fn times_of_a_clock_since_1970_are_shown_from_the_first_one_on() {
+    let folder = simulated("epoch");
+    let text = folder.read("sim/short_measured.csv");
+    let later = |text: &str| {
+        with_column(text, "time_s", |value| format!("{:.3}", 1_700_000_000.0 + value.parse::<f64>().unwrap()))
+    };
+    let lines = |text: &str, kept: &str| -> Vec<String> {
+        text.lines().filter(|line| line.contains(kept)).map(str::to_owned).collect()
+    };
+    let begins_s = |name: &str, column: &str| numbers(&folder.read(name), column);
+    // Of the car with a gearbox.
+    let near = said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("near.csv")]));
+    folder.write("log.csv", later(&text));
+    let far = said(&estimate(&folder, "log.csv", &["-o", &folder.path("far.csv")]));
+    let sentence = "times from 1700000000 s of the log's clock on; the tables in files keep that clock";
+    assert!(far.matches(sentence).count() == 1 && !near.contains("times from"), "{far}");
+    let shifts = lines(&near, "-on upshift");
+    assert!(shifts.len() > 1 && lines(&far, "-on upshift").len() == shifts.len(), "{far}");
+    for (near, far) in shifts.iter().zip(lines(&far, "-on upshift")) {
+        assert_eq!(near.split_whitespace().nth(4), far.split_whitespace().nth(4));
+    }
+    for (near, far) in begins_s("near_shifts.csv", "time_s").iter().zip(begins_s("far_shifts.csv", "time_s")) {
+        assert!((far - 1_700_000_000.0 - near).abs() < 1e-3, "{near} {far}");
+    }
+    // The labels of axes and the cells of tables.
+    let page = folder.read("far_report.html");
+    assert!(page.contains("times from 1700000000 s") && !page.contains(">17000000"));
+    // Of the two-speed car.
+    said(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("drive")]));
+    folder.write("log.csv", later(&folder.read("drive/e1_measured.csv")));
+    let out = folder.path("two.csv");
+    let far = said(&wetclutch(&["estimate", &folder.path("log.csv"), "--vehicle", VEHICLE, "-o", &out]));
+    assert!(far.matches(sentence).count() == 1 && far.contains("from 0.000 to 9.500 s"), "{far}");
+    assert!(!far.replace(sentence, "").contains("17000000"), "{far}");
+    assert!(begins_s("two_shifts.csv", "time_s")[0] > 1_700_000_000.0);
+    let page = folder.read("two_report.html");
+    assert!(page.contains("times from 1700000000 s") && !page.contains(">17000000"));
 }

@@ -51,6 +51,7 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
         "converter capacity",
         "M11 of 1-2",
         "torque scale: not told by these logs",
+        "correlated: ",
         "shifts held out: ",
         "better one in ",
         "mass and road load from ",

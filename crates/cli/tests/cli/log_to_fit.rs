@@ -1,4 +1,4 @@
-//! The commands of `docs/fit.md`, from a log to an estimate with a fitted file, as they stand there.
+//! The commands of `docs/fit.md` and `docs/guide.md`, from a log to an estimate with a fitted file, as they stand there.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,9 +7,8 @@ use config::Vehicle;
 use trace::{Cell, ColumnKind, TableWriter};
 
 use crate::fit::common::{Logs, TestCar};
-use crate::support::Folder;
+use crate::support::{Folder, ROOT, said, wetclutch};
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/fit.md");
 const SHIFTS: u64 = 5;
 
 /// The log of a car that differs from its file in everything, as MDF with the names of the program.
@@ -31,11 +30,11 @@ fn write_log(path: &Path, car: &mut TestCar) {
     writer.finish().unwrap();
 }
 
-#[test]
-fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
-    let folder = Folder::new("log-to-fit");
-    let page = std::fs::read_to_string(PAGE).unwrap();
-    let commands: Vec<&str> = page.split("```").nth(1).unwrap().lines().filter(|line| !line.is_empty()).collect();
+/// Runs the commands of the first block after `heading` of a page in a folder; `after` gets each with what it said on standard error.
+fn run_page(folder: &Folder, page: &str, heading: &str, mut after: impl FnMut(&str, &str)) {
+    let page = std::fs::read_to_string(format!("{ROOT}docs/{page}")).unwrap();
+    let block = page.split_once(heading).unwrap().1.split("```").nth(1).unwrap();
+    let commands: Vec<&str> = block.lines().filter(|line| !line.is_empty()).collect();
     assert!(commands.len() >= 4 && commands.iter().all(|command| command.starts_with("wetclutch ")), "{commands:?}");
     let program = Path::new(env!("CARGO_BIN_EXE_wetclutch")).parent().unwrap();
     let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
@@ -44,6 +43,34 @@ fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
             Command::new("sh").args(["-c", command]).env("PATH", &path).current_dir(folder.path("")).output().unwrap();
         let said = String::from_utf8(shell.stderr).unwrap();
         assert!(shell.status.success(), "{command}: {said}");
+        after(command, &said);
+    }
+}
+
+#[test]
+fn the_commands_for_a_car_with_a_gearbox_do_what_the_guide_says() {
+    let folder = Folder::new("gearbox-to-fit");
+    run_page(&folder, "guide.md", "## From a log to a fitted file", |command, _| {
+        if command.starts_with("wetclutch init") {
+            // Three minutes of town.
+            let drive = std::fs::read_to_string(format!("{ROOT}drives/city.toml")).unwrap();
+            let drive = drive.replace("repetitions = 20", "repetitions = 1").replace("vehicle = ", "# vehicle = ");
+            let (drive, car) = (folder.write("town.toml", drive), folder.path("car.toml"));
+            said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("")]));
+            // The first bytes of a log tell its format.
+            folder.write("drive.mf4", folder.read("city_measured.csv"));
+        }
+    });
+    assert!(folder.read("map.toml").contains("element_a_current"));
+    // The car is that of the given file.
+    assert!(folder.read("fitted.toml").starts_with("# fit: all values are those of the given file"));
+    assert!(folder.read("fitted_shifts.csv").lines().count() > 15);
+}
+
+#[test]
+fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
+    let folder = Folder::new("log-to-fit");
+    run_page(&folder, "fit.md", "# Fitting a vehicle file to logs", |command, said| {
         if command.starts_with("wetclutch init") {
             let mut car = TestCar::of(Vehicle::read(Path::new(&folder.path("car.toml"))).unwrap(), 4);
             write_log(Path::new(&folder.path("drive.mf4")), &mut car);
@@ -51,7 +78,7 @@ fn the_commands_from_a_log_to_a_fitted_file_do_what_the_page_says() {
         if command.starts_with("wetclutch estimate") {
             assert!(said.contains(&format!("shifts: {SHIFTS} (")), "{said}");
         }
-    }
+    });
     let fitted = folder.read("fitted.toml");
     assert!(fitted.contains("# fit: x ") && fitted.contains("what the fit leaves open"), "{fitted}");
     assert!(Path::new(&folder.path("estimate_report.html")).exists());

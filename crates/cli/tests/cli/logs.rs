@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::support::{EXPERIMENT, Folder, VEHICLE, stderr, wetclutch};
+use trace::{Cell, ColumnKind, TableWriter};
+
+use crate::support::{EXPERIMENT, Folder, VEHICLE, refused, stderr, wetclutch};
 
 const NAMES: &str = "time_s,engine_speed_rad_s,turbine_speed_rad_s,output_speed_rad_s,oncoming_current_a";
 
@@ -43,7 +45,10 @@ fn a_log_that_is_wrong_is_refused_by_line_and_nothing_is_written() {
         ),
         (format!("{NAMES}\n0,{row}\ninf,{row}\n"), ":3: the time is inf"),
         (format!("{NAMES}\n0,{row}\n1,{row},\n"), ":3: the row has 6 cells, but the first line names 5 columns"),
-        (format!("{NAMES}\n0,{row}\n1,200,n/a,76,0.1\n"), ":3: column `turbine_speed_rad_s` contains `n/a`"),
+        (
+            format!("{NAMES}\n0,{row}\n0.1,200,n/a,76,0.1\n0.2,200,n/a,76,0.1\n"),
+            ": 2 of 3 samples of turbine_speed_rad_s are text or infinite, and are not used\nhint: look at this column",
+        ),
         (format!("{}1,2\n", log(20_000)), ":20002: the row has 2 cells"),
         (
             format!("{NAMES},turbine_speed_rpm\n0,{row},1\n"),
@@ -294,4 +299,23 @@ fn a_drive_of_absurd_size_is_announced_before_it_is_written() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert_eq!(said, "600 s with a sample time of 0.00001 s are 60,000,000 rows, about 27 GB in two files\n");
+}
+
+#[test]
+fn a_log_with_nothing_in_it_and_one_that_is_cut_are_refused() {
+    let folder = Folder::new("nothing");
+    let table = |name: &str, rows: u32| {
+        let (path, columns) = (folder.path(name), [("a", ColumnKind::Number)]);
+        let mut table = TableWriter::create(Path::new(&path), columns).unwrap();
+        (0..rows).for_each(|row| table.row(f64::from(row), [Cell::Number(1.0)]).unwrap());
+        table.finish().unwrap();
+        path
+    };
+    let error = refused(&wetclutch(&["inspect", &table("none.mf4", 0)]));
+    assert!(error.contains("none.mf4: there are no samples in it\nhint: check that the recorder"), "{error}");
+    let whole = std::fs::read(table("whole.parquet", 100)).unwrap();
+    let cut = folder.write("cut.parquet", &whole[..whole.len() / 2]);
+    let error = refused(&wetclutch(&["inspect", &cut]));
+    let length = format!("the file of {} bytes begins as Parquet and does not end as one (", whole.len() / 2);
+    assert!(error.contains(&length) && error.contains("\nhint: it is cut"), "{error}");
 }

@@ -9,7 +9,7 @@ use crate::driving::DRAG_UNIT_N_M;
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row};
-use crate::{BacklashFit, ReportRow, Verdict};
+use crate::{BacklashFit, ReportRow, Verdict, correlated};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -86,6 +86,10 @@ impl GearboxFit {
             format!("beside that factor, friction x valve gain is known within +- {}", seen.join(", ")),
             self.said_of_gain(),
         ];
+        lines.extend(correlated::statement(&self.stated, |at| {
+            let quantity = self.quantities.all.get(at).filter(|quantity| self.is_seen(**quantity))?;
+            Some(self.quantities.name(*quantity))
+        }));
         lines.extend(self.said_of_driving());
         lines.push(BacklashFit::statement(&self.backlash));
         lines.extend(self.given_is_possible().then(|| {

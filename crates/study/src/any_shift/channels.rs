@@ -11,6 +11,7 @@ use observer::Reading as Measured;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
+use super::gear_signal::GearSignal;
 use super::logged::{LogStep, element_column, element_commands};
 
 /// The newest reading of each entry of a map since the step before.
@@ -48,6 +49,7 @@ pub struct CarChannels<'a> {
     /// Role of each entry, and the place in the filter's tables where it is the command of an element.
     entries: Vec<(Role, Option<usize>)>,
     gears: [usize; 2],
+    signals: [GearSignal; 2],
     lock_up_applied: bool,
     pedal: f64,
     vehicle_m_s: Option<f64>,
@@ -65,7 +67,9 @@ impl<'a> CarChannels<'a> {
         let readings = Readings::new(log, map)?;
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
         let (gears, truth) = ([NO_GEAR; 2], [f64::NAN; 2]);
-        Ok(Self { car, steps, entries, gears, lock_up_applied: false, pedal: f64::NAN, vehicle_m_s: None, truth })
+        let signals = [Role::Gear, Role::TargetGear].map(|role| GearSignal::new(role.name()));
+        let (lock_up_applied, pedal, vehicle_m_s) = (false, f64::NAN, None);
+        Ok(Self { car, steps, entries, gears, signals, lock_up_applied, pedal, vehicle_m_s, truth })
     }
 
     /// The readings, with their summary and notes.
@@ -73,10 +77,23 @@ impl<'a> CarChannels<'a> {
         self.steps.readings()
     }
 
+    /// What was met in the gears, in sentences.
+    ///
+    /// # Errors
+    /// Most samples of a gear are no gear of the gearbox.
+    pub fn check_gears(&self) -> Result<Vec<String>, LogError> {
+        let hint = format!(
+            "gears are numbers from 1 to {}, 0 for none, and negative for reverse; use `scale` and `offset` of the channel map",
+            self.car.gearbox.forward_gears().len()
+        );
+        let notes = self.signals.iter().map(|signal| signal.note(&hint).map_err(LogError::map));
+        Ok(notes.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+    }
+
     /// The next step; `None` at the end.
     ///
     /// # Errors
-    /// The log cannot be read, or a gear is none of the gearbox.
+    /// The log cannot be read.
     pub fn next_step(&mut self) -> Result<Option<LogStep>, LogError> {
         let Some(step) = self.steps.next() else { return Ok(None) };
         let ChannelStep { time_s, dt_s, readings } = step?;
@@ -106,10 +123,9 @@ impl<'a> CarChannels<'a> {
                 }
             }
         }
-        for (gear, number) in self.gears.iter_mut().zip(changed_gear) {
-            if let Some(number) = number {
-                *gear = gear_of(self.car, number)?;
-            }
+        for ((gear, signal), number) in self.gears.iter_mut().zip(&mut self.signals).zip(changed_gear) {
+            let Some(number) = number else { continue };
+            *gear = signal.take(gear_of(self.car, number), || format!("{number}")).unwrap_or(*gear);
         }
         let [from, to] = self.gears;
         let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m] = of_role;
@@ -185,6 +201,14 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
     if missing.is_empty() {
         return Ok(());
     }
+    if !map.channels.iter().any(|entry| entry.role.is_command()) {
+        return Err(LogError::map(format!(
+            "the channel map has no command of a valve: without them no pressure can be estimated\nhint: an estimate of this car needs {}; add \
+             `[channel.NAME]` for each if the log has them. Without them, `wetclutch inspect` with the map and --shifts finds the shifts, and with -o \
+             PAGE.html fits the converter and gives the torque at the turbine",
+            keys.join(", ")
+        )));
+    }
     Err(LogError::map(format!(
         "the channel map has no {}\nhint: an estimate of this car needs {}; add `[channel.{}]` or --channel {2}=NAME",
         missing.join(", "),
@@ -193,23 +217,17 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
     )))
 }
 
-/// The place of a gear with this number.
-fn gear_of(car: &Car, number: f64) -> Result<usize, LogError> {
+/// The place of a gear with this number; none where the gearbox has no such gear.
+fn gear_of(car: &Car, number: f64) -> Option<usize> {
     let forward = car.gearbox.forward_gears();
     let whole = number.round();
-    let found = match whole {
+    match whole {
         _ if (number - whole).abs() > 0.01 => None,
         0.0 => Some(NO_GEAR),
         _ if whole < 0.0 => car.gearbox.gears.iter().position(|gear| gear.ratio < 0.0),
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1")]
         _ => forward.get(whole as usize - 1).copied(),
-    };
-    found.ok_or_else(|| {
-        LogError::map(format!(
-            "the log has the gear {number}, which the gearbox does not have\nhint: gears are numbers from 1 to {}, 0 for none, and negative for reverse; use `scale` and `offset` of the channel map",
-            forward.len()
-        ))
-    })
+    }
 }
 
 /// The map of a log whose channels have the names of the program, as it writes them itself; `None` if some are missing.

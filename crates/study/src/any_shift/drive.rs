@@ -163,6 +163,16 @@ impl ScoredDrive {
         self.shifts.iter().any(ScoredShift::has_truth)
     }
 
+    /// The same drive on a clock that began at this time of the log's, s.
+    pub fn earlier_by(mut self, origin_s: f64) -> Self {
+        self.states.iter_mut().for_each(|state| state.time_s -= origin_s);
+        for shift in &mut self.shifts {
+            shift.time_s.iter_mut().for_each(|time_s| *time_s -= origin_s);
+            shift.rows.iter_mut().for_each(|row| row.time_s -= origin_s);
+        }
+        self
+    }
+
     /// The shifts as rows of a matrix; those without a kind are left out.
     pub fn matrix(&self, car: &Car) -> Matrix {
         let row = |shift: &ScoredShift| {

@@ -16,21 +16,19 @@ use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive};
+use super::gear_signal::GearSignal;
+pub use super::in_gear::Unusable;
+use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
-use crate::ratio_histogram::RatioHistogram;
 use crate::row_clock::{RowClock, RowTime};
+use crate::row_samples::RowSamples;
 use crate::shift_estimates::is_refused;
-use crate::swapped_speeds::SwappedSpeeds;
 
 /// Slip below which a true clutch sticks, rad/s.
 const STICKS_RAD_S: f64 = 0.05;
-
-/// Output speed from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they may differ.
-const RATIO_FROM_RAD_S: f64 = 20.0;
-const RATIO_SHARE: f64 = 0.1;
 
 /// Rows further apart, and three times as far as usual, are a hole in the recording, s \[chosen\]: a phase of a shift may pass in it.
 const HOLE_S: f64 = 0.5;
@@ -81,10 +79,10 @@ impl ReadingColumn {
         Ok(Self { value, age: signal::age_of(name).and_then(|age| rows.find(age)) })
     }
 
-    fn read(self, rows: &CsvRows) -> Result<Option<Reading<f64>>, TraceError> {
-        let value = rows.number(self.value)?;
-        let age_s = self.age.map_or(Ok(0.0), |age| rows.number(age))?;
-        Ok((!value.is_nan()).then_some(Reading { value, age_s: if age_s.is_nan() { 0.0 } else { age_s } }))
+    fn read(self, rows: &CsvRows, samples: &RowSamples) -> Option<Reading<f64>> {
+        let value = samples.number(rows, self.value);
+        let age_s = self.age.map_or(0.0, |age| samples.number(rows, age));
+        (!value.is_nan()).then_some(Reading { value, age_s: if age_s.is_nan() { 0.0 } else { age_s } })
     }
 }
 
@@ -166,7 +164,10 @@ pub struct CarLog<'c> {
     columns: Columns,
     clock: RowClock,
     frozen: FrozenRows,
-    gear: Option<usize>,
+    samples: RowSamples,
+    /// Gear and target gear of the row before.
+    gears: [Option<usize>; 2],
+    signals: [GearSignal; 2],
 }
 
 impl<'c> CarLog<'c> {
@@ -176,15 +177,22 @@ impl<'c> CarLog<'c> {
     /// One that is needed is missing.
     pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
         let columns = Columns::of(&rows, car, tables)?;
-        Ok(Self { car, columns, rows, clock: RowClock::default(), frozen: FrozenRows::new(), gear: None })
+        let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
+        let signals = [signal::GEAR, signal::TARGET_GEAR].map(GearSignal::new);
+        Ok(Self { car, columns, rows, clock, frozen, samples, gears: [None; 2], signals })
     }
 
-    /// What was met in the time stamps and of frozen speeds, in sentences.
+    /// What was met in the time stamps, the samples, the gears and of frozen speeds, in sentences.
     ///
     /// # Errors
-    /// Most rows, or most readings of a speed, could not be used.
+    /// Most rows, or most samples of a column, could not be used.
     pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
         let mut notes = self.clock.notes(&self.rows)?;
+        notes.extend(self.samples.notes(&self.rows)?);
+        let gears = format!("its gears are {}", self.gear_names());
+        for signal in &self.signals {
+            notes.extend(signal.note(&gears).map_err(|message| self.rows.refused(message))?);
+        }
         notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
         Ok(notes)
     }
@@ -197,63 +205,70 @@ impl<'c> CarLog<'c> {
     /// The next row; `None` at the end.
     ///
     /// # Errors
-    /// The file cannot be read, a cell is no number, or a gear is none of the gearbox.
+    /// The file cannot be read, a time is no number, or the first row has no gear.
     pub fn next_step(&mut self) -> Result<Option<LogStep>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
-        let gear = self.gear_at(self.columns.gear, self.gear)?;
-        let to = self.gear_at(self.columns.target, Some(gear))?;
-        self.gear = Some(gear);
-        let (rows, columns) = (&self.rows, &self.columns);
-        let reading = |column: Option<ReadingColumn>| column.map_or(Ok(None), |column| column.read(rows));
-        let number = |column: Option<usize>| column.map_or(Ok(f64::NAN), |column| rows.number(column));
+        let gear = self.gear_at(0, None)?;
+        let to = self.gear_at(1, Some(gear))?;
+        self.gears = [Some(gear), Some(to)];
+        let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
         let mut commands = [None; MAX_ELEMENTS];
         for &(place, column) in &columns.commands {
-            commands[place] = column.read(rows)?;
+            commands[place] = column.read(rows, samples);
         }
-        let wheel_rad_s = reading(columns.wheel)?;
+        let reading = |column: Option<ReadingColumn>| column.and_then(|column| column.read(rows, samples));
+        let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, reported_n_m] =
+            [columns.engine, Some(columns.turbine), Some(columns.output), columns.wheel, columns.engine_torque]
+                .map(reading);
+        let number = |column: Option<usize>| column.map_or(f64::NAN, |column| samples.number(rows, column));
         let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
-        let vehicle_m_s = if columns.vehicle.is_some() { number(columns.vehicle)? } else { by_wheels };
+        let vehicle_m_s = if columns.vehicle.is_some() { number(columns.vehicle) } else { by_wheels };
         let mut truth = [[f64::NAN; 3]; 2];
         for (values, places) in truth.iter_mut().flatten().zip(columns.truth.iter().flatten().flatten()) {
-            *values = rows.number(*places)?;
+            *values = number(Some(*places));
         }
-        let lock_up_applied = number(columns.lock_up)? > 0.5;
-        let reported_n_m = reading(columns.engine_torque)?;
+        let lock_up_applied = number(columns.lock_up) > 0.5;
         // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
         let mut input = ShiftInput {
             dt_s,
-            engine_rad_s: reading(columns.engine)?,
-            turbine_rad_s: reading(Some(columns.turbine))?,
-            output_rad_s: reading(Some(columns.output))?,
+            engine_rad_s,
+            turbine_rad_s,
+            output_rad_s,
             wheel_rad_s,
             engine_n_m: reported_n_m.filter(|_| self.car.converter.is_none() || lock_up_applied),
             lock_up_applied,
             commands,
             gear: GearCommand { from: gear, to },
         };
-        let pedals = [number(columns.pedals[0])?, number(columns.pedals[1])?];
+        let pedals = columns.pedals.map(number);
         let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
         self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
         Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, reported_n_m, truth }))
     }
 
-    /// The gear of a cell; an empty one is the gear before.
-    fn gear_at(&self, column: usize, before: Option<usize>) -> Result<usize, TraceError> {
-        let text = self.rows.text(column);
+    /// The gear of a cell of `gear` (0) or `target_gear` (1). An empty one is `otherwise` or the gear before, one that the gearbox does not have the
+    /// one before.
+    fn gear_at(&mut self, which: usize, otherwise: Option<usize>) -> Result<usize, TraceError> {
+        let text = self.rows.text([self.columns.gear, self.columns.target][which]);
+        let before = self.gears[which];
+        if text.is_empty() {
+            return otherwise.or(before).ok_or_else(|| {
+                let hint = format!("its gears are {}", self.gear_names());
+                self.rows.wrong(format!("the gear is missing, and no row before has one\nhint: {hint}"))
+            });
+        }
         let gears = &self.car.gearbox.gears;
         // A logger may write the gear as a number with decimals.
         let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
         let named = |name: &str| gears.iter().position(|gear| gear.name == name);
         let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(NO_GEAR);
         let found = named(&text).or(neutral).or_else(|| named(&whole?));
-        found.or_else(|| before.filter(|_| text.is_empty())).ok_or_else(|| {
-            let names = gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
-            let what = match &*text {
-                "" => "the gear is missing, and no row before has one".to_owned(),
-                other => format!("the gear `{other}`, which the gearbox does not have"),
-            };
-            self.rows.wrong(format!("{what}\nhint: its gears are {names}"))
-        })
+        let found = self.signals[which].take(found, || text.escape_debug().to_string());
+        Ok(found.or(before).or(otherwise).unwrap_or(NO_GEAR))
+    }
+
+    fn gear_names(&self) -> String {
+        self.car.gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -269,12 +284,7 @@ pub struct LoggedDrive<'c> {
     came_rad_s: [f64; 3],
     speeds_rad_s: [f64; 3],
     begun_s: f64,
-    /// Rows in a gear at speed, and those whose speeds do not fit its ratio.
-    in_gear: [u64; 2],
-    swapped: SwappedSpeeds,
-    /// Output over wheel speed in the rows in a gear at speed that have both; how many there are, and how long they are, s.
-    output_over_wheel: RatioHistogram<1000>,
-    wheel_rows: (u64, f64),
+    in_gear: InGear<'c>,
     /// The gear of the row before, and changes of the gear which no target gear announced.
     gear: Option<usize>,
     unannounced: u64,
@@ -335,10 +345,7 @@ impl<'c> LoggedDrive<'c> {
             came_rad_s: [f64::NAN; 3],
             speeds_rad_s: [f64::NAN; 3],
             begun_s: f64::NAN,
-            in_gear: [0; 2],
-            swapped: SwappedSpeeds::default(),
-            output_over_wheel: RatioHistogram::default(),
-            wheel_rows: (0, 0.0),
+            in_gear: InGear::new(car),
             gear: None,
             unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
@@ -400,7 +407,14 @@ impl<'c> LoggedDrive<'c> {
                 let are_dogs = self.car.converter.is_none() && is_open;
                 // What happens in a hole is not seen.
                 self.unannounced += u64::from(!is_same && !is_hole && !are_dogs);
-                self.compare_ratio(from, input);
+                self.in_gear.push(&InGearRow {
+                    gear: from,
+                    dt_s: input.dt_s,
+                    came_rad_s: self.came_rad_s,
+                    output: input.output_rad_s,
+                    wheel: input.wheel_rad_s,
+                    health: estimate.health,
+                });
             }
         }
         // In a shift the gear may be the new one already.
@@ -421,37 +435,24 @@ impl<'c> LoggedDrive<'c> {
         (&self.filter, self.state.learnt(), self.learning)
     }
 
-    fn compare_ratio(&mut self, gear: usize, input: &ShiftInput<f64>) {
-        let [engine, turbine, output] = self.came_rad_s;
-        let by_output = self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio) * output;
-        if output > RATIO_FROM_RAD_S {
-            self.swapped.push(engine, turbine, &[by_output]);
-            self.in_gear[0] += 1;
-            self.in_gear[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
-            if let (Some(output), Some(wheel)) = (input.output_rad_s, input.wheel_rad_s) {
-                self.output_over_wheel.push(output.value / wheel.value);
-                self.wheel_rows.0 += 1;
-                self.wheel_rows.1 += input.dt_s.clamp(0.0, 1.0);
-            }
-        }
-    }
-
     /// Rows in a gear at speed, and those whose turbine and output speed do not fit the ratio of that gear.
     pub fn rows_in_gear(&self) -> [u64; 2] {
-        self.in_gear
+        self.in_gear.rows()
+    }
+
+    /// The rows in a gear while the car moves, if there are enough of them and the filter could use the readings of none.
+    pub fn unusable(&self) -> Option<Unusable> {
+        self.in_gear.unusable()
     }
 
     /// Output over wheel speed in a gear at speed, in the middle; not a number where too few rows have both.
     pub fn output_over_wheel(&self) -> f64 {
-        /// Rows that are needed to judge, and their time, s \[chosen\].
-        const ENOUGH: (u64, f64) = (200, 3.0);
-        let (rows, time_s) = self.wheel_rows;
-        if rows < ENOUGH.0 || time_s < ENOUGH.1 { f64::NAN } else { self.output_over_wheel.middle() }
+        self.in_gear.output_over_wheel()
     }
 
     /// What contradicts the channels of engine and turbine speed, in a sentence.
     pub fn swapped_speeds(&self) -> Option<String> {
-        self.swapped.warning()
+        self.in_gear.swapped_speeds()
     }
 
     fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {
@@ -505,7 +506,8 @@ impl<'c> LoggedDrive<'c> {
     pub fn finish(mut self) -> ScoredDrive {
         // A shift that the log cuts off is not complete.
         self.end(f64::NAN, usize::MAX);
-        let mut warnings: Vec<String> = self.swapped.warning().into_iter().chain(self.commands.warnings()).collect();
+        let mut warnings: Vec<String> =
+            self.in_gear.swapped_speeds().into_iter().chain(self.commands.warnings()).collect();
         warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {
             warnings.push(format!(

@@ -185,6 +185,17 @@ impl CsvRows {
         }
     }
 
+    /// The same, and none where the cell holds something else.
+    #[inline]
+    pub fn number_or_none(&self, column: usize) -> Option<f64> {
+        number(self.cell(column)).map(|number| number * self.columns[column].1)
+    }
+
+    /// Names of the columns, in SI.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.columns.iter().map(|(name, _)| name.as_str())
+    }
+
     #[cold]
     fn not_a_number(&self, column: usize) -> TraceError {
         let (name, text) = (TraceError::shown(&self.columns[column].0), TraceError::shown(&self.text(column)));

@@ -10,7 +10,9 @@ use trace::units;
 
 use super::measured::Step;
 use super::ratios::Ratios;
+use super::said_of_origin;
 use super::watched::is_looked_at;
+use crate::commands::shown_from_s;
 use crate::failure::Failure;
 use crate::output;
 
@@ -102,6 +104,11 @@ impl Findings {
     /// From the first step to the last, s.
     pub(super) fn span_s(&self) -> f64 {
         self.last_s - self.first_s
+    }
+
+    /// From which time on the times of the log are shown, s.
+    pub(super) fn origin_s(&self) -> f64 {
+        if self.first_s.is_nan() { 0.0 } else { shown_from_s(self.first_s) }
     }
 
     /// Refuses a log of which a channel is unusable in most samples, or that does not belong to the vehicle.
@@ -200,8 +207,10 @@ impl Findings {
                 output::grouped(self.other_gear)
             ));
         }
-        said.push(format!("rows: {rows}, from {:.3} to {:.3} s", self.first_s, self.last_s));
-        said.push(format!("shifts: {}", self.shifts()));
+        let origin_s = self.origin_s();
+        said.extend(said_of_origin(origin_s));
+        said.push(format!("rows: {rows}, from {:.3} to {:.3} s", self.first_s - origin_s, self.last_s - origin_s));
+        said.push(format!("shifts: {}", self.shifts(origin_s)));
         #[expect(clippy::cast_precision_loss, reason = "a share to a tenth of a percent")]
         let share = |count: u64| 100.0 * count as f64 / self.rows as f64;
         let shares = self.health.iter().map(|(health, count)| format!("{} {:.1} %", health.name(), share(*count)));
@@ -209,9 +218,10 @@ impl Findings {
         said
     }
 
-    fn shifts(&self) -> String {
+    fn shifts(&self, origin_s: f64) -> String {
         let Passages { count, first_s, .. } = &self.passages;
-        let times = first_s.iter().map(|[from_s, to_s]| format!("{from_s:.3} to {to_s:.3} s"));
+        let times =
+            first_s.iter().map(|[from_s, to_s]| format!("{:.3} to {:.3} s", from_s - origin_s, to_s - origin_s));
         let mut parts: Vec<String> = times.collect();
         match count - parts.len() as u64 {
             0 => {}

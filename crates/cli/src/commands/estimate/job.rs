@@ -1,9 +1,8 @@
 //! The estimate of one log.
 
 use std::cell::RefCell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use ::observer::Estimate;
 use config::{ObserverKind, Vehicle};
@@ -18,7 +17,7 @@ use super::measured::{Measured, Step, check_span, old_commands, slow_log};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
-use super::{Messages, Setup, observer};
+use super::{Messages, Setup, observer, say_end_of_followed};
 use crate::commands::write_text;
 use crate::failure::Failure;
 use crate::output;
@@ -47,9 +46,7 @@ pub(super) fn estimate(
         rows.table.flush()?;
     }
     log.finish(say)?;
-    if options.follow && !setup.stop.load(Ordering::Relaxed) && path.is_file() {
-        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
-    }
+    say_end_of_followed(options, &setup.stop, path, say);
     let Rows { table, shifts, findings, .. } = rows;
     let median_s = log.median_step_s();
     check_findings(path, &findings, vehicle, &log, observer.kind)?;
@@ -57,6 +54,11 @@ pub(super) fn estimate(
     warnings.into_iter().flatten().for_each(|warning| say.note(&warning));
     shifts.check()?;
     table.finish()?;
+    let places = output.and_then(beside).filter(|_| !shifts.found.is_empty());
+    if let Some([csv, json, _]) = &places {
+        shifts::write(&shifts.found, csv, json)?;
+    }
+    let shifts = shifts.earlier_by(findings.origin_s());
     let sentences = findings.sentences();
     sentences.iter().for_each(|sentence| say.note(sentence));
     report_shifts(&shifts, say);
@@ -81,7 +83,10 @@ pub(super) fn estimate(
         shifts_of_log: shifts.seen(),
         findings: &sentences,
     };
-    write_beside(output, &page, say)
+    match places {
+        Some(places) => write_page(&page, &places, say),
+        None => beside(output).map_or(Ok(()), |old| remove_old(&old, |note| say.note(note))),
+    }
 }
 
 /// Opens a log: a table with the names of the program, or channels by the map. `opened` keeps the latter.
@@ -152,15 +157,9 @@ fn check_findings(
     findings.check(commands, log.has_wheel_speed() && !without_wheel.contains(&observer))
 }
 
-/// Writes the shifts and the page beside the output, if there are shifts.
-fn write_beside(output: &Path, page: &LogPage<'_>, say: &mut Messages) -> Result<(), Failure> {
-    let Some(places) = beside(output) else { return Ok(()) };
-    if page.shifts.is_empty() {
-        return remove_old(&places, |note| say.note(note));
-    }
-    let [csv, json, html] = places;
-    shifts::write(page.shifts, &csv, &json)?;
-    write_text(&html, &page.html()?)?;
+/// Writes the page, beside the table of shifts.
+fn write_page(page: &LogPage<'_>, [csv, json, html]: &[PathBuf; 3], say: &mut Messages) -> Result<(), Failure> {
+    write_text(html, &page.html()?)?;
     say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
     say.note(&format!("report: {}", html.display()));
     Ok(())

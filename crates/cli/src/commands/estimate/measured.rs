@@ -390,7 +390,7 @@ pub(super) fn report_readings(readings: &Readings<'_>, say: &mut Messages) -> Re
                 "{} of {} samples of {} are not used: {}",
                 output::grouped(total - good),
                 output::grouped(total),
-                role.role.name(),
+                role.name,
                 role.counts.faults()
             ));
         }

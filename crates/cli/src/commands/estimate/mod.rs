@@ -123,6 +123,19 @@ fn stop(options: &Estimate) -> Result<Arc<AtomicBool>, Failure> {
     Ok(stop)
 }
 
+/// Says from where on the times in the terminal and on the page count, if not from zero of the log's clock.
+fn said_of_origin(origin_s: f64) -> Option<String> {
+    (origin_s != 0.0)
+        .then(|| format!("times from {origin_s:.0} s of the log's clock on; the tables in files keep that clock"))
+}
+
+/// Says that a log which is followed has ended by itself, where it is a file that may grow.
+fn say_end_of_followed(options: &Estimate, stop: &AtomicBool, path: &Path, say: &mut Messages) {
+    if options.follow && !stop.load(Ordering::Relaxed) && path.is_file() {
+        say.note("warning: the log became shorter or was replaced by another file: the estimate ends there");
+    }
+}
+
 /// Several logs, each into a file of its own. One that fails does not stop the others.
 fn several<S: Sync>(
     options: &Estimate,

@@ -72,6 +72,12 @@ impl<'a> Shifts<'a> {
         Ok(())
     }
 
+    /// The same on a clock that began at this time of the log's, s.
+    pub(super) fn earlier_by(self, origin_s: f64) -> Self {
+        let found = self.found.into_iter().map(|shift| shift.earlier_by(origin_s)).collect();
+        Self { found, overview: self.overview.earlier_by(origin_s), ..self }
+    }
+
     /// Refuses a selection that no shift is in.
     pub(super) fn check(&self) -> Result<(), Failure> {
         self.selection.check("`wetclutch inspect --shifts` says what tells a shift")

@@ -7,15 +7,17 @@ use design::ShiftTables;
 use drivetrain::CommandKind;
 use logs::Role;
 use logs::plausibility::Seen;
-use observer::Reading;
 use observer::any_shift::GearCommand;
-use study::any_shift::logged::{LogStep, element_commands};
+use observer::{Health, Reading};
+use report::tables::health_meaning;
+use study::any_shift::logged::{LogStep, Unusable, element_commands};
 use study::log::FIRST_LOOK;
-use trace::signal;
+use trace::{shown_path, signal};
 
 use super::super::measured::{check_span, check_step};
 use super::super::watched::{WatchedColumn, WatchedColumns};
 use crate::failure::Failure;
+use crate::output;
 
 /// The times of the rows of a log.
 #[derive(Default)]
@@ -34,6 +36,11 @@ impl RowTimes {
         self.ends_s = Some([self.ends_s.map_or(step.time_s, |[first_s, _]| first_s), step.time_s]);
     }
 
+    /// The time of the first row, s; zero without one.
+    pub(super) fn first_s(&self) -> f64 {
+        self.ends_s.map_or(0.0, |[first_s, _]| first_s)
+    }
+
     /// The middle time between two rows, s.
     ///
     /// # Errors
@@ -44,6 +51,27 @@ impl RowTimes {
         check_span(path, median_s, self.ends_s.map_or(f64::NAN, |[first_s, last_s]| last_s - first_s))?;
         Ok(median_s)
     }
+}
+
+/// Why a log is no drive of this car: the filter could use no row in a gear.
+pub(super) fn refused(unusable: Unusable, path: &Path) -> Failure {
+    let Unusable { rows, health } = unusable;
+    let hint = match health {
+        Health::CommandRejected => {
+            "check the units of the commands of the elements, and that each is the command of this element's valve"
+        }
+        _ => {
+            "check the units and scales of turbine_speed and output_speed, the gear, and whether this is the vehicle file of the car; `wetclutch \
+             inspect` shows least and greatest values, and with --shifts whether the ratios fit the gears"
+        }
+    };
+    Failure::Input(format!(
+        "{}: in none of {} rows in a gear, with the car moving, can the estimate be used; most of them have {} (`{}`)\nhint: {hint}",
+        shown_path(path),
+        output::grouped(rows),
+        health_meaning(health),
+        health.name()
+    ))
 }
 
 /// The columns of a table of a drive, to tell wrong units and empty columns.

@@ -6,7 +6,7 @@ mod learnt;
 mod passing;
 pub(in crate::commands) mod source;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -18,20 +18,20 @@ use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
 use trace::{Cell, shown_path};
 
-use self::checks::RowTimes;
+use self::checks::{RowTimes, refused};
 pub(super) use self::columns::is_car_column;
 use self::columns::{Row, chosen, columns};
 use self::learnt::Kept;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
-use super::Messages;
 use super::measured::slow_log;
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::ratios::check_wheel;
 use super::selection::Selection;
+use super::{Messages, said_of_origin, say_end_of_followed};
 use crate::args::{Estimate, ObserverChoice};
-use crate::commands::{JsonObject, channel_map_of_car, write_cells, write_json_list, write_text};
+use crate::commands::{JsonObject, channel_map_of_car, shown_from_s, write_cells, write_json_list, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -112,8 +112,10 @@ pub(super) fn estimate(
             table.flush()?;
         }
     }
+    let origin_s = shown_from_s(times.first_s());
     let median_s = times.check(path, !setup.map.channels.is_empty())?;
     log.finish(say)?;
+    say_end_of_followed(options, &setup.stop, path, say);
     checks.map_or(Ok(()), |checks| checks.check())?;
     check_speeds(&drive, setup, path, say)?;
     if let Some(warning) = slow_log(median_s) {
@@ -124,24 +126,34 @@ pub(super) fn estimate(
     passing.check()?;
     drive.shifts.retain(|shift| passing.wants(shift.number, car, [shift.from, shift.to]));
     table.finish()?;
+    let places = output.and_then(beside).filter(|_| !drive.shifts.is_empty());
+    if let Some([csv, json, _]) = &places {
+        write_tables(&drive, car, csv, json)?;
+    }
+    drive = drive.earlier_by(origin_s);
+    drive.warnings.splice(0..0, said_of_origin(origin_s));
     report(&drive, car, say);
-    match output {
-        None => say.note("estimate: on standard output"),
-        Some(output) => {
+    match (output, places) {
+        (None, _) => say.note("estimate: on standard output"),
+        (Some(output), places) => {
             say.note(&format!("estimate: {}", output.display()));
-            write_beside(&drive, car, path, output, say)?;
+            match places {
+                Some(places) => write_page(&drive, car, path, &places, say)?,
+                None => beside(output).map_or(Ok(()), |old| remove_old(&old, |note| say.note(note)))?,
+            }
         }
     }
     kept.map_or(Ok(()), |kept| kept.write(say))
 }
 
-/// Refuses a log whose speeds are not those of the car.
+/// Refuses a log whose speeds are not those of the car, or of which no estimate can be used.
 fn check_speeds(drive: &LoggedDrive<'_>, setup: &CarSetup<'_>, path: &Path, say: &mut Messages) -> Result<(), Failure> {
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say.note(&swapped);
     }
     check_ratios(drive.rows_in_gear(), &setup.options.vehicle, path)?;
-    check_wheel(drive.output_over_wheel(), setup.car.driveline.final_ratio)
+    check_wheel(drive.output_over_wheel(), setup.car.driveline.final_ratio)?;
+    drive.unusable().map_or(Ok(()), |unusable| Err(refused(unusable, path)))
 }
 
 /// Whether the speeds of most rows in a gear are not those of that gear.
@@ -162,19 +174,24 @@ pub(in crate::commands) fn check_ratios(rows: [u64; 2], vehicle: &Path, log: &Pa
     )))
 }
 
-/// The table of shifts and the page.
-fn write_beside(drive: &ScoredDrive, car: &Car, log: &Path, output: &Path, say: &mut Messages) -> Result<(), Failure> {
-    let Some(places) = beside(output) else { return Ok(()) };
-    if drive.shifts.is_empty() {
-        return remove_old(&places, |note| say.note(note));
-    }
-    let [csv, json, page] = places;
+/// The table of shifts.
+fn write_tables(drive: &ScoredDrive, car: &Car, csv: &Path, json: &Path) -> Result<(), Failure> {
     let cells: Vec<Vec<(String, Cell<'_>)>> = drive.shifts.iter().map(|shift| shift_cells(shift, car)).collect();
-    write_cells(&csv, &cells)?;
-    write_json_list(&json, cells.into_iter().map(JsonObject::of))?;
+    write_cells(csv, &cells)?;
+    write_json_list(json, cells.into_iter().map(JsonObject::of))
+}
+
+/// The page, beside the table of shifts.
+fn write_page(
+    drive: &ScoredDrive,
+    car: &Car,
+    log: &Path,
+    [csv, json, page]: &[PathBuf; 3],
+    say: &mut Messages,
+) -> Result<(), Failure> {
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
-    write_text(&page, &html)?;
+    write_text(page, &html)?;
     say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
     say.note(&format!("report: {}", page.display()));
     Ok(())

@@ -99,7 +99,11 @@ impl<'a> CarSource<'a> {
                 rows.check_readings()?.iter().for_each(|note| say.note(&format!("warning: {note}")));
                 Ok(())
             }
-            Self::Channels(channels) => report_readings(channels.readings(), say),
+            Self::Channels(channels) => {
+                let gears = channels.check_gears()?;
+                gears.iter().for_each(|note| say.note(&format!("warning: {note}")));
+                report_readings(channels.readings(), say)
+            }
         }
     }
 }

@@ -1,0 +1,147 @@
+//! What the rows in a gear tell of a log: whether their speeds fit the gear, and whether the filter could use them.
+
+use config::Car;
+use observer::{Health, Reading};
+
+use crate::ratio_histogram::RatioHistogram;
+use crate::swapped_speeds::SwappedSpeeds;
+
+/// Speed of the output by any of the speeds from which on the ratio of a gear is compared with the speeds, rad/s, and share by which they
+/// may differ.
+const RATIO_FROM_RAD_S: f64 = 20.0;
+const RATIO_SHARE: f64 = 0.1;
+/// Output speed above which the car moves where the turbine is at speed, rad/s \[chosen\]: a slow walk.
+const MOVES_RAD_S: f64 = 5.0;
+/// From fewer rows nothing is said of all of them \[chosen\]: one second at 100 Hz.
+const ENOUGH_ROWS: u64 = 100;
+
+/// Rows in which the estimate cannot be used, of a log that has no others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unusable {
+    /// How many there are.
+    pub rows: u64,
+    /// What most of them have.
+    pub health: Health,
+}
+
+/// The rows in a gear at speed.
+pub(super) struct InGear<'c> {
+    car: &'c Car,
+    /// All, and those whose speeds do not fit the ratio of the gear.
+    rows: [u64; 2],
+    /// Rows with each health while the car moves, in the order of [`Health::ALL`].
+    health: [u64; Health::ALL.len()],
+    swapped: SwappedSpeeds,
+    /// Output over wheel speed in the rows that have both; how many there are, and how long they are, s.
+    output_over_wheel: RatioHistogram<1000>,
+    wheel_rows: (u64, f64),
+    /// Newest speed of the wheels, rad/s.
+    wheel_rad_s: f64,
+}
+
+/// A row in a gear.
+pub(super) struct InGearRow {
+    /// The gear, by its place in the gearbox.
+    pub(super) gear: usize,
+    /// Time since the row before, s.
+    pub(super) dt_s: f64,
+    /// Newest speeds of engine, turbine and output as they came, rad/s.
+    pub(super) came_rad_s: [f64; 3],
+    /// Output and wheel speed of this row.
+    pub(super) output: Option<Reading<f64>>,
+    pub(super) wheel: Option<Reading<f64>>,
+    /// What the filter says of the row.
+    pub(super) health: Health,
+}
+
+impl<'c> InGear<'c> {
+    pub(super) fn new(car: &'c Car) -> Self {
+        Self {
+            car,
+            rows: [0; 2],
+            health: [0; Health::ALL.len()],
+            swapped: SwappedSpeeds::default(),
+            output_over_wheel: RatioHistogram::default(),
+            wheel_rows: (0, 0.0),
+            wheel_rad_s: f64::NAN,
+        }
+    }
+
+    pub(super) fn push(&mut self, row: &InGearRow) {
+        let [engine, turbine, output] = row.came_rad_s;
+        if let Some(Reading { value, .. }) = row.wheel {
+            self.wheel_rad_s = value;
+        }
+        let ratio = self.car.gearbox.gears.get(row.gear).map_or(f64::NAN, |gear| gear.ratio);
+        // An output speed in a wrong unit may be too slow to count. Without a converter the turbine turns with the engine at a standstill.
+        let by_turbine = if self.car.converter.is_some() { turbine / ratio } else { f64::NAN };
+        let by_wheels = self.wheel_rad_s * self.car.driveline.final_ratio;
+        if ratio.is_nan() {
+            return;
+        }
+        let is_at_speed = output.max(by_turbine).max(by_wheels) > RATIO_FROM_RAD_S;
+        if is_at_speed || output > MOVES_RAD_S && turbine > RATIO_FROM_RAD_S {
+            self.health[row.health as usize] += 1;
+        }
+        if !is_at_speed {
+            return;
+        }
+        let by_output = ratio * output;
+        self.swapped.push(engine, turbine, &[by_output]);
+        self.rows[0] += 1;
+        self.rows[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
+        if let (Some(output), Some(wheel)) = (row.output, row.wheel) {
+            self.output_over_wheel.push(output.value / wheel.value);
+            self.wheel_rows.0 += 1;
+            self.wheel_rows.1 += row.dt_s.clamp(0.0, 1.0);
+        }
+    }
+
+    /// Rows, and those whose turbine and output speed do not fit the ratio of the gear.
+    pub(super) fn rows(&self) -> [u64; 2] {
+        self.rows
+    }
+
+    /// The rows while the car moves, if there are enough of them and the filter could use the readings of none.
+    pub(super) fn unusable(&self) -> Option<Unusable> {
+        let of = |health: &Health| self.health[*health as usize];
+        let rows = self.health.iter().sum();
+        let is_used = Health::ALL.iter().any(|health| is_usable(*health) && of(health) > 0);
+        let health = Health::ALL.into_iter().max_by_key(of)?;
+        (!is_used && rows >= ENOUGH_ROWS).then_some(Unusable { rows, health })
+    }
+
+    /// Output over wheel speed in the middle; not a number where too few rows have both.
+    pub(super) fn output_over_wheel(&self) -> f64 {
+        /// Rows that are needed to judge, and their time, s \[chosen\].
+        const ENOUGH: (u64, f64) = (200, 3.0);
+        let (rows, time_s) = self.wheel_rows;
+        if rows < ENOUGH.0 || time_s < ENOUGH.1 { f64::NAN } else { self.output_over_wheel.middle() }
+    }
+
+    /// What contradicts the channels of engine and turbine speed, in a sentence.
+    pub(super) fn swapped_speeds(&self) -> Option<String> {
+        self.swapped.warning()
+    }
+}
+
+/// Whether an estimate of this health says nothing against the log: it is made from the readings of the car, or there is nothing that they could
+/// say.
+fn is_usable(health: Health) -> bool {
+    match health {
+        Health::Good
+        | Health::ReadingRefused
+        | Health::ChannelLost
+        | Health::Flare
+        | Health::OutsideRange
+        | Health::LimitedToRange
+        | Health::PressureLimited
+        | Health::TooSlow
+        | Health::ClutchOpen => true,
+        Health::CommandRejected
+        | Health::SpeedsRejected
+        | Health::HeldClutchSlips
+        | Health::Restarted
+        | Health::TimeRejected => false,
+    }
+}

@@ -1,0 +1,63 @@
+//! Samples of a table with the names of the program: those that are no numbers count as missing.
+
+use std::cell::Cell;
+
+use trace::{CsvRows, TraceError};
+
+/// What came of the cells of each column.
+pub(crate) struct RowSamples {
+    columns: Vec<Counts>,
+}
+
+#[derive(Clone, Default)]
+struct Counts {
+    good: Cell<u64>,
+    /// Text and infinite numbers.
+    missing: Cell<u64>,
+}
+
+impl RowSamples {
+    /// Of the columns of a table.
+    pub(crate) fn new(rows: &CsvRows) -> Self {
+        Self { columns: vec![Counts::default(); rows.names().count()] }
+    }
+
+    /// The number in a column of this row, in SI; not a number where the cell is empty, or holds text or an infinite number, which is counted.
+    #[inline]
+    pub(crate) fn number(&self, rows: &CsvRows, column: usize) -> f64 {
+        let counts = &self.columns[column];
+        match rows.number_or_none(column) {
+            Some(number) if number.is_finite() => {
+                counts.good.update(|count| count + 1);
+                number
+            }
+            Some(number) if number.is_nan() => f64::NAN,
+            _ => {
+                counts.missing.update(|count| count + 1);
+                f64::NAN
+            }
+        }
+    }
+
+    /// What was met, in sentences.
+    ///
+    /// # Errors
+    /// Most samples of a column are missing.
+    pub(crate) fn notes(&self, rows: &CsvRows) -> Result<Vec<String>, TraceError> {
+        let mut notes = Vec::new();
+        for (name, counts) in rows.names().zip(&self.columns) {
+            let (good, missing) = (counts.good.get(), counts.missing.get());
+            if missing == 0 {
+                continue;
+            }
+            let note =
+                format!("{missing} of {} samples of {name} are text or infinite, and are not used", good + missing);
+            if missing > good {
+                let hint = "look at this column with `wetclutch inspect`; leave a lost sample empty";
+                return Err(rows.refused(format!("{note}\nhint: {hint}")));
+            }
+            notes.push(note);
+        }
+        Ok(notes)
+    }
+}
