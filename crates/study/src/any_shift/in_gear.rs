@@ -80,7 +80,10 @@ impl<'c> InGear<'c> {
             return;
         }
         let is_at_speed = output.max(by_turbine).max(by_wheels) > RATIO_FROM_RAD_S;
-        if is_at_speed || output > MOVES_RAD_S && turbine > RATIO_FROM_RAD_S {
+        // A car that creeps is rightly too slow, and its clutch may be open; not where the turbine is too fast for that in this gear.
+        let is_rightly_slow =
+            matches!(row.health, Health::TooSlow | Health::ClutchOpen) && turbine / ratio <= RATIO_FROM_RAD_S;
+        if (is_at_speed || output > MOVES_RAD_S && turbine > RATIO_FROM_RAD_S) && !is_rightly_slow {
             self.health[row.health as usize] += 1;
         }
         if !is_at_speed {
@@ -125,8 +128,7 @@ impl<'c> InGear<'c> {
     }
 }
 
-/// Whether an estimate of this health says nothing against the log: it is made from the readings of the car, or there is nothing that they could
-/// say.
+/// Whether an estimate of this health is made from the readings of the car.
 fn is_usable(health: Health) -> bool {
     match health {
         Health::Good
@@ -135,10 +137,10 @@ fn is_usable(health: Health) -> bool {
         | Health::Flare
         | Health::OutsideRange
         | Health::LimitedToRange
-        | Health::PressureLimited
-        | Health::TooSlow
-        | Health::ClutchOpen => true,
+        | Health::PressureLimited => true,
         Health::CommandRejected
+        | Health::TooSlow
+        | Health::ClutchOpen
         | Health::SpeedsRejected
         | Health::HeldClutchSlips
         | Health::Restarted
