@@ -75,8 +75,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if self.turbine.converter.is_some() || gear.from != gear.to {
             return false;
         }
-        let shift = self.tables.shifts.iter().find(|shift| shift.from == gear.from);
-        let found = shift.and_then(|shift| self.element(&state.elements, shift.clutches[0].element));
+        let found =
+            self.tables.out_of(gear.from).and_then(|shift| self.element(&state.elements, shift.clutches[0].element));
         found.is_some_and(|(memory, element)| {
             let kiss_pa = element.clutch.kiss_pressure();
             memory.pressure_pa() < kiss_pa + self.uncertainty.above_kiss_pa(&element.clutch)

@@ -61,8 +61,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         if input.gear.to != gear {
             return None;
         }
-        // Any shift from this gear has the mass of its side, and its clutch.
-        let shift = self.tables.shifts.iter().find(|shift| shift.from == gear)?;
+        let shift = self.tables.out_of(gear)?;
         let reported = side.reported_n_m?;
         let (acceleration, acceleration_variance) = match side.engine {
             Some([_, _, acceleration, variance]) => (acceleration, variance),

@@ -133,6 +133,11 @@ impl<T: Real> GearboxTables<'_, T> {
         (from.abs_diff(to) == 1).then_some(from.min(to))
     }
 
+    /// A shift out of a gear: in the gear its balance of the turbine holds with the offgoing clutch alone.
+    pub(super) fn out_of(&self, gear: usize) -> Option<&ShiftRow<T>> {
+        self.shifts.iter().find(|shift| shift.from == gear)
+    }
+
     /// The shift between two gears, if it is one between two known elements.
     pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
         let known = |row: &&ShiftRow<T>| {

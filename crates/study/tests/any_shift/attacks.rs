@@ -373,6 +373,7 @@ fn a_torque_that_the_speeds_do_not_show_is_said_to_be_hidden() {
 fn single_precision_estimates_the_same() {
     let mut largest = 0.0_f64;
     let mut square = [0.0, 0.0];
+    let (mut input_clutches, mut of_input_clutch) = (0, 0.0_f64);
     let (mut steps, mut time_s) = (0.0, 0.0);
     for car in cars() {
         let tables = ShiftTables::of_car(&car, &ERRORS).unwrap();
@@ -396,6 +397,10 @@ fn single_precision_estimates_the_same() {
             steps += inputs.len() as f64;
             for ((_, input), estimate) in inputs.iter().zip(estimates) {
                 let rounded = single.step(&mut single_state, &cast(input));
+                if let (Some(clutch), Some(other)) = (estimate.input_clutch, rounded.input_clutch) {
+                    input_clutches += 1;
+                    of_input_clutch = of_input_clutch.max((clutch.torque_n_m - f64::from(other.torque_n_m)).abs());
+                }
                 if let (Some(clutches), Some(others)) = (estimate.clutches, rounded.clutches) {
                     for (clutch, other) in clutches.iter().zip(&others) {
                         let difference = clutch.torque_n_m - f64::from(other.torque_n_m);
@@ -411,6 +416,9 @@ fn single_precision_estimates_the_same() {
     println!("{:.2} us for a step with ranges, each shift the fastest of ten times", 1e6 * time_s / steps);
     println!("single from double precision: RMS {rms:.3} N m, largest {largest:.2} N m");
     assert!(rms < 0.5, "{rms} {largest}");
+    println!("clutch between engine and gearbox: largest {of_input_clutch:.3} N m of {input_clutches} steps");
+    // Torques of some 100 N m in numbers of seven digits.
+    assert!(input_clutches > 100 && of_input_clutch < 0.1, "{input_clutches} {of_input_clutch}");
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]

@@ -99,8 +99,8 @@ fn the_lock_up_clutch_has_its_torque_while_it_closes_slips_and_holds() {
                 found.rows
             );
             assert!(found.rows > 500.0, "{how}, {name}: {} rows", found.rows);
-            // The deviation is that of errors anywhere within the bounds.
-            assert!(standardised < 1.8 && error < 0.2 * size, "{how}, {name}: {error} {standardised} {size}");
+            // An error at its bound, the edge of a uniform distribution, is 1.73 of its deviations.
+            assert!(standardised < 1.74 && error < 0.2 * size, "{how}, {name}: {error} {standardised} {size}");
         }
     }
 }
@@ -121,7 +121,7 @@ fn the_clutch_that_starts_a_car_has_its_torque_from_standstill_on() {
                 found.rows
             );
             assert!(
-                found.rows > 200.0 && standardised < 1.8 && error < 0.2 * size,
+                found.rows > 200.0 && standardised < 1.74 && error < 0.2 * size,
                 "{name}: {error} {standardised} {size}"
             );
         }
