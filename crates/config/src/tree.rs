@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn a_file_is_the_same_through_its_tree() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let tree = Tree::of(&vehicle.source).unwrap();
         assert_eq!(Vehicle::from_tree(&vehicle.source, &tree).unwrap(), vehicle);
         for experiment in Experiment::built_in().unwrap().into_iter().chain([Experiment::bench().unwrap()]) {
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_changed_value_is_said_with_its_line_in_the_file() {
-        let source = Vehicle::two_speed_at().unwrap().source;
+        let source = Vehicle::built_in().unwrap().source;
         let error = |key: &str, change, value| {
             let mut tree = Tree::of(&source).unwrap();
             tree.change(&path(key), change, value).unwrap();

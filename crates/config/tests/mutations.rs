@@ -90,7 +90,7 @@ fn every_mutation_of_a_drive_file_is_refused_with_its_place_or_accepted() {
 
 #[test]
 fn every_mutation_of_an_experiment_file_is_refused_with_its_place_or_accepted() {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let mut accepted = 0;
     let all = mutations(EXPERIMENT);
     for (name, text) in &all {

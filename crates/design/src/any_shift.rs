@@ -11,7 +11,7 @@ use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
 use crate::kalman::{SCALE_LEAST, deviation_of, engine_noise, speed_reading};
 
-/// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the two-speed car's budget.
+/// Quantum of the speeds of engine, turbine and output where no sensor is described, rad/s: that of the built-in car's budget.
 const SPEED_QUANTUM_RAD_S: f64 = 0.7;
 /// The same of the wheel speed.
 const WHEEL_QUANTUM_RAD_S: f64 = 0.14;

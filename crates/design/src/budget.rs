@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_valve_that_is_what_the_observers_are_told_has_no_error() {
-        let mut vehicle = Vehicle::two_speed_at().unwrap();
+        let mut vehicle = Vehicle::built_in().unwrap();
         let Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
         vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
             time_constant_s: Table1::constant(time_constant_s),

@@ -476,7 +476,7 @@ mod tests {
     /// The gain of the inertia phase is not unique by its cost; it must not depend on how the program is scaled.
     #[test]
     fn the_gain_of_least_norm_is_the_same_however_the_program_is_scaled() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let phase = Phase::InertiaPhase;
         let (requirement, vertices) = (compliant_requirement(&vehicle, phase), vertices(&vehicle, phase));
         let at = |unit| {

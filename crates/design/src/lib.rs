@@ -17,7 +17,7 @@
 //! use config::Vehicle;
 //! use design::design_rigid;
 //!
-//! let designed = design_rigid(&Vehicle::two_speed_at()?)?;
+//! let designed = design_rigid(&Vehicle::built_in()?)?;
 //! let certificate = &designed.inertia_phase;
 //! assert!((certificate.gain_pa_s_rad[0] + 783.7).abs() < 0.1);
 //! assert!((certificate.offset_pa - 49.9e3).abs() < 0.1e3);

@@ -81,7 +81,7 @@ mod tests {
     /// What a gain does to the estimate decides, and not its size.
     #[test]
     fn a_gain_is_the_open_loop_by_its_effect_on_the_bound() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let is_one =
             |vehicle: &Vehicle, gain: f64| is_open_loop(vehicle, Model::Rigid, Phase::InertiaPhase, &[gain, 0.0], 0.01);
         assert!(is_one(&vehicle, 0.0) && !is_one(&vehicle, -6323.0));

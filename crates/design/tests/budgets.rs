@@ -85,7 +85,7 @@ const ENTRIES: [Entry; 22] = [
 
 /// The built-in car with a valve that is what the observers are told, so that nothing is left of its errors.
 fn known_valve() -> Vehicle {
-    let mut vehicle = Vehicle::two_speed_at().unwrap();
+    let mut vehicle = Vehicle::built_in().unwrap();
     let drivetrain::Valve::Proportional { time_constant_s, gain_pa_a } = vehicle.observer_valve else { panic!() };
     vehicle.oncoming.valve = ClutchValve::Proportional(ValveMaps {
         time_constant_s: Table1::constant(time_constant_s),
@@ -146,7 +146,7 @@ fn without_errors_the_open_loop_serves_and_its_bound_is_zero() {
 
 #[test]
 fn a_budget_without_errors_has_a_design() {
-    for (turn, mut vehicle) in [Vehicle::two_speed_at().unwrap(), known_valve()].into_iter().enumerate() {
+    for (turn, mut vehicle) in [Vehicle::built_in().unwrap(), known_valve()].into_iter().enumerate() {
         vehicle.error_bounds = without_errors(&vehicle);
         filters_are_finite(&vehicle, "no entry");
         designs_hold(&vehicle, turn, "no entry");
@@ -155,7 +155,7 @@ fn a_budget_without_errors_has_a_design() {
 
 #[test]
 fn a_budget_of_one_entry_has_a_design() {
-    let file = Vehicle::two_speed_at().unwrap();
+    let file = Vehicle::built_in().unwrap();
     for (turn, (name, put)) in ENTRIES.into_iter().enumerate() {
         // A valve whose told gain is off leaves an error of its own.
         let mut vehicle = if turn % 2 == 0 { file.clone() } else { known_valve() };

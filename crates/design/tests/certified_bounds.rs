@@ -22,7 +22,7 @@ proptest! {
         initial in -0.2e6..0.2e6_f64,
         errors in prop::collection::vec((0.0..1.0_f64, 0.0..6.3_f64), 15),
     ) {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let design = design_rigid(&vehicle).unwrap();
         let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
         let certificate = design.of(phase).unwrap();
@@ -58,7 +58,7 @@ fn designed(method: GainMethod, sample_time: usize) -> DiscreteDesign {
     if let Some((_, design)) = designs.iter().find(|(of, _)| *of == key) {
         return design.clone();
     }
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let design = design_discrete(&vehicle, Model::Rigid, method, SAMPLE_TIMES_S[sample_time]).unwrap();
     designs.push((key, design.clone()));
     design
@@ -93,7 +93,7 @@ fn errors(
     disturbances: &[Disturbance],
 ) -> Vec<[f64; 2]> {
     let t = SAMPLE_TIMES_S[sample_time];
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let bounds = vehicle.error_bounds;
     let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
     let observer = rigid_observer(&vehicle, designed(method, sample_time).rigid_gains());
@@ -193,7 +193,7 @@ fn the_sampled_bound_holds_with_the_worst_noise() {
 #[test]
 fn without_model_error_the_estimate_decays_at_least_with_kappa2() {
     for phase in [Phase::TorquePhase, Phase::InertiaPhase] {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let kappa2 = design_rigid(&vehicle).unwrap().of(phase).unwrap().kappa2_per_s;
         let mut car = Car::start(phase, 0.1e6);
         for n in 1..=1000 {

@@ -12,7 +12,7 @@ use observer::{Phase, SlidingGains};
 use proptest::prelude::*;
 
 fn vehicle() -> Vehicle {
-    Vehicle::two_speed_at().unwrap()
+    Vehicle::built_in().unwrap()
 }
 
 fn requirement(kappa1_per_s: Option<f64>) -> IssRequirement {

@@ -14,7 +14,7 @@ use observer::{Estimator, Health, Input, Phase, RigidGains, RigidObserver, Rigid
 
 #[test]
 fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left() {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let design = design_discrete(&vehicle, Model::Rigid, GainMethod::PeakToPeak, 0.01).unwrap();
     let observer = rigid_observer(&vehicle, design.rigid_gains());
     let mut car = Car::start_at(observer, Phase::InertiaPhase, [340.0, 300.0], 0.0);
@@ -34,7 +34,7 @@ fn a_reading_that_no_pressure_explains_is_rejected_and_nothing_possible_is_left(
 
 #[test]
 fn an_observer_that_starts_anew_says_so_once() {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let compliant = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     says_so(&kalman_filter(&vehicle, None), "kalman");
     says_so(&unscented_filter(&vehicle, None), "unscented");
@@ -46,7 +46,7 @@ fn says_so(observer: &impl Estimator<f64>, name: &str) {
     let usable = Sample { wheel_rad_s: 40.0, ..input(0.01, 300.0, 300.0, 0.0) };
     let mut state = observer.start();
     let mut health = |input: Sample<f64>| {
-        observer.step(&mut state, &Input::of_sample(&input, &Vehicle::two_speed_at().unwrap().shift)).health
+        observer.step(&mut state, &Input::of_sample(&input, &Vehicle::built_in().unwrap().shift)).health
     };
     assert_eq!([(); 3].map(|()| health(usable)), [Health::Good; 3], "{name}: the first start is no new one");
     // The gap is longer than any gain is made for.

@@ -27,7 +27,7 @@ struct Gains {
 fn gains() -> &'static Gains {
     static GAINS: OnceLock<Gains> = OnceLock::new();
     GAINS.get_or_init(|| {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let methods = &GainMethod::ALL[1..];
         let discrete = |model, method: &GainMethod| design_discrete(&vehicle, model, *method, 0.01).unwrap();
         let mut rigid = vec![design_rigid(&vehicle).unwrap().gains().into(), RigidGains::open_loop().into()];
@@ -216,7 +216,7 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
             let mut draws = draw.into_iter();
             // On a logarithmic scale: the ends of the ranges are met as often as their middles.
             let mut within = |low: f64, high: f64| low * (high / low).powf(draws.next().unwrap());
-            let mut v = Vehicle::two_speed_at().unwrap();
+            let mut v = Vehicle::built_in().unwrap();
             v.engine.inertia_kg_m2 = within(0.01, 5.0);
             v.driveline.final_ratio = within(0.5, 10.0);
             v.driveline.shaft_stiffness_n_m_rad = within(100.0, 1e6);
@@ -266,7 +266,7 @@ proptest! {
 
     #[test]
     fn prop_no_input_stops_an_observer(samples in samples(), euler in any::<bool>()) {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let discretisation = if euler { Discretisation::Euler } else { Discretisation::Exact };
         attack::<f64>(&vehicle, discretisation, &samples, true)?;
         attack::<f32>(&vehicle, discretisation, &samples, true)?;

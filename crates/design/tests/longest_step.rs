@@ -9,7 +9,7 @@ use design::{
 use observer::{Discretisation, Phase, RigidGains};
 
 fn vehicle() -> Vehicle {
-    Vehicle::two_speed_at().unwrap()
+    Vehicle::built_in().unwrap()
 }
 
 /// What a gain on `(w_t, dw)` multiplies an error by over a step in the inertia phase, at this friction.

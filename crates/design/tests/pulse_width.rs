@@ -11,7 +11,7 @@ use observer::{RigidGains, SampleEstimator};
 /// The valve of Remark 2.1, linearised along its own way, is the nonlinear law itself where nothing else is wrong.
 #[test]
 fn the_open_loop_of_a_pulse_width_valve_is_its_law() {
-    let mut vehicle = Vehicle::two_speed_at().unwrap();
+    let mut vehicle = Vehicle::built_in().unwrap();
     let law = PulseWidth { flow_sqrt_pa_s: 6000.0, line_pressure_pa: 1e6 };
     vehicle.observer_valve = Valve::PulseWidth(law);
     vehicle.limits.command_max = 100.0;
@@ -32,7 +32,7 @@ fn the_open_loop_of_a_pulse_width_valve_is_its_law() {
 
 #[test]
 fn a_pulse_width_valve_adds_its_operating_points_as_vertices() {
-    let mut vehicle = Vehicle::two_speed_at().unwrap();
+    let mut vehicle = Vehicle::built_in().unwrap();
     let law = PulseWidth { flow_sqrt_pa_s: 12e3, line_pressure_pa: 1e6 };
     vehicle.observer_valve = Valve::PulseWidth(law);
     vehicle.uncertainty.valve = ValveUncertainty::PressureDrop((0.0, 0.09e6));

@@ -135,7 +135,7 @@ fn a_clutch_carries_no_torque_before_its_piston_can_have_arrived_and_some_once_i
     assert_eq!((soon.clutch_torque_n_m, soon.pressure_pa[1]), ([0.0, 0.0], 1.1 * kiss));
     assert!(later.pressure_pa[0] > 1.1 * kiss && later.clutch_torque_n_m[0] > 0.0, "{later:?}");
     // Without a stroke the same 40 ms are pressure and torque.
-    let chapter = Vehicle::two_speed_at().unwrap();
+    let chapter = Vehicle::built_in().unwrap();
     let at = ranges(&chapter, &[(4.0, 0.0), (0.04, asked)])[1];
     assert!(at.pressure_pa[1] > 2.0 * kiss && at.clutch_torque_n_m[1] > 0.0, "{at:?}");
 }

@@ -84,7 +84,7 @@ fn over_a_sample_the_error_is_multiplied_by_phi_less_l_g_psi() {
 #[test]
 fn over_a_sample_both_errors_of_the_compliant_observer_are_multiplied_by_phi_less_l_g_psi() {
     const T: f64 = 0.01;
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let observer = compliant_observer(&vehicle, design_compliant(&vehicle).unwrap().gains());
     let (model, command) = (observer.model, 0.25);
     for (phase, mut speeds) in

@@ -89,7 +89,7 @@ fn errors(load: &RoadLoad<f64>, is_other: Option<bool>, of: [f64; 3], random: &m
 }
 
 fn main() {
-    let load = Vehicle::two_speed_at().unwrap().road;
+    let load = Vehicle::built_in().unwrap().road;
     let mut random = Pcg64Mcg::new(0xcafe_f00d_d15e_a5e5);
     for of in ROADS_OF {
         let [mean_rad, changing_rad, wind_m_s] = of;

@@ -340,7 +340,7 @@ mod tests {
     /// What a shift has told is not used again, and a clutch that may carry torque makes no gear.
     #[test]
     fn a_gear_is_one_outside_of_shifts_with_the_other_clutch_open() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let shift = Shift {
             from: 1,
             to: 2,

@@ -288,7 +288,7 @@ mod tests {
     /// the parameters, and a fit gets stuck in it.
     #[test]
     fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
-        let car = Car::of_file(&Vehicle::two_speed_at().unwrap(), ReadingAges::default());
+        let car = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
         let part = Part { begin_s: 0.0, first: 0, steps: 10 };
         let points = 2 * part.steps + 1;
         let inputs = Inputs {

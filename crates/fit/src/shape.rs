@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_freed_shape_without_a_change_is_the_map_of_the_file() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let knots = Knots::of(&vehicle);
         let clutch = &vehicle.oncoming.clutch;
         let friction = knots.changed(&clutch.friction, Map::Friction, 0, 0.0);
@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_change_is_whole_at_its_point_and_none_at_the_next() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let knots = Knots::of(&vehicle);
         let before = vehicle.oncoming.clutch.friction;
         let after = knots.changed(&before, Map::Friction, 1, -0.1);

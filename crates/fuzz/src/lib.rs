@@ -115,7 +115,7 @@ impl Fuzzer {
                 fs::copy(&path, folder.join(name).join(path.file_name().unwrap_or_default()))?;
             }
         }
-        let vehicle = Vehicle::two_speed_at()?;
+        let vehicle = Vehicle::built_in()?;
         let methods = if depth == Depth::Long { &GainMethod::ALL[..] } else { &[GainMethod::Iss] };
         let observers = samples::observers(&vehicle, methods)?;
         let layout = Layout::of(&Study::read(&folder.join("experiments/settings.toml"))?);

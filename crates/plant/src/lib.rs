@@ -12,7 +12,7 @@
 //! use plant::simulate;
 //!
 //! let experiment = Experiment::e1()?;
-//! let vehicle = Vehicle::two_speed_at()?;
+//! let vehicle = Vehicle::built_in()?;
 //! let mut highest_pa = 0.0_f64;
 //! simulate(&vehicle, &experiment, |sample| highest_pa = highest_pa.max(sample.oncoming_pa))?;
 //! assert!(highest_pa > 0.5e6);

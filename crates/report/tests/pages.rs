@@ -14,7 +14,7 @@ use study::campaign::{Metric, PHASES, factor_values};
 use study::{Bench, Comparison, Row, Status, Summary, compare};
 
 fn e1() -> Comparison {
-    compare(&Vehicle::two_speed_at().unwrap(), &Experiment::e1().unwrap()).unwrap()
+    compare(&Vehicle::built_in().unwrap(), &Experiment::e1().unwrap()).unwrap()
 }
 
 fn panel(panels: &[Panel], quantity: &str) -> Panel {
@@ -115,7 +115,7 @@ fn a_study_without_runs_has_a_page() {
 
 #[test]
 fn the_bench_page_has_a_column_for_each_observer_even_without_a_ranking() {
-    let (vehicle, experiment) = (Vehicle::two_speed_at().unwrap(), Experiment::bench().unwrap());
+    let (vehicle, experiment) = (Vehicle::built_in().unwrap(), Experiment::bench().unwrap());
     let cell = |name: &str| BenchCell {
         observer: name.to_owned(),
         torque_phase_rms_pa: 1e4,

@@ -152,7 +152,7 @@ mod tests {
     }
 
     fn read(sensors: &Sensors) -> Trace {
-        through_sensors(&drive(), 0.01, sensors, &Vehicle::two_speed_at().unwrap())
+        through_sensors(&drive(), 0.01, sensors, &Vehicle::built_in().unwrap())
     }
 
     /// The columns in which two traces differ.

@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn the_known_facts_come_out() {
-        let phases = sensitivity(&Vehicle::two_speed_at().unwrap());
+        let phases = sensitivity(&Vehicle::built_in().unwrap());
         let influence = |phase: Phase| phases.iter().find(|p| p.phase == phase.name()).unwrap().influence_rad_s2_mpa;
         // The rigid model is nearly blind in the torque phase.
         assert!(influence(Phase::InertiaPhase) > 50.0 * influence(Phase::TorquePhase));

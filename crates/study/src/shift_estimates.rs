@@ -489,7 +489,7 @@ mod tests {
 
     #[test]
     fn a_refused_reading_does_no_friction_work() {
-        let reduced = &Vehicle::two_speed_at().unwrap().shift;
+        let reduced = &Vehicle::built_in().unwrap().shift;
         let work = |turbine: ChannelHealth, spike: f64| {
             let sample = |step: u32| {
                 let reading = |value: f64| Some(Reading::now(value));

@@ -11,7 +11,7 @@ use study::{Chapter, Comparison, Statement, reproduce};
 
 /// The experiments, and the statements in so many settings besides.
 fn chapter_in(settings: u64, threads: usize) -> Chapter {
-    let (vehicle, study) = (Vehicle::two_speed_at().unwrap(), Study::plausible().unwrap());
+    let (vehicle, study) = (Vehicle::built_in().unwrap(), Study::plausible().unwrap());
     reproduce(&vehicle, &Experiment::built_in().unwrap(), &study, settings, threads, || ()).unwrap()
 }
 
@@ -63,7 +63,7 @@ fn the_setting_of_the_files_gives_the_verdicts_of_the_files() {
     std::fs::write(&path, text).unwrap();
     let study = Study::read(&path).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let chapter = reproduce(&vehicle, &Experiment::built_in().unwrap(), &study, 1, 1, || ()).unwrap();
     let share = |verdict: Option<bool>| verdict.map(|yes| f64::from(u8::from(yes)));
     for row in &chapter.statements {
@@ -139,7 +139,7 @@ fn the_chapters_compliant_gains_do_as_well_as_ours() {
 
 #[test]
 fn sensors_change_the_estimate_and_their_seed_changes_the_noise() {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let [_, _, _, mut e4] = Experiment::built_in().unwrap();
     let name = "compliant, 100 Hz, sensors";
     let first = study::compare(&vehicle, &e4).unwrap();
@@ -155,7 +155,7 @@ fn bench_with(seed: u64) -> study::Bench {
     experiment.sensors.as_mut().unwrap().seed = seed;
     let kept = ["Kalman", "extended Kalman", "unscented", "inversion", "peak-to-peak", "open loop"];
     experiment.observers.retain(|entry| kept.contains(&entry.name.as_str()));
-    study::bench(&Vehicle::two_speed_at().unwrap(), &experiment, |_| ()).unwrap()
+    study::bench(&Vehicle::built_in().unwrap(), &experiment, |_| ()).unwrap()
 }
 
 /// The one with seed 1, which two tests look at.

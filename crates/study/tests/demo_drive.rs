@@ -9,7 +9,7 @@ use study::{Comparison, ObserverRun, RunColumns, compare, run};
 use trace::{read_csv, signal, write_csv};
 
 fn comparison() -> (Vehicle, Comparison) {
-    let (vehicle, experiment) = (Vehicle::two_speed_at().unwrap(), Experiment::e1().unwrap());
+    let (vehicle, experiment) = (Vehicle::built_in().unwrap(), Experiment::e1().unwrap());
     let comparison = compare(&vehicle, &experiment).unwrap();
     (vehicle, comparison)
 }

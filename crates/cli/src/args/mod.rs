@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Simulate a shift, design the observer, estimate the pressure, write the report
     ///
-    /// Simulates a launch from rest and a power-on 1st to 2nd upshift of the built-in two-speed automatic,
+    /// Simulates a launch from rest and a power-on 1st to 2nd upshift of the built-in car,
     /// designs the observer's gains for it, runs the observer and the open loop on the same samples, prints
     /// their errors, and writes:
     ///

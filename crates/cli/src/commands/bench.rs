@@ -21,7 +21,7 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
             let experiment = Experiment::read(path)?;
             (experiment.read_vehicle()?, experiment)
         }
-        None => (Vehicle::two_speed_at()?, Experiment::bench()?),
+        None => (Vehicle::built_in()?, Experiment::bench()?),
     };
     experiment.check_size()?;
     open_loop(&experiment)?;

@@ -25,7 +25,7 @@ pub(crate) fn demo(options: &Demo) -> Result<(), Failure> {
     let folder = &options.output;
     writable(folder, &FILES)?;
     let [report, trace, measured_only, estimate] = FILES.map(|name| folder.join(name));
-    let (vehicle, mut experiment) = (Vehicle::two_speed_at()?, Experiment::e1()?);
+    let (vehicle, mut experiment) = (Vehicle::built_in()?, Experiment::e1()?);
     // The gains that E1 gives are the chapter's; the demo designs its own.
     experiment.observers.retain(|entry| entry.gains.is_none());
     output::note(&format!("simulating {} s of driving; designing and running the observers", experiment.duration_s));

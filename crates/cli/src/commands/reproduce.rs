@@ -14,7 +14,7 @@ use crate::output;
 pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     const FILES: [&str; 3] = ["reproduction.html", "reproduction.md", "reproduction.json"];
     writable(&options.output, &FILES)?;
-    let (vehicle, study) = (Vehicle::two_speed_at()?, Study::plausible()?);
+    let (vehicle, study) = (Vehicle::built_in()?, Study::plausible()?);
     let settings = options.settings.map_or(study.runs, |settings| u64::from(settings).min(study.runs));
     output::note(&format!("running experiments E1 to E4, and again in {settings} settings"));
     let bar = progress(settings, 0);

@@ -21,7 +21,7 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         Some(path) if Source::read(path)?.kind()? == Kind::Car => return of_car(options, path),
         _ if options.sensors.is_some() => return Err(sensors_without_effect()),
         Some(path) => Vehicle::read(path)?,
-        None => Vehicle::two_speed_at()?,
+        None => Vehicle::built_in()?,
     };
     let (phases, valve, shaft) = (find(&vehicle), valve_alone(&vehicle), shaft_level(&vehicle));
     if let Some(folder) = &options.output {

@@ -12,7 +12,7 @@ impl Study {
     pub fn plausible() -> Result<Self, ConfigError> {
         let text = include_str!("../../../../experiments/plausible.toml");
         let [.., e4] = Experiment::built_in()?;
-        Self::of(Source::built_in("experiments/plausible.toml", text), e4, Vehicle::two_speed_at()?)
+        Self::of(Source::built_in("experiments/plausible.toml", text), e4, Vehicle::built_in()?)
     }
 
     /// Another experiment with these values of the study's factors. A factor of a table that this experiment does not

@@ -177,11 +177,11 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    /// The two-speed transmission that ships with the program.
+    /// The car of one shift that a command takes where it is given no vehicle file: that of `vehicles/two_speed_at.toml`.
     ///
     /// # Errors
     /// None in a released program; the tests read this file.
-    pub fn two_speed_at() -> Result<Self, ConfigError> {
+    pub fn built_in() -> Result<Self, ConfigError> {
         Self::from_source(Source::built_in(
             "vehicles/two_speed_at.toml",
             include_str!("../../../../vehicles/two_speed_at.toml"),
@@ -220,7 +220,7 @@ impl Vehicle {
     /// # Errors
     /// The file is no TOML, or holds a key or a value that no vehicle file may have.
     pub fn check_overlay(over: &Source) -> Result<(), ConfigError> {
-        match Self::laid_over(Self::two_speed_at()?.source, over) {
+        match Self::laid_over(Self::built_in()?.source, over) {
             Err(error) if error.path() == over.path => Err(error),
             _ => Ok(()),
         }

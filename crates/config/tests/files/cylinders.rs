@@ -12,7 +12,7 @@ fn stroke_vehicle(text: &str) -> Vehicle {
 
 #[test]
 fn the_car_with_a_stroke_differs_from_the_built_in_one_in_nothing_else() {
-    let (built_in, mut stroke) = (Vehicle::two_speed_at().unwrap(), stroke_vehicle(STROKE));
+    let (built_in, mut stroke) = (Vehicle::built_in().unwrap(), stroke_vehicle(STROKE));
     assert!(stroke.offgoing.has_stroke && stroke.oncoming.has_stroke);
     assert!(!built_in.offgoing.has_stroke && !built_in.oncoming.has_stroke);
     (stroke.source, stroke.name) = (built_in.source.clone(), built_in.name.clone());

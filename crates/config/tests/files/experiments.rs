@@ -72,7 +72,7 @@ fn forward_euler_beyond_the_time_constant_of_the_valve_is_refused() {
 fn an_observer_cannot_be_faster_than_the_signals() {
     let text = EXPERIMENT.replace("sample_time_s = 0.001 # of the", "sample_time_s = 0.002 # of the");
     let experiment = Experiment::from_source(Source::built_in("e.toml", &text)).unwrap();
-    let error = experiment.check_observers(&Vehicle::two_speed_at().unwrap()).unwrap_err().to_string();
+    let error = experiment.check_observers(&Vehicle::built_in().unwrap()).unwrap_err().to_string();
     assert!(
         error.contains("`observer \"rigid ISS\"`: a sample time of 0.001 s is shorter than the 0.002 s"),
         "{error}"
@@ -81,7 +81,7 @@ fn an_observer_cannot_be_faster_than_the_signals() {
 
 #[test]
 fn the_experiments_that_ship_go_with_the_vehicle_that_ships() {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     for experiment in Experiment::built_in().unwrap().iter().chain([&Experiment::bench().unwrap()]) {
         experiment.check_observers(&vehicle).unwrap();
     }
@@ -135,7 +135,7 @@ fn what_the_observers_do_not_know_changes_the_simulated_car_alone() {
         let text = EXPERIMENT.replacen("[shift]", &format!("[off_nominal]\n{differences}\n\n[shift]"), 1);
         Experiment::from_source(Source::built_in("e.toml", &text)).unwrap()
     };
-    let nominal = Vehicle::two_speed_at().unwrap();
+    let nominal = Vehicle::built_in().unwrap();
     assert_eq!(with("").simulated_vehicle(&nominal), nominal);
     let car = |differences: &str| with(differences).simulated_vehicle(&nominal);
     let shafts = car("shaft_stiffness_factor = 0.8\nbacklash_rad = 0.03");

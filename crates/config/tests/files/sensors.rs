@@ -100,7 +100,7 @@ fn rows_of_a_scenario_that_forward_euler_cannot_carry_are_refused() {
     let text = [BENCH, rows].concat();
     let euler = text.replacen("sensors = \"real\"", "sensors = \"real\"\ndiscretisation = \"euler\"", 1);
     assert!(euler != text);
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let checked =
         |text: &str| Experiment::from_source(Source::built_in("e.toml", text)).unwrap().check_observers(&vehicle);
     checked(&text).unwrap();

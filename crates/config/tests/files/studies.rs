@@ -89,7 +89,7 @@ fn a_study_changes_other_experiments_as_far_as_they_have_what_it_varies() {
 #[test]
 fn the_plausible_settings_contain_that_of_the_files() {
     let study = config::Study::plausible().unwrap();
-    let (vehicle, [e1, ..]) = (Vehicle::two_speed_at().unwrap(), Experiment::built_in().unwrap());
+    let (vehicle, [e1, ..]) = (Vehicle::built_in().unwrap(), Experiment::built_in().unwrap());
     let road = &vehicle.road;
     for (name, nominal) in [
         ("inertia_kg_m2", vehicle.engine.inertia_kg_m2),

@@ -12,7 +12,7 @@ fn vehicle_error(from: &str, to: &str) -> String {
 
 #[test]
 fn chapter_parameters_of_table_2_1_are_those_of_the_built_in_vehicle() {
-    let v = Vehicle::two_speed_at().unwrap();
+    let v = Vehicle::built_in().unwrap();
     assert_eq!((v.road.mass_kg, v.road.wheel_radius_m, v.road.front_area_m2), (1500.0, 0.3, 2.0));
     assert_eq!((v.engine.inertia_kg_m2, v.engine.drag_n_m_s), (0.17, 0.047));
     assert_eq!((v.driveline.final_ratio, v.driveline.shaft_stiffness_n_m_rad), (3.0, 13e3));
@@ -180,7 +180,7 @@ fn with_budget(keys: &str, fill: &str) -> Result<Vehicle, String> {
 
 #[test]
 fn what_a_budget_leaves_out_of_valve_and_stroke_has_defaults_and_what_it_holds_is_checked() {
-    assert!(Vehicle::two_speed_at().unwrap().error_bounds.fill.is_none());
+    assert!(Vehicle::built_in().unwrap().error_bounds.fill.is_none());
     let bounds = with_budget("", "").unwrap().error_bounds;
     assert_eq!((bounds.valve_hysteresis_pa, bounds.command_age_s), (10e3, 0.05));
     assert_eq!(bounds.line_pressure_pa, [bounds.pressure_max_pa; 2]);

@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn the_discrete_twin_has_the_reference_gain() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let phase = Phase::TorquePhase;
         let mut system = ErrorSystem::of(&vehicle, Model::Compliant, Quantity::Pressure, phase, 0.01);
         system.h = DMatrix::from_row_slice(2, 2, &[2.38, 0.0, 0.0, 0.13]);
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn the_rigid_twin_contracts_and_yields_to_the_open_loop_where_it_must() {
-        let vehicle = Vehicle::two_speed_at().unwrap();
+        let vehicle = Vehicle::built_in().unwrap();
         let design = |vehicle: &Vehicle, phase| {
             design_discrete_phase(vehicle, Model::Rigid, GainMethod::IssDiscrete, Quantity::Pressure, phase, 0.01)
                 .unwrap()

@@ -7,7 +7,7 @@ const METHODS: [GainMethod; 4] =
     [GainMethod::IssDiscrete, GainMethod::PeakToPeak, GainMethod::Scheduled, GainMethod::Interval];
 
 fn vehicle() -> Vehicle {
-    Vehicle::two_speed_at().expect("the built-in vehicle is valid")
+    Vehicle::built_in().expect("the built-in vehicle is valid")
 }
 
 fn inertia(method: GainMethod, model: Model) -> DiscreteCertificate {

@@ -10,7 +10,7 @@ pub(crate) const ENGINE_RAD_S: f64 = 370.0;
 pub(crate) const DT_S: f64 = 1e-4;
 
 pub(crate) fn observer() -> RigidObserver<f64> {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     rigid_observer(&vehicle, design_rigid(&vehicle).unwrap().gains())
 }
 

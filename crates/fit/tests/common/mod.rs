@@ -112,7 +112,7 @@ fn draw_fill(clutch: &mut ShiftClutch, draw: &mut Draw) -> f64 {
 
 impl TestCar {
     pub(crate) fn drawn(seed: u64) -> Self {
-        Self::of(Vehicle::two_speed_at().unwrap(), seed)
+        Self::of(Vehicle::built_in().unwrap(), seed)
     }
 
     /// A car whose pistons have a stroke.

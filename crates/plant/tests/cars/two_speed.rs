@@ -21,7 +21,7 @@ fn as_any_car(vehicle: &Vehicle) -> Car {
 
 #[test]
 fn the_two_speed_plant_and_the_general_one_agree_under_the_same_commands() {
-    let vehicle = Vehicle::two_speed_at().unwrap();
+    let vehicle = Vehicle::built_in().unwrap();
     let mut experiment = Experiment::e1().unwrap();
     experiment.sample_time_s = experiment.shift.control_period_s;
     let mut samples: Vec<Sample> = Vec::new();

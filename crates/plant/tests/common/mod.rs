@@ -7,7 +7,7 @@ use drivetrain::{ClutchValve, Table1, Table2, ValveMaps};
 use plant::{Powertrain, Sample, Segment, Simulation};
 
 pub(crate) fn vehicle() -> Vehicle {
-    Vehicle::two_speed_at().unwrap()
+    Vehicle::built_in().unwrap()
 }
 
 pub(crate) fn e1() -> Experiment {

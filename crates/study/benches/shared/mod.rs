@@ -18,7 +18,7 @@ pub(crate) fn root() -> PathBuf {
 }
 
 pub(crate) fn vehicle() -> Vehicle {
-    Vehicle::two_speed_at().unwrap()
+    Vehicle::built_in().unwrap()
 }
 
 /// A shift of the bench as its observers see it: through sensors, from a second before its request.

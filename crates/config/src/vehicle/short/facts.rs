@@ -47,7 +47,7 @@ const RATIOS: std::ops::RangeInclusive<f64> = 0.6..=20.0;
 /// A shift changes the ratio by more than this factor.
 const LEAST_STEP: f64 = 1.02;
 
-/// The two-speed file's valve [chosen]; its comments have the reasons.
+/// The built-in vehicle's valve [chosen]; its comments have the reasons.
 const PROPORTIONAL: [(&str, &str); 9] = [
     (
         "clutch_valve",

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_with_the_numbers_of_the_two_speed_car_has_its_bounds_and_cylinders() {
+    fn a_file_with_the_numbers_of_the_built_in_car_has_its_bounds_and_cylinders() {
         let numbers = Facts {
             mass_kg: 1500.0,
             wheel_radius_m: 0.3,
@@ -166,7 +166,7 @@ mod tests {
             engine_torque_n_m: 190.0,
             ..facts(2.5, 1.0)
         };
-        let (short, shipped) = (vehicle(&numbers).unwrap(), Vehicle::two_speed_at().unwrap());
+        let (short, shipped) = (vehicle(&numbers).unwrap(), Vehicle::built_in().unwrap());
         assert_eq!((short.filter, short.error_bounds), (shipped.filter, shipped.error_bounds));
         assert_eq!(short.engine, shipped.engine);
         let supply = |vehicle: &Vehicle| vehicle.offgoing.cylinder.supply;

@@ -112,7 +112,7 @@ fn numbers(values: &[f64]) -> String {
     }
 }
 
-/// The car whose values are scaled: that of the two-speed vehicle file.
+/// The car whose values are scaled: the built-in one.
 const ENGINE_TORQUE_N_M: f64 = 190.0;
 const MASS_KG: f64 = 1500.0;
 const WHEEL_RADIUS_M: f64 = 0.3;
@@ -145,7 +145,7 @@ const KISS_PA: f64 = 60e3;
 
 /// The defaults as the text of a vehicle file.
 fn text_of(facts: &Facts) -> Result<String, ConfigError> {
-    let given = Vehicle::two_speed_at()?;
+    let given = Vehicle::built_in()?;
     let torque = facts.engine_torque_n_m / ENGINE_TORQUE_N_M;
     let lower_gear = torque * facts.ratio_before * facts.final_ratio / LOWER_GEAR;
     let mass = facts.mass_kg / MASS_KG;
