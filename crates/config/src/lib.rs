@@ -31,5 +31,5 @@ pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
     Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ErrorBounds,
-    FilterSettings, LockUp, ShiftClutch, Uncertainty, ValveUncertainty, Vehicle,
+    FilterSettings, LockUp, ShiftClutch, TURBINE_SIDE_INERTIA_KG_M2, Uncertainty, ValveUncertainty, Vehicle,
 };

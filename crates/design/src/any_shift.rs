@@ -4,8 +4,8 @@ use config::{Car, ElementErrorBounds, Sensors};
 use drivetrain::{CommandKind, Cylinder, Real};
 use geartrain::{Change, Gearbox};
 use observer::any_shift::{
-    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, Piston, ShiftRow, ShiftUncertainty,
-    TurbineTorque,
+    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, Piston, ShiftRow,
+    ShiftUncertainty, TurbineTorque,
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
@@ -67,10 +67,14 @@ impl ShiftTables<f64> {
             return Err(elements.len());
         }
         let shift_rows = gearbox.shifts.iter().filter_map(|shift| {
-            let Change::Single { offgoing, oncoming, .. } = &shift.change else { return None };
+            let clutches = match &shift.change {
+                Change::Single { offgoing, oncoming, .. } => [places[*offgoing]?, places[*oncoming]?],
+                // Of ratios alone.
+                Change::Unknown => [NO_ELEMENT; 2],
+                _ => return None,
+            };
             let mut reduced = shift.reduced?;
             reduced.mass_kg_m2[0][0] += more_on_input_kg_m2;
-            let clutches = [places[*offgoing]?, places[*oncoming]?];
             Some(ShiftRow::new([shift.from, shift.to], clutches, &reduced))
         });
         let shifts: Vec<_> = shift_rows.collect();

@@ -92,6 +92,11 @@ impl Gearbox {
         Self { name, elements, gears, shifts, capacities, train: None, warnings }
     }
 
+    /// Whether its ratios alone are known: it has no elements, and torques of its clutches are those that the turbine feels.
+    pub fn has_ratios_alone(&self) -> bool {
+        self.elements.is_empty()
+    }
+
     /// The forward gears from the largest ratio to the smallest.
     pub fn forward_gears(&self) -> Vec<usize> {
         let mut forward: Vec<usize> = (0..self.gears.len()).filter(|&gear| self.gears[gear].ratio > 0.0).collect();

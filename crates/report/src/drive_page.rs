@@ -100,6 +100,11 @@ impl DrivePage<'_> {
     }
 }
 
+/// What an estimate by ratios alone is, and what is missing for more.
+const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques are those of all clutches together, as the turbine feels them. The \
+                            torque of a clutch needs the holding torques of the gears (level = \"shares\" in the gearbox file), its pressure \
+                            plates and piston besides (`pack`).";
+
 /// The healths of the drive, each with its meaning.
 fn healths(drive: &ScoredDrive) -> Vec<Value> {
     let there = |health: &Health| {
@@ -200,6 +205,9 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
         ));
     }
     let hidden = |is_garage: bool| shifts.iter().filter(|s| s.rows.is_empty() && s.is_garage == is_garage).count();
+    if rows().any(|row| row.at_turbine_n_m.is_some()) {
+        sentences.push(RATIOS_ALONE.to_owned());
+    }
     if hidden(false) > 0 {
         sentences.push(format!("Of {} shifts the filter has no tables: nothing is estimated.", hidden(false)));
     }
@@ -236,8 +244,10 @@ const COLUMNS: &[Column] = &[
     column("time s", "from the request until the shift is complete", |s, _| {
         number(s.quality.complete_s.unwrap_or(f64::NAN), 2)
     }),
-    column("torque phase s", "one clutch holds and the other carries torque while it slips", |s, _| {
-        number(phase_s(s, TruePhase::Torque), 2)
+    column("torque phase s", "one clutch holds and the other carries torque while it slips", |s, car| {
+        // The ratios do not say when a clutch begins to carry.
+        let is_known = !car.gearbox.has_ratios_alone();
+        if is_known { number(phase_s(s, TruePhase::Torque), 2) } else { String::new() }
     }),
     column("inertia phase s", "both clutches slip", |s, _| number(phase_s(s, TruePhase::Inertia), 2)),
     column("flare rad/s", "largest slip of the old gear in the wrong direction, at the turbine", |s, _| {
@@ -281,9 +291,22 @@ const COLUMNS: &[Column] = &[
         |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0))),
     ),
     column(
+        "at the turbine N m",
+        "torque of the clutches together as the turbine feels it, mean of the inertia phase; in brackets its standard deviation",
+        |s, _| {
+            unscored(s, |s| {
+                s.mean_at_turbine_n_m().map(|[mean, sd]| format!("{} (+-{})", number(mean, 0), number(sd, 0)))
+            })
+        },
+    ),
+    column(
         "not seen",
         "share of both phases in which the speeds show nothing of the controlling clutch's torque",
-        |s, _| s.hidden().map_or("–".to_owned(), |share| format!("{:.0} %", 100.0 * share)),
+        |s, car| match s.hidden() {
+            Some(share) => format!("{:.0} %", 100.0 * share),
+            None if car.gearbox.has_ratios_alone() => String::new(),
+            None => "–".to_owned(),
+        },
     ),
     column("health", "the worst health of the shift and its share of the samples", |s, _| {
         s.worst_health().map_or("no tables".to_owned(), health)
@@ -355,7 +378,10 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         word("offgoing", offgoing),
         word("oncoming", oncoming),
         number("complete_s", quality.complete_s.unwrap_or(f64::NAN)),
-        number("torque_phase_s", phase_s(shift, TruePhase::Torque)),
+        number(
+            "torque_phase_s",
+            if car.gearbox.has_ratios_alone() { f64::NAN } else { phase_s(shift, TruePhase::Torque) },
+        ),
         number("inertia_phase_s", phase_s(shift, TruePhase::Inertia)),
         number("flare_rad_s", quality.flare_rad_s),
         number("past_synchronous_rad_s", quality.past_synchronous_rad_s),
@@ -379,6 +405,11 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
             cells.push(number(&format!("{role}_pressure_mean_{what}pa"), pressure[at]));
             cells.push(number(&format!("{role}_torque_mean_{what}n_m"), torque[at]));
         }
+    }
+    if car.gearbox.has_ratios_alone() {
+        let [mean, deviation] = shift.mean_at_turbine_n_m().unwrap_or([f64::NAN; 2]);
+        cells.push(number("at_turbine_mean_n_m", mean));
+        cells.push(number("at_turbine_mean_deviation_n_m", deviation));
     }
     cells.push(number("hidden_share", shift.hidden().unwrap_or(f64::NAN)));
     let inside = shift.inside().filter(|_| shift.has_truth());
@@ -483,7 +514,9 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     ];
     let mut panels = vec![panel("speed (rpm)", 120.0, speeds)];
     let names = clutch_names(shift, car);
-    if !shift.rows.is_empty() {
+    if shift.rows.iter().any(|row| row.at_turbine_n_m.is_some()) {
+        panels.push(at_turbine_panel(&shift.rows));
+    } else if !shift.rows.is_empty() {
         let roles = || ["offgoing", "oncoming"].into_iter().zip(names).enumerate();
         panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
         panels.extend(roles().map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
@@ -503,6 +536,26 @@ fn phase_spans(shift: &ScoredShift, label: &str, phase: TruePhase, colour: &'sta
     let longest = pieces.iter().map(|[start, end]| end - start).fold(0.0, f64::max);
     let label = |[start, end]: [f64; 2]| if end - start >= longest { label.to_owned() } else { String::new() };
     pieces.into_iter().map(|piece| Span { label: label(piece), start: piece[0], end: piece[1], colour }).collect()
+}
+
+/// Torque of the clutches together at the turbine, with two standard deviations.
+fn at_turbine_panel(rows: &[ShiftScoreRow]) -> Panel {
+    let points = |of: fn([f64; 2]) -> f64| -> Vec<(f64, f64)> {
+        rows.iter().map(|row| (row.time_s, row.at_turbine_n_m.map_or(f64::NAN, of))).collect()
+    };
+    let curve = |label: &str, stroke: Stroke, points| Series { label: label.to_owned(), stroke, points };
+    let turbine = rows.iter().map(|row| (row.time_s, row.turbine_n_m[1])).collect();
+    let series = vec![
+        curve("clutches together", ESTIMATE, points(|[torque, _]| torque)),
+        curve("turbine", Stroke::THIRD, turbine),
+    ];
+    let band = Band {
+        label: "two standard deviations".to_owned(),
+        colour: RANGE,
+        lower: points(|[torque, sd]| torque - 2.0 * sd),
+        upper: points(|[torque, sd]| torque + 2.0 * sd),
+    };
+    Panel { band: Some(band), ..panel("torque at the turbine (N\u{a0}m)", 170.0, series) }
 }
 
 /// Truth, estimate and valve model of a clutch's torque. One that holds has no torque by its valve model, and its range is all

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::Source;
+use config::{Source, TURBINE_SIDE_INERTIA_KG_M2};
 use fit::Series as Readings;
 use fit::drive::{ConverterFit, DriveRecord, Moment, ShiftTorque};
 use logs::Shift;
@@ -143,8 +143,12 @@ impl SpeedsPage<'_> {
     }
 
     /// What this log cannot tell.
-    fn cannot(&self) -> Vec<&'static str> {
-        let mut said = Vec::new();
+    fn cannot(&self) -> Vec<String> {
+        let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
+        let converter = format!(
+            "Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the inertia of the turbine's side as {least:.2} to {greatest:.2} kg m². Both are in the ranges."
+        );
+        let mut said: Vec<&str> = Vec::new();
         if !self.has_command {
             said.push("No pressure: the log has no valve current, duty cycle or pressure command. With one of them and a vehicle file, `wetclutch estimate` gives it with its range.");
         }
@@ -153,14 +157,14 @@ impl SpeedsPage<'_> {
             "Not how offgoing and oncoming clutch divide U while both carry: that needs the torque on the output side.",
         );
         if self.converter.is_ok() {
-            said.push("Not the torque ratio of the converter: nothing measures the turbine's torque. It is taken as anything from 1 to a line from 2.2 at stall to 1 at speed ratio 0.9; the input side's inertia as 0.04 to 0.16 kg m². Both are in the ranges.");
+            said.push(&converter);
         }
         if self.record.output_is_of_car {
             said.push(
                 "The output speed is that of the car times a constant: slip of the tyres is part of the shift's slip.",
             );
         }
-        said
+        said.into_iter().map(str::to_owned).collect()
     }
 
     /// Spans without slip of at least half a second.

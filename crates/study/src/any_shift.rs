@@ -236,6 +236,9 @@ pub struct ShiftScoreRow {
     pub clutches: [ClutchRow; 2],
     /// Torque at the gearbox input, N m: true and estimated.
     pub turbine_n_m: [f64; 2],
+    /// Of a gearbox by its ratios alone: torque of its clutches together as the turbine feels it, and its standard deviation, N m. Then
+    /// nothing is known of each of them but whether it sticks.
+    pub at_turbine_n_m: Option<[f64; 2]>,
     /// True speeds of engine, turbine, output and wheels, rad/s.
     pub speeds_rad_s: [f64; 4],
     /// Slip of the offgoing clutch away from the new gear by the filter, rad/s.
@@ -253,6 +256,21 @@ pub enum TruePhase {
     Torque,
     /// Both slip.
     Inertia,
+}
+
+impl ClutchRow {
+    /// A clutch of which nothing is known but whether it sticks.
+    fn unknown(sticks: bool) -> Self {
+        Self {
+            torque_n_m: [f64::NAN; 3],
+            pressure_pa: [f64::NAN; 3],
+            sticks,
+            torque_range_n_m: None,
+            pressure_range_pa: None,
+            hidden: false,
+            in_range: true,
+        }
+    }
 }
 
 impl ShiftScoreRow {
@@ -432,6 +450,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
         time_s: sample.time_s,
         clutches: [of(0)?, of(1)?],
         turbine_n_m: [sample.turbine_n_m, estimate.turbine_n_m.unwrap_or(f64::NAN)],
+        at_turbine_n_m: None,
         speeds_rad_s: [
             sample.torques.engine_rad_s,
             sample.torques.turbine_rad_s,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::{Car, Kind, Source};
+use config::{Car, Kind, Source, TURBINE_SIDE_INERTIA_KG_M2};
 
 use super::gearbox;
 use crate::failure::Failure;
@@ -63,7 +63,16 @@ pub(super) fn describe_gearbox(car: &Car) -> Result<(), Failure> {
     gearbox::gears(&car.gearbox)?;
     gearbox::capacities(&car.gearbox, &car.capacities())?;
     output::line(&torques_asked(car))?;
-    gearbox::shifts(&car.gearbox)
+    gearbox::shifts(&car.gearbox)?;
+    if car.gearbox.has_ratios_alone() {
+        let [least, greatest] = TURBINE_SIDE_INERTIA_KG_M2;
+        output::line(&format!(
+            "ratios alone: `wetclutch estimate` gives the torque of all clutches together, as the turbine feels it, with its standard deviation.\n\
+             Without `shift_mass` in the gearbox file, M11 is assumed, somewhere from {least} to {greatest} kg m2 for an engine of 190 N m, and makes most of that\n\
+             deviation in a shift. The torque of a clutch needs the holding torques (level = \"shares\"), its pressure plates and piston besides (`pack`)"
+        ))?;
+    }
+    Ok(())
 }
 
 /// The turbine torque that is asked of the gears: `278 N m in R, 1; 203 N m in 2, 3`.

@@ -10,6 +10,8 @@ use crate::output;
 
 /// Defaults that are shown, if not all are asked for.
 const SHOWN: usize = 12;
+/// Defaults on which a torque at the turbine depends: with the lock-up clutch closed on the engine's inertia.
+const AT_TURBINE: [&str; 2] = ["converter.", "engine.inertia"];
 /// Longest value that is shown as it stands in the file.
 const LONGEST: usize = 24;
 
@@ -58,6 +60,16 @@ pub(super) fn describe_car_values(car: &Car, sensors: &Sensors, all: bool) -> Re
         return Ok(());
     }
     output::line(&format!("\n{} values are not in the file and are defaults", taken.len()))?;
+    if car.gearbox.has_ratios_alone() {
+        let matters = |key: &str| AT_TURBINE.iter().any(|of| key.starts_with(of));
+        let (shown, others): (Vec<DefaultTaken>, Vec<DefaultTaken>) =
+            taken.iter().cloned().partition(|taken| matters(&taken.key));
+        output::line("a torque at the turbine depends on these of them, and in a shift on the masses of the shifts:")?;
+        for taken in &shown {
+            output::line(&format!("  {} = {}", taken.key, taken.value))?;
+        }
+        return all_names(&others, &[], all);
+    }
     let influences = match car_influences(car, sensors) {
         Ok(Some(influences)) if influences.shifts > 0 => influences,
         // A file is not wrong because a shift of its car cannot be simulated.

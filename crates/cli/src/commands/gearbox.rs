@@ -31,7 +31,7 @@ pub(super) fn describe(file: &GearboxFile, folder: Option<&Path>) -> Result<(), 
 
 /// What the file describes, and on which level.
 fn head(gearbox: &Gearbox) -> String {
-    let known = match (&gearbox.train, gearbox.elements.is_empty()) {
+    let known = match (&gearbox.train, gearbox.has_ratios_alone()) {
         (Some(train), _) => {
             let parts = [
                 (train.shafts.len(), "shaft", "shafts"),
@@ -72,7 +72,7 @@ pub(super) fn gears(gearbox: &Gearbox) -> Result<(), Failure> {
         }));
         rows.push(row);
     }
-    let what = if gearbox.elements.is_empty() {
+    let what = if gearbox.has_ratios_alone() {
         ""
     } else {
         ", holding torque of each engaged element per N m of turbine torque"
@@ -190,7 +190,7 @@ fn order_of_phases() -> Result<(), Failure> {
 /// What the description does not tell.
 fn remarks(gearbox: &Gearbox) -> Vec<String> {
     let mut remarks = Vec::new();
-    if gearbox.elements.is_empty() {
+    if gearbox.has_ratios_alone() {
         remarks.push(
             "With ratios alone, clutch torques are known as torques at the turbine. Clutch torques need the holding torques \
              of the elements (level = \"shares\"), pressures need their plates and pistons (`pack`) as well."

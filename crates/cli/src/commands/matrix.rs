@@ -24,7 +24,7 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     let all = runs(&car, draws)?;
     if all == 0 {
         let message = format!(
-            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; the elements need plates (`pack`) and valves",
+            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; clutches and brakes need plates (`pack`) and valves, which ratios alone do not give",
             vehicle.display()
         );
         return Err(Failure::Input(message));

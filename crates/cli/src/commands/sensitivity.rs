@@ -84,7 +84,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     let shifts = car_sensitivity(&car, &sensors_or_bench(options.sensors.as_deref())?)?;
     if shifts.is_empty() {
         let message = format!(
-            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; the elements need plates (`pack`) and valves",
+            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; clutches and brakes need plates (`pack`) and valves, which ratios alone do not give",
             path.display()
         );
         return Err(Failure::Input(message));

@@ -107,7 +107,7 @@ fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
             CAR.to_owned(),
             "is not the output speed times the ratio",
         ),
-        ("ratios alone", text.clone(), ratios, "has ratios alone"),
+        ("ratios alone", text.clone(), ratios, "the ratios alone are known"),
     ] {
         let log = folder.write("log.csv", &text);
         let said = refused(&wetclutch(&["fit", &log, "--vehicle", &vehicle, "-o", &fitted]));

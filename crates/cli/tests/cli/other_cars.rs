@@ -1,7 +1,7 @@
 //! Estimates of cars with other parts than a converter that is open and a gearbox whose train is known.
 
 use crate::any_car::numbers;
-use crate::support::{Folder, ROOT, refused, said, wetclutch};
+use crate::support::{Folder, ROOT, printed, refused, said, wetclutch};
 
 /// Two shifts of a car with the two-speed gearbox.
 const TWO_SHIFTS: &str = "name = \"d\"\n[[shift]]\ntime_s = 6\ngear = \"2\"\n[[shift]]\ntime_s = 14\ngear = \"1\"\n\
@@ -72,11 +72,69 @@ fn a_gearbox_by_its_shares_has_the_estimates_of_its_stick_diagram() {
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success() && error.contains("no stick diagram: it can be estimated"), "{error}");
     assert!(error.contains("hint: describe it with level"), "{error}");
-    // Ratios alone say nothing of a clutch.
-    folder.write("ratios.toml", "name = \"g\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 3.0 }]\n");
-    let alone = vehicle(&folder, "alone", "ratios.toml", "");
-    let error = refused(&wetclutch(&["estimate", &log, "--vehicle", &alone]));
-    assert!(error.contains("has ratios alone") && error.contains("wetclutch inspect LOG --shifts"), "{error}");
+}
+
+#[test]
+fn a_gearbox_by_its_ratios_alone_has_torques_at_the_turbine() {
+    const RATIOS: &str =
+        "name = \"g\"\nlevel = \"ratios\"\ngear = [{ name = \"1\", ratio = 2.5 }, { name = \"2\", ratio = 1.0 }]\n";
+    let folder = Folder::new("ratios-alone");
+    let mass = SHARES.split_once("[[shift_mass]]").unwrap().1;
+    folder.write("masses.toml", format!("{RATIOS}[[shift_mass]]{mass}"));
+    folder.write("ratios.toml", RATIOS);
+    let train = vehicle(&folder, "train", &format!("{ROOT}gearboxes/two_speed.toml"), "");
+    let [masses, alone] =
+        ["masses", "ratios"].map(|name| vehicle(&folder, &format!("by_{name}"), &format!("{name}.toml"), ""));
+    let [truth, log] = simulated(&folder, TWO_SHIFTS, &train);
+    let truth = std::fs::read_to_string(truth).unwrap();
+    // `alpha` is one over the share.
+    let sum: Vec<f64> = [("offgoing", [1.0 / 1.5, 1.0 / 0.6]), ("oncoming", [1.0 / 0.6, 1.0 / 1.5])]
+        .map(|(role, alphas)| {
+            let gears = numbers(&truth, "gear").into_iter().zip(numbers(&truth, &format!("{role}_torque_n_m")));
+            gears.map(|(gear, torque)| torque * alphas[usize::from(gear > 1.5)]).collect::<Vec<f64>>()
+        })
+        .into_iter()
+        .reduce(|a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect())
+        .unwrap();
+    for (car, most) in [(&masses, 8.0), (&alone, 60.0)] {
+        let text = estimate(&folder, &log, car, "out.csv");
+        assert!(!text.lines().next().unwrap().contains("pressure"), "no command and no pressure");
+        let found = numbers(&text, "clutches_at_turbine_estimate_n_m");
+        let phases: Vec<&str> = text.lines().skip(1).map(|line| line.split(',').nth(3).unwrap()).collect();
+        let rows = sum.iter().zip(&found).zip(&phases).filter(|(_, phase)| **phase == "both_slip");
+        let errors: Vec<f64> = rows.map(|((truth, found), _)| found - truth).collect();
+        let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!(errors.len() > 40 && rms < most, "{car}: {rms} N m in {} rows", errors.len());
+        assert!(text.lines().filter(|line| line.contains("both_slip")).all(|line| line.ends_with(",good")));
+    }
+    let said_of = said(&wetclutch(&["estimate", &log, "--vehicle", &alone, "-o", &folder.path("out.csv")]));
+    assert!(said_of.contains("2 of 2 shifts were completed") && said_of.contains("at the turbine N m"), "{said_of}");
+    assert!(said_of.contains("Of this gearbox the ratios alone are known"), "{said_of}");
+    assert!(!said_of.contains("not seen") && !said_of.contains("no tables"), "{said_of}");
+    assert!(folder.read("out_report.html").contains("torque at the turbine"));
+    // The log needs no command of a valve.
+    let without: Vec<String> = std::fs::read_to_string(&log)
+        .unwrap()
+        .lines()
+        .map(|line| line.split(',').take(12).collect::<Vec<_>>().join(","))
+        .collect();
+    let bare = folder.write("bare.csv", without.join("\n"));
+    estimate(&folder, &bare, &alone, "bare_out.csv");
+    let checked = printed(&wetclutch(&["check", &alone]));
+    assert!(
+        checked.contains("ratios alone: `wetclutch estimate` gives") && checked.contains("converter.torque_ratio"),
+        "{checked}"
+    );
+    // What needs clutches says so.
+    let learnt = folder.path("learnt.toml");
+    let error = refused(&wetclutch(&["estimate", &log, "--vehicle", &alone, "--learnt", &learnt]));
+    assert!(error.contains("--learnt has no effect"), "{error}");
+    let error =
+        refused(&wetclutch(&["simulate", &folder.path("drive.toml"), "--vehicle", &alone, "-o", &folder.path("no")]));
+    assert!(error.contains("no stick diagram: it can be estimated"), "{error}");
+    let clutch = vehicle(&folder, "clutch", "ratios.toml", "[clutch.A]\ndrag_n_m = 1.0\n");
+    let error = refused(&wetclutch(&["check", &clutch]));
+    assert!(error.contains("no clutch or brake \"A\"") && error.contains("has ratios alone"), "{error}");
 }
 
 /// RMS of estimate minus truth, N m, and how many rows have both.

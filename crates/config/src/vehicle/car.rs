@@ -17,7 +17,7 @@ use super::raw::{RawClutchValve, RawConverter, RawDriveline, RawEngine, RawFrict
 use super::short::{car_defaults, car_defaults_taken, of_default};
 use super::{
     DefaultTaken, HYSTERESES_PA, RETURN_SPRINGS_N, ShiftClutch, backlash, converter, driveline, engine,
-    oil_temperature, road, tyre, valves,
+    oil_temperature, ratios_alone, road, tyre, valves,
 };
 use crate::check::{Check, Number, Word};
 use crate::source::Layers;
@@ -61,7 +61,8 @@ pub struct Car {
     pub source: Source,
     /// Its name for people.
     pub name: String,
-    /// The gearbox. Without a stick diagram the car can be estimated, and not simulated.
+    /// The gearbox. Without a stick diagram the car can be estimated, and not simulated; with ratios alone, torques at the turbine are estimated,
+    /// with masses of the shifts that are assumed where its file has none.
     pub gearbox: Gearbox,
     /// The friction elements, in the order of the gearbox's elements; `None` for dogs and one-way clutches.
     pub clutches: Vec<Option<ShiftClutch>>,
@@ -138,14 +139,8 @@ impl Car {
             .parse()
             .map_err(|error| incomplete_table(&source).unwrap_or(error))?;
         let check = Check { layers: Layers { source: defaults, over: Some(&source) } };
-        let at = raw.gearbox.span().start;
-        if gearbox.elements.is_empty() {
-            let message =
-                format!("\"{}\" has ratios alone: no clutch has a torque or a pressure by them", raw.gearbox.get_ref());
-            let hint = "describe its elements (level = \"stick-diagram\", or \"shares\"); with ratios alone `wetclutch inspect LOG --shifts` gives \
-                        torques at the turbine, with the ratios under [gearbox] of its channel map";
-            return Err(check.meaning("gearbox", at, message, Some(hint.to_owned())));
-        }
+        let engine = engine(&check, &raw.engine)?;
+        let assumed = gearbox.has_ratios_alone().then(|| ratios_alone::assume_masses(&mut gearbox, &engine)).flatten();
         turbine_inertias(&check, &raw, &mut gearbox)?;
         let line_pressure_pa =
             check.number("hydraulics.line_pressure_pa", &raw.hydraulics.line_pressure_pa, 1e5..=10e6)?;
@@ -155,13 +150,14 @@ impl Car {
         let own_check = Check::of(&source);
         let valve = own.valve.as_ref().map_or((&check, &raw.valve), |valve| (&own_check, valve));
         let clutches = clutches(&check, &raw, valve, &gearbox, line_pressure_pa, oil_temperature_degc)?;
-        let error_bounds = error_bounds(&check, &raw, &gearbox, &clutches)?;
+        let mut error_bounds = error_bounds(&check, &raw, &gearbox, &clutches)?;
+        error_bounds.inertia_share = error_bounds.inertia_share.or(assumed);
         Ok(Self {
             error_bounds,
             name: check.title("name", &raw.name)?,
             clutches,
             line_pressure_pa,
-            engine: engine(&check, &raw.engine)?,
+            engine,
             converter: match raw.launch {
                 RawLaunch::Converter => Some(converter(&check, &raw.converter)?),
                 RawLaunch::Clutch => None,
@@ -404,7 +400,11 @@ fn known_clutches(check: &Check<'_>, raw: &RawCar, gearbox: &Gearbox) -> Result<
     let Some(name) = unknown else { return Ok(()) };
     let names = with_plates().map(|element| element.name.as_str()).collect::<Vec<_>>().join(", ");
     let message = format!("the gearbox has no clutch or brake \"{}\"", name.get_ref());
-    Err(check.meaning("clutch", name.span().start, message, Some(format!("it has {names}"))))
+    let hint = match gearbox.has_ratios_alone() {
+        true => "its file has ratios alone; with level = \"shares\" or \"stick-diagram\" it has elements".to_owned(),
+        false => format!("it has {names}"),
+    };
+    Err(check.meaning("clutch", name.span().start, message, Some(hint)))
 }
 
 /// Friction over slip, over that of the gearbox file, and the drag of an open clutch.

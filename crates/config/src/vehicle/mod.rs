@@ -9,6 +9,7 @@ mod fill;
 mod fill_bounds;
 mod gear_train;
 mod plausible;
+mod ratios_alone;
 mod raw;
 pub mod short;
 mod valves;
@@ -32,6 +33,7 @@ pub use car::{Car, LockUp};
 pub use car_bounds::{CarErrorBounds, ElementErrorBounds};
 pub use clutch::ShiftClutch;
 pub(crate) use clutch::{FRICTION_FACES, HYSTERESES_PA, PISTON_AREAS_M2, PLATE_RADII_M, RETURN_SPRINGS_N};
+pub use ratios_alone::TURBINE_SIDE_INERTIA_KG_M2;
 use raw::{
     RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
     RawRequirement, RawRoad, RawTyre, RawVehicleFile,

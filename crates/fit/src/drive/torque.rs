@@ -9,6 +9,7 @@
 //! In the inertia phase of a power-on upshift the offgoing clutch is open and the sum is the oncoming one's. `alpha` of the gearbox is not needed for
 //! the work. The torque ratio of the converter and `M11` are not known here: they lie in ranges, which make the ranges of the results.
 
+use config::TURBINE_SIDE_INERTIA_KG_M2;
 use logs::{Direction, Load, Shift};
 
 use super::converter::ConverterFit;
@@ -18,8 +19,6 @@ use super::record::{DriveRecord, Moment};
 const STALL_RATIO_MAX: f64 = 2.2;
 /// Speed ratio from which on it is 1, at most.
 const COUPLING: f64 = 0.9;
-/// Inertia of the input side, kg m^2 \[chosen: turbine 0.05 to 0.08, drums and carriers up to as much again\].
-const INPUT_INERTIA_KG_M2: [f64; 2] = [0.04, 0.16];
 /// Time before and after a shift that is shown, s.
 const BEFORE_S: f64 = 0.6;
 const AFTER_S: f64 = 0.9;
@@ -76,7 +75,7 @@ impl ConverterFit {
             }
             None => return None,
         };
-        let inertial = INPUT_INERTIA_KG_M2.map(|inertia| inertia * moment.turbine_rad_s2);
+        let inertial = TURBINE_SIDE_INERTIA_KG_M2.map(|inertia| inertia * moment.turbine_rad_s2);
         let ends = inertial.into_iter().flat_map(|inertial| turbine_n_m.map(|turbine| turbine - inertial));
         Some(TurbineTorque { time_s: moment.time_s, turbine_n_m, clutches_n_m: three(ends) })
     }

@@ -6,8 +6,8 @@ use super::elements::{ElementState, PressureError};
 use super::phases::Slip;
 use super::powertrain::{ClutchTorque, Torques};
 use super::{
-    AnyShiftFilter, AnyShiftState, FRICTION, GearCommand, InputClutch, KISS, MAX_ELEMENTS, N, Newest, OUTPUT, PRESSURE,
-    SHARE, SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
+    AnyShiftFilter, AnyShiftState, ClutchesAtTurbine, FRICTION, GearCommand, InputClutch, KISS, MAX_ELEMENTS, N,
+    Newest, OUTPUT, PRESSURE, SHARE, SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, WHEEL,
 };
 use crate::{ChannelHealth, Channels, Health};
 
@@ -63,6 +63,8 @@ pub struct ShiftEstimate<T> {
     pub shaft_n_m: Option<T>,
     /// The lock-up clutch of the converter while it is applied; without a converter, the clutch of the gear while there is no shift.
     pub input_clutch: Option<InputClutch<T>>,
+    /// All clutches together as the turbine feels them, of a gearbox without elements: one of which the ratios alone are known.
+    pub at_turbine: Option<ClutchesAtTurbine<T>>,
     /// Whether the input could be used, and whether the estimate can be believed.
     pub health: Health,
     /// What became of the reading of each channel; of the commands together a refused one, or a lost one
@@ -83,6 +85,7 @@ impl<T: Real> ShiftEstimate<T> {
             turbine_n_m: None,
             shaft_n_m: None,
             input_clutch: None,
+            at_turbine: None,
             health: Health::SpeedsRejected,
             channels: Channels::all(ChannelHealth::Lost),
             commands: [ChannelHealth::Lost; MAX_ELEMENTS],
@@ -142,7 +145,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 });
             }
             None => {
-                if health < Health::TooSlow {
+                let at_turbine = input.gear.from != input.gear.to && self.is_at_turbine(input.gear);
+                let phase = self.phase_at_turbine(state, input.gear).filter(|_| at_turbine && turbine_n_m.is_some());
+                let estimate = &mut state.estimate;
+                if phase.is_some() {
+                    (estimate.phase, estimate.turbine_n_m) = (phase, turbine_n_m);
+                } else if health < Health::TooSlow {
                     health = Health::SpeedsRejected;
                 }
                 let then = self.measured(&state.newest, None);

@@ -80,7 +80,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     }
 
     /// Rate of a speed by its two newest readings, rad/s^2, and its variance.
-    fn rate(&self, state: &AnyShiftState<T>, speed: usize) -> Option<(T, T)> {
+    pub(super) fn rate(&self, state: &AnyShiftState<T>, speed: usize) -> Option<(T, T)> {
         let (rate, span_s) = state.newest[speed]?.rate()?;
         Some((rate, T::of(2.0) * square(self.readings[speed].deviation_rad_s / span_s)))
     }

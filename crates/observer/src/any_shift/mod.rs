@@ -26,6 +26,7 @@
 //! `s`, `c`, `f`, `k` and `m` last longer than a shift. What a shift or the time in a gear has shown of them is kept in [`Learnt`], which can be saved
 //! and given to another filter of the same car ([`AnyShiftFilter::start_with`]), which believes it as far as its shifts show it.
 
+mod at_turbine;
 mod begin;
 mod correct;
 mod covariance;
@@ -57,12 +58,13 @@ use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
 use turbine::InputSide;
 
+pub use at_turbine::ClutchesAtTurbine;
 pub use estimate::{ClutchEstimate, ShiftEstimate};
 pub use input_clutch::InputClutch;
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;
-pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ShiftClutch, ShiftRow};
+pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
 const N: usize = 16;
@@ -396,6 +398,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let side = self.input_side(state, input);
         let torque = side.as_ref().and_then(|side| self.turbine.at(side));
         let input_clutch = side.as_ref().and_then(|side| self.input_clutch(state, input, side));
+        let at_turbine = torque.as_ref().and_then(|torque| self.at_turbine(state, input.gear, torque));
         if let Some(running) = &mut state.running {
             match &torque {
                 Some(torque) => {
@@ -411,6 +414,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let turbine_n_m = torque.map(|torque| torque.turbine_n_m);
         self.conclude(state, input, (&channels, &commands), health, turbine_n_m);
         state.estimate.input_clutch = input_clutch.filter(|clutch| clutch.torque_n_m.is_finite());
+        state.estimate.at_turbine = at_turbine;
         state.estimate
     }
 
@@ -427,7 +431,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         for clutch in state.estimate.clutches.iter_mut().flatten() {
             (clutch.pressure_range_pa, clutch.torque_range_n_m) = (None, None);
         }
-        state.estimate.input_clutch = None;
+        (state.estimate.input_clutch, state.estimate.at_turbine) = (None, None);
         state.estimate.health = Health::TimeRejected;
         state.estimate.channels = Channels::all(ChannelHealth::Refused);
         state.estimate.commands = [ChannelHealth::Refused; MAX_ELEMENTS];
@@ -461,7 +465,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                     // No equations for this change: the valve models alone, until a gear fits.
                     state.lose();
                     state.lost = false;
-                    if opens { Health::ClutchOpen } else { Health::SpeedsRejected }
+                    match (opens, self.is_at_turbine(command)) {
+                        (true, _) => Health::ClutchOpen,
+                        (_, true) => Health::Good,
+                        _ => Health::SpeedsRejected,
+                    }
                 }
             },
         }

@@ -9,11 +9,15 @@
 
 use drivetrain::{Clutch, Real, ReducedShift};
 
+use super::GearCommand;
 use super::pistons::Piston;
 use crate::{Budget, ValveModel};
 
 /// Most clutches and brakes of a gearbox.
 pub const MAX_ELEMENTS: usize = 8;
+
+/// The place of no element: in the shifts of a gearbox of which the ratios alone are known.
+pub const NO_ELEMENT: usize = usize::MAX;
 
 /// A clutch or brake with its valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +59,7 @@ pub struct ShiftRow<T> {
     pub from: usize,
     /// The gear after.
     pub to: usize,
-    /// The element that opens, then the one that closes.
+    /// The element that opens, then the one that closes; [`NO_ELEMENT`] where the ratios alone are known.
     pub clutches: [ShiftClutch<T>; 2],
     /// Mass `M` in turbine and output speed, kg m^2.
     pub mass_kg_m2: [[T; 2]; 2],
@@ -136,6 +140,13 @@ impl<T: Real> GearboxTables<'_, T> {
     /// A shift out of a gear: in the gear its balance of the turbine holds with the offgoing clutch alone.
     pub(super) fn out_of(&self, gear: usize) -> Option<&ShiftRow<T>> {
         self.shifts.iter().find(|shift| shift.from == gear)
+    }
+
+    /// Mass of turbine and output speed in a gear or in a shift, kg m^2.
+    pub(super) fn mass(&self, gear: GearCommand) -> Option<&[[T; 2]; 2]> {
+        let of_shift = |row: &&ShiftRow<T>| (row.from, row.to) == (gear.from, gear.to);
+        let row = if gear.from == gear.to { self.out_of(gear.from) } else { self.shifts.iter().find(of_shift) };
+        row.map(|row| &row.mass_kg_m2)
     }
 
     /// The shift between two gears, if it is one between two known elements.

@@ -201,7 +201,7 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
     if missing.is_empty() {
         return Ok(());
     }
-    if !map.channels.iter().any(|entry| entry.role.is_command()) {
+    if !car.gearbox.has_ratios_alone() && !map.channels.iter().any(|entry| entry.role.is_command()) {
         return Err(LogError::map(format!(
             "the channel map has no command of a valve: without them no pressure can be estimated\nhint: an estimate of this car needs {}; add \
              `[channel.NAME]` for each if the log has them. Without them, `wetclutch inspect` with the map and --shifts finds the shifts, and with -o \

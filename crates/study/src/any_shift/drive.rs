@@ -101,7 +101,8 @@ impl ScoredShift {
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn hidden(&self) -> Option<f64> {
         let clutch = controlling(self.kind?);
-        let rows = self.rows.iter().filter(|row| row.phase().is_some()).map(|row| &row.clutches[clutch]);
+        let shown = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase().is_some();
+        let rows = self.rows.iter().filter(shown).map(|row| &row.clutches[clutch]);
         let slipping: Vec<bool> = rows.filter(|clutch| !clutch.sticks).map(|clutch| clutch.hidden).collect();
         let hidden = slipping.iter().filter(|hidden| **hidden).count();
         (!slipping.is_empty()).then(|| hidden as f64 / slipping.len() as f64)
@@ -122,10 +123,20 @@ impl ScoredShift {
         self.mean(clutch, |clutch| (clutch.torque_n_m[1], clutch.torque_range_n_m))
     }
 
+    /// Of a gearbox by its ratios alone: mean torque of the clutches at the turbine in the inertia phase, and the mean of its deviation, N m.
+    pub fn mean_at_turbine_n_m(&self) -> Option<[f64; 2]> {
+        let inertia = self.rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
+        let torques: Vec<[f64; 2]> = inertia.filter_map(|row| row.at_turbine_n_m).collect();
+        #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+        let mean = |which: usize| torques.iter().map(|torque| torque[which]).sum::<f64>() / torques.len() as f64;
+        (!torques.is_empty()).then(|| [mean(0), mean(1)])
+    }
+
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     fn mean(&self, clutch: usize, of: impl Fn(&ClutchRow) -> (f64, Option<[f64; 2]>)) -> Option<[f64; 3]> {
         let (mut sum, mut count) = ([0.0; 3], 0_usize);
-        for row in self.rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia)) {
+        let inertia = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase() == Some(TruePhase::Inertia);
+        for row in self.rows.iter().filter(inertia) {
             let (value, range) = of(&row.clutches[clutch.min(1)]);
             let [low, high] = range.unwrap_or([f64::NAN; 2]);
             [value, low, high].iter().zip(&mut sum).for_each(|(value, sum)| *sum += value);

@@ -9,6 +9,7 @@ use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::CommandKind;
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
+    ShiftPhase,
 };
 use observer::{Health, Reading};
 use plant::car::{CarShiftQuality, NO_GEAR};
@@ -476,12 +477,21 @@ impl<'c> LoggedDrive<'c> {
         let quality = &mut shift.quality;
         quality.flare_rad_s = quality.flare_rad_s.max(slip(from));
         quality.past_synchronous_rad_s = quality.past_synchronous_rad_s.max(-slip(to));
-        let clutches = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
-        let Some(found) = clutches else { return };
+        let found = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
+        let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.deviation_n_m]);
+        let clutches = match (found, self.car.gearbox.has_ratios_alone()) {
+            (Some(found), _) => [0, 1].map(|c| clutch_row(&found[c], step.truth[c])),
+            (None, true) => {
+                let holds = [ShiftPhase::OffgoingHolds, ShiftPhase::OncomingHolds];
+                holds.map(|holds| ClutchRow::unknown(estimate.phase == Some(holds)))
+            }
+            (None, false) => return,
+        };
         shift.rows.push(ShiftScoreRow {
             time_s: step.time_s,
-            clutches: [0, 1].map(|c| clutch_row(&found[c], step.truth[c])),
+            clutches,
             turbine_n_m: [f64::NAN, estimate.turbine_n_m.unwrap_or(f64::NAN)],
+            at_turbine_n_m,
             speeds_rad_s: [self.speeds_rad_s[0], turbine, output, f64::NAN],
             phase: estimate.phase.map_or("-", |phase| phase.name()),
             health: estimate.health,

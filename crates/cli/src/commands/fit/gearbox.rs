@@ -29,6 +29,14 @@ const STEPS: u64 = 20_000;
 
 pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     let car = Car::read(&options.vehicle)?;
+    if car.gearbox.has_ratios_alone() {
+        return Err(Failure::Input(format!(
+            "{}: the ratios alone are known of its gearbox, and a fit finds values of clutches and valves\n\
+             hint: describe its elements (level = \"stick-diagram\", or \"shares\"); `wetclutch inspect LOG --shifts -o PAGE.html` fits the \
+             converter without them",
+            options.vehicle.display()
+        )));
+    }
     let tables = LoggedDrive::tables(&car)?;
     let ages = options.sensors.as_deref().map(sensors).transpose()?.map(|sensors| ReadingAges::of(&sensors));
     let bar = progress();

@@ -97,8 +97,21 @@ pub(super) struct Column {
     pub(super) value: Value,
 }
 
-/// The columns of a car whose elements have these places in the filter's tables, with a converter or without.
-pub(super) fn columns(places: &[(usize, &str)], has_converter: bool) -> Vec<Column> {
+/// What decides which columns a car has.
+#[derive(Clone, Copy)]
+pub(super) struct Knows {
+    converter: bool,
+    elements: bool,
+}
+
+impl Knows {
+    pub(super) fn of(car: &Car) -> Self {
+        Self { converter: car.converter.is_some(), elements: !car.gearbox.has_ratios_alone() }
+    }
+}
+
+/// The columns of a car whose elements have these places in the filter's tables.
+pub(super) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
     let word = |name: &str, value: for<'a> fn(&Row<'a>) -> Cell<'a>| Column {
         name: name.to_owned(),
         kind: ColumnKind::Word,
@@ -109,16 +122,27 @@ pub(super) fn columns(places: &[(usize, &str)], has_converter: bool) -> Vec<Colu
         word(trace::signal::GEAR, |row| row.gear(0)),
         word(trace::signal::TARGET_GEAR, |row| row.gear(1)),
         word(trace::signal::PHASE, |row| Cell::Word(row.estimate.phase.map_or("", |phase| phase.name()))),
-        word(ROLES[0], |row| row.element(0)),
-        word(ROLES[1], |row| row.element(1)),
     ];
-    for (which, role) in ROLES.iter().enumerate() {
-        let named = CLUTCH.iter().enumerate();
-        columns.extend(named.map(|(what, name)| number(format!("{role}_{name}"), Value::Clutch(which, what))));
+    if knows.elements {
+        columns.extend([word(ROLES[0], |row| row.element(0)), word(ROLES[1], |row| row.element(1))]);
+        for (which, role) in ROLES.iter().enumerate() {
+            let named = CLUTCH.iter().enumerate();
+            columns.extend(named.map(|(what, name)| number(format!("{role}_{name}"), Value::Clutch(which, what))));
+        }
     }
     columns.push(number("turbine_torque_estimate_n_m".to_owned(), Value::Of(|row| of(row.estimate.turbine_n_m))));
+    if !knows.elements {
+        columns.push(number(
+            "clutches_at_turbine_estimate_n_m".to_owned(),
+            Value::Of(|row| of(row.estimate.at_turbine.map(|clutches| clutches.torque_n_m + 0.0))),
+        ));
+        columns.push(number(
+            "clutches_at_turbine_deviation_n_m".to_owned(),
+            Value::Of(|row| of(row.estimate.at_turbine.map(|clutches| clutches.deviation_n_m))),
+        ));
+    }
     columns.push(number(trace::signal::SHAFT_ESTIMATE.to_owned(), Value::Of(|row| of(row.estimate.shaft_n_m))));
-    let clutch = if has_converter { "lock_up" } else { "launch_clutch" };
+    let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
     columns.push(number(
         format!("{clutch}_torque_estimate_n_m"),
         Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.torque_n_m))),
@@ -143,8 +167,10 @@ pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
         let rest = name.strip_suffix(what).and_then(|rest| rest.strip_suffix('_'));
         rest.is_some_and(|rest| rest.starts_with("element_"))
     };
-    let is_one = |with: bool| columns(&[], with).iter().any(|column| column.name == name);
-    is_one(true) || is_one(false) || ELEMENT.into_iter().any(of_element)
+    let is_one = |[converter, elements]: [bool; 2]| {
+        columns(&[], Knows { converter, elements }).iter().any(|column| column.name == name)
+    };
+    [[true, true], [false, true], [true, false]].into_iter().any(is_one) || ELEMENT.into_iter().any(of_element)
 }
 
 fn of(value: Option<f64>) -> Cell<'static> {

@@ -20,7 +20,7 @@ use trace::{Cell, shown_path};
 
 use self::checks::{RowTimes, refused};
 pub(super) use self::columns::is_car_column;
-use self::columns::{Row, chosen, columns};
+use self::columns::{Knows, Row, chosen, columns};
 use self::learnt::Kept;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
@@ -65,6 +65,13 @@ pub(super) struct CarSetup<'a> {
 impl<'a> CarSetup<'a> {
     pub(super) fn new(options: &'a Estimate) -> Result<Self, Failure> {
         let car = Car::read(&options.vehicle)?;
+        if options.learnt.is_some() && car.gearbox.has_ratios_alone() {
+            let vehicle = options.vehicle.display();
+            let message = format!("--learnt has no effect with {vehicle}: the ratios alone are known of its gearbox");
+            let hint =
+                "leave it out; what is learnt is of clutches and valves, which such a gearbox file does not have";
+            return Err(Failure::Input(format!("{message}\nhint: {hint}")));
+        }
         let sensors = options.sensors.as_deref().map(sensors).transpose()?;
         let tables = LoggedDrive::tables(&car)?;
         let map = channel_map_of_car(&options.mapping, car.road.wheel_radius_m)?;
@@ -91,7 +98,7 @@ pub(super) fn estimate(
     let elements = car.gearbox.elements.iter().enumerate();
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
-    let columns = chosen(columns(&places, car.converter.is_some()), &options.columns)?;
+    let columns = chosen(columns(&places, Knows::of(car)), &options.columns)?;
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
