@@ -7,6 +7,7 @@
 pub mod campaign;
 pub mod channels;
 mod contradictions;
+mod converter_check;
 pub mod drive;
 mod gear_signal;
 mod in_gear;

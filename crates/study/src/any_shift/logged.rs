@@ -16,6 +16,7 @@ use plant::car::{CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
+use super::converter_check::ConverterCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive};
 use super::gear_signal::GearSignal;
 pub use super::in_gear::Unusable;
@@ -290,6 +291,7 @@ pub struct LoggedDrive<'c> {
     gear: Option<usize>,
     unannounced: u64,
     commands: CommandCheck<'c>,
+    converter: ConverterCheck,
     still: StillCommands,
     holes: Holes,
 }
@@ -350,6 +352,7 @@ impl<'c> LoggedDrive<'c> {
             gear: None,
             unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
+            converter: ConverterCheck::default(),
             still: StillCommands::default(),
             holes: Holes::default(),
         }
@@ -420,7 +423,10 @@ impl<'c> LoggedDrive<'c> {
         }
         // In a shift the gear may be the new one already.
         self.gear = gears.map_or(Some(from), |_| None);
-        let [_, turbine, output] = self.came_rad_s;
+        let [engine, turbine, output] = self.came_rad_s;
+        if gears.is_none() {
+            self.converter.push(self.car, step, [engine, turbine]);
+        }
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
         estimate
@@ -518,6 +524,7 @@ impl<'c> LoggedDrive<'c> {
         self.end(f64::NAN, usize::MAX);
         let mut warnings: Vec<String> =
             self.in_gear.swapped_speeds().into_iter().chain(self.commands.warnings()).collect();
+        warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {
             warnings.push(format!(

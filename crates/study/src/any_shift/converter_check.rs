@@ -1,0 +1,135 @@
+//! Whether the converter of the vehicle file takes the torque that the engine's controller reports.
+//!
+//! At a steady engine speed the pump takes all of it. The estimates of torque, and what is learnt, are in proportion to the converter's
+//! capacity: where both differ by more than their bounds, one of them is not that of this car.
+
+use config::Car;
+use design::ShiftErrors;
+
+use super::logged::LogStep;
+use crate::ratio_histogram::RatioHistogram;
+
+/// Engine speed counts as steady if it has changed by no more than so much, rad/s, in so long, s \[chosen\]: the engine's inertia takes some 3 N m.
+const STEADY_RAD_S: f64 = 10.0;
+const STEADY_S: f64 = 0.5;
+/// Torques that are compared, N m, and speed ratios up to which the pump's torque is well known \[chosen\].
+const LEAST_N_M: f64 = 20.0;
+const MOST_SPEED_RATIO: f64 = 0.9;
+/// Rows that are needed to judge, and their time, s \[chosen\].
+const ENOUGH: (u64, f64) = (200, 3.0);
+/// Difference beside the bounds of both: drag, auxiliaries, the time by which a signal comes late \[chosen\].
+const MORE: f64 = 0.05;
+
+/// Reported over pump torque, so far.
+#[derive(Default)]
+pub(super) struct ConverterCheck {
+    ratio: RatioHistogram<100>,
+    rows: (u64, f64),
+    /// An engine speed, rad/s, and when it was read, s.
+    before: Option<(f64, f64)>,
+    is_steady: bool,
+    reported_n_m: Option<f64>,
+}
+
+impl ConverterCheck {
+    /// Takes a row with the newest speeds of engine and turbine, rad/s.
+    pub(super) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
+        if let Some(reported) = step.reported_n_m {
+            self.reported_n_m = Some(reported.value);
+        }
+        let Some(converter) = &car.converter else { return };
+        match self.before {
+            Some((before, at_s)) if step.time_s - at_s < STEADY_S && step.time_s >= at_s => {
+                self.is_steady &= (engine - before).abs() <= STEADY_RAD_S;
+            }
+            before => {
+                let was_near = before.is_some_and(|(before, _)| (engine - before).abs() <= STEADY_RAD_S);
+                (self.is_steady, self.before) = (was_near, Some((engine, step.time_s)));
+            }
+        }
+        let (Some(reported), true) = (self.reported_n_m, self.is_steady && !step.input.lock_up_applied) else { return };
+        let pump = converter.torques(engine, turbine).pump_n_m;
+        if pump > LEAST_N_M && reported > LEAST_N_M && turbine <= MOST_SPEED_RATIO * engine {
+            self.ratio.push(reported / pump);
+            self.rows.0 += 1;
+            self.rows.1 += step.input.dt_s.clamp(0.0, 1.0);
+        }
+    }
+
+    /// What contradicts the vehicle file, in a sentence.
+    pub(super) fn warning(&self, car: &Car) -> Option<String> {
+        let (rows, time_s) = self.rows;
+        let errors = ShiftErrors::LOGGED.of_car(car);
+        let ratio = self.ratio.middle();
+        let most = (1.0 + errors.converter) * (1.0 + errors.engine) + MORE;
+        if rows < ENOUGH.0 || time_s < ENOUGH.1 || (most.recip()..=most).contains(&ratio) {
+            return None;
+        }
+        Some(format!(
+            "warning: reported_engine_torque is {ratio:.2} of what the converter of the vehicle file takes, in the middle of {rows} rows with a steady engine \
+             speed: the torques of the estimate are off by as much if the signal is right. `converter.capacity_n_m_s2` times {ratio:.2} would agree; \
+             `wetclutch inspect LOG --shifts -o PAGE.html` fits it. Or the signal is no torque at the crankshaft, or in percent"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::any_shift::{SAMPLE_S, logged::LogStep};
+    use observer::Reading;
+    use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+
+    /// A log in which the engine has this share of the torque that the converter takes; its speed changes at this rate, rad/s^2.
+    fn said(share: f64, rate: f64, lock_up_applied: bool, rows: u32) -> Option<String> {
+        let car = Car::eight_speed().unwrap();
+        let mut check = ConverterCheck::default();
+        for row in 0..rows {
+            let time_s = f64::from(row) * SAMPLE_S;
+            let [engine, turbine] = [200.0 + rate * time_s, 150.0];
+            let torque = car.converter.unwrap().torques(engine, turbine).pump_n_m;
+            let input = ShiftInput {
+                dt_s: SAMPLE_S,
+                engine_rad_s: Some(Reading::now(engine)),
+                turbine_rad_s: Some(Reading::now(turbine)),
+                output_rad_s: None,
+                wheel_rad_s: None,
+                engine_n_m: None,
+                lock_up_applied,
+                commands: [None; MAX_ELEMENTS],
+                gear: GearCommand { from: 1, to: 1 },
+            };
+            let reported_n_m = (row % 4 == 0).then(|| Reading::now(share * torque));
+            let step = LogStep {
+                time_s,
+                input,
+                pedals: [f64::NAN; 2],
+                vehicle_m_s: f64::NAN,
+                reported_n_m,
+                truth: [[f64::NAN; 3]; 2],
+            };
+            check.push(&car, &step, [engine, turbine]);
+        }
+        check.warning(&car)
+    }
+
+    #[test]
+    fn a_converter_that_does_not_take_the_reported_torque_is_named() {
+        for share in [0.55, 0.75, 1.35, 2.0] {
+            let said = said(share, 0.0, false, 1000).unwrap();
+            let (_, found) = said.split_once("reported_engine_torque is ").unwrap();
+            let found: f64 = found.split_once(' ').unwrap().0.parse().unwrap();
+            assert!((found / share - 1.0).abs() < 0.015, "{said}");
+        }
+        for share in [0.85, 1.0, 1.18] {
+            assert_eq!(said(share, 0.0, false, 1000), None);
+        }
+    }
+
+    #[test]
+    fn of_a_closed_lock_up_clutch_an_engine_that_accelerates_and_a_short_log_nothing_is_said() {
+        assert_eq!(said(2.0, 0.0, true, 1000), None);
+        assert_eq!(said(2.0, 60.0, false, 400), None);
+        assert_eq!(said(2.0, 0.0, false, 200), None);
+    }
+}
