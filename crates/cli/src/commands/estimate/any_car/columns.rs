@@ -1,8 +1,11 @@
 //! The columns of an estimate of a car with any gearbox.
 
 use config::Car;
+use observer::ChannelHealth;
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate};
+use study::any_shift::channels::gear_number;
 use study::any_shift::logged::element_column;
+use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 
 use crate::failure::Failure;
@@ -21,6 +24,18 @@ pub(super) struct Row<'a> {
 impl<'a> Row<'a> {
     fn gear(&self, which: usize) -> Cell<'a> {
         Cell::Word(self.car.gearbox.gears.get(self.gears[which]).map_or("", |gear| gear.name.as_str()))
+    }
+
+    /// What became of the reading of a channel, by its place in [`READINGS`]; of the command of a clutch of the shift nothing where there
+    /// is none.
+    fn reading(&self, at: usize) -> Cell<'a> {
+        let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
+        let health = match READINGS.get(at) {
+            Some(&ONCOMING_COMMAND_READING) => clutches.map(|clutches| commands[clutches[1].element]),
+            Some(&OFFGOING_COMMAND_READING) => clutches.map(|clutches| commands[clutches[0].element]),
+            _ => channels.each().get(at).copied(),
+        };
+        Cell::Word(health.map_or("", ChannelHealth::name))
     }
 
     fn element(&self, which: usize) -> Cell<'a> {
@@ -64,6 +79,8 @@ const CLUTCH: [&str; 9] = [
     "valve_model_torque_n_m",
     "hidden",
 ];
+/// The column of an element, after its name, that says what became of the reading of its command.
+const COMMAND_READING: &str = "command_reading";
 /// The columns of an element, after its name: those of [`CLUTCH`] that its command alone gives.
 const ELEMENT: [&str; 3] = [CLUTCH[6], CLUTCH[1], CLUTCH[2]];
 const ROLES: [&str; 2] = ["offgoing", "oncoming"];
@@ -73,10 +90,16 @@ const ROLES: [&str; 2] = ["offgoing", "oncoming"];
 pub(super) enum Value {
     Of(for<'a> fn(&Row<'a>) -> Cell<'a>),
     Clutch(usize, usize),
+    /// The number of the gear (0) or the target gear (1).
+    GearNumber(usize),
     /// Pressure of an element by its valve model, by its place in the filter's tables.
     Valve(usize),
     /// An end of the range of that pressure.
     Range(usize, usize),
+    /// What became of the reading of a channel, by its place in [`READINGS`].
+    Reading(usize),
+    /// The same of the command of an element, by its place in the filter's tables.
+    Command(usize),
 }
 
 impl Value {
@@ -86,6 +109,9 @@ impl Value {
             Self::Clutch(which, what) => row.clutch_cell(which, what),
             Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
             Self::Range(place, end) => of(row.ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0)),
+            Self::GearNumber(which) => Cell::Number(gear_number(row.car, row.gears[which])),
+            Self::Reading(at) => row.reading(at),
+            Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
         }
     }
 }
@@ -134,6 +160,14 @@ pub(super) fn columns(places: &[(usize, &str)], has_converter: bool) -> Vec<Colu
         );
     }
     columns.push(word(trace::signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
+    let gears = [(trace::signal::GEAR_NUMBER, 0), (trace::signal::TARGET_GEAR_NUMBER, 1)];
+    columns.extend(gears.map(|(name, which)| number(name.to_owned(), Value::GearNumber(which))));
+    let words = |name: String, value: Value| Column { name, kind: ColumnKind::Word, value };
+    columns.extend(READINGS.iter().enumerate().map(|(at, name)| words((*name).to_owned(), Value::Reading(at))));
+    let command = |(place, name): &(usize, &str)| {
+        words(format!("{}_{COMMAND_READING}", element_column(name)), Value::Command(*place))
+    };
+    columns.extend(places.iter().map(command));
     columns
 }
 
@@ -144,7 +178,7 @@ pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
         rest.is_some_and(|rest| rest.starts_with("element_"))
     };
     let is_one = |with: bool| columns(&[], with).iter().any(|column| column.name == name);
-    is_one(true) || is_one(false) || ELEMENT.into_iter().any(of_element)
+    is_one(true) || is_one(false) || ELEMENT.into_iter().chain([COMMAND_READING]).any(of_element)
 }
 
 fn of(value: Option<f64>) -> Cell<'static> {
