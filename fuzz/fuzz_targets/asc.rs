@@ -1,4 +1,4 @@
 //! Measured logs, from Vector's text.
 #![no_main]
 
-fuzz_targets::program!(Measured);
+fuzz_targets::program!(Asc);

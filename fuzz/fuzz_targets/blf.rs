@@ -1,4 +1,4 @@
 //! Measured logs, from Vector's binary files.
 #![no_main]
 
-fuzz_targets::program!(Measured);
+fuzz_targets::program!(Blf);

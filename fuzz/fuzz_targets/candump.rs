@@ -1,4 +1,4 @@
 //! Measured logs, from candump's text.
 #![no_main]
 
-fuzz_targets::program!(Measured);
+fuzz_targets::program!(Candump);

@@ -1,4 +1,4 @@
 //! Measured logs, from MDF 4 files.
 #![no_main]
 
-fuzz_targets::program!(Measured);
+fuzz_targets::program!(Mdf);

@@ -1,4 +1,4 @@
 //! Measured logs, from Parquet files.
 #![no_main]
 
-fuzz_targets::program!(Measured);
+fuzz_targets::program!(Parquet);

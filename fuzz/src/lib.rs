@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! mkdir -p fuzz/corpus/mdf
-//! cargo fuzz run mdf --sanitizer none fuzz/corpus/mdf crates/logs/tests/data -- \
+//! cargo fuzz run mdf --sanitizer none fuzz/corpus/mdf crates/fuzz/corpus/mdf crates/logs/tests/data -- \
 //!     -max_total_time=600 -rss_limit_mb=1024 -timeout=10 -max_len=16384
 //! ```
 //!

@@ -4,10 +4,13 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use config::{Car, Experiment, GearboxFile, Source, Study, Vehicle};
+use config::{Car, Experiment, GearboxFile, Source, Study, Vehicle, read_learnt, write_learnt};
 use design::{design_compliant, design_rigid};
+use observer::Reading;
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_shift};
 use report::gearbox_figure::{gear_figure, train_figure};
+use study::any_shift::logged::{LogStep, LoggedDrive};
 use study::campaign::{factor_values, run_seed};
 use study::{Log, Row, RunColumns, simulate_shift};
 use trace::{ColumnKind, CsvRows, GrowingTable, partial_path, read_csv, read_rows, write_csv, write_parquet};
@@ -51,6 +54,36 @@ pub(crate) fn gearbox(fuzzer: &Fuzzer, input: &[u8]) {
     for gear in 0..file.gearbox.gears.len() {
         let _ = gear_figure(&file.gearbox, gear);
     }
+}
+
+/// What was learnt of a car, in the filter of a drive.
+pub(crate) fn learnt(car: &Car, input: &[u8]) {
+    let source = Source::built_in("learnt.toml", &String::from_utf8_lossy(input));
+    let Ok(learnt) = read_learnt(&car.gearbox, &source) else { return };
+    let Ok(tables) = LoggedDrive::tables(car) else { return };
+    let mut drive = LoggedDrive::new(car, &tables, None, Some(&learnt));
+    let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
+    for row in 0..20_u32 {
+        let (gear, share) = (GearCommand { from: 2, to: 2 + usize::from(row > 9) }, f64::from(row) / 20.0);
+        let input = ShiftInput {
+            dt_s: 0.01,
+            engine_rad_s: reading(210.0),
+            turbine_rad_s: reading(200.0 - 40.0 * share),
+            output_rad_s: reading(200.0 / car.gearbox.gears[2].ratio),
+            wheel_rad_s: None,
+            engine_n_m: None,
+            lock_up_applied: false,
+            commands: [reading(share); MAX_ELEMENTS],
+            gear,
+        };
+        let (time_s, truth) = (0.01 * f64::from(row), [[f64::NAN; 3]; 2]);
+        let estimate =
+            drive.push(&LogStep { time_s, input, pedals: [0.0; 2], vehicle_m_s: 10.0, reported_n_m: None, truth });
+        assert!(estimate.valve_pa.iter().all(|pressure_pa| !pressure_pa.is_infinite()));
+    }
+    // What is written is read again.
+    let text = write_learnt(&car.gearbox, drive.learnt().1);
+    read_learnt(&car.gearbox, &Source::built_in("learnt.toml", &text)).unwrap_or_else(|error| panic!("{error}"));
 }
 
 pub(crate) fn experiment(fuzzer: &Fuzzer, input: &[u8]) {

@@ -4,8 +4,11 @@
 //! A reader may refuse an input; an accepted input is used as the commands would use it. A panic is a finding.
 //!
 //! `cargo test` makes the first few hundred cases of each target. `cargo run --release -p fuzz -- --seconds 600` goes on
-//! for longer; it prints each finding and writes its input, which `--replay` takes. An input that was a finding goes to
-//! `corpus/`: the test tries each of those files as it is, and mutates them too.
+//! for longer; it prints each finding and writes its input, which `--replay` takes.
+//!
+//! `corpus/` has a folder for each target that the project's own files do not serve: small files that its reader takes, with an ending in
+//! their names, and inputs that were findings, without one. The test tries each of those files as it is, and mutates them too. `cargo run -p
+//! fuzz --example corpus` makes those that are not written by hand.
 
 pub mod files;
 pub mod measured;
@@ -17,7 +20,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{env, fs, panic};
 
-use config::{GainMethod, Study, Vehicle};
+use config::{Car, GainMethod, Study, Vehicle};
+use logs::{CanKind, Format};
 use rand_pcg::Pcg64Mcg;
 use study::AnyObserver;
 use study::campaign::{Layout, Row, Status};
@@ -37,29 +41,47 @@ pub enum Target {
     Table,
     /// The `step` of every observer.
     Step,
-    /// The readers of measured logs of every format, and what reads from them.
-    Measured,
+    /// The reader of tables as text, and what reads from a measured log.
+    Csv,
+    /// The same of Parquet.
+    Parquet,
+    /// The same of MDF 4.
+    Mdf,
+    /// The same of candump's text.
+    Candump,
+    /// The same of Vector's text.
+    Asc,
+    /// The same of Vector's objects.
+    Blf,
     /// The reader of channel maps.
     Map,
     /// The reader of the messages and signals of a bus.
     Dbc,
     /// The reader of gearbox files, and the diagrams of a gearbox.
     Gearbox,
+    /// The reader of what was learnt of a car.
+    Learnt,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 16] = [
         Self::Vehicle,
         Self::Experiment,
         Self::Study,
         Self::Log,
         Self::Table,
         Self::Step,
-        Self::Measured,
+        Self::Csv,
+        Self::Parquet,
+        Self::Mdf,
+        Self::Candump,
+        Self::Asc,
+        Self::Blf,
         Self::Map,
         Self::Dbc,
         Self::Gearbox,
+        Self::Learnt,
     ];
 
     /// Its name on the command line, and the folder of its corpus.
@@ -71,11 +93,30 @@ impl Target {
             Self::Log => "log",
             Self::Table => "table",
             Self::Step => "step",
-            Self::Measured => "measured",
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mdf => "mdf",
+            Self::Candump => "candump",
+            Self::Asc => "asc",
+            Self::Blf => "blf",
             Self::Map => "map",
             Self::Dbc => "dbc",
             Self::Gearbox => "gearbox",
+            Self::Learnt => "learnt",
         }
+    }
+
+    /// The format of the measured logs that a target takes; none of other targets.
+    pub fn format(self) -> Option<Format> {
+        Some(match self {
+            Self::Csv => Format::Csv,
+            Self::Parquet => Format::Parquet,
+            Self::Mdf => Format::Mdf,
+            Self::Candump => Format::Can(CanKind::Candump),
+            Self::Asc => Format::Can(CanKind::Asc),
+            Self::Blf => Format::Can(CanKind::Blf),
+            _ => return None,
+        })
     }
 }
 
@@ -95,6 +136,7 @@ pub struct Fuzzer {
     /// A folder of its own, with the project's vehicle and experiment files in it.
     folder: PathBuf,
     vehicle: Vehicle,
+    car: Car,
     observers: Vec<AnyObserver>,
     layout: Layout,
 }
@@ -119,7 +161,7 @@ impl Fuzzer {
         let methods = if depth == Depth::Long { &GainMethod::ALL[..] } else { &[GainMethod::Iss] };
         let observers = samples::observers(&vehicle, methods)?;
         let layout = Layout::of(&Study::read(&folder.join("experiments/settings.toml"))?);
-        Ok(Self { depth, folder, vehicle, observers, layout })
+        Ok(Self { depth, folder, vehicle, car: Car::eight_speed()?, observers, layout })
     }
 
     /// The input of a case.
@@ -145,10 +187,16 @@ impl Fuzzer {
             Target::Log => files::log(self, input),
             Target::Table => files::table(self, input),
             Target::Step => samples::step_all(&self.vehicle, &self.observers, input),
-            Target::Measured => measured::log(self, input),
+            Target::Csv | Target::Parquet | Target::Mdf | Target::Candump | Target::Asc | Target::Blf => {
+                // A file of another format is a case of another target.
+                if target.format() == Some(Format::of(input)) {
+                    measured::log(self, input);
+                }
+            }
             Target::Map => measured::map(self, input),
             Target::Dbc => measured::dbc(self, input),
             Target::Gearbox => files::gearbox(self, input),
+            Target::Learnt => files::learnt(&self.car, input),
         }
     }
 
@@ -179,17 +227,19 @@ impl Fuzzer {
                 ["settings", "budget", "error_bound"].map(|name| text(&experiments.join(name).with_extension("toml"))),
             ),
             Target::Gearbox => seeds.extend(texts(&[self.folder.join("gearboxes")])),
-            Target::Table => seeds.push(self.table()),
-            Target::Measured => seeds.extend(texts(&[measured::data()])),
+            Target::Csv | Target::Parquet | Target::Mdf | Target::Candump | Target::Asc | Target::Blf => {
+                let logs = measured::logs().into_iter().filter(|log| target.format() == Some(Format::of(log)));
+                seeds.extend(logs);
+            }
             Target::Map => seeds.push(text(&project().join("maps/genesis_at8.toml"))),
             Target::Dbc => seeds.extend([text(&measured::bus()), text(&project().join("maps/genesis_at8.dbc"))]),
-            Target::Log | Target::Step => {}
+            Target::Log | Target::Step | Target::Table | Target::Learnt => {}
         }
         seeds
     }
 
-    /// A small table of runs.
-    fn table(&self) -> Vec<u8> {
+    /// A small table of a study's runs.
+    pub fn table(&self) -> Vec<u8> {
         let mut text = self.layout.header().join(",");
         for (run, status) in [(0, Status::Ok), (1, Status::NoLockUp), (2, Status::TieUp)] {
             let numbers = vec![if status.is_scored() { 0.25 } else { f64::NAN }; self.layout.width()];

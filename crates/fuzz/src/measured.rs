@@ -6,11 +6,24 @@ use std::path::{Path, PathBuf};
 use logs::can::Database;
 use logs::{ChannelMap, Gearbox, Log, OpenOptions, Readings, ShiftFinder, Steps, inspect, suggest};
 
-use crate::{Fuzzer, project};
+use crate::{Fuzzer, project, text};
 
 /// The folder of logs that other programs wrote.
 pub(crate) fn data() -> PathBuf {
     project().join("crates/logs/tests/data")
+}
+
+/// The files in it that are logs, not their maker and its notes.
+pub(crate) fn logs() -> Vec<Vec<u8>> {
+    let Ok(entries) = fs::read_dir(data()) else { return Vec::new() };
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    let is_log = |path: &PathBuf| {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        ending.is_some_and(|ending| ["mf4", "parquet", "log", "asc", "blf"].contains(&ending))
+    };
+    paths.retain(is_log);
+    paths.sort();
+    paths.iter().map(|path| text(path)).collect()
 }
 
 /// The messages of the bus logs among them.

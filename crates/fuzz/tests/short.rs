@@ -2,7 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use config::{Car, Source, read_learnt};
 use fuzz::{Depth, Fuzzer, Target};
+use logs::can::Database;
+use logs::{ChannelMap, Format, Log, OpenOptions, inspect};
 
 fn first_cases(target: Target, cases: u64) {
     let fuzzer = Fuzzer::new(Depth::Short).unwrap();
@@ -53,7 +59,14 @@ fn no_sample_panics_an_observer() {
 
 #[test]
 fn no_measured_log_panics() {
-    first_cases(Target::Measured, 300);
+    for target in Target::ALL.into_iter().filter(|target| target.format().is_some()) {
+        first_cases(target, 60);
+    }
+}
+
+#[test]
+fn nothing_learnt_panics() {
+    first_cases(Target::Learnt, 200);
 }
 
 #[test]
@@ -64,6 +77,38 @@ fn no_channel_map_panics() {
 #[test]
 fn no_dbc_panics() {
     first_cases(Target::Dbc, 300);
+}
+
+/// The files of a corpus that its reader takes: those with an ending.
+fn seeds(target: Target) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.name());
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(|path| path.extension().is_some()).collect()
+}
+
+#[test]
+fn each_seed_is_one_that_its_reader_takes_and_a_corpus_is_small() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../logs/tests/data");
+    let options = OpenOptions { dbc: Some(data.join("bus.dbc")), time: None };
+    for target in Target::ALL.into_iter().filter(|target| target.format().is_some()) {
+        let seeds = seeds(target);
+        assert!(!seeds.is_empty(), "{}", target.name());
+        for path in seeds {
+            assert_eq!(target.format(), Some(Format::of(&fs::read(&path).unwrap())), "{}", path.display());
+            let mut log = Log::open(&path, &options).unwrap();
+            let samples: u64 = inspect(&mut log).unwrap().channels.iter().map(|channel| channel.counts.total()).sum();
+            assert!(samples > 0, "{}", path.display());
+        }
+    }
+    let text = |path: &PathBuf| Source::built_in("seed", &fs::read_to_string(path).unwrap());
+    seeds(Target::Dbc).iter().for_each(|path| assert!(!Database::read(path).unwrap().channels().is_empty()));
+    seeds(Target::Map).iter().for_each(|path| assert!(!ChannelMap::read(path).unwrap().channels.is_empty()));
+    let gearbox = Car::eight_speed().unwrap().gearbox;
+    seeds(Target::Learnt).iter().for_each(|path| assert!(read_learnt(&gearbox, &text(path)).is_ok()));
+    for target in Target::ALL {
+        let bytes: usize = Fuzzer::corpus(target).iter().map(Vec::len).sum();
+        assert!(bytes < 20_000, "{}: {bytes} bytes", target.name());
+    }
 }
 
 #[test]

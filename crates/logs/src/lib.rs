@@ -35,7 +35,7 @@ pub use columns::{Block, Column, Columns};
 pub use error::LogError;
 pub use frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
 pub use inspect::{ChannelSummary, Inspection, inspect};
-pub use log::{Channel, Log, OpenOptions, TimeColumn, needs_map};
+pub use log::{CanKind, Channel, Format, Log, OpenOptions, TimeColumn, needs_map};
 pub use map::{ChannelMap, Combine, Gearbox, Mapped};
 pub use readings::{Reading, Readings, RoleSummary};
 pub use role::Role;

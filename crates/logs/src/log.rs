@@ -351,24 +351,35 @@ fn first_bytes(reader: &mut dyn Read) -> io::Result<Vec<u8>> {
 
 /// The kinds of CAN logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum CanKind {
+pub enum CanKind {
+    /// Text of candump.
     Candump,
+    /// Vector's text.
     Asc,
+    /// Vector's objects in containers.
     Blf,
 }
 
-enum Format {
+/// Formats of files, as their first bytes tell them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// ASAM MDF 4.
     Mdf,
+    /// MDF 2 and 3, which are not read.
     Mdf3,
+    /// Parquet.
     Parquet,
+    /// Frames of a bus.
     Can(CanKind),
     /// Frames in a form that is not read.
     OtherFrames,
+    /// Anything else: a table as text.
     Csv,
 }
 
 impl Format {
-    fn of(head: &[u8]) -> Self {
+    /// The format of a file that begins with these bytes.
+    pub fn of(head: &[u8]) -> Self {
         if head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ") {
             return if matches!(head.get(8), Some(b'2' | b'3')) { Self::Mdf3 } else { Self::Mdf };
         }

@@ -56,7 +56,8 @@ impl DrivePage<'_> {
     pub fn html(&self) -> Result<String, PageError> {
         let (car, drive) = (self.car, self.drive);
         let worst = worst_first(&drive.shifts);
-        let mut drawn: Vec<&ScoredShift> = worst.iter().take(MOST_DRAWN).copied().collect();
+        let mut drawn: Vec<&ScoredShift> =
+            worst.iter().filter(|shift| shift.is_drawn).take(MOST_DRAWN).copied().collect();
         drawn.sort_by_key(|shift| shift.number);
         let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
         let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
@@ -73,7 +74,7 @@ impl DrivePage<'_> {
             }
         });
         let named = worst.iter().take(WORST).map(|shift| {
-            context! { number => shift.number, gears => gears(shift, car), error => number(worst_error(shift), 1) }
+            context! { number => shift.number, gears => gears(shift, car), error => number(shift.worst_error_n_m(), 1) }
         });
         Ok(templates()?.get_template("drive.html")?.render(context! {
             name => self.name,
@@ -109,7 +110,7 @@ const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques 
 fn healths(drive: &ScoredDrive) -> Vec<Value> {
     let there = |health: &Health| {
         let in_states = drive.states.iter().any(|state| state.health == *health);
-        in_states || drive.shifts.iter().flat_map(|shift| &shift.rows).any(|row| row.health == *health)
+        in_states || drive.shifts.iter().any(|shift| shift.summary.rows_with(*health) > 0)
     };
     let value =
         |health: Health| context! { name => health.name().replace('_', " "), meaning => health_meaning(health) };
@@ -149,16 +150,10 @@ fn clutch_words(shift: &ScoredShift, car: &Car) -> String {
     named.map(|(name, does)| format!("{name} {does}")).collect::<Vec<_>>().join(", ")
 }
 
-/// The largest RMS error of the controlling clutch's torque in a phase, N m.
-fn worst_error(shift: &ScoredShift) -> f64 {
-    let errors = shift.errors().unwrap_or_default();
-    errors.iter().map(|phase| phase[0].torque.rms_n_m()[0]).fold(0.0, f64::max)
-}
-
 /// The shifts with the largest error first.
 fn worst_first(shifts: &[ScoredShift]) -> Vec<&ScoredShift> {
     let mut worst: Vec<&ScoredShift> = shifts.iter().collect();
-    worst.sort_by(|a, b| worst_error(b).total_cmp(&worst_error(a)));
+    worst.sort_by(|a, b| b.worst_error_n_m().total_cmp(&a.worst_error_n_m()));
     worst
 }
 
@@ -181,10 +176,9 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     }
     let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
     let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
-    let clutches = || shifts.iter().flat_map(|shift| &shift.rows).flat_map(|row| &row.clutches);
-    let (all, inside) = (2 * clutches().count(), 2 * clutches().filter(|clutch| clutch.in_range).count());
-    let rows = || shifts.iter().flat_map(|shift| &shift.rows);
-    let good = rows().filter(|row| row.health == Health::Good).count();
+    let sum = |of: fn(&ScoredShift) -> u64| shifts.iter().map(of).sum::<u64>();
+    let [all, inside] = [sum(|shift| 2 * shift.summary.clutches()[0]), sum(|shift| 2 * shift.summary.clutches()[1])];
+    let good = sum(|shift| shift.summary.rows_with(Health::Good));
     let mut sentences = drive.warnings.clone();
     sentences.extend([format!(
         "{completed} of {} shifts were completed; the longest took {} s.",
@@ -198,14 +192,17 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
             number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
         ));
     }
-    sentences.extend([format!("Health is good in {good} of {} samples of the shifts.", rows().count())]);
+    sentences.extend([format!(
+        "Health is good in {good} of {} samples of the shifts.",
+        sum(|shift| shift.summary.counts.rows)
+    )]);
     if drive.has_truth() {
         sentences.push(format!(
             "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
         ));
     }
-    let hidden = |is_garage: bool| shifts.iter().filter(|s| s.rows.is_empty() && s.is_garage == is_garage).count();
-    if rows().any(|row| row.at_turbine_n_m.is_some()) {
+    let hidden = |is_garage: bool| shifts.iter().filter(|s| !s.is_estimated() && s.is_garage == is_garage).count();
+    if shifts.iter().any(|shift| shift.mean_at_turbine_n_m().is_some()) {
         sentences.push(RATIOS_ALONE.to_owned());
     }
     if hidden(false) > 0 {

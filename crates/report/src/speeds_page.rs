@@ -137,7 +137,7 @@ impl SpeedsPage<'_> {
         });
         let asked: Vec<String> = asked.collect();
         if !asked.is_empty() {
-            said.push(format!("The gearbox asked the engine for less torque in {}.", asked.join(", ")));
+            said.push(format!("The gearbox asked the engine for less torque in {}.", first_of(&asked, ", ")));
         }
         said
     }
@@ -461,4 +461,27 @@ fn points(readings: &Readings, span_s: [f64; 2], most: usize, unit: fn(f64) -> f
     let count = readings.between(span_s).count();
     let every = count.div_ceil(most).max(1);
     readings.between(span_s).step_by(every).map(|(time_s, value)| (time_s, unit(value))).collect()
+}
+
+/// The first of these in one line, with the number of the others: a long drive has hundreds.
+fn first_of(items: &[String], between: &str) -> String {
+    const SAID: usize = 8;
+    let said = items[..items.len().min(SAID)].join(between);
+    match items.len().saturating_sub(SAID) {
+        0 => said,
+        more => format!("{said}{between}and {more} more"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_of;
+
+    #[test]
+    fn a_long_list_is_cut_and_counted() {
+        let items: Vec<String> = (1..=11).map(|item| item.to_string()).collect();
+        assert_eq!(first_of(&items, "; "), "1; 2; 3; 4; 5; 6; 7; 8; and 3 more");
+        assert_eq!(first_of(&items[..8], ", "), "1, 2, 3, 4, 5, 6, 7, 8");
+        assert_eq!(first_of(&items[..1], ", "), "1");
+    }
 }

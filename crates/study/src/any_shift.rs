@@ -19,6 +19,7 @@ pub mod measured;
 mod nominal;
 pub mod recording;
 pub mod sensitivity;
+pub mod shift_summary;
 mod still_commands;
 mod thinned;
 pub mod tour;

@@ -32,6 +32,10 @@ pub const LAUNCH_CLUTCH_TORQUE: &str = "launch_clutch_torque_n_m";
 pub const GEAR: &str = "gear";
 /// Gear that is commanded, by its name.
 pub const TARGET_GEAR: &str = "target_gear";
+/// The number of the gear: 1 is the first forward gear, 0 none, -1 reverse.
+pub const GEAR_NUMBER: &str = "gear_number";
+/// The same of the target gear.
+pub const TARGET_GEAR_NUMBER: &str = "target_gear_number";
 /// Brake, 0 to 1.
 pub const BRAKE: &str = "brake";
 /// Throttle, 0 to 1.
@@ -54,6 +58,10 @@ pub const AGES: &[(&str, &str)] = &[
     (REPORTED_ENGINE_TORQUE, "reported_engine_torque_age_s"),
 ];
 
+/// What became of the reading of the command of the oncoming clutch's valve, a word.
+pub const ONCOMING_COMMAND_READING: &str = "oncoming_command_reading";
+/// The same of the offgoing clutch.
+pub const OFFGOING_COMMAND_READING: &str = "offgoing_command_reading";
 /// What became of the reading of engine, turbine, output and wheel speed, of the commands of both clutches, and of the
 /// reported engine torque.
 pub const READINGS: [&str; 7] = [
@@ -61,8 +69,8 @@ pub const READINGS: [&str; 7] = [
     "turbine_reading",
     "output_reading",
     "wheel_reading",
-    "oncoming_command_reading",
-    "offgoing_command_reading",
+    ONCOMING_COMMAND_READING,
+    OFFGOING_COMMAND_READING,
     "engine_torque_reading",
 ];
 

@@ -185,6 +185,10 @@ fn an_estimate_of_a_drive_has_both_clutches_of_every_shift_and_does_not_read_the
     for name in ["e.parquet", "e.mf4"] {
         said(&estimate(&folder, "sim/short.csv", &["-o", &folder.path(name)]));
         assert!(std::fs::metadata(folder.path(name)).unwrap().len() > 10_000, "{name}");
+        // The gears can be plotted: they are there as numbers, too.
+        let channels = printed(&wetclutch(&["inspect", &folder.path(name)]));
+        let numbers = channels.lines().find(|line| line.trim_start().starts_with("gear_number "));
+        assert!(numbers.is_some_and(|line| line.contains('4')), "{channels}");
     }
 }
 
@@ -218,6 +222,26 @@ fn lost_repeated_and_late_readings_of_a_drive_are_no_error() {
     let estimates = folder.read("lost_out.csv");
     assert_eq!(estimates.lines().count(), text.lines().count());
     assert!(!estimates.contains("NaN") && !estimates.contains("inf"));
+    // What became of each reading is said in every row.
+    let absent = |name: &str, rest: usize| {
+        let readings = column(&estimates, name);
+        let rows =
+            readings.iter().enumerate().filter(|(row, _)| *row > 0 && row % 7 == rest && !(600..650).contains(row));
+        rows.map(|(_, reading)| reading == "absent").collect::<Vec<_>>()
+    };
+    for (name, rest) in [("turbine_reading", 0), ("engine_reading", 1), ("element_int_command_reading", 2)] {
+        assert!(absent(name, rest).iter().all(|absent| *absent), "{name}");
+        assert!(absent(name, 4).iter().all(|absent| !absent), "{name}");
+    }
+    assert!(column(&estimates, "wheel_reading").iter().filter(|reading| *reading == "good").count() > 1000);
+    // Of the clutches of a shift, that of their elements; none in a gear.
+    for role in ["offgoing", "oncoming"] {
+        let (elements, readings) = (column(&estimates, role), column(&estimates, &format!("{role}_command_reading")));
+        for (row, (element, reading)) in elements.iter().zip(&readings).enumerate() {
+            assert_eq!(element.is_empty(), reading.is_empty(), "{role} in row {row}");
+        }
+        assert!(readings.iter().any(|reading| reading == "good"));
+    }
 }
 
 #[test]

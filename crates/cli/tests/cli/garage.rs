@@ -45,6 +45,15 @@ fn garage_shifts_have_their_gears_and_no_flare() {
         }
         assert!(text.contains("4 of 4 shifts were completed") && !text.contains("warning"), "{car}: {text}");
         assert!(!text.contains("Largest flare") && text.contains("Of 2 garage shifts nothing is estimated"), "{text}");
+        // The gears as numbers: none is 0, reverse -1.
+        let estimates = folder.read("out.csv");
+        for [name, number] in [["gear", "gear_number"], ["target_gear", "target_gear_number"]] {
+            let pairs = column(&estimates, name).into_iter().zip(column(&estimates, number));
+            let pairs: std::collections::BTreeSet<_> = pairs.collect();
+            let expected =
+                [("", "0"), ("1", "1"), ("R", "-1")].map(|(name, number)| (name.to_owned(), number.to_owned()));
+            assert_eq!(pairs, expected.into(), "{car}");
+        }
         // Out of neutral no clutch opens.
         let log = folder.read("sim/garage_measured.csv");
         let offgoing = column(&log, "offgoing");

@@ -217,14 +217,32 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
     )))
 }
 
-/// The place of a gear with this number; none where the gearbox has no such gear.
+/// The places of the gears in reverse.
+fn reverse_gears(car: &Car) -> Vec<usize> {
+    let gears = car.gearbox.gears.iter().enumerate();
+    gears.filter(|(_, gear)| gear.ratio < 0.0).map(|(at, _)| at).collect()
+}
+
+/// The number of a gear, by its place: 1 is the first forward gear, 0 none, -1 reverse, -2 a second reverse gear.
+#[expect(clippy::cast_precision_loss, reason = "a handful of gears")]
+pub fn gear_number(car: &Car, gear: usize) -> f64 {
+    let place = |gears: Vec<usize>| gears.iter().position(|&known| known == gear).map(|place| place as f64 + 1.0);
+    place(car.gearbox.forward_gears()).or_else(|| place(reverse_gears(car)).map(|place| -place)).unwrap_or(0.0)
+}
+
+/// The place of a gear with this number; none where the gearbox has no such gear. A negative number that no gear has is the first reverse
+/// gear.
 fn gear_of(car: &Car, number: f64) -> Option<usize> {
     let forward = car.gearbox.forward_gears();
     let whole = number.round();
     match whole {
         _ if (number - whole).abs() > 0.01 => None,
         0.0 => Some(NO_GEAR),
-        _ if whole < 0.0 => car.gearbox.gears.iter().position(|gear| gear.ratio < 0.0),
+        _ if whole < 0.0 => {
+            let reverse = reverse_gears(car);
+            let named = reverse.iter().copied().find(|&gear| gear_number(car, gear) == whole);
+            named.or_else(|| reverse.first().copied())
+        }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1")]
         _ => forward.get(whole as usize - 1).copied(),
     }

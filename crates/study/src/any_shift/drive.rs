@@ -7,10 +7,11 @@ use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
-use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
+use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift};
 use super::recording::Recording;
+use super::shift_summary::{ShiftSummary, spans_s};
 use super::thinned::thinned;
-use super::{AnyShiftError, ClutchRow, ShiftScoreRow, TruePhase, row};
+use super::{AnyShiftError, ShiftScoreRow, TruePhase, row};
 
 /// The place of no element among those of the gearbox.
 pub(super) const NO_ELEMENT: usize = usize::MAX;
@@ -51,106 +52,86 @@ pub struct ScoredShift {
     pub time_s: [f64; 2],
     /// How it went.
     pub quality: CarShiftQuality,
-    /// Truth and estimates; empty where the filter has no tables.
+    /// Truth and estimates; empty where the filter has no tables, and where [`Self::is_drawn`] is false.
     pub rows: Vec<ShiftScoreRow>,
+    /// What the rows say together.
+    pub summary: ShiftSummary,
+    /// Whether what a figure of it needs is kept: its rows, and the states of the drive around it.
+    pub is_drawn: bool,
 }
 
 impl ScoredShift {
+    /// Leaves out what only its figure needs.
+    fn leave_undrawn(&mut self) {
+        (self.rows, self.is_drawn) = (Vec::new(), false);
+    }
+
     /// Errors by phase of the controlling and the other clutch; none where the shift has no kind.
     pub fn errors(&self) -> Option<ErrorsByPhase> {
-        self.kind.map(|kind| errors_by_phase(&self.rows, kind))
+        self.summary.errors
+    }
+
+    /// The largest RMS error of the controlling clutch's torque in a phase, N m; zero where the truth is not known.
+    pub fn worst_error_n_m(&self) -> f64 {
+        let errors = self.errors().unwrap_or_default();
+        errors.iter().map(|phase| phase[0].torque.rms_n_m()[0]).fold(0.0, f64::max)
     }
 
     /// How long a true phase lasts, s.
     pub fn length_s(&self, phase: TruePhase) -> f64 {
-        self.spans_s(phase).iter().fold(0.0, |length_s, [from_s, to_s]| length_s + (to_s - from_s))
+        self.summary.lengths_s[usize::from(phase == TruePhase::Inertia)]
     }
 
-    /// Begin and end of every piece of a phase, s.
+    /// Begin and end of every piece of a phase, s; none of a shift that has lost its rows.
     pub fn spans_s(&self, phase: TruePhase) -> Vec<[f64; 2]> {
-        // A row lasts until the next one; the last one, and one behind which rows are missing, as long as is usual.
-        const MISSING: f64 = 2.5;
-        let steps_s = self.rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
-        let usual_s =
-            Some(trace::median_step_s(steps_s)).filter(|step_s| step_s.is_finite()).unwrap_or(super::SAMPLE_S);
-        let end_s = |at: usize| {
-            let next = self.rows.get(at + 1).map(|next| next.time_s);
-            next.filter(|next| *next <= self.rows[at].time_s + MISSING * usual_s)
-                .unwrap_or(self.rows[at].time_s + usual_s)
-        };
-        let mut spans: Vec<[f64; 2]> = Vec::new();
-        for (at, row) in self.rows.iter().enumerate().filter(|(_, row)| row.phase() == Some(phase)) {
-            match spans.last_mut().filter(|[_, to_s]| *to_s == row.time_s) {
-                Some(span) => span[1] = end_s(at),
-                None => spans.push([row.time_s, end_s(at)]),
-            }
-        }
-        spans
+        spans_s(&self.rows, phase)
     }
 
-    /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without rows.
+    /// Whether the filter has tables for this shift, so that there are estimates.
+    pub fn is_estimated(&self) -> bool {
+        self.summary.counts.rows > 0
+    }
+
+    /// Share of the pressures and torques of both clutches that lie within their guaranteed ranges; `None` without estimates.
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn inside(&self) -> Option<f64> {
-        let clutches = || self.rows.iter().flat_map(|row| &row.clutches);
-        let inside = clutches().filter(|clutch| clutch.in_range).count();
-        (!self.rows.is_empty()).then(|| inside as f64 / clutches().count() as f64)
+        let [all, inside] = self.summary.clutches();
+        self.is_estimated().then(|| inside as f64 / all as f64)
     }
 
     /// Share of the rows of both phases in which the speeds show nothing of the controlling clutch's torque while it slips; `None`
     /// where there are none.
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn hidden(&self) -> Option<f64> {
-        let clutch = controlling(self.kind?);
-        let shown = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase().is_some();
-        let rows = self.rows.iter().filter(shown).map(|row| &row.clutches[clutch]);
-        let slipping: Vec<bool> = rows.filter(|clutch| !clutch.sticks).map(|clutch| clutch.hidden).collect();
-        let hidden = slipping.iter().filter(|hidden| **hidden).count();
-        (!slipping.is_empty()).then(|| hidden as f64 / slipping.len() as f64)
+        let [slipping, hidden] = self.summary.hidden;
+        (slipping > 0).then(|| hidden as f64 / slipping as f64)
     }
 
     /// Whether the true pressures and torques are known, as in a simulation.
     pub fn has_truth(&self) -> bool {
-        self.rows.iter().any(|row| row.clutches[0].torque_n_m[0].is_finite())
+        self.summary.has_truth
     }
 
     /// Mean estimate of the inertia phase, and of the ends of its range: pressure of the offgoing (0) or oncoming (1) clutch, Pa.
     pub fn mean_pressure_pa(&self, clutch: usize) -> Option<[f64; 3]> {
-        self.mean(clutch, |clutch| (clutch.pressure_pa[1], clutch.pressure_range_pa))
+        self.summary.mean_pressure_pa[clutch.min(1)]
     }
 
     /// The same of its torque, N m.
     pub fn mean_torque_n_m(&self, clutch: usize) -> Option<[f64; 3]> {
-        self.mean(clutch, |clutch| (clutch.torque_n_m[1], clutch.torque_range_n_m))
+        self.summary.mean_torque_n_m[clutch.min(1)]
     }
 
     /// Of a gearbox by its ratios alone: mean torque of the clutches at the turbine in the inertia phase, and the mean of its deviation, N m.
     pub fn mean_at_turbine_n_m(&self) -> Option<[f64; 2]> {
-        let inertia = self.rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
-        let torques: Vec<[f64; 2]> = inertia.filter_map(|row| row.at_turbine_n_m).collect();
-        #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
-        let mean = |which: usize| torques.iter().map(|torque| torque[which]).sum::<f64>() / torques.len() as f64;
-        (!torques.is_empty()).then(|| [mean(0), mean(1)])
+        self.summary.mean_at_turbine_n_m
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
-    fn mean(&self, clutch: usize, of: impl Fn(&ClutchRow) -> (f64, Option<[f64; 2]>)) -> Option<[f64; 3]> {
-        let (mut sum, mut count) = ([0.0; 3], 0_usize);
-        let inertia = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase() == Some(TruePhase::Inertia);
-        for row in self.rows.iter().filter(inertia) {
-            let (value, range) = of(&row.clutches[clutch.min(1)]);
-            let [low, high] = range.unwrap_or([f64::NAN; 2]);
-            [value, low, high].iter().zip(&mut sum).for_each(|(value, sum)| *sum += value);
-            count += 1;
-        }
-        (count > 0).then(|| sum.map(|sum| sum / count as f64))
-    }
-
-    /// The worst health and its share of the rows; `None` without rows.
+    /// The worst health and its share of the rows; `None` without estimates.
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn worst_health(&self) -> Option<(Health, f64)> {
-        let worst = self.rows.iter().map(|row| row.health).max()?;
-        let share = self.rows.iter().filter(|row| row.health == worst).count() as f64 / self.rows.len() as f64;
-        Some((worst, share))
+        let worst = Health::ALL.into_iter().filter(|health| self.summary.rows_with(*health) > 0).max()?;
+        Some((worst, self.summary.rows_with(worst) as f64 / self.summary.counts.rows as f64))
     }
 }
 
@@ -189,11 +170,10 @@ impl ScoredDrive {
         let row = |shift: &ScoredShift| {
             let (from, to, kind) = (shift.from, shift.to, shift.kind?);
             let [i_off, i_on] = [from, to].map(|gear| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
-            let errors = errors_by_phase(&shift.rows, kind);
             Some(MatrixRow {
                 shift: MatrixShift { from, to, kind, gain: (i_off - i_on).abs().recip() },
-                counts: counts(&shift.rows, &errors),
-                errors,
+                counts: shift.summary.counts,
+                errors: shift.errors()?,
                 failure: None,
             })
         };
@@ -208,6 +188,9 @@ pub(super) struct PassingShifts {
     pub(super) open: Option<ScoredShift>,
     /// States that were left when some were left out the last time.
     left: usize,
+    /// Shifts that are drawn, by their places, as far as it is decided; and how many shifts it is decided of.
+    drawn: Vec<usize>,
+    decided: usize,
 }
 
 impl PassingShifts {
@@ -217,7 +200,8 @@ impl PassingShifts {
         states.push(state);
         if states.len() >= (MOST_STATES as usize).max(2 * self.left) {
             let under_way = self.open.as_ref().map(|open| [open.time_s[0], f64::INFINITY]);
-            let shifts_s = self.drive.shifts.iter().map(|shift| shift.time_s).chain(under_way);
+            let drawn = self.drive.shifts.iter().filter(|shift| shift.is_drawn);
+            let shifts_s = drawn.map(|shift| shift.time_s).chain(under_way);
             *states = thinned(states, shifts_s, MOST_STATES / 4);
             self.left = states.len();
         }
@@ -232,7 +216,32 @@ impl PassingShifts {
         if self.open.as_ref().is_some_and(|open| open.is_garage) {
             (quality.flare_rad_s, quality.past_synchronous_rad_s) = (f64::NAN, f64::NAN);
         }
-        self.drive.shifts.extend(self.open.take().map(|shift| ScoredShift { quality, ..shift }));
+        self.drive.shifts.extend(self.open.take().map(|shift| {
+            let summary = ShiftSummary::of(&shift.rows, shift.kind);
+            ScoredShift { quality, summary, ..shift }
+        }));
+    }
+
+    /// Keeps what figures need of at most so many of the shifts that are wanted: those with the largest errors, of equal ones the first. In
+    /// the end they are the same ones however often it is called.
+    pub(super) fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
+        let shifts = &mut self.drive.shifts;
+        for at in self.decided..shifts.len() {
+            if is_wanted(&shifts[at]) {
+                self.drawn.push(at);
+            } else {
+                shifts[at].leave_undrawn();
+            }
+            if self.drawn.len() > most {
+                let error = |place: &usize| shifts[self.drawn[*place]].worst_error_n_m();
+                // The first of equal ones is the last of these, which is left out.
+                let least = (0..self.drawn.len()).rev().min_by(|a, b| error(a).total_cmp(&error(b)));
+                if let Some(place) = least {
+                    shifts[self.drawn.remove(place)].leave_undrawn();
+                }
+            }
+        }
+        self.decided = shifts.len();
     }
 
     /// Begins a shift. The turbine torque tells its kind.
@@ -254,6 +263,8 @@ impl PassingShifts {
             time_s: [time_s; 2],
             quality: CarShiftQuality::default(),
             rows: Vec::new(),
+            summary: ShiftSummary::default(),
+            is_drawn: true,
         });
     }
 }
@@ -365,5 +376,99 @@ fn state_of(sample: &CarSample, health: Health) -> DriveState {
         vehicle_m_s: sample.vehicle_m_s,
         speeds_rad_s: [torques.engine_rad_s, torques.turbine_rad_s, torques.output_rad_s],
         health,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ClutchRow;
+    use super::*;
+
+    /// Ten rows of an inertia phase, then ten in which one clutch holds; the torque is wrong by this.
+    fn rows(error_n_m: f64) -> Vec<ShiftScoreRow> {
+        let clutch = |sticks: bool, truth_n_m: f64| ClutchRow {
+            torque_n_m: [truth_n_m, truth_n_m + error_n_m, truth_n_m],
+            pressure_pa: [3e5, 3.1e5, 3e5],
+            sticks,
+            torque_range_n_m: Some([0.0, 200.0]),
+            pressure_range_pa: Some([2e5, 4e5]),
+            hidden: truth_n_m > 105.0,
+            in_range: truth_n_m < 108.0,
+        };
+        let row = |at: u32| ShiftScoreRow {
+            time_s: 5.0 + 0.01 * f64::from(at),
+            clutches: [clutch(at > 9, 50.0), clutch(false, 100.0 + f64::from(at))],
+            turbine_n_m: [90.0; 2],
+            speeds_rad_s: [200.0, 190.0, 100.0, 30.0],
+            flare_rad_s: 0.0,
+            phase: "-",
+            health: if at == 3 { Health::Flare } else { Health::Good },
+        };
+        (0..20).map(row).collect()
+    }
+
+    fn shift(number: usize, error_n_m: f64) -> ScoredShift {
+        let (rows, kind) = (rows(error_n_m), Some(ShiftKind::PowerOnUp));
+        ScoredShift {
+            number,
+            from: 1,
+            to: 2,
+            kind,
+            is_garage: false,
+            elements: [0, 1],
+            time_s: [5.0, 5.2],
+            quality: CarShiftQuality::default(),
+            summary: ShiftSummary::of(&rows, kind),
+            rows,
+            is_drawn: true,
+        }
+    }
+
+    #[test]
+    fn the_worst_shifts_stay_drawn_however_often_the_others_are_left_out() {
+        let errors = [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0, 5.0, 3.0, 5.0];
+        let is_wanted = |shift: &ScoredShift| shift.number != 6;
+        let drawn = |each: bool, most: usize| {
+            let mut passing = PassingShifts::default();
+            for (at, error_n_m) in errors.into_iter().enumerate() {
+                passing.drive.shifts.push(shift(at + 1, error_n_m));
+                if each {
+                    passing.draw_at_most(most, is_wanted);
+                }
+            }
+            passing.draw_at_most(most, is_wanted);
+            let shifts = &passing.drive.shifts;
+            assert!(shifts.iter().all(|shift| shift.is_drawn != shift.rows.is_empty() && shift.is_estimated()));
+            shifts.iter().filter(|shift| shift.is_drawn).map(|shift| shift.number).collect::<Vec<_>>()
+        };
+        // The sixth is the worst and not wanted; of three with 5 N m the first two.
+        assert_eq!(drawn(true, 3), [5, 8, 9]);
+        assert_eq!(drawn(false, 3), [5, 8, 9]);
+        // Of both with 3 N m the first.
+        assert_eq!(drawn(true, 6), [1, 3, 5, 8, 9, 11]);
+        assert_eq!(drawn(true, 0), [0; 0]);
+        assert_eq!(drawn(true, 60), [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]);
+    }
+
+    #[test]
+    fn a_shift_that_has_lost_its_rows_says_the_same_in_the_table() {
+        let whole = shift(1, 7.0);
+        let mut left = whole.clone();
+        left.leave_undrawn();
+        let said = |shift: &ScoredShift| {
+            let phases = [TruePhase::Torque, TruePhase::Inertia].map(|phase| shift.length_s(phase));
+            let means = (shift.mean_pressure_pa(1), shift.mean_torque_n_m(0));
+            (shift.errors(), phases, shift.inside(), shift.hidden(), shift.has_truth(), means, shift.worst_health())
+        };
+        assert_eq!(said(&left), said(&whole));
+        assert!((whole.worst_error_n_m() - 7.0).abs() < 1e-9);
+        let [torque_s, inertia_s] = [TruePhase::Torque, TruePhase::Inertia].map(|phase| whole.length_s(phase));
+        assert!((torque_s - 0.1).abs() < 1e-9 && (inertia_s - 0.1).abs() < 1e-9);
+        // Both clutches of the first eight rows, and one of the others; hidden from the seventh on.
+        assert_eq!((whole.inside(), whole.hidden()), (Some(28.0 / 40.0), Some(14.0 / 20.0)));
+        assert_eq!(whole.worst_health(), Some((Health::Flare, 0.05)));
+        let drive = ScoredDrive { shifts: vec![left], ..ScoredDrive::default() };
+        let other = ScoredDrive { shifts: vec![whole], ..ScoredDrive::default() };
+        assert!(drive.has_truth() && other.has_truth());
     }
 }

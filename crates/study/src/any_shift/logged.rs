@@ -17,7 +17,7 @@ use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
 use super::converter_check::ConverterCheck;
-use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive};
+use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
 use super::gear_signal::GearSignal;
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
@@ -516,6 +516,12 @@ impl<'c> LoggedDrive<'c> {
         let unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
         self.passing.end(CarShiftQuality { complete_s, ..unknown });
+    }
+
+    /// Keeps what figures need of at most so many of the shifts up to now that are wanted, those with the largest errors, of equal
+    /// ones the first: called after each row, it bounds what is held of a long drive.
+    pub fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
+        self.passing.draw_at_most(most, is_wanted);
     }
 
     /// The drive.

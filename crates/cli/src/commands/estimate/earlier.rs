@@ -45,7 +45,8 @@ fn is_estimate(path: &Path) -> bool {
         names.map(str::to_owned).collect()
     };
     // A log may have both gears, and nothing else.
-    let is_gear = |name: &str| [signal::GEAR, signal::TARGET_GEAR].contains(&name);
+    let gears = [signal::GEAR, signal::TARGET_GEAR, signal::GEAR_NUMBER, signal::TARGET_GEAR_NUMBER];
+    let is_gear = |name: &str| gears.contains(&name);
     names.iter().all(|name| is_estimate_column(name)) && names.iter().any(|name| !is_gear(name))
 }
 
@@ -71,6 +72,9 @@ mod tests {
                     "health",
                     "turbine_torque_estimate_n_m",
                     "offgoing_hidden",
+                    "target_gear_number",
+                    "oncoming_command_reading",
+                    "element_k1_command_reading",
                     "element_e_pressure_least_pa"
                 ])
                 .all(|name| is_estimate_column(name))

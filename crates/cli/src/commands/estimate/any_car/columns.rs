@@ -1,8 +1,11 @@
 //! The columns of an estimate of a car with any gearbox.
 
 use config::Car;
+use observer::ChannelHealth;
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate};
+use study::any_shift::channels::gear_number;
 use study::any_shift::logged::element_column;
+use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 
 use crate::failure::Failure;
@@ -21,6 +24,18 @@ pub(super) struct Row<'a> {
 impl<'a> Row<'a> {
     fn gear(&self, which: usize) -> Cell<'a> {
         Cell::Word(self.car.gearbox.gears.get(self.gears[which]).map_or("", |gear| gear.name.as_str()))
+    }
+
+    /// What became of the reading of a channel, by its place in [`READINGS`]; of the command of a clutch of the shift nothing where there
+    /// is none.
+    fn reading(&self, at: usize) -> Cell<'a> {
+        let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
+        let health = match READINGS.get(at) {
+            Some(&ONCOMING_COMMAND_READING) => clutches.and_then(|clutches| commands.get(clutches[1].element).copied()),
+            Some(&OFFGOING_COMMAND_READING) => clutches.and_then(|clutches| commands.get(clutches[0].element).copied()),
+            _ => channels.each().get(at).copied(),
+        };
+        Cell::Word(health.map_or("", ChannelHealth::name))
     }
 
     fn element(&self, which: usize) -> Cell<'a> {
@@ -64,6 +79,8 @@ const CLUTCH: [&str; 9] = [
     "valve_model_torque_n_m",
     "hidden",
 ];
+/// The column of an element, after its name, that says what became of the reading of its command.
+const COMMAND_READING: &str = "command_reading";
 /// The columns of an element, after its name: those of [`CLUTCH`] that its command alone gives.
 const ELEMENT: [&str; 3] = [CLUTCH[6], CLUTCH[1], CLUTCH[2]];
 const ROLES: [&str; 2] = ["offgoing", "oncoming"];
@@ -73,10 +90,16 @@ const ROLES: [&str; 2] = ["offgoing", "oncoming"];
 pub(super) enum Value {
     Of(for<'a> fn(&Row<'a>) -> Cell<'a>),
     Clutch(usize, usize),
+    /// The number of the gear (0) or the target gear (1).
+    GearNumber(usize),
     /// Pressure of an element by its valve model, by its place in the filter's tables.
     Valve(usize),
     /// An end of the range of that pressure.
     Range(usize, usize),
+    /// What became of the reading of a channel, by its place in [`READINGS`].
+    Reading(usize),
+    /// The same of the command of an element, by its place in the filter's tables.
+    Command(usize),
 }
 
 impl Value {
@@ -86,6 +109,9 @@ impl Value {
             Self::Clutch(which, what) => row.clutch_cell(which, what),
             Self::Valve(place) => Cell::Number(row.estimate.valve_pa[place.min(MAX_ELEMENTS - 1)]),
             Self::Range(place, end) => of(row.ranges_pa[place.min(MAX_ELEMENTS - 1)].map(|range| range[end] + 0.0)),
+            Self::GearNumber(which) => Cell::Number(gear_number(row.car, row.gears[which])),
+            Self::Reading(at) => row.reading(at),
+            Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
         }
     }
 }
@@ -110,14 +136,16 @@ impl Knows {
     }
 }
 
+fn word(name: &str, value: for<'a> fn(&Row<'a>) -> Cell<'a>) -> Column {
+    Column { name: name.to_owned(), kind: ColumnKind::Word, value: Value::Of(value) }
+}
+
+fn number(name: impl Into<String>, value: Value) -> Column {
+    Column { name: name.into(), kind: ColumnKind::Number, value }
+}
+
 /// The columns of a car whose elements have these places in the filter's tables.
 pub(super) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
-    let word = |name: &str, value: for<'a> fn(&Row<'a>) -> Cell<'a>| Column {
-        name: name.to_owned(),
-        kind: ColumnKind::Word,
-        value: Value::Of(value),
-    };
-    let number = |name: String, value: Value| Column { name, kind: ColumnKind::Number, value };
     let mut columns = vec![
         word(trace::signal::GEAR, |row| row.gear(0)),
         word(trace::signal::TARGET_GEAR, |row| row.gear(1)),
@@ -130,18 +158,31 @@ pub(super) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
             columns.extend(named.map(|(what, name)| number(format!("{role}_{name}"), Value::Clutch(which, what))));
         }
     }
-    columns.push(number("turbine_torque_estimate_n_m".to_owned(), Value::Of(|row| of(row.estimate.turbine_n_m))));
-    if !knows.elements {
-        columns.push(number(
-            "clutches_at_turbine_estimate_n_m".to_owned(),
-            Value::Of(|row| of(row.estimate.at_turbine.map(|clutches| clutches.torque_n_m + 0.0))),
-        ));
-        columns.push(number(
-            "clutches_at_turbine_deviation_n_m".to_owned(),
-            Value::Of(|row| of(row.estimate.at_turbine.map(|clutches| clutches.deviation_n_m))),
-        ));
+    columns.extend(torques(knows));
+    for (place, name) in places {
+        let values = [Value::Valve(*place), Value::Range(*place, 0), Value::Range(*place, 1)];
+        columns.extend(
+            ELEMENT.iter().zip(values).map(|(what, value)| number(format!("{}_{what}", element_column(name)), value)),
+        );
     }
-    columns.push(number(trace::signal::SHAFT_ESTIMATE.to_owned(), Value::Of(|row| of(row.estimate.shaft_n_m))));
+    columns.push(word(trace::signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
+    let gears = [(trace::signal::GEAR_NUMBER, 0), (trace::signal::TARGET_GEAR_NUMBER, 1)];
+    columns.extend(gears.map(|(name, which)| number(name, Value::GearNumber(which))));
+    columns.extend(readings(places, knows));
+    columns
+}
+
+/// Torques beside those of the clutches of a shift.
+fn torques(knows: Knows) -> Vec<Column> {
+    let mut columns = vec![number("turbine_torque_estimate_n_m", Value::Of(|row| of(row.estimate.turbine_n_m)))];
+    if !knows.elements {
+        let clutches: [(&str, for<'a> fn(&Row<'a>) -> Cell<'a>); 2] = [
+            ("clutches_at_turbine_estimate_n_m", |row| of(row.estimate.at_turbine.map(|sum| sum.torque_n_m + 0.0))),
+            ("clutches_at_turbine_deviation_n_m", |row| of(row.estimate.at_turbine.map(|sum| sum.deviation_n_m))),
+        ];
+        columns.extend(clutches.map(|(name, value)| number(name, Value::Of(value))));
+    }
+    columns.push(number(trace::signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.estimate.shaft_n_m))));
     let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
     columns.push(number(
         format!("{clutch}_torque_estimate_n_m"),
@@ -151,14 +192,19 @@ pub(super) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
         format!("{clutch}_torque_deviation_n_m"),
         Value::Of(|row| of(row.estimate.input_clutch.map(|clutch| clutch.deviation_n_m))),
     ));
-    for (place, name) in places {
-        let values = [Value::Valve(*place), Value::Range(*place, 0), Value::Range(*place, 1)];
-        columns.extend(
-            ELEMENT.iter().zip(values).map(|(what, value)| number(format!("{}_{what}", element_column(name)), value)),
-        );
-    }
-    columns.push(word(trace::signal::HEALTH, |row| Cell::Word(row.estimate.health.name())));
     columns
+}
+
+/// What became of the reading of each channel, and of the command of each element.
+fn readings(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
+    let words = |name: String, value: Value| Column { name, kind: ColumnKind::Word, value };
+    let is_command = |name: &str| [OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING].contains(&name);
+    let channels = READINGS.iter().enumerate().filter(|(_, name)| knows.elements || !is_command(name));
+    let channels = channels.map(|(at, name)| words((*name).to_owned(), Value::Reading(at)));
+    let command = |(place, name): &(usize, &str)| {
+        words(format!("{}_{COMMAND_READING}", element_column(name)), Value::Command(*place))
+    };
+    channels.chain(places.iter().map(command)).collect()
 }
 
 /// Whether the estimate of some car may have a column of this name.
@@ -170,7 +216,8 @@ pub(in crate::commands::estimate) fn is_car_column(name: &str) -> bool {
     let is_one = |[converter, elements]: [bool; 2]| {
         columns(&[], Knows { converter, elements }).iter().any(|column| column.name == name)
     };
-    [[true, true], [false, true], [true, false]].into_iter().any(is_one) || ELEMENT.into_iter().any(of_element)
+    [[true, true], [false, true], [true, false]].into_iter().any(is_one)
+        || ELEMENT.into_iter().chain([COMMAND_READING]).any(of_element)
 }
 
 fn of(value: Option<f64>) -> Cell<'static> {

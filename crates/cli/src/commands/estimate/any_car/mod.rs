@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 use config::{Car, Sensors};
 use design::ShiftTables;
 use logs::ChannelMap;
-use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
+use report::drive_page::{DrivePage, MOST_DRAWN, findings, shift_cells, shift_rows, shift_words};
 use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
 use trace::{Cell, shown_path};
@@ -104,12 +104,15 @@ pub(super) fn estimate(
     let mut passing = Passing::new(Selection::of(options));
     let mut checks = log.columns(car, tables);
     let mut times = RowTimes::default();
+    // Without a page no shift is drawn.
+    let most_drawn = output.and_then(beside).map_or(0, |_| MOST_DRAWN);
     while let Some(step) = log.next_step()? {
         times.push(&step);
         if let Some(checks) = &mut checks {
             checks.push(&step);
         }
         let estimate = drive.push(&step);
+        drive.draw_at_most(most_drawn, |shift| passing.wants(shift.number, car, [shift.from, shift.to]));
         let gears = [step.input.gear.from, step.input.gear.to];
         let row = Row { car, places: &places, gears, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {

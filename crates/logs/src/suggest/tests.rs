@@ -1,0 +1,195 @@
+//! Names of channels in logs of several kinds.
+
+use super::*;
+
+fn channel(name: &str, unit: &str) -> Channel {
+    Channel { name: name.to_owned(), unit: unit.to_owned(), group: String::new() }
+}
+
+/// The channel that is suggested for each role.
+fn suggested(channels: &[Channel]) -> Vec<(String, String)> {
+    let text = suggest(channels, None);
+    let table: toml::Table = text.parse().unwrap();
+    let channels = table.get("channel").and_then(|value| value.as_table()).cloned().unwrap_or_default();
+    channels.into_iter().map(|(role, entry)| (role, entry["name"].as_str().unwrap().to_owned())).collect()
+}
+
+#[test]
+fn usual_names_in_two_languages_are_found() {
+    let logs: [&[(&str, &str, &str)]; 8] = [
+        &[
+            ("N_Eng", "rpm", "engine_speed"),
+            ("N_Turb", "rpm", "turbine_speed"),
+            ("N_Out", "rpm", "output_speed"),
+            ("GearCurrent", "", "gear"),
+        ],
+        &[
+            ("Motordrehzahl", "1/min", "engine_speed"),
+            ("Turbinendrehzahl", "1/min", "turbine_speed"),
+            ("Abtriebsdrehzahl", "1/min", "output_speed"),
+            ("Zielgang", "", "target_gear"),
+            ("Ventilstrom_Kupplung_B", "mA", "oncoming_current"),
+        ],
+        &[
+            ("EngineSpeed", "rpm", "engine_speed"),
+            ("TurbineSpeed", "rpm", "turbine_speed"),
+            ("VehicleSpeed", "km/h", "vehicle_speed"),
+            ("TargetGear", "", "target_gear"),
+            ("CurrentGear", "", "gear"),
+            ("EngineTorque", "Nm", "engine_torque"),
+            ("OilTemperature", "degC", "oil_temperature"),
+        ],
+        &[
+            ("engine_speed_rad_s", "rad/s", "engine_speed"),
+            ("turbine_speed_rad_s", "rad/s", "turbine_speed"),
+            ("output_speed_rad_s", "rad/s", "output_speed"),
+            ("wheel_speed_rad_s", "rad/s", "wheel_speed"),
+            ("oncoming_current_a", "A", "oncoming_current"),
+            ("offgoing_current_a", "A", "offgoing_current"),
+            ("throttle", "", "throttle"),
+        ],
+        &[("I_ClA", "mA", "oncoming_current"), ("I_ClA_off", "mA", "offgoing_current"), ("APP", "%", "throttle")],
+        &[
+            ("SolCurr_A", "mA", "element_a_current"),
+            ("SolCurr_B", "mA", "element_b_current"),
+            ("SolCurr_C", "mA", "element_c_current"),
+            ("Gear_Tgt", "", "target_gear"),
+            ("AccPed", "%", "throttle"),
+            ("BrkPed", "%", ""),
+        ],
+        &[
+            ("element_a_current_a", "A", "element_a_current"),
+            ("element_b_duty_percent", "%", "element_b_duty"),
+            ("element_35r_current_ma", "mA", "element_35r_current"),
+            ("lock_up_applied", "", "lock_up_applied"),
+            ("oncoming_current_a", "A", "oncoming_current"),
+        ],
+        &[
+            ("I_ClA", "mA", "element_a_current"),
+            ("Solenoid_B1_Current_A", "A", "element_b1_current"),
+            ("Kupplung_E_Strom_Ist", "mA", "element_e_current"),
+            ("TCC_State", "", "lock_up_applied"),
+            ("TCC_Sol_Current", "mA", ""),
+        ],
+    ];
+    for log in logs {
+        let found = suggested(&log.iter().map(|(name, unit, _)| channel(name, unit)).collect::<Vec<_>>());
+        for (name, _, role) in log.iter().filter(|(.., role)| !role.is_empty()) {
+            assert!(found.contains(&((*role).to_owned(), (*name).to_owned())), "{name}: {found:?}");
+        }
+        assert_eq!(found.len(), log.iter().filter(|(.., role)| !role.is_empty()).count(), "{found:?}");
+    }
+}
+
+#[test]
+fn short_names_and_those_of_a_bus_for_lorries_are_found() {
+    let short = [
+        ("NMot", "1/min", "engine_speed"),
+        ("nTurb", "1/min", "turbine_speed"),
+        ("nAb", "1/min", "output_speed"),
+        ("TqEng", "Nm", "engine_torque"),
+        ("Tq", "Nm", ""),
+        ("Thr", "%", "throttle"),
+        ("GearAct", "", "gear"),
+        ("TGear", "", "target_gear"),
+        ("TOT", "degC", "oil_temperature"),
+        ("I_A", "mA", "element_a_current"),
+        ("I_B", "mA", "element_b_current"),
+        ("I_K1", "mA", "element_k1_current"),
+    ];
+    let others = [
+        ("EngTrq", "Nm", "engine_torque"),
+        ("ThrPos", "%", "throttle"),
+        ("GearTgt", "", "target_gear"),
+        ("I_SolA", "A", "element_a_current"),
+        ("I_SolB", "A", "element_b_current"),
+        ("I_SolC", "A", "element_c_current"),
+        ("Getriebeöltemperatur", "°C", "oil_temperature"),
+        ("Fahrzeuggeschwindigkeit", "km/h", "vehicle_speed"),
+        ("Getriebeeingangsdrehzahl", "1/min", "turbine_speed"),
+    ];
+    let bus = [
+        ("EngineSpeed", "rpm", "engine_speed"),
+        ("InputShaftSpeed", "rpm", "turbine_speed"),
+        ("TransOutShaftSpeed", "rpm", "output_speed"),
+        ("WheelBasedVehSpeed", "km/h", "vehicle_speed"),
+        ("Accelerator Pedal Position 1", "%", "throttle"),
+        ("TransCurrentGear", "", "gear"),
+        ("TransSelectedGear", "", "target_gear"),
+        ("TransShiftInProcess", "", "shift_active"),
+        ("TransTorqueConverterLockupEngaged", "", "lock_up_applied"),
+        ("TransOilTemp1", "degC", "oil_temperature"),
+        ("ActualEngPercentTorque", "%", ""),
+        ("DriversDemandEngPercentTorque", "%", ""),
+        ("EngOilTemp1", "degC", ""),
+        ("EngTurbocharger1Speed", "rpm", ""),
+    ];
+    for log in [&short[..], &others, &bus] {
+        let mut found = suggested(&log.iter().map(|(name, unit, _)| channel(name, unit)).collect::<Vec<_>>());
+        let named = log.iter().filter(|(.., role)| !role.is_empty());
+        let mut expected: Vec<_> = named.map(|(name, _, role)| ((*role).to_owned(), (*name).to_owned())).collect();
+        found.sort();
+        expected.sort();
+        assert_eq!(found, expected);
+    }
+    // Where nothing else is an engine torque, a name that says no more than torque may be it.
+    assert_eq!(suggested(&[channel("Tq", "Nm")]), [("engine_torque".to_owned(), "Tq".to_owned())]);
+}
+
+#[test]
+fn names_that_look_alike_are_not_taken() {
+    let alike = [
+        ("EngOilTemp1", "degC"),
+        ("T_Oil_Axle", "degC"),
+        ("GearRatio", ""),
+        ("KnockThr", ""),
+        ("SlipThr", "rpm"),
+        ("BrkPedPos", "%"),
+        ("FanSpeed", "rpm"),
+        ("EngRequestedSpeed", "rpm"),
+        ("TqWhl", "Nm"),
+        ("EngTorqueMode", ""),
+        ("AccelPedal1LowIdleSwitch", ""),
+        ("FrontAxleSpeed", "rpm"),
+        ("RelativeSpeedRearAxle1LeftWheel", "km/h"),
+        ("I_Bat", "A"),
+        ("I_Line", "A"),
+        ("I_TCC", "A"),
+        ("I_A", "degC"),
+    ];
+    for (name, unit) in alike {
+        assert_eq!(suggested(&[channel(name, unit)]), [], "{name}");
+    }
+    let role = |name: &str, unit: &str| suggested(&[channel(name, unit)]).pop().map(|(role, _)| role);
+    // The acceleration of the car is no pedal, and the lever no gear.
+    assert_eq!(role("ax", "m/s^2").as_deref(), Some("vehicle_acceleration"));
+    assert_eq!(role("GearLever", "").as_deref(), Some("selector"));
+    assert_eq!(role("Gear_Sel", "").as_deref(), Some("selector"));
+}
+
+#[test]
+fn per_cent_of_a_torque_and_single_currents_stand_as_comments() {
+    for unit in ["%", ""] {
+        let text = suggest(&[channel("ActualEngPercentTorque", unit)], None);
+        let block = "# [channel.engine_torque]\n# name = \"ActualEngPercentTorque\"\n# unit = \"N m\"";
+        assert!(text.contains(block) && text.contains("\n# scale =\n"), "{text}");
+    }
+    let text = suggest(&[channel("I_A", "mA"), channel("I_B", "mA")], None);
+    assert!(text.contains("# Perhaps commands of clutches, which an estimate needs: I_A, I_B\n"), "{text}");
+    assert_eq!(suggested(&[channel("I_A", "mA"), channel("I_B", "mA")]), []);
+}
+
+#[test]
+fn the_input_of_a_gearbox_is_found_and_unused_channels_are_named() {
+    let text = suggest(&[channel("N_In", "1/min"), channel("I_K1", "mA"), channel("Wiper", "")], None);
+    assert!(text.contains("[channel.turbine_speed]\nname = \"N_In\""), "{text}");
+    assert!(text.ends_with("# Channels that are not used: I_K1, Wiper\n"), "{text}");
+    let many: Vec<Channel> = (0..30).map(|at| channel(&format!("Signal{at}"), "")).collect();
+    assert!(suggest(&many, None).ends_with("Signal19, ...\n"));
+}
+
+#[test]
+fn a_name_with_quotation_marks_stays_a_name() {
+    let found = suggested(&[channel("Engine \"speed\" \\ n", "rpm")]);
+    assert_eq!(found, [("engine_speed".to_owned(), "Engine \"speed\" \\ n".to_owned())]);
+}

@@ -1,0 +1,114 @@
+//! What the rows of a shift say together: what is left of it where it is not drawn.
+
+use drivetrain::ShiftKind;
+use observer::Health;
+
+use super::matrix::{ErrorsByPhase, MatrixCounts, controlling, counts, errors_by_phase};
+use super::{ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase};
+
+/// Sums and means over the rows of a shift.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ShiftSummary {
+    /// Whether the true pressures and torques are known.
+    pub has_truth: bool,
+    /// Counts over the rows.
+    pub counts: MatrixCounts,
+    /// Errors by phase of the controlling and the other clutch; none where the shift has no kind.
+    pub errors: Option<ErrorsByPhase>,
+    /// Rows with each health, in the order of [`Health::ALL`].
+    pub healths: [u64; Health::ALL.len()],
+    /// How long torque and inertia phase last, s.
+    pub lengths_s: [f64; 2],
+    /// Rows of both phases in which the controlling clutch slips, and those of them in which the speeds show nothing of its torque.
+    pub hidden: [u64; 2],
+    /// Mean estimate of the inertia phase, and of the ends of its range, by clutch: pressure, Pa.
+    pub mean_pressure_pa: [Option<[f64; 3]>; 2],
+    /// The same of the torque, N m.
+    pub mean_torque_n_m: [Option<[f64; 3]>; 2],
+    /// Of a gearbox by its ratios alone: mean torque of the clutches together at the turbine in the inertia phase, and of its deviation, N m.
+    pub mean_at_turbine_n_m: Option<[f64; 2]>,
+}
+
+impl ShiftSummary {
+    /// That of a shift of this kind with these rows.
+    pub(super) fn of(rows: &[ShiftScoreRow], kind: Option<ShiftKind>) -> Self {
+        let errors = kind.map(|kind| errors_by_phase(rows, kind));
+        let length_s = |phase: TruePhase| {
+            spans_s(rows, phase).iter().fold(0.0, |length_s, [from_s, to_s]| length_s + (to_s - from_s))
+        };
+        let with = |health: Health| rows.iter().filter(|row| row.health == health).count() as u64;
+        Self {
+            has_truth: rows.iter().any(|row| row.clutches[0].torque_n_m[0].is_finite()),
+            counts: counts(rows, &errors.unwrap_or_default()),
+            errors,
+            healths: Health::ALL.map(with),
+            lengths_s: [TruePhase::Torque, TruePhase::Inertia].map(length_s),
+            hidden: kind.map_or([0; 2], |kind| hidden(rows, controlling(kind))),
+            mean_pressure_pa: [0, 1]
+                .map(|clutch| mean(rows, clutch, |clutch| (clutch.pressure_pa[1], clutch.pressure_range_pa))),
+            mean_torque_n_m: [0, 1]
+                .map(|clutch| mean(rows, clutch, |clutch| (clutch.torque_n_m[1], clutch.torque_range_n_m))),
+            mean_at_turbine_n_m: mean_at_turbine(rows),
+        }
+    }
+
+    /// Rows with this health.
+    pub fn rows_with(&self, health: Health) -> u64 {
+        Health::ALL.iter().zip(self.healths).find(|(it, _)| **it == health).map_or(0, |(_, rows)| rows)
+    }
+
+    /// Clutches of all rows, and those whose pressure and torque lie within their guaranteed ranges.
+    pub fn clutches(&self) -> [u64; 2] {
+        let all = self.counts.values / 2;
+        [all, all - self.counts.outside]
+    }
+}
+
+/// Begin and end of every piece of a phase, s.
+pub(super) fn spans_s(rows: &[ShiftScoreRow], phase: TruePhase) -> Vec<[f64; 2]> {
+    // A row lasts until the next one; the last one, and one behind which rows are missing, as long as is usual.
+    const MISSING: f64 = 2.5;
+    let steps_s = rows.windows(2).map(|pair| pair[1].time_s - pair[0].time_s).collect();
+    let usual_s = Some(trace::median_step_s(steps_s)).filter(|step_s| step_s.is_finite()).unwrap_or(SAMPLE_S);
+    let end_s = |at: usize| {
+        let next = rows.get(at + 1).map(|next| next.time_s);
+        next.filter(|next| *next <= rows[at].time_s + MISSING * usual_s).unwrap_or(rows[at].time_s + usual_s)
+    };
+    let mut spans: Vec<[f64; 2]> = Vec::new();
+    for (at, row) in rows.iter().enumerate().filter(|(_, row)| row.phase() == Some(phase)) {
+        match spans.last_mut().filter(|[_, to_s]| *to_s == row.time_s) {
+            Some(span) => span[1] = end_s(at),
+            None => spans.push([row.time_s, end_s(at)]),
+        }
+    }
+    spans
+}
+
+/// Rows of both phases in which a clutch slips, and those of them in which the speeds show nothing of its torque.
+fn hidden(rows: &[ShiftScoreRow], clutch: usize) -> [u64; 2] {
+    let shown = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase().is_some();
+    let rows = rows.iter().filter(shown).map(|row| &row.clutches[clutch]);
+    rows.filter(|clutch| !clutch.sticks)
+        .fold([0; 2], |[all, hidden], clutch| [all + 1, hidden + u64::from(clutch.hidden)])
+}
+
+#[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+fn mean(rows: &[ShiftScoreRow], clutch: usize, of: impl Fn(&ClutchRow) -> (f64, Option<[f64; 2]>)) -> Option<[f64; 3]> {
+    let (mut sum, mut count) = ([0.0; 3], 0_usize);
+    let inertia = |row: &&ShiftScoreRow| row.at_turbine_n_m.is_none() && row.phase() == Some(TruePhase::Inertia);
+    for row in rows.iter().filter(inertia) {
+        let (value, range) = of(&row.clutches[clutch]);
+        let [low, high] = range.unwrap_or([f64::NAN; 2]);
+        [value, low, high].iter().zip(&mut sum).for_each(|(value, sum)| *sum += value);
+        count += 1;
+    }
+    (count > 0).then(|| sum.map(|sum| sum / count as f64))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+fn mean_at_turbine(rows: &[ShiftScoreRow]) -> Option<[f64; 2]> {
+    let inertia = rows.iter().filter(|row| row.phase() == Some(TruePhase::Inertia));
+    let torques: Vec<[f64; 2]> = inertia.filter_map(|row| row.at_turbine_n_m).collect();
+    let mean = |which: usize| torques.iter().map(|torque| torque[which]).sum::<f64>() / torques.len() as f64;
+    (!torques.is_empty()).then(|| [mean(0), mean(1)])
+}
