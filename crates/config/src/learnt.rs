@@ -16,6 +16,7 @@ struct RawLearnt {
     elements: Spanned<Vec<String>>,
     shifts: u32,
     refused: u8,
+    oil_temperature_degc: Option<f64>,
     mean: Spanned<Vec<f64>>,
     covariance: Spanned<Vec<Vec<f64>>>,
 }
@@ -33,11 +34,13 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     // The covariance is symmetric: its lower triangle.
     let triangle = learnt.covariance.iter().enumerate();
     let triangle = triangle.map(|(k, values)| format!("  [{}],\n", row(&values[..=k])));
+    // The temperature that it is for, where the log has one.
+    let oil = learnt.oil_degc.map_or_else(String::new, |degc| format!("oil_temperature_degc = {degc:?}\n"));
     format!(
         "# What the filter for any shift has learnt of a car. Each number is in units of the deviation that the quantity has\n\
          # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input, stiffness\n\
          # of the drive shafts, scale of the wheel speed.\n\
-         gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\nmean = [{}]\ncovariance = [\n{}]\n",
+         gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\n{oil}mean = [{}]\ncovariance = [\n{}]\n",
         toml_string(&gearbox.name),
         elements.join(", "),
         learnt.shifts,
@@ -74,8 +77,9 @@ pub fn read_learnt(gearbox: &Gearbox, source: &Source) -> Result<Learnt<f64>, Co
     let (mean, covariance) = (raw.mean.get_ref(), raw.covariance.get_ref());
     size("mean", raw.mean.span().start, mean.len(), LEARNT)?;
     size("covariance", raw.covariance.span().start, covariance.len(), LEARNT)?;
-    let (shifts, refused) = (raw.shifts, raw.refused);
-    let mut learnt = Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0 };
+    let (shifts, refused, oil_degc) = (raw.shifts, raw.refused, raw.oil_temperature_degc);
+    let mut learnt =
+        Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0, oil_degc };
     learnt.mean.copy_from_slice(mean);
     for (i, row) in covariance.iter().enumerate() {
         size("covariance", raw.covariance.span().start, row.len(), i + 1)?;
@@ -106,8 +110,14 @@ mod tests {
 
     /// Something that was learnt: unequal numbers everywhere.
     fn learnt() -> Learnt<f64> {
-        let mut learnt =
-            Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts: 31, refused: 2, odds: 0.0 };
+        let mut learnt = Learnt {
+            mean: [0.0; LEARNT],
+            covariance: [[0.0; LEARNT]; LEARNT],
+            shifts: 31,
+            refused: 2,
+            odds: 0.0,
+            oil_degc: Some(81.5),
+        };
         for i in 0..LEARNT {
             learnt.mean[i] = 1.0 / (i as f64 + 3.0) - 0.1;
             for j in 0..LEARNT {
@@ -122,6 +132,11 @@ mod tests {
         let gearbox = eight_speed();
         let source = Source::built_in("learnt.toml", &write_learnt(&gearbox, &learnt()));
         assert_eq!(read_learnt(&gearbox, &source).unwrap(), learnt());
+        // A car without a sensor of the oil's temperature.
+        let without = Learnt { oil_degc: None, ..learnt() };
+        let text = write_learnt(&gearbox, &without);
+        assert!(!text.contains("oil_temperature"));
+        assert_eq!(read_learnt(&gearbox, &Source::built_in("learnt.toml", &text)).unwrap(), without);
     }
 
     #[test]
@@ -140,6 +155,7 @@ mod tests {
         assert!(earlier.contains("has 34 numbers, expected 35") && earlier.contains("another version"), "{earlier}");
         assert!(refused(&text.replace("7e-1", "-7e-1")).contains("no covariance"));
         assert!(refused(&text.replace("7e-1", "nan")).contains("no covariance"));
+        assert!(refused(&text.replace("81.5", "815")).contains("bounds"));
         // Cut anywhere in the middle.
         for part in 1..8 {
             assert!(read_learnt(&gearbox, &Source::built_in("learnt.toml", &text[..part * text.len() / 8])).is_err());

@@ -77,8 +77,15 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
             gear,
         };
         let (time_s, truth) = (0.01 * f64::from(row), [[f64::NAN; 3]; 2]);
-        let estimate =
-            drive.push(&LogStep { time_s, input, pedals: [0.0; 2], vehicle_m_s: 10.0, reported_n_m: None, truth });
+        let estimate = drive.push(&LogStep {
+            time_s,
+            input,
+            pedals: [0.0; 2],
+            vehicle_m_s: 10.0,
+            oil_degc: None,
+            reported_n_m: None,
+            truth,
+        });
         assert!(estimate.valve_pa.iter().all(|pressure_pa| !pressure_pa.is_infinite()));
     }
     // What is written is read again.

@@ -92,6 +92,8 @@ pub const TURBINE_TORQUE: &str = "turbine_torque_n_m";
 pub const SHAFT_TORQUE: &str = "shaft_torque_n_m";
 /// True vehicle speed, m/s.
 pub const VEHICLE_SPEED: &str = "vehicle_speed_m_s";
+/// Temperature of the oil in the gearbox, degC.
+pub const OIL_TEMPERATURE: &str = "oil_temperature_degc";
 /// True vehicle acceleration, m/s^2.
 pub const VEHICLE_ACCELERATION: &str = "vehicle_acceleration_m_s2";
 /// True phase of the shift, a word.

@@ -167,3 +167,41 @@ fn a_friction_above_the_file_is_said_in_words() {
     }
     assert!(text.contains("\nlearnt scale of the wheel speed: it reads "), "{text}");
 }
+
+/// The log with a column of the oil's temperature, degC.
+fn with_oil(text: &str, degc: &str) -> String {
+    let mut lines = text.lines();
+    let head = format!("{},oil_temperature_degc\n", lines.next().unwrap());
+    head + &lines.map(|line| format!("{line},{degc}\n")).collect::<String>()
+}
+
+#[test]
+fn a_log_with_colder_oil_forgets_what_depends_on_it() {
+    let folder = Folder::new("learnt-oil");
+    town(&folder, 1, &vehicle("eight_speed"));
+    let text = folder.read("sim/city_measured.csv");
+    for degc in ["80", "82", "20", ""] {
+        folder.write(&format!("oil_{degc}.csv"), with_oil(&text, degc));
+    }
+    let warm = folder.path("warm.toml");
+    said(&estimate(&folder, &["oil_80.csv"], &["-o", &folder.path("first.csv"), "--learnt", &warm]));
+    assert!(folder.read("warm.toml").contains("\noil_temperature_degc = 80.0\n"));
+    let again = |degc: &str| {
+        let learnt = folder.write("again.toml", folder.read("warm.toml"));
+        said(&estimate(
+            &folder,
+            &[&format!("oil_{degc}.csv")],
+            &["-o", &folder.path("again.csv"), "--learnt", &learnt],
+        ));
+        folder.read("again.csv")
+    };
+    let (same, near, cold, unknown) = (again("80"), again("82"), again("20"), again(""));
+    assert!(
+        same == near && same == unknown,
+        "two kelvin are the noise of a sensor, and without a reading time alone counts"
+    );
+    assert!(same != cold);
+    // Without a file the temperature changes nothing.
+    said(&estimate(&folder, &["oil_20.csv"], &["-o", &folder.path("cold.csv")]));
+    assert!(folder.read("cold.csv") == folder.read("first.csv"));
+}

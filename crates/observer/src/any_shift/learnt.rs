@@ -80,11 +80,16 @@ const ODDS_OF_SHIFT: f64 = 2.3;
 const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
-/// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the temperature of the
-/// oil, of which there is no channel; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
+/// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the
+/// oil; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
 /// common, and fade together: else their correlation could not last.
 const WITH_OIL_S: f64 = 7200.0;
 const INERTIA_S: f64 = 3.6e6;
+/// Change of the oil's temperature in which as much is forgotten as in [`WITH_OIL_S`], K \[chosen\]; from this change on it counts, so that the noise
+/// of a sensor makes nothing forgotten; and temperatures that an oil can have, degC.
+const OIL_K: f64 = 40.0;
+const OIL_STEP_K: f64 = 5.0;
+const OIL_DEGC: [f64; 2] = [-60.0, 220.0];
 
 /// What is learnt, as a Gaussian. It is plain data and can be written to a file and read again; what is read must pass
 /// [`Learnt::checked`].
@@ -101,6 +106,8 @@ pub struct Learnt<T> {
     pub refused: u8,
     /// Logarithm of the odds that it is of this car, against any car of the budget.
     pub odds: T,
+    /// Temperature of the oil that it is for, degC, where that was read.
+    pub oil_degc: Option<T>,
 }
 
 /// What is learnt of an element: error and its standard deviation.
@@ -184,7 +191,7 @@ impl<T: Real> Learnt<T> {
                 *value = unlearnt(correlations, k, j);
             }
         }
-        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0, odds: T::of(ODDS_MOST) }
+        Self { mean: [T::zero(); LEARNT], covariance, shifts: 0, refused: 0, odds: T::of(ODDS_MOST), oil_degc: None }
     }
 
     /// Mean and covariance of torque factor and kiss point of an element.
@@ -357,13 +364,27 @@ impl<T: Real> Learnt<T> {
         }
     }
 
+    /// Takes a temperature of the oil, degC, and returns the time in which as much would be forgotten, s.
+    pub(super) fn take_oil(&mut self, degc: T) -> T {
+        if !is_oil(degc) {
+            return T::zero();
+        }
+        let change = self.oil_degc.map_or(T::zero(), |before| (degc - before).abs());
+        if self.oil_degc.is_none() || change >= T::of(OIL_STEP_K) {
+            self.oil_degc = Some(degc);
+            return change * T::of(WITH_OIL_S / OIL_K);
+        }
+        T::zero()
+    }
+
     /// Whether all are numbers within their bounds, and the covariance is one.
     fn is_sound(&self) -> bool {
         let within = |value: T, most: f64| value.abs() <= T::of(most);
         let means = self.mean.iter().enumerate().all(|(k, &mean)| within(mean, edge(k)));
         let symmetric = (0..LEARNT).all(|i| (0..i).all(|j| self.covariance[i][j] == self.covariance[j][i]));
         let variances = (0..LEARNT).all(|i| within(self.covariance[i][i], VARIANCE_MOST));
-        means && symmetric && variances && within(self.odds, ODDS_MOST) && is_positive(self.covariance)
+        let oil = self.oil_degc.is_none_or(is_oil);
+        means && symmetric && variances && oil && within(self.odds, ODDS_MOST) && is_positive(self.covariance)
     }
 
     /// What was read from a file, or `None` if it cannot be what a filter has learnt: not numbers, outside the bounds, or no
@@ -381,8 +402,15 @@ impl<T: Real> Learnt<T> {
             shifts: self.shifts,
             refused: self.refused,
             odds: to(self.odds),
+            oil_degc: self.oil_degc.map(to),
         }
     }
+}
+
+/// Whether oil can have this temperature, degC.
+fn is_oil<T: Real>(degc: T) -> bool {
+    let [least, greatest] = OIL_DEGC.map(T::of);
+    least <= degc && degc <= greatest
 }
 
 /// Bound of a quantity in its deviations.

@@ -500,6 +500,12 @@ impl<T: Real> AnyShiftState<T> {
         &self.learnt
     }
 
+    /// Takes a reading of the oil's temperature, degC: what depends on it is forgotten with its changes, from the next shift on. A car
+    /// without this sensor leaves it out, and time alone makes forget.
+    pub fn take_oil_temperature(&mut self, degc: T) {
+        self.fading_s = self.fading_s + self.learnt.take_oil(degc);
+    }
+
     /// Ends the filter. What a shift has shown up to then is not learnt: it is not known what went wrong.
     fn lose(&mut self) {
         self.lost = self.lost || self.running.take().is_some();

@@ -53,6 +53,7 @@ pub struct CarChannels<'a> {
     lock_up_applied: bool,
     pedal: f64,
     vehicle_m_s: Option<f64>,
+    oil_degc: Option<f64>,
     truth: [f64; 2],
 }
 
@@ -68,8 +69,8 @@ impl<'a> CarChannels<'a> {
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
         let (gears, truth) = ([NO_GEAR; 2], [f64::NAN; 2]);
         let signals = [Role::Gear, Role::TargetGear].map(|role| GearSignal::new(role.name()));
-        let (lock_up_applied, pedal, vehicle_m_s) = (false, f64::NAN, None);
-        Ok(Self { car, steps, entries, gears, signals, lock_up_applied, pedal, vehicle_m_s, truth })
+        let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
+        Ok(Self { car, steps, entries, gears, signals, lock_up_applied, pedal, vehicle_m_s, oil_degc, truth })
     }
 
     /// The readings, with their summary and notes.
@@ -114,6 +115,7 @@ impl<'a> CarChannels<'a> {
                 Role::LockUpApplied => self.lock_up_applied = measured.value > 0.5,
                 Role::Throttle => self.pedal = measured.value,
                 Role::VehicleSpeed => self.vehicle_m_s = Some(measured.value),
+                Role::OilTemperature => self.oil_degc = Some(measured.value),
                 Role::OncomingPressure => self.truth[0] = measured.value,
                 Role::OncomingTorque => self.truth[1] = measured.value,
                 _ => {
@@ -148,6 +150,7 @@ impl<'a> CarChannels<'a> {
             input,
             pedals: [self.pedal, f64::NAN],
             vehicle_m_s: self.vehicle_m_s.unwrap_or(by_wheels),
+            oil_degc: self.oil_degc,
             reported_n_m: engine_n_m,
             truth: [[f64::NAN; 3], oncoming],
         }))
@@ -262,6 +265,7 @@ pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
         (Role::TargetGear, signal::TARGET_GEAR),
         (Role::Throttle, signal::THROTTLE),
         (Role::VehicleSpeed, signal::VEHICLE_SPEED),
+        (Role::OilTemperature, signal::OIL_TEMPERATURE),
         (Role::OncomingPressure, signal::ONCOMING_PRESSURE),
         (Role::OncomingTorque, signal::ONCOMING_TORQUE),
     ];

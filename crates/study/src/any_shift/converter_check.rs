@@ -105,6 +105,7 @@ mod tests {
                 input,
                 pedals: [f64::NAN; 2],
                 vehicle_m_s: f64::NAN,
+                oil_degc: None,
                 reported_n_m,
                 truth: [[f64::NAN; 3]; 2],
             };

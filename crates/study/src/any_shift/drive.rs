@@ -399,6 +399,7 @@ mod tests {
             time_s: 5.0 + 0.01 * f64::from(at),
             clutches: [clutch(at > 9, 50.0), clutch(false, 100.0 + f64::from(at))],
             turbine_n_m: [90.0; 2],
+            at_turbine_n_m: None,
             speeds_rad_s: [200.0, 190.0, 100.0, 30.0],
             flare_rad_s: 0.0,
             phase: "-",

@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     fn learnt(shifts: u32, refused: u8) -> Learnt<f64> {
-        Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0 }
+        Learnt { mean: [0.0; LEARNT], covariance: [[0.0; LEARNT]; LEARNT], shifts, refused, odds: 0.0, oil_degc: None }
     }
 
     fn counted(steps: &[(u32, u8)]) -> (u32, u32) {

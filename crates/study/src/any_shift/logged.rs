@@ -102,6 +102,7 @@ struct Columns {
     commands: Vec<(usize, ReadingColumn)>,
     pedals: [Option<usize>; 2],
     vehicle: Option<usize>,
+    oil: Option<usize>,
     /// Pressure, torque and slip of offgoing and oncoming clutch.
     truth: Option<[[usize; 3]; 2]>,
 }
@@ -137,6 +138,7 @@ impl Columns {
             commands: commands.collect::<Result<_, _>>()?,
             pedals: [signal::THROTTLE, signal::BRAKE].map(|name| rows.find(name)),
             vehicle: rows.find(signal::VEHICLE_SPEED),
+            oil: rows.find(signal::OIL_TEMPERATURE),
             truth: offgoing.zip(oncoming).map(|(offgoing, oncoming)| [offgoing, oncoming]),
         })
     }
@@ -153,6 +155,8 @@ pub struct LogStep {
     pub pedals: [f64; 2],
     /// Vehicle speed, m/s; by the wheels where the log has none.
     pub vehicle_m_s: f64,
+    /// Temperature of the oil in the gearbox, degC, where there is a reading of it.
+    pub oil_degc: Option<f64>,
     /// Engine torque as the engine's controller reports it, N m, also where the filter is not shown it.
     pub reported_n_m: Option<Reading<f64>>,
     /// Pressure, Pa, torque, N m, and slip, rad/s, of offgoing and oncoming clutch; not a number where the log has none.
@@ -243,9 +247,10 @@ impl<'c> CarLog<'c> {
             gear: GearCommand { from: gear, to },
         };
         let pedals = columns.pedals.map(number);
+        let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
         let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
         self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
-        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, reported_n_m, truth }))
+        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, truth }))
     }
 
     /// The gear of a cell of `gear` (0) or `target_gear` (1). An empty one is `otherwise` or the gear before, one that the gearbox does not have the
@@ -369,6 +374,9 @@ impl<'c> LoggedDrive<'c> {
     /// Takes a row and returns the estimate for it.
     pub fn push(&mut self, step: &LogStep) -> ShiftEstimate<f64> {
         let input = &step.input;
+        if let Some(degc) = step.oil_degc {
+            self.state.take_oil_temperature(degc);
+        }
         let estimate = self.filter.step(&mut self.state, input);
         self.learning.push(self.state.learnt());
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];

@@ -262,3 +262,40 @@ fn the_scale_of_the_wheel_speed_is_kept_within_its_bounds_and_apart_from_all_els
     shown_by(|place| if place < INERTIA_AT { -1.2 } else { 0.0 }, &mut learnt, 8, &mut seed);
     assert_eq!(learnt.of_wheel()[0], 0.0);
 }
+
+#[test]
+fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
+    let mut learnt = Learnt::nothing(&CORRELATIONS);
+    for place in [1, KISS_AT + 1, INERTIA_AT + 2, TURBINE_AT, STIFFNESS_AT, WHEEL_AT] {
+        learnt.mean[place] = 0.8;
+    }
+    // The first reading says nothing of a change, nor does the noise of a sensor.
+    let mut noise_s = learnt.take_oil(80.0);
+    for reading in 0..1000 {
+        noise_s += learnt.take_oil(80.0 + f64::from(reading % 7) - 3.0);
+    }
+    assert_eq!(noise_s, 0.0);
+    // What is no temperature of oil is not taken.
+    for wrong in [f64::NAN, f64::INFINITY, -273.0, 1e9] {
+        assert_eq!((learnt.take_oil(wrong), learnt.oil_degc), (0.0, Some(80.0)));
+    }
+    // By 40 K as in two hours, at once or slowly.
+    let slowly: f64 = (0..=400).map(|step| learnt.take_oil(80.0 - 0.1 * f64::from(step))).sum();
+    let at_once = learnt.take_oil(80.0);
+    assert!(
+        (slowly - WITH_OIL_S).abs() < 0.05 * WITH_OIL_S && (at_once - WITH_OIL_S).abs() < 0.05 * WITH_OIL_S,
+        "{slowly} {at_once}"
+    );
+    learnt.pass(WITH_OIL_S, &CORRELATIONS);
+    let left = (-1.0_f64).exp();
+    for (place, share) in [
+        (1, left),
+        (KISS_AT + 1, left),
+        (TURBINE_AT, left),
+        (INERTIA_AT + 2, 1.0),
+        (STIFFNESS_AT, 1.0),
+        (WHEEL_AT, 1.0),
+    ] {
+        assert!((learnt.mean[place] / 0.8 - share).abs() < 3e-3, "{place}: {}", learnt.mean[place]);
+    }
+}
