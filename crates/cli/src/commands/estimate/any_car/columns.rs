@@ -1,8 +1,8 @@
 //! The columns of an estimate of a car with any gearbox.
 
 use config::Car;
-use observer::ChannelHealth;
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate};
+use observer::{ChannelHealth, Channels};
 use study::any_shift::channels::gear_number;
 use study::any_shift::logged::element_column;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
@@ -21,7 +21,16 @@ pub(super) struct Row<'a> {
     pub(super) ranges_pa: [Option<[f64; 2]>; MAX_ELEMENTS],
 }
 
+/// What the columns of readings say of a row: of channels, of the commands of elements, and which of these are those of the shift.
+type Said = (Channels<ChannelHealth>, [ChannelHealth; MAX_ELEMENTS], Option<[usize; 2]>);
+
 impl<'a> Row<'a> {
+    /// What its columns of readings say, which is mostly the same as in the row before.
+    pub(super) fn said(&self) -> Said {
+        let ShiftEstimate { channels, commands, clutches, .. } = &self.estimate;
+        (*channels, *commands, clutches.map(|clutches| clutches.map(|clutch| clutch.element)))
+    }
+
     fn gear(&self, which: usize) -> Cell<'a> {
         Cell::Word(self.car.gearbox.gears.get(self.gears[which]).map_or("", |gear| gear.name.as_str()))
     }
@@ -114,6 +123,12 @@ impl Value {
             Self::Command(place) => Cell::Word(row.estimate.commands[place.min(MAX_ELEMENTS - 1)].name()),
         }
     }
+}
+
+/// How many columns stand before the columns of readings that end a table.
+pub(super) fn before_readings(columns: &[Column]) -> usize {
+    let is_other = |column: &Column| !matches!(column.value, Value::Reading(_) | Value::Command(_));
+    columns.iter().rposition(is_other).map_or(0, |last| last + 1)
 }
 
 /// A column of the estimate.

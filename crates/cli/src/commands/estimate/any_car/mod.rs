@@ -20,7 +20,7 @@ use trace::{Cell, shown_path};
 
 use self::checks::{RowTimes, refused};
 pub(super) use self::columns::is_car_column;
-use self::columns::{Knows, Row, chosen, columns};
+use self::columns::{Knows, Row, before_readings, chosen, columns};
 use self::learnt::Kept;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
@@ -99,6 +99,7 @@ pub(super) fn estimate(
     let places: Vec<(usize, &str)> =
         elements.filter_map(|(at, element)| Some((tables.place(at)?, element.name.as_str()))).collect();
     let columns = chosen(columns(&places, Knows::of(car)), &options.columns)?;
+    let (before_readings, mut said) = (before_readings(&columns), None);
     let named = columns.iter().map(|column| (column.name.as_str(), column.kind));
     let mut table = Output::named(output, named)?;
     let mut passing = Passing::new(Selection::of(options));
@@ -116,7 +117,10 @@ pub(super) fn estimate(
         let gears = [step.input.gear.from, step.input.gear.to];
         let row = Row { car, places: &places, gears, estimate, ranges_pa: drive.pressure_ranges_pa() };
         passing.push(step.time_s, row, |time_s, row| {
-            table.cells(time_s, columns.iter().map(|column| column.value.cell(row)))
+            let is_same = said.replace(row.said()) == Some(row.said());
+            let new = if is_same { &columns[..before_readings] } else { &columns[..] };
+            let same = (new.len() < columns.len()).then_some(Cell::SameWords);
+            table.cells(time_s, new.iter().map(|column| column.value.cell(row)).chain(same))
         })?;
         if options.follow {
             table.flush()?;
