@@ -49,7 +49,8 @@ impl CarShift {
 pub struct CarShiftQuality {
     /// Time from the request until the oncoming clutch sticks and the controller is done, s; `None` if it was not completed.
     pub complete_s: Option<f64>,
-    /// Largest slip of the old gear in the wrong direction, rad/s.
+    /// Largest slip of the old gear in the wrong direction, rad/s; zero where a one-way clutch is to catch the turbine, which may
+    /// fall before.
     pub flare_rad_s: f64,
     /// Largest slip beyond the new gear, rad/s.
     pub past_synchronous_rad_s: f64,
@@ -113,6 +114,10 @@ pub struct CarShiftRating {
     quality: CarShiftQuality,
     jerk: PeakJerk,
     was_requested: bool,
+    /// Whether the turbine has been on the side of the old gear: behind a one-way clutch that overruns it may begin on the other.
+    was_before: bool,
+    /// Whether a one-way clutch is to catch the turbine.
+    catches: bool,
 }
 
 impl CarShiftRating {
@@ -122,9 +127,10 @@ impl CarShiftRating {
         let (ratios, alphas) = reduced.map_or(([1.0; 2], [1.0; 2]), |r| {
             ([r.ratio_offgoing(), r.ratio_oncoming()], [r.slip_offgoing[0], r.slip_oncoming[0]])
         });
-        let held = match model.car.gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
-            Some(Change::Single { held, .. }) => held.clone(),
-            _ => Vec::new(),
+        let gearbox = &model.car.gearbox;
+        let (held, catches) = match gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
+            Some(Change::Single { held, oncoming, .. }) => (held.clone(), gearbox.is_one_way(*oncoming)),
+            _ => (Vec::new(), false),
         };
         Self {
             shift: *shift,
@@ -134,6 +140,8 @@ impl CarShiftRating {
             quality: CarShiftQuality::default(),
             jerk: PeakJerk::default(),
             was_requested: false,
+            was_before: false,
+            catches,
         }
     }
 
@@ -161,8 +169,13 @@ impl CarShiftRating {
         }
         let direction = (self.ratios[0] - self.ratios[1]).signum();
         let slip = |ratio: f64| direction * (sample.torques.turbine_rad_s - ratio * sample.torques.output_rad_s);
-        q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
-        q.past_synchronous_rad_s = q.past_synchronous_rad_s.max(-slip(self.ratios[1]));
+        if !self.catches {
+            q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
+        }
+        self.was_before |= slip(self.ratios[1]) > 0.0;
+        if self.was_before && !self.catches {
+            q.past_synchronous_rad_s = q.past_synchronous_rad_s.max(-slip(self.ratios[1]));
+        }
         let Some(shift) = &sample.shift else {
             if sample.gears() == [Some(self.shift.to).filter(|&to| to != NO_GEAR); 2] {
                 q.complete_s.get_or_insert(sample.time_s - self.shift.request_s);

@@ -18,6 +18,7 @@ macro_rules! car {
 mod drives;
 mod energy;
 mod garage;
+mod one_way;
 mod sequences;
 mod shifts;
 mod two_speed;
@@ -30,6 +31,11 @@ fn dual_clutch() -> Car {
     car!("gearboxes/dual_clutch_7.toml", "launch = \"clutch\"\n[driveline]\nfinal_ratio = 1.0\n")
 }
 
+/// The four-speed gearbox whose 1st gear a one-way clutch holds.
+fn one_way() -> Car {
+    car!("gearboxes/ravigneaux_4_one_way.toml", "")
+}
+
 /// A car for every gearbox that ships with the program.
 fn cars() -> Vec<Car> {
     vec![
@@ -39,6 +45,7 @@ fn cars() -> Vec<Car> {
         car!("gearboxes/10_speed.toml", ""),
         two_speed(),
         dual_clutch(),
+        one_way(),
     ]
 }
 
