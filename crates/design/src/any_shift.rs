@@ -4,7 +4,7 @@ use config::{Car, ElementErrorBounds, Sensors};
 use drivetrain::{CommandKind, Cylinder, Real};
 use geartrain::{Change, Gearbox};
 use observer::any_shift::{
-    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, Piston, ShiftRow, ShiftUncertainty,
+    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, ONE_WAY, Piston, ShiftRow, ShiftUncertainty,
     TurbineTorque,
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
@@ -45,7 +45,7 @@ pub struct ShiftTables<T> {
 
 impl ShiftTables<f64> {
     /// The tables of a gearbox whose elements have these valves, `None` for an element that has none, as a dog. An element
-    /// without plates or valve is left out, and the shifts between others remain. What sits on the input
+    /// without plates or valve is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
     /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
     ///
     /// # Errors
@@ -70,7 +70,12 @@ impl ShiftTables<f64> {
             let Change::Single { offgoing, oncoming, .. } = &shift.change else { return None };
             let mut reduced = shift.reduced?;
             reduced.mass_kg_m2[0][0] += more_on_input_kg_m2;
-            let clutches = [places[*offgoing]?, places[*oncoming]?];
+            // Between gears of one ratio the speeds show nothing.
+            let place = |element: usize| places[element].or(gearbox.is_one_way(element).then_some(ONE_WAY));
+            let clutches = [place(*offgoing)?, place(*oncoming)?];
+            if gearbox.is_same_ratio(shift.from, shift.to) || clutches == [ONE_WAY; 2] {
+                return None;
+            }
             Some(ShiftRow::new([shift.from, shift.to], clutches, &reduced))
         });
         let shifts: Vec<_> = shift_rows.collect();

@@ -4,7 +4,7 @@ use config::{Car, Source};
 use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
-use study::any_shift::matrix::{ErrorsByPhase, controlling};
+use study::any_shift::matrix::{ErrorsByPhase, controlling_of};
 use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, TruePhase};
 use trace::Cell;
 use trace::units::{km_h, mpa, rpm};
@@ -268,17 +268,17 @@ const COLUMNS: &[Column] = &[
         },
     ),
     column("controlling", "the clutch that drives the inertia phase", |s, car| {
-        unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))
+        unscored(s, |s| Some(clutch_names(s, car)[controlling_of(&s.rows, s.kind?)].to_owned()))
     }),
     column(
         "pressure MPa",
         "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
-        |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3))),
+        |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling_of(&s.rows, s.kind?))?, 1e-6, 3))),
     ),
     column(
         "torque N m",
         "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
-        |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0))),
+        |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling_of(&s.rows, s.kind?))?, 1.0, 0))),
     ),
     column(
         "not seen",

@@ -2,7 +2,7 @@
 
 use config::Car;
 use drivetrain::PeakJerk;
-use geartrain::Change;
+use geartrain::{Change, Gearbox};
 
 use super::controller::{CarCalibration, ShiftStage};
 use super::integrate::CarError;
@@ -98,6 +98,40 @@ pub fn simulate_car_shift(
     Ok(rating.quality())
 }
 
+/// How far the turbine leaves the speeds between those of two gears.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeyondGears {
+    /// Of the gear before and after.
+    ratios: [f64; 2],
+    /// Whether a one-way clutch is to catch the turbine. It may fall before, and cannot go beyond.
+    catches: bool,
+    /// Whether the turbine has been on the side of the old gear. Behind a one-way clutch that overruns it may begin on the other.
+    was_before: bool,
+}
+
+impl BeyondGears {
+    /// Between gears of these ratios; `gears` are their places.
+    pub fn new(gearbox: &Gearbox, gears: [usize; 2], ratios: [f64; 2]) -> Self {
+        let single = gearbox.shift(gears[0], gears[1]).and_then(|shift| shift.change.single());
+        let [overruns, catches] = single.map_or([false; 2], |elements| elements.map(|at| gearbox.is_one_way(at)));
+        Self { ratios, catches, was_before: !overruns }
+    }
+
+    /// Takes the speeds of turbine and output, rad/s.
+    pub fn push(&mut self, quality: &mut CarShiftQuality, [turbine, output]: [f64; 2]) {
+        if self.catches {
+            return;
+        }
+        let direction = (self.ratios[0] - self.ratios[1]).signum();
+        let [old, new] = self.ratios.map(|ratio| direction * (turbine - ratio * output));
+        quality.flare_rad_s = quality.flare_rad_s.max(old);
+        self.was_before |= new > 0.0;
+        if self.was_before {
+            quality.past_synchronous_rad_s = quality.past_synchronous_rad_s.max(-new);
+        }
+    }
+}
+
 /// The place of neutral among the gears: that of no gear.
 pub const NO_GEAR: usize = usize::MAX;
 
@@ -108,16 +142,12 @@ const RATED_AFTER_S: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct CarShiftRating {
     shift: CarShift,
-    ratios: [f64; 2],
+    beyond: BeyondGears,
     alphas: [f64; 2],
     held: Vec<usize>,
     quality: CarShiftQuality,
     jerk: PeakJerk,
     was_requested: bool,
-    /// Whether the turbine has been on the side of the old gear: behind a one-way clutch that overruns it may begin on the other.
-    was_before: bool,
-    /// Whether a one-way clutch is to catch the turbine.
-    catches: bool,
 }
 
 impl CarShiftRating {
@@ -127,21 +157,18 @@ impl CarShiftRating {
         let (ratios, alphas) = reduced.map_or(([1.0; 2], [1.0; 2]), |r| {
             ([r.ratio_offgoing(), r.ratio_oncoming()], [r.slip_offgoing[0], r.slip_oncoming[0]])
         });
-        let gearbox = &model.car.gearbox;
-        let (held, catches) = match gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
-            Some(Change::Single { held, oncoming, .. }) => (held.clone(), gearbox.is_one_way(*oncoming)),
-            _ => (Vec::new(), false),
+        let held = match model.car.gearbox.shift(shift.from, shift.to).map(|shift| &shift.change) {
+            Some(Change::Single { held, .. }) => held.clone(),
+            _ => Vec::new(),
         };
         Self {
             shift: *shift,
-            ratios,
+            beyond: BeyondGears::new(&model.car.gearbox, [shift.from, shift.to], ratios),
             alphas,
             held,
             quality: CarShiftQuality::default(),
             jerk: PeakJerk::default(),
             was_requested: false,
-            was_before: false,
-            catches,
         }
     }
 
@@ -167,15 +194,7 @@ impl CarShiftRating {
             q.turbine_n_m = sample.turbine_n_m;
             self.was_requested = true;
         }
-        let direction = (self.ratios[0] - self.ratios[1]).signum();
-        let slip = |ratio: f64| direction * (sample.torques.turbine_rad_s - ratio * sample.torques.output_rad_s);
-        if !self.catches {
-            q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
-        }
-        self.was_before |= slip(self.ratios[1]) > 0.0;
-        if self.was_before && !self.catches {
-            q.past_synchronous_rad_s = q.past_synchronous_rad_s.max(-slip(self.ratios[1]));
-        }
+        self.beyond.push(q, [sample.torques.turbine_rad_s, sample.torques.output_rad_s]);
         let Some(shift) = &sample.shift else {
             if sample.gears() == [Some(self.shift.to).filter(|&to| to != NO_GEAR); 2] {
                 q.complete_s.get_or_insert(sample.time_s - self.shift.request_s);

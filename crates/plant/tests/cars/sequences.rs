@@ -34,8 +34,6 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
     run.preselect(Some(shift.to));
     let ratios = [shift.from, shift.to].map(|gear| car.gearbox.gears[gear].ratio);
     let (low, high) = (ratios[0].min(ratios[1]), ratios[0].max(ratios[1]));
-    // Behind a one-way clutch the turbine of a coasting car falls to idle.
-    let may_fall = [shift.from, shift.to].iter().any(|&gear| car.gearbox.one_way_clutch_of(gear).is_some());
     let mut active_s = REQUEST_S;
     let (mut result, mut before) = (Run { complete_s: None, outside_rad_s: 0.0, jerk_m_s3: 0.0 }, None);
     while run.time_s() < 6.0 {
@@ -54,8 +52,7 @@ fn run(model: &CarModel, shift: &CarShift, asked: impl Fn(f64) -> usize, throttl
                     return;
                 }
                 let (turbine, output) = (sample.torques.turbine_rad_s, sample.torques.output_rad_s);
-                let below = if may_fall { 0.0 } else { low * output - turbine };
-                result.outside_rad_s = result.outside_rad_s.max(turbine - high * output).max(below);
+                result.outside_rad_s = result.outside_rad_s.max(turbine - high * output).max(low * output - turbine);
                 if let Some(before) = before.replace(sample.vehicle_m_s2)
                     && after_s > 0.0
                 {

@@ -7,7 +7,7 @@ use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
-use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling, counts, errors_by_phase};
+use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift, controlling_of, counts, errors_by_phase};
 use super::recording::Recording;
 use super::thinned::thinned;
 use super::{AnyShiftError, ClutchRow, ShiftScoreRow, TruePhase, row};
@@ -100,7 +100,7 @@ impl ScoredShift {
     /// where there are none.
     #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
     pub fn hidden(&self) -> Option<f64> {
-        let clutch = controlling(self.kind?);
+        let clutch = controlling_of(&self.rows, self.kind?);
         let rows = self.rows.iter().filter(|row| row.phase().is_some()).map(|row| &row.clutches[clutch]);
         let slipping: Vec<bool> = rows.filter(|clutch| !clutch.sticks).map(|clutch| clutch.hidden).collect();
         let hidden = slipping.iter().filter(|hidden| **hidden).count();

@@ -9,6 +9,7 @@ mod drives;
 mod input_clutch;
 mod learning;
 mod limits;
+mod one_way;
 mod sensitivity;
 mod strokes;
 mod wheel;
