@@ -486,7 +486,8 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     if !shift.rows.is_empty() {
         let roles = || ["offgoing", "oncoming"].into_iter().zip(names).enumerate();
         panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
-        panels.extend(roles().map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
+        let with_pressure = roles().filter(|(c, _)| !is_one_way(&shift.rows, *c));
+        panels.extend(with_pressure.map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
     }
     let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
     let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
@@ -495,6 +496,11 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     spans.extend(phase_spans(shift, "inertia phase", TruePhase::Inertia, INERTIA_PHASE));
     spans.sort_by(|a, b| a.start.total_cmp(&b.start));
     Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
+}
+
+/// Whether a clutch of the shift is a one-way clutch, which has no pressure and no valve model.
+fn is_one_way(rows: &[ShiftScoreRow], c: usize) -> bool {
+    rows.iter().any(|row| row.clutches[c].is_one_way)
 }
 
 /// The pieces of a phase; the longest has its name.
@@ -542,8 +548,10 @@ fn clutch_panel(
         let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1.map_or(f64::NAN, |range| range[end]);
         rows.iter().map(|row| (row.time_s, value(row))).collect()
     };
-    let series =
-        vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE), curve(2, "valve model", OPEN_LOOP)];
+    let mut series = vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE)];
+    if !is_one_way(rows, c) {
+        series.push(curve(2, "valve model", OPEN_LOOP));
+    }
     let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
     Panel { y_label, height, series, band: Some(band), axis }
 }

@@ -390,6 +390,8 @@ fn a_gearbox_whose_first_gear_is_held_by_a_one_way_clutch_is_driven_through_all_
     assert!(text.contains("12 of 12 shifts were completed"), "{text}");
     assert_eq!(column(&folder.read("out/shifts.csv"), "from_gear")[..4], ["1", "2", "3", "4"]);
     assert!(!text.contains("NaN"), "{text}");
+    let page = folder.read("out/report.html");
+    assert!(page.contains("torque of F1,") && page.contains("pressure of INT,") && !page.contains("pressure of F1"));
     // The gear for engine braking follows in a list of shifts, and coasting in 1st gear is said to be that.
     let drive = "name = \"short\"\nstart = { gear = \"1\", vehicle_m_s = 9 }\n\
                  segment = [{ duration_s = 2, throttle = 0.2 }, { duration_s = 8, throttle = 0 }, { duration_s = 4, throttle = 0.2 }]\n\

@@ -205,13 +205,14 @@ impl Contacts {
         for (&element, contact) in at_zero.iter().zip(solution.contacts) {
             states[element] = Some(contact);
         }
-        let contacts = Self::new(model, states)?.without_idle(model, at_zero, &state, inputs)?;
+        let contacts = Self::new(model, states)?.without_sharing(model, at_zero, &state, inputs)?;
         Ok((contacts, state))
     }
 
-    /// The same with the one-way clutches open whose slip the other sticking elements hold alone: how two of them share a torque is
-    /// not determined, and a rounding error would open the one-way clutch again and again.
-    fn without_idle(
+    /// The same where no one-way clutch shares its slip with another sticking element, as with a brake beside it: how the two share a
+    /// torque is not determined, and a rounding error would change the contacts again and again. The other one holds alone if it
+    /// can; else it gives what it can, and the one-way clutch holds the rest.
+    fn without_sharing(
         self,
         model: &CarModel,
         at_zero: &[usize],
@@ -226,19 +227,30 @@ impl Contacts {
             let mut states = contacts.states;
             states[element] = Some(Contact::Slipping(Direction::Backward));
             let without = Self::new(model, states)?;
-            if without.is_kept(element) && without.are_held(model, state, inputs) {
+            if !without.is_kept(element) {
+                continue;
+            }
+            let Some((other, direction)) = without.overloaded(model, state, inputs) else {
                 contacts = without;
+                continue;
+            };
+            let mut states = contacts.states;
+            states[other] = Some(Contact::Slipping(direction));
+            let with = Self::new(model, states)?;
+            if with.is_kept(other) && with.overloaded(model, state, inputs).is_none() {
+                contacts = with;
             }
         }
         Ok(contacts)
     }
 
-    /// Whether every sticking element can hold what it must.
-    fn are_held(&self, model: &CarModel, state: &CarState, inputs: &CarInputs) -> bool {
+    /// A sticking element that cannot hold what it must, and in which direction it would slip.
+    fn overloaded(&self, model: &CarModel, state: &CarState, inputs: &CarInputs) -> Option<(usize, Direction)> {
         let torques = model.torques(self, state, inputs).elements_n_m;
-        self.stuck().iter().all(|&element| {
-            let limits = model.holding_limits(element, state, inputs);
-            limits.is_some_and(|(lower, upper)| (lower..=upper).contains(&torques[element]))
+        self.stuck().iter().copied().find_map(|element| {
+            let (lower, upper) = model.holding_limits(element, state, inputs).unwrap_or((0.0, 0.0));
+            let is_over = !(lower..=upper).contains(&torques[element]);
+            is_over.then_some((element, Direction::of(torques[element])))
         })
     }
 }

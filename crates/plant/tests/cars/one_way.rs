@@ -173,3 +173,64 @@ fn a_shift_without_a_clutch_that_opens_or_closes_is_refused_with_a_hint() {
         "{error}"
     );
 }
+
+/// Other gearboxes with a one-way clutch beside the brake of 1st gear, given by the members that it connects.
+fn others() -> Vec<config::Car> {
+    let files = [
+        (include_str!("../../../config/tests/gearboxes/fn4a.toml"), "LR", "frc"),
+        (include_str!("../../../config/tests/gearboxes/a340e.toml"), "B3", "rcar"),
+    ];
+    let car = |(text, brake, output): (&str, &str, &str)| {
+        let first = text.lines().find(|line| line.contains("name = \"1\"")).unwrap();
+        let on_one_way = first.replace(&format!("\"{brake}\""), "\"F\"");
+        assert_ne!(first, on_one_way);
+        let text = text.replace(first, &on_one_way)
+            + &format!(
+                "\n[[element]]\nname = \"F\"\nkind = \"one-way-clutch\"\ninput = \"housing\"\noutput = \"{output}\"\n"
+            );
+        let source = config::Source::built_in("car.toml", "name = \"car\"\ngearbox = \"g.toml\"\n");
+        config::Car::from_sources(source, config::Source::built_in("g.toml", &text)).unwrap()
+    };
+    files.map(car).into()
+}
+
+/// The brake beside it holds while a gear is engaged from neutral and from reverse, and then leaves the one-way clutch its load.
+#[test]
+fn the_brake_beside_it_leaves_its_load_to_the_one_way_clutch_whatever_the_load() {
+    for car in others().into_iter().chain([one_way()]) {
+        let model = CarModel::new(car).unwrap();
+        let [first, second, reverse] = ["1", "2", "R"].map(|name| model.car.gearbox.gear(name).unwrap());
+        let element = model.car.gearbox.one_way_clutch_of(first).unwrap();
+        for (brake, throttle) in [(0.6, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.0), (0.05, 0.0)] {
+            let label = format!("{} brake {brake} throttle {throttle}", model.car.gearbox.name);
+            let driver = Driver { throttle, brake, grade_rad: 0.0 };
+            let state = model.in_gear(first, None, 0.0, 0.0).unwrap();
+            let mut run =
+                CarRun::new(&model, &model.car, CarCalibration::STANDARD, first, state, (driver, 0.01)).unwrap();
+            run.start_in_neutral().unwrap();
+            let mut torque_n_m = 0.0;
+            while run.time_s() < 14.0 {
+                let wanted = match run.time_s() {
+                    0.5..4.0 => Some(first),
+                    4.0..7.0 => Some(reverse),
+                    7.0..11.0 => Some(first),
+                    11.0.. => Some(second),
+                    _ => None,
+                };
+                // Reverse can be engaged only at rest.
+                if let Some(wanted) = wanted.filter(|&gear| gear != reverse || (brake >= 0.3 && throttle == 0.0)) {
+                    run.request(wanted).unwrap_or_else(|error| panic!("{label}: {error}"));
+                }
+                let time_s = run.time_s();
+                let record = |sample: &CarSample| {
+                    if time_s < 11.0 && sample.shift.is_none() {
+                        torque_n_m = sample.torques.elements_n_m[element];
+                    }
+                };
+                run.advance(driver, |_| {}, record).unwrap_or_else(|error| panic!("{label}: {error}"));
+            }
+            assert_eq!(run.controller().gear(), second, "{label}");
+            assert!(torque_n_m > 5.0, "{label}: {torque_n_m}");
+        }
+    }
+}
