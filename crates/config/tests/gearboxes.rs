@@ -114,6 +114,34 @@ fn assert_ratios(gearbox: &Gearbox, gears: &str, ratios: &str, how: Printed) -> 
     printed.len()
 }
 
+/// 1st gear on a one-way clutch, and the brake beside it for engine braking and reverse.
+#[test]
+fn a_brake_beside_a_one_way_clutch_holds_through_the_shift_to_reverse() {
+    let gearbox = gearbox!("../../../gearboxes/ravigneaux_4_one_way.toml");
+    let gear = |name: &str| gearbox.gear(name).unwrap();
+    let element = |name: &str| gearbox.elements.iter().position(|element| element.name == name).unwrap();
+    let change = |from: &str, to: &str| gearbox.shift(gear(from), gear(to)).unwrap().change.clone();
+    let single = |off: &str, on: &str, held: &str| Change::Single {
+        offgoing: element(off),
+        oncoming: element(on),
+        held: vec![element(held)],
+    };
+    assert_eq!(change("R", "1"), single("REV", "FWD", "LR"));
+    assert_eq!(change("1", "R"), single("FWD", "REV", "LR"));
+    assert_eq!(change("1", "2"), single("F1", "INT", "FWD"));
+    assert_eq!(change("1", "L"), single("F1", "LR", "FWD"));
+    assert_eq!(
+        gearbox.shift(gear("R"), gear("1")).unwrap().reduced,
+        gearbox.shift(gear("R"), gear("L")).unwrap().reduced
+    );
+    // Of the two gears of one ratio that of the one-way clutch is driven, wherever it stands in the table.
+    assert_eq!(gearbox.forward_gears(), ["1", "2", "3", "4"].map(gear));
+    assert_eq!(
+        (gearbox.one_way_clutch_of(gear("1")), gearbox.one_way_clutch_of(gear("L"))),
+        (Some(element("F1")), None)
+    );
+}
+
 #[test]
 fn all_102_published_ratios_come_out_to_the_published_digits() {
     use Printed::{Rounded, Truncated};

@@ -4,7 +4,7 @@ use config::{Car, ElementErrorBounds, Sensors};
 use drivetrain::{CommandKind, Cylinder, Real};
 use geartrain::{Change, Gearbox};
 use observer::any_shift::{
-    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, Piston, ShiftRow,
+    AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, Piston, ShiftRow,
     ShiftUncertainty, TurbineTorque,
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
@@ -45,7 +45,7 @@ pub struct ShiftTables<T> {
 
 impl ShiftTables<f64> {
     /// The tables of a gearbox whose elements have these valves, `None` for an element that has none, as a dog. An element
-    /// without plates or valve is left out, and the shifts between others remain. What sits on the input
+    /// without plates or valve is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
     /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
     ///
     /// # Errors
@@ -67,14 +67,19 @@ impl ShiftTables<f64> {
             return Err(elements.len());
         }
         let shift_rows = gearbox.shifts.iter().filter_map(|shift| {
+            let place = |element: usize| places[element].or(gearbox.is_one_way(element).then_some(ONE_WAY));
             let clutches = match &shift.change {
-                Change::Single { offgoing, oncoming, .. } => [places[*offgoing]?, places[*oncoming]?],
+                Change::Single { offgoing, oncoming, .. } => [place(*offgoing)?, place(*oncoming)?],
                 // Of ratios alone.
                 Change::Unknown => [NO_ELEMENT; 2],
                 _ => return None,
             };
             let mut reduced = shift.reduced?;
             reduced.mass_kg_m2[0][0] += more_on_input_kg_m2;
+            // Between gears of one ratio the speeds show nothing.
+            if gearbox.is_same_ratio(shift.from, shift.to) || clutches == [ONE_WAY; 2] {
+                return None;
+            }
             Some(ShiftRow::new([shift.from, shift.to], clutches, &reduced))
         });
         let shifts: Vec<_> = shift_rows.collect();

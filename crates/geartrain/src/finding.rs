@@ -94,6 +94,8 @@ pub enum Fault {
     Capacity { element: String, gear: String, capacity_n_m: f64, wanted_n_m: f64, line_pressure_pa: f64 },
     #[error("the one-way clutch \"{element}\" would have to drive its input side in \"{gear}\"")]
     OneWay { element: String, gear: String },
+    #[error("the one-way clutch \"{element}\" would turn in \"{gear}\" in the direction in which it holds")]
+    OneWayBlocks { element: String, gear: String },
     #[error("no gear engages \"{0}\"")]
     Unused(String),
     #[error("\"{gear}\" engages the same elements as \"{other}\"")]
@@ -152,6 +154,7 @@ impl Fault {
                 1e-6 * line_pressure_pa
             ),
             Self::OneWay { .. } => "swap its `input` and `output`, or engage a brake or clutch in its place".to_owned(),
+            Self::OneWayBlocks { .. } => "swap its `input` and `output`: it overruns in the gears that do not engage it".to_owned(),
             Self::Unused(_) => "engage it in a gear, or leave it out: it is open in all of them".to_owned(),
             Self::SameElements { .. } => "two names of one gear: check `engaged` of both".to_owned(),
             Self::Order { .. } => "gears are listed from the largest ratio to the smallest, each ratio turbine over output speed".to_owned(),

@@ -10,6 +10,9 @@ use crate::shift::{Change, Shift, change};
 use crate::train::{GearTrain, NoGear, ZERO};
 use crate::unusual;
 
+/// Ratios closer than this share are one.
+const SAME_RATIO: f64 = 1e-6;
+
 /// An element of a gearbox.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GearboxElement {
@@ -97,11 +100,36 @@ impl Gearbox {
         self.elements.is_empty()
     }
 
-    /// The forward gears from the largest ratio to the smallest.
+    /// The forward gears from the largest ratio to the smallest. Of gears with one ratio, as one for engine braking, that of a
+    /// one-way clutch, or the first of the table.
     pub fn forward_gears(&self) -> Vec<usize> {
         let mut forward: Vec<usize> = (0..self.gears.len()).filter(|&gear| self.gears[gear].ratio > 0.0).collect();
         forward.sort_by(|&a, &b| self.gears[b].ratio.total_cmp(&self.gears[a].ratio));
+        forward.dedup_by(|later, first| {
+            let is_same = self.is_same_ratio(*first, *later);
+            if is_same && self.one_way_clutch_of(*first).is_none() && self.one_way_clutch_of(*later).is_some() {
+                *first = *later;
+            }
+            is_same
+        });
         forward
+    }
+
+    /// Whether two gears have one ratio: the elements of one hold in the other direction too, as for engine braking.
+    pub fn is_same_ratio(&self, a: usize, b: usize) -> bool {
+        let ratio = |gear: usize| self.gears[gear].ratio;
+        (ratio(a) - ratio(b)).abs() < SAME_RATIO * ratio(a).abs()
+    }
+
+    /// Whether an element is a one-way clutch.
+    pub fn is_one_way(&self, element: usize) -> bool {
+        self.elements.get(element).is_some_and(|element| element.kind == ElementKind::OneWayClutch)
+    }
+
+    /// The one-way clutch that is engaged in a gear.
+    pub fn one_way_clutch_of(&self, gear: usize) -> Option<usize> {
+        let holding = self.gears.get(gear)?.holding.iter().map(|holding| holding.element);
+        holding.into_iter().find(|&element| self.is_one_way(element))
     }
 
     /// The shift between two gears.
@@ -125,14 +153,28 @@ impl Gearbox {
                 let fault = Fault::OneWay { element, gear: gear.name.clone() };
                 return Err(Finding { part: Part::Gear(at), key: "engaged", fault });
             }
+            if let Some(element) = self.train.as_ref().and_then(|train| self.blocking(train, gear)) {
+                let element = self.elements[element].name.clone();
+                let fault = Fault::OneWayBlocks { element, gear: gear.name.clone() };
+                return Err(Finding { part: Part::Gear(at), key: "engaged", fault });
+            }
         }
         Ok(())
+    }
+
+    /// A one-way clutch that would turn in the direction in which it holds.
+    fn blocking(&self, train: &GearTrain, gear: &Gear) -> Option<usize> {
+        let speeds: Vec<f64> = gear.shaft_speeds.iter().copied().collect::<Option<_>>()?;
+        let slip =
+            |element: usize| train.slip_row(element).iter().zip(&speeds).map(|(k, speed)| k * speed).sum::<f64>();
+        (0..self.elements.len()).find(|&element| self.is_one_way(element) && slip(element) > ZERO)
     }
 
     /// Adds the shift between any two gears.
     fn add_shifts(
         &mut self,
         possible: impl Fn(usize, usize, &[usize]) -> bool,
+        beside: impl Fn(usize, usize) -> bool,
         reduced: impl Fn(usize, usize, &Change) -> Option<ReducedShift<f64>>,
     ) {
         let engaged = |gear: usize| self.gears[gear].holding.iter().map(|holding| holding.element).collect::<Vec<_>>();
@@ -140,7 +182,7 @@ impl Gearbox {
         let pairs = (0..count).flat_map(|from| (0..count).filter(move |&to| to != from).map(move |to| (from, to)));
         self.shifts = pairs
             .map(|(from, to)| {
-                let change = change(&self.elements, &engaged(from), &engaged(to), &possible);
+                let change = change(&self.elements, &engaged(from), &engaged(to), &possible, &beside);
                 Shift { from, to, reduced: reduced(from, to, &change), change }
             })
             .collect();
@@ -188,6 +230,7 @@ fn from_stick_diagram(diagram: &StickDiagram) -> Result<Gearbox, Finding> {
     gearbox.warnings = warnings;
     gearbox.add_shifts(
         |offgoing, oncoming, held| train.reduce(held, offgoing, oncoming).is_some(),
+        |a, b| train.is_beside(a, b),
         |_, _, change| match change {
             Change::Single { offgoing, oncoming, held } => train.reduce(held, *offgoing, *oncoming),
             _ => None,
@@ -252,6 +295,7 @@ fn from_shares(shares: &Shares) -> Result<Gearbox, Finding> {
     };
     gearbox.add_shifts(
         |_, _, _| true,
+        |_, _| false,
         |from, to, change| match *change {
             Change::Single { offgoing, oncoming, .. } => Some(ReducedShift {
                 mass_kg_m2: mass_of(&masses, from, to)?,

@@ -29,7 +29,8 @@ pub enum Change {
         offgoing: usize,
         /// The element that closes.
         oncoming: usize,
-        /// The elements that stay engaged. The dogs of both gears of a dual clutch are among them.
+        /// The elements that stay engaged. The dogs of both gears of a dual clutch are among them, and a clutch or brake that
+        /// holds in one of the gears what a one-way clutch beside it holds in the other.
         held: Vec<usize>,
     },
     /// Several elements change at once: a double or triple transition.
@@ -81,12 +82,14 @@ impl Change {
     }
 }
 
-/// The change between two gears. `possible` says whether two elements can change while others are held.
+/// The change between two gears. `possible` says whether two elements can change while others are held, `beside` whether
+/// two elements connect the same.
 pub(crate) fn change(
     elements: &[GearboxElement],
     from: &[usize],
     to: &[usize],
     possible: impl Fn(usize, usize, &[usize]) -> bool,
+    beside: impl Fn(usize, usize) -> bool,
 ) -> Change {
     let only = |of: &[usize], other: &[usize]| -> Vec<usize> {
         of.iter().copied().filter(|element| !other.contains(element)).collect()
@@ -99,6 +102,24 @@ pub(crate) fn change(
         let dogs = off.iter().chain(&on).copied().filter(|&element| is_dog(element));
         let held: Vec<usize> = common.iter().copied().chain(dogs).collect();
         if held.len() == common.len() || possible(*offgoing, *oncoming, &held) {
+            return Change::Single { offgoing: *offgoing, oncoming: *oncoming, held };
+        }
+    }
+    // A clutch or brake may hold through the shift what the one-way clutch beside it holds in one of the gears.
+    let is_one_way = |element: usize| elements[element].kind == ElementKind::OneWayClutch;
+    let partner = |element: usize, others: &[usize]| {
+        others.iter().copied().find(|&other| is_one_way(element) != is_one_way(other) && beside(element, other))
+    };
+    let changing = |of: &[usize], others: &[usize]| -> Vec<usize> {
+        of.iter().copied().filter(|&element| partner(element, others).is_none()).collect()
+    };
+    if let ([offgoing], [oncoming]) = (&*changing(&off, &on), &*changing(&on, &off)) {
+        let stays = off.iter().filter_map(|&element| {
+            let other = partner(element, &on)?;
+            Some(if is_one_way(element) { other } else { element })
+        });
+        let held: Vec<usize> = common.iter().copied().chain(stays).collect();
+        if held.len() > common.len() && possible(*offgoing, *oncoming, &held) {
             return Change::Single { offgoing: *offgoing, oncoming: *oncoming, held };
         }
     }

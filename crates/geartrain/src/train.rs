@@ -113,6 +113,14 @@ impl GearTrain {
         }
     }
 
+    /// Whether two elements connect the same members.
+    pub(crate) fn is_beside(&self, a: usize, b: usize) -> bool {
+        match (self.elements[a].connection, self.elements[b].connection) {
+            (Connection::Sides(a, b), Connection::Sides(c, d)) => (a, b) == (c, d) || (a, b) == (d, c),
+            _ => false,
+        }
+    }
+
     /// Sides of a member as a row over the shafts.
     fn row(&self, terms: &[(Member, f64)]) -> RowDVector<f64> {
         let mut row = RowDVector::zeros(self.shafts.len());

@@ -210,6 +210,9 @@ pub enum Health {
     /// No gear drives the car, and none has to: neutral, or the clutch of a car without a converter is open, or slips at a launch. The
     /// estimate is from the valve model alone.
     ClutchOpen,
+    /// The one-way clutch of the gear overruns: the turbine turns slower than the wheels would turn it, as in coasting. In a gear the
+    /// estimate is from the valve model alone.
+    OneWayOverruns,
     /// The speeds cannot be used: the estimate is from the valve model alone.
     SpeedsRejected,
     /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
@@ -222,7 +225,7 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
@@ -233,6 +236,7 @@ impl Health {
         Self::PressureLimited,
         Self::TooSlow,
         Self::ClutchOpen,
+        Self::OneWayOverruns,
         Self::SpeedsRejected,
         Self::HeldClutchSlips,
         Self::Restarted,
@@ -253,6 +257,7 @@ impl Health {
             Self::HeldClutchSlips => "held_clutch_slips",
             Self::TooSlow => "too_slow",
             Self::ClutchOpen => "clutch_open",
+            Self::OneWayOverruns => "one_way_overruns",
             Self::SpeedsRejected => "speeds_rejected",
             Self::Restarted => "restarted",
             Self::TimeRejected => "time_rejected",

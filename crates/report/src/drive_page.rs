@@ -4,7 +4,7 @@ use config::{Car, Source};
 use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
-use study::any_shift::matrix::{ErrorsByPhase, controlling};
+use study::any_shift::matrix::{ErrorsByPhase, controlling_of};
 use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, TruePhase};
 use trace::Cell;
 use trace::units::{km_h, mpa, rpm};
@@ -275,17 +275,17 @@ const COLUMNS: &[Column] = &[
         },
     ),
     column("controlling", "the clutch that drives the inertia phase", |s, car| {
-        unscored(s, |s| Some(clutch_names(s, car)[controlling(s.kind?)].to_owned()))
+        unscored(s, |s| Some(clutch_names(s, car)[controlling_of(&s.rows, s.kind?)].to_owned()))
     }),
     column(
         "pressure MPa",
         "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
-        |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling(s.kind?))?, 1e-6, 3))),
+        |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling_of(&s.rows, s.kind?))?, 1e-6, 3))),
     ),
     column(
         "torque N m",
         "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
-        |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling(s.kind?))?, 1.0, 0))),
+        |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling_of(&s.rows, s.kind?))?, 1.0, 0))),
     ),
     column(
         "at the turbine N m",
@@ -516,7 +516,8 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     } else if !shift.rows.is_empty() {
         let roles = || ["offgoing", "oncoming"].into_iter().zip(names).enumerate();
         panels.extend(roles().map(|(c, (role, name))| torque_panel(&shift.rows, c, format!("{name}, {role}"))));
-        panels.extend(roles().map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
+        let with_pressure = roles().filter(|(c, _)| !is_one_way(&shift.rows, *c));
+        panels.extend(with_pressure.map(|(c, (role, name))| pressure_panel(&shift.rows, c, format!("{name}, {role}"))));
     }
     let is = |row: &ShiftScoreRow| Health::ALL.map(|health| health == row.health);
     let healths: Vec<_> = shift.rows.iter().map(|row| (row.time_s, is(row))).collect();
@@ -525,6 +526,11 @@ fn shift_figure(shift: &ScoredShift, drive: &ScoredDrive, car: &Car) -> Figure {
     spans.extend(phase_spans(shift, "inertia phase", TruePhase::Inertia, INERTIA_PHASE));
     spans.sort_by(|a, b| a.start.total_cmp(&b.start));
     Figure { x_label: "time (s)", x_range: (from_s.max(0.0), to_s), spans, panels }
+}
+
+/// Whether a clutch of the shift is a one-way clutch, which has no pressure and no valve model.
+fn is_one_way(rows: &[ShiftScoreRow], c: usize) -> bool {
+    rows.iter().any(|row| row.clutches[c].is_one_way)
 }
 
 /// The pieces of a phase; the longest has its name.
@@ -592,8 +598,10 @@ fn clutch_panel(
         let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1.map_or(f64::NAN, |range| range[end]);
         rows.iter().map(|row| (row.time_s, value(row))).collect()
     };
-    let series =
-        vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE), curve(2, "valve model", OPEN_LOOP)];
+    let mut series = vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE)];
+    if !is_one_way(rows, c) {
+        series.push(curve(2, "valve model", OPEN_LOOP));
+    }
     let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
     Panel { y_label, height, series, band: Some(band), axis }
 }

@@ -36,6 +36,9 @@ pub fn health_meaning(health: Health) -> &'static str {
         Health::CommandRejected => "an unusable valve command: the last usable command is used",
         Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
         Health::TooSlow => "the gearbox output turns too slowly to be read: the estimate is from the valve model alone",
+        Health::OneWayOverruns => {
+            "the one-way clutch of the gear overruns: the car coasts, and the engine does not drive it"
+        }
         Health::ClutchOpen => "no gear drives the car: neutral, or a clutch that is open or slips at a launch",
         Health::SpeedsRejected => "an unusable speed: the estimate is from the valve model alone",
         Health::Restarted => "a restart: the observer lost its state and starts again",

@@ -28,7 +28,7 @@ use config::{Car, ElementErrorBounds, Sensors, ShiftClutch};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::{Cylinder, Passage};
 use observer::Health;
-use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ShiftEstimate, ShiftInput};
+use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput};
 use plant::TrainError;
 use plant::car::{CarCalibration, CarError, CarModel, CarSample, CarShift, simulate_car_shift};
 use recording::{Recording, records_in_a_sample};
@@ -227,6 +227,8 @@ pub struct ClutchRow {
     pub hidden: bool,
     /// Whether the truth is within the guaranteed ranges.
     pub in_range: bool,
+    /// Whether it is a one-way clutch, which has no pressure.
+    pub is_one_way: bool,
 }
 
 /// A row of a shift.
@@ -267,6 +269,7 @@ impl ClutchRow {
             torque_n_m: [f64::NAN; 3],
             pressure_pa: [f64::NAN; 3],
             sticks,
+            is_one_way: false,
             torque_range_n_m: None,
             pressure_range_pa: None,
             hidden: false,
@@ -436,7 +439,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
     let clutches = estimate.clutches.as_ref()?;
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
-        (Some(found.element) == tables.place(truth.element)).then(|| ClutchRow {
+        (found.element == tables.place(truth.element).unwrap_or(ONE_WAY)).then(|| ClutchRow {
             // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
             torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],
             pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
@@ -444,6 +447,7 @@ fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f
             torque_range_n_m: found.torque_range_n_m,
             pressure_range_pa: found.pressure_range_pa,
             hidden: found.hidden,
+            is_one_way: found.element == ONE_WAY,
             in_range: within(found.pressure_range_pa, truth.pressure_pa, ROUNDING_PA)
                 && within(found.torque_range_n_m, truth.torque_n_m, DRAG_N_M),
         })

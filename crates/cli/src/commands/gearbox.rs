@@ -157,8 +157,9 @@ pub(super) fn shifts(gearbox: &Gearbox) -> Result<(), Failure> {
             None => vec![String::new(); 5],
         });
         let [i_off, i_on] = [shift.from, shift.to].map(|gear| gearbox.gears[gear].ratio);
-        // Between forward and reverse there is no torque phase.
-        row.push(if i_off * i_on > 0.0 { short(1.0 / (i_off - i_on), 2) } else { String::new() });
+        // Between forward and reverse, and between gears of one ratio, there is no torque phase.
+        let has_gain = i_off * i_on > 0.0 && !gearbox.is_same_ratio(shift.from, shift.to);
+        row.push(if has_gain { short(1.0 / (i_off - i_on), 2) } else { String::new() });
         rows.push(row);
     }
     output::line("\nshifts between one element and another; the way back exchanges off and on")?;
@@ -199,7 +200,10 @@ fn remarks(gearbox: &Gearbox) -> Vec<String> {
         return remarks;
     }
     let without: Vec<&str> = (gearbox.elements.iter())
-        .filter(|element| element.pack.is_none() && element.kind != geartrain::ElementKind::Dog)
+        .filter(|element| {
+            element.pack.is_none()
+                && matches!(element.kind, geartrain::ElementKind::Clutch | geartrain::ElementKind::Brake)
+        })
         .map(|element| element.name.as_str())
         .collect();
     if !without.is_empty() {

@@ -29,7 +29,8 @@ impl Car {
         let direct_n_m = self.engine.largest_torque();
         let Some(converter) = &self.converter else { return direct_n_m };
         let is_reverse = self.gearbox.gears.get(gear).is_some_and(|gear| gear.ratio < 0.0);
-        let starts = is_reverse || self.gearbox.forward_gears().first() == Some(&gear);
+        let starts = is_reverse
+            || self.gearbox.forward_gears().first().is_some_and(|&lowest| self.gearbox.is_same_ratio(lowest, gear));
         let slowest = if starts { 0.0 } else { SLOWEST_TURBINE_RAD_S };
         let fastest = self.engine.torque_n_m.rows().last().map_or(slowest, |last| last.max(slowest));
         let step = (fastest - slowest) / f64::from(TURBINE_SPEEDS);

@@ -3,7 +3,7 @@
 use config::Car;
 use design::ShiftTables;
 use observer::Reading;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftClutch, ShiftInput};
 
 use super::shift_log::{ShiftLog, named_pair};
 use crate::driving::{DrivenCar, Driving, DrivingRecorder, RowState};
@@ -260,6 +260,9 @@ impl<'a> Recorder<'a> {
         }
         let rows = self.tables.tables();
         let row = rows.shift(from, to).ok_or("it is not from one clutch to another")?;
+        if row.clutches.iter().any(ShiftClutch::is_one_way) {
+            return Err("one of its elements is a one-way clutch");
+        }
         let span = [open.begun_s - 0.1, ended_s + AFTER_S];
         let commands = row.clutches.map(|clutch| {
             let all = self.commands.get(clutch.element);

@@ -216,6 +216,16 @@ fn a_one_way_clutch_that_would_have_to_pull_is_refused() {
     assert_finding(&one_way("ring", HOUSING).unwrap_err(), Part::Gear(0), "engaged", &fault);
 }
 
+#[test]
+fn a_one_way_clutch_that_would_hold_in_another_gear_is_refused() {
+    // B drives the ring in 2nd; in 1st the ring stands, and the turbine would turn it.
+    let mut diagram = two_speed();
+    diagram.elements[1] = geartrain::Element { kind: ElementKind::OneWayClutch, ..element("B", "turbine", "ring") };
+    let fault = Fault::OneWayBlocks { element: "B".to_owned(), gear: "1".to_owned() };
+    assert_finding(&Gearbox::new(&described(diagram)).unwrap_err(), Part::Gear(0), "engaged", &fault);
+    assert!(fault.hint().is_some());
+}
+
 fn shares(change: impl FnOnce(&mut Shares)) -> Finding {
     let gear = |name: &str, ratio: f64, element: &str| SharedGear {
         name: name.to_owned(),

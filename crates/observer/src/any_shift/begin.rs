@@ -3,8 +3,9 @@
 use super::running::TURBINE_ACTS;
 use super::{
     AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, GearCommand, Health, LOAD, LOAD_START, LOST_S,
-    MISFIT, N, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE, SPEEDS,
-    SPRING, ShiftInput, ShiftPhase, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start, square, turbine,
+    MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE,
+    SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start,
+    square, turbine,
 };
 use drivetrain::Real;
 
@@ -19,6 +20,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let mut health = Health::Good;
         let speeds = self.measured(&state.newest, state.running.as_ref());
         let opens = self.is_open(state, input.gear);
+        let overruns = self.overruns(input.gear, speeds);
         if let Some(running) = &mut state.running {
             let lost = T::of(LOST_S);
             let blind = running.silent_s[TURBINE].min(running.silent_s[OUTPUT]) > lost;
@@ -27,13 +29,18 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 && self.limits.shaft_torque_possible(running.x.mean[SPRING])
                 && running.x.mean[..SPEEDS].iter().all(|&speed| self.limits.speed_valid(speed));
             let ratio = self.tied_ratio(running).filter(|_| running.shift.is_none());
-            let unfit = ratio.is_some_and(|ratio| self.slip(ratio, speeds).is_over());
+            let is_late = running.shift.is_some() && overruns;
+            let unfit = is_late || ratio.is_some_and(|ratio| self.slip(ratio, speeds).is_over());
             state.unfit = if unfit { state.unfit.saturating_add(1) } else { 0 };
             if running.misfit > T::of(MISFIT) {
-                health = if opens { Health::ClutchOpen } else { Health::HeldClutchSlips };
+                health = match (opens, overruns || self.may_overrun(running, input.gear, speeds)) {
+                    (true, _) => Health::ClutchOpen,
+                    (_, true) => Health::OneWayOverruns,
+                    _ => Health::HeldClutchSlips,
+                };
                 running.before = None;
             }
-            let slips = state.unfit >= SLIPS_IN_GEAR;
+            let slips = state.unfit >= if is_late { NOT_CAUGHT } else { SLIPS_IN_GEAR };
             if slow && possible {
                 self.keep_wheel_scale(running, &mut state.learnt);
             }
@@ -48,12 +55,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             let slow = self.is_slow(state);
             let stands = state.running.is_none();
             state.launches = stands && self.turbine.converter.is_none() && (state.launches || slow || opens);
-            state.slips = stands && !slow && !state.launches && (state.slips || slips);
+            state.slips = stands && !slow && !state.launches && !overruns && (state.slips || slips);
             let neutral = [input.gear.from, input.gear.to] == [GearCommand::NEUTRAL; 2];
             health = match (stands && neutral, stands && slow, state.launches && slips, state.slips) {
                 (true, ..) => Health::ClutchOpen,
                 (_, true, ..) => Health::TooSlow,
                 (_, _, true, _) => Health::ClutchOpen,
+                _ if stands && overruns => Health::OneWayOverruns,
                 (.., true) => Health::HeldClutchSlips,
                 _ => health,
             };
@@ -62,6 +70,25 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
         }
         health
+    }
+
+    /// Slip of the gear that is commanded, where a one-way clutch holds it.
+    fn one_way_slip(&self, gear: GearCommand, speeds: [T; 2]) -> Option<Slip<T>> {
+        let row = self.tables.gears.get(gear.to).filter(|_| gear.from == gear.to && self.tables.is_one_way(gear.to))?;
+        Some(self.slip(row.ratio, speeds))
+    }
+
+    /// Whether the turbine turns slower than the gear would let it, behind a one-way clutch that overruns.
+    fn overruns(&self, gear: GearCommand, speeds: [T; 2]) -> bool {
+        self.one_way_slip(gear, speeds).is_some_and(|slip| slip.is_over() && slip.value < T::zero())
+    }
+
+    /// Whether it may begin to do so where the readings do not show it yet: an element that slips makes the turbine faster. In a shift
+    /// it does while the car coasts.
+    fn may_overrun(&self, running: &Running<T>, gear: GearCommand, speeds: [T; 2]) -> bool {
+        let in_gear = self.one_way_slip(gear, speeds).is_some_and(|slip| !slip.is_over() || slip.value < T::zero());
+        let coasts = running.phase.phase == ShiftPhase::BothSlip && running.slow_n_m <= T::zero();
+        in_gear || coasts && running.shift.is_some_and(|shift| shift.clutches.iter().any(ShiftClutch::is_one_way))
     }
 
     /// Whether the newest reading of the output speed is too slow to be used.
@@ -108,6 +135,12 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         );
         // Of a gear that is in no table nothing can be said.
         let known = self.tables.gears.get(gear.from).is_some();
+        // Behind a one-way clutch that overruns the turbine turns freely.
+        let is_free = |shift: &ShiftRow<T>| {
+            let [off, _] = &shift.clutches;
+            off.is_one_way() && self.slip(off.ratio, [turbine, output]).value < T::zero()
+        };
+        let held = held.or(shift.as_ref().filter(|shift| is_free(shift)).map(|_| (T::zero(), ShiftPhase::BothSlip)));
         let Some((ratio, phase)) = held else { return (None, known && gear.from == gear.to) };
         if gear.from != gear.to && shift.is_none() {
             return (None, false);
@@ -129,13 +162,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             before: None,
         };
         running.renew_shift();
+        if phase == ShiftPhase::BothSlip {
+            running.x.renew(TURBINE, turbine, square(self.readings[TURBINE].deviation_rad_s));
+        }
         if let Some(shift) = shift {
             self.enter_shift(&mut running, shift, &state.learnt);
         }
         (Some(running), false)
     }
 
-    /// Mean and covariance in a gear with this ratio, the drive shafts in balance with the torque at the gearbox input.
+    /// Mean and covariance in a gear with this ratio, the drive shafts in balance with the torque at the gearbox input. With the ratio
+    /// zero no torque passes.
     fn balanced(&self, state: &AnyShiftState<T>, ratio: T, output: T, torque: &turbine::Found<T>) -> Gaussian<T> {
         let u = &self.uncertainty;
         let shaft = torque.turbine_n_m * ratio * self.driveline.final_ratio;

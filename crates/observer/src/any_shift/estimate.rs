@@ -270,7 +270,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             valve_pa,
             open_loop_n_m: open_loop_n_m / clutch.alpha,
             holds,
-            hidden: !holds && deviation >= T::of(HIDDEN) * alone,
+            hidden: !holds && !clutch.is_one_way() && deviation >= T::of(HIDDEN) * alone,
             pressure_range_pa: None,
             torque_range_n_m: None,
         }

@@ -16,7 +16,7 @@
 //!
 //! Both clutches of a shift have the same equations, from [`GearboxTables`]; nothing is written for the oncoming one. A
 //! clutch that slips has the torque of its valve model, corrected by `f` and `x`; one that holds has the torque that this
-//! takes. Which of them hold, the measured slip decides ([`ShiftPhase`]). The shift command may change at any time: what
+//! takes. A one-way clutch holds any torque in one direction, and none in the other. Which of them hold, the measured slip decides ([`ShiftPhase`]). The shift command may change at any time: what
 //! is known of an element that takes part in both shifts is kept, and nothing begins anew. The valve models of all
 //! elements run all the time. Where pistons have a stroke, a clutch carries nothing before its plates touch; when that is, five
 //! pistons of each element say, with the probability of it.
@@ -64,7 +64,7 @@ pub use input_clutch::InputClutch;
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;
-pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ShiftClutch, ShiftRow};
+pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, ShiftClutch, ShiftRow};
 pub use turbine::TurbineTorque;
 
 const N: usize = 16;
@@ -119,6 +119,8 @@ const MISFIT_S: f64 = 0.05;
 const MISFIT: f64 = 25.0;
 /// Samples in a row with slip in a gear after which an element of the gear slips.
 const SLIPS_IN_GEAR: u8 = 3;
+/// The same after a shift to a gear whose one-way clutch has not caught the turbine \[chosen\]: half a second of a log at 100 Hz.
+const NOT_CAUGHT: u8 = 50;
 
 /// What the filter does not know: standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -167,12 +167,17 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 // Its slip alone decides.
                 return Contact { slip, needed_n_m: T::zero(), holds_n_m: T::zero() };
             }
+            let (row, rest) = self.held_torque(&shift, c, torques);
+            let needed_n_m = running.x.value(&row) + rest;
+            if clutch.is_one_way() {
+                let holds_n_m = if needed_n_m * clutch.alpha > T::zero() { T::infinity() } else { T::zero() };
+                return Contact { slip, needed_n_m, holds_n_m };
+            }
             let (factor, wrong) = (running.x.mean[FRICTION[c.min(1)]], running.x.pressure_error(c));
             let holds_n_m = self.element(elements, clutch.element).map_or(T::zero(), |(memory, element)| {
                 memory.holds(element, clutch, &self.uncertainty, factor, &wrong)
             });
-            let (row, rest) = self.held_torque(&shift, c, torques);
-            Contact { slip, needed_n_m: running.x.value(&row) + rest, holds_n_m }
+            Contact { slip, needed_n_m, holds_n_m }
         };
         let contacts = [contact(0), contact(1)];
         let before = running.phase.phase;
@@ -189,7 +194,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         if let Some(held) = after.holding() {
             let held = held.min(1);
-            running.phase.slips_yet = Self::slips_yet(running, &shift, held, torques);
+            running.phase.slips_yet = if shift.clutches[held].is_one_way() {
+                T::zero()
+            } else {
+                Self::slips_yet(running, &shift, held, torques)
+            };
             Self::tie(running, &shift, shift.clutches[held].ratio);
         }
     }

@@ -17,7 +17,7 @@ use crate::{Budget, ValveModel};
 pub const MAX_ELEMENTS: usize = 8;
 
 /// The place of no element: in the shifts of a gearbox of which the ratios alone are known.
-pub const NO_ELEMENT: usize = usize::MAX;
+pub const NO_ELEMENT: usize = usize::MAX - 1;
 
 /// A clutch or brake with its valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,15 +41,25 @@ pub struct GearRow<T> {
     pub inertia_kg_m2: T,
 }
 
+/// The place of a one-way clutch, which has no pressure and is in no table.
+pub const ONE_WAY: usize = usize::MAX;
+
 /// An element that changes in a shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftClutch<T> {
-    /// Its place in [`GearboxTables::elements`].
+    /// Its place in [`GearboxTables::elements`], or [`ONE_WAY`].
     pub element: usize,
     /// Its slip per turbine speed, `alpha`: the turbine feels `alpha` times its torque.
     pub alpha: T,
     /// The ratio `i` of the gear in which it holds.
     pub ratio: T,
+}
+
+impl<T> ShiftClutch<T> {
+    /// Whether it is a one-way clutch: it holds any torque in one direction, and carries none while it overruns.
+    pub fn is_one_way(&self) -> bool {
+        self.element == ONE_WAY
+    }
 }
 
 /// A shift between two elements.
@@ -149,11 +159,21 @@ impl<T: Real> GearboxTables<'_, T> {
         row.map(|row| &row.mass_kg_m2)
     }
 
+    /// Whether a one-way clutch holds a gear.
+    pub(super) fn is_one_way(&self, gear: usize) -> bool {
+        let holds = |row: &ShiftRow<T>| {
+            let [off, on] = &row.clutches;
+            (row.from == gear && off.is_one_way()) || (row.to == gear && on.is_one_way())
+        };
+        self.shifts.iter().any(holds)
+    }
+
     /// The shift between two gears, if it is one between two known elements.
     pub fn shift(&self, from: usize, to: usize) -> Option<&ShiftRow<T>> {
+        let elements = self.elements.len().min(MAX_ELEMENTS);
         let known = |row: &&ShiftRow<T>| {
             (row.from, row.to) == (from, to)
-                && row.clutches.iter().all(|clutch| clutch.element < self.elements.len().min(MAX_ELEMENTS))
+                && row.clutches.iter().all(|clutch| clutch.element < elements || clutch.is_one_way())
         };
         self.shifts.iter().find(known)
     }

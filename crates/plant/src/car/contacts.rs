@@ -4,7 +4,7 @@
 //! `sum s_k a_k`, and each sticking element holds `sum s_k h_k`. The columns `a_k` and `h_k` are computed once for each set of
 //! sticking elements.
 
-use super::model::{CarInputs, CarModel, CarState, end_responses};
+use super::model::{CarInputs, CarModel, CarState, Part, end_responses};
 use crate::gear_train::{Limits, MAX_ELEMENTS, MAX_FREEDOMS, TrainError};
 use crate::{Contact, Direction, MAX_CONTACTS};
 
@@ -22,6 +22,8 @@ pub struct Contacts {
     stuck_count: usize,
     sliding: [usize; MAX_ELEMENTS],
     sliding_count: usize,
+    /// Whether what sticks keeps the slip of an element as it is, as that of a one-way clutch beside a brake that holds.
+    is_kept: [bool; MAX_ELEMENTS],
     /// `a_k`.
     accelerations: [[f64; MAX_FREEDOMS]; ENDS + MAX_ELEMENTS],
     /// `h_k` of each sticking element: ends, then elements.
@@ -30,6 +32,8 @@ pub struct Contacts {
 
 /// A slip below this is zero, rad/s.
 const ZERO_SLIP_RAD_S: f64 = 1e-6;
+/// A slip that changes by less than this share of what it would without the sticking elements is kept.
+const KEPT: f64 = 1e-7;
 
 impl Contacts {
     /// The columns of these contacts.
@@ -44,6 +48,7 @@ impl Contacts {
             stuck_count: 0,
             sliding: [0; MAX_ELEMENTS],
             sliding_count: 0,
+            is_kept: [false; MAX_ELEMENTS],
             accelerations: [[0.0; MAX_FREEDOMS]; ENDS + MAX_ELEMENTS],
             holding: [[0.0; ENDS + MAX_ELEMENTS]; MAX_CONTACTS],
         };
@@ -58,7 +63,9 @@ impl Contacts {
         let sliding = contacts.sliding().to_vec();
         let ends = end_responses(train).into_iter().enumerate();
         // An element that drives its output side takes as much from its input side.
-        let elements = sliding.into_iter().map(|element| (ENDS + element, train.responses[element].map(|x| -x)));
+        let elements = sliding.iter().map(|&element| (ENDS + element, train.responses[element].map(|x| -x)));
+        // The largest change of each slip with and without the sticking elements.
+        let mut changes = [[0.0_f64; 2]; MAX_ELEMENTS];
         for (source, free) in ends.chain(elements) {
             let (stuck, count) = (contacts.stuck, contacts.stuck_count);
             let stuck = &stuck[..count];
@@ -71,7 +78,15 @@ impl Contacts {
                 }
                 contacts.holding[at][source] = held;
             }
+            for &element in &sliding {
+                let [with, without] = &mut changes[element];
+                *with = with.max(train.slip(&acceleration, element).abs());
+                *without = without.max(train.slip(&free, element).abs());
+            }
             contacts.accelerations[source] = acceleration;
+        }
+        for (kept, [with, without]) in contacts.is_kept.iter_mut().zip(changes) {
+            *kept = with < KEPT * without;
         }
         Ok(contacts)
     }
@@ -80,6 +95,12 @@ impl Contacts {
     #[inline]
     pub fn of(&self, element: usize) -> ContactState {
         self.states[element]
+    }
+
+    /// Whether what sticks keeps the slip of an element that does not.
+    #[inline]
+    pub(super) fn is_kept(&self, element: usize) -> bool {
+        self.is_kept[element]
     }
 
     /// What all elements do.
@@ -157,7 +178,9 @@ impl Contacts {
         let mut count = 0;
         for element in 0..model.parts.len() {
             let slip = model.slip(state, element);
-            let sticks = before[element] == Some(Contact::Stuck) || touched == Some(element);
+            // A one-way clutch has no slip in the direction in which it holds, whatever its rounding error.
+            let catches = slip > 0.0 && matches!(model.parts[element], Part::OneWay);
+            let sticks = before[element] == Some(Contact::Stuck) || touched == Some(element) || catches;
             if model.holding_limits(element, state, inputs).is_none() {
                 states[element] = None;
             } else if sticks || slip.abs() < ZERO_SLIP_RAD_S {
@@ -182,6 +205,52 @@ impl Contacts {
         for (&element, contact) in at_zero.iter().zip(solution.contacts) {
             states[element] = Some(contact);
         }
-        Ok((Self::new(model, states)?, state))
+        let contacts = Self::new(model, states)?.without_sharing(model, at_zero, &state, inputs)?;
+        Ok((contacts, state))
+    }
+
+    /// The same where no one-way clutch shares its slip with another sticking element, as with a brake beside it: how the two share a
+    /// torque is not determined, and a rounding error would change the contacts again and again. The other one holds alone if it
+    /// can; else it gives what it can, and the one-way clutch holds the rest.
+    fn without_sharing(
+        self,
+        model: &CarModel,
+        at_zero: &[usize],
+        state: &CarState,
+        inputs: &CarInputs,
+    ) -> Result<Self, TrainError> {
+        let mut contacts = self;
+        for &element in at_zero {
+            if contacts.of(element) != Some(Contact::Stuck) || !matches!(model.parts[element], Part::OneWay) {
+                continue;
+            }
+            let mut states = contacts.states;
+            states[element] = Some(Contact::Slipping(Direction::Backward));
+            let without = Self::new(model, states)?;
+            if !without.is_kept(element) {
+                continue;
+            }
+            let Some((other, direction)) = without.overloaded(model, state, inputs) else {
+                contacts = without;
+                continue;
+            };
+            let mut states = contacts.states;
+            states[other] = Some(Contact::Slipping(direction));
+            let with = Self::new(model, states)?;
+            if with.is_kept(other) && with.overloaded(model, state, inputs).is_none() {
+                contacts = with;
+            }
+        }
+        Ok(contacts)
+    }
+
+    /// A sticking element that cannot hold what it must, and in which direction it would slip.
+    fn overloaded(&self, model: &CarModel, state: &CarState, inputs: &CarInputs) -> Option<(usize, Direction)> {
+        let torques = model.torques(self, state, inputs).elements_n_m;
+        self.stuck().iter().copied().find_map(|element| {
+            let (lower, upper) = model.holding_limits(element, state, inputs).unwrap_or((0.0, 0.0));
+            let is_over = !(lower..=upper).contains(&torques[element]);
+            is_over.then_some((element, Direction::of(torques[element])))
+        })
     }
 }

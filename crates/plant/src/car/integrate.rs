@@ -241,7 +241,9 @@ impl CarIntegrator {
     fn margins(&self, model: &CarModel, inputs: &CarInputs, x: &CarState, applied: &CarTorques) -> Margins {
         let mut margins = [f64::INFINITY; 2 * MAX_ELEMENTS];
         for &element in self.contacts.sliding() {
-            if let Some(Contact::Slipping(direction)) = self.contacts.of(element) {
+            if let Some(Contact::Slipping(direction)) = self.contacts.of(element)
+                && !self.contacts.is_kept(element)
+            {
                 margins[element] = Direction::sign(direction) * model.slip(x, element) + SLACK;
             }
             if let Part::Friction(slot, clutch) = &model.parts[element] {

@@ -2,7 +2,7 @@
 
 use config::Car;
 use drivetrain::PeakJerk;
-use geartrain::Change;
+use geartrain::{Change, Gearbox};
 
 use super::controller::{CarCalibration, ShiftStage};
 use super::integrate::CarError;
@@ -49,7 +49,8 @@ impl CarShift {
 pub struct CarShiftQuality {
     /// Time from the request until the oncoming clutch sticks and the controller is done, s; `None` if it was not completed.
     pub complete_s: Option<f64>,
-    /// Largest slip of the old gear in the wrong direction, rad/s.
+    /// Largest slip of the old gear in the wrong direction, rad/s; zero where a one-way clutch is to catch the turbine, which may
+    /// fall before.
     pub flare_rad_s: f64,
     /// Largest slip beyond the new gear, rad/s.
     pub past_synchronous_rad_s: f64,
@@ -97,6 +98,40 @@ pub fn simulate_car_shift(
     Ok(rating.quality())
 }
 
+/// How far the turbine leaves the speeds between those of two gears.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeyondGears {
+    /// Of the gear before and after.
+    ratios: [f64; 2],
+    /// Whether a one-way clutch is to catch the turbine. It may fall before, and cannot go beyond.
+    catches: bool,
+    /// Whether the turbine has been on the side of the old gear. Behind a one-way clutch that overruns it may begin on the other.
+    was_before: bool,
+}
+
+impl BeyondGears {
+    /// Between gears of these ratios; `gears` are their places.
+    pub fn new(gearbox: &Gearbox, gears: [usize; 2], ratios: [f64; 2]) -> Self {
+        let single = gearbox.shift(gears[0], gears[1]).and_then(|shift| shift.change.single());
+        let [overruns, catches] = single.map_or([false; 2], |elements| elements.map(|at| gearbox.is_one_way(at)));
+        Self { ratios, catches, was_before: !overruns }
+    }
+
+    /// Takes the speeds of turbine and output, rad/s.
+    pub fn push(&mut self, quality: &mut CarShiftQuality, [turbine, output]: [f64; 2]) {
+        if self.catches {
+            return;
+        }
+        let direction = (self.ratios[0] - self.ratios[1]).signum();
+        let [old, new] = self.ratios.map(|ratio| direction * (turbine - ratio * output));
+        quality.flare_rad_s = quality.flare_rad_s.max(old);
+        self.was_before |= new > 0.0;
+        if self.was_before {
+            quality.past_synchronous_rad_s = quality.past_synchronous_rad_s.max(-new);
+        }
+    }
+}
+
 /// The place of neutral among the gears: that of no gear.
 pub const NO_GEAR: usize = usize::MAX;
 
@@ -107,7 +142,7 @@ const RATED_AFTER_S: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct CarShiftRating {
     shift: CarShift,
-    ratios: [f64; 2],
+    beyond: BeyondGears,
     alphas: [f64; 2],
     held: Vec<usize>,
     quality: CarShiftQuality,
@@ -128,7 +163,7 @@ impl CarShiftRating {
         };
         Self {
             shift: *shift,
-            ratios,
+            beyond: BeyondGears::new(&model.car.gearbox, [shift.from, shift.to], ratios),
             alphas,
             held,
             quality: CarShiftQuality::default(),
@@ -159,10 +194,7 @@ impl CarShiftRating {
             q.turbine_n_m = sample.turbine_n_m;
             self.was_requested = true;
         }
-        let direction = (self.ratios[0] - self.ratios[1]).signum();
-        let slip = |ratio: f64| direction * (sample.torques.turbine_rad_s - ratio * sample.torques.output_rad_s);
-        q.flare_rad_s = q.flare_rad_s.max(slip(self.ratios[0]));
-        q.past_synchronous_rad_s = q.past_synchronous_rad_s.max(-slip(self.ratios[1]));
+        self.beyond.push(q, [sample.torques.turbine_rad_s, sample.torques.output_rad_s]);
         let Some(shift) = &sample.shift else {
             if sample.gears() == [Some(self.shift.to).filter(|&to| to != NO_GEAR); 2] {
                 q.complete_s.get_or_insert(sample.time_s - self.shift.request_s);

@@ -81,6 +81,22 @@ fn power_in_is_stored_or_dissipated_in_every_gearbox_and_kind_of_shift() {
     println!("most missing: {:.1e} ({})", worst.0, worst.1);
 }
 
+/// It lets go, catches and overruns; the brake beside it takes its load and leaves it.
+#[test]
+fn power_is_accounted_for_in_shifts_of_a_one_way_clutch() {
+    let model = CarModel::new(crate::one_way()).unwrap();
+    let mut worst: f64 = 0.0;
+    for names in [["1", "2"], ["2", "1"], ["3", "1"], ["1", "L"], ["L", "1"], ["2", "L"]] {
+        let [from, to] = names.map(|name| model.car.gearbox.gear(name).unwrap());
+        for throttle in [0.15, 0.0] {
+            let missing = audit(&model, (from, to), throttle, 2e-6).missing(&model, "");
+            assert!(missing < 1e-4, "{names:?}, throttle {throttle}: {missing:e}");
+            worst = worst.max(missing);
+        }
+    }
+    println!("shifts of a one-way clutch, most missing: {worst:.1e}");
+}
+
 #[test]
 fn a_lock_up_clutch_that_closes_and_opens_loses_its_friction_only() {
     let mut car = crate::cars().swap_remove(0);
@@ -119,7 +135,7 @@ fn power_is_accounted_for_in_launches_garage_shifts_and_withdrawn_shifts() {
     for throttle in [0.0, 0.2, 0.5] {
         run(crate::dual_clutch(), 0.0, driver(throttle, 0.0), &|_| {});
     }
-    for car in cars().into_iter().take(4) {
+    for car in cars().into_iter().take(4).chain([crate::one_way()]) {
         let reverse = car.gearbox.gear("R").unwrap();
         run(car.clone(), 0.0, driver(0.0, 0.6), &|run| {
             if run.time_s() > 1.0 {

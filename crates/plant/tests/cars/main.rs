@@ -18,6 +18,7 @@ macro_rules! car {
 mod drives;
 mod energy;
 mod garage;
+mod one_way;
 mod sequences;
 mod shifts;
 mod two_speed;
@@ -30,7 +31,12 @@ fn dual_clutch() -> Car {
     car!("gearboxes/dual_clutch_7.toml", "launch = \"clutch\"\n[driveline]\nfinal_ratio = 1.0\n")
 }
 
-/// A car for every gearbox that ships with the program.
+/// The four-speed gearbox whose 1st gear a one-way clutch holds.
+fn one_way() -> Car {
+    car!("gearboxes/ravigneaux_4_one_way.toml", "")
+}
+
+/// A car for every gearbox that ships with the program, but for that with a one-way clutch.
 fn cars() -> Vec<Car> {
     vec![
         car!("gearboxes/8hp.toml", ""),

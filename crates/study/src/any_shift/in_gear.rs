@@ -141,6 +141,7 @@ fn is_usable(health: Health) -> bool {
         Health::CommandRejected
         | Health::TooSlow
         | Health::ClutchOpen
+        | Health::OneWayOverruns
         | Health::SpeedsRejected
         | Health::HeldClutchSlips
         | Health::Restarted

@@ -7,7 +7,7 @@ use config::{Car, Sensors, ShiftClutch};
 use design::{ElementErrors, ShiftErrors};
 use drivetrain::Table1;
 
-use super::matrix::controlling;
+use super::matrix::controlling_of;
 use super::nominal::{NominalShift, nominal_shifts};
 use super::{AnyShiftError, SquaredErrors, TruePhase};
 use crate::StudyError;
@@ -251,7 +251,7 @@ fn errors(file: &Car, sensors: &Sensors, shifts: &[NominalShift]) -> Result<(usi
     let mut slipping = 0;
     for nominal in shifts {
         let rows = nominal.estimated(file, sensors, ERRORS.valve_delay_s, &nominal.inputs)?;
-        let clutch = controlling(nominal.shift.kind);
+        let clutch = controlling_of(&rows, nominal.shift.kind);
         let before = torque.rows;
         for phase in [TruePhase::Torque, TruePhase::Inertia] {
             torque.add(&SquaredErrors::of(&rows, phase, clutch));

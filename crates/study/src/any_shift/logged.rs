@@ -8,11 +8,11 @@ use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use drivetrain::CommandKind;
 use observer::any_shift::{
-    AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ShiftEstimate, ShiftInput,
-    ShiftPhase,
+    AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate,
+    ShiftInput, ShiftPhase,
 };
 use observer::{Health, Reading};
-use plant::car::{CarShiftQuality, NO_GEAR};
+use plant::car::{BeyondGears, CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
 use super::contradictions::CommandCheck;
@@ -291,6 +291,8 @@ pub struct LoggedDrive<'c> {
     came_rad_s: [f64; 3],
     speeds_rad_s: [f64; 3],
     begun_s: f64,
+    /// Where the turbine is in it.
+    beyond: BeyondGears,
     in_gear: InGear<'c>,
     /// The gear of the row before, and changes of the gear which no target gear announced.
     gear: Option<usize>,
@@ -353,6 +355,7 @@ impl<'c> LoggedDrive<'c> {
             came_rad_s: [f64::NAN; 3],
             speeds_rad_s: [f64::NAN; 3],
             begun_s: f64::NAN,
+            beyond: BeyondGears::new(&car.gearbox, [NO_GEAR; 2], [f64::NAN; 2]),
             in_gear: InGear::new(car),
             gear: None,
             unannounced: 0,
@@ -474,23 +477,19 @@ impl<'c> LoggedDrive<'c> {
         let GearCommand { from, to } = step.input.gear;
         let elements = self.tables.tables().shift(from, to).map(|row| row.clutches.map(|clutch| clutch.element));
         if self.passing.open.is_none() {
-            let known = (0..self.car.gearbox.elements.len()).collect::<Vec<_>>();
-            let of = |place: usize| known.iter().copied().find(|&element| self.tables.place(element) == Some(place));
-            let elements = elements.map_or([NO_ELEMENT; 2], |places| places.map(|at| of(at).unwrap_or(NO_ELEMENT)));
+            let single = || self.car.gearbox.shift(from, to).and_then(|shift| shift.change.single());
+            let elements = elements.and_then(|_| single()).unwrap_or([NO_ELEMENT; 2]);
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;
             self.still.begin();
+            let ratios = [from, to].map(|gear| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
+            self.beyond = BeyondGears::new(&self.car.gearbox, [from, to], ratios);
         }
         let Some(shift) = &mut self.passing.open else { return };
         shift.time_s[1] = step.time_s;
-        let ratio = |gear: usize| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio);
-        let direction = (ratio(from) - ratio(to)).signum();
         let [_, turbine, output] = self.speeds_rad_s;
-        let slip = |gear: usize| direction * (turbine - ratio(gear) * output);
-        let quality = &mut shift.quality;
-        quality.flare_rad_s = quality.flare_rad_s.max(slip(from));
-        quality.past_synchronous_rad_s = quality.past_synchronous_rad_s.max(-slip(to));
+        self.beyond.push(&mut shift.quality, [turbine, output]);
         let found = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
         let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.deviation_n_m]);
         let clutches = match (found, self.car.gearbox.has_ratios_alone()) {
@@ -578,6 +577,7 @@ fn clutch_row(found: &ClutchEstimate<f64>, [pressure_pa, torque_n_m, slip_rad_s]
         torque_range_n_m: found.torque_range_n_m,
         pressure_range_pa: found.pressure_range_pa,
         hidden: found.hidden,
+        is_one_way: found.element == ONE_WAY,
         in_range: within(found.pressure_range_pa, pressure_pa, ROUNDING_PA)
             && within(found.torque_range_n_m, torque_n_m, DRAG_N_M),
     }

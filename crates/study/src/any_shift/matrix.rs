@@ -113,6 +113,12 @@ pub fn controlling(kind: ShiftKind) -> usize {
     }
 }
 
+/// The same of the shift with these rows: the other one where that is a one-way clutch, which overruns then and drives nothing.
+pub fn controlling_of(rows: &[ShiftScoreRow], kind: ShiftKind) -> usize {
+    let by_kind = controlling(kind);
+    if rows.first().is_some_and(|row| row.clutches[by_kind].is_one_way) { 1 - by_kind } else { by_kind }
+}
+
 /// The classes of `1/|i_off - i_on|`, by their lower ends.
 pub const CLASSES: [f64; 3] = [0.0, 2.0, 5.0];
 
@@ -150,7 +156,7 @@ pub type ErrorsByPhase = [[PhaseErrors; 2]; 2];
 
 /// Errors by phase and clutch of a shift of this kind.
 pub fn errors_by_phase(rows: &[ShiftScoreRow], kind: ShiftKind) -> ErrorsByPhase {
-    let main = controlling(kind);
+    let main = controlling_of(rows, kind);
     [TruePhase::Torque, TruePhase::Inertia]
         .map(|phase| [main, 1 - main].map(|clutch| PhaseErrors::of(rows, phase, clutch)))
 }

@@ -7,7 +7,7 @@ use config::{Car, CarErrorBounds, Sensors, ShiftClutch};
 use design::ShiftErrors;
 use serde::Serialize;
 
-use super::matrix::{MatrixShift, controlling};
+use super::matrix::{MatrixShift, controlling_of};
 use super::nominal::{NominalShift, nominal_shifts};
 use super::{AnyShiftError, ShiftScoreRow, TruePhase};
 use crate::StudyError;
@@ -186,9 +186,9 @@ pub fn car_sensitivity(car: &Car, sensors: &Sensors) -> Result<Vec<ShiftSensitiv
 
 fn of_shift(car: &Car, sensors: &Sensors, nominal: &NominalShift) -> Result<Option<ShiftSensitivity>, AnyShiftError> {
     let Some(clutches) = nominal.elements() else { return Ok(None) };
-    let main = controlling(nominal.shift.kind);
-    let (own, other) = (clutches[main], clutches[1 - main]);
     let as_it_is = nominal.estimated(car, sensors, ERRORS.valve_delay_s, &nominal.inputs)?;
+    let main = controlling_of(&as_it_is, nominal.shift.kind);
+    let (own, other) = (clutches[main], clutches[1 - main]);
     let mut effects: [Vec<EffectInShift>; 2] = Default::default();
     for error in ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)) {
         let off = [-1.0, 1.0].map(|sign| with_error(car, sensors, nominal, error, sign, [own, other]));

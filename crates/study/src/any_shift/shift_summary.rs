@@ -3,7 +3,7 @@
 use drivetrain::ShiftKind;
 use observer::Health;
 
-use super::matrix::{ErrorsByPhase, MatrixCounts, controlling, counts, errors_by_phase};
+use super::matrix::{ErrorsByPhase, MatrixCounts, controlling_of, counts, errors_by_phase};
 use super::{ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase};
 
 /// Sums and means over the rows of a shift.
@@ -43,7 +43,7 @@ impl ShiftSummary {
             errors,
             healths: Health::ALL.map(with),
             lengths_s: [TruePhase::Torque, TruePhase::Inertia].map(length_s),
-            hidden: kind.map_or([0; 2], |kind| hidden(rows, controlling(kind))),
+            hidden: kind.map_or([0; 2], |kind| hidden(rows, controlling_of(rows, kind))),
             mean_pressure_pa: [0, 1]
                 .map(|clutch| mean(rows, clutch, |clutch| (clutch.pressure_pa[1], clutch.pressure_range_pa))),
             mean_torque_n_m: [0, 1]

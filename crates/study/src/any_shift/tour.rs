@@ -42,7 +42,7 @@ pub struct Leg {
 }
 
 /// The shifts of a drive through all forward gears. A gear to which no shift between two clutches leads from the one below is passed
-/// over; so is the lowest gear, where a one-way clutch holds it, if more gears are reached from the next one.
+/// over; so is the lowest gear, if more gears are reached from the next one.
 pub fn legs(car: &Car, tables: &ShiftTables<f64>) -> Vec<Leg> {
     let is_single = |from: usize, to: usize| tables.tables().shift(from, to).is_some();
     let gears = car.gearbox.forward_gears();

@@ -29,7 +29,12 @@ pub(crate) fn cars() -> Vec<Car> {
     ]
 }
 
-/// The same with pistons that have a stroke.
+/// The four-speed gearbox whose 1st gear a one-way clutch holds.
+pub(crate) fn one_way() -> Car {
+    car!("gearboxes/ravigneaux_4_one_way.toml", "")
+}
+
+/// The gearboxes of [`cars`] with pistons that have a stroke.
 pub(crate) fn cars_with_strokes() -> Vec<Car> {
     vec![
         car!("gearboxes/8hp.toml", "[fill]\n"),

@@ -9,6 +9,7 @@ mod drives;
 mod input_clutch;
 mod learning;
 mod limits;
+mod one_way;
 mod ratios_alone;
 mod sensitivity;
 mod strokes;

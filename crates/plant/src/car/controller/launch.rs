@@ -29,7 +29,7 @@ impl Launch {
         let clutch = |holding: &geartrain::Holding| {
             let alpha = 1.0 / holding.per_turbine_torque;
             let clutch = car.clutches.get(holding.element).copied().flatten()?;
-            Some(Controlled::new(holding.element, clutch, [alpha, -alpha * gear.ratio], 0.0))
+            Some(Controlled::new(holding.element, Some(clutch), [alpha, -alpha * gear.ratio], 0.0))
         };
         let clutch = gear.holding.iter().find_map(clutch)?;
         Some(Self { clutch, torque_n_m: 0.0, filled_since_s: None, locked_since_s: None })

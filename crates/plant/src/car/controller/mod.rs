@@ -11,6 +11,8 @@
 //! The sum `U` goes to the clutch whose slip has the right sign: the oncoming one if `U (i_off - i_on) > 0`, else the
 //! offgoing one. So the roles change by themselves when the turbine torque changes its sign during a shift. The controller knows
 //! the nominal car; it does not know pressures, torques, or the errors of the valves.
+//!
+//! One of the two may be a one-way clutch. It has no command: it lets go when its torque is gone, and catches at synchronous speed.
 
 mod calibration;
 mod engine;
@@ -39,8 +41,9 @@ pub use shift::ShiftStage;
 use strokes::Strokes;
 use track::Track;
 
-/// Offgoing and oncoming clutch of a shift, with their places among the elements, and the reduced shift.
-type Single<'c> = ([(usize, ShiftClutch); 2], &'c ReducedShift<f64>);
+/// Offgoing and oncoming clutch of a shift, with their places among the elements, and the reduced shift. One of them may be a
+/// one-way clutch, which has no valve.
+type Single<'c> = ([(usize, Option<ShiftClutch>); 2], &'c ReducedShift<f64>);
 
 /// Speed of the gearbox output below which a gear of the other direction may be engaged, rad/s \[chosen\].
 const AT_REST_RAD_S: f64 = 10.0;
@@ -279,18 +282,25 @@ impl CarShiftController {
         Ok(())
     }
 
-    /// The clutches of a shift between two clutches, offgoing and oncoming, with the reduced shift.
+    /// The clutches of a shift between two clutches, offgoing and oncoming, with the reduced shift. At least one of them has a valve.
     fn single(&self, from: usize, to: usize) -> Option<Single<'_>> {
         let shift = self.car.gearbox.shift(from, to)?;
         let (Change::Single { offgoing, oncoming, .. }, Some(reduced)) = (&shift.change, &shift.reduced) else {
             return None;
         };
-        let clutch = |element: usize| Some((element, self.car.clutches.get(element).copied().flatten()?));
-        Some(([clutch(*offgoing)?, clutch(*oncoming)?], reduced))
+        let clutch = |element: usize| {
+            let clutch = self.car.clutches.get(element).copied().flatten();
+            (clutch.is_some() || self.car.gearbox.is_one_way(element)).then_some((element, clutch))
+        };
+        let clutches = [clutch(*offgoing)?, clutch(*oncoming)?];
+        clutches.iter().any(|(_, clutch)| clutch.is_some()).then_some((clutches, reduced))
     }
 
     /// The gears to go through, each one further on than the one before, by the fewest shifts between two clutches.
     fn way(&self, from: usize, to: usize) -> Result<VecDeque<usize>, CarError> {
+        if self.car.gearbox.is_same_ratio(from, to) && from != to && self.single(from, to).is_some() {
+            return Ok(VecDeque::from([to]));
+        }
         let gears = &self.car.gearbox.gears;
         let ahead =
             |a: usize, b: usize| (gears[a].ratio - gears[b].ratio) * (gears[from].ratio - gears[to].ratio) > 0.0;
@@ -324,12 +334,11 @@ impl CarShiftController {
 
     /// What to do about a gear that a one-way clutch holds.
     fn one_way_hint(&self, gear: usize) -> Option<String> {
-        let elements =
-            self.car.gearbox.gears[gear].holding.iter().map(|holding| &self.car.gearbox.elements[holding.element]);
-        let one_way = elements.into_iter().find(|element| element.kind == ElementKind::OneWayClutch)?;
+        let gearbox = &self.car.gearbox;
+        let one_way = gearbox.elements.get(gearbox.one_way_clutch_of(gear)?)?;
         Some(format!(
-            "gear {} is held by the one-way clutch {}, and shifts from and to such a gear are not driven: in the gearbox file let the clutch or \
-             brake hold it that holds it for engine braking, or drive in the gears above with [start] and [[shift]]",
+            "gear {} is held by the one-way clutch {}: a shift from or to it is driven where one clutch or brake, no dog and no other \
+             one-way clutch, closes or opens; `wetclutch check` lists what changes",
             self.name(gear),
             one_way.name
         ))
@@ -395,12 +404,8 @@ impl CarShiftController {
             std::array::from_fn(|element| open(element).map_or(0.0, |clutch| clutch.valve.command_for(0.0)));
         let mut dogs = [false; MAX_ELEMENTS];
         let line_pa = self.car.line_pressure_pa;
-        let opened = if self.is_neutral {
-            self.partner(self.gear).and_then(|partner| self.single(self.gear, partner))
-        } else {
-            None
-        };
-        let opened = opened.map(|(clutches, _)| clutches[0].0);
+        let partner = self.partner(self.gear).filter(|_| self.is_neutral);
+        let opened = partner.and_then(|partner| self.single(self.gear, partner)).map(|(clutches, _)| clutches[0].0);
         // The clutches of a shift get their commands from it.
         let next = self.active.as_ref().map_or(self.preselected, |shift| Some(shift.to));
         for gear in [Some(self.gear), next].into_iter().flatten() {
@@ -412,6 +417,16 @@ impl CarShiftController {
                     }
                     Some(_) => (),
                     None => dogs[element] = self.car.gearbox.elements[element].kind == ElementKind::Dog,
+                }
+            }
+        }
+        // What holds through the shift may not be of the gear before, where a one-way clutch does the same.
+        let to = self.active.as_ref().map(|shift| shift.to).or(partner);
+        let change = to.and_then(|to| self.car.gearbox.shift(self.gear, to)).map(|shift| &shift.change);
+        if let Some(Change::Single { held, .. }) = change {
+            for &element in held {
+                if let Some(clutch) = &self.car.clutches[element] {
+                    elements[element] = clutch.valve.command_for(line_pa);
                 }
             }
         }

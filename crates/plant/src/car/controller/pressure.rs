@@ -1,4 +1,5 @@
-//! A shift clutch as its controller sees it: from torque at the turbine to the command of its valve.
+//! A shift clutch as its controller sees it: from torque at the turbine to the command of its valve. A one-way clutch has none: it
+//! is asked for nothing.
 
 use config::{FastFill, ShiftClutch};
 
@@ -10,7 +11,8 @@ use crate::fast_fill::{FillPlan, StrokeModel};
 pub(super) struct Controlled {
     /// Its place among the elements.
     pub(super) element: usize,
-    clutch: ShiftClutch,
+    /// `None` for a one-way clutch.
+    clutch: Option<ShiftClutch>,
     /// Its slip per turbine speed.
     alpha: f64,
     /// Turbine speed over output speed while it sticks.
@@ -22,9 +24,14 @@ pub(super) struct Controlled {
 }
 
 impl Controlled {
-    pub(super) fn new(element: usize, clutch: ShiftClutch, slip_row: [f64; 2], modelled_pa: f64) -> Self {
+    pub(super) fn new(element: usize, clutch: Option<ShiftClutch>, slip_row: [f64; 2], modelled_pa: f64) -> Self {
         let [alpha, per_output] = slip_row;
         Self { element, clutch, alpha, ratio: -per_output / alpha, modelled_pa, fill: None }
+    }
+
+    /// Whether it holds by itself, in one direction.
+    pub(super) fn is_one_way(&self) -> bool {
+        self.clutch.is_none()
     }
 
     /// The same, filled from this state of its piston. The plates touch gently: a clutch that counts much at the turbine has
@@ -34,7 +41,8 @@ impl Controlled {
         let gentle_pa = self.pressure_for(c.filled_n_m, 0.0) - self.kiss_pa();
         let stroke_over_kiss_pa = c.fast_fill.stroke_over_kiss_pa.min(gentle_pa);
         let fast_fill = FastFill { stroke_over_kiss_pa, ..c.fast_fill };
-        self.fill = state.map(|state| FillPlan::from_state(&self.clutch, fast_fill, c.control_period_s, state));
+        let plan = |(clutch, state)| FillPlan::from_state(clutch, fast_fill, c.control_period_s, state);
+        self.fill = self.clutch.as_ref().zip(state).map(plan);
         self
     }
 
@@ -44,20 +52,22 @@ impl Controlled {
     }
 
     pub(super) fn kiss_pa(&self) -> f64 {
-        self.clutch.clutch.kiss_pressure()
+        self.clutch.as_ref().map_or(0.0, |clutch| clutch.clutch.kiss_pressure())
     }
 
     /// Pressure at which it carries this torque at the turbine, Pa.
     pub(super) fn pressure_for(&self, turbine_n_m: f64, slip_at_turbine_rad_s: f64) -> f64 {
-        self.clutch.clutch.pressure_for(turbine_n_m / self.alpha, self.alpha * slip_at_turbine_rad_s)
+        self.clutch.as_ref().map_or(0.0, |clutch| {
+            clutch.clutch.pressure_for(turbine_n_m / self.alpha, self.alpha * slip_at_turbine_rad_s)
+        })
     }
 
     /// Pressure at which the command must settle for the pressure to follow `wanted_pa`, Pa. The valve's lag is compensated by
     /// its nominal model, its delay is not.
     pub(super) fn lead(&mut self, calibration: &CarCalibration, wanted_pa: f64, line_pa: f64) -> f64 {
-        let c = calibration;
+        let (c, Some(clutch)) = (calibration, &self.clutch) else { return 0.0 };
         let to_go = wanted_pa - self.modelled_pa;
-        let lag_s = self.clutch.valve.lag(self.modelled_pa, to_go / c.pressure_follow_s);
+        let lag_s = clutch.valve.lag(self.modelled_pa, to_go / c.pressure_follow_s);
         let ahead = (lag_s / c.pressure_follow_s - 1.0).max(0.0) * to_go;
         let settled = wanted_pa + ahead.clamp(-c.pressure_lead_pa, c.pressure_lead_pa);
         self.without_lead(calibration, settled, line_pa)
@@ -65,14 +75,15 @@ impl Controlled {
 
     /// The pressure at which its command is to settle, Pa, within what the valve can give; the model follows.
     pub(super) fn without_lead(&mut self, calibration: &CarCalibration, settled_pa: f64, line_pa: f64) -> f64 {
+        let Some(clutch) = &self.clutch else { return 0.0 };
         let settled = settled_pa.clamp(0.0, line_pa);
-        let step = self.clutch.valve.step(settled, self.modelled_pa, calibration.control_period_s);
+        let step = clutch.valve.step(settled, self.modelled_pa, calibration.control_period_s);
         self.modelled_pa = step.phi * self.modelled_pa + step.drift_pa;
         settled
     }
 
-    /// Command at which its valve settles at this pressure, A or %.
+    /// Command at which its valve settles at this pressure, A or %; zero without a valve.
     pub(super) fn valve_command(&self, pressure_pa: f64) -> f64 {
-        self.clutch.valve.command_for(pressure_pa)
+        self.clutch.as_ref().map_or(0.0, |clutch| clutch.valve.command_for(pressure_pa))
     }
 }

@@ -9,6 +9,9 @@ use super::{CarCalibration, CarMeasured};
 /// Share of the fill after which the oncoming clutch is at its waiting pressure.
 const FILLED_AT: f64 = 0.75;
 
+/// Ratios closer than this are one.
+const SAME_RATIO: f64 = 1e-6;
+
 /// Stage of a shift, as the controller runs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShiftStage {
@@ -88,7 +91,9 @@ impl ActiveShift {
         line_pa: f64,
         time_s: f64,
     ) -> Self {
-        let direction = (offgoing.ratio - oncoming.ratio).signum();
+        let fall = offgoing.ratio - oncoming.ratio;
+        // Between gears of one ratio the turbine torque of a driven car comes first.
+        let direction = if fall.abs() < SAME_RATIO { 1.0 } else { fall.signum() };
         Self {
             to,
             offgoing,
@@ -139,6 +144,8 @@ impl ActiveShift {
         let clutches = [self.oncoming.clone(), self.offgoing.clone()];
         let mut back = Self::new(from, clutches, self.mass_kg_m2, self.line_pa, time_s);
         match self.stage {
+            // The turbine has fallen behind the one-way clutch: the next step begins its inertia phase.
+            ShiftStage::TorquePhase if self.oncoming.is_one_way() => back.since_s = f64::NEG_INFINITY,
             ShiftStage::TorquePhase => {
                 // What the old gear has given up comes back as at the end of a shift.
                 back.stage = ShiftStage::HandOver;
@@ -212,7 +219,7 @@ impl ActiveShift {
             if now.z.abs() < c.lock_slip_rad_s { self.locked_since_s.or(Some(now.time_s)) } else { None };
         let holds = self.locked_since_s.is_some_and(|since_s| passed(since_s, c.lock_hold_s));
         let next = match self.stage {
-            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) && self.is_from_neutral => {
+            ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) && self.is_free(c, now) => {
                 ShiftStage::InertiaPhase
             }
             ShiftStage::Fill if passed(self.since_s, self.fill_s(c)) => match self.order(now.turbine_n_m) {
@@ -225,8 +232,13 @@ impl ActiveShift {
                 ShiftStage::TorquePhase
             }
             ShiftStage::TorquePhase if now.y * direction < -c.release_slip_rad_s => ShiftStage::InertiaPhase,
+            // A one-way clutch does not bring the turbine up: it waits for it.
+            ShiftStage::TorquePhase if self.transferred >= 1.0 && self.oncoming.is_one_way() => ShiftStage::Lock,
             ShiftStage::TorquePhase if self.transferred >= 1.0 => ShiftStage::InertiaPhase,
             ShiftStage::InertiaPhase if !self.is_slipping => ShiftStage::InertiaPhase,
+            ShiftStage::InertiaPhase if self.oncoming.is_one_way() && now.turbine_n_m * direction > c.sign_n_m => {
+                ShiftStage::Lock
+            }
             ShiftStage::InertiaPhase => match self.order(self.controlled_n_m) {
                 PhaseOrder::TorqueFirst if locks => ShiftStage::Lock,
                 PhaseOrder::InertiaFirst if self.nears(c, now) => ShiftStage::HandOver,
@@ -234,7 +246,9 @@ impl ActiveShift {
                 _ => ShiftStage::InertiaPhase,
             },
             ShiftStage::HandOver if passed(self.since_s, c.hand_over_s) => ShiftStage::Lock,
-            ShiftStage::Lock if holds && passed(self.since_s, c.lock_ramp_s) => ShiftStage::Done,
+            ShiftStage::Lock if (holds || self.oncoming.is_one_way()) && passed(self.since_s, c.lock_ramp_s) => {
+                ShiftStage::Done
+            }
             same => same,
         };
         if next == self.stage {
@@ -244,16 +258,21 @@ impl ActiveShift {
         self.since_s = now.time_s;
         if next == ShiftStage::InertiaPhase {
             self.controlled_n_m = now.turbine_n_m;
-            if self.is_from_neutral {
+            if self.is_free(c, now) {
                 self.direction = now.z.signum();
             }
-            if self.is_from_neutral || self.order(now.turbine_n_m) == PhaseOrder::TorqueFirst {
+            if self.is_free(c, now) || self.order(now.turbine_n_m) == PhaseOrder::TorqueFirst {
                 self.begin_slip(c, now);
             }
         }
         if next == ShiftStage::HandOver {
             self.handed_n_m = self.controlled_n_m;
         }
+    }
+
+    /// Whether the old gear holds the turbine no longer: it is neutral, or its one-way clutch overruns.
+    fn is_free(&self, c: &CarCalibration, now: &Now) -> bool {
+        self.is_from_neutral || (self.offgoing.is_one_way() && now.y < -c.release_slip_rad_s)
     }
 
     /// The old gear slips: from now on the slip follows its reference.
@@ -326,7 +345,8 @@ impl ActiveShift {
     }
 
     fn transfer(&mut self, c: &CarCalibration, now: &Now) -> [f64; 2] {
-        let flare = now.y * self.direction > c.flare_slip_rad_s;
+        // Where a one-way clutch is to catch the turbine later, it may go.
+        let flare = now.y * self.direction > c.flare_slip_rad_s && !self.oncoming.is_one_way();
         self.has_flared |= flare;
         let speed = if self.has_flared { c.flare_ramp } else { 1.0 };
         self.transferred = (self.transferred + speed * c.control_period_s / c.torque_phase_s).min(1.0);

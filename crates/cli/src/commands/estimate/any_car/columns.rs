@@ -1,7 +1,7 @@
 //! The columns of an estimate of a car with any gearbox.
 
 use config::Car;
-use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate};
+use observer::any_shift::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
 use study::any_shift::channels::gear_number;
 use study::any_shift::logged::element_column;
@@ -49,19 +49,35 @@ impl<'a> Row<'a> {
 
     fn element(&self, which: usize) -> Cell<'a> {
         let place = self.estimate.clutches.map(|clutches| clutches[which].element);
+        if place == Some(ONE_WAY) {
+            return Cell::Word(self.one_way(which));
+        }
         let named = self.places.iter().find(|(known, _)| Some(*known) == place);
         Cell::Word(named.map_or("", |(_, name)| *name))
+    }
+
+    /// The one-way clutch of the shift.
+    fn one_way(&self, which: usize) -> &'a str {
+        let gearbox = &self.car.gearbox;
+        let [from, to] = self.estimate.gear.map_or(self.gears, |gear| [gear.from, gear.to]);
+        let single = gearbox.shift(from, to).and_then(|shift| shift.change.single());
+        let element = single.and_then(|elements| gearbox.elements.get(elements[which]));
+        element.map_or("", |element| element.name.as_str())
     }
 
     /// Pressure, torque, their ranges, both by the valve model, and whether the speeds show nothing, in the order of [`CLUTCH`].
     fn clutch(&self, which: usize, what: usize) -> f64 {
         let Some(clutch) = self.estimate.clutches.map(|clutches| clutches[which]) else { return f64::NAN };
+        if clutch.element == ONE_WAY && what != TORQUE {
+            // It has a torque alone.
+            return f64::NAN;
+        }
         let end = |range: Option<[f64; 2]>, end: usize| range.map_or(f64::NAN, |range| range[end]);
         match what {
             0 => clutch.pressure_pa,
             1 => end(clutch.pressure_range_pa, 0),
             2 => end(clutch.pressure_range_pa, 1),
-            3 => clutch.torque_n_m,
+            TORQUE => clutch.torque_n_m,
             4 => end(clutch.torque_range_n_m, 0),
             5 => end(clutch.torque_range_n_m, 1),
             6 => clutch.valve_pa,
@@ -90,6 +106,8 @@ const CLUTCH: [&str; 9] = [
 ];
 /// The column of an element, after its name, that says what became of the reading of its command.
 const COMMAND_READING: &str = "command_reading";
+/// The place of the torque among them.
+const TORQUE: usize = 3;
 /// The columns of an element, after its name: those of [`CLUTCH`] that its command alone gives.
 const ELEMENT: [&str; 3] = [CLUTCH[6], CLUTCH[1], CLUTCH[2]];
 const ROLES: [&str; 2] = ["offgoing", "oncoming"];
