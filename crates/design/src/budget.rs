@@ -3,6 +3,7 @@
 use config::Vehicle;
 use drivetrain::road::GRAVITY_M_S2;
 use drivetrain::{ClutchValve, Valve};
+use observer::Phase;
 
 /// Rates of the pressure that the observers' valve model leaves out in a shift, Pa/s, each at its largest.
 ///
@@ -56,6 +57,15 @@ pub fn shift_time_constant(vehicle: &Vehicle) -> f64 {
 /// Pressure of a shift at which the budget weighs the errors, Pa.
 pub fn shift_pressure(vehicle: &Vehicle) -> f64 {
     vehicle.oncoming.clutch.kiss_pressure() + vehicle.error_bounds.shift_pressure_pa
+}
+
+/// Bound on the error of the turbine torque, N m; in the inertia phase with that of the torque that accelerates the turbine.
+pub fn turbine_n_m(vehicle: &Vehicle, phase: Phase) -> f64 {
+    let bounds = &vehicle.error_bounds;
+    match phase {
+        Phase::InertiaPhase => bounds.turbine_torque_n_m + bounds.inertia_torque_n_m,
+        _ => bounds.turbine_torque_n_m,
+    }
 }
 
 /// What a grade at its bound does at the wheels, N m.

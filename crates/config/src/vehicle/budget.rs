@@ -24,6 +24,9 @@ pub struct ErrorBounds {
     pub turbine_torque_n_m: f64,
     /// The same as a share of the torque.
     pub turbine_torque_share: f64,
+    /// Torque that an error of the turbine-side inertia is worth in the inertia phase, N m. Zero in a file with [gear_train]: its bound
+    /// on the turbine torque is for both.
+    pub inertia_torque_n_m: f64,
     /// Pressure from the valve model alone, Pa.
     pub pressure_pa: f64,
     /// Mass of the vehicle, kg.
@@ -145,6 +148,7 @@ pub(super) fn error_bounds(
         shaft_stiffness_factor: stiffness.transpose()?.unwrap_or(SHAFT_STIFFNESS_FACTOR),
         backlash_rad: optional("backlash_rad", &raw.backlash_rad, 0.0..=0.2, BACKLASH_RAD)?,
         turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
+        inertia_torque_n_m: 0.0,
         pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
         mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
         grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
