@@ -1,5 +1,7 @@
 //! The vehicle of one shift of a car with a gearbox.
 
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
 use config::{Car, Source, Vehicle};
 use drivetrain::Valve;
 
@@ -50,7 +52,10 @@ fn the_two_speed_gearbox_gives_the_built_in_vehicle() {
     near(own.shaft_torque_n_m, other.shaft_torque_n_m, 1e-9);
     near(own.slip_quantum_rad_s, other.slip_quantum_rad_s, 0.03);
     near(own.slip_rad_s, other.slip_rad_s, 1e-9);
-    near(found.inertia_phase.model_error_max_rad_s2, built_in.inertia_phase.model_error_max_rad_s2, 1e-3);
+    // A turbine torque within 13.3 N m, and in the inertia phase 7.9 N m of the inertia, in place of 20 N m.
+    let model_error = |phase: fn(&Vehicle) -> f64| phase(&found) / phase(&built_in);
+    assert!((0.9..1.0).contains(&model_error(|vehicle| vehicle.torque_phase.model_error_max_rad_s2)));
+    near(model_error(|vehicle| vehicle.inertia_phase.model_error_max_rad_s2), 1.0, 0.1);
     near(found.filter.offgoing_n_m, built_in.filter.offgoing_n_m, 1e-9);
     assert_eq!(found.supervisor, built_in.supervisor);
     // The turbine torque is within 10 % of 133 N m, the inertia of 0.06 kg m^2 and more within 20 %.

@@ -1,7 +1,6 @@
 //! What the bounds of the vehicle file's error budget come to in the units of a design.
 
 use config::Vehicle;
-use drivetrain::road::GRAVITY_M_S2;
 use drivetrain::{ClutchValve, Valve};
 use observer::Phase;
 
@@ -70,13 +69,12 @@ pub fn turbine_n_m(vehicle: &Vehicle, phase: Phase) -> f64 {
 
 /// What a grade at its bound does at the wheels, N m.
 pub fn grade_n_m(vehicle: &Vehicle) -> f64 {
-    let road = &vehicle.road;
-    road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * vehicle.error_bounds.grade_rad.sin()
+    vehicle.error_bounds.grade_n_m(&vehicle.road)
 }
 
-/// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
+/// What a mass at its bound does at the wheels, N m.
 pub fn mass_n_m(vehicle: &Vehicle) -> f64 {
-    vehicle.error_bounds.mass_kg / vehicle.road.mass_kg * vehicle.error_bounds.shaft_torque_n_m
+    vehicle.error_bounds.mass_n_m(&vehicle.road)
 }
 
 #[cfg(test)]

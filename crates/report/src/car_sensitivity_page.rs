@@ -14,7 +14,7 @@ const PHASES: [&str; 2] = ["torque phase", "inertia phase"];
 const HIDDEN: &str = "hidden";
 
 /// Why a certified bound and this statistic may call different phases hidden; without its full stop.
-pub const BOUND_AND_DEVIATION: &str = "`design` calls more phases hidden than `sensitivity`: it bounds the error with all errors at their bounds at the \
+pub const BOUND_AND_DEVIATION: &str = "`design` and `sensitivity` may call different phases hidden: `design` bounds the error with all errors at their bounds at the \
                                        same time, for a fixed gain;\n`sensitivity` gives the standard deviation of the filter for any shift, with errors \
                                        anywhere within their bounds, independent of each other";
 
@@ -103,7 +103,7 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &Car) -> Result<St
         hidden,
         all,
         // A car without converter has no designs.
-        bound_and_deviation => car.converter.is_some().then_some(BOUND_AND_DEVIATION),
+        bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_DEVIATION.replace('`', "")),
         inputs => origin(&[&car.source]),
     })?)
 }

@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use drivetrain::RoadLoad;
+use drivetrain::road::GRAVITY_M_S2;
 use observer::FillBudget;
 use toml::Spanned;
 
@@ -182,6 +184,18 @@ pub(super) fn error_bounds(
         slip_rad_s: number("slip_rad_s", &raw.slip_rad_s, 0.0..=200.0)?,
         pressure_max_pa,
     })
+}
+
+impl ErrorBounds {
+    /// What a grade at its bound does at the wheels of a car with this load, N m.
+    pub fn grade_n_m(&self, road: &RoadLoad<f64>) -> f64 {
+        road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * self.grade_rad.sin()
+    }
+
+    /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
+    pub fn mass_n_m(&self, road: &RoadLoad<f64>) -> f64 {
+        self.mass_kg / road.mass_kg * self.shaft_torque_n_m
+    }
 }
 
 /// Least and greatest of a factor on a value of the file.

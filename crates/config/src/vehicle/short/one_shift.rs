@@ -1,6 +1,8 @@
 //! The vehicle of one shift of a car with a gearbox: what designs of gains are made for.
 
-use drivetrain::{ClutchValve, CommandKind, Converter, Driveline, Engagement, ReducedShift, Valve};
+use drivetrain::{
+    AccelerationRow, ClutchValve, CommandKind, Converter, Driveline, Engagement, ReducedShift, RoadLoad, Valve,
+};
 use geartrain::{Change, Shift};
 
 use super::facts::{Facts, ValveKind};
@@ -199,7 +201,10 @@ impl<'c> OneShift<'c> {
         }
         let mut filter = size.filter;
         filter.offgoing_n_m *= self.offgoing_size();
-        let [in_torque_phase, in_inertia_phase] = self.acceleration_sizes()?;
+        let built_in = Vehicle::built_in()?;
+        let own = acceleration_errors(&self.reduced, &car.driveline, &car.road, &error_bounds);
+        let other = acceleration_errors(&built_in.shift, &built_in.driveline, &built_in.road, &built_in.error_bounds);
+        let [in_torque_phase, in_inertia_phase] = [own[0] / other[0], own[1] / other[1]];
         let train = car.gearbox.train.as_ref();
         Ok(Vehicle {
             source: Source { path: car.source.path.clone(), text: car.source.text.clone() },
@@ -288,7 +293,8 @@ impl<'c> OneShift<'c> {
         }
     }
 
-    /// A requirement of the car of the defaults at the accelerations and pressures of this shift.
+    /// A requirement of the car of the defaults, at the pressures of this shift and with errors of the accelerations that are larger by
+    /// this factor.
     fn requirement(&self, of: &DesignRequirement, acceleration: f64) -> DesignRequirement {
         DesignRequirement {
             model_error_max_rad_s2: acceleration * of.model_error_max_rad_s2,
@@ -299,21 +305,6 @@ impl<'c> OneShift<'c> {
 
     fn compliant(&self, of: &CompliantRequirement) -> CompliantRequirement {
         CompliantRequirement { offset_max_pa: self.pressure_size() * of.offset_max_pa, ..*of }
-    }
-
-    /// What the greatest engine torque does to the outputs of torque and inertia phase, over what it does in the built-in car.
-    fn acceleration_sizes(&self) -> Result<[f64; 2], ConfigError> {
-        let (car, built_in) = (self.car, Vehicle::built_in()?);
-        let accelerations = |shift: &ReducedShift<f64>, driveline: &Driveline<f64>, road, torque_n_m: f64| {
-            let shift = shift.with_output_inertia(driveline.vehicle_inertia_at_output(road));
-            let of = |engagement| shift.coefficients(engagement);
-            let (torque, inertia) = (of(Engagement::OffgoingStuck), of(Engagement::BothSlipping));
-            let in_inertia_phase = inertia.turbine.per_turbine_torque.hypot(inertia.slip_oncoming.per_turbine_torque);
-            [torque_n_m * torque.turbine.per_turbine_torque, torque_n_m * in_inertia_phase]
-        };
-        let own = accelerations(&self.reduced, &car.driveline, &car.road, car.engine.largest_torque());
-        let other = accelerations(&built_in.shift, &built_in.driveline, &built_in.road, ENGINE_TORQUE_N_M);
-        Ok([own[0] / other[0], own[1] / other[1]])
     }
 
     /// What an error of the turbine-side inertia is worth in the inertia phase, N m.
@@ -367,4 +358,26 @@ fn with_rising_command(clutch: ShiftClutch) -> ShiftClutch {
         ClutchValve::NormallyHigh { maps, .. } => ShiftClutch { valve: ClutchValve::Proportional(maps), ..clutch },
         _ => clutch,
     }
+}
+
+/// What the errors of the budget do to the outputs of torque and inertia phase, all at their bounds at the same time, rad/s^2.
+fn acceleration_errors(
+    shift: &ReducedShift<f64>,
+    driveline: &Driveline<f64>,
+    road: &RoadLoad<f64>,
+    bounds: &ErrorBounds,
+) -> [f64; 2] {
+    let shift = shift.with_output_inertia(driveline.vehicle_inertia_at_output(road));
+    let of = |engagement| shift.coefficients(engagement);
+    let (torque, inertia) = (of(Engagement::OffgoingStuck), of(Engagement::BothSlipping));
+    let output_n_m =
+        bounds.output_torque_n_m + (bounds.grade_n_m(road) + bounds.mass_n_m(road)) / driveline.final_ratio;
+    let size = |row: &AccelerationRow<f64>, turbine_n_m: f64, offgoing_n_m: f64| {
+        (row.per_turbine_torque * turbine_n_m).abs()
+            + (row.per_output_torque * output_n_m).abs()
+            + (row.per_offgoing_torque * offgoing_n_m).abs()
+    };
+    let turbine_n_m = bounds.turbine_torque_n_m;
+    let slipping = |row| size(row, turbine_n_m + bounds.inertia_torque_n_m, bounds.offgoing_torque_n_m);
+    [size(&torque.turbine, turbine_n_m, 0.0), slipping(&inertia.turbine).hypot(slipping(&inertia.slip_oncoming))]
 }
