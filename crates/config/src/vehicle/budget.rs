@@ -26,7 +26,7 @@ pub struct ErrorBounds {
     pub turbine_torque_n_m: f64,
     /// The same as a share of the torque.
     pub turbine_torque_share: f64,
-    /// Torque that an error of the turbine-side inertia is worth in the inertia phase, N m. Zero in a file with [gear_train]: its bound
+    /// Torque that an error of the turbine-side inertia is worth in the inertia phase, N m. Zero in a file with `[gear_train]`: its bound
     /// on the turbine torque is for both.
     pub inertia_torque_n_m: f64,
     /// Pressure from the valve model alone, Pa.
