@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-use config::ConfigError;
+use config::{ConfigError, OneShiftError};
 use design::DesignError;
 use fit::FitError;
 use logs::LogError;
@@ -67,6 +67,12 @@ impl From<io::Error> for Failure {
 
 impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+impl From<OneShiftError> for Failure {
+    fn from(error: OneShiftError) -> Self {
         Self::Input(error.to_string())
     }
 }

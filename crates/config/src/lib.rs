@@ -30,6 +30,7 @@ pub use source::{Kind, Source, toml_number, toml_string};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
-    Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ErrorBounds,
-    FilterSettings, LockUp, ShiftClutch, TURBINE_SIDE_INERTIA_KG_M2, Uncertainty, ValveUncertainty, Vehicle,
+    Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ElementErrors,
+    ErrorBounds, FilterSettings, LockUp, OneShiftError, ShiftClutch, ShiftErrors, TURBINE_SIDE_INERTIA_KG_M2,
+    Uncertainty, ValveUncertainty, Vehicle,
 };

@@ -1,8 +1,8 @@
 //! What the bounds of the vehicle file's error budget come to in the units of a design.
 
 use config::Vehicle;
-use drivetrain::road::GRAVITY_M_S2;
 use drivetrain::{ClutchValve, Valve};
+use observer::Phase;
 
 /// Rates of the pressure that the observers' valve model leaves out in a shift, Pa/s, each at its largest.
 ///
@@ -58,15 +58,23 @@ pub fn shift_pressure(vehicle: &Vehicle) -> f64 {
     vehicle.oncoming.clutch.kiss_pressure() + vehicle.error_bounds.shift_pressure_pa
 }
 
-/// What a grade at its bound does at the wheels, N m.
-pub fn grade_n_m(vehicle: &Vehicle) -> f64 {
-    let road = &vehicle.road;
-    road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * vehicle.error_bounds.grade_rad.sin()
+/// Bound on the error of the turbine torque, N m; in the inertia phase with that of the torque that accelerates the turbine.
+pub fn turbine_n_m(vehicle: &Vehicle, phase: Phase) -> f64 {
+    let bounds = &vehicle.error_bounds;
+    match phase {
+        Phase::InertiaPhase => bounds.turbine_torque_n_m + bounds.inertia_torque_n_m,
+        _ => bounds.turbine_torque_n_m,
+    }
 }
 
-/// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
+/// What a grade at its bound does at the wheels, N m.
+pub fn grade_n_m(vehicle: &Vehicle) -> f64 {
+    vehicle.error_bounds.grade_n_m(&vehicle.road)
+}
+
+/// What a mass at its bound does at the wheels, N m.
 pub fn mass_n_m(vehicle: &Vehicle) -> f64 {
-    vehicle.error_bounds.mass_kg / vehicle.road.mass_kg * vehicle.error_bounds.shaft_torque_n_m
+    vehicle.error_bounds.mass_n_m(&vehicle.road)
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use observer::{CompliantGains, CompliantModel, CompliantObserver, Discretisation, Phase, Schedule};
 use serde::Serialize;
 
-use crate::budget::{grade_n_m, mass_n_m};
+use crate::budget::{grade_n_m, mass_n_m, turbine_n_m};
 use crate::certificate::BOTH_DIRECTIONS;
 use crate::discrete::Model;
 use crate::discrete::given::longest_decaying_step_s;
@@ -196,7 +196,7 @@ pub fn compliant_observer(
 pub fn error_matrix(vehicle: &Vehicle, phase: Phase) -> DMatrix<f64> {
     let model = compliant_model(vehicle);
     let wheel = model.wheel_per_torque * (grade_n_m(vehicle) + mass_n_m(vehicle)) / SPEED_UNITS_RAD_S[2];
-    let turbine_n_m = vehicle.error_bounds.turbine_torque_n_m;
+    let turbine_n_m = turbine_n_m(vehicle, phase);
     let turbine = |per_torque: f64, output: usize| per_torque * turbine_n_m / SPEED_UNITS_RAD_S[output];
     let rows = &model.inertia_phase;
     match phase {

@@ -9,6 +9,7 @@ use config::Vehicle;
 use drivetrain::ShiftTorques;
 use observer::{Phase, SlidingGains, SlidingObserver};
 
+use crate::budget::turbine_n_m;
 use crate::polytope::slowest_valve;
 use crate::rigid::{requirement, rigid_model, tracker};
 
@@ -35,7 +36,7 @@ fn phase_gains(vehicle: &Vehicle, phase: Phase) -> ([f64; 2], [f64; 2]) {
     let model = rigid_model(vehicle);
     let (weak, strong) = vehicle.uncertainty.friction;
     let bounds = &vehicle.error_bounds;
-    let error = ShiftTorques { turbine_n_m: bounds.turbine_torque_n_m, ..ShiftTorques::default() };
+    let error = ShiftTorques { turbine_n_m: turbine_n_m(vehicle, phase), ..ShiftTorques::default() };
     let rows = model.coefficients(phase);
     let outputs = if phase == Phase::InertiaPhase { 2 } else { 1 };
     let influence = model.influence(phase, strong);

@@ -14,6 +14,7 @@ fn without_errors(vehicle: &Vehicle) -> ErrorBounds {
     ErrorBounds {
         turbine_torque_n_m: 0.0,
         turbine_torque_share: 0.0,
+        inertia_torque_n_m: 0.0,
         engine_torque_share: 0.0,
         pressure_pa: 0.0,
         mass_kg: 0.0,

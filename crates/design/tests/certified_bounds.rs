@@ -6,10 +6,11 @@ mod common;
 
 use std::sync::Mutex;
 
-use common::{Car, DISCRETISATION_PA, DT_S, ENGINE_RAD_S, input, over_a_sample};
+use common::sampled::{Disturbance, SampledCar, disturbance};
+use common::{Car, DISCRETISATION_PA, DT_S};
 use config::{GainMethod, Vehicle};
-use design::{DiscreteDesign, Model, ValveErrors, design_discrete, design_rigid, rigid_observer};
-use observer::{Phase, SampleEstimator};
+use design::{DiscreteDesign, Model, design_discrete, design_rigid};
+use observer::Phase;
 use proptest::prelude::*;
 
 proptest! {
@@ -64,27 +65,7 @@ fn designed(method: GainMethod, sample_time: usize) -> DiscreteDesign {
     design
 }
 
-/// What disturbs a sample, as shares of the bounds of the budget.
-#[derive(Debug, Clone)]
-struct Disturbance {
-    turbine: f64,
-    output: f64,
-    readings: [f64; 2],
-    age: f64,
-    valve: f64,
-}
-
-fn disturbance() -> impl Strategy<Value = Disturbance> {
-    let shares = prop::array::uniform6(-1.0..1.0_f64);
-    // Now and then the worst case at once: everything at its limit.
-    (shares, any::<bool>()).prop_map(|(shares, worst)| {
-        let [turbine, output, first, second, age, valve] = shares.map(|x| if worst { x.signum() } else { x });
-        Disturbance { turbine, output, readings: [first, second], age, valve }
-    })
-}
-
-/// A car whose readings, torques and valve err within the budget, with the rigid observer on it: the sizes of the error and of
-/// what is left of the first one, after each sample.
+/// The built-in car in this phase, with the rigid observer by this method.
 fn errors(
     inertia: bool,
     method: GainMethod,
@@ -92,58 +73,12 @@ fn errors(
     initial_pa: f64,
     disturbances: &[Disturbance],
 ) -> Vec<[f64; 2]> {
-    let t = SAMPLE_TIMES_S[sample_time];
     let vehicle = Vehicle::built_in().unwrap();
-    let bounds = vehicle.error_bounds;
+    let gains = designed(method, sample_time).rigid_gains();
     let phase = if inertia { Phase::InertiaPhase } else { Phase::TorquePhase };
-    let observer = rigid_observer(&vehicle, designed(method, sample_time).rigid_gains());
-    let model = observer.model;
-    // In the inertia phase far from lock-up, in the torque phase in first gear.
-    let (command, mut speeds) = (0.25, if inertia { [340.0, 300.0] } else { [360.0, 360.0] });
-    let mut state = observer.start_sample();
-    for dt in [0.0, 10.0, 1e-9] {
-        observer.step_sample(&mut state, &input(dt, speeds[0], speeds[1], command));
-    }
-    let start = observer.step_sample(&mut state, &input(1e-9, speeds[0], speeds[1], command));
-    assert_eq!(start.phase, phase);
-    let mut pressure = start.pressure_pa + initial_pa;
-    let valve = model.valve.linear(command, pressure);
-    let (phi, psi, gam2) = over_a_sample(valve.a22_per_s, t);
-    let valve_pa_s = ValveErrors::of(&vehicle).largest_pa_s() - 0.2 * bounds.shift_pressure_pa * valve.a22_per_s;
-    // The budget bounds the error of a change; half of it bounds that of each reading.
-    let reading_rad_s = [0.5 * bounds.turbine_quantum_rad_s, 0.5 * bounds.slip_quantum_rad_s];
-    let (mut measured, mut left, mut errors) = (speeds, initial_pa.abs(), Vec::new());
-    for d in disturbances {
-        let rows = model.coefficients(phase);
-        let torques = drivetrain::ShiftTorques {
-            turbine_n_m: d.turbine * bounds.turbine_torque_n_m,
-            output_n_m: d.output * bounds.output_torque_n_m,
-            offgoing_n_m: if inertia { d.output * bounds.offgoing_torque_n_m } else { 0.0 },
-            ..Default::default()
-        };
-        let w = [rows.turbine.at(&torques), rows.slip_oncoming.at(&torques)];
-        let m = model.speed_model(phase, ENGINE_RAD_S, measured[0], measured[1]);
-        // The speeds tell what the pressure was a while ago.
-        let old = d.age * bounds.sampling_delay_s * bounds.shift_ramp_pa_s;
-        let integral = psi * (pressure + old) + gam2 * valve.b2_pa_s;
-        let gain = observer.gains.at(m.friction).of(phase);
-        let factor = phi - (0..2).map(|i| gain[i] * m.per_pressure_rad_s2_pa[i] * psi).sum::<f64>();
-        for i in 0..2 {
-            speeds[i] += t * (m.free_rad_s2[i] + w[i]) + m.per_pressure_rad_s2_pa[i] * integral;
-            measured[i] = speeds[i] + d.readings[i] * reading_rad_s[i];
-        }
-        if !inertia {
-            (speeds[1], measured[1]) = (speeds[0], measured[0]);
-        }
-        pressure = phi * pressure + psi * valve.b2_pa_s + d.valve * psi * valve_pa_s;
-        let estimate = observer.step_sample(&mut state, &input(t, measured[0], measured[1], command));
-        if estimate.phase != phase || measured[1] < 20.0 {
-            break;
-        }
-        left *= factor.abs();
-        errors.push([(pressure - estimate.pressure_pa).abs(), left]);
-    }
-    errors
+    let speeds = if inertia { [340.0, 300.0] } else { [360.0, 360.0] };
+    SampledCar { vehicle: &vehicle, gains, phase, sample_time_s: SAMPLE_TIMES_S[sample_time], command: 0.25, speeds }
+        .errors(initial_pa, disturbances)
 }
 
 proptest! {

@@ -13,6 +13,11 @@ const PHASES: [&str; 2] = ["torque phase", "inertia phase"];
 /// A word where the speeds are of no use.
 const HIDDEN: &str = "hidden";
 
+/// Why a certified bound and this statistic may call different phases hidden; without its full stop.
+pub const BOUND_AND_DEVIATION: &str = "`design` and `sensitivity` may call different phases hidden: `design` bounds the error with all errors at their bounds at the \
+                                       same time, for a fixed gain;\n`sensitivity` gives the standard deviation of the filter for any shift, with errors \
+                                       anywhere within their bounds, independent of each other";
+
 /// Titles and rows of the summary: a row for each shift.
 pub fn sensitivity_rows(shifts: &[ShiftSensitivity], car: &Car) -> (Vec<&'static str>, Vec<Vec<String>>) {
     let titles = vec![
@@ -97,6 +102,8 @@ pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &Car) -> Result<St
         phases => phases.collect::<Vec<_>>(),
         hidden,
         all,
+        // A car without converter has no designs.
+        bound_and_deviation => car.converter.is_some().then(|| BOUND_AND_DEVIATION.replace('`', "")),
         inputs => origin(&[&car.source]),
     })?)
 }

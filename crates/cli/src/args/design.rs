@@ -5,22 +5,29 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use config::{GainMethod, SAMPLE_TIMES_S};
 use design::Quantity;
+use observer::Phase;
 
 use super::within;
 
-#[derive(Debug, Args)]
+/// Default sample time of a design, s: the usual period of a transmission controller.
+pub(crate) const SAMPLE_TIME_S: f64 = 0.01;
+
+#[derive(Debug, Clone, Args)]
 pub(crate) struct Design {
     /// Vehicle file
     pub(crate) vehicle: PathBuf,
+    /// Shift of a car with a gearbox, by its gears; without it, a table of all upshifts from each gear to the next
+    #[arg(long, value_name = "FROM-TO")]
+    pub(crate) shift: Option<String>,
     /// File with values that replace those of the vehicle file, such as the output of `error-bound`
     #[arg(long, value_name = "BOUNDS.toml")]
     pub(crate) bounds: Option<PathBuf>,
     /// Observer to design for
     #[arg(long, value_enum, default_value_t = DesignChoice::Rigid)]
     pub(crate) observer: DesignChoice,
-    /// Design method of the gains
-    #[arg(long, value_enum, default_value_t = MethodChoice::Iss)]
-    pub(crate) method: MethodChoice,
+    /// Design method of the gains [default: iss; of the table of all upshifts: peak-to-peak]
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<MethodChoice>,
     /// Quantity of the error bound in the discrete-time methods [default: clutch-torque]
     #[arg(long, value_enum, value_name = "QUANTITY")]
     pub(crate) bound_on: Option<QuantityChoice>,
@@ -45,6 +52,27 @@ pub(crate) struct Design {
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl Design {
+    /// The method for the gains of one shift.
+    pub(crate) fn method(&self) -> MethodChoice {
+        self.method.unwrap_or(MethodChoice::Iss)
+    }
+
+    /// Sample time of a design in discrete time, s.
+    pub(crate) fn sample_time_s(&self) -> f64 {
+        self.sample_time.unwrap_or(SAMPLE_TIME_S)
+    }
+
+    /// The phases to design for.
+    pub(crate) fn phases(&self) -> &'static [Phase] {
+        match self.phase {
+            PhaseChoice::Both => &[Phase::TorquePhase, Phase::InertiaPhase],
+            PhaseChoice::Torque => &[Phase::TorquePhase],
+            PhaseChoice::Inertia => &[Phase::InertiaPhase],
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice};
+pub(crate) use design::{Design, DesignChoice, MethodChoice, PhaseChoice, SAMPLE_TIME_S};
 pub(crate) use logs::{Estimate, Fit, FormatChoice, GearPair, Init, Inspect, LaunchChoice, Mapping};
 pub(crate) use studies::{
     Bench, ErrorBoundOptions, Merge, ObserverChoice, Reproduce, SensitivityOptions, Shard, StudyOptions, Threads,
@@ -26,6 +26,7 @@ Examples:
   wetclutch study experiments/settings.toml -o out            two thousand shifts: errors and sensitivities
   wetclutch simulate experiments/e1.toml -o out               a drive as CSV
   wetclutch design vehicles/two_speed_at.toml                 gains with their certificate
+  wetclutch design vehicles/eight_speed.toml                  which upshifts of a gearbox hide their pressure
   wetclutch inspect drive.mf4                                 channels, units, rates and gaps of a log
   wetclutch estimate log.csv --vehicle my_car.toml            pressure from measured signals
   wetclutch fit log.csv --vehicle my_car.toml -o fitted.toml  a vehicle file that fits the car
@@ -95,6 +96,12 @@ pub(crate) enum Command {
     /// increased until the bound on the remaining error is small enough. Requirements come from the vehicle
     /// file; options replace them. If no gain meets a requirement, the best certified gain is printed, with
     /// its error bound and the settling time that would meet the requirement; the exit code is then 1.
+    ///
+    /// Of a car with a gearbox: a table of all upshifts from each gear to the next, with the certified bounds of
+    /// the open loop and of the best gain; `--shift` gives the gains of one of them. Its requirements are
+    /// defaults, which are no failure if they are not met. Gains are for upshifts with a driving engine.
+    ///   wetclutch design vehicles/eight_speed.toml
+    ///   wetclutch design vehicles/eight_speed.toml --shift 1-2
     ///
     /// To use bounds on the model errors that were found by simulation:
     ///   wetclutch error-bound experiments/error_bound.toml -o bounds.toml

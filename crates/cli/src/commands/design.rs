@@ -1,7 +1,5 @@
 //! `wetclutch design`.
 
-use std::path::Path;
-
 use config::{GainMethod, Kind, Source, Vehicle};
 use design::compliant::{CompliantRequirement, best_compliant_phase, compliant_requirement, physical_gains};
 use design::open_loop::is_open_loop;
@@ -15,49 +13,64 @@ use report::tables::phase_name;
 use serde_json::{Map, Value, json};
 use trace::units;
 
-use crate::args::{Design, DesignChoice, MethodChoice, PhaseChoice};
-use crate::commands::shell_quoted;
+use super::design_car::of_car;
+use crate::args::{Design, DesignChoice, MethodChoice, SAMPLE_TIME_S};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn design(options: &Design) -> Result<(), Failure> {
-    refuse_a_gearbox(&options.vehicle)?;
+    if Source::read(&options.vehicle)?.kind().is_ok_and(|kind| kind == Kind::Car) {
+        return of_car(options);
+    }
+    if options.shift.is_some() {
+        let message = "--shift has an effect with the vehicle file of a car with a gearbox alone\nhint: leave it out";
+        return Err(Failure::Input(message.to_owned()));
+    }
     let vehicle = match &options.bounds {
         Some(bounds) => Vehicle::read_with(&options.vehicle, bounds)?,
         None => Vehicle::read(&options.vehicle)?,
     };
-    let phases: &[Phase] = match options.phase {
-        PhaseChoice::Both => &[Phase::TorquePhase, Phase::InertiaPhase],
-        PhaseChoice::Torque => &[Phase::TorquePhase],
-        PhaseChoice::Inertia => &[Phase::InertiaPhase],
-    };
+    let missed = of_vehicle(&vehicle, options, &[])?;
+    not_met(missed, options)
+}
+
+/// Prints the gains for a vehicle under its name and lines about it; returns the requirements that they do not meet.
+pub(super) fn of_vehicle(vehicle: &Vehicle, options: &Design, about: &[String]) -> Result<Vec<OffsetMissed>, Failure> {
     options_apply(options)?;
     let mut object = Map::new();
     let mut text = Vec::new();
     let mut all_missed = Vec::new();
-    for &phase in phases {
-        let (json, lines) = of_phase(&vehicle, phase, options, &mut all_missed)?;
+    for &phase in options.phases() {
+        let (json, lines) = of_phase(vehicle, phase, options, &mut all_missed)?;
         object.insert(phase.name().to_owned(), json);
         text.extend(lines);
     }
     if options.json {
         output::line(&serde_json::to_string_pretty(&object)?)?;
     } else {
-        output::line(&format!("{} ({})\n", vehicle.name, vehicle.source.path.display()))?;
+        output::line(&format!("{} ({})", vehicle.name, vehicle.source.path.display()))?;
+        for line in about {
+            output::line(line)?;
+        }
+        output::line("")?;
         for line in &text {
             output::line(line)?;
         }
         output::line(&format!("vehicle file sha256 {}", vehicle.source.sha256()))?;
     }
-    if all_missed.is_empty() {
+    Ok(all_missed)
+}
+
+/// The certified gain is printed, but a requirement that it does not meet is a failure.
+pub(super) fn not_met(missed: Vec<OffsetMissed>, options: &Design) -> Result<(), Failure> {
+    if missed.is_empty() {
         return Ok(());
     }
-    // The certified gain is printed, but a requirement that it does not meet is a failure.
     let of_the_option = |missed: OffsetMissed| match options.offset_max {
         Some(_) => OffsetMissed { required_by: "--offset-max".to_owned(), ..missed },
         None => missed,
     };
-    let messages = all_missed.into_iter().map(|missed| of_the_option(missed).to_string());
+    let messages = missed.into_iter().map(|missed| of_the_option(missed).to_string());
     Err(Failure::Work(messages.collect::<Vec<_>>().join("\n")))
 }
 
@@ -68,8 +81,8 @@ fn of_phase(
     options: &Design,
     missed_requirements: &mut Vec<OffsetMissed>,
 ) -> Result<(Value, Vec<String>), Failure> {
-    let sample_time_s = options.sample_time.unwrap_or(SAMPLE_TIME_S);
-    Ok(match (options.observer, options.method) {
+    let sample_time_s = options.sample_time_s();
+    Ok(match (options.observer, options.method()) {
         (DesignChoice::Rigid, MethodChoice::Iss) => {
             let required = replaced(requirement(vehicle, phase).into(), options);
             let (certificate, missed) = best_phase(vehicle, phase, &required)?;
@@ -94,28 +107,10 @@ fn of_phase(
     })
 }
 
-/// A car with a whole gearbox has nothing to design.
-fn refuse_a_gearbox(path: &Path) -> Result<(), Failure> {
-    if !Source::read(path)?.kind().is_ok_and(|kind| kind == Kind::Car) {
-        return Ok(());
-    }
-    let vehicle = shell_quoted(path);
-    Err(Failure::Input(format!(
-        "{}: this is a vehicle file of a car with a gearbox, and gains are designed for the one shift of a file with [gear_train]\n\
-         hint: the filter for any shift needs no design: its gains follow from the variances of the readings and the car's errors in each \
-         step, and its guaranteed ranges from the bounds of these errors. `wetclutch bench --vehicle {vehicle} -o DIR` gives its errors by shift \
-         beside those of the valve model alone, and `wetclutch estimate LOG --vehicle {vehicle}` uses it",
-        path.display()
-    )))
-}
-
-/// Default sample time of a design, s: the usual period of a transmission controller.
-const SAMPLE_TIME_S: f64 = 0.01;
-
 /// Refuses an option that the method does not use.
-fn options_apply(options: &Design) -> Result<(), Failure> {
+pub(super) fn options_apply(options: &Design) -> Result<(), Failure> {
     let sliding = options.observer == DesignChoice::Sliding;
-    let discrete = options.method != MethodChoice::Iss;
+    let discrete = options.method() != MethodChoice::Iss;
     let required = [
         ("--kappa1", options.kappa1.is_some()),
         ("--kappa2", options.kappa2.is_some()),
@@ -190,6 +185,7 @@ impl UseOf {
     fn added_to(&self, mut certificate: Value) -> Value {
         certificate["uses_open_loop"] = json!(self.is_open_loop);
         certificate["longest_step_s"] = json!(self.longest_step_s);
+        certificate["open_loop_bound_pa"] = json!(self.open_loop_bound_pa);
         certificate
     }
 
@@ -205,8 +201,16 @@ impl UseOf {
         offset
     }
 
-    fn step_line(&self) -> String {
-        step_line(self.longest_step_s)
+    /// How long it may correct, and whether the open loop is better by its bound.
+    fn use_lines(&self, offset_pa: f64) -> Vec<String> {
+        let mut lines = vec![step_line(self.longest_step_s)];
+        if !self.is_open_loop && offset_pa > self.open_loop_bound_pa {
+            lines.push(format!(
+                "  open loop serves: its steady-state bound, with every error of the budget, is {:.4} MPa, less than the offset bound of this gain",
+                units::mpa(self.open_loop_bound_pa)
+            ));
+        }
+        lines
     }
 }
 
@@ -229,8 +233,8 @@ fn rigid_lines(phase: Phase, certificate: &Certificate, use_of: &UseOf) -> Vec<S
         format!("{}: {}", phase_name(phase), certificate.gain_text(phase)),
         kappas(certificate.kappa1_per_s, certificate.kappa2_per_s),
         use_of.offset_line(offset),
-        use_of.step_line(),
     ];
+    lines.extend(use_of.use_lines(certificate.offset_pa));
     lines.extend(vertex_lines(vertices));
     lines
 }
@@ -255,8 +259,8 @@ fn compliant_lines(phase: Phase, certificate: &CompliantCertificate, use_of: &Us
             certificate.offset_n_m,
             certificate.w_max,
         )),
-        use_of.step_line(),
     ];
+    lines.extend(use_of.use_lines(certificate.offset_pa));
     lines.extend(vertex_lines(vertices));
     lines
 }

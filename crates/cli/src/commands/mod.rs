@@ -7,6 +7,7 @@ mod check_defaults;
 mod demo;
 mod demo_drive;
 mod design;
+mod design_car;
 mod error_bound;
 mod estimate;
 mod fit;

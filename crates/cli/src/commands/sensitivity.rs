@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use config::{Car, Kind, Source, Vehicle};
-use report::car_sensitivity_page::{car_sensitivity_page, hidden_phases, sensitivity_rows};
+use report::car_sensitivity_page::{BOUND_AND_DEVIATION, car_sensitivity_page, hidden_phases, sensitivity_rows};
 use report::sensitivity_page;
 use serde_json::json;
 use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
@@ -12,7 +12,7 @@ use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
-use crate::commands::{read_car, sensors_without_effect, write_text};
+use crate::commands::{read_car, sensors_without_effect, shell_quoted, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -109,6 +109,10 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(&car)).map(bound).collect();
     let [hidden, all] = hidden_phases(&shifts);
     output::line(&format!("\nbounds, either way: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;
+    // A car without converter has no designs.
+    if car.converter.is_some() {
+        output::line(&format!("{BOUND_AND_DEVIATION}: `wetclutch design {}`.", shell_quoted(path)))?;
+    }
     if let Some(folder) = &options.output {
         output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
     }

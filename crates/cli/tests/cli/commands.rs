@@ -436,6 +436,8 @@ fn sensitivity_of_a_car_with_a_gearbox_says_which_shifts_hide_their_torque() {
     let output = wetclutch(&["sensitivity", &car, "-o", &folder.path("out")]);
     let text = printed(&output);
     assert!(text.contains("hidden: ") && text.contains("converter capacity 10 %"), "{text}");
+    let both = "`design` and `sensitivity` may call different phases hidden";
+    assert!(text.contains(both) && text.contains("four_speed.toml`."), "{text}");
     assert_eq!(
         text.lines().filter(|line| line.contains("upshift") || line.contains("downshift")).count(),
         12,
@@ -443,6 +445,7 @@ fn sensitivity_of_a_car_with_a_gearbox_says_which_shifts_hide_their_torque() {
     );
     let page = read(folder.path("out/sensitivity.html"));
     assert!(page.contains("Torque phase") && page.contains("AODE") && page.contains("bound, either way"));
+    assert!(page.contains(&both.replace('`', "")));
     let apart = page.split_once("<h2>What cannot be told apart</h2>").unwrap().1;
     for errors in ["Friction and valve gain", "kiss point and gain", "stiffness of the drive shafts", "Lag and delay"] {
         assert!(apart.contains(errors), "{errors}");

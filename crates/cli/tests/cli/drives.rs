@@ -94,7 +94,7 @@ fn a_file_of_another_kind_is_named() {
     let (drive, car) = (format!("{ROOT}drives/city.toml"), format!("{ROOT}vehicles/eight_speed.toml"));
     let (gearbox, map) = (format!("{ROOT}gearboxes/8hp.toml"), format!("{ROOT}maps/genesis_at8.toml"));
     let (out, table) = (folder.path("out"), folder.write("log.csv", "time_s,engine_speed_rad_s,turbine_speed_rad_s\n"));
-    let cases: [(&[&str], &str); 13] = [
+    let cases: [(&[&str], &str); 12] = [
         (&["simulate", &study, "-o", &out], "this looks like a study file, expected an experiment file"),
         (&["simulate", &car_study, "-o", &out], "this looks like a study file of a car with a gearbox"),
         (&["simulate", &car, "-o", &out], "this looks like a vehicle file of a car with a gearbox"),
@@ -107,10 +107,6 @@ fn a_file_of_another_kind_is_named() {
         (&["estimate", &car, "--vehicle", &car], "this is a TOML file, expected a log"),
         (&["estimate", &table, "--vehicle", VEHICLE, "--map", &car], "a gearbox, expected a channel map\nhint: "),
         (&["check", env!("CARGO_BIN_EXE_wetclutch")], "this is no text file, expected TOML"),
-        (
-            &["design", &car],
-            "gains are designed for the one shift of a file with [gear_train]\nhint: the filter for any shift",
-        ),
     ];
     for (arguments, words) in cases {
         let text = refused(&wetclutch(arguments));

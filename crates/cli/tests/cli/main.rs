@@ -9,6 +9,7 @@ mod attacks;
 mod car_check;
 mod commands;
 mod day_of_logs;
+mod design_car;
 mod drives;
 mod equations;
 mod fit;

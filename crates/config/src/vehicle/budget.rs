@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use drivetrain::RoadLoad;
+use drivetrain::road::GRAVITY_M_S2;
 use observer::FillBudget;
 use toml::Spanned;
 
@@ -24,6 +26,9 @@ pub struct ErrorBounds {
     pub turbine_torque_n_m: f64,
     /// The same as a share of the torque.
     pub turbine_torque_share: f64,
+    /// Torque that an error of the turbine-side inertia is worth in the inertia phase, N m. Zero in a file with `[gear_train]`: its bound
+    /// on the turbine torque is for both.
+    pub inertia_torque_n_m: f64,
     /// Pressure from the valve model alone, Pa.
     pub pressure_pa: f64,
     /// Mass of the vehicle, kg.
@@ -145,6 +150,7 @@ pub(super) fn error_bounds(
         shaft_stiffness_factor: stiffness.transpose()?.unwrap_or(SHAFT_STIFFNESS_FACTOR),
         backlash_rad: optional("backlash_rad", &raw.backlash_rad, 0.0..=0.2, BACKLASH_RAD)?,
         turbine_torque_n_m: number("turbine_torque_n_m", &raw.turbine_torque_n_m, 0.0..=1e3)?,
+        inertia_torque_n_m: 0.0,
         pressure_pa: number("pressure_pa", &raw.pressure_pa, 0.0..=2e6)?,
         mass_kg: number("mass_kg", &raw.mass_kg, 0.0..=20e3)?,
         grade_rad: number("grade_rad", &raw.grade_rad, 0.0..=0.4)?,
@@ -178,6 +184,18 @@ pub(super) fn error_bounds(
         slip_rad_s: number("slip_rad_s", &raw.slip_rad_s, 0.0..=200.0)?,
         pressure_max_pa,
     })
+}
+
+impl ErrorBounds {
+    /// What a grade at its bound does at the wheels of a car with this load, N m.
+    pub fn grade_n_m(&self, road: &RoadLoad<f64>) -> f64 {
+        road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * self.grade_rad.sin()
+    }
+
+    /// What a mass at its bound does at the wheels, N m: they answer the shaft torque wrongly by its share.
+    pub fn mass_n_m(&self, road: &RoadLoad<f64>) -> f64 {
+        self.mass_kg / road.mass_kg * self.shaft_torque_n_m
+    }
 }
 
 /// Least and greatest of a factor on a value of the file.

@@ -11,6 +11,7 @@ mod gear_train;
 mod plausible;
 mod ratios_alone;
 mod raw;
+mod shift_errors;
 pub mod short;
 mod valves;
 
@@ -38,7 +39,8 @@ use raw::{
     RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
     RawRequirement, RawRoad, RawTyre, RawVehicleFile,
 };
-pub use short::DefaultTaken;
+pub use shift_errors::{ElementErrors, ShiftErrors};
+pub use short::{DefaultTaken, OneShiftError};
 use short::{Short, of_default, refuse_facts};
 
 /// Largest drive-shaft torque over what the tyres can pass to the road [chosen]: wheels that spin up take more for a moment.
@@ -235,7 +237,7 @@ impl Vehicle {
     pub fn from_source(source: Source) -> Result<Self, ConfigError> {
         if source.kind().is_ok_and(|kind| kind == Kind::Car) {
             let message = "is a vehicle with a whole gearbox, not one with a single shift".to_owned();
-            let hint = "`simulate`, `demo`, `bench`, `estimate`, `fit` and `check` take it; what designs gains or searches one shift needs a file with [gear_train]";
+            let hint = "`simulate`, `demo`, `bench`, `estimate`, `fit`, `design` and `check` take it; what searches one shift needs a file with [gear_train]";
             return Err(Check::of(&source).meaning("gearbox", 0, message, Some(hint.to_owned())));
         }
         if let Some(short) = Short::of(&source)? {

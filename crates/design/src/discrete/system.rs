@@ -41,6 +41,8 @@ use crate::rigid::rigid_model;
 
 /// Name of the readings' errors as a cause.
 pub(super) const READINGS: &str = "sensor quantisation";
+/// The turbine-side inertia as a cause.
+const INERTIA: &str = "turbine-side inertia";
 /// Roundings that an observer adds up in a sample, in single precision.
 const ROUNDINGS: f64 = 8.0;
 
@@ -247,6 +249,11 @@ pub(crate) fn corners(
     corners
 }
 
+/// Torque of an error of the turbine-side inertia, N m, where the budget has one.
+fn inertia_n_m(vehicle: &Vehicle) -> Option<f64> {
+    Some(vehicle.error_bounds.inertia_torque_n_m).filter(|size| *size > 0.0)
+}
+
 /// Errors of the accelerations that the rigid model has, over the units of its outputs.
 fn rigid_errors(vehicle: &Vehicle, phase: Phase) -> Vec<Cause> {
     let model = rigid_model(vehicle);
@@ -273,6 +280,8 @@ fn rigid_errors(vehicle: &Vehicle, phase: Phase) -> Vec<Cause> {
             slip.per_offgoing_torque,
             bounds.offgoing_torque_n_m,
         ));
+        let [on_turbine, on_slip] = [turbine.per_turbine_torque, slip.per_turbine_torque];
+        causes.extend(inertia_n_m(vehicle).map(|size| cause(INERTIA, on_turbine, on_slip, size)));
     }
     causes
 }
@@ -303,6 +312,8 @@ fn compliant_errors(vehicle: &Vehicle, phase: Phase) -> Vec<Cause> {
     if phase == Phase::InertiaPhase {
         let on = [turbine.per_offgoing_torque, slip.per_offgoing_torque];
         causes.push(gearbox("offgoing clutch", on[0], on[1], bounds.offgoing_torque_n_m));
+        let on = [turbine.per_turbine_torque, slip.per_turbine_torque];
+        causes.extend(inertia_n_m(vehicle).map(|size| gearbox(INERTIA, on[0], on[1], size)));
     }
     causes
 }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used, reason = "each test file uses a part of it; a test may")]
 
+pub(crate) mod sampled;
+
 use config::Vehicle;
 use design::{design_rigid, rigid_observer};
 use observer::{Phase, RigidObserver, RigidState, Sample, SampleEstimator};

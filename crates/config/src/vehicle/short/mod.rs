@@ -7,6 +7,7 @@ mod car;
 mod complete;
 mod facts;
 mod first_file;
+mod one_shift;
 mod train;
 mod uncertainty;
 
@@ -24,6 +25,7 @@ use facts::located;
 pub(super) use facts::refuse_facts;
 pub use facts::{Facts, ValveKind};
 pub use first_file::{complete_file, short_file};
+pub use one_shift::OneShiftError;
 pub use uncertainty::Uncertainty;
 
 const DEFAULTS: &str = include_str!("defaults.toml");

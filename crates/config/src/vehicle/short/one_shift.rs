@@ -1,0 +1,383 @@
+//! The vehicle of one shift of a car with a gearbox: what designs of gains are made for.
+
+use drivetrain::{
+    AccelerationRow, ClutchValve, CommandKind, Converter, Driveline, Engagement, ReducedShift, RoadLoad, Valve,
+};
+use geartrain::{Change, Shift};
+
+use super::facts::{Facts, ValveKind};
+use super::{ENGINE_TORQUE_N_M, MASS_SHARE, PISTON_AREAS_M2, PLATE_RADII_M, RATIO_BEFORE, TORQUE_SHARES, text_of};
+use crate::vehicle::{Car, ElementErrors, SHAFT_OVER_TYRES, ShiftClutch, ShiftErrors, Uncertainty};
+use crate::{CompliantRequirement, ConfigError, DesignRequirement, ErrorBounds, Source, Vehicle};
+
+/// Turbine torque of the shift at which the errors are weighed, over the greatest torque of the engine: 133 of 190 N m in the car that is scaled.
+const SHIFT_TORQUE: f64 = 0.7;
+/// Friction coefficient and number of faces with which its oncoming clutch has the pressures of its error budget.
+const FRICTION: f64 = 0.13;
+const FACES: f64 = 3.0;
+/// Turbine acceleration of an inertia phase at which an error of the inertia is weighed, rad/s^2, per share by which the ratio falls
+/// \[chosen\]: a turbine of 400 rad/s that reaches its new speed in 0.4 s.
+const TURBINE_RAD_S2: f64 = 1000.0;
+/// Largest command that is one of a valve, over the one for the highest pressure.
+const COMMAND_ROOM: f64 = 1.2;
+
+/// Why a car has no vehicle of one shift.
+#[derive(Debug, thiserror::Error)]
+pub enum OneShiftError {
+    /// The name is not that of two gears.
+    #[error(
+        "the gearbox has no shift \"{asked}\"\nhint: two gears with a line between them, as \"1-2\"; its gears are {gears}"
+    )]
+    NoShift {
+        /// What was asked for.
+        asked: String,
+        /// The gears that there are.
+        gears: String,
+    },
+    /// The ratio does not fall, or there is a reverse gear in it.
+    #[error(
+        "{shift} is no upshift between forward gears, and the designs are for upshifts with a driving engine\n\
+         hint: the filter for any shift serves in the other kinds (`wetclutch estimate`); the upshifts of one clutch against another \
+         are {upshifts}"
+    )]
+    NoUpshift {
+        /// The shift.
+        shift: String,
+        /// Those that there are.
+        upshifts: String,
+    },
+    /// More than one element opens or closes.
+    #[error(
+        "in {shift} more than one element opens or closes ({change}), and the designs are for one clutch against another\n\
+         hint: the upshifts of one clutch against another are {upshifts}"
+    )]
+    Several {
+        /// The shift.
+        shift: String,
+        /// What the trade calls it.
+        change: String,
+        /// Those that there are.
+        upshifts: String,
+    },
+    /// The inertias are not known, or an element carries no torque in its gear.
+    #[error(
+        "the inertias of {shift} are not known\n\
+         hint: a gearbox of level \"shares\" needs `shift_mass` for the two gears, and both elements a torque in their gears"
+    )]
+    NoMass {
+        /// The shift.
+        shift: String,
+    },
+    /// An element has no plates.
+    #[error(
+        "{element}, which opens or closes in {shift}, has no friction plates\nhint: the designs are for two wet clutches or brakes"
+    )]
+    NoPlates {
+        /// The shift.
+        shift: String,
+        /// The element.
+        element: String,
+    },
+    /// The car has no converter.
+    #[error(
+        "the car has no converter, and the observers with designed gains take the turbine torque from the maps of one\n\
+         hint: the filter for any shift takes the torque that the engine's controller reports (`wetclutch estimate`), and `wetclutch \
+         sensitivity` says what the speeds show of each clutch torque"
+    )]
+    NoConverter,
+    /// A number of the car is outside the range of a vehicle file.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+/// A shift with all that its vehicle needs.
+struct OneShift<'c> {
+    car: &'c Car,
+    name: String,
+    reduced: ReducedShift<f64>,
+    converter: Converter<f64>,
+    offgoing: ShiftClutch,
+    oncoming: ShiftClutch,
+    /// What is not known of the oncoming clutch and of the car.
+    element: ElementErrors,
+    errors: ShiftErrors,
+}
+
+impl Car {
+    /// The gears of a shift that is written as `1-2`.
+    ///
+    /// # Errors
+    /// There are no such gears.
+    pub fn shift_named(&self, name: &str) -> Result<[usize; 2], OneShiftError> {
+        // The name of a gear may have a line in it.
+        let at = |(line, _): (usize, &str)| {
+            let (from, to) = (self.gearbox.gear(name[..line].trim())?, self.gearbox.gear(name[line + 1..].trim())?);
+            (from != to).then_some([from, to])
+        };
+        name.match_indices('-').find_map(at).ok_or_else(|| self.no_shift(name))
+    }
+
+    fn no_shift(&self, asked: &str) -> OneShiftError {
+        let gears = self.gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ");
+        OneShiftError::NoShift { asked: asked.to_owned(), gears }
+    }
+
+    /// A shift as it is written: `1-2`.
+    pub fn shift_name(&self, [from, to]: [usize; 2]) -> String {
+        let gear = |gear: usize| self.gearbox.gears.get(gear).map_or("", |gear| gear.name.as_str());
+        format!("{}-{}", gear(from), gear(to))
+    }
+
+    /// The upshifts from each forward gear to the next in which one element opens and one closes.
+    pub fn single_upshifts(&self) -> Vec<[usize; 2]> {
+        let is_single = |gears: &[usize; 2]| {
+            self.gearbox.shift(gears[0], gears[1]).is_some_and(|shift| shift.change.single().is_some())
+        };
+        self.gearbox.forward_gears().windows(2).map(|pair| [pair[0], pair[1]]).filter(is_single).collect()
+    }
+
+    /// The vehicle of one shift of this car, for the designs of gains and their certificates.
+    ///
+    /// Engine, converter, clutches, driveline, tyre and road are the car's, the gear train is its reduction to the shift. The
+    /// observers' valve is that of the oncoming element, linear around the pressure of a shift; of a normally-high valve the command is
+    /// `zero_pressure_a` less the current. The bounds of the errors are those of the car ([`ShiftErrors::of_car`]). All else is
+    /// the default of a short file, scaled to the car and to the torques that the two elements carry. Its source is that of the car, so
+    /// that none of its values can be changed by its key.
+    ///
+    /// # Errors
+    /// It is no shift between two wet clutches with a falling ratio, or the car has no converter; see [`OneShiftError`].
+    pub fn of_shift(&self, gears: [usize; 2]) -> Result<Vehicle, OneShiftError> {
+        let name = self.shift_name(gears);
+        let shift = self.gearbox.shift(gears[0], gears[1]).ok_or_else(|| self.no_shift(&name))?;
+        OneShift::of(self, shift, name)?.vehicle()
+    }
+}
+
+impl<'c> OneShift<'c> {
+    fn of(car: &'c Car, shift: &Shift, name: String) -> Result<Self, OneShiftError> {
+        let upshifts =
+            || car.single_upshifts().into_iter().map(|gears| car.shift_name(gears)).collect::<Vec<_>>().join(", ");
+        let [before, after] = [shift.from, shift.to].map(|gear| car.gearbox.gears[gear].ratio);
+        if !(before > after && after > 0.0) {
+            return Err(OneShiftError::NoUpshift { shift: name, upshifts: upshifts() });
+        }
+        let Change::Single { offgoing, oncoming, .. } = shift.change else {
+            let change = shift.change.name();
+            return Err(OneShiftError::Several { shift: name, change, upshifts: upshifts() });
+        };
+        let clutch = |element: usize| {
+            car.clutches.get(element).copied().flatten().ok_or_else(|| OneShiftError::NoPlates {
+                shift: name.clone(),
+                element: car.gearbox.elements[element].name.clone(),
+            })
+        };
+        let (offgoing_clutch, oncoming_clutch) = (clutch(offgoing)?, clutch(oncoming)?);
+        let Some(reduced) = shift.reduced else { return Err(OneShiftError::NoMass { shift: name }) };
+        let Some(converter) = car.converter else { return Err(OneShiftError::NoConverter) };
+        Ok(Self {
+            reduced,
+            converter,
+            offgoing: offgoing_clutch,
+            oncoming: with_rising_command(oncoming_clutch),
+            element: ShiftErrors::STANDARD.of_element(car, oncoming),
+            errors: ShiftErrors::STANDARD.of_car(car),
+            car,
+            name,
+        })
+    }
+
+    fn vehicle(&self) -> Result<Vehicle, OneShiftError> {
+        let car = self.car;
+        let size = self.of_size()?;
+        let pressure_max_pa = car.line_pressure_pa * self.element.valve_gain_factor[1];
+        let error_bounds = self.error_bounds(&size.error_bounds, pressure_max_pa);
+        let mut supervisor = size.supervisor;
+        supervisor.kiss_pressure_pa = self.oncoming.clutch.kiss_pressure();
+        let mut limits = size.limits;
+        limits.pressure_max_pa = pressure_max_pa;
+        limits.shaft_torque_max_n_m = SHAFT_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m;
+        if self.oncoming.valve.command_kind() == CommandKind::Current {
+            limits.command_max = COMMAND_ROOM * self.oncoming.valve.command_for(pressure_max_pa);
+        }
+        let mut filter = size.filter;
+        filter.offgoing_n_m *= self.offgoing_size();
+        let built_in = Vehicle::built_in()?;
+        let own = acceleration_errors(&self.reduced, &car.driveline, &car.road, &error_bounds);
+        let other = acceleration_errors(&built_in.shift, &built_in.driveline, &built_in.road, &built_in.error_bounds);
+        let [in_torque_phase, in_inertia_phase] = [own[0] / other[0], own[1] / other[1]];
+        let train = car.gearbox.train.as_ref();
+        Ok(Vehicle {
+            source: Source { path: car.source.path.clone(), text: car.source.text.clone() },
+            name: format!("{}, shift {}", car.name, self.name),
+            engine: car.engine,
+            converter: self.converter,
+            shift: self.reduced,
+            // Without a stick diagram the mass of the output shaft alone is not known: it is small beside the car's.
+            output_inertia_kg_m2: train.map_or(0.0, |train| train.shafts[train.output].inertia_kg_m2),
+            offgoing: self.offgoing,
+            oncoming: self.oncoming,
+            driveline: car.driveline,
+            backlash_rad: car.backlash_rad,
+            oil_temperature_degc: car.oil_temperature_degc,
+            tyre: car.tyre,
+            road: car.road,
+            observer_valve: self.observer_valve(self.oncoming.clutch.kiss_pressure() + error_bounds.shift_pressure_pa),
+            uncertainty: Uncertainty { friction: self.friction(), ..size.uncertainty },
+            supervisor,
+            limits,
+            torque_phase: self.requirement(&size.torque_phase, in_torque_phase),
+            inertia_phase: self.requirement(&size.inertia_phase, in_inertia_phase),
+            compliant_torque_phase: self.compliant(&size.compliant_torque_phase),
+            compliant_inertia_phase: self.compliant(&size.compliant_inertia_phase),
+            error_bounds,
+            filter,
+            defaults_taken: car.defaults_taken.clone(),
+            ..size
+        })
+    }
+
+    /// The car of the defaults at the size of this one.
+    fn of_size(&self) -> Result<Vehicle, ConfigError> {
+        let car = self.car;
+        let facts = Facts {
+            name: car.name.clone(),
+            mass_kg: car.road.mass_kg,
+            wheel_radius_m: car.road.wheel_radius_m,
+            // The gear train is the car's: it takes the place of this one.
+            ratio_before: RATIO_BEFORE,
+            ratio_after: 1.0,
+            final_ratio: car.driveline.final_ratio,
+            engine_torque_n_m: car.engine.largest_torque(),
+            valve: match self.oncoming.valve.command_kind() {
+                CommandKind::Current => ValveKind::Proportional,
+                CommandKind::DutyCycle => ValveKind::PulseWidth,
+            },
+        };
+        let path = format!("defaults for a shift of {}", car.source.path.display());
+        Vehicle::from_source(Source { path: path.into(), text: text_of(&facts)? })
+    }
+
+    /// The error budget of the car of the defaults, for this shift.
+    fn error_bounds(&self, size: &ErrorBounds, pressure_max_pa: f64) -> ErrorBounds {
+        let (car, errors, element) = (self.car, &self.errors, &self.element);
+        let torque_n_m = SHIFT_TORQUE * car.engine.largest_torque();
+        let lower_gear = self.reduced.ratio_offgoing() / RATIO_BEFORE;
+        let (pressure, slip) = (self.pressure_size(), self.slip_size());
+        let [on_turbine, on_output] = self.reduced.slip_oncoming;
+        let around = |share: f64| [1.0 - share, 1.0 + share];
+        ErrorBounds {
+            turbine_torque_n_m: errors.converter * torque_n_m,
+            turbine_torque_share: errors.converter,
+            inertia_torque_n_m: self.inertia_torque_n_m(),
+            pressure_pa: pressure * size.pressure_pa,
+            shift_pressure_pa: pressure * size.shift_pressure_pa,
+            shift_ramp_pa_s: pressure * size.shift_ramp_pa_s,
+            pressure_max_pa,
+            line_pressure_pa: [pressure_max_pa; 2],
+            mass_kg: car.error_bounds.mass_share.unwrap_or(MASS_SHARE) * car.road.mass_kg,
+            shaft_torque_n_m: lower_gear * size.shaft_torque_n_m,
+            output_torque_n_m: lower_gear * size.output_torque_n_m,
+            offgoing_torque_n_m: self.offgoing_size() * size.offgoing_torque_n_m,
+            slip_quantum_rad_s: (on_turbine * size.turbine_quantum_rad_s).hypot(on_output * size.output_quantum_rad_s),
+            slip_rad_s: slip * size.slip_rad_s,
+            friction_factor: element.friction_factor,
+            valve_gain_factor: element.valve_gain_factor,
+            valve_lag_factor: element.valve_lag_factor,
+            valve_delay_s: element.valve_delay_s,
+            valve_hysteresis_pa: element.valve_hysteresis_pa,
+            fill: self.oncoming.standard_fill_budget(car.oil_temperature_degc),
+            wheel_scale: errors.wheel_scale,
+            engine_torque_share: errors.engine,
+            shaft_stiffness_factor: around(errors.stiffness),
+            ..*size
+        }
+    }
+
+    /// A requirement of the car of the defaults, at the pressures of this shift and with errors of the accelerations that are larger by
+    /// this factor.
+    fn requirement(&self, of: &DesignRequirement, acceleration: f64) -> DesignRequirement {
+        DesignRequirement {
+            model_error_max_rad_s2: acceleration * of.model_error_max_rad_s2,
+            offset_max_pa: self.pressure_size() * of.offset_max_pa,
+            ..*of
+        }
+    }
+
+    fn compliant(&self, of: &CompliantRequirement) -> CompliantRequirement {
+        CompliantRequirement { offset_max_pa: self.pressure_size() * of.offset_max_pa, ..*of }
+    }
+
+    /// What an error of the turbine-side inertia is worth in the inertia phase, N m.
+    fn inertia_torque_n_m(&self) -> f64 {
+        let step = 1.0 - self.reduced.ratio_oncoming() / self.reduced.ratio_offgoing();
+        self.errors.inertia * self.reduced.mass_kg_m2[0][0] * TURBINE_RAD_S2 * step
+    }
+
+    /// Torque of the offgoing clutch per turbine torque, over that of the car of the defaults.
+    fn offgoing_size(&self) -> f64 {
+        (1.0 / self.reduced.slip_offgoing[0]).abs() / TORQUE_SHARES[0]
+    }
+
+    /// Slip of the oncoming clutch per speed of the turbine, over that of the car of the defaults: its torque per turbine torque is the
+    /// inverse.
+    fn slip_size(&self) -> f64 {
+        self.reduced.slip_oncoming[0].abs() * TORQUE_SHARES[1]
+    }
+
+    /// Pressure of the oncoming clutch in a shift, over that of the car of the defaults.
+    fn pressure_size(&self) -> f64 {
+        let clutch = &self.oncoming.clutch;
+        let torque_n_m = self.car.engine.largest_torque() / self.slip_size() / ENGINE_TORQUE_N_M;
+        let (least, greatest) = clutch.friction.range();
+        let torque_per_pressure = 0.5 * (least + greatest) * clutch.lever() * clutch.piston_area_m2;
+        torque_n_m * FRICTION * FACES * PLATE_RADII_M[1] * PISTON_AREAS_M2[1] / torque_per_pressure
+    }
+
+    /// The friction of the oncoming clutch: over slip, and what is not known of it.
+    fn friction(&self) -> (f64, f64) {
+        let (least, greatest) = self.oncoming.clutch.friction.range();
+        let [low, high] = self.element.friction_factor;
+        (low * least, high * greatest)
+    }
+
+    /// The valve of the oncoming clutch as it is at this pressure. What its lag may be besides is among the errors of the budget.
+    fn observer_valve(&self, pressure_pa: f64) -> Valve<f64> {
+        match &self.oncoming.valve {
+            ClutchValve::Proportional(maps) | ClutchValve::NormallyHigh { maps, .. } => Valve::Proportional {
+                time_constant_s: maps.time_constant_s.at(pressure_pa),
+                gain_pa_a: pressure_pa / maps.current_for(pressure_pa),
+            },
+            ClutchValve::PulseWidth { law, .. } => Valve::PulseWidth(*law),
+        }
+    }
+}
+
+/// The clutch with a valve whose pressure rises with its command.
+fn with_rising_command(clutch: ShiftClutch) -> ShiftClutch {
+    match clutch.valve {
+        ClutchValve::NormallyHigh { maps, .. } => ShiftClutch { valve: ClutchValve::Proportional(maps), ..clutch },
+        _ => clutch,
+    }
+}
+
+/// What the errors of the budget do to the outputs of torque and inertia phase, all at their bounds at the same time, rad/s^2.
+fn acceleration_errors(
+    shift: &ReducedShift<f64>,
+    driveline: &Driveline<f64>,
+    road: &RoadLoad<f64>,
+    bounds: &ErrorBounds,
+) -> [f64; 2] {
+    let shift = shift.with_output_inertia(driveline.vehicle_inertia_at_output(road));
+    let of = |engagement| shift.coefficients(engagement);
+    let (torque, inertia) = (of(Engagement::OffgoingStuck), of(Engagement::BothSlipping));
+    let output_n_m =
+        bounds.output_torque_n_m + (bounds.grade_n_m(road) + bounds.mass_n_m(road)) / driveline.final_ratio;
+    let size = |row: &AccelerationRow<f64>, turbine_n_m: f64, offgoing_n_m: f64| {
+        (row.per_turbine_torque * turbine_n_m).abs()
+            + (row.per_output_torque * output_n_m).abs()
+            + (row.per_offgoing_torque * offgoing_n_m).abs()
+    };
+    let turbine_n_m = bounds.turbine_torque_n_m;
+    let slipping = |row| size(row, turbine_n_m + bounds.inertia_torque_n_m, bounds.offgoing_torque_n_m);
+    [size(&torque.turbine, turbine_n_m, 0.0), slipping(&inertia.turbine).hypot(slipping(&inertia.slip_oncoming))]
+}
