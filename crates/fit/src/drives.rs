@@ -103,9 +103,14 @@ pub(crate) struct DriveNormal {
 }
 
 impl DriveNormal {
-    /// The deviation of the mass after a step of the parameters.
-    pub(crate) fn stepped(&self, deviation: f64, step: &DVector<f64>) -> f64 {
-        deviation - (self.own[1] + self.mixed.dot(step)) / self.own[0]
+    /// The deviation of the mass after a share of its own step and a step of the parameters.
+    pub(crate) fn stepped(&self, deviation: f64, step: &DVector<f64>, share: f64) -> f64 {
+        deviation - (share * self.own[1] + self.mixed.dot(step)) / self.own[0]
+    }
+
+    /// What its own step takes away of the cost.
+    pub(crate) fn own_decrease(&self) -> f64 {
+        0.5 * self.own[1] * self.own[1] / self.own[0]
     }
 }
 
@@ -147,13 +152,12 @@ impl<'a> Drives<'a> {
         priors: &[Prior],
         at: [&[f64]; 2],
         weights: &[DrivingWeights],
-        damping: f64,
     ) -> Result<Vec<DriveNormal>, FitError> {
         let drives = self.evaluated(priors, at, weights);
         let normal = |(drive, deviation): (&Evaluated, &f64)| {
             let mass = place(priors, Term::Mass).ok_or_else(|| FitError::Work("the mass is not fitted".to_owned()))?;
             let precision = MASS_SHARE_SD.powi(-2);
-            let own = (drive.information[(mass, mass)] + precision) * (1.0 + damping);
+            let own = drive.information[(mass, mass)] + precision;
             let own_gradient = precision * deviation - drive.score[mass];
             let mixed = drive.information.column(mass).into_owned();
             Ok(DriveNormal {

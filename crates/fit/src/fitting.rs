@@ -9,12 +9,13 @@ use crate::driving::{BacklashFit, Driving, fit_backlash};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::freeing::Misfit;
 use crate::intervals::{self, Precision};
+use crate::least_squares::Iterations;
 use crate::parameters::{self, Available, DELAY_UNIT_S, Prior, Shaft};
 use crate::pressure::Hydraulics;
 use crate::record::OutputClock;
 use crate::shape::Map;
 use crate::shift_model::ShiftModel;
-use crate::solver::{End, Iterations, Problem, Solved, Unknowns};
+use crate::solver::{Problem, Solved, Unknowns};
 use crate::torque_change::TorqueChange;
 use crate::weights::Weights;
 use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord, freeing};
@@ -25,9 +26,11 @@ pub const SHIFTS_MAX: usize = 30;
 const FIRST_SHIFTS: usize = 5;
 
 /// On these; on all shifts, with all shapes free; and with those bound that the shifts do not ask for.
-const FIRST: Iterations = Iterations { scaled: 3, most: 5, end: End::COARSE };
-const FREE: Iterations = Iterations { scaled: 3, most: 14, end: End::COARSE };
-const BOUND: Iterations = Iterations { scaled: 1, most: 14, end: End::OF_FIT };
+const FIRST: Iterations = Iterations { reweighted: 3, most: 5, decrease: 0.5 };
+const FREE: Iterations = Iterations { reweighted: 3, most: 14, decrease: 0.5 };
+const BOUND: Iterations = Iterations { reweighted: 1, most: 14, decrease: DECREASE };
+/// That with which a fit ends.
+pub(crate) const DECREASE: f64 = 0.1;
 
 /// A fitted vehicle.
 #[derive(Debug, Clone)]
@@ -144,7 +147,7 @@ fn fit_with(
     let at = Unknowns { own, ..first.at };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
     let solved = problem.solve(&models, at, first.weights, FREE, &mut say)?;
-    let freed = freed(&problem, &models, &solved, &all_held)?;
+    let freed = freed(&problem, &solved, &all_held)?;
     let (mut priors, held) = with_shapes(&freed);
     let problem = Problem { file: &file, shafts, priors: &priors, drives };
     let at = Unknowns { shared: taken_over(&free, &solved.at.shared, &priors), ..solved.at };
@@ -188,13 +191,12 @@ fn fit_with(
 }
 
 /// The maps whose shape stays free after a fit with all shapes free.
-fn freed(problem: &Problem<'_>, models: &[ShiftModel], solved: &Solved, held: &[Held]) -> Result<Vec<Map>, FitError> {
+fn freed(problem: &Problem<'_>, solved: &Solved, held: &[Held]) -> Result<Vec<Map>, FitError> {
     // Near a minimum the derivatives of the last step are those of its end.
-    let normal = problem.normal(models, &solved.lines, &solved.at, &solved.weights, 0.0)?;
     // What is held of a shape is no reason to free it.
     let of_maps: Vec<Held> = held.iter().copied().filter(|held| !held.parameter.is_shape()).collect();
-    let precision = intervals::precision(problem.priors, &normal, &of_maps).ok_or_else(singular)?;
-    Ok(freeing::differing(problem.priors, &solved.at.shared, &precision.stated, models.len()))
+    let precision = intervals::precision(problem.priors, &solved.normal, &of_maps).ok_or_else(singular)?;
+    Ok(freeing::differing(problem.priors, &solved.at.shared, &precision.stated, solved.at.own.len()))
 }
 
 /// What is known of the unknowns at a minimum, and which shapes that are not fitted the shifts ask for. What is not fitted of the shapes is not known
@@ -218,7 +220,7 @@ fn found(
     at.shared.resize(all.len(), 0.0);
     let problem = Problem { priors: &all, ..*problem };
     let lines = problem.linearised(models, &at);
-    let normal = problem.normal(models, &lines, &at, &solved.weights, 0.0)?;
+    let normal = problem.normal(models, &lines, &at, &solved.weights)?;
     let precision = intervals::precision(&all, &normal, held).ok_or_else(singular)?.of_first(known);
     let maps: Vec<Map> = pairs.into_iter().map(|(map, _)| map).collect();
     let misfits = freeing::misfits(&all, &precision.stated, known, &maps, &normal, &at.shared).ok_or_else(singular)?;

@@ -21,6 +21,7 @@ pub mod gearbox;
 mod hotelling;
 pub mod intervals;
 mod kinds;
+mod least_squares;
 mod motion;
 pub mod open_loop;
 pub mod parameters;

@@ -1,51 +1,17 @@
-//! Gauss-Newton with Levenberg's damping over many shifts.
+//! The cost of the shifts of one pair of gears, and its normal equations.
 //!
 //! Each shift has unknowns of its own (load, start of each segment). They are eliminated by their Schur complement, so the
-//! cost grows linearly with the shifts, and the step has only as many unknowns as there are parameters. A general solver would factor
-//! one matrix of all shifts' rows and unknowns, and would not know of scales that change between steps.
+//! cost grows linearly with the shifts, and a step has only as many unknowns as there are parameters.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::FitError;
 use crate::car::Car;
 use crate::drives::{DriveNormal, Drives};
+use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
 use crate::parameters::{Prior, Shaft};
 use crate::shift_model::{Block, Linearised, ShiftModel};
 use crate::weights::{HUBER, Weights};
-
-/// The steps of a stage of a fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Iterations {
-    /// With new scales and gains.
-    pub(crate) scaled: u32,
-    /// All of them.
-    pub(crate) most: u32,
-    pub(crate) end: End,
-}
-
-/// What ends a stage of a fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct End {
-    /// A step that changes no unknown by more than so many of its standard deviations.
-    pub(crate) small: f64,
-    /// A step of up to so many of them,
-    pub(crate) passable: f64,
-    /// which lowers the cost by less than this. At kinks of the model, such as the kiss point, steps go to and fro around a minimum.
-    pub(crate) decrease: f64,
-}
-
-impl End {
-    /// That of a fit. From a minimum to a standard deviation of `d` away the cost grows by `d^2/2`.
-    pub(crate) const OF_FIT: Self = Self { small: 0.2, passable: 0.5, decrease: 0.1 };
-    /// Where something else follows.
-    pub(crate) const COARSE: Self = Self { small: 0.5, passable: f64::INFINITY, decrease: 0.5 };
-
-    fn is_reached(self, size: f64, decrease: f64) -> bool {
-        size <= self.small || (size <= self.passable && decrease <= self.decrease)
-    }
-}
-/// Dampings tried in one iteration.
-const TRIES: u32 = 8;
 
 /// What does not change during a fit.
 pub(crate) struct Problem<'a> {
@@ -79,7 +45,7 @@ pub(crate) struct Solved {
     /// The last step was small; otherwise the iterations were used up.
     pub(crate) is_converged: bool,
     /// Where the last step began.
-    pub(crate) lines: Vec<Linearised>,
+    pub(crate) normal: Normal,
 }
 
 /// Normal equations of the parameters with the shifts' own unknowns eliminated.
@@ -99,6 +65,12 @@ impl Normal {
     pub(crate) fn all_scores(&self) -> Vec<DVector<f64>> {
         self.scores.iter().chain(self.drives.iter().map(|drive| &drive.score)).cloned().collect()
     }
+
+    /// What the own unknowns of shifts and drives can take away of the cost with the parameters as they are.
+    fn own_decrease(&self) -> f64 {
+        let shifts = self.eliminated.iter().map(Eliminated::decrease).sum::<f64>();
+        shifts + self.drives.iter().map(DriveNormal::own_decrease).sum::<f64>()
+    }
 }
 
 /// What is needed to find the own unknowns of a shift when the parameters are known.
@@ -106,6 +78,18 @@ struct Eliminated {
     own: Cholesky<f64, Dyn>,
     gradient: DVector<f64>,
     mixed: DMatrix<f64>,
+}
+
+impl Eliminated {
+    /// Their step: a share of their own one, and what follows from a step of the parameters.
+    fn step(&self, parameters: &DVector<f64>, share: f64) -> DVector<f64> {
+        -self.own.solve(&(&self.gradient * share + &self.mixed * parameters))
+    }
+
+    /// What their own step takes away of the cost.
+    fn decrease(&self) -> f64 {
+        0.5 * self.gradient.dot(&self.own.solve(&self.gradient))
+    }
 }
 
 impl Problem<'_> {
@@ -147,10 +131,9 @@ impl Problem<'_> {
         lines: &[Linearised],
         at: &Unknowns,
         weights: &Weights,
-        damping: f64,
     ) -> Result<Normal, FitError> {
         let count = self.priors.len();
-        let drives = self.drives.normal(self.priors, at.of_driving(), &weights.drives, damping)?;
+        let drives = self.drives.normal(self.priors, at.of_driving(), &weights.drives)?;
         let sum = |zero: DMatrix<f64>| drives.iter().fold(zero, |sum, drive| sum + &drive.information);
         let mut normal = Normal {
             information: sum(DMatrix::zeros(count, count)),
@@ -183,7 +166,7 @@ impl Problem<'_> {
             let mut own_gradient = gradient.rows(count, own_count).into_owned();
             for (j, (unknown, x)) in shift.own.iter().zip(own).enumerate() {
                 let precision = unknown.sd.powi(-2);
-                own_square[(j, j)] = (own_square[(j, j)] + precision) * (1.0 + damping);
+                own_square[(j, j)] += precision;
                 own_gradient[j] += precision * (x - unknown.mean);
             }
             let cholesky = own_square.cholesky().ok_or_else(|| not_finite(&shift.record.name))?;
@@ -200,106 +183,84 @@ impl Problem<'_> {
     pub(crate) fn solve(
         &self,
         shifts: &[ShiftModel],
-        mut at: Unknowns,
-        mut weights: Weights,
+        at: Unknowns,
+        weights: Weights,
         iterations: Iterations,
         progress: &mut dyn FnMut(u32),
     ) -> Result<Solved, FitError> {
-        let mut is_converged = false;
-        let mut damping = 1e-3;
-        let mut residuals = self.residuals(shifts, &at);
-        let mut lines = Vec::new();
-        for iteration in 0..iterations.most {
-            progress(iteration);
-            // The first residuals are those of the file, whose scale says nothing of the readings.
-            if (1..=iterations.scaled).contains(&iteration) {
-                weights = weights.following(shifts, &residuals);
-                weights.drives = self.drives.following(self.priors, at.of_driving());
-            }
-            lines = self.linearised(shifts, &at);
-            let cost = self.cost(shifts, &at, &residuals, &weights);
-            if !cost.is_finite() {
-                return Err(not_finite("the shifts"));
-            }
-            let (mut largest, mut decrease) = (f64::INFINITY, f64::INFINITY);
-            for _ in 0..TRIES {
-                let normal = self.normal(shifts, &lines, &at, &weights, damping)?;
-                let (next, size) = self.step(&at, &normal, damping)?;
-                let next_residuals = self.residuals(shifts, &next);
-                let next_cost = self.cost(shifts, &next, &next_residuals, &weights);
-                if next_cost <= cost {
-                    (at, residuals, largest, decrease) = (next, next_residuals, size, cost - next_cost);
-                    damping = (damping / 10.0).max(1e-8);
-                    break;
-                }
-                damping = (damping * 8.0).max(1e-6);
-                // Where no damping helps, nothing smaller can be found.
-                largest = size.min(iterations.end.small);
-            }
-            if iterations.end.is_reached(largest, decrease) && iteration > iterations.scaled {
-                is_converged = true;
-                break;
-            }
-        }
-        Ok(Solved { at, weights, is_converged, lines })
-    }
-
-    /// The unknowns after a step, and its largest size in standard deviations after the fit.
-    fn step(&self, at: &Unknowns, normal: &Normal, damping: f64) -> Result<(Unknowns, f64), FitError> {
-        let mut matrix = normal.information.clone();
-        let mut gradient: DVector<f64> = normal.scores.iter().sum::<DVector<f64>>() + &normal.driving;
-        for (j, (prior, x)) in self.priors.iter().zip(&at.shared).enumerate() {
-            let precision = prior.sd.powi(-2);
-            matrix[(j, j)] = (matrix[(j, j)] + precision) * (1.0 + damping);
-            gradient[j] += precision * (x - prior.mean);
-        }
-        let (whole, inverse) = self.within_limits(at, matrix, &gradient)?;
-        let limited = |j: usize| {
-            let [least, greatest] = self.priors[j].limits();
-            (at.shared[j] + whole[j]).clamp(least, greatest)
-        };
-        let shared: Vec<f64> = (0..whole.len()).map(limited).collect();
-        let step = DVector::from_fn(whole.len(), |j, _| shared[j] - at.shared[j]);
-        let size = (0..step.len()).map(|j| step[j].abs() / inverse[(j, j)].sqrt()).fold(0.0, f64::max);
-        let own = (at.own.iter().zip(&normal.eliminated))
-            .map(|(own, eliminated)| {
-                let step = -eliminated.own.solve(&(&eliminated.gradient + &eliminated.mixed * &step));
-                own.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect()
-            })
-            .collect();
-        let drives = normal.drives.iter().zip(&at.drives).map(|(drive, x)| drive.stepped(*x, &step)).collect();
-        Ok((Unknowns { shared, own, drives }, size))
+        let residuals = self.residuals(shifts, &at);
+        let mut weighed = Weighed { problem: self, shifts, weights };
+        let Minimum { at: Point { unknowns, .. }, line, is_converged } =
+            minimised(&mut weighed, Point { unknowns: at, residuals }, iterations, progress)?;
+        Ok(Solved { at: unknowns, weights: weighed.weights, is_converged, normal: line })
     }
 }
 
-impl Problem<'_> {
-    /// The step of the parameters and the inverse of their matrix. A parameter that is at its limit and would leave it is held there
-    /// before the others are solved for: clamped afterwards, it would have made their steps wrong again and again.
-    fn within_limits(
-        &self,
-        at: &Unknowns,
-        mut matrix: DMatrix<f64>,
-        gradient: &DVector<f64>,
-    ) -> Result<(DVector<f64>, DMatrix<f64>), FitError> {
-        /// Precision over that of the data with which a parameter is held.
-        const HELD: f64 = 1e9;
-        let mut is_held = vec![false; gradient.len()];
-        loop {
-            let cholesky = matrix.clone().cholesky().ok_or_else(|| not_finite("the parameters"))?;
-            let step = -cholesky.solve(gradient);
-            let leaves = |j: usize| {
-                let [least, greatest] = self.priors[j].limits();
-                (at.shared[j] <= least && step[j] < 0.0) || (at.shared[j] >= greatest && step[j] > 0.0)
-            };
-            let leaving: Vec<usize> = (0..step.len()).filter(|j| !is_held[*j] && leaves(*j)).collect();
-            if leaving.is_empty() {
-                return Ok((step, cholesky.inverse()));
-            }
-            for j in leaving {
-                is_held[j] = true;
-                matrix[(j, j)] *= HELD;
-            }
+/// A problem with weights.
+struct Weighed<'a> {
+    problem: &'a Problem<'a>,
+    shifts: &'a [ShiftModel],
+    weights: Weights,
+}
+
+/// Unknowns and what they leave of the readings of each shift.
+#[derive(Clone)]
+struct Point {
+    unknowns: Unknowns,
+    residuals: Vec<DVector<f64>>,
+}
+
+impl Objective for Weighed<'_> {
+    type Point = Point;
+    type Line = Normal;
+
+    fn parameters<'a>(&self, point: &'a Point) -> &'a [f64] {
+        &point.unknowns.shared
+    }
+
+    fn limits(&self, place: usize) -> [f64; 2] {
+        self.problem.priors[place].limits()
+    }
+
+    fn reweighted(&mut self, point: Point) -> Point {
+        self.weights = self.weights.clone().following(self.shifts, &point.residuals);
+        self.weights.drives = self.problem.drives.following(self.problem.priors, point.unknowns.of_driving());
+        point
+    }
+
+    fn cost(&self, point: &Point) -> f64 {
+        self.problem.cost(self.shifts, &point.unknowns, &point.residuals, &self.weights)
+    }
+
+    fn equations(&self, Point { unknowns, .. }: &Point) -> Result<Equations<Normal>, FitError> {
+        let lines = self.problem.linearised(self.shifts, unknowns);
+        let normal = self.problem.normal(self.shifts, &lines, unknowns, &self.weights)?;
+        let mut information = normal.information.clone();
+        let mut gradient: DVector<f64> = normal.scores.iter().sum::<DVector<f64>>() + &normal.driving;
+        for (j, (prior, x)) in self.problem.priors.iter().zip(&unknowns.shared).enumerate() {
+            let precision = prior.sd.powi(-2);
+            information[(j, j)] += precision;
+            gradient[j] += precision * (x - prior.mean);
         }
+        Ok(Equations { information, gradient, own_decrease: normal.own_decrease(), line: normal })
+    }
+
+    fn moved(&self, from: &Point, normal: &Normal, shared: Vec<f64>, share: f64) -> Point {
+        let step = DVector::from_column_slice(&shared) - DVector::from_column_slice(&from.unknowns.shared);
+        let own = (from.unknowns.own.iter().zip(&normal.eliminated))
+            .map(|(own, eliminated)| {
+                let step = eliminated.step(&step, share);
+                own.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect()
+            })
+            .collect();
+        let drives = normal.drives.iter().zip(&from.unknowns.drives);
+        let drives = drives.map(|(drive, x)| drive.stepped(*x, &step, share)).collect();
+        let unknowns = Unknowns { shared, own, drives };
+        Point { residuals: self.problem.residuals(self.shifts, &unknowns), unknowns }
+    }
+
+    fn not_finite(&self) -> FitError {
+        not_finite("the shifts")
     }
 }
 

@@ -4,9 +4,11 @@ use config::Vehicle;
 
 use crate::car::Car;
 use crate::drives::Drives;
+use crate::fitting::DECREASE;
+use crate::least_squares::Iterations;
 use crate::parameters::{self, HYSTERESIS_UNIT_PA, Prior};
 use crate::shift_model::ShiftModel;
-use crate::solver::{End, Iterations, Problem, Unknowns};
+use crate::solver::{Problem, Unknowns};
 use crate::{Channel, Fit, FitError, Parameter, ReadingAges, ShiftRecord, open_loop};
 
 /// Errors over shifts that were held out.
@@ -66,25 +68,21 @@ impl Fit {
         held_out: &[ShiftRecord],
         ages: ReadingAges,
     ) -> Result<Option<f64>, FitError> {
-        /// A parameter that is held.
-        const HELD_SD: f64 = 1e-7;
         let file = Car::of_file(vehicle, ages);
         let shafts = parameters::shafts(vehicle)?;
-        let of_file = |prior: &Prior, x: f64| match prior.parameter {
-            parameter if parameter.is_of_signals() => x,
+        let of_file = |(prior, x): (&Prior, &f64)| match prior.parameter {
+            parameter if parameter.is_of_signals() => *x,
             Parameter::Hysteresis => vehicle.oncoming.hysteresis_pa / HYSTERESIS_UNIT_PA,
             _ => 0.0,
         };
-        let held = |(prior, x): (&Prior, &f64)| Prior { mean: of_file(prior, *x), sd: HELD_SD, ..prior.clone() };
-        let priors: Vec<Prior> = self.priors.iter().zip(&self.unknowns).map(held).collect();
-        let problem = Problem { file: &file, shafts: &shafts, priors: &priors, drives: &Drives::NONE };
+        let unknowns: Vec<f64> = self.priors.iter().zip(&self.unknowns).map(of_file).collect();
         let models: Vec<ShiftModel> = held_out.iter().map(|record| ShiftModel::new(record.clone(), &file)).collect();
-        let start = Unknowns {
-            shared: priors.iter().map(|prior| prior.mean).collect(),
-            own: models.iter().map(ShiftModel::start).collect(),
-            drives: Vec::new(),
-        };
-        const STARTS: Iterations = Iterations { scaled: 0, most: 6, end: End::OF_FIT };
+        // No parameter is free, the own unknowns of the shifts are.
+        let car = file.with(&shafts, &self.priors, &unknowns);
+        let problem = Problem { file: &car, shafts: &shafts, priors: &[], drives: &Drives::NONE };
+        let own = models.iter().map(ShiftModel::start).collect();
+        let start = Unknowns { shared: Vec::new(), own, drives: Vec::new() };
+        const STARTS: Iterations = Iterations { reweighted: 0, most: 6, decrease: DECREASE };
         let at = problem.solve(&models, start, self.weights.clone(), STARTS, &mut |_| {})?.at;
         let residuals = problem.residuals(&models, &at);
         let errors = models.iter().zip(residuals).flat_map(|(model, mut rows)| {

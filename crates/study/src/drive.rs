@@ -2,6 +2,7 @@
 
 use config::{Experiment, Vehicle};
 use observer::Phase;
+use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Contact, Mode, Moment, PlantError, Powertrain, Sample, Simulation, Stage, simulate};
 use trace::{Cell, Column, Trace, Values, Word, signal};
 
@@ -63,24 +64,38 @@ pub fn simulate_shift(
     experiment: &Experiment,
     before_s: f64,
 ) -> Result<Trace, PlantError> {
-    let mut recording = Recording::new(car, Trace::default());
-    over_shift(car, nominal, experiment, before_s, |moment| recording.take(&moment.sample()))?;
-    Ok(recording.finish())
+    simulate_shift_within(car, nominal, experiment, before_s, RELATIVE_TOLERANCE)
 }
 
-/// As [`simulate_shift`], where `take` gets every sample and records what it needs.
+/// As [`simulate_shift`], with a relative tolerance of the integration of its own.
 ///
 /// # Errors
 /// See [`PlantError`].
-pub(crate) fn over_shift(
+pub fn simulate_shift_within(
     car: &Vehicle,
     nominal: &Vehicle,
     experiment: &Experiment,
     before_s: f64,
+    relative_tolerance: f64,
+) -> Result<Trace, PlantError> {
+    let mut recording = Recording::new(car, Trace::default());
+    over_shift([car, nominal], experiment, before_s, relative_tolerance, |moment| recording.take(&moment.sample()))?;
+    Ok(recording.finish())
+}
+
+/// As [`simulate_shift_within`] of a car and the model of its controller, where `take` gets every sample and records what it needs.
+///
+/// # Errors
+/// See [`PlantError`].
+pub(crate) fn over_shift(
+    [car, nominal]: [&Vehicle; 2],
+    experiment: &Experiment,
+    before_s: f64,
+    relative_tolerance: f64,
     mut take: impl FnMut(&Moment<'_>),
 ) -> Result<(), PlantError> {
     let powertrain = Powertrain::new(experiment.simulated_vehicle(car));
-    let mut drive = Simulation::new(&powertrain, nominal, experiment)?;
+    let mut drive = Simulation::with_tolerance(&powertrain, nominal, experiment, relative_tolerance)?;
     drive.record_from(experiment.shift.request_s - before_s);
     let mut until_s = experiment.shift.request_s;
     loop {

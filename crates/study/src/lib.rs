@@ -35,7 +35,7 @@ pub use campaign::{Campaign, Row, Status, Summary, execute};
 pub use comparison::{Comparison, ObserverRun, StudyError, compare};
 pub use consistency::Consistency;
 pub use default_influence::{Influence, default_influences};
-pub use drive::{DriveColumns, DriveRow, simulate_drive, simulate_shift, true_phases};
+pub use drive::{DriveColumns, DriveRow, simulate_drive, simulate_shift, simulate_shift_within, true_phases};
 pub use error_bound::{ErrorBound, error_bound};
 pub use estimates::{EstimateColumns, OutputColumn, estimates_trace};
 pub use log::{Log, LogRow};

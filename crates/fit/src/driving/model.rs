@@ -64,6 +64,7 @@ pub(crate) struct DrivingModel<'a> {
 }
 
 /// Driving about unknowns.
+#[derive(Clone)]
 pub(crate) struct Evaluated {
     /// Half the gradient by the unknowns, with the sign of a step.
     pub(crate) score: DVector<f64>,

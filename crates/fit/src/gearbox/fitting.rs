@@ -104,8 +104,8 @@ fn fit_with(
     let all = Models { shifts: &models, driving: of_driving };
     let solved = problem.solve(&all, &mut |iteration| progress(Progress { shifts: models.len(), iteration }))?;
     let mut stated = stated(&problem, &models, &solved, &Unfitted::of(car, tables))?;
-    let at_limit = problem.at_limit(&solved.at);
-    let mut unknowns = solved.at;
+    let at_limit = problem.at_limit(&solved.point.at);
+    let mut unknowns = solved.point.at;
     let drawn_off = drawn_off(&quantities, &mut unknowns, &mut stated);
     let mut by_pair = vec![[0; 4]; quantities.pairs.len()];
     let mut elements_seen = vec![false; quantities.elements.len()];

@@ -18,7 +18,7 @@ pub(crate) fn stated(
     solved: &Solved,
     unfitted: &[Unfitted],
 ) -> Result<DMatrix<f64>, FitError> {
-    let count = solved.at.len();
+    let count = solved.point.at.len();
     let (information, _) = solved.point.normal();
     let singular = || FitError::Work("the information of the shifts is not finite".to_owned());
     let curvature = (information + &problem.precision).cholesky().ok_or_else(singular)?;

@@ -1,23 +1,19 @@
-//! Gauss-Newton with Levenberg's damping over the shifts of a car.
+//! The cost of the shifts of a car and of the driving between them, and its normal equations.
 //!
 //! A shift's own unknowns act linearly: for given parameters they are found at once, and the parameters see what is left (variable
 //! projection). The weights are those of the one-shift fit.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::quantities::Quantities;
 use super::shift::{Linearised, MeasuredPressure, OWN, ShiftModel};
 use crate::FitError;
 use crate::driving::{DrivingModel, DrivingWeights, Evaluated};
+use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
 use crate::weights::{ChannelWeights, FACTOR};
 
-/// A step that changes no unknown by more than this share of its plain standard deviation ends the fit.
-const CONVERGED: f64 = 0.1;
-/// Dampings tried in one iteration.
-const TRIES: u32 = 8;
-/// Iterations in which the scale follows the residuals, and all of them.
-const SCALED_ITERATIONS: u32 = 5;
-const ITERATIONS: u32 = 20;
+/// Steps after each of which the weights follow the residuals, and all of them.
+const ITERATIONS: Iterations = Iterations { reweighted: 5, most: 20, decrease: 0.1 };
 /// Turns in which the own unknowns of a shift are found with Huber's weights.
 const OWN_TURNS: u32 = 4;
 /// Deviations of what was known before beyond which nothing is held possible.
@@ -42,7 +38,9 @@ impl Weights {
 }
 
 /// Shifts and driving at unknowns.
+#[derive(Clone)]
 pub(crate) struct Point {
+    pub(crate) at: Vec<f64>,
     pub(crate) shifts: Vec<Profiled>,
     pub(crate) driving: Evaluated,
 }
@@ -58,6 +56,7 @@ impl Point {
 }
 
 /// A shift at unknowns, with its own unknowns at their best.
+#[derive(Clone)]
 pub(crate) struct Profiled {
     /// Residuals of the turbine speed, rad/s, and of measured pressures, Pa.
     residuals: Vec<f64>,
@@ -73,7 +72,6 @@ pub(crate) struct Profiled {
 
 /// Where a fit ended.
 pub(crate) struct Solved {
-    pub(crate) at: Vec<f64>,
     pub(crate) weights: Weights,
     pub(crate) is_converged: bool,
     pub(crate) point: Point,
@@ -175,79 +173,88 @@ impl<'a> Problem<'a> {
         profiled(shift, &shift.linearised(self.quantities, at), weights).score
     }
 
-    fn point(&self, models: &Models<'_>, at: &[f64], weights: Weights) -> Point {
-        let shift = |shift: &ShiftModel| profiled(shift, &shift.linearised(self.quantities, at), weights);
+    fn point(&self, models: &Models<'_>, at: Vec<f64>, weights: Weights) -> Point {
+        let shift = |shift: &ShiftModel| profiled(shift, &shift.linearised(self.quantities, &at), weights);
         Point {
             shifts: models.shifts.iter().map(shift).collect(),
-            driving: models.driving.evaluated(&|term| self.quantities.place_of(term), at, weights.driving),
+            driving: models.driving.evaluated(&|term| self.quantities.place_of(term), &at, weights.driving),
+            at,
         }
     }
 
-    fn cost(&self, point: &Point, at: &[f64]) -> f64 {
-        let at = DVector::from_column_slice(at);
+    fn cost(&self, point: &Point) -> f64 {
+        let at = DVector::from_column_slice(&point.at);
         let shifts = point.shifts.iter().map(|shift| shift.cost).sum::<f64>();
         0.5 * at.dot(&(&self.precision * &at)) + shifts + point.driving.cost
     }
 
     /// Finds the parameters of shifts and driving, from those of the file.
     pub(crate) fn solve(&self, models: &Models<'_>, progress: &mut dyn FnMut(u32)) -> Result<Solved, FitError> {
-        let mut weights = Weights::START;
-        let mut at = vec![0.0; self.quantities.all.len()];
-        let (mut damping, mut is_converged) = (1e-3, false);
-        let mut point = self.point(models, &at, weights);
-        for iteration in 0..ITERATIONS {
-            progress(iteration);
-            if iteration <= SCALED_ITERATIONS {
-                weights = following(&point, weights);
-                weights.driving = models.driving.following(&|term| self.quantities.place_of(term), &at);
-                point = self.point(models, &at, weights);
-            }
-            let cost = self.cost(&point, &at);
-            if !cost.is_finite() {
-                return Err(not_finite());
-            }
-            let mut largest = f64::INFINITY;
-            for _ in 0..TRIES {
-                let (next, size) = self.step(&point, &at, damping)?;
-                let next_point = self.point(models, &next, weights);
-                if self.cost(&next_point, &next) <= cost {
-                    (at, point, largest) = (next, next_point, size);
-                    damping = (damping / 10.0).max(1e-8);
-                    break;
-                }
-                damping *= 8.0;
-                largest = size.min(CONVERGED);
-            }
-            if largest <= CONVERGED && iteration > SCALED_ITERATIONS {
-                is_converged = true;
-                break;
-            }
-        }
-        Ok(Solved { at, weights, is_converged, point })
-    }
-
-    /// The unknowns after a step, and its largest size in standard deviations.
-    fn step(&self, point: &Point, at: &[f64], damping: f64) -> Result<(Vec<f64>, f64), FitError> {
-        let here = DVector::from_column_slice(at);
-        let (information, score) = point.normal();
-        let mut matrix = information + &self.precision;
-        let gradient = score - &self.precision * &here;
-        for j in 0..at.len() {
-            matrix[(j, j)] *= 1.0 + damping;
-        }
-        let cholesky: Cholesky<f64, Dyn> = matrix.cholesky().ok_or_else(not_finite)?;
-        let (step, inverse) = (cholesky.solve(&gradient), cholesky.inverse());
-        let limit = |j: usize| LIMIT * self.quantities.sd_before(j);
-        let next: Vec<f64> = (0..at.len()).map(|j| (at[j] + step[j]).clamp(-limit(j), limit(j))).collect();
-        let size = |j: usize| (next[j] - at[j]).abs() / inverse[(j, j)].sqrt();
-        let largest = (0..at.len()).map(size).fold(0.0, f64::max);
-        Ok((next, largest))
+        let mut weighed = Weighed { problem: self, models, weights: Weights::START };
+        let start = weighed.at(vec![0.0; self.quantities.all.len()]);
+        let start = weighed.reweighted(start);
+        let Minimum { at: point, is_converged, .. } = minimised(&mut weighed, start, ITERATIONS, progress)?;
+        Ok(Solved { weights: weighed.weights, is_converged, point })
     }
 
     /// Names of the unknowns that ended where nothing beyond is held possible.
     pub(crate) fn at_limit(&self, at: &[f64]) -> Vec<String> {
         let is_there = |(j, _): &(usize, &f64)| at[*j].abs() >= LIMIT * self.quantities.sd_before(*j);
         at.iter().enumerate().filter(is_there).map(|(j, _)| self.quantities.name(self.quantities.all[j])).collect()
+    }
+}
+
+/// A problem with weights.
+struct Weighed<'a> {
+    problem: &'a Problem<'a>,
+    models: &'a Models<'a>,
+    weights: Weights,
+}
+
+impl Weighed<'_> {
+    fn at(&self, at: Vec<f64>) -> Point {
+        self.problem.point(self.models, at, self.weights)
+    }
+}
+
+impl Objective for Weighed<'_> {
+    type Point = Point;
+    type Line = ();
+
+    fn parameters<'a>(&self, point: &'a Point) -> &'a [f64] {
+        &point.at
+    }
+
+    fn limits(&self, place: usize) -> [f64; 2] {
+        let limit = LIMIT * self.problem.quantities.sd_before(place);
+        [-limit, limit]
+    }
+
+    fn reweighted(&mut self, point: Point) -> Point {
+        self.weights = following(&point, self.weights);
+        let place = |term| self.problem.quantities.place_of(term);
+        self.weights.driving = self.models.driving.following(&place, &point.at);
+        self.at(point.at)
+    }
+
+    fn cost(&self, point: &Point) -> f64 {
+        self.problem.cost(point)
+    }
+
+    fn equations(&self, point: &Point) -> Result<Equations<()>, FitError> {
+        let here = DVector::from_column_slice(&point.at);
+        let (information, score) = point.normal();
+        let gradient = &self.problem.precision * &here - score;
+        // The own unknowns of a point are at their best.
+        Ok(Equations { information: information + &self.problem.precision, gradient, own_decrease: 0.0, line: () })
+    }
+
+    fn moved(&self, _: &Point, (): &(), at: Vec<f64>, _: f64) -> Point {
+        self.at(at)
+    }
+
+    fn not_finite(&self) -> FitError {
+        not_finite()
     }
 }
 

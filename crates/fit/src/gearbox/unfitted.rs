@@ -63,11 +63,11 @@ impl Unfitted {
         solved: &Solved,
         curvature: &Cholesky<f64, Dyn>,
     ) {
-        let mut change = DVector::zeros(solved.at.len());
+        let mut change = DVector::zeros(solved.point.at.len());
         let mut is_seen = false;
         for (model, shift) in models.iter().zip(&solved.point.shifts) {
             if let Some(other) = model.with_hydraulics(self.place, |of| self.change(of)) {
-                change += problem.score(&other, &solved.at, solved.weights) - &shift.score;
+                change += problem.score(&other, &solved.point.at, solved.weights) - &shift.score;
                 is_seen = true;
             }
         }

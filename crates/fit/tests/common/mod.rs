@@ -5,10 +5,11 @@ use config::vehicle::ShiftClutch;
 use config::{Experiment, Sensors, Source, Vehicle};
 use drivetrain::{ClutchValve, Table1};
 use fit::{Driving, Fit, Map, Parameter, ReadingAges, Series, ShiftRecord};
+use plant::hybrid::RELATIVE_TOLERANCE;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64Mcg;
 use study::sampling::through_sensors;
-use study::simulate_shift;
+use study::simulate_shift_within;
 use trace::{Trace, Values, signal};
 
 /// The fit of a car to shifts, and to driving between them.
@@ -69,6 +70,8 @@ pub(crate) struct TestCar {
     /// Factor on the time of the fill.
     pub(crate) fill: f64,
     seed: u64,
+    /// Relative tolerance with which its shifts are integrated.
+    pub(crate) tolerance: f64,
     /// Whether the pedal is released now and then in its drives.
     pub(crate) releases: bool,
     draw: Draw,
@@ -212,6 +215,7 @@ impl TestCar {
             pressure_late_s,
             fill,
             seed,
+            tolerance: RELATIVE_TOLERANCE,
             releases: false,
             draw,
         };
@@ -333,7 +337,7 @@ impl TestCar {
         let mut car = self.car.clone();
         car.road.mass_kg *= self.draw.factor(0.06);
         car.road.grade_rad = self.draw.between(-0.05, 0.05);
-        simulate_shift(&car, &self.file, &experiment, 1.2).unwrap()
+        simulate_shift_within(&car, &self.file, &experiment, 1.2, self.tolerance).unwrap()
     }
 
     /// The readings of a drive at 100 Hz.

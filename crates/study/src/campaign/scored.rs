@@ -3,6 +3,7 @@
 
 use config::{Experiment, Vehicle};
 use observer::Phase;
+use plant::hybrid::RELATIVE_TOLERANCE;
 use plant::{Moment, PlantError};
 use trace::{Trace, signal};
 
@@ -39,7 +40,7 @@ pub fn scored_shift(
     let mut rating = ShiftRating::new(&nominal.shift);
     let mut scored = 0;
     let felt_from_s = ShiftRating::felt_from_s(experiment.shift.request_s);
-    over_shift(car, nominal, experiment, before_s, |moment| {
+    over_shift([car, nominal], experiment, before_s, RELATIVE_TOLERANCE, |moment| {
         let phase = phase(moment.stage, moment.mode);
         let sample = shift_sample(moment, phase, moment.time_s >= felt_from_s, rating.is_locked());
         rating.push(&sample);
