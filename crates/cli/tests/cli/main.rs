@@ -25,4 +25,5 @@ mod other_cars;
 mod own_car;
 mod studies;
 mod support;
+mod tables;
 mod wrong_maps;

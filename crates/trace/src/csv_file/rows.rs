@@ -59,6 +59,26 @@ impl CsvRows {
         Ok(rows)
     }
 
+    /// Reads a wheel speed in m/s or km/h, that of the tread, as the rotation of a wheel with this rolling radius, m.
+    ///
+    /// # Errors
+    /// There is a column in rad/s or rpm too.
+    pub fn with_wheel_radius(mut self, wheel_radius_m: f64) -> Result<Self, TraceError> {
+        if let Some(tread) = self.find(signal::WHEEL_TREAD_SPEED) {
+            if self.find(signal::WHEEL_SPEED).is_some() {
+                return Err(self.refused(format!(
+                    "there are two columns of the wheel speed, in {} and in {}\nhint: remove one of them",
+                    signal::WHEEL_SPEED,
+                    signal::WHEEL_TREAD_SPEED
+                )));
+            }
+            let (name, factor) = &mut self.columns[tread];
+            signal::WHEEL_SPEED.clone_into(name);
+            *factor /= wheel_radius_m;
+        }
+        Ok(self)
+    }
+
     fn refuse_twins(&self, names: &[String]) -> Result<(), TraceError> {
         let mut places: HashMap<&str, usize> = HashMap::with_capacity(names.len());
         for (i, (name, _)) in self.columns.iter().enumerate().filter(|(_, (name, _))| !name.is_empty()) {
