@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
+use crate::error::TIME_BY_MAP;
 use crate::{TraceError, signal, units};
 
 /// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
@@ -219,7 +220,10 @@ impl CsvRows {
     #[cold]
     fn not_a_number(&self, column: usize) -> TraceError {
         let (name, text) = (TraceError::shown(&self.columns[column].0), TraceError::shown(&self.text(column)));
-        self.wrong(format!("column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"))
+        let is_date = text.contains([':', '/'])
+            || text.len() >= "31.3.24".len() && text.starts_with(|c: char| c.is_ascii_digit());
+        let hint = if column == self.time_at && is_date { TIME_BY_MAP } else { "leave a lost sample empty" };
+        self.wrong(format!("column `{name}` contains `{text}`, which is not a number\nhint: {hint}"))
     }
 
     #[inline]
