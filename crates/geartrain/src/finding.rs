@@ -96,6 +96,8 @@ pub enum Fault {
     OneWay { element: String, gear: String },
     #[error("the one-way clutch \"{element}\" would turn in \"{gear}\" in the direction in which it holds")]
     OneWayBlocks { element: String, gear: String },
+    #[error("there is no forward gear: all ratios are negative")]
+    NoForward,
     #[error("no gear engages \"{0}\"")]
     Unused(String),
     #[error("\"{gear}\" engages the same elements as \"{other}\"")]
@@ -155,6 +157,9 @@ impl Fault {
             ),
             Self::OneWay { .. } => "swap its `input` and `output`, or engage a brake or clutch in its place".to_owned(),
             Self::OneWayBlocks { .. } => "swap its `input` and `output`: it overruns in the gears that do not engage it".to_owned(),
+            Self::NoForward => "a gear pair turns the direction round: `idler = true` keeps it, and so does a second pair, as that to the output or of the \
+                                differential; in a table of ratios those of forward gears are positive"
+                .to_owned(),
             Self::Unused(_) => "engage it in a gear, or leave it out: it is open in all of them".to_owned(),
             Self::SameElements { .. } => "two names of one gear: check `engaged` of both".to_owned(),
             Self::Order { .. } => "gears are listed from the largest ratio to the smallest, each ratio turbine over output speed".to_owned(),

@@ -81,6 +81,9 @@ impl Gearbox {
             Given::Ratios(ratios) => from_ratios(ratios)?,
         };
         gearbox.name.clone_from(&description.name);
+        if gearbox.gears.iter().all(|gear| gear.ratio < 0.0) {
+            return Err(Finding { part: Part::Gearbox, key: "gear", fault: Fault::NoForward });
+        }
         gearbox.check_one_way()?;
         if let Some(line_pressure_pa) = description.line_pressure_pa {
             positive(Part::Gearbox, "line_pressure_pa", line_pressure_pa)?;
@@ -130,6 +133,13 @@ impl Gearbox {
     pub fn one_way_clutch_of(&self, gear: usize) -> Option<usize> {
         let holding = self.gears.get(gear)?.holding.iter().map(|holding| holding.element);
         holding.into_iter().find(|&element| self.is_one_way(element))
+    }
+
+    /// Whether only dogs change between its forward gears, as behind one clutch: no clutch takes the load over from another.
+    pub fn only_dogs_change(&self) -> bool {
+        let is_forward = |gear: usize| self.gears[gear].ratio > 0.0;
+        let mut forward = self.shifts.iter().filter(|shift| is_forward(shift.from) && is_forward(shift.to)).peekable();
+        forward.peek().is_some() && forward.all(|shift| matches!(shift.change, Change::Interrupted { .. }))
     }
 
     /// The shift between two gears.

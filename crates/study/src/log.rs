@@ -124,6 +124,7 @@ impl Log {
     /// # Errors
     /// A signal is missing, or one of the first rows is wrong.
     pub fn of(rows: CsvRows, vehicle: &Vehicle, look: usize) -> Result<Self, TraceError> {
+        let rows = rows.with_wheel_radius(vehicle.road.wheel_radius_m)?;
         let signals = Signals::choose(vehicle, |name| rows.find(name), |name| rows.require(name))?;
         let truth = rows.find(signal::TRUE_PHASE).zip(rows.find(signal::ONCOMING_PRESSURE));
         let truth = truth.map(|(phase, pressure)| TruthColumns { phase, pressure });

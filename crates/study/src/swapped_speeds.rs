@@ -13,12 +13,17 @@ const ENOUGH: u64 = 100;
 /// So many times more samples have to speak for a swap than against it \[chosen\]. In a shift, where the turbine is between two gears, the
 /// engine may pass one of them.
 const TIMES: u64 = 4;
+/// Of all samples, the engine speed fits a gear in so many at least \[chosen\]: what turns with the output does so except in shifts, while
+/// an engine before a slipping converter only passes a gear.
+const MOST: f64 = 0.5;
 
 /// Samples for and against a swap.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SwappedSpeeds {
     turbine_alone: u64,
     engine_alone: u64,
+    /// All samples, and those in which the engine fits a gear.
+    engine: [u64; 2],
 }
 
 impl SwappedSpeeds {
@@ -27,16 +32,20 @@ impl SwappedSpeeds {
         let fits =
             |speed: f64, share: f64| in_gears_rad_s.iter().any(|gear| (speed - gear).abs() <= share * gear.abs());
         let (turbine, engine) = (fits(turbine_rad_s, FITS), fits(engine_rad_s, FITS));
+        self.engine[0] += u64::from(engine_rad_s.is_finite());
+        self.engine[1] += u64::from(engine);
         self.turbine_alone += u64::from(turbine && !fits(engine_rad_s, DIFFERS) && engine_rad_s.is_finite());
         self.engine_alone += u64::from(engine && !fits(turbine_rad_s, DIFFERS) && turbine_rad_s.is_finite());
     }
 
-    /// What the log shows, if it contradicts the channels.
-    pub fn warning(&self) -> Option<String> {
-        let Self { turbine_alone, engine_alone } = *self;
-        (engine_alone >= ENOUGH && engine_alone > TIMES * turbine_alone).then(|| {
+    /// What the log shows, if it contradicts the channels, in a sentence.
+    pub fn contradiction(&self) -> Option<String> {
+        let Self { turbine_alone, engine_alone, engine: [all, engine] } = *self;
+        #[expect(clippy::cast_precision_loss, reason = "a share")]
+        let is_in_gear = engine as f64 >= MOST * all as f64;
+        (is_in_gear && engine_alone >= ENOUGH && engine_alone > TIMES * turbine_alone).then(|| {
             format!(
-                "warning: engine_speed and turbine_speed may be swapped: in a gear the turbine turns with the output, but in {engine_alone} samples \
+                "engine_speed and turbine_speed may be swapped: in a gear the turbine turns with the output, but in {engine_alone} samples \
                  engine_speed is the output speed times the ratio of a gear and turbine_speed is not; the other way round it is in {turbine_alone}"
             )
         })
@@ -50,7 +59,7 @@ mod tests {
     fn of(samples: &[(f64, f64)]) -> Option<String> {
         let mut swapped = SwappedSpeeds::default();
         samples.iter().for_each(|(engine, turbine)| swapped.push(*engine, *turbine, &[300.0, 200.0]));
-        swapped.warning()
+        swapped.contradiction()
     }
 
     #[test]
@@ -64,5 +73,8 @@ mod tests {
         let shift: Vec<(f64, f64)> = vec![(200.0, 250.0); 120];
         assert_eq!(of(&[good, shift].concat()), None);
         assert_eq!(of(&vec![(300.0, f64::NAN); 500]), None);
+        // Nor does an output speed of a wrong scale: the turbine fits no gear, and the engine passes some.
+        let wrong_output: Vec<(f64, f64)> = (0..900).map(|i| (260.0 + 0.2 * f64::from(i), 225.0)).collect();
+        assert_eq!(of(&wrong_output), None);
     }
 }

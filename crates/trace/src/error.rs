@@ -83,8 +83,29 @@ impl TraceError {
     }
 }
 
+/// How times are read that are no numbers in s or ms.
+pub(crate) const TIME_BY_MAP: &str = "a date and time, as `31.03.2024 01:59:30.000`, is read with a channel map: `wetclutch inspect LOG \
+    --suggest > map.toml` writes one, for --map map.toml";
+
+/// The endings of a name like this one, for the units that its signal may have.
+fn endings_like(wanted: &str) -> &'static str {
+    match wanted {
+        _ if wanted.ends_with("_rad_s") => " (_rad_s or _rpm)",
+        _ if wanted.ends_with("_a") => " (_a or _ma)",
+        _ if wanted.ends_with("_pa") => " (_pa, _kpa, _bar or _mpa)",
+        _ => "",
+    }
+}
+
 /// Names a column with a similar name, or all columns.
 fn column_hint(wanted: &str, present: &[String]) -> String {
+    if wanted == signal::TIME
+        && let Some(near) = present.iter().find(|name| name.contains("time") || name.contains("date"))
+    {
+        let near = TraceError::shown(near);
+        return format!("rename `{near}` to `time_s` or `time_ms` if it is in s or ms; {TIME_BY_MAP}");
+    }
+    let endings = endings_like(wanted);
     const MOST: usize = 20;
     // What a name is about: without its unit, and without a word that many names have.
     let about = |name: &str| -> Vec<String> {
@@ -100,7 +121,7 @@ fn column_hint(wanted: &str, present: &[String]) -> String {
     let near = |name: &&String| !known(name) && about(name).iter().any(|word| wanted.contains(word));
     if let Some(near) = present.iter().find(near) {
         let near = TraceError::shown(near);
-        return format!("`{near}` has a similar name; rename it, with its unit at the end (_rad_s or _rpm, _a or _ma)");
+        return format!("`{near}` has a similar name; rename it, with its unit at the end{endings}");
     }
     let names: Vec<String> = present.iter().take(MOST).map(|name| TraceError::shown(name)).collect();
     match present.len() {
@@ -118,6 +139,18 @@ mod tests {
         let present = ["time_s", "element_d_current_a", "turbine_n"].map(str::to_owned);
         assert!(column_hint("element_e_current_a", &present).starts_with("the columns are "));
         assert!(column_hint("turbine_speed_rad_s", &present).starts_with("`turbine_n` has a similar name"));
+    }
+
+    #[test]
+    fn a_hint_has_units_of_the_quantity_alone() {
+        let hint = |wanted: &str, name: &str| column_hint(wanted, &[name.to_owned()]);
+        assert!(hint("turbine_speed_rad_s", "turbine_n").ends_with("at the end (_rad_s or _rpm)"));
+        assert!(
+            hint("element_e_current_a", "e_valve").starts_with("`e_valve` has")
+                && !hint("x_current_a", "x_i").contains("rpm")
+        );
+        let time = hint(signal::TIME, "time");
+        assert!(time.contains("`time_s` or `time_ms`") && time.contains("--map") && !time.contains("_rad_s"), "{time}");
     }
 
     #[test]

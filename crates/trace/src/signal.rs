@@ -10,6 +10,8 @@ pub const TURBINE_SPEED: &str = "turbine_speed_rad_s";
 pub const OUTPUT_SPEED: &str = "output_speed_rad_s";
 /// Driven wheel speed, rad/s.
 pub const WHEEL_SPEED: &str = "wheel_speed_rad_s";
+/// The same as the speed of the tread, m/s; with the wheel's radius it becomes [`WHEEL_SPEED`].
+pub const WHEEL_TREAD_SPEED: &str = "wheel_speed_m_s";
 /// Slip of the oncoming clutch, rad/s.
 pub const ONCOMING_SLIP: &str = "oncoming_slip_rad_s";
 /// Commanded current of the oncoming clutch's valve, A.

@@ -11,6 +11,8 @@ const ENDINGS: &[(&str, &str, f64)] = &[
     ("_ms", "_s", 1e-3),
     ("_ma", "_a", 1e-3),
     ("_km_h", "_m_s", 1.0 / 3.6),
+    ("_kmh", "_m_s", 1.0 / 3.6),
+    ("_kph", "_m_s", 1.0 / 3.6),
     ("_deg", "_rad", PI / 180.0),
     // A duty cycle is in % inside too, as in the valve's law.
     ("_duty_percent", "_duty_percent", 1.0),

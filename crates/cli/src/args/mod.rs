@@ -126,7 +126,7 @@ pub(crate) enum Command {
     ///   time_s, engine_speed_rad_s, turbine_speed_rad_s,
     ///   oncoming_current_a, or oncoming_duty_percent for pulse-width-modulated valves,
     ///   oncoming_slip_rad_s or output_speed_rad_s,
-    ///   and for some observers wheel_speed_rad_s
+    ///   and for some observers wheel_speed_rad_s (or wheel_speed_km_h, read with the wheel radius of the vehicle file)
     ///
     /// in any order and in the units rad/s or rpm, A or mA, s or ms. An empty cell or `nan` is a reading that did
     /// not come. If the file also contains the true pressure (a simulated drive), the error is reported.

@@ -28,6 +28,16 @@ pub(super) fn warn_of_slipping(car: &Car) {
     }
 }
 
+/// Why there is nothing to show of the shifts of a car, where the filter has tables for none of them.
+pub(super) fn no_shift(car: &Car, path: &Path) -> String {
+    let why = car.why_not_driven().unwrap_or_else(|| {
+        "the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; clutches and brakes need plates (`pack`) and \
+         valves, which ratios alone do not give"
+            .to_owned()
+    });
+    format!("{}: {why}", path.display())
+}
+
 /// Prints what a vehicle file with a gearbox describes.
 pub(super) fn describe_car(car: &Car) -> Result<(), Failure> {
     let gears = car.gearbox.forward_gears();

@@ -38,6 +38,7 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
                 gearbox::draw(&car.gearbox, folder)?;
             }
             warn(&car.implausible());
+            warn(car.why_not_driven().as_slice());
             describe_car_values(&car, &sensors, options.all)
         }
         Kind::CarStudy => super::study::describe_cars(&options.file),

@@ -7,6 +7,7 @@ use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_r
 use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
 use trace::Cell;
 
+use super::car::no_shift;
 use crate::args::Bench;
 use crate::commands::{JsonObject, progress, read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
@@ -23,11 +24,7 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     let (draws, seed) = (u64::from(options.draws), options.seed);
     let all = runs(&car, draws)?;
     if all == 0 {
-        let message = format!(
-            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; clutches and brakes need plates (`pack`) and valves, which ratios alone do not give",
-            vehicle.display()
-        );
-        return Err(Failure::Input(message));
+        return Err(Failure::Input(no_shift(&car, vehicle)));
     }
     output::note(&format!("running the filter and the open loop on {all} shifts"));
     let bar = progress(all, 0);

@@ -10,6 +10,7 @@ use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivi
 use study::sensitivity as find;
 use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
 
+use super::car::no_shift;
 use super::matrix::sensors_or_bench;
 use crate::args::SensitivityOptions;
 use crate::commands::{read_car, sensors_without_effect, shell_quoted, write_text};
@@ -83,11 +84,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     let car = read_car(path)?;
     let shifts = car_sensitivity(&car, &sensors_or_bench(options.sensors.as_deref())?)?;
     if shifts.is_empty() {
-        let message = format!(
-            "{}: the filter has tables for no shift of this gearbox\nhint: `wetclutch check` lists its shifts; clutches and brakes need plates (`pack`) and valves, which ratios alone do not give",
-            path.display()
-        );
-        return Err(Failure::Input(message));
+        return Err(Failure::Input(no_shift(&car, path)));
     }
     if let Some(folder) = &options.output {
         write_text(&folder.join("sensitivity.html"), &car_sensitivity_page(&shifts, &car)?)?;

@@ -15,6 +15,7 @@ mod equations;
 mod fit;
 mod fit_gearbox;
 mod garage;
+mod layshaft;
 mod learnt;
 #[cfg(unix)]
 mod log_to_fit;
@@ -25,4 +26,5 @@ mod other_cars;
 mod own_car;
 mod studies;
 mod support;
+mod tables;
 mod wrong_maps;

@@ -71,6 +71,16 @@ impl Car {
         Some(format!("{said}\nhint: {}", self.how_to_hold(least, pressure_pa)))
     }
 
+    /// Why the car cannot be driven through its gears, with what can be done with it, where only dogs change between them.
+    pub fn why_not_driven(&self) -> Option<String> {
+        self.gearbox.only_dogs_change().then(|| {
+            "only dogs change between the gears of this gearbox: no clutch takes the load over from another, so its shifts cannot be simulated, and \
+             the filter has tables for none of them\nhint: `wetclutch check` lists gears, holding torques and capacities, and `wetclutch estimate` \
+             gives the torques in gear from a log; a dual clutch has one clutch for each of two neighbouring gears"
+                .to_owned()
+        })
+    }
+
     /// Line pressure at which an element holds what is asked of it, Pa.
     fn holding_pressure(&self, capacity: &Capacity) -> f64 {
         let kiss_pa = self.clutches[capacity.element].as_ref().map_or(0.0, |clutch| clutch.clutch.kiss_pressure());
@@ -90,7 +100,8 @@ impl Car {
         };
         format!(
             "{pressure}with an engine of {:.0} N m in place of {most_n_m:.0} N m (`{key}`); or with {:.1} times the friction faces or \
-             piston areas in the gearbox file, which `wetclutch init --gearbox` sizes for the engine",
+             piston areas (`friction_faces`, `piston_area_m2` in `pack`) in the gearbox file; for a gearbox that comes with the program \
+             `wetclutch init --gearbox` writes them sized for the engine",
             (least * most_n_m).floor(),
             (10.0 / least).ceil() / 10.0
         )
@@ -149,6 +160,11 @@ mod tests {
         let said = car(torque).slipping_elements().unwrap();
         let enough = said.split("an engine of ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
         assert_eq!(car(&torque.replace("900", enough)).slipping_elements(), None, "{said}");
+        // It holds for a gearbox file of one's own too, which `init` does not size.
+        assert!(
+            said.contains("`piston_area_m2` in `pack`") && said.contains("for a gearbox that comes with the program"),
+            "{said}"
+        );
     }
 
     #[test]

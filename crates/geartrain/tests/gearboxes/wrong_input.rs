@@ -380,3 +380,16 @@ fn what_is_possible_and_seldom_meant_is_a_warning() {
     let is_order = |fault: &Fault| matches!(fault, Fault::Order { gear, before, .. } if gear == "3" && before == "2");
     assert!(is_order(&warnings[2].fault) && warnings[2].fault.hint().is_some(), "{warnings:?}");
 }
+
+#[test]
+fn a_gearbox_without_a_forward_gear_is_refused() {
+    let ratios = |all: [f64; 2]| {
+        let gears = all.map(|ratio| Ratio { name: format!("{ratio}"), ratio }).to_vec();
+        let given = Given::Ratios(Ratios { gears, masses: vec![] });
+        Gearbox::new(&Description { name: String::new(), line_pressure_pa: None, given })
+    };
+    assert!(ratios([-3.0, 2.0]).is_ok());
+    let finding = ratios([-3.0, -2.0]).unwrap_err();
+    assert_finding(&finding, Part::Gearbox, "gear", &Fault::NoForward);
+    assert!(finding.fault.hint().unwrap().contains("`idler = true`"));
+}

@@ -62,7 +62,10 @@ impl CarModel {
         let input = if idles { IDLE_RAD_S } else { turbine };
         let shafts: Vec<f64> = match held {
             Some(speeds) => speeds.row_iter().map(|row| row[0] * input + row[1] * output).collect(),
-            None if idles => return wrong(format!("gear {} has no clutch that could slip", of_gear.name)),
+            None if idles => {
+                let why = car.why_not_driven();
+                return wrong(why.unwrap_or_else(|| format!("gear {} has no clutch that could slip", of_gear.name)));
+            }
             None => of_gear.shaft_speeds.iter().map(|speed| speed.unwrap_or(0.0) * turbine).collect(),
         };
         let engine_rad_s = self.steady_engine(input, throttle);

@@ -253,7 +253,7 @@ fn gear_of(car: &Car, number: f64) -> Option<usize> {
 
 /// The map of a log whose channels have the names of the program, as it writes them itself; `None` if some are missing.
 pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
-    use trace::signal;
+    use trace::{Unit, signal, units};
     let named = [
         (Role::EngineSpeed, signal::ENGINE_SPEED),
         (Role::TurbineSpeed, signal::TURBINE_SPEED),
@@ -269,18 +269,28 @@ pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
         (Role::OncomingPressure, signal::ONCOMING_PRESSURE),
         (Role::OncomingTorque, signal::ONCOMING_TORQUE),
     ];
-    let is_there = |name: &str| log.channels().iter().any(|channel| channel.name == name);
+    // The channel of a signal, with its unit: that of the role, or another one that ends its name.
+    let channel_of = |role: Role, name: &str| -> Option<(String, String)> {
+        let mut channels = log.channels().iter();
+        if channels.any(|channel| channel.name == name) {
+            return Some((name.to_owned(), role.unit().to_owned()));
+        }
+        let other = log.channels().iter().find(|channel| units::to_si(&channel.name).0 == name)?;
+        Some((other.name.clone(), Unit::of_name(&other.name).map_or(role.unit(), |unit| unit.name).to_owned()))
+    };
     let of = |role: Role, element: Option<String>, name: &str| {
-        let unit = Some(role.unit().to_owned()).filter(|unit| !unit.is_empty());
-        Mapped { unit, element, ..Mapped::new(role, name) }
+        let (name, unit) = channel_of(role, name)?;
+        Some(Mapped { unit: Some(unit).filter(|unit| !unit.is_empty()), element, ..Mapped::new(role, &name) })
     };
     let mut map = ChannelMap::default();
-    map.channels.extend(named.into_iter().filter(|(_, name)| is_there(name)).map(|(role, name)| of(role, None, name)));
+    map.gearbox.wheel_radius_m = Some(car.road.wheel_radius_m);
+    map.channels.extend(named.into_iter().filter_map(|(role, name)| of(role, None, name)));
+    if !map.has(Role::WheelSpeed) {
+        map.channels.extend(of(Role::WheelSpeed, None, signal::WHEEL_TREAD_SPEED));
+    }
     for (_, name) in element_commands(car) {
         let (role, element) = Role::of_element(&key_of(&name)).map(|(role, element)| (role, element.to_owned()))?;
-        if is_there(&name) {
-            map.channels.push(of(role, Some(element), &name));
-        }
+        map.channels.extend(of(role, Some(element), &name));
     }
     [Role::TurbineSpeed, Role::Gear].into_iter().all(|role| map.has(role)).then_some(map)
 }

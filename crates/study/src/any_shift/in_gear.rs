@@ -124,7 +124,7 @@ impl<'c> InGear<'c> {
 
     /// What contradicts the channels of engine and turbine speed, in a sentence.
     pub(super) fn swapped_speeds(&self) -> Option<String> {
-        self.swapped.warning()
+        self.swapped.contradiction()
     }
 }
 

@@ -182,6 +182,7 @@ impl<'c> CarLog<'c> {
     /// # Errors
     /// One that is needed is missing.
     pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
+        let rows = rows.with_wheel_radius(car.road.wheel_radius_m)?;
         let columns = Columns::of(&rows, car, tables)?;
         let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
         let signals = [signal::GEAR, signal::TARGET_GEAR].map(GearSignal::new);
@@ -535,8 +536,8 @@ impl<'c> LoggedDrive<'c> {
     pub fn finish(mut self) -> ScoredDrive {
         // A shift that the log cuts off is not complete.
         self.end(f64::NAN, usize::MAX);
-        let mut warnings: Vec<String> =
-            self.in_gear.swapped_speeds().into_iter().chain(self.commands.warnings()).collect();
+        let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
+        let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
         warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {

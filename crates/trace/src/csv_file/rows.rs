@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::decimal;
 use super::records::{LONGEST_ROW, RecordError, Records};
+use crate::error::TIME_BY_MAP;
 use crate::{TraceError, signal, units};
 
 /// A comma-separated file that is read row by row. The first row names the columns; `time_s` (or `time_ms`) must be among
@@ -57,6 +58,26 @@ impl CsvRows {
         rows.refuse_twins(&names)?;
         rows.time_at = rows.require(signal::TIME)?;
         Ok(rows)
+    }
+
+    /// Reads a wheel speed in m/s or km/h, that of the tread, as the rotation of a wheel with this rolling radius, m.
+    ///
+    /// # Errors
+    /// There is a column in rad/s or rpm too.
+    pub fn with_wheel_radius(mut self, wheel_radius_m: f64) -> Result<Self, TraceError> {
+        if let Some(tread) = self.find(signal::WHEEL_TREAD_SPEED) {
+            if self.find(signal::WHEEL_SPEED).is_some() {
+                return Err(self.refused(format!(
+                    "there are two columns of the wheel speed, in {} and in {}\nhint: remove one of them",
+                    signal::WHEEL_SPEED,
+                    signal::WHEEL_TREAD_SPEED
+                )));
+            }
+            let (name, factor) = &mut self.columns[tread];
+            signal::WHEEL_SPEED.clone_into(name);
+            *factor /= wheel_radius_m;
+        }
+        Ok(self)
     }
 
     fn refuse_twins(&self, names: &[String]) -> Result<(), TraceError> {
@@ -199,7 +220,10 @@ impl CsvRows {
     #[cold]
     fn not_a_number(&self, column: usize) -> TraceError {
         let (name, text) = (TraceError::shown(&self.columns[column].0), TraceError::shown(&self.text(column)));
-        self.wrong(format!("column `{name}` contains `{text}`, which is not a number\nhint: leave a lost sample empty"))
+        let is_date = text.contains([':', '/'])
+            || text.len() >= "31.3.24".len() && text.starts_with(|c: char| c.is_ascii_digit());
+        let hint = if column == self.time_at && is_date { TIME_BY_MAP } else { "leave a lost sample empty" };
+        self.wrong(format!("column `{name}` contains `{text}`, which is not a number\nhint: {hint}"))
     }
 
     #[inline]

@@ -264,6 +264,16 @@ fn only_a_last_line_without_an_end_loses_what_may_be_cut() {
 }
 
 #[test]
+fn a_local_time_is_read_by_a_map() {
+    for time in ["31.03.2024 01:59:30.000", "2024-03-31", "1:59:30"] {
+        let text = format!("time_s,x\n{time},1\n");
+        let mut rows = CsvRows::of_log(Path::new("log.csv"), Box::new(io::Cursor::new(text.into_bytes()))).unwrap();
+        let message = rows.advance().unwrap_err().to_string();
+        assert!(message.contains("which is not a number") && message.contains("--map map.toml"), "{message}");
+    }
+}
+
+#[test]
 fn a_broken_file_says_where_it_is_broken() {
     assert_eq!(
         error("back", "time_s,a\n0,1\n0.2,1\n0.1,1\n"),

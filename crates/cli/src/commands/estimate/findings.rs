@@ -181,7 +181,8 @@ impl Findings {
 
     /// What was found, in sentences.
     pub(super) fn sentences(&self) -> Vec<String> {
-        let mut said: Vec<String> = self.ratios.warning().into_iter().collect();
+        let mut said: Vec<String> =
+            self.ratios.contradiction().map(|said| format!("warning: {said}")).into_iter().collect();
         for (health, count) in &self.health {
             // A few are normal while the cylinder fills: there the observers' valve model is faster than the valve maps.
             let few = matches!(health, Health::OutsideRange | Health::LimitedToRange) && 100 * count <= self.rows;

@@ -13,6 +13,8 @@ const OUTPUT_MIN_RAD_S: f64 = 8.0;
 const IN_GEAR: f64 = 0.05;
 /// A car is in gear for most of the time; so little says that its gears are others.
 const IN_GEAR_SHARE: f64 = 0.1;
+/// By the wheels it is in gear for so much of the time where the output speed alone is wrong.
+const MOSTLY: f64 = 0.5;
 /// Wheels differ by so much: tyres, scale and slip are a part of it.
 const WHEEL: f64 = 0.15;
 /// Bins of the ratios for a factor of e: of a hundredth.
@@ -30,6 +32,8 @@ pub(super) struct Ratios {
     moving_s: f64,
     moving: u64,
     in_gear: u64,
+    /// The same with the output speed that the wheels give.
+    in_gear_by_wheel: u64,
     turbine_over_output: RatioHistogram<PER_CENT>,
     output_over_wheel: RatioHistogram<PER_CENT>,
     /// Newest engine speed, rad/s.
@@ -46,6 +50,7 @@ impl Ratios {
             moving_s: 0.0,
             moving: 0,
             in_gear: 0,
+            in_gear_by_wheel: 0,
             turbine_over_output: RatioHistogram::default(),
             output_over_wheel: RatioHistogram::default(),
             engine_rad_s: f64::NAN,
@@ -54,8 +59,8 @@ impl Ratios {
     }
 
     /// What contradicts the channels of the speeds, in a sentence.
-    pub(super) fn warning(&self) -> Option<String> {
-        self.swapped.warning()
+    pub(super) fn contradiction(&self) -> Option<String> {
+        self.swapped.contradiction()
     }
 
     /// Takes the speeds of a row; only where it is looked at, they are judged.
@@ -75,7 +80,9 @@ impl Ratios {
             self.moving_s += input.dt_s.clamp(0.0, 1.0);
             self.swapped.push(self.engine_rad_s, turbine, &self.gears.map(|gear| gear * output));
             let ratio = turbine / output;
-            self.in_gear += u64::from(self.gears.iter().any(|gear| (ratio / gear - 1.0).abs() < IN_GEAR));
+            let fits = |ratio: f64| u64::from(self.gears.iter().any(|gear| (ratio / gear - 1.0).abs() < IN_GEAR));
+            self.in_gear += fits(ratio);
+            self.in_gear_by_wheel += fits(turbine / (wheel * self.final_ratio));
             self.turbine_over_output.push(ratio);
             self.output_over_wheel.push(output / wheel);
         }
@@ -90,16 +97,28 @@ impl Ratios {
             return Ok(());
         }
         #[expect(clippy::cast_precision_loss, reason = "a share")]
-        let share = self.in_gear as f64 / self.moving as f64;
-        if share < IN_GEAR_SHARE {
+        let share = |in_gear: u64| in_gear as f64 / self.moving as f64;
+        if share(self.in_gear) < IN_GEAR_SHARE {
+            // Turbine and wheels fit each other: it is the output that is wrong.
+            let (final_ratio, found) = (self.final_ratio, self.output_over_wheel.middle());
+            if share(self.in_gear_by_wheel) > MOSTLY && check_wheel(found, final_ratio).is_err() {
+                return Err(Failure::Input(format!(
+                    "output_speed over wheel_speed is {found:.2} in the middle, and the final ratio of the vehicle file is {final_ratio:.2}; \
+                     turbine_speed and wheel_speed fit the gears\nhint: output_speed is {:.3} times too large: check its unit and scale",
+                    found / final_ratio
+                )));
+            }
             let [offgoing, oncoming] = self.gears;
-            let swapped = self.warning().map_or(String::new(), |warning| warning + "\n");
+            let hint = self.contradiction().unwrap_or_else(|| {
+                "check unit and scale of turbine_speed and output_speed, and whether the vehicle file is of this car; for a log of more gears, a \
+                 channel map with `gearbox.ratios` tells them apart"
+                    .to_owned()
+            });
             return Err(Failure::Input(format!(
-                "{swapped}turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
-                 {oncoming:.3}: the car is in them for {:.0} % of the time\nhint: check unit and scale of turbine_speed and output_speed, and \
-                 whether the vehicle file is of this car; for a log of more gears, a channel map with `gearbox.ratios` tells them apart",
+                "turbine_speed over output_speed is {:.3} in the middle, and the gears of the vehicle file have {offgoing:.3} and \
+                 {oncoming:.3}: the car is in them for {:.0} % of the time\nhint: {hint}",
                 self.turbine_over_output.middle(),
-                100.0 * share,
+                100.0 * share(self.in_gear),
             )));
         }
         check_wheel(self.output_over_wheel.middle(), self.final_ratio)

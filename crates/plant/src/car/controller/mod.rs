@@ -323,6 +323,9 @@ impl CarShiftController {
                 }
             }
         }
+        if let Some(why) = self.car.why_not_driven() {
+            return Err(CarError::Request(why));
+        }
         let (from_name, to_name) = (self.name(from), self.name(to));
         let hint = [from, to].into_iter().find_map(|gear| self.one_way_hint(gear)).unwrap_or_else(|| {
             "`wetclutch check` of the gearbox file lists its shifts, and the elements that open and close in each"

@@ -163,7 +163,7 @@ pub(super) fn estimate(
 /// Refuses a log whose speeds are not those of the car, or of which no estimate can be used.
 fn check_speeds(drive: &LoggedDrive<'_>, setup: &CarSetup<'_>, path: &Path, say: &mut Messages) -> Result<(), Failure> {
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
-        say.note(&swapped);
+        say.note(&format!("warning: {swapped}"));
     }
     check_ratios(drive.rows_in_gear(), &setup.options.vehicle, path)?;
     check_wheel(drive.output_over_wheel(), setup.car.driveline.final_ratio)?;
