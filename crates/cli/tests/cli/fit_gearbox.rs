@@ -89,6 +89,22 @@ fn a_drive_of_a_car_with_a_gearbox_gives_a_file_that_estimate_takes() {
 }
 
 #[test]
+fn commands_in_each_others_place_are_not_fitted() {
+    let (folder, log) = town();
+    let text = std::fs::read_to_string(&log).unwrap();
+    let (names, rows) = text.split_once('\n').unwrap();
+    let names = names
+        .replace("element_c_", "element_x_")
+        .replace("element_e_", "element_c_")
+        .replace("element_x_", "element_e_");
+    let exchanged = folder.write("exchanged.csv", format!("{names}\n{rows}"));
+    let output = wetclutch(&["fit", &exchanged, "--vehicle", CAR, "-o", &folder.path("fitted.toml")]);
+    let notes = said(&output);
+    assert!(notes.contains("the fitted values are not written: the turbine does not turn as any car"), "{notes}");
+    assert!(notes.contains("the commands of two elements may be exchanged"), "{notes}");
+}
+
+#[test]
 fn logs_that_cannot_be_fitted_are_refused_with_a_reason() {
     let (folder, log) = town();
     let text = std::fs::read_to_string(&log).unwrap();

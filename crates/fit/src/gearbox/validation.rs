@@ -1,5 +1,7 @@
 //! Shifts that were not fitted, with the given and with the fitted vehicle file.
 
+use std::cmp::Ordering;
+
 use config::Car;
 use design::ShiftTables;
 
@@ -41,9 +43,21 @@ impl HeldOut {
     }
 }
 
+/// Scale of the one-step errors of the turbine speed, rad/s, above which the model is that of another car or log \[chosen\]: between two rows of a
+/// shift the turbine itself changes by as much.
+const MOST_ONE_STEP_RAD_S: f64 = 4.0;
+
 impl GearboxFit {
     /// Why the fitted file is not to be used in place of the given one, if so.
     pub fn reason_against(&self, checked: Option<&HeldOut>) -> Option<String> {
+        let [one_step, _] = self.scale_and_gain;
+        // An error that is not a number counts against the fit.
+        if !matches!(one_step.partial_cmp(&MOST_ONE_STEP_RAD_S), Some(Ordering::Less | Ordering::Equal)) {
+            return Some(format!(
+                "the turbine does not turn as any car within the error bounds would, with a one-step error of {one_step:.1} rad/s: the commands of two \
+                 elements may be exchanged, or be other signals (`wetclutch estimate` names those that contradict the gear), or the gearbox is another"
+            ));
+        }
         let checked = checked.map(|checked| (checked.shifts, checked.turbine_rad_s));
         reason_to_keep(&self.at_limit, checked, "the error of the turbine speed")
     }

@@ -147,9 +147,9 @@ pub(in super::super) fn car_defaults_taken(
     Ok(taken.filter_map(|leaf| taken_of(&leaf, &defaults.text)).collect())
 }
 
-/// A gearbox file that is made for the engine of the defaults, with clutches, springs and torques for an engine of another torque.
+/// A gearbox file that is made for the engine of the defaults, with clutches, springs, inertias and torques for an engine of another torque.
 ///
-/// A pack that is larger in all directions has a radius by the third root of its torque and an area by the square of that root; its
+/// Inertias of the shafts grow with the torque, as that of the engine does: so a shift takes as long. A pack that is larger in all directions has a radius by the third root of its torque and an area by the square of that root; its
 /// plates touch at the same pressure.
 ///
 /// # Errors
@@ -159,6 +159,7 @@ pub fn sized_gearbox(gearbox: &Source, engine_torque_n_m: f64) -> Result<String,
     let length = torque.cbrt();
     let text = scaled(gearbox, |key| match key.rsplit_once('.') {
         Some((table, "turbine_max_n_m")) if table.starts_with("gear.") => Some(torque),
+        Some((table, "inertia_kg_m2")) if table.starts_with("shaft.") => Some(torque),
         Some((table, field)) if table.starts_with("element.") && table.ends_with(".pack") => match field {
             "mean_radius_m" => Some(length),
             "piston_area_m2" | "return_spring_n" => Some(length * length),
@@ -167,8 +168,8 @@ pub fn sized_gearbox(gearbox: &Source, engine_torque_n_m: f64) -> Result<String,
         _ => None,
     })?;
     Ok(format!(
-        "# `turbine_max_n_m` and the torques that clutches hold are scaled by {} from those for {} N m, to an engine of {} N m:\n\
-         # radii by the third root of it, piston areas and return springs by its square.\n#\n{text}",
+        "# `turbine_max_n_m`, the torques that clutches hold and the inertias of the shafts are scaled by {} from those for {} N m, to an engine\n\
+         # of {} N m: radii by the third root of it, piston areas and return springs by its square.\n#\n{text}",
         toml_number(torque),
         exact(ENGINE_TORQUE_N_M),
         exact(engine_torque_n_m)

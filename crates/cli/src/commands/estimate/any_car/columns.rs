@@ -209,11 +209,14 @@ pub(super) fn columns(places: &[(usize, &str)], knows: Knows) -> Vec<Column> {
 fn torques(knows: Knows) -> Vec<Column> {
     let mut columns = vec![number("turbine_torque_estimate_n_m", Value::Of(|row| of(row.estimate.turbine_n_m)))];
     if !knows.elements {
-        let clutches: [(&str, for<'a> fn(&Row<'a>) -> Cell<'a>); 2] = [
-            ("clutches_at_turbine_estimate_n_m", |row| of(row.estimate.at_turbine.map(|sum| sum.torque_n_m + 0.0))),
-            ("clutches_at_turbine_deviation_n_m", |row| of(row.estimate.at_turbine.map(|sum| sum.deviation_n_m))),
-        ];
-        columns.extend(clutches.map(|(name, value)| number(name, Value::Of(value))));
+        columns.push(number(
+            "clutches_at_turbine_estimate_n_m",
+            Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.torque_n_m + 0.0))),
+        ));
+        columns.push(number(
+            "clutches_at_turbine_deviation_n_m",
+            Value::Of(|row| of(row.estimate.at_turbine.map(|sum| sum.deviation_n_m))),
+        ));
     }
     columns.push(number(trace::signal::SHAFT_ESTIMATE, Value::Of(|row| of(row.estimate.shaft_n_m))));
     let clutch = if knows.converter { "lock_up" } else { "launch_clutch" };
