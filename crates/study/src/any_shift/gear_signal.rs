@@ -1,10 +1,13 @@
 //! The gears that a log names.
 
+use observer::any_shift::GearCommand;
+use plant::car::NO_GEAR;
+
 /// Values that a message names.
 const NAMED: usize = 5;
 
 /// Samples of a gear signal, and those of a gear that the gearbox does not have: after such a one the gear before stands.
-pub(super) struct GearSignal {
+struct GearSignal {
     /// Its name.
     name: &'static str,
     samples: u64,
@@ -14,12 +17,12 @@ pub(super) struct GearSignal {
 }
 
 impl GearSignal {
-    pub(super) fn new(name: &'static str) -> Self {
+    fn new(name: &'static str) -> Self {
         Self { name, samples: 0, unknown: 0, values: Vec::new() }
     }
 
     /// Takes a sample: the gear if the gearbox has it, and the value as the log has it.
-    pub(super) fn take(&mut self, found: Option<usize>, value: impl FnOnce() -> String) -> Option<usize> {
+    fn take(&mut self, found: Option<usize>, value: impl FnOnce() -> String) -> Option<usize> {
         self.samples += 1;
         if found.is_none() {
             self.unknown += 1;
@@ -37,7 +40,7 @@ impl GearSignal {
     ///
     /// # Errors
     /// Most samples are unknown; holds what to say of it, with `gears` as a hint.
-    pub(super) fn note(&self, gears: &str) -> Result<Option<String>, String> {
+    fn note(&self, gears: &str) -> Result<Option<String>, String> {
         let Self { name, samples, unknown, values } = self;
         if *unknown == 0 {
             return Ok(None);
@@ -53,6 +56,45 @@ impl GearSignal {
             "{met}: the gear before stands\nhint: if these values stand for no gear, leave them out with `valid_range` of `channel.{name}` in a \
              channel map"
         )))
+    }
+}
+
+/// What a log says of gear and target gear, up to a row.
+pub(super) struct Gears {
+    /// Of `gear` and `target_gear`.
+    signals: [GearSignal; 2],
+    /// The newest gear and target gear that the gearbox has.
+    newest: [Option<usize>; 2],
+}
+
+impl Gears {
+    pub(super) fn new(names: [&'static str; 2]) -> Self {
+        Self { signals: names.map(GearSignal::new), newest: [None; 2] }
+    }
+
+    /// Takes a sample of `gear` (0) or `target_gear` (1): the gear if the gearbox has it, and the value as the log has it.
+    pub(super) fn take(&mut self, which: usize, found: Option<usize>, value: impl FnOnce() -> String) {
+        self.newest[which] = self.signals[which].take(found, value).or(self.newest[which]);
+    }
+
+    /// Whether `gear` has had no sample.
+    pub(super) fn is_without_gear(&self) -> bool {
+        self.signals[0].samples == 0
+    }
+
+    /// Gear and target gear by the newest samples. Before the first gear there is none, before the first target gear it is the gear.
+    pub(super) fn command(&self) -> GearCommand {
+        let [gear, target] = self.newest;
+        gear.map_or(GearCommand { from: NO_GEAR, to: NO_GEAR }, |from| GearCommand { from, to: target.unwrap_or(from) })
+    }
+
+    /// What was met in both signals, in sentences.
+    ///
+    /// # Errors
+    /// Most samples of one are unknown; holds what to say of it, with `gears` as a hint.
+    pub(super) fn notes(&self, gears: &str) -> Result<Vec<String>, String> {
+        let notes = self.signals.iter().map(|signal| signal.note(gears));
+        Ok(notes.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
     }
 }
 
