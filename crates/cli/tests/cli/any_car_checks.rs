@@ -452,3 +452,35 @@ fn a_number_that_stands_for_no_value_is_no_wrong_unit() {
     let refused = health.iter().filter(|health| *health == "reading_refused").count();
     assert!((row / 50..row / 20).contains(&refused), "{refused} of {row}");
 }
+
+#[test]
+fn a_late_gear_makes_no_shifts_that_were_not_driven() {
+    let folder = Folder::new("late-gear");
+    let drive = folder.write(
+        "drive.toml",
+        "name = \"late\"\n[[segment]]\nduration_s = 20\nthrottle = 0.3\n[[segment]]\nduration_s = 6\nthrottle = 0\nbrake = 0.3\n",
+    );
+    let car = format!("{ROOT}vehicles/eight_speed.toml");
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+    let text = folder.read("sim/late_measured.csv");
+    let map = folder.path("map.toml");
+    std::fs::write(&map, wetclutch(&["inspect", &folder.path("sim/late_measured.csv"), "--suggest"]).stdout).unwrap();
+    // Two rows late, of 10 ms.
+    let mut before = ["1".to_owned(), "1".to_owned()];
+    let late = with_column(&text, "gear", |gear| {
+        before.rotate_left(1);
+        std::mem::replace(&mut before[1], gear.to_owned())
+    });
+    let shifts = |log: &str, more: &[&str], is_late: bool| {
+        let (log, out) = (folder.write("log.csv", log), folder.path("out.csv"));
+        let said = said(&wetclutch(&[&["estimate", &log, "--vehicle", &car, "-o", &out], more].concat()));
+        assert_eq!(said.contains("warning: gear is late (so often: 1): target_gear went on"), is_late, "{said}");
+        let shifts = folder.read("out_shifts.csv");
+        ["from_gear", "to_gear"].map(|name| column(&shifts, name))
+    };
+    let driven = shifts(&text, &[], false);
+    assert_eq!(driven[0][5..], ["6", "8", "7", "6"]);
+    assert_eq!(driven[1][5..], ["8", "7", "6", "4"]);
+    assert_eq!(shifts(&late, &[], true), driven);
+    assert_eq!(shifts(&late, &["--map", &map], true), driven);
+}

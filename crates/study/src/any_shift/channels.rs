@@ -138,7 +138,7 @@ impl<'a> CarChannels<'a> {
             engine_n_m: engine_n_m.filter(|_| self.car.converter.is_none() || self.lock_up_applied),
             lock_up_applied: self.lock_up_applied,
             commands,
-            gear: self.gears.command(),
+            gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
         let oncoming = [self.truth[0], self.truth[1], f64::NAN];
         Ok(Some(LogStep {

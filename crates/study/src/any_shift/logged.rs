@@ -241,7 +241,7 @@ impl<'c> CarLog<'c> {
             engine_n_m: reported_n_m.filter(|_| self.car.converter.is_none() || lock_up_applied),
             lock_up_applied,
             commands,
-            gear: self.gears.command(),
+            gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
         let pedals = columns.pedals.map(number);
         let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
