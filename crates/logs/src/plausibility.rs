@@ -95,6 +95,23 @@ impl Extremes {
         let limit = nearly_all.map_or(f64::INFINITY, |(size, _)| f64::from(size - 31).exp2());
         self.greatest.abs().max(self.least.abs()).min(limit)
     }
+
+    /// The greatest size of a speed. A shaft passes every speed between two others: a tenth of the values or less that is parted from all
+    /// others by a factor of two and more are readings that are wrong, as of a sensor that says by a number that it has no value.
+    fn speed(&self) -> f64 {
+        let all: u64 = self.sizes.iter().map(|count| u64::from(*count)).sum();
+        let (mut above, mut limit) = (0, f64::INFINITY);
+        for (size, count) in (0_i32..64).zip(&self.sizes).rev() {
+            if *count == 0 && above > 0 {
+                limit = f64::from(size - 32).exp2();
+            }
+            above += u64::from(*count);
+            if 10 * above > all {
+                break;
+            }
+        }
+        self.size().min(limit)
+    }
 }
 
 /// A unit that cannot be right.
@@ -155,7 +172,7 @@ pub fn too_fast_a_time(step_s: f64, span_s: f64) -> Option<String> {
 /// What cannot be right.
 pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
     let turning =
-        |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.size() > 1.0);
+        |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.speed() > 1.0);
     let mut findings: Vec<Finding> = summary.iter().filter_map(|entry| alone(entry, seen)).collect();
     if !findings.is_empty() {
         return findings;
@@ -171,7 +188,7 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
     ];
     for (of, role, unit, least, most, likely) in pairs {
         let (Some(of), Some(entry)) = (turning(of), turning(role)) else { continue };
-        let ratio = entry.extremes.size() / of.extremes.size();
+        let ratio = entry.extremes.speed() / of.extremes.speed();
         let is_small = most < 1.0;
         if entry.unit_name == unit && (least..most).contains(&ratio) && !(is_small && seen == Seen::Beginning) {
             let reference = of.name.as_str();
@@ -232,7 +249,9 @@ fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
         Quantity::Current if unit == "A" && size > 10.0 => {
             say(format!("its greatest value would be {size:.0} A"), "mA")
         }
-        Quantity::Rotation if size > 2000.0 || entry.role == Role::EngineSpeed && middle > ENGINE_RAD_S => {
+        Quantity::Rotation
+            if entry.extremes.speed() > 2000.0 || entry.role == Role::EngineSpeed && middle > ENGINE_RAD_S =>
+        {
             say(format!("most values would be about {:.0} rpm", rpm(middle)), slower(unit, middle))
         }
         Quantity::Share if unit == "1" && size > 1.5 && !is_duty(entry.role) => {
@@ -358,6 +377,14 @@ mod tests {
             summary(Role::OncomingCurrent, "A", &currents),
         ];
         assert_eq!(findings(&right, Seen::All), []);
+        // A sensor that says by 65535 that it has no value, in one of fifty readings; in one of five nothing is known of the unit.
+        for (every, are_right) in [(50, true), (5, false)] {
+            let speeds: Vec<f64> =
+                (0..1000_u32).map(|i| if i % every == 0 { 65535.0 } else { 80.0 + 0.4 * f64::from(i) }).collect();
+            for (role, unit) in [Role::EngineSpeed, Role::TurbineSpeed, Role::WheelSpeed].map(|role| (role, "rad/s")) {
+                assert_eq!(findings(&[summary(role, unit, &speeds)], Seen::All).is_empty(), are_right, "{role:?}");
+            }
+        }
         // One reading does not turn a sign, be the other ones large or small.
         for most in [20.0, 600.0] {
             let mut speeds: Vec<f64> = (0..400).map(|i| most * f64::from(i) / 400.0).collect();

@@ -27,7 +27,7 @@ fn a_log_that_does_not_fit_the_car_is_refused_and_nothing_is_written() {
             first.replacen(",1,1,", ",9,1,", 1),
             "log.csv: 1 of 1 samples of gear are no gear of this gearbox (9) and are not used\nhint: its gears are",
         ),
-        (first.replacen(",1,1,", ",,1,", 1), "log.csv:2: the gear is missing"),
+        (first.replacen(",1,1,", ",,1,", 1), "log.csv: the gear is missing in all rows\nhint: its gears are"),
         (String::new(), "the file is empty"),
     ];
     for (log, words) in cases {
@@ -403,4 +403,84 @@ fn times_of_a_clock_since_1970_are_shown_from_the_first_one_on() {
     assert!(begins_s("two_shifts.csv", "time_s")[0] > 1_700_000_000.0);
     let page = folder.read("two_report.html");
     assert!(page.contains("times from 1700000000 s") && !page.contains(">17000000"));
+}
+
+#[test]
+fn an_empty_gear_is_the_one_before() {
+    let folder = simulated("empty-gears");
+    let text = folder.read("sim/short_measured.csv");
+    let shifts = |log: String| {
+        folder.write("log.csv", log);
+        let said = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        assert!(!said.contains("warning"), "{said}");
+        folder.read("out_shifts.csv")
+    };
+    let every = |name: &str, full: fn(usize) -> bool| {
+        let mut row = 0;
+        with_column(&text, name, |cell| {
+            row += 1;
+            if full(row - 1) { cell.to_owned() } else { String::new() }
+        })
+    };
+    let whole = shifts(text.clone());
+    for signal in ["gear", "target_gear"] {
+        // A slow channel has its first value late; before the first gear there is none, before the first target gear it is the gear.
+        let slow = shifts(every(signal, |row| row % 2 == 1));
+        assert_eq!(whole.lines().count(), slow.lines().count(), "{signal}: {slow}");
+        for name in ["from_gear", "to_gear"] {
+            assert_eq!(column(&whole, name), column(&slow, name), "{signal}");
+        }
+        assert!(column(&slow, "complete_s").iter().all(|time_s| !time_s.is_empty()), "{signal}: {slow}");
+    }
+    folder.write("log.csv", every("gear", |_| false));
+    let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(error.contains("the gear is missing in all rows\nhint: its gears are"), "{error}");
+}
+
+#[test]
+fn a_number_that_stands_for_no_value_is_no_wrong_unit() {
+    let folder = simulated("no-value");
+    let text = folder.read("sim/short_measured.csv");
+    let mut row = 0;
+    let log = with_column(&text, "engine_speed_rad_s", |cell| {
+        row += 1;
+        if row % 50 == 7 { "65535".to_owned() } else { cell.to_owned() }
+    });
+    folder.write("log.csv", log);
+    said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    let health = column(&folder.read("out.csv"), "health");
+    let refused = health.iter().filter(|health| *health == "reading_refused").count();
+    assert!((row / 50..row / 20).contains(&refused), "{refused} of {row}");
+}
+
+#[test]
+fn a_late_gear_makes_no_shifts_that_were_not_driven() {
+    let folder = Folder::new("late-gear");
+    let drive = folder.write(
+        "drive.toml",
+        "name = \"late\"\n[[segment]]\nduration_s = 20\nthrottle = 0.3\n[[segment]]\nduration_s = 6\nthrottle = 0\nbrake = 0.3\n",
+    );
+    let car = format!("{ROOT}vehicles/eight_speed.toml");
+    said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &folder.path("sim")]));
+    let text = folder.read("sim/late_measured.csv");
+    let map = folder.path("map.toml");
+    std::fs::write(&map, wetclutch(&["inspect", &folder.path("sim/late_measured.csv"), "--suggest"]).stdout).unwrap();
+    // Two rows late, of 10 ms.
+    let mut before = ["1".to_owned(), "1".to_owned()];
+    let late = with_column(&text, "gear", |gear| {
+        before.rotate_left(1);
+        std::mem::replace(&mut before[1], gear.to_owned())
+    });
+    let shifts = |log: &str, more: &[&str], is_late: bool| {
+        let (log, out) = (folder.write("log.csv", log), folder.path("out.csv"));
+        let said = said(&wetclutch(&[&["estimate", &log, "--vehicle", &car, "-o", &out], more].concat()));
+        assert_eq!(said.contains("warning: gear is late (so often: 1): target_gear went on"), is_late, "{said}");
+        let shifts = folder.read("out_shifts.csv");
+        ["from_gear", "to_gear"].map(|name| column(&shifts, name))
+    };
+    let driven = shifts(&text, &[], false);
+    assert_eq!(driven[0][5..], ["6", "8", "7", "6"]);
+    assert_eq!(driven[1][5..], ["8", "7", "6", "4"]);
+    assert_eq!(shifts(&late, &[], true), driven);
+    assert_eq!(shifts(&late, &["--map", &map], true), driven);
 }

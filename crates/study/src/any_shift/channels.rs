@@ -8,10 +8,10 @@ use design::ShiftTables;
 use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
-use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
-use super::gear_signal::GearSignal;
+use super::gear_signal::Gears;
 use super::logged::{LogStep, element_column, element_commands};
 
 /// The newest reading of each entry of a map since the step before.
@@ -48,8 +48,7 @@ pub struct CarChannels<'a> {
     steps: Steps<'a, Newest>,
     /// Role of each entry, and the place in the filter's tables where it is the command of an element.
     entries: Vec<(Role, Option<usize>)>,
-    gears: [usize; 2],
-    signals: [GearSignal; 2],
+    gears: Gears,
     lock_up_applied: bool,
     pedal: f64,
     vehicle_m_s: Option<f64>,
@@ -67,10 +66,9 @@ impl<'a> CarChannels<'a> {
         require(map, car, tables)?;
         let readings = Readings::new(log, map)?;
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
-        let (gears, truth) = ([NO_GEAR; 2], [f64::NAN; 2]);
-        let signals = [Role::Gear, Role::TargetGear].map(|role| GearSignal::new(role.name()));
+        let (gears, truth) = (Gears::new([Role::Gear, Role::TargetGear].map(Role::name)), [f64::NAN; 2]);
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
-        Ok(Self { car, steps, entries, gears, signals, lock_up_applied, pedal, vehicle_m_s, oil_degc, truth })
+        Ok(Self { car, steps, entries, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc, truth })
     }
 
     /// The readings, with their summary and notes.
@@ -87,8 +85,7 @@ impl<'a> CarChannels<'a> {
             "gears are numbers from 1 to {}, 0 for none, and negative for reverse; use `scale` and `offset` of the channel map",
             self.car.gearbox.forward_gears().len()
         );
-        let notes = self.signals.iter().map(|signal| signal.note(&hint).map_err(LogError::map));
-        Ok(notes.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+        self.gears.notes(&hint).map_err(LogError::map)
     }
 
     /// The next step; `None` at the end.
@@ -125,11 +122,10 @@ impl<'a> CarChannels<'a> {
                 }
             }
         }
-        for ((gear, signal), number) in self.gears.iter_mut().zip(&mut self.signals).zip(changed_gear) {
+        for (which, number) in changed_gear.into_iter().enumerate() {
             let Some(number) = number else { continue };
-            *gear = signal.take(gear_of(self.car, number), || format!("{number}")).unwrap_or(*gear);
+            self.gears.take(which, gear_of(self.car, number), || format!("{number}"));
         }
-        let [from, to] = self.gears;
         let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, engine_n_m] = of_role;
         let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
         let input = ShiftInput {
@@ -142,7 +138,7 @@ impl<'a> CarChannels<'a> {
             engine_n_m: engine_n_m.filter(|_| self.car.converter.is_none() || self.lock_up_applied),
             lock_up_applied: self.lock_up_applied,
             commands,
-            gear: GearCommand { from, to },
+            gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
         let oncoming = [self.truth[0], self.truth[1], f64::NAN];
         Ok(Some(LogStep {

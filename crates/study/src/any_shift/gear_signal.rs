@@ -1,10 +1,20 @@
 //! The gears that a log names.
 
+use config::Car;
+use observer::Reading;
+use observer::any_shift::GearCommand;
+use plant::car::NO_GEAR;
+
 /// Values that a message names.
 const NAMED: usize = 5;
 
+/// A shift is done by the readings if the turbine has at most this share of the way to the new gear before it, with the output at least
+/// so fast, rad/s \[chosen\]: a late `gear` leaves the turbine at the new gear, a change of mind comes before it is there.
+const LEFT_OF_WAY: f64 = 0.05;
+const OUTPUT_RAD_S: f64 = 20.0;
+
 /// Samples of a gear signal, and those of a gear that the gearbox does not have: after such a one the gear before stands.
-pub(super) struct GearSignal {
+struct GearSignal {
     /// Its name.
     name: &'static str,
     samples: u64,
@@ -14,12 +24,12 @@ pub(super) struct GearSignal {
 }
 
 impl GearSignal {
-    pub(super) fn new(name: &'static str) -> Self {
+    fn new(name: &'static str) -> Self {
         Self { name, samples: 0, unknown: 0, values: Vec::new() }
     }
 
     /// Takes a sample: the gear if the gearbox has it, and the value as the log has it.
-    pub(super) fn take(&mut self, found: Option<usize>, value: impl FnOnce() -> String) -> Option<usize> {
+    fn take(&mut self, found: Option<usize>, value: impl FnOnce() -> String) -> Option<usize> {
         self.samples += 1;
         if found.is_none() {
             self.unknown += 1;
@@ -37,7 +47,7 @@ impl GearSignal {
     ///
     /// # Errors
     /// Most samples are unknown; holds what to say of it, with `gears` as a hint.
-    pub(super) fn note(&self, gears: &str) -> Result<Option<String>, String> {
+    fn note(&self, gears: &str) -> Result<Option<String>, String> {
         let Self { name, samples, unknown, values } = self;
         if *unknown == 0 {
             return Ok(None);
@@ -56,9 +66,134 @@ impl GearSignal {
     }
 }
 
+/// What a log says of gear and target gear, up to a row.
+pub(super) struct Gears {
+    /// Of `gear` and `target_gear`.
+    signals: [GearSignal; 2],
+    /// The newest gear and target gear that the gearbox has.
+    newest: [Option<usize>; 2],
+    /// The newest speeds of turbine and output, rad/s.
+    speeds_rad_s: [f64; 2],
+    /// Of the row before: `gear`, and what the filter was shown.
+    before: Option<(usize, GearCommand)>,
+    /// The gear that is left while `gear` is still the one before it, and how often this was so.
+    left: Option<usize>,
+    late: u64,
+}
+
+impl Gears {
+    pub(super) fn new(names: [&'static str; 2]) -> Self {
+        Self {
+            signals: names.map(GearSignal::new),
+            newest: [None; 2],
+            speeds_rad_s: [f64::NAN; 2],
+            before: None,
+            left: None,
+            late: 0,
+        }
+    }
+
+    /// Takes a sample of `gear` (0) or `target_gear` (1): the gear if the gearbox has it, and the value as the log has it.
+    pub(super) fn take(&mut self, which: usize, found: Option<usize>, value: impl FnOnce() -> String) {
+        self.newest[which] = self.signals[which].take(found, value).or(self.newest[which]);
+    }
+
+    /// Whether `gear` has had no sample.
+    pub(super) fn is_without_gear(&self) -> bool {
+        self.signals[0].samples == 0
+    }
+
+    /// Gear and target gear after the samples of a row with these speeds of turbine and output. Before the first gear there is none, before
+    /// the first target gear it is the gear. Where the target goes on to a third gear before `gear` has changed, and the speeds are those of
+    /// the first target, `gear` is late: the first target is the gear that is left.
+    pub(super) fn row(&mut self, car: &Car, speeds: [Option<Reading<f64>>; 2]) -> GearCommand {
+        for (newest, reading) in self.speeds_rad_s.iter_mut().zip(speeds) {
+            *newest = reading.map_or(*newest, |reading| reading.value);
+        }
+        let Some(gear) = self.newest[0] else { return GearCommand { from: NO_GEAR, to: NO_GEAR } };
+        let to = self.newest[1].unwrap_or(gear);
+        let before = self.before.filter(|(before, _)| *before == gear && to != gear).map(|(_, shown)| shown);
+        if before.is_none() {
+            self.left = None;
+        }
+        if let Some(GearCommand { from, to: first }) = before
+            && from != first
+            && ![from, first].contains(&to)
+            && self.is_done(car, [from, first])
+        {
+            self.left = Some(first);
+            self.late += 1;
+        }
+        let shown = GearCommand { from: self.left.unwrap_or(gear), to };
+        self.before = Some((gear, shown));
+        shown
+    }
+
+    /// Whether a shift between these gears is done by the speeds.
+    fn is_done(&self, car: &Car, gears: [usize; 2]) -> bool {
+        let [turbine, output] = self.speeds_rad_s;
+        let [from, to] = gears.map(|gear| car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio * output));
+        output > OUTPUT_RAD_S && (turbine - to).abs() < LEFT_OF_WAY * (to - from).abs()
+    }
+
+    /// What was met in both signals, in sentences.
+    ///
+    /// # Errors
+    /// Most samples of one are unknown; holds what to say of it, with `gears` as a hint.
+    pub(super) fn notes(&self, gears: &str) -> Result<Vec<String>, String> {
+        let notes = self.signals.iter().map(|signal| signal.note(gears));
+        let mut notes: Vec<String> = notes.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+        if self.late > 0 {
+            notes.push(format!(
+                "gear is late (so often: {}): target_gear went on to another gear while gear was still the one before, and turbine and output speed \
+                 fitted the first target: the shift to it counts as completed there\nhint: use a gear that changes when a shift is done, as the \
+                 controller of the gearbox has it",
+                self.late
+            ));
+        }
+        Ok(notes)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_third_gear_is_a_late_gear_or_a_change_of_mind_by_the_speeds() {
+        let car =
+            Car::read(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../vehicles/eight_speed.toml")))
+                .unwrap();
+        let gear = |name: &str| car.gearbox.gear(name).unwrap();
+        let ratio = |name: &str| car.gearbox.gears[gear(name)].ratio;
+        // Names of gear and target gear in rows with this turbine speed at the end of the first shift, the output at 100 rad/s.
+        let shown = |rows: &[[&str; 2]], ratio: f64| {
+            let mut gears = Gears::new(["gear", "target_gear"]);
+            let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
+            let mut row = |names: &[&str; 2]| {
+                names.iter().enumerate().for_each(|(which, name)| gears.take(which, Some(gear(name)), String::new));
+                let GearCommand { from, to } = gears.row(&car, [reading(100.0 * ratio), reading(100.0)]);
+                [from, to].map(|gear| car.gearbox.gears[gear].name.as_str())
+            };
+            let shown: Vec<[&str; 2]> = rows.iter().map(&mut row).collect();
+            (shown, gears.late, gears.notes("").unwrap().len())
+        };
+        let late = [["8", "8"], ["8", "6"], ["8", "5"], ["8", "5"], ["6", "5"], ["5", "5"]];
+        let right = [["8", "8"], ["8", "6"], ["6", "5"], ["6", "5"], ["6", "5"], ["5", "5"]];
+        assert_eq!(shown(&late, ratio("6")), (right.to_vec(), 1, 1));
+        // The turbine is at the gear that is left, or on its way.
+        for share in [0.0, 0.5, 0.9, 1.2] {
+            let on_its_way = ratio("8") + share * (ratio("6") - ratio("8"));
+            assert_eq!(shown(&late, on_its_way), (late.to_vec(), 0, 0), "{share}");
+        }
+        // `gear` never says 6, and three shifts follow each other. Back to the gear that is left is always a change of mind.
+        let never = [["8", "6"], ["8", "5"], ["5", "5"]];
+        assert_eq!(shown(&never, ratio("6")).0, [["8", "6"], ["6", "5"], ["5", "5"]]);
+        let more = [["8", "6"], ["8", "5"], ["8", "4"], ["6", "4"]];
+        assert_eq!(shown(&more, ratio("6")).0, [["8", "6"], ["6", "5"], ["6", "4"], ["6", "4"]]);
+        let back = [["8", "6"], ["8", "8"], ["8", "5"]];
+        assert_eq!(shown(&back, ratio("6")).0, back);
+    }
 
     #[test]
     fn unknown_gears_are_counted_with_their_first_values() {

@@ -18,7 +18,7 @@ use trace::{CsvRows, TraceError, signal};
 use super::contradictions::CommandCheck;
 use super::converter_check::ConverterCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
-use super::gear_signal::GearSignal;
+use super::gear_signal::Gears;
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
@@ -171,9 +171,7 @@ pub struct CarLog<'c> {
     clock: RowClock,
     frozen: FrozenRows,
     samples: RowSamples,
-    /// Gear and target gear of the row before.
-    gears: [Option<usize>; 2],
-    signals: [GearSignal; 2],
+    gears: Gears,
 }
 
 impl<'c> CarLog<'c> {
@@ -185,21 +183,22 @@ impl<'c> CarLog<'c> {
         let rows = rows.with_wheel_radius(car.road.wheel_radius_m)?;
         let columns = Columns::of(&rows, car, tables)?;
         let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
-        let signals = [signal::GEAR, signal::TARGET_GEAR].map(GearSignal::new);
-        Ok(Self { car, columns, rows, clock, frozen, samples, gears: [None; 2], signals })
+        let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);
+        Ok(Self { car, columns, rows, clock, frozen, samples, gears })
     }
 
     /// What was met in the time stamps, the samples, the gears and of frozen speeds, in sentences.
     ///
     /// # Errors
-    /// Most rows, or most samples of a column, could not be used.
+    /// Most rows, or most samples of a column, could not be used, or no row has a gear.
     pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
         let mut notes = self.clock.notes(&self.rows)?;
         notes.extend(self.samples.notes(&self.rows)?);
         let gears = format!("its gears are {}", self.gear_names());
-        for signal in &self.signals {
-            notes.extend(signal.note(&gears).map_err(|message| self.rows.refused(message))?);
+        if self.gears.is_without_gear() {
+            return Err(self.rows.refused(format!("the gear is missing in all rows\nhint: {gears}")));
         }
+        notes.extend(self.gears.notes(&gears).map_err(|message| self.rows.refused(message))?);
         notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
         Ok(notes)
     }
@@ -212,12 +211,10 @@ impl<'c> CarLog<'c> {
     /// The next row; `None` at the end.
     ///
     /// # Errors
-    /// The file cannot be read, a time is no number, or the first row has no gear.
+    /// The file cannot be read, or a time is no number.
     pub fn next_step(&mut self) -> Result<Option<LogStep>, TraceError> {
         let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
-        let gear = self.gear_at(0, None)?;
-        let to = self.gear_at(1, Some(gear))?;
-        self.gears = [Some(gear), Some(to)];
+        self.take_gears();
         let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
         let mut commands = [None; MAX_ELEMENTS];
         for &(place, column) in &columns.commands {
@@ -245,7 +242,7 @@ impl<'c> CarLog<'c> {
             engine_n_m: reported_n_m.filter(|_| self.car.converter.is_none() || lock_up_applied),
             lock_up_applied,
             commands,
-            gear: GearCommand { from: gear, to },
+            gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
         let pedals = columns.pedals.map(number);
         let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
@@ -254,25 +251,21 @@ impl<'c> CarLog<'c> {
         Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, truth }))
     }
 
-    /// The gear of a cell of `gear` (0) or `target_gear` (1). An empty one is `otherwise` or the gear before, one that the gearbox does not have the
-    /// one before.
-    fn gear_at(&mut self, which: usize, otherwise: Option<usize>) -> Result<usize, TraceError> {
-        let text = self.rows.text([self.columns.gear, self.columns.target][which]);
-        let before = self.gears[which];
-        if text.is_empty() {
-            return otherwise.or(before).ok_or_else(|| {
-                let hint = format!("its gears are {}", self.gear_names());
-                self.rows.wrong(format!("the gear is missing, and no row before has one\nhint: {hint}"))
-            });
+    /// Takes the cells of `gear` and `target_gear`; an empty one says nothing new.
+    fn take_gears(&mut self) {
+        for (which, column) in [self.columns.gear, self.columns.target].into_iter().enumerate() {
+            let text = self.rows.text(column);
+            if text.is_empty() {
+                continue;
+            }
+            let gears = &self.car.gearbox.gears;
+            // A logger may write the gear as a number with decimals.
+            let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
+            let named = |name: &str| gears.iter().position(|gear| gear.name == name);
+            let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(NO_GEAR);
+            let found = named(&text).or(neutral).or_else(|| named(&whole?));
+            self.gears.take(which, found, || text.escape_debug().to_string());
         }
-        let gears = &self.car.gearbox.gears;
-        // A logger may write the gear as a number with decimals.
-        let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
-        let named = |name: &str| gears.iter().position(|gear| gear.name == name);
-        let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(NO_GEAR);
-        let found = named(&text).or(neutral).or_else(|| named(&whole?));
-        let found = self.signals[which].take(found, || text.escape_debug().to_string());
-        Ok(found.or(before).or(otherwise).unwrap_or(NO_GEAR))
     }
 
     fn gear_names(&self) -> String {
