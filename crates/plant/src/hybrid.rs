@@ -1,5 +1,8 @@
 //! The hybrid integrator: smooth steps within a mode, events between modes.
 
+use drivetrain::Engagement;
+
+use crate::mode::CLUTCHES;
 use crate::powertrain::Acting;
 use crate::rosenbrock::{self, LONGEST_STEP_S, SHORTEST_STEP_S, StepSize, Tolerance, Trial};
 use crate::state::{STATES, STATES_WITH_STROKE, State};
@@ -136,21 +139,19 @@ impl HybridIntegrator {
             shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s),
             shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s),
         ];
-        let [offgoing, oncoming] = slips.map(|slip| Contact::Slipping(Direction::of(slip)));
+        let directions = slips.map(Direction::of);
         let mut start = Self {
             time_s,
             state,
-            mode: Mode { offgoing, oncoming },
+            mode: Mode::of(directions.map(Contact::Slipping)),
             step_size: StepSize::FIRST,
             relative_tolerance: relative,
             known: None,
         };
-        for (clutch, slip) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(slips) {
-            if slip.abs() < MARGIN_SLACK {
-                start.at_zero_slip(powertrain, inputs, clutch);
-            }
-        }
-        start.release_overloaded(powertrain, inputs)?;
+        let capacities_n_m = powertrain.capacities_n_m(&state);
+        let likely = [0, 1].map(|clutch| if_at_rest(directions[clutch], capacities_n_m[clutch]));
+        let without_slip = [0, 1].map(|clutch| (slips[clutch].abs() < MARGIN_SLACK).then_some(capacities_n_m[clutch]));
+        start.settle(powertrain, inputs, likely, without_slip)?;
         Ok(start)
     }
 
@@ -269,108 +270,74 @@ impl HybridIntegrator {
             .min_by(f64::total_cmp)
     }
 
-    /// Changes the mode of every clutch whose margin is used up.
+    /// Changes the mode at an event: a slip has reached zero, or a sticking clutch can hold no more.
     fn change_mode(&mut self, powertrain: &Powertrain, inputs: &Inputs) -> Result<(), PlantError> {
-        // The margin at the event is zero up to the accuracy of locating it.
+        // The margin at the event is zero up to the accuracy of locating it: a clutch that can hold no more can hold what it does.
         const AT_EVENT: f64 = 1e-6;
+        let holding = powertrain.torques(self.mode, &self.state, inputs).shift;
+        let holding_n_m = [holding.offgoing_n_m, holding.oncoming_n_m];
         let margins = self.margins(powertrain, inputs, &self.state);
-        for (clutch, margin) in [ClutchId::Offgoing, ClutchId::Oncoming].into_iter().zip(margins) {
-            if margin > AT_EVENT {
-                continue;
-            }
-            match self.contact(clutch) {
-                Contact::Slipping(_) => self.at_zero_slip(powertrain, inputs, clutch),
-                Contact::Stuck => self.release(powertrain, inputs, clutch),
-            }
+        let (capacities_n_m, mut likely) = (powertrain.capacities_n_m(&self.state), self.mode.contacts());
+        let mut without_slip = [None; CLUTCHES];
+        for clutch in 0..CLUTCHES {
+            let (capacity_n_m, holding_n_m) = (capacities_n_m[clutch], holding_n_m[clutch]);
+            let is_used_up = margins[clutch] <= AT_EVENT;
+            (likely[clutch], without_slip[clutch]) = match likely[clutch] {
+                Contact::Slipping(direction) if is_used_up => (if_at_rest(direction, capacity_n_m), Some(capacity_n_m)),
+                slipping @ Contact::Slipping(_) => (slipping, None),
+                Contact::Stuck if is_used_up => {
+                    (Contact::Slipping(Direction::of(holding_n_m)), Some(capacity_n_m.min(holding_n_m.abs())))
+                }
+                Contact::Stuck => (Contact::Stuck, Some(capacity_n_m)),
+            };
         }
-        self.release_overloaded(powertrain, inputs)
+        self.settle(powertrain, inputs, likely, without_slip)
     }
 
-    /// A slip has reached zero: the clutch sticks if it can hold, else it slips on.
-    fn at_zero_slip(&mut self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) {
-        self.set_contact(clutch, Contact::Stuck);
-        if self.overload(powertrain, inputs, clutch) > 0.0 {
-            self.release(powertrain, inputs, clutch);
-        } else {
+    /// Decides all clutches without slip together, those with a capacity, N m, from contacts that are likely, and makes the speeds
+    /// agree with one that begins to stick.
+    fn settle(
+        &mut self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        likely: [Contact; CLUTCHES],
+        without_slip: [Option<f64>; CLUTCHES],
+    ) -> Result<(), PlantError> {
+        let problem = powertrain
+            .contact_problem(self.mode, without_slip, &self.state, inputs)
+            .ok_or(PlantError::Diverged { time_s: self.time_s })?;
+        let asked: Vec<usize> = (0..CLUTCHES).filter(|&clutch| without_slip[clutch].is_some()).collect();
+        let guess: Vec<Contact> = asked.iter().map(|&clutch| likely[clutch]).collect();
+        let solution = problem.solve(&guess);
+        let before = self.mode.contacts();
+        let mut contacts = before;
+        for (&clutch, contact) in asked.iter().zip(solution.contacts) {
+            contacts[clutch] = contact;
+        }
+        self.mode = Mode::of(contacts);
+        let begins = |clutch: usize| contacts[clutch] == Contact::Stuck && before[clutch] != Contact::Stuck;
+        if (0..CLUTCHES).any(begins) {
             self.lock(powertrain);
         }
+        Ok(())
     }
 
     /// Makes the speeds agree with the clutches that stick, conserving momentum.
     fn lock(&mut self, powertrain: &Powertrain) {
         let shift = &powertrain.vehicle.shift;
         let (turbine, output) = (self.state.turbine_rad_s, self.state.output_rad_s);
-        (self.state.turbine_rad_s, self.state.output_rad_s) = match self.mode {
-            Mode { offgoing: Contact::Stuck, oncoming: Contact::Stuck } => (0.0, 0.0),
-            Mode { offgoing: Contact::Stuck, .. } => shift.after_lock_up(shift.slip_offgoing, turbine, output),
-            Mode { oncoming: Contact::Stuck, .. } => shift.after_lock_up(shift.slip_oncoming, turbine, output),
-            Mode { .. } => (turbine, output),
+        (self.state.turbine_rad_s, self.state.output_rad_s) = match self.mode.engagement() {
+            Engagement::BothStuck => (0.0, 0.0),
+            Engagement::OffgoingStuck => shift.after_lock_up(shift.slip_offgoing, turbine, output),
+            Engagement::OncomingStuck => shift.after_lock_up(shift.slip_oncoming, turbine, output),
+            Engagement::BothSlipping => (turbine, output),
         };
-    }
-
-    /// Releases sticking clutches that are asked for more than they can hold, the most overloaded first.
-    fn release_overloaded(&mut self, powertrain: &Powertrain, inputs: &Inputs) -> Result<(), PlantError> {
-        for _ in 0..MOST_CHANGES {
-            let worst = [ClutchId::Offgoing, ClutchId::Oncoming]
-                .into_iter()
-                .filter(|&clutch| self.contact(clutch) == Contact::Stuck)
-                .map(|clutch| (self.overload(powertrain, inputs, clutch), clutch))
-                .max_by(|a, b| a.0.total_cmp(&b.0));
-            match worst {
-                Some((overload, clutch)) if overload > MARGIN_SLACK => self.release(powertrain, inputs, clutch),
-                _ => return Ok(()),
-            }
-        }
-        Err(PlantError::Chatter { time_s: self.time_s })
-    }
-
-    /// Lets a sticking clutch slip. Without it the slip would grow with the sign of the torque by which
-    /// it was held.
-    fn release(&mut self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) {
-        let holding = self.holding(powertrain, inputs, clutch);
-        self.set_contact(clutch, Contact::Slipping(Direction::of(holding)));
-    }
-
-    /// Torque asked of a sticking clutch beyond what it can hold, N m.
-    fn overload(&self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) -> f64 {
-        self.holding(powertrain, inputs, clutch).abs() - self.capacity(powertrain, clutch)
-    }
-
-    fn holding(&self, powertrain: &Powertrain, inputs: &Inputs, clutch: ClutchId) -> f64 {
-        let torques = powertrain.torques(self.mode, &self.state, inputs).shift;
-        match clutch {
-            ClutchId::Offgoing => torques.offgoing_n_m,
-            ClutchId::Oncoming => torques.oncoming_n_m,
-        }
-    }
-
-    fn capacity(&self, powertrain: &Powertrain, clutch: ClutchId) -> f64 {
-        let [offgoing_pa, oncoming_pa] = powertrain.pressures(&self.state);
-        match clutch {
-            ClutchId::Offgoing => powertrain.vehicle.offgoing.clutch.static_capacity(offgoing_pa),
-            ClutchId::Oncoming => powertrain.vehicle.oncoming.clutch.static_capacity(oncoming_pa),
-        }
-    }
-
-    fn contact(&self, clutch: ClutchId) -> Contact {
-        match clutch {
-            ClutchId::Offgoing => self.mode.offgoing,
-            ClutchId::Oncoming => self.mode.oncoming,
-        }
-    }
-
-    fn set_contact(&mut self, clutch: ClutchId, contact: Contact) {
-        match clutch {
-            ClutchId::Offgoing => self.mode.offgoing = contact,
-            ClutchId::Oncoming => self.mode.oncoming = contact,
-        }
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ClutchId {
-    Offgoing,
-    Oncoming,
+/// What a clutch that slipped in this direction is likely to do without slip: it sticks if it can hold a torque, else it slips on.
+fn if_at_rest(direction: Direction, capacity_n_m: f64) -> Contact {
+    if capacity_n_m > 0.0 { Contact::Stuck } else { Contact::Slipping(direction) }
 }
 
 /// Where in `(0, 1]` a function that is not negative at 0 turns negative, by the Illinois variant of the false

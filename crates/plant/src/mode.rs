@@ -46,7 +46,20 @@ pub struct Mode {
     pub oncoming: Contact,
 }
 
+/// Clutches of a shift: the offgoing and the oncoming one.
+pub(crate) const CLUTCHES: usize = 2;
+
 impl Mode {
+    /// The mode with these contacts of offgoing and oncoming clutch.
+    pub(crate) fn of([offgoing, oncoming]: [Contact; CLUTCHES]) -> Self {
+        Self { offgoing, oncoming }
+    }
+
+    /// Contacts of offgoing and oncoming clutch.
+    pub(crate) fn contacts(self) -> [Contact; CLUTCHES] {
+        [self.offgoing, self.oncoming]
+    }
+
     /// Which clutches stick.
     #[inline]
     pub fn engagement(self) -> Engagement {

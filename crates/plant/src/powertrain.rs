@@ -4,9 +4,10 @@ use config::{ShiftClutch, Vehicle};
 use drivetrain::clutch::drag_torque;
 use drivetrain::{Clutch, ColumnPlace, Driveline, Engagement, ShiftCoefficients, ShiftTorques};
 
+use crate::mode::CLUTCHES;
 use crate::rosenbrock::StiffRow;
 use crate::state::{AT_THE_WHEEL, CYLINDERS, STATES, State, VALVE_TO_CYLINDER, WHEEL};
-use crate::{Contact, Direction, Mode};
+use crate::{Contact, ContactProblem, Direction, Mode};
 
 /// What acts on the plant from outside, constant over a segment of the integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -276,6 +277,48 @@ impl Powertrain {
     pub(crate) fn acceleration_under(&self, x: &State, tyre_n: f64) -> f64 {
         let road = &self.vehicle.road;
         (tyre_n - road.drag_force(x.vehicle_m_s) - self.grade_force_n) / road.mass_kg
+    }
+
+    /// Torques that the offgoing and the oncoming clutch can hold at this state, N m.
+    pub(crate) fn capacities_n_m(&self, x: &State) -> [f64; CLUTCHES] {
+        let [offgoing_pa, oncoming_pa] = self.pressures(x);
+        let v = &self.vehicle;
+        [v.offgoing.clutch.static_capacity(offgoing_pa), v.oncoming.clutch.static_capacity(oncoming_pa)]
+    }
+
+    /// What decides which clutches without slip stick: those with a capacity, N m. The others slip as in `mode`. `None` if a number is not
+    /// finite.
+    pub(crate) fn contact_problem(
+        &self,
+        mode: Mode,
+        capacities_n_m: [Option<f64>; CLUTCHES],
+        x: &State,
+        inputs: &Inputs,
+    ) -> Option<ContactProblem> {
+        let v = &self.vehicle;
+        let asked = || (0..CLUTCHES).filter(|&clutch| capacities_n_m[clutch].is_some());
+        // A clutch that sticks has no torque among the applied ones.
+        let mut others = mode.contacts();
+        asked().for_each(|clutch| others[clutch] = Contact::Stuck);
+        let applied = self.applied_torques(Mode::of(others), x, &self.acting(inputs)).shift;
+        let slips = [v.shift.slip_offgoing, v.shift.slip_oncoming];
+        let gear = self.coefficients(Engagement::BothSlipping);
+        // Acceleration of the slip of a clutch by these torques, rad/s^2.
+        let by = |clutch: usize, torques: &ShiftTorques<f64>| {
+            slips[clutch][0] * gear.turbine.at(torques) + slips[clutch][1] * gear.output.at(torques)
+        };
+        let nothing = ShiftTorques { turbine_n_m: 0.0, offgoing_n_m: 0.0, oncoming_n_m: 0.0, output_n_m: 0.0 };
+        let one_n_m = [ShiftTorques { offgoing_n_m: 1.0, ..nothing }, ShiftTorques { oncoming_n_m: 1.0, ..nothing }];
+        let mut problem = ContactProblem::new();
+        for (clutch, capacity_n_m) in capacities_n_m.into_iter().enumerate() {
+            let Some(capacity_n_m) = capacity_n_m else { continue };
+            let row: Vec<f64> =
+                asked().filter(|&other| other <= clutch).map(|other| -by(clutch, &one_n_m[other])).collect();
+            if !problem.add(by(clutch, &applied), &row, (-capacity_n_m, capacity_n_m)) {
+                return None;
+            }
+        }
+        Some(problem)
     }
 
     /// How far the offgoing and the oncoming clutch are from a change of mode: the slip of a slipping

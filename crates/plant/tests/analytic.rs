@@ -44,6 +44,44 @@ fn two_inertias_lock_when_and_at_the_speed_they_should() {
     assert!((plant.state().output_rad_s - expected.1).abs() < 1e-9);
 }
 
+/// At rest neither clutch slips. Whatever their pressures and the torques, a clutch that sticks holds what it must, and one that does
+/// not begins to slip in the direction of its torque.
+#[test]
+fn clutches_without_slip_are_decided_together() {
+    let mut vehicle = bare_gear_train();
+    vehicle.driveline.shaft_stiffness_n_m_rad = 13e3;
+    let powertrain = Powertrain::new(vehicle);
+    let pressures = [0.0, 0.06e6, 0.15e6, 0.3e6, 1e6];
+    let mut met: Vec<[bool; 2]> = Vec::new();
+    for (offgoing, oncoming) in pressures.iter().flat_map(|&a| pressures.map(|b| (a, b))) {
+        for (engine_rad_s, twist_rad) in [(0.0, 0.0), (100.0, 0.0), (300.0, 0.05), (300.0, -0.05), (0.0, 0.1)] {
+            let start = State {
+                engine_rad_s,
+                twist_rad,
+                offgoing_valve_pa: offgoing,
+                oncoming_valve_pa: oncoming,
+                ..state(0.0, 0.0)
+            };
+            let inputs = Inputs { throttle: 0.0, offgoing_settled_pa: offgoing, oncoming_settled_pa: oncoming };
+            let mut plant = HybridIntegrator::new(&powertrain, 0.0, start, &inputs).unwrap();
+            let mode = plant.mode();
+            let stuck = [mode.offgoing, mode.oncoming].map(|contact| contact == Contact::Stuck);
+            let case = format!("{offgoing} {oncoming} {engine_rad_s} {twist_rad}: {mode:?}");
+            let margins = powertrain.margins(mode, &start, &inputs);
+            assert!(margins.iter().all(|&margin| margin > -1e-6), "{case}: {margins:?}");
+            // A clutch in balance between two directions may go either way; any other slips as it was decided.
+            plant.advance(&powertrain, &inputs, 1e-5, &mut |_| {}).unwrap();
+            let margins = powertrain.margins(mode, plant.state(), &inputs);
+            assert!(plant.mode() != mode || margins.iter().all(|&margin| margin > -1e-6), "{case}: {margins:?}");
+            assert_eq!(plant.mode(), mode, "{case}");
+            met.push(stuck);
+        }
+    }
+    for combination in [[true, true], [true, false], [false, true], [false, false]] {
+        assert!(met.contains(&combination), "{combination:?}");
+    }
+}
+
 /// Gear train in first gear, shaft and wheel without tyre: two inertias on a spring,
 /// `w^2 = K (1/J_gearbox + 1/J_wheel)`.
 #[test]
