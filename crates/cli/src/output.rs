@@ -27,9 +27,9 @@ fn coloured_hints(message: &str) -> String {
     message.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A table on standard output, see [`lines`].
+/// A table on standard output: the first `left` columns to the left, the others to the right.
 pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
-    lines(left, rows).iter().try_for_each(|line| self::line(line))
+    long_table(left, || rows.iter().cloned())
 }
 
 /// The same, of rows that may be very many: each is made twice, and none is kept.
@@ -42,12 +42,35 @@ pub(crate) fn long_table<R: Iterator<Item = Vec<String>>>(left: usize, rows: imp
     rows().try_for_each(|row| self::line(&line_of(left, &row, &widths)))
 }
 
-/// The lines of a table: the first `left` columns to the left, the others to the right.
-pub(crate) fn lines(left: usize, rows: &[Vec<String>]) -> Vec<String> {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    rows.iter().map(|row| line_of(left, row, &widths)).collect()
+/// The lines of a table, as [`table`] has them, below its titles. A title that is wider than the cells of its
+/// column takes several lines.
+pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>]) -> Vec<String> {
+    let length = |text: &str| text.chars().count();
+    let widest = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| length(cell)).max().unwrap_or(0);
+    let word = |title: &str| title.split(' ').map(length).max().unwrap_or(0);
+    let widths: Vec<usize> = titles.iter().enumerate().map(|(j, title)| widest(j).max(word(title))).collect();
+    let titles: Vec<Vec<String>> = titles.iter().zip(&widths).map(|(title, &width)| wrapped(title, width)).collect();
+    let height = titles.iter().map(Vec::len).max().unwrap_or(0);
+    // The last lines of all titles stand on one line.
+    let title_line = |at: usize| {
+        let of =
+            |title: &Vec<String>| (at + title.len()).checked_sub(height).map_or(String::new(), |at| title[at].clone());
+        titles.iter().map(of).collect::<Vec<_>>()
+    };
+    let titles: Vec<Vec<String>> = (0..height).map(title_line).collect();
+    titles.iter().chain(rows).map(|row| line_of(left, row, &widths)).collect()
+}
+
+/// A text in lines of at most this width, as far as its words are no wider.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        match lines.last_mut().filter(|line| line.chars().count() + 1 + word.chars().count() <= width) {
+            Some(line) => *line = format!("{line} {word}"),
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// A line of a table with columns of these widths.
@@ -84,6 +107,21 @@ pub(crate) fn grouped(count: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_title_that_is_wider_than_its_cells_takes_several_lines() {
+        let words = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
+        let titles = words(&["shift", "past new gear rad/s", "torque N m"]);
+        let rows = [words(&["1-2", "0.5", "62 (23 to 102)"]), words(&["2-1", "11.5", "1"])];
+        let expected = ["        past", "         new", "        gear", "shift  rad/s      torque N m"];
+        assert_eq!(titled_lines(1, &titles, &rows)[..4], expected);
+        assert_eq!(
+            titled_lines(1, &titles, &rows)[4..],
+            ["1-2      0.5  62 (23 to 102)", "2-1     11.5               1"]
+        );
+        assert_eq!(titled_lines(1, &titles, &[]).len(), 4);
+        assert!(titled_lines(1, &[], &[]).is_empty());
+    }
 
     #[test]
     fn thousands_are_separated_by_commas() {

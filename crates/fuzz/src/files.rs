@@ -84,6 +84,8 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
             vehicle_m_s: 10.0,
             oil_degc: None,
             reported_n_m: None,
+            speed_m_s: reading(10.0),
+            pressures: [reading(1e5 * share); MAX_ELEMENTS],
             truth,
         });
         assert!(estimate.valve_pa.iter().all(|pressure_pa| !pressure_pa.is_infinite()));

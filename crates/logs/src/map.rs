@@ -23,7 +23,7 @@ pub enum Combine {
 pub struct Mapped {
     /// What they are.
     pub role: Role,
-    /// The element of the gearbox, in small letters, where the role is the command of one.
+    /// The element of the gearbox, in small letters, where the role is the command or the pressure of one.
     pub element: Option<String>,
     /// Their names.
     pub names: Vec<String>,
@@ -63,8 +63,7 @@ impl Mapped {
     /// Its name in a map.
     pub fn key(&self) -> String {
         match (&self.element, self.role) {
-            (Some(element), Role::ElementDuty) => format!("element_{element}_duty"),
-            (Some(element), _) => format!("element_{element}_current"),
+            (Some(element), role) => role.name().replace("NAME", element),
             (None, role) => role.name().to_owned(),
         }
     }

@@ -5,7 +5,7 @@ use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
 use study::any_shift::matrix::{ErrorsByPhase, controlling_of};
-use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, TruePhase};
+use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase};
 use trace::Cell;
 use trace::units::{km_h, mpa, rpm};
 
@@ -256,6 +256,18 @@ const COLUMNS: &[Column] = &[
     column("jerk m/s^3", "greatest jerk of the car, from parabolas over 0.3 s of its speed", |s, _| {
         if s.quality.jerk_m_s3.is_nan() { String::new() } else { number(s.quality.jerk_m_s3, 1) }
     }),
+    column(
+        "tie-up N m",
+        "largest torque with which both clutches work against each other, at the turbine, by the estimate",
+        |s, _| {
+            if s.summary.tie_up_n_m.is_nan() { String::new() } else { number(s.summary.tie_up_n_m, 0) }
+        },
+    ),
+    column(
+        "friction work kJ",
+        "torque times slip of both clutches over the shift by the estimate; in brackets by the ends of the guaranteed range",
+        |s, _| friction_work(s).map_or(String::new(), |work| ranged(&work, 1e-3, 1)),
+    ),
     column("inertia phase", "error of the controlling clutch's torque over that of the open loop", |s, _| {
         scored(s, |[_, [inertia, _]]| ratio(&inertia.torque))
     }),
@@ -274,6 +286,22 @@ const COLUMNS: &[Column] = &[
             if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }
         },
     ),
+    column(
+        "pressure kPa",
+        "RMS errors of filter / open loop against measured pressures, both phases, both clutches",
+        |s, _| {
+            measured(s, |errors| {
+                let [filter, open_loop] = errors.rms_pa();
+                format!("{} / {}", number(1e-3 * filter, 1), number(1e-3 * open_loop, 1))
+            })
+        },
+    ),
+    column("pressures in range", "share of the measured pressures within their guaranteed ranges", |s, _| {
+        let [all, inside] = s.summary.pressures;
+        #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+        let share = inside as f64 / all as f64;
+        if all > 0 { coverage(share) } else { String::new() }
+    }),
     column("controlling", "the clutch that drives the inertia phase", |s, car| {
         unscored(s, |s| Some(clutch_names(s, car)[controlling_of(&s.rows, s.kind?)].to_owned()))
     }),
@@ -326,9 +354,20 @@ pub fn shift_rows(drive: &ScoredDrive, car: &Car) -> (Vec<&'static str>, Vec<Vec
 
 /// What the words of the table of shifts say that a reader may not have met, and the healths in it: word and meaning.
 pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)> {
-    const EXPLAINED: [&str; 5] = ["flare rad/s", "past new gear rad/s", "controlling", "not seen", "health"];
+    const EXPLAINED: [&str; 8] = [
+        "flare rad/s",
+        "past new gear rad/s",
+        "tie-up N m",
+        "friction work kJ",
+        "pressure kPa",
+        "controlling",
+        "not seen",
+        "health",
+    ];
     let columns = filled_columns(drive, car).into_iter().filter(|column| EXPLAINED.contains(&column.title));
-    let word = |title: &str| title.trim_end_matches(" rad/s").to_owned();
+    let word = |title: &str| {
+        [" rad/s", " N m", " kJ", " kPa"].iter().fold(title, |title, unit| title.trim_end_matches(unit)).to_owned()
+    };
     let columns = columns.map(|column| (word(column.title), column.meaning));
     let worst =
         |health: &Health| drive.shifts.iter().any(|shift| shift.worst_health().is_some_and(|(it, _)| it == *health));
@@ -339,6 +378,22 @@ pub fn shift_words(drive: &ScoredDrive, car: &Car) -> Vec<(String, &'static str)
 /// A cell of a shift whose truth is known.
 fn scored(shift: &ScoredShift, cell: fn(ErrorsByPhase) -> String) -> String {
     shift.errors().filter(|_| shift.has_truth()).map_or(String::new(), cell)
+}
+
+/// A cell of a shift with measured pressures, whose torques are not known: errors of both clutches in both phases.
+fn measured(shift: &ScoredShift, cell: fn(&SquaredErrors) -> String) -> String {
+    let mut sum = SquaredErrors::default();
+    for errors in shift.errors().unwrap_or_default().iter().flatten() {
+        sum.add(&errors.pressure);
+    }
+    if shift.has_truth() || sum.rows == 0.0 { String::new() } else { cell(&sum) }
+}
+
+/// Friction work of both clutches, J, with its ends.
+fn friction_work(shift: &ScoredShift) -> Option<[f64; 3]> {
+    let [offgoing, oncoming] = shift.summary.friction_work_j;
+    let (offgoing, oncoming) = (offgoing?, oncoming?);
+    Some(core::array::from_fn(|end| offgoing[end] + oncoming[end]))
 }
 
 /// A cell of a shift whose truth is not known.
@@ -384,6 +439,7 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
         number("past_synchronous_rad_s", quality.past_synchronous_rad_s),
         number("held_slip_rad_s", quality.held_slip_rad_s),
         number("tie_up_n_m", quality.tie_up_n_m),
+        number("tie_up_estimate_n_m", shift.summary.tie_up_n_m),
         number("jerk_m_s3", quality.jerk_m_s3),
     ];
     let errors: ErrorsByPhase = shift.errors().unwrap_or_default();
@@ -395,8 +451,24 @@ pub fn shift_cells<'a>(shift: &ScoredShift, car: &'a Car) -> Vec<(String, Cell<'
             }
         }
     }
+    for (phase, clutches) in ["torque_phase", "inertia_phase"].iter().zip(errors) {
+        for (clutch, errors) in ["controlling", "other"].iter().zip(clutches) {
+            let ends = errors.pressure.rms_pa().map(|pa| if errors.pressure.rows > 0.0 { pa } else { f64::NAN });
+            for (what, value) in ["rms_pa", "open_loop_rms_pa"].iter().zip(ends) {
+                cells.push(number(&format!("{phase}_{clutch}_{what}"), value));
+            }
+        }
+    }
+    let [pressures, inside] = shift.summary.pressures;
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    let share = if pressures > 0 { inside as f64 / pressures as f64 } else { f64::NAN };
+    cells.push(number("measured_pressure_inside_range", share));
     for (c, role) in ["offgoing", "oncoming"].iter().enumerate() {
         let none = [f64::NAN; 3];
+        let work = shift.summary.friction_work_j[c].unwrap_or(none);
+        for (what, at) in [("", 0), ("_least", 1), ("_greatest", 2)] {
+            cells.push(number(&format!("{role}_friction_work{what}_j"), work[at]));
+        }
         let (pressure, torque) = (shift.mean_pressure_pa(c).unwrap_or(none), shift.mean_torque_n_m(c).unwrap_or(none));
         for (what, at) in [("", 0), ("least_", 1), ("greatest_", 2)] {
             cells.push(number(&format!("{role}_pressure_mean_{what}pa"), pressure[at]));

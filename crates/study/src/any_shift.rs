@@ -13,6 +13,7 @@ mod gear_signal;
 mod in_gear;
 pub mod influence;
 pub mod learning_count;
+mod log_beside;
 pub mod logged;
 pub mod matrix;
 pub mod measured;
@@ -217,6 +218,10 @@ pub struct ClutchRow {
     pub torque_n_m: [f64; 3],
     /// Pressure, Pa: true (not a number where it is not known), estimated, by the valve model alone.
     pub pressure_pa: [f64; 3],
+    /// Slip, rad/s; by the readings where the true one is not known.
+    pub slip_rad_s: f64,
+    /// Its slip per turbine speed, `alpha`: the turbine feels `alpha` times its torque.
+    pub alpha: f64,
     /// Whether it truly sticks; by the estimate where that is not known.
     pub sticks: bool,
     /// The guaranteed range of the torque, N m.
@@ -268,6 +273,8 @@ impl ClutchRow {
         Self {
             torque_n_m: [f64::NAN; 3],
             pressure_pa: [f64::NAN; 3],
+            slip_rad_s: f64::NAN,
+            alpha: f64::NAN,
             sticks,
             is_one_way: false,
             torque_range_n_m: None,
@@ -335,12 +342,12 @@ impl SquaredErrors {
         (self.rows > 0.0 && open_loop > 0.0).then(|| estimate / open_loop)
     }
 
-    /// The errors of one clutch's torque in one phase.
+    /// The errors of one clutch's torque in one phase, over the rows in which the truth is known.
     pub fn of(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
         Self::over(rows, phase, clutch, |clutch| clutch.torque_n_m)
     }
 
-    /// The errors of one clutch's pressure in one phase.
+    /// The errors of one clutch's pressure in one phase, over the rows in which the truth is known.
     pub fn of_pressure(rows: &[ShiftScoreRow], phase: TruePhase, clutch: usize) -> Self {
         Self::over(rows, phase, clutch, |clutch| clutch.pressure_pa)
     }
@@ -349,6 +356,9 @@ impl SquaredErrors {
         let mut sum = Self::default();
         for row in rows.iter().filter(|row| row.phase() == Some(phase) && !row.clutches[clutch].sticks) {
             let [truth, estimate, open_loop] = values(&row.clutches[clutch]);
+            if truth.is_nan() {
+                continue;
+            }
             sum.estimate += (truth - estimate).powi(2);
             sum.open_loop += (truth - open_loop).powi(2);
             sum.size += truth.abs();
@@ -437,12 +447,15 @@ fn within(range: Option<[f64; 2]>, value: f64, tolerance: f64) -> bool {
 fn row(tables: &ShiftTables<f64>, sample: &CarSample, estimate: &ShiftEstimate<f64>) -> Option<ShiftScoreRow> {
     let under_way = sample.shift.as_ref()?;
     let clutches = estimate.clutches.as_ref()?;
+    let alphas = tables.tables().shift(under_way.from, under_way.to).map(|row| row.clutches.map(|clutch| clutch.alpha));
     let of = |c: usize| {
         let (truth, found) = ([&under_way.offgoing, &under_way.oncoming][c], &clutches[c]);
         (found.element == tables.place(truth.element).unwrap_or(ONE_WAY)).then(|| ClutchRow {
             // A valve model knows no direction: it is told the true one. Else noise of a slip that is not yet seen would be its error.
             torque_n_m: [truth.torque_n_m, found.torque_n_m, found.open_loop_n_m.abs().copysign(truth.torque_n_m)],
             pressure_pa: [truth.pressure_pa, found.pressure_pa, found.valve_pa],
+            slip_rad_s: truth.slip_rad_s,
+            alpha: alphas.map_or(f64::NAN, |alphas| alphas[c]),
             sticks: truth.sticks,
             torque_range_n_m: found.torque_range_n_m,
             pressure_range_pa: found.pressure_range_pa,

@@ -111,7 +111,7 @@ fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {
     )?;
     for (left, (titles, rows)) in [(3, shift_rows(drive, car)), (2, kind_rows(&drive.matrix(car)))] {
         let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
-        output::table(left, &std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
+        output::titled_lines(left, &head, &rows).iter().try_for_each(|line| output::line(line))?;
         output::line("")?;
     }
     for (word, meaning) in shift_words(drive, car) {

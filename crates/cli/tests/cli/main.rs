@@ -22,6 +22,7 @@ mod log_to_fit;
 mod logs;
 mod long_logs;
 mod measured;
+mod measured_pressures;
 mod other_cars;
 mod own_car;
 mod studies;

@@ -137,12 +137,15 @@ impl<'a> Recorder<'a> {
         self.forget(time_s);
     }
 
-    /// Takes measured pressures of the offgoing and the oncoming element of the shift of the step before, Pa; not a number where there is
-    /// none.
-    pub fn push_pressure(&mut self, time_s: f64, pressure_pa: [f64; 2]) {
+    /// Takes measured pressures of the offgoing and the oncoming element of the shift of the step before, Pa, where there are any.
+    pub fn push_pressure(&mut self, time_s: f64, pressure_pa: [Option<Reading<f64>>; 2]) {
         if self.open.is_some_and(|open| open.ended_s.is_none()) {
             let both = self.pressure.iter_mut().zip(pressure_pa);
-            both.filter(|(_, value)| value.is_finite()).for_each(|(series, value)| series.push(time_s, value));
+            for (series, reading) in both.filter_map(|(series, reading)| Some((series, reading?))) {
+                if reading.value.is_finite() {
+                    series.push(time_s - reading.age_s, reading.value);
+                }
+            }
         }
     }
 

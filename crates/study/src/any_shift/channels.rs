@@ -8,11 +8,11 @@ use design::ShiftTables;
 use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
 use observer::Reading as Measured;
-use observer::any_shift::{MAX_ELEMENTS, ShiftInput};
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
 use super::gear_signal::Gears;
-use super::logged::{LogStep, element_column, element_commands};
+use super::logged::{LogStep, element_column, element_commands, element_pressures};
 
 /// The newest reading of each entry of a map since the step before.
 #[derive(Debug, Clone)]
@@ -45,6 +45,7 @@ impl Places for Newest {
 /// A log by its channel map, step by step.
 pub struct CarChannels<'a> {
     car: &'a Car,
+    tables: &'a ShiftTables<f64>,
     steps: Steps<'a, Newest>,
     /// Role of each entry, and the place in the filter's tables where it is the command of an element.
     entries: Vec<(Role, Option<usize>)>,
@@ -53,7 +54,6 @@ pub struct CarChannels<'a> {
     pedal: f64,
     vehicle_m_s: Option<f64>,
     oil_degc: Option<f64>,
-    truth: [f64; 2],
 }
 
 impl<'a> CarChannels<'a> {
@@ -61,14 +61,19 @@ impl<'a> CarChannels<'a> {
     ///
     /// # Errors
     /// The map lacks one that is needed, has one of no element, or does not fit the log.
-    pub fn of(log: &'a mut Log, map: &ChannelMap, car: &'a Car, tables: &ShiftTables<f64>) -> Result<Self, LogError> {
+    pub fn of(
+        log: &'a mut Log,
+        map: &ChannelMap,
+        car: &'a Car,
+        tables: &'a ShiftTables<f64>,
+    ) -> Result<Self, LogError> {
         let entries = map.channels.iter().map(|entry| entry_of(entry, car, tables)).collect::<Result<Vec<_>, _>>()?;
         require(map, car, tables)?;
         let readings = Readings::new(log, map)?;
         let steps = Steps::into(Newest(vec![None; entries.len()]), readings);
-        let (gears, truth) = (Gears::new([Role::Gear, Role::TargetGear].map(Role::name)), [f64::NAN; 2]);
+        let gears = Gears::new([Role::Gear, Role::TargetGear].map(Role::name));
         let (lock_up_applied, pedal, vehicle_m_s, oil_degc) = (false, f64::NAN, None, None);
-        Ok(Self { car, steps, entries, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc, truth })
+        Ok(Self { car, tables, steps, entries, gears, lock_up_applied, pedal, vehicle_m_s, oil_degc })
     }
 
     /// The readings, with their summary and notes.
@@ -95,8 +100,8 @@ impl<'a> CarChannels<'a> {
     pub fn next_step(&mut self) -> Result<Option<LogStep>, LogError> {
         let Some(step) = self.steps.next() else { return Ok(None) };
         let ChannelStep { time_s, dt_s, readings } = step?;
-        let mut commands = [None; MAX_ELEMENTS];
-        let mut of_role = [None; 5];
+        let (mut commands, mut pressures) = ([None; MAX_ELEMENTS], [None; MAX_ELEMENTS]);
+        let (mut of_role, mut of_car, mut oncoming) = ([None; 5], None, [None; 2]);
         let mut changed_gear = [None; 2];
         for ((role, place), reading) in self.entries.iter().zip(&readings) {
             let Some(reading) = reading else { continue };
@@ -111,10 +116,18 @@ impl<'a> CarChannels<'a> {
                 Role::TargetGear => changed_gear[1] = Some(measured.value),
                 Role::LockUpApplied => self.lock_up_applied = measured.value > 0.5,
                 Role::Throttle => self.pedal = measured.value,
-                Role::VehicleSpeed => self.vehicle_m_s = Some(measured.value),
+                Role::VehicleSpeed => {
+                    self.vehicle_m_s = Some(measured.value);
+                    of_car = Some(measured);
+                }
                 Role::OilTemperature => self.oil_degc = Some(measured.value),
-                Role::OncomingPressure => self.truth[0] = measured.value,
-                Role::OncomingTorque => self.truth[1] = measured.value,
+                Role::OncomingPressure => oncoming[0] = Some(measured),
+                Role::OncomingTorque => oncoming[1] = Some(measured),
+                Role::ElementPressure => {
+                    if let Some(place) = place {
+                        pressures[*place] = Some(measured);
+                    }
+                }
                 _ => {
                     if let Some(place) = place {
                         commands[*place] = Some(measured);
@@ -140,7 +153,12 @@ impl<'a> CarChannels<'a> {
             commands,
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
         };
-        let oncoming = [self.truth[0], self.truth[1], f64::NAN];
+        let GearCommand { from, to } = input.gear;
+        let shift = self.tables.tables().shift(from, to).map(|row| row.clutches[1].element);
+        if let Some(pressure) = shift.and_then(|element| pressures.get_mut(element)) {
+            *pressure = pressure.or(oncoming[0]);
+        }
+        let oncoming_n_m = oncoming[1].map_or(f64::NAN, |torque| torque.value);
         Ok(Some(LogStep {
             time_s,
             input,
@@ -148,7 +166,9 @@ impl<'a> CarChannels<'a> {
             vehicle_m_s: self.vehicle_m_s.unwrap_or(by_wheels),
             oil_degc: self.oil_degc,
             reported_n_m: engine_n_m,
-            truth: [[f64::NAN; 3], oncoming],
+            speed_m_s: of_car,
+            pressures,
+            truth: [[f64::NAN; 3], [f64::NAN, oncoming_n_m, f64::NAN]],
         }))
     }
 }
@@ -159,6 +179,16 @@ fn entry_of(entry: &Mapped, car: &Car, tables: &ShiftTables<f64>) -> Result<(Rol
     let column = format!("element_{element}");
     let at = car.gearbox.elements.iter().position(|known| element_column(&known.name) == column);
     let clutch = at.and_then(|at| car.clutches.get(at)?.as_ref());
+    if entry.role == Role::ElementPressure {
+        return at.and_then(|at| tables.place(at)).map(|place| (entry.role, Some(place))).ok_or_else(|| {
+            let names = element_pressures(car).filter(|(at, _)| tables.place(*at).is_some());
+            let names = names.map(|(_, name)| key_of(&name)).collect::<Vec<_>>().join(", ");
+            LogError::map(format!(
+                "the channel map has {}, which is no clutch or brake of this gearbox with a valve\nhint: the pressures are {names}",
+                entry.key()
+            ))
+        });
+    }
     let Some((at, clutch)) = at.zip(clutch) else {
         let names = element_commands(car).into_iter().map(|(_, name)| key_of(&name)).collect::<Vec<_>>().join(", ");
         return Err(LogError::map(format!(
@@ -283,6 +313,12 @@ pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
     map.channels.extend(named.into_iter().filter_map(|(role, name)| of(role, None, name)));
     if !map.has(Role::WheelSpeed) {
         map.channels.extend(of(Role::WheelSpeed, None, signal::WHEEL_TREAD_SPEED));
+    }
+    let pressures = element_pressures(car).map(|(_, name)| name);
+    for name in pressures.filter(|name| channel_of(Role::ElementPressure, name).is_some()) {
+        let key = key_of(&name);
+        let Some((role, element)) = Role::of_element(&key) else { continue };
+        map.channels.extend(of(role, Some(element.to_owned()), &name));
     }
     for (_, name) in element_commands(car) {
         let (role, element) = Role::of_element(&key_of(&name)).map(|(role, element)| (role, element.to_owned()))?;

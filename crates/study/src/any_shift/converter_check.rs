@@ -107,6 +107,8 @@ mod tests {
                 vehicle_m_s: f64::NAN,
                 oil_degc: None,
                 reported_n_m,
+                speed_m_s: None,
+                pressures: [None; MAX_ELEMENTS],
                 truth: [[f64::NAN; 3]; 2],
             };
             check.push(&car, &step, [engine, turbine]);

@@ -390,6 +390,8 @@ mod tests {
             torque_n_m: [truth_n_m, truth_n_m + error_n_m, truth_n_m],
             pressure_pa: [3e5, 3.1e5, 3e5],
             sticks,
+            slip_rad_s: if sticks { 0.0 } else { 20.0 },
+            alpha: 1.0,
             is_one_way: false,
             torque_range_n_m: Some([0.0, 200.0]),
             pressure_range_pa: Some([2e5, 4e5]),

@@ -22,6 +22,7 @@ use super::gear_signal::Gears;
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
+use super::log_beside::{CarriedPressures, ShiftJerk};
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -51,7 +52,13 @@ pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
     columns.collect()
 }
 
-/// The column with the age of a command: how long before its row it was read, s.
+/// The columns with the measured pressures of the elements: element of the gearbox, and name.
+pub fn element_pressures(car: &Car) -> impl Iterator<Item = (usize, String)> + '_ {
+    let elements = car.gearbox.elements.iter().enumerate();
+    elements.map(|(at, element)| (at, format!("{}_pressure_pa", element_column(&element.name))))
+}
+
+/// The column with the age of a command or a pressure: how long before its row it was read, s.
 pub fn command_age(command: &str) -> String {
     let name = command.rsplit_once('_').map_or(command, |(name, _)| name);
     format!("{name}_age_s")
@@ -100,11 +107,13 @@ struct Columns {
     target: usize,
     /// Place in the filter's tables, and column.
     commands: Vec<(usize, ReadingColumn)>,
+    /// The same of measured pressures.
+    pressures: Vec<(usize, ReadingColumn)>,
     pedals: [Option<usize>; 2],
     vehicle: Option<usize>,
     oil: Option<usize>,
     /// Pressure, torque and slip of offgoing and oncoming clutch.
-    truth: Option<[[usize; 3]; 2]>,
+    truth: [[Option<usize>; 3]; 2],
 }
 
 impl Columns {
@@ -116,10 +125,11 @@ impl Columns {
             let age = rows.find(&command_age(&name));
             Some(rows.require(&name).map(|value| (place, ReadingColumn { value, age })))
         });
-        let truth = |names: [&str; 3]| -> Option<[usize; 3]> {
-            let places: Option<Vec<usize>> = names.iter().map(|name| rows.find(name)).collect();
-            places?.try_into().ok()
-        };
+        let pressures = element_pressures(car).filter_map(|(element, name)| {
+            let age = rows.find(&command_age(&name));
+            Some((tables.place(element)?, ReadingColumn { value: rows.find(&name)?, age }))
+        });
+        let truth = |names: [&str; 3]| names.map(|name| rows.find(name));
         let offgoing = truth([signal::OFFGOING_PRESSURE, signal::OFFGOING_TORQUE, signal::OFFGOING_SLIP]);
         let oncoming = truth([signal::ONCOMING_PRESSURE, signal::ONCOMING_TORQUE, signal::ONCOMING_SLIP]);
         let has_converter = car.converter.is_some();
@@ -139,7 +149,8 @@ impl Columns {
             pedals: [signal::THROTTLE, signal::BRAKE].map(|name| rows.find(name)),
             vehicle: rows.find(signal::VEHICLE_SPEED),
             oil: rows.find(signal::OIL_TEMPERATURE),
-            truth: offgoing.zip(oncoming).map(|(offgoing, oncoming)| [offgoing, oncoming]),
+            pressures: pressures.collect(),
+            truth: [offgoing, oncoming],
         })
     }
 }
@@ -159,8 +170,27 @@ pub struct LogStep {
     pub oil_degc: Option<f64>,
     /// Engine torque as the engine's controller reports it, N m, also where the filter is not shown it.
     pub reported_n_m: Option<Reading<f64>>,
+    /// Speed of the car, m/s, where this row has a reading of it.
+    pub speed_m_s: Option<Reading<f64>>,
+    /// Measured pressures of elements, Pa, by their places in the filter's tables.
+    pub pressures: [Option<Reading<f64>>; MAX_ELEMENTS],
     /// Pressure, Pa, torque, N m, and slip, rad/s, of offgoing and oncoming clutch; not a number where the log has none.
     pub truth: [[f64; 3]; 2],
+}
+
+impl LogStep {
+    /// Measured pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa, where this row has readings of them.
+    pub fn shift_pressures(&self, tables: &ShiftTables<f64>) -> [Option<Reading<f64>>; 2] {
+        let GearCommand { from, to } = self.input.gear;
+        let clutches = tables.tables().shift(from, to).map(|row| row.clutches);
+        [0, 1].map(|c| {
+            let of_shift = self.truth[c][0];
+            if of_shift.is_finite() {
+                return Some(Reading { value: of_shift, age_s: 0.0 });
+            }
+            *self.pressures.get(clutches?[c].element)?
+        })
+    }
 }
 
 /// A log, read row by row.
@@ -220,17 +250,20 @@ impl<'c> CarLog<'c> {
         for &(place, column) in &columns.commands {
             commands[place] = column.read(rows, samples);
         }
+        let mut pressures = [None; MAX_ELEMENTS];
+        for &(place, column) in &columns.pressures {
+            pressures[place] = column.read(rows, samples);
+        }
         let reading = |column: Option<ReadingColumn>| column.and_then(|column| column.read(rows, samples));
         let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, reported_n_m] =
             [columns.engine, Some(columns.turbine), Some(columns.output), columns.wheel, columns.engine_torque]
                 .map(reading);
         let number = |column: Option<usize>| column.map_or(f64::NAN, |column| samples.number(rows, column));
         let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
-        let vehicle_m_s = if columns.vehicle.is_some() { number(columns.vehicle) } else { by_wheels };
-        let mut truth = [[f64::NAN; 3]; 2];
-        for (values, places) in truth.iter_mut().flatten().zip(columns.truth.iter().flatten().flatten()) {
-            *values = number(Some(*places));
-        }
+        let of_car = number(columns.vehicle);
+        let vehicle_m_s = if columns.vehicle.is_some() { of_car } else { by_wheels };
+        let speed_m_s = Some(Reading { value: of_car, age_s: 0.0 }).filter(|speed| !speed.value.is_nan());
+        let truth = columns.truth.map(|clutch| clutch.map(number));
         let lock_up_applied = number(columns.lock_up) > 0.5;
         // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
         let mut input = ShiftInput {
@@ -248,7 +281,7 @@ impl<'c> CarLog<'c> {
         let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
         let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
         self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
-        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, truth }))
+        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, speed_m_s, pressures, truth }))
     }
 
     /// Takes the cells of `gear` and `target_gear`; an empty one says nothing new.
@@ -295,6 +328,8 @@ pub struct LoggedDrive<'c> {
     converter: ConverterCheck,
     still: StillCommands,
     holes: Holes,
+    carried: CarriedPressures,
+    jerk: ShiftJerk,
 }
 
 /// Holes of the recording within shifts.
@@ -357,6 +392,8 @@ impl<'c> LoggedDrive<'c> {
             converter: ConverterCheck::default(),
             still: StillCommands::default(),
             holes: Holes::default(),
+            carried: CarriedPressures::default(),
+            jerk: ShiftJerk::default(),
         }
     }
 
@@ -385,6 +422,8 @@ impl<'c> LoggedDrive<'c> {
                 self.speeds_rad_s[at] = value;
             }
         }
+        self.carried.push(input.dt_s, &estimate.valve_pa);
+        self.jerk.push(step);
         let GearCommand { from, to } = input.gear;
         self.passing.state(DriveState {
             time_s: step.time_s,
@@ -434,6 +473,7 @@ impl<'c> LoggedDrive<'c> {
         }
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
+        self.take_jerk();
         estimate
     }
 
@@ -476,6 +516,7 @@ impl<'c> LoggedDrive<'c> {
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;
+            self.jerk.begin(step);
             self.still.begin();
             let ratios = [from, to].map(|gear| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
             self.beyond = BeyondGears::new(&self.car.gearbox, [from, to], ratios);
@@ -486,8 +527,20 @@ impl<'c> LoggedDrive<'c> {
         self.beyond.push(&mut shift.quality, [turbine, output]);
         let found = estimate.clutches.filter(|found| Some(found.map(|clutch| clutch.element)) == elements);
         let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.deviation_n_m]);
-        let clutches = match (found, self.car.gearbox.has_ratios_alone()) {
-            (Some(found), _) => [0, 1].map(|c| clutch_row(&found[c], step.truth[c])),
+        let row = self.tables.tables().shift(from, to).copied();
+        let clutches = match (found.zip(row), self.car.gearbox.has_ratios_alone()) {
+            (Some((found, row)), _) => {
+                let pressures_pa = self.carried.pressures_pa(step, self.tables);
+                [0, 1].map(|c| {
+                    let [_, torque_n_m, slip_rad_s] = step.truth[c];
+                    let by_speeds = row.clutches[c].alpha * (turbine - row.clutches[c].ratio * output);
+                    let slips = [slip_rad_s, by_speeds];
+                    ClutchRow {
+                        alpha: row.clutches[c].alpha,
+                        ..clutch_row(&found[c], [pressures_pa[c], torque_n_m], slips)
+                    }
+                })
+            }
             (None, true) => {
                 let holds = [ShiftPhase::OffgoingHolds, ShiftPhase::OncomingHolds];
                 holds.map(|holds| ClutchRow::unknown(estimate.phase == Some(holds)))
@@ -513,10 +566,18 @@ impl<'c> LoggedDrive<'c> {
         if let Some(row) = self.tables.tables().shift(shift.from, shift.to).filter(|_| complete_s.is_some()) {
             self.still.end(row.clutches.map(|clutch| clutch.element));
         }
-        // A log has no acceleration of its own, and of the held elements no slip.
+        // A log has no slip of the held elements.
         let unknown =
             CarShiftQuality { jerk_m_s3: f64::NAN, held_slip_rad_s: f64::NAN, tie_up_n_m: f64::NAN, ..shift.quality };
         self.passing.end(CarShiftQuality { complete_s, ..unknown });
+        self.jerk.end(time_s);
+    }
+
+    /// Gives the jerk to the shift that ended last, some tenths of a second after its end.
+    fn take_jerk(&mut self) {
+        if let Some((jerk_m_s3, shift)) = self.jerk.ended().zip(self.passing.drive.shifts.last_mut()) {
+            shift.quality.jerk_m_s3 = jerk_m_s3;
+        }
     }
 
     /// Keeps what figures need of at most so many of the shifts up to now that are wanted, those with the largest errors, of equal
@@ -563,8 +624,15 @@ impl<'c> LoggedDrive<'c> {
     }
 }
 
-fn clutch_row(found: &ClutchEstimate<f64>, [pressure_pa, torque_n_m, slip_rad_s]: [f64; 3]) -> ClutchRow {
+/// The row of a clutch beside the pressure and torque that are known, with its true slip and that by the readings.
+fn clutch_row(
+    found: &ClutchEstimate<f64>,
+    [pressure_pa, torque_n_m]: [f64; 2],
+    [slip_rad_s, by_speeds]: [f64; 2],
+) -> ClutchRow {
     ClutchRow {
+        slip_rad_s: if slip_rad_s.is_nan() { by_speeds } else { slip_rad_s },
+        alpha: f64::NAN,
         torque_n_m: [torque_n_m, found.torque_n_m, found.open_loop_n_m],
         pressure_pa: [pressure_pa, found.pressure_pa, found.valve_pa],
         sticks: if slip_rad_s.is_nan() { found.holds } else { slip_rad_s.abs() < STICKS_RAD_S },

@@ -25,6 +25,13 @@ pub struct ShiftSummary {
     pub mean_pressure_pa: [Option<[f64; 3]>; 2],
     /// The same of the torque, N m.
     pub mean_torque_n_m: [Option<[f64; 3]>; 2],
+    /// Rows of the clutches with a measured pressure, and those of them in which it lies within its guaranteed range; of a shift whose true
+    /// torques are not known.
+    pub pressures: [u64; 2],
+    /// Friction work by clutch, and by the ends of the torque's range, J; the ends are not numbers where a row has no range.
+    pub friction_work_j: [Option<[f64; 3]>; 2],
+    /// Largest torque with which both clutches work against each other, at the turbine, N m, by the estimate.
+    pub tie_up_n_m: f64,
     /// Of a gearbox by its ratios alone: mean torque of the clutches together at the turbine in the inertia phase, and of its deviation, N m.
     pub mean_at_turbine_n_m: Option<[f64; 2]>,
 }
@@ -37,8 +44,12 @@ impl ShiftSummary {
             spans_s(rows, phase).iter().fold(0.0, |length_s, [from_s, to_s]| length_s + (to_s - from_s))
         };
         let with = |health: Health| rows.iter().filter(|row| row.health == health).count() as u64;
+        let has_truth = rows.iter().any(|row| row.clutches[0].torque_n_m[0].is_finite());
         Self {
-            has_truth: rows.iter().any(|row| row.clutches[0].torque_n_m[0].is_finite()),
+            has_truth,
+            pressures: if has_truth { [0; 2] } else { pressures(rows) },
+            friction_work_j: [0, 1].map(|clutch| friction_work_j(rows, clutch)),
+            tie_up_n_m: tie_up_n_m(rows),
             counts: counts(rows, &errors.unwrap_or_default()),
             errors,
             healths: Health::ALL.map(with),
@@ -82,6 +93,45 @@ pub(super) fn spans_s(rows: &[ShiftScoreRow], phase: TruePhase) -> Vec<[f64; 2]>
         }
     }
     spans
+}
+
+/// Rows of both clutches with a measured pressure, and those of them in which it lies within its range.
+fn pressures(rows: &[ShiftScoreRow]) -> [u64; 2] {
+    let clutches = rows.iter().flat_map(|row| row.clutches);
+    let measured = clutches.filter(|clutch| clutch.pressure_pa[0].is_finite());
+    measured.fold([0; 2], |[all, inside], clutch| [all + 1, inside + u64::from(clutch.in_range)])
+}
+
+/// Torque of a clutch times its slip over the shift, with the estimated torque and with the ends of its range, J; none where no slip is
+/// known.
+fn friction_work_j(rows: &[ShiftScoreRow], clutch: usize) -> Option<[f64; 3]> {
+    let power_w = |row: &ShiftScoreRow| {
+        let ClutchRow { torque_n_m: [_, torque, _], torque_range_n_m, slip_rad_s, sticks, .. } = row.clutches[clutch];
+        if sticks {
+            return (row.time_s, [0.0; 3]);
+        }
+        // Friction takes power and gives none.
+        let ends = torque_range_n_m.unwrap_or([f64::NAN; 2]).map(|n_m| n_m * slip_rad_s);
+        let [low, high] = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
+        let at_least_zero = |power: f64| if power < 0.0 { 0.0 } else { power };
+        (row.time_s, [torque * slip_rad_s, low, high].map(at_least_zero))
+    };
+    let shown = rows.iter().filter(|row| row.at_turbine_n_m.is_none());
+    let known: Vec<_> = shown.map(power_w).filter(|(_, [power, ..])| power.is_finite()).collect();
+    let work = known.windows(2).fold([0.0; 3], |work, pair| {
+        let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
+        core::array::from_fn(|end| work[end] + 0.5 * (to_s - from_s) * (from[end] + to[end]))
+    });
+    (known.len() > 1).then_some(work)
+}
+
+/// Largest torque with which both clutches work against each other, at the turbine, N m.
+fn tie_up_n_m(rows: &[ShiftScoreRow]) -> f64 {
+    let against = rows.iter().map(|row| {
+        let [off, on] = row.clutches.map(|clutch| clutch.alpha * clutch.torque_n_m[1]);
+        if off * on < 0.0 { off.abs().min(on.abs()) } else { off * on * 0.0 }
+    });
+    against.filter(|n_m| n_m.is_finite()).fold(f64::NAN, f64::max)
 }
 
 /// Rows of both phases in which a clutch slips, and those of them in which the speeds show nothing of its torque.

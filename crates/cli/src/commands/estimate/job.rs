@@ -229,8 +229,7 @@ fn report_shifts(shifts: &Shifts<'_>, say: &mut Messages) {
     const SHOWN: usize = 40;
     let (titles, rows) = shift_rows(&shifts.found, SHOWN);
     let more = shifts.found.len() - rows.len();
-    let table = std::iter::once(titles).chain(rows).collect::<Vec<_>>();
-    for line in output::lines(3, &table) {
+    for line in output::titled_lines(3, &titles, &rows) {
         say.note(&line);
     }
     if more > 0 {

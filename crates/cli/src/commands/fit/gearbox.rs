@@ -109,7 +109,7 @@ fn record_one(
     while let Some(step) = steps.next_step()? {
         recorder.push_reported(step.reported_n_m);
         recorder.push(step.time_s, &step.input);
-        recorder.push_pressure(step.time_s, step.truth.map(|[pressure_pa, ..]| pressure_pa));
+        recorder.push_pressure(step.time_s, step.shift_pressures(tables));
         count += 1;
         if count.is_multiple_of(STEPS) {
             bar.set_message(format!("reading {}, {:.0} s", log.display(), step.time_s));

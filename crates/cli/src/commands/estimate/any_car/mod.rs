@@ -213,12 +213,12 @@ fn write_page(
 
 /// The shifts as a table, and what was found.
 fn report(drive: &ScoredDrive, car: &Car, say: &mut Messages) {
-    let (titles, rows) = shift_rows(drive, car);
+    let (titles, mut rows) = shift_rows(drive, car);
     let more = rows.len().saturating_sub(SHOWN);
-    let head: Vec<String> = titles.into_iter().map(str::to_owned).collect();
-    let table: Vec<Vec<String>> = std::iter::once(head).chain(rows.into_iter().take(SHOWN)).collect();
-    if table.len() > 1 {
-        output::lines(3, &table).iter().for_each(|line| say.note(line));
+    rows.truncate(SHOWN);
+    let titles: Vec<String> = titles.into_iter().map(str::to_owned).collect();
+    if !rows.is_empty() {
+        output::titled_lines(3, &titles, &rows).iter().for_each(|line| say.note(line));
     }
     if more > 0 {
         say.note(&format!("and {more} more shifts"));
