@@ -670,7 +670,9 @@ fn clutch_panel(
         let value = |row: &ShiftScoreRow| of(&row.clutches[c]).1.map_or(f64::NAN, |range| range[end]);
         rows.iter().map(|row| (row.time_s, value(row))).collect()
     };
-    let mut series = vec![curve(0, "true", Stroke::TRUTH), curve(1, "filter", ESTIMATE)];
+    // A log may have a measured pressure, and then no torque.
+    let known = if rows.iter().any(|row| row.clutches[c].torque_n_m[0].is_finite()) { "true" } else { "measured" };
+    let mut series = vec![curve(0, known, Stroke::TRUTH), curve(1, "filter", ESTIMATE)];
     if !is_one_way(rows, c) {
         series.push(curve(2, "valve model", OPEN_LOOP));
     }
