@@ -6,6 +6,7 @@
 
 pub mod campaign;
 pub mod channels;
+mod command_delay;
 mod contradictions;
 mod converter_check;
 pub mod drive;

@@ -15,6 +15,7 @@ mod equations;
 mod fit;
 mod fit_gearbox;
 mod garage;
+mod late_commands;
 mod layshaft;
 mod learnt;
 #[cfg(unix)]

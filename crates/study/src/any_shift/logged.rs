@@ -15,6 +15,7 @@ use observer::{Health, Reading};
 use plant::car::{BeyondGears, CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
+use super::command_delay::CommandDelay;
 use super::contradictions::CommandCheck;
 use super::converter_check::ConverterCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
@@ -292,6 +293,7 @@ pub struct LoggedDrive<'c> {
     gear: Option<usize>,
     unannounced: u64,
     commands: CommandCheck<'c>,
+    delay: CommandDelay<'c>,
     converter: ConverterCheck,
     still: StillCommands,
     holes: Holes,
@@ -354,6 +356,7 @@ impl<'c> LoggedDrive<'c> {
             gear: None,
             unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
+            delay: CommandDelay::new(tables),
             converter: ConverterCheck::default(),
             still: StillCommands::default(),
             holes: Holes::default(),
@@ -374,7 +377,10 @@ impl<'c> LoggedDrive<'c> {
         if let Some(degc) = step.oil_degc {
             self.state.take_oil_temperature(degc);
         }
-        let estimate = self.filter.step(&mut self.state, input);
+        let mut estimate = self.filter.step(&mut self.state, input);
+        if self.delay.is_found() {
+            estimate.health = estimate.health.max(Health::CommandsMistimed);
+        }
         self.learning.push(self.state.learnt());
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
         let channels = [estimate.channels.engine, estimate.channels.turbine, estimate.channels.output];
@@ -434,6 +440,8 @@ impl<'c> LoggedDrive<'c> {
         }
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
+        let [_, turbine, output] = self.speeds_rad_s;
+        self.delay.push(step, &estimate, [turbine, output]);
         estimate
     }
 
@@ -512,6 +520,7 @@ impl<'c> LoggedDrive<'c> {
         let complete_s = (gear == shift.to).then_some(time_s - self.begun_s);
         if let Some(row) = self.tables.tables().shift(shift.from, shift.to).filter(|_| complete_s.is_some()) {
             self.still.end(row.clutches.map(|clutch| clutch.element));
+            self.delay.end([shift.from, shift.to], [self.begun_s, time_s]);
         }
         // A log has no acceleration of its own, and of the held elements no slip.
         let unknown =
@@ -531,6 +540,7 @@ impl<'c> LoggedDrive<'c> {
         self.end(f64::NAN, usize::MAX);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
         let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
+        warnings.extend(self.delay.warning());
         warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {
