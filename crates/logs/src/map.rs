@@ -66,8 +66,7 @@ impl Mapped {
     /// Its name in a map.
     pub fn key(&self) -> String {
         match (&self.element, self.role) {
-            (Some(element), Role::ElementDuty) => format!("element_{element}_duty"),
-            (Some(element), _) => format!("element_{element}_current"),
+            (Some(element), role) => role.name().replace("NAME", element),
             (None, role) => role.name().to_owned(),
         }
     }

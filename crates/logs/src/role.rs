@@ -55,6 +55,8 @@ pub enum Role {
     ElementCurrent,
     /// Duty cycle of the valve of an element of the gearbox, %: `element_a_duty`.
     ElementDuty,
+    /// Commanded pressure of an element of the gearbox, Pa: `element_a_pressure_command`.
+    ElementPressureCommand,
 }
 
 /// Role, its name in maps, what it measures, and its unit in readings.
@@ -84,6 +86,7 @@ const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
     (Role::LockUpApplied, "lock_up_applied", None, ""),
     (Role::ElementCurrent, "element_NAME_current", Some(Quantity::Current), "A"),
     (Role::ElementDuty, "element_NAME_duty", Some(Quantity::Share), "%"),
+    (Role::ElementPressureCommand, "element_NAME_pressure_command", Some(Quantity::Pressure), "Pa"),
 ];
 
 impl Role {
@@ -120,8 +123,12 @@ impl Role {
     /// The element of the gearbox that a name in a map is about, and its role: `element_a_current` is the current of `a`.
     pub fn of_element(name: &str) -> Option<(Self, &str)> {
         let rest = name.strip_prefix("element_")?;
-        let found = rest.strip_suffix("_current").map(|element| (Self::ElementCurrent, element));
-        let found = found.or_else(|| rest.strip_suffix("_duty").map(|element| (Self::ElementDuty, element)));
+        let endings = [
+            ("_current", Self::ElementCurrent),
+            ("_duty", Self::ElementDuty),
+            ("_pressure_command", Self::ElementPressureCommand),
+        ];
+        let found = endings.into_iter().find_map(|(ending, role)| Some((role, rest.strip_suffix(ending)?)));
         found.filter(|(_, element)| !element.is_empty())
     }
 
@@ -135,6 +142,7 @@ impl Role {
                 | Self::OffgoingDuty
                 | Self::ElementCurrent
                 | Self::ElementDuty
+                | Self::ElementPressureCommand
         )
     }
 
@@ -159,8 +167,9 @@ mod tests {
             assert_eq!(role as usize, i);
             assert_eq!(Role::parse(role.name()), Some(role));
         }
-        assert_eq!(Role::ElementDuty as usize, TABLE.len() - 1);
+        assert_eq!(Role::ElementPressureCommand as usize, TABLE.len() - 1);
         assert_eq!(Role::of_element("element_k1_duty"), Some((Role::ElementDuty, "k1")));
+        assert_eq!(Role::of_element("element_b_pressure_command"), Some((Role::ElementPressureCommand, "b")));
         assert_eq!(Role::of_element("element__current"), None);
     }
 }

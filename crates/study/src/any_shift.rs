@@ -18,6 +18,7 @@ pub mod logged;
 pub mod matrix;
 pub mod measured;
 mod nominal;
+pub mod pressure_command;
 pub mod recording;
 pub mod sensitivity;
 pub mod shift_summary;

@@ -25,6 +25,7 @@ mod long_logs;
 mod measured;
 mod other_cars;
 mod own_car;
+mod pressure_commands;
 mod studies;
 mod support;
 mod tables;

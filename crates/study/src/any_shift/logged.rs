@@ -23,6 +23,7 @@ use super::gear_signal::Gears;
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
+use super::pressure_command::{command_for, pressure_command_column};
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -99,8 +100,8 @@ struct Columns {
     lock_up: Option<usize>,
     gear: usize,
     target: usize,
-    /// Place in the filter's tables, and column.
-    commands: Vec<(usize, ReadingColumn)>,
+    /// Place in the filter's tables, column, and the element where the column has the pressure that is asked of it.
+    commands: Vec<(usize, ReadingColumn, Option<usize>)>,
     pedals: [Option<usize>; 2],
     vehicle: Option<usize>,
     oil: Option<usize>,
@@ -114,8 +115,12 @@ impl Columns {
         let require = |name: &str| ReadingColumn::require(rows, name);
         let commands = element_commands(car).into_iter().filter_map(|(element, name)| {
             let place = tables.place(element)?;
-            let age = rows.find(&command_age(&name));
-            Some(rows.require(&name).map(|value| (place, ReadingColumn { value, age })))
+            let found = |name: &str, value| ReadingColumn { value, age: rows.find(&command_age(name)) };
+            let pressure = pressure_command_column(&car.gearbox.elements[element].name);
+            Some(match (rows.find(&name), rows.find(&pressure)) {
+                (None, Some(value)) => Ok((place, found(&pressure, value), Some(element))),
+                _ => rows.require(&name).map(|value| (place, found(&name, value), None)),
+            })
         });
         let truth = |names: [&str; 3]| -> Option<[usize; 3]> {
             let places: Option<Vec<usize>> = names.iter().map(|name| rows.find(name)).collect();
@@ -204,6 +209,11 @@ impl<'c> CarLog<'c> {
         Ok(notes)
     }
 
+    /// Whether the table has the pressure that is asked of an element in place of the command of its valve.
+    pub fn has_pressure_command(&self, element: usize) -> bool {
+        self.columns.commands.iter().any(|(.., of_pressure)| *of_pressure == Some(element))
+    }
+
     /// Whether the table has a signal, of this name in SI, in its SI unit.
     pub fn is_in_si(&self, name: &str) -> bool {
         self.rows.find(name).is_none_or(|column| self.rows.factor(column) == 1.0)
@@ -218,8 +228,10 @@ impl<'c> CarLog<'c> {
         self.take_gears();
         let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
         let mut commands = [None; MAX_ELEMENTS];
-        for &(place, column) in &columns.commands {
-            commands[place] = column.read(rows, samples);
+        for &(place, column, of_pressure) in &columns.commands {
+            let read = column.read(rows, samples);
+            let command = |value: f64| of_pressure.map_or(value, |element| command_for(self.car, element, value));
+            commands[place] = read.map(|Reading { value, age_s }| Reading { value: command(value), age_s });
         }
         let reading = |column: Option<ReadingColumn>| column.and_then(|column| column.read(rows, samples));
         let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, reported_n_m] =
