@@ -76,18 +76,10 @@ pub(crate) fn learnt(car: &Car, input: &[u8]) {
             commands: [reading(share); MAX_ELEMENTS],
             gear,
         };
-        let (time_s, truth) = (0.01 * f64::from(row), [[f64::NAN; 3]; 2]);
-        let estimate = drive.push(&LogStep {
-            time_s,
-            input,
-            pedals: [0.0; 2],
-            vehicle_m_s: 10.0,
-            oil_degc: None,
-            reported_n_m: None,
-            speed_m_s: reading(10.0),
-            pressures: [reading(1e5 * share); MAX_ELEMENTS],
-            truth,
-        });
+        let pressures = [reading(1e5 * share); MAX_ELEMENTS];
+        let beside =
+            LogStep { vehicle_m_s: 10.0, speed_m_s: reading(10.0), ..LogStep::of(0.01 * f64::from(row), input) };
+        let estimate = drive.push(&LogStep { pressures, ..beside });
         assert!(estimate.valve_pa.iter().all(|pressure_pa| !pressure_pa.is_infinite()));
     }
     // What is written is read again.

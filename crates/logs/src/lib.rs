@@ -15,6 +15,7 @@ mod csv_dialect;
 pub mod csv_log;
 pub mod error;
 pub mod frozen;
+mod in_order;
 pub mod inspect;
 pub mod log;
 pub mod map;

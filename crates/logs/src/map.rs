@@ -39,6 +39,8 @@ pub struct Mapped {
     pub offset: f64,
     /// How much earlier than its time stamp a value was measured, s.
     pub delay_s: f64,
+    /// By how much its time stamps are too late against those of the other channels, s; negative: too early.
+    pub late_s: f64,
     /// Least and greatest value in the unit; others are not used.
     pub valid_range: Option<[f64; 2]>,
 }
@@ -56,6 +58,7 @@ impl Mapped {
             scale: 1.0,
             offset: 0.0,
             delay_s: 0.0,
+            late_s: 0.0,
             valid_range: None,
         }
     }
@@ -131,6 +134,8 @@ struct RawChannel {
     offset: f64,
     #[serde(default)]
     delay_s: f64,
+    #[serde(default)]
+    late_s: f64,
     valid_range: Option<[f64; 2]>,
 }
 
@@ -233,6 +238,9 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
     if !(0.0..=10.0).contains(&raw.delay_s) {
         return Err(format!("{} is {}, expected 0 to 10", key("delay_s"), raw.delay_s));
     }
+    if !(-10.0..=10.0).contains(&raw.late_s) {
+        return Err(format!("{} is {}, expected -10 to 10", key("late_s"), raw.late_s));
+    }
     if let Some([least, greatest]) = raw.valid_range
         && (least >= greatest || least.is_nan() || greatest.is_nan())
     {
@@ -248,6 +256,7 @@ fn mapped(role: &str, raw: RawChannel) -> Result<Mapped, String> {
         scale: finite(raw.scale, "scale")?,
         offset: finite(raw.offset, "offset")?,
         delay_s: raw.delay_s,
+        late_s: raw.late_s,
         valid_range: raw.valid_range,
     })
 }

@@ -8,6 +8,7 @@
 //! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
 use crate::frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
+use crate::in_order::InOrder;
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Finding, Likely, Seen};
 use crate::samples::{Quality, QualityCounts};
@@ -20,7 +21,7 @@ pub struct Reading {
     pub role: Role,
     /// When it was measured, s: its time stamp less the delay of the map.
     pub time_s: f64,
-    /// Its time stamp, s; rising for each role.
+    /// Its time stamp less `late_s` of the map, s; rising for each role.
     pub stamp_s: f64,
     /// The value in the unit of the role.
     pub value: f64,
@@ -61,6 +62,8 @@ pub struct Readings<'a> {
     /// Roles that the last sample still has to be given to.
     pending: Vec<(usize, usize)>,
     sample: Option<crate::Sample>,
+    /// What is held back where stamps are moved.
+    in_order: Option<InOrder>,
     /// Place of the last reading's entry in the map.
     entry: usize,
     speeds: Speeds,
@@ -84,6 +87,7 @@ impl<'a> Readings<'a> {
             }
         }
         let wanted: Vec<usize> = (0..users.len()).filter(|&i| !users[i].is_empty()).collect();
+        let in_order = InOrder::of(&resolved);
         let roles = resolved.into_iter().map(|resolved| Channels {
             parts: vec![None; resolved.channels.len()],
             parts_s: f64::NAN,
@@ -99,6 +103,7 @@ impl<'a> Readings<'a> {
             users,
             pending: Vec::new(),
             sample: None,
+            in_order,
             entry: 0,
             speeds: NO_SPEEDS,
             is_reverse: false,
@@ -225,7 +230,8 @@ impl<'a> Readings<'a> {
         if quality == Quality::Good && kind == Role::EngineFrictionTorque {
             self.friction_n_m = Some(value);
         }
-        let time_s = sample.time_s - entry.delay_s;
+        let stamp_s = sample.time_s - entry.late_s;
+        let time_s = stamp_s - entry.delay_s;
         if quality == Quality::Good && kind.is_speed() {
             if channels.frozen.is_frozen(value, sample.time_s, &self.speeds) {
                 quality = Quality::Frozen;
@@ -243,7 +249,7 @@ impl<'a> Readings<'a> {
         // In reverse the car goes backwards: the sign of these speeds says nothing.
         let is_backwards = self.is_reverse && matches!(kind, Role::OutputSpeed | Role::WheelSpeed);
         channels.extremes.push(if is_backwards { value.abs() } else { value });
-        Some(Reading { role: kind, time_s, stamp_s: sample.time_s, value })
+        Some(Reading { role: kind, time_s, stamp_s, value })
     }
 }
 
@@ -252,15 +258,29 @@ impl Iterator for Readings<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
+            let newest_s = self.sample.map_or(f64::NEG_INFINITY, |sample| sample.time_s);
+            if let Some((entry, reading)) = self.in_order.as_mut().and_then(|waiting| waiting.next(newest_s)) {
+                self.entry = entry;
+                return Some(Ok(reading));
+            }
             while let (Some(user), Some(sample)) = (self.pending.pop(), self.sample) {
-                if let Some(reading) = self.take(user, &sample) {
-                    self.entry = user.0;
-                    return Some(Ok(reading));
+                let Some(reading) = self.take(user, &sample) else { continue };
+                match &mut self.in_order {
+                    Some(waiting) => waiting.push(user.0, reading),
+                    None => {
+                        self.entry = user.0;
+                        return Some(Ok(reading));
+                    }
                 }
             }
-            match self.samples.next()? {
-                Err(error) => return Some(Err(error)),
-                Ok(sample) => {
+            match self.samples.next() {
+                None => {
+                    let (entry, reading) = self.in_order.as_mut()?.next(f64::INFINITY)?;
+                    self.entry = entry;
+                    return Some(Ok(reading));
+                }
+                Some(Err(error)) => return Some(Err(error)),
+                Some(Ok(sample)) => {
                     self.pending.extend_from_slice(&self.users[sample.channel]);
                     self.sample = Some(sample);
                 }

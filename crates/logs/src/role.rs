@@ -57,6 +57,8 @@ pub enum Role {
     ElementDuty,
     /// Measured pressure of an element of the gearbox, Pa: `element_a_pressure`.
     ElementPressure,
+    /// Commanded pressure of an element of the gearbox, Pa: `element_a_pressure_command`.
+    ElementPressureCommand,
 }
 
 /// Role, its name in maps, what it measures, and its unit in readings.
@@ -87,6 +89,7 @@ const TABLE: &[(Role, &str, Option<Quantity>, &str)] = &[
     (Role::ElementCurrent, "element_NAME_current", Some(Quantity::Current), "A"),
     (Role::ElementDuty, "element_NAME_duty", Some(Quantity::Share), "%"),
     (Role::ElementPressure, "element_NAME_pressure", Some(Quantity::Pressure), "Pa"),
+    (Role::ElementPressureCommand, "element_NAME_pressure_command", Some(Quantity::Pressure), "Pa"),
 ];
 
 impl Role {
@@ -123,9 +126,13 @@ impl Role {
     /// The element of the gearbox that a name in a map is about, and its role: `element_a_current` is the current of `a`.
     pub fn of_element(name: &str) -> Option<(Self, &str)> {
         let rest = name.strip_prefix("element_")?;
-        let kinds =
-            [("_current", Self::ElementCurrent), ("_duty", Self::ElementDuty), ("_pressure", Self::ElementPressure)];
-        let found = kinds.into_iter().find_map(|(end, role)| rest.strip_suffix(end).map(|element| (role, element)));
+        let endings = [
+            ("_current", Self::ElementCurrent),
+            ("_duty", Self::ElementDuty),
+            ("_pressure", Self::ElementPressure),
+            ("_pressure_command", Self::ElementPressureCommand),
+        ];
+        let found = endings.into_iter().find_map(|(ending, role)| Some((role, rest.strip_suffix(ending)?)));
         found.filter(|(_, element)| !element.is_empty())
     }
 
@@ -139,6 +146,7 @@ impl Role {
                 | Self::OffgoingDuty
                 | Self::ElementCurrent
                 | Self::ElementDuty
+                | Self::ElementPressureCommand
         )
     }
 
@@ -163,8 +171,9 @@ mod tests {
             assert_eq!(role as usize, i);
             assert_eq!(Role::parse(role.name()), Some(role));
         }
-        assert_eq!(Role::ElementPressure as usize, TABLE.len() - 1);
+        assert_eq!(Role::ElementPressureCommand as usize, TABLE.len() - 1);
         assert_eq!(Role::of_element("element_k1_duty"), Some((Role::ElementDuty, "k1")));
+        assert_eq!(Role::of_element("element_b_pressure_command"), Some((Role::ElementPressureCommand, "b")));
         assert_eq!(Role::of_element("element__current"), None);
     }
 }

@@ -94,19 +94,27 @@ const WHOLE_GEARBOX: usize = 3;
 /// The element whose valve has this command, and the role; none if the channel is no such command.
 fn element(channel: &Channel) -> Option<(Role, String)> {
     const ELEMENT: &[&str] = &["element", "brake", "bremse", "elem"];
-    const UNITS: [&str; 2] = ["a", "ma"];
+    const PRESSURE: &[&str] = &["pressure", "druck", "p", "prs", "press"];
+    const COMMAND: &[&str] =
+        &["command", "cmd", "commanded", "set", "setpoint", "des", "desired", "soll", "target", "req"];
+    const UNITS: [&str; 7] = ["a", "ma", "pa", "kpa", "mpa", "bar", "psi"];
     let name = channel.name.to_lowercase();
     let own = name.strip_prefix("element_").and_then(|rest| {
         let current = ["_current_a", "_current_ma"].into_iter().find_map(|ending| rest.strip_suffix(ending));
-        let duty = || rest.strip_suffix("_duty_percent");
-        current.map(|name| (Role::ElementCurrent, name)).or_else(|| Some((Role::ElementDuty, duty()?)))
+        let duty = || Some((Role::ElementDuty, rest.strip_suffix("_duty_percent")?));
+        let pressure = || Some((Role::ElementPressureCommand, rest.split_once("_pressure_command")?.0));
+        current.map(|name| (Role::ElementCurrent, name)).or_else(duty).or_else(pressure)
     });
     if let Some((role, name)) = own {
         return Some((role, name.to_owned()));
     }
     let words = words(&channel.name);
     let is_about = |list: &[&str]| met(list, &words);
-    let unit = Unit::parse(&channel.unit).filter(|unit| unit.quantity == Quantity::Current)?;
+    let role = match Unit::parse(&channel.unit)?.quantity {
+        Quantity::Current => Role::ElementCurrent,
+        Quantity::Pressure => Role::ElementPressureCommand,
+        _ => return None,
+    };
     // `I_A`, `I_K1`: a current and a letter, with or without a number.
     let is_lettered = match &words[..] {
         [i, letter, number @ ..] => {
@@ -115,34 +123,44 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         }
         _ => false,
     };
-    let is_command = is_lettered || is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT));
-    if unit.quantity != Quantity::Current
-        || !is_command
-        || is_about(&["line", "tcc", "lockup", "battery", "off", "offgoing", "oncoming"])
-    {
+    let is_command = match role {
+        Role::ElementCurrent => is_lettered || is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT)),
+        _ => is_about(PRESSURE) && is_about(COMMAND),
+    };
+    const OTHERS: &[&str] = &[
+        "line", "tcc", "lockup", "battery", "off", "offgoing", "oncoming", "main", "sys", "system", "oil", "fuel",
+        "rail", "boost", "air",
+    ];
+    if !is_command || is_about(OTHERS) {
         return None;
     }
     let is_name = |word: &&String| {
         let word = std::slice::from_ref(*word);
-        ![CURRENT, CLUTCH, ELEMENT, TARGET, ACTUAL].iter().any(|list| met(list, word))
+        ![CURRENT, CLUTCH, ELEMENT, TARGET, ACTUAL, PRESSURE, COMMAND].iter().any(|list| met(list, word))
     };
     let mut named: Vec<&str> = words.iter().filter(is_name).map(String::as_str).collect();
     if named.len() > 1 && named.last().is_some_and(|word| UNITS.contains(word)) {
         named.pop();
     }
     let name = named.concat();
-    (1..=3).contains(&name.len()).then_some((Role::ElementCurrent, name))
+    (1..=3).contains(&name.len()).then_some((role, name))
 }
 
 /// The commands of the elements of a whole gearbox: their keys in a map, and their channels. None if there are but a few, or two
 /// with one key.
 fn elements(channels: &[Channel]) -> Vec<(String, usize)> {
-    let key = |(at, channel)| {
-        let (role, name) = element(channel)?;
-        let what = if role == Role::ElementDuty { "duty" } else { "current" };
-        Some((format!("element_{name}_{what}"), at))
+    let commands: Vec<(Role, String, usize)> = channels
+        .iter()
+        .enumerate()
+        .filter_map(|(at, channel)| element(channel).map(|(role, name)| (role, name, at)))
+        .collect();
+    // The command of the valve itself is better than the pressure that is asked for.
+    let is_best = |(role, name, _): &&(Role, String, usize)| {
+        let is_other = |(other, of, _): &(Role, String, usize)| *other != Role::ElementPressureCommand && of == name;
+        *role != Role::ElementPressureCommand || !commands.iter().any(is_other)
     };
-    let found: Vec<(String, usize)> = channels.iter().enumerate().filter_map(key).collect();
+    let best = commands.iter().filter(is_best);
+    let found: Vec<(String, usize)> = best.map(|(role, name, at)| (role.name().replace("NAME", name), *at)).collect();
     let keys: std::collections::BTreeSet<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
     if keys.len() == found.len() && found.len() >= WHOLE_GEARBOX { found } else { Vec::new() }
 }
@@ -189,7 +207,7 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
         );
     }
     for (key, at) in &elements {
-        let role = if key.ends_with("duty") { Role::ElementDuty } else { Role::ElementCurrent };
+        let role = Role::of_element(key).map_or(Role::ElementCurrent, |(role, _)| role);
         text += &table_of(key, role, *at, channels);
     }
     let perhaps = channels.iter().zip(&taken).filter(|(channel, taken)| !**taken && element(channel).is_some());

@@ -146,6 +146,36 @@ fn scale_offset_delay_and_range_of_the_map_count_in_this_order() {
     assert!((read[1].time_s - 0.0).abs() < 1e-12 && (read[1].stamp_s - 0.02).abs() < 1e-12);
 }
 
+/// A channel whose stamps are said to be late or early stands beside those of its time, and no reading is lost.
+#[test]
+fn stamps_that_are_late_or_early_are_moved() {
+    let mut text = "time_s,n_rpm,m_rpm,k_rpm\n".to_owned();
+    (0..50).for_each(|row| writeln!(text, "{1:.2},{0},{0},{0}", 1000 + row, 0.01 * f64::from(row)).unwrap());
+    let channel =
+        |role: &str, name: &str, late_s: f64| format!("[channel.{role}]\nname = \"{name}\"\nlate_s = {late_s}\n");
+    let folder = Folder::new("late");
+    let map = [
+        channel("engine_speed", "n_rpm", 0.1),
+        channel("turbine_speed", "m_rpm", 0.0),
+        channel("wheel_speed", "k_rpm", -0.05),
+    ];
+    let map = ChannelMap::read(&folder.write("map.toml", map.concat())).unwrap();
+    let (read, ..) = readings(&text, &map).unwrap();
+    assert_eq!(read.len(), 150);
+    assert!(read.windows(2).all(|pair| pair[0].stamp_s <= pair[1].stamp_s));
+    let mut log = Log::open(&folder.write("log.csv", &text), &map.open).unwrap();
+    let steps = Steps::new(Readings::new(&mut log, &map).unwrap()).collect::<Result<Vec<_>, _>>().unwrap();
+    let row = |reading: Option<observer::Reading<f64>>| {
+        reading.map(|reading| (reading.value / 0.104_719_755_119_659_77).round())
+    };
+    let step = steps.iter().find(|step| (step.time_s - 0.2).abs() < 1e-6).unwrap();
+    assert_eq!(
+        [step.input.engine_rad_s, step.input.turbine_rad_s, step.input.wheel_rad_s].map(row),
+        [Some(1030.0), Some(1020.0), Some(1015.0)]
+    );
+    assert!(step.input.engine_rad_s.is_some_and(|reading| reading.age_s.abs() < 1e-9));
+}
+
 #[test]
 fn parts_count_where_all_of_them_came() {
     let folder = Folder::new("parts");
@@ -242,6 +272,7 @@ fn a_wrong_map_is_refused_with_its_key() {
         ("[channel.gear]\n", "`channel.gear.name` or `channel.gear.names` must say the channel"),
         ("[channel.gear]\nnames = [\"a\", \"b\"]\n", "`channel.gear.combine` is missing"),
         ("[channel.gear]\nname = \"a\"\nscale = 0\n", "`channel.gear.scale` is 0"),
+        ("[channel.gear]\nname = \"a\"\nlate_s = -11\n", "`channel.gear.late_s` is -11, expected -10 to 10"),
         ("[channel.gear]\nname = \"a\"\ndelay_s = 100\n", "`channel.gear.delay_s` is 100, expected 0 to 10"),
         ("[channel.gear]\nname = \"a\"\nvalid_range = [1, nan]\n", "`channel.gear.valid_range` is [1, NaN]"),
         ("[gearbox]\nratios = [1.0, 2.0]\n", "`gearbox.ratios`: 1 is followed by 2, expected falling ratios"),

@@ -200,6 +200,9 @@ pub enum Health {
     OutsideRange,
     /// The estimate was outside its guaranteed range, and is the nearest end of it.
     LimitedToRange,
+    /// Over many shifts the valve commands have come late or early against the speeds: the guaranteed ranges do not hold. No observer says
+    /// this, which needs the time after a shift; what reads a whole log does.
+    CommandsMistimed,
     /// The valve command is unusable: the last usable command is used.
     CommandRejected,
     /// The pressure of the observer is below zero or above the highest pressure of the supply: the estimate is that
@@ -225,13 +228,14 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
         Self::Flare,
         Self::OutsideRange,
         Self::LimitedToRange,
+        Self::CommandsMistimed,
         Self::CommandRejected,
         Self::PressureLimited,
         Self::TooSlow,
@@ -252,6 +256,7 @@ impl Health {
             Self::Flare => "flare",
             Self::OutsideRange => "outside_range",
             Self::LimitedToRange => "limited_to_range",
+            Self::CommandsMistimed => "commands_mistimed",
             Self::CommandRejected => "command_rejected",
             Self::PressureLimited => "pressure_limited",
             Self::HeldClutchSlips => "held_clutch_slips",

@@ -33,6 +33,9 @@ pub fn health_meaning(health: Health) -> &'static str {
         Health::LimitedToRange => {
             "an estimate outside its guaranteed range, replaced by the nearest end: the observer has a large error, or the car is outside its error budget"
         }
+        Health::CommandsMistimed => {
+            "commands that come late or early against the speeds: the guaranteed ranges do not hold"
+        }
         Health::CommandRejected => "an unusable valve command: the last usable command is used",
         Health::PressureLimited => "a pressure outside 0 to `pressure_max_pa`: the estimate is that limit",
         Health::TooSlow => "the gearbox output turns too slowly to be read: the estimate is from the valve model alone",

@@ -6,6 +6,7 @@
 
 pub mod campaign;
 pub mod channels;
+mod command_delay;
 mod contradictions;
 mod converter_check;
 pub mod drive;
@@ -18,6 +19,7 @@ pub mod logged;
 pub mod matrix;
 pub mod measured;
 mod nominal;
+pub mod pressure_command;
 pub mod recording;
 pub mod sensitivity;
 pub mod shift_summary;

@@ -303,6 +303,7 @@ fn has_command(map: &ChannelMap) -> bool {
         Role::OncomingPressureCommand,
         Role::ElementCurrent,
         Role::ElementDuty,
+        Role::ElementPressureCommand,
     ];
     commands.into_iter().any(|role| map.has(role))
 }

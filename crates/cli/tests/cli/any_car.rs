@@ -11,8 +11,17 @@ fn vehicle(name: &str) -> String {
 
 /// A folder with the signals of a simulated drive of the four-speed car.
 pub(super) fn simulated(name: &str) -> Folder {
+    of_drive(name, DRIVE)
+}
+
+/// The same drive twice.
+pub(super) fn simulated_twice(name: &str) -> Folder {
+    of_drive(name, &DRIVE.replacen("[[", "repetitions = 2\n[[", 1))
+}
+
+fn of_drive(name: &str, drive: &str) -> Folder {
     let folder = Folder::new(name);
-    let drive = folder.write("drive.toml", DRIVE);
+    let drive = folder.write("drive.toml", drive);
     let (car, out) = (vehicle("four_speed"), folder.path("sim"));
     said(&wetclutch(&["simulate", &drive, "--vehicle", &car, "-o", &out]));
     folder

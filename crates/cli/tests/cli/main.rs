@@ -15,6 +15,7 @@ mod equations;
 mod fit;
 mod fit_gearbox;
 mod garage;
+mod late_commands;
 mod layshaft;
 mod learnt;
 #[cfg(unix)]
@@ -25,6 +26,7 @@ mod measured;
 mod measured_pressures;
 mod other_cars;
 mod own_car;
+mod pressure_commands;
 mod studies;
 mod support;
 mod tables;

@@ -193,3 +193,27 @@ fn a_name_with_quotation_marks_stays_a_name() {
     let found = suggested(&[channel("Engine \"speed\" \\ n", "rpm")]);
     assert_eq!(found, [("engine_speed".to_owned(), "Engine \"speed\" \\ n".to_owned())]);
 }
+
+#[test]
+fn pressures_that_are_asked_of_elements_are_commands_of_a_gearbox() {
+    let named = [
+        ("P_cmd_B", "bar", "element_b_pressure_command"),
+        ("pressure_command_C", "kPa", "element_c_pressure_command"),
+        ("Druck_Soll_K1", "mbar", "element_k1_pressure_command"),
+        ("Druck_Soll_E", "bar", "element_e_pressure_command"),
+        ("element_d_pressure_command_bar", "bar", "element_d_pressure_command"),
+        ("P_act_B", "bar", ""),
+        ("line_pressure_cmd", "bar", ""),
+        ("P_cmd_A", "bar", ""),
+        ("I_A", "mA", "element_a_current"),
+    ];
+    let channels: Vec<Channel> = named.iter().map(|(name, unit, _)| channel(name, unit)).collect();
+    let mut wanted: Vec<(String, String)> = named
+        .iter()
+        .filter(|(.., role)| !role.is_empty())
+        .map(|(name, _, role)| ((*role).to_owned(), (*name).to_owned()))
+        .collect();
+    wanted.sort();
+    let found = suggested(&channels).into_iter().filter(|(role, _)| role.starts_with("element_"));
+    assert_eq!(found.collect::<Vec<_>>(), wanted);
+}

@@ -13,6 +13,7 @@ use plant::car::NO_GEAR;
 
 use super::gear_signal::Gears;
 use super::logged::{LogStep, element_column, element_commands, element_pressures};
+use super::pressure_command::{command_for, pressure_command_column};
 
 /// The newest reading of each entry of a map since the step before.
 #[derive(Debug, Clone)]
@@ -42,13 +43,20 @@ impl Places for Newest {
     }
 }
 
+/// An entry of the map.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    role: Role,
+    /// The element that it is the command of, in the gearbox and in the filter's tables.
+    element: Option<(usize, Option<usize>)>,
+}
+
 /// A log by its channel map, step by step.
 pub struct CarChannels<'a> {
     car: &'a Car,
     tables: &'a ShiftTables<f64>,
     steps: Steps<'a, Newest>,
-    /// Role of each entry, and the place in the filter's tables where it is the command of an element.
-    entries: Vec<(Role, Option<usize>)>,
+    entries: Vec<Entry>,
     gears: Gears,
     lock_up_applied: bool,
     pedal: f64,
@@ -103,7 +111,7 @@ impl<'a> CarChannels<'a> {
         let (mut commands, mut pressures) = ([None; MAX_ELEMENTS], [None; MAX_ELEMENTS]);
         let (mut of_role, mut of_car, mut oncoming) = ([None; 5], None, [None; 2]);
         let mut changed_gear = [None; 2];
-        for ((role, place), reading) in self.entries.iter().zip(&readings) {
+        for (Entry { role, element }, reading) in self.entries.iter().zip(&readings) {
             let Some(reading) = reading else { continue };
             let measured = Measured { value: reading.value, age_s: (time_s - reading.time_s).max(0.0) };
             match role {
@@ -124,13 +132,16 @@ impl<'a> CarChannels<'a> {
                 Role::OncomingPressure => oncoming[0] = Some(measured),
                 Role::OncomingTorque => oncoming[1] = Some(measured),
                 Role::ElementPressure => {
-                    if let Some(place) = place {
-                        pressures[*place] = Some(measured);
+                    if let Some((_, Some(place))) = *element {
+                        pressures[place] = Some(measured);
                     }
                 }
                 _ => {
-                    if let Some(place) = place {
-                        commands[*place] = Some(measured);
+                    if let Some((element, Some(place))) = *element {
+                        let is_pressure = *role == Role::ElementPressureCommand;
+                        let value =
+                            if is_pressure { command_for(self.car, element, measured.value) } else { measured.value };
+                        commands[place] = Some(Measured { value, ..measured });
                     }
                 }
             }
@@ -173,44 +184,44 @@ impl<'a> CarChannels<'a> {
     }
 }
 
-/// Role of an entry, and the place in the filter's tables of the element that it is the command of.
-fn entry_of(entry: &Mapped, car: &Car, tables: &ShiftTables<f64>) -> Result<(Role, Option<usize>), LogError> {
-    let Some(element) = &entry.element else { return Ok((entry.role, None)) };
+/// An entry with the element that it is the command of.
+fn entry_of(entry: &Mapped, car: &Car, tables: &ShiftTables<f64>) -> Result<Entry, LogError> {
+    let Some(element) = &entry.element else { return Ok(Entry { role: entry.role, element: None }) };
     let column = format!("element_{element}");
     let at = car.gearbox.elements.iter().position(|known| element_column(&known.name) == column);
     let clutch = at.and_then(|at| car.clutches.get(at)?.as_ref());
-    if entry.role == Role::ElementPressure {
-        return at.and_then(|at| tables.place(at)).map(|place| (entry.role, Some(place))).ok_or_else(|| {
-            let names = element_pressures(car).filter(|(at, _)| tables.place(*at).is_some());
-            let names = names.map(|(_, name)| key_of(&name)).collect::<Vec<_>>().join(", ");
-            LogError::map(format!(
-                "the channel map has {}, which is no clutch or brake of this gearbox with a valve\nhint: the pressures are {names}",
-                entry.key()
-            ))
-        });
-    }
+    let is_measured = entry.role == Role::ElementPressure;
     let Some((at, clutch)) = at.zip(clutch) else {
-        let names = element_commands(car).into_iter().map(|(_, name)| key_of(&name)).collect::<Vec<_>>().join(", ");
+        let commands = || element_commands(car).into_iter().map(|(_, name)| name).collect::<Vec<_>>();
+        let (what, names) = if is_measured {
+            ("pressures", element_pressures(car).map(|(_, name)| name).collect())
+        } else {
+            ("commands", commands())
+        };
+        let names = names.iter().map(|name| key_of(name)).collect::<Vec<_>>().join(", ");
         return Err(LogError::map(format!(
-            "the channel map has {}, which is no clutch or brake of this gearbox\nhint: the commands are {names}",
+            "the channel map has {}, which is no clutch or brake of this gearbox\nhint: the {what} are {names}",
             entry.key()
         )));
     };
+    if is_measured {
+        return Ok(Entry { role: entry.role, element: Some((at, tables.place(at))) });
+    }
     let wanted = match clutch.valve.command_kind() {
         CommandKind::Current => Role::ElementCurrent,
         CommandKind::DutyCycle => Role::ElementDuty,
     };
-    if entry.role != wanted {
+    if entry.role != wanted && entry.role != Role::ElementPressureCommand {
         let hint = match wanted {
             Role::ElementDuty => format!("element_{element}_duty, in %"),
             _ => format!("element_{element}_current, in A"),
         };
         return Err(LogError::map(format!(
-            "the channel map has {}, and the command of this valve is another\nhint: it is {hint}",
+            "the channel map has {}, and the command of this valve is another\nhint: it is {hint}, or element_{element}_pressure_command",
             entry.key()
         )));
     }
-    Ok((entry.role, tables.place(at)))
+    Ok(Entry { role: entry.role, element: Some((at, tables.place(at))) })
 }
 
 /// The name in a map of the command whose column in a table is called so.
@@ -225,15 +236,25 @@ fn require(map: &ChannelMap, car: &Car, tables: &ShiftTables<f64>) -> Result<(),
     let commands = element_commands(car).into_iter().filter(|(at, _)| tables.place(*at).is_some());
     let keys: Vec<String> =
         needed.iter().map(|role| role.name().to_owned()).chain(commands.map(|(_, name)| key_of(&name))).collect();
-    let missing: Vec<&str> =
-        keys.iter().filter(|key| map.channels.iter().all(|entry| entry.key() != **key)).map(String::as_str).collect();
+    let has = |key: &str| map.channels.iter().any(|entry| entry.key() == key);
+    let pressure_of = |key: &str| {
+        Role::of_element(key).map(|(_, element)| Role::ElementPressureCommand.name().replace("NAME", element))
+    };
+    let both = keys.iter().find_map(|key| Some((key, pressure_of(key).filter(|pressure| has(key) && has(pressure))?)));
+    if let Some((key, pressure)) = both {
+        return Err(LogError::map(format!(
+            "the channel map has {key} and {pressure}, which are commands of one valve\nhint: leave {pressure} out: the command of the valve itself is better"
+        )));
+    }
+    let is_there = |key: &str| has(key) || pressure_of(key).is_some_and(|pressure| has(&pressure));
+    let missing: Vec<&str> = keys.iter().map(String::as_str).filter(|key| !is_there(key)).collect();
     if missing.is_empty() {
         return Ok(());
     }
     if !car.gearbox.has_ratios_alone() && !map.channels.iter().any(|entry| entry.role.is_command()) {
         return Err(LogError::map(format!(
             "the channel map has no command of a valve: without them no pressure can be estimated\nhint: an estimate of this car needs {}; add \
-             `[channel.NAME]` for each if the log has them. Without them, `wetclutch inspect` with the map and --shifts finds the shifts, and with -o \
+             `[channel.NAME]` for each if the log has them, or element_NAME_pressure_command where it has the pressure that is asked of an element. Without them, `wetclutch inspect` with the map and --shifts finds the shifts, and with -o \
              PAGE.html fits the converter and gives the torque at the turbine",
             keys.join(", ")
         )));
@@ -320,9 +341,13 @@ pub fn own_map(log: &Log, car: &Car) -> Option<ChannelMap> {
         let Some((role, element)) = Role::of_element(&key) else { continue };
         map.channels.extend(of(role, Some(element.to_owned()), &name));
     }
-    for (_, name) in element_commands(car) {
+    for (at, name) in element_commands(car) {
         let (role, element) = Role::of_element(&key_of(&name)).map(|(role, element)| (role, element.to_owned()))?;
-        map.channels.extend(of(role, Some(element), &name));
+        let command = of(role, Some(element.clone()), &name);
+        let pressure = || {
+            of(Role::ElementPressureCommand, Some(element), &pressure_command_column(&car.gearbox.elements[at].name))
+        };
+        map.channels.extend(command.or_else(pressure));
     }
     [Role::TurbineSpeed, Role::Gear].into_iter().all(|role| map.has(role)).then_some(map)
 }

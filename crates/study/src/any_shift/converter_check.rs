@@ -100,17 +100,7 @@ mod tests {
                 gear: GearCommand { from: 1, to: 1 },
             };
             let reported_n_m = (row % 4 == 0).then(|| Reading::now(share * torque));
-            let step = LogStep {
-                time_s,
-                input,
-                pedals: [f64::NAN; 2],
-                vehicle_m_s: f64::NAN,
-                oil_degc: None,
-                reported_n_m,
-                speed_m_s: None,
-                pressures: [None; MAX_ELEMENTS],
-                truth: [[f64::NAN; 3]; 2],
-            };
+            let step = LogStep { reported_n_m, ..LogStep::of(time_s, input) };
             check.push(&car, &step, [engine, turbine]);
         }
         check.warning(&car)

@@ -137,6 +137,7 @@ fn is_usable(health: Health) -> bool {
         | Health::Flare
         | Health::OutsideRange
         | Health::LimitedToRange
+        | Health::CommandsMistimed
         | Health::PressureLimited => true,
         Health::CommandRejected
         | Health::TooSlow

@@ -15,6 +15,7 @@ use observer::{Health, Reading};
 use plant::car::{BeyondGears, CarShiftQuality, NO_GEAR};
 use trace::{CsvRows, TraceError, signal};
 
+use super::command_delay::CommandDelay;
 use super::contradictions::CommandCheck;
 use super::converter_check::ConverterCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
@@ -23,6 +24,7 @@ pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
 use super::log_beside::{CarriedPressures, ShiftJerk};
+use super::pressure_command::{command_for, pressure_command_column};
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -54,8 +56,9 @@ pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
 
 /// The columns with the measured pressures of the elements: element of the gearbox, and name.
 pub fn element_pressures(car: &Car) -> impl Iterator<Item = (usize, String)> + '_ {
-    let elements = car.gearbox.elements.iter().enumerate();
-    elements.map(|(at, element)| (at, format!("{}_pressure_pa", element_column(&element.name))))
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
+    let pressed = elements.filter(|(_, (_, clutch))| clutch.is_some());
+    pressed.map(|(at, (element, _))| (at, format!("{}_pressure_pa", element_column(&element.name))))
 }
 
 /// The column with the age of a command or a pressure: how long before its row it was read, s.
@@ -105,9 +108,9 @@ struct Columns {
     lock_up: Option<usize>,
     gear: usize,
     target: usize,
-    /// Place in the filter's tables, and column.
-    commands: Vec<(usize, ReadingColumn)>,
-    /// The same of measured pressures.
+    /// Place in the filter's tables, column, and the element where the column has the pressure that is asked of it.
+    commands: Vec<(usize, ReadingColumn, Option<usize>)>,
+    /// Place and column of measured pressures.
     pressures: Vec<(usize, ReadingColumn)>,
     pedals: [Option<usize>; 2],
     vehicle: Option<usize>,
@@ -122,8 +125,12 @@ impl Columns {
         let require = |name: &str| ReadingColumn::require(rows, name);
         let commands = element_commands(car).into_iter().filter_map(|(element, name)| {
             let place = tables.place(element)?;
-            let age = rows.find(&command_age(&name));
-            Some(rows.require(&name).map(|value| (place, ReadingColumn { value, age })))
+            let found = |name: &str, value| ReadingColumn { value, age: rows.find(&command_age(name)) };
+            let pressure = pressure_command_column(&car.gearbox.elements[element].name);
+            Some(match (rows.find(&name), rows.find(&pressure)) {
+                (None, Some(value)) => Ok((place, found(&pressure, value), Some(element))),
+                _ => rows.require(&name).map(|value| (place, found(&name, value), None)),
+            })
         });
         let pressures = element_pressures(car).filter_map(|(element, name)| {
             let age = rows.find(&command_age(&name));
@@ -179,6 +186,21 @@ pub struct LogStep {
 }
 
 impl LogStep {
+    /// A row with nothing beside what the filter is shown.
+    pub fn of(time_s: f64, input: ShiftInput<f64>) -> Self {
+        Self {
+            time_s,
+            input,
+            pedals: [f64::NAN; 2],
+            vehicle_m_s: f64::NAN,
+            oil_degc: None,
+            reported_n_m: None,
+            speed_m_s: None,
+            pressures: [None; MAX_ELEMENTS],
+            truth: [[f64::NAN; 3]; 2],
+        }
+    }
+
     /// Measured pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa, where this row has readings of them.
     pub fn shift_pressures(&self, tables: &ShiftTables<f64>) -> [Option<Reading<f64>>; 2] {
         let GearCommand { from, to } = self.input.gear;
@@ -233,6 +255,11 @@ impl<'c> CarLog<'c> {
         Ok(notes)
     }
 
+    /// Whether the table has the pressure that is asked of an element in place of the command of its valve.
+    pub fn has_pressure_command(&self, element: usize) -> bool {
+        self.columns.commands.iter().any(|(.., of_pressure)| *of_pressure == Some(element))
+    }
+
     /// Whether the table has a signal, of this name in SI, in its SI unit.
     pub fn is_in_si(&self, name: &str) -> bool {
         self.rows.find(name).is_none_or(|column| self.rows.factor(column) == 1.0)
@@ -247,8 +274,10 @@ impl<'c> CarLog<'c> {
         self.take_gears();
         let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
         let mut commands = [None; MAX_ELEMENTS];
-        for &(place, column) in &columns.commands {
-            commands[place] = column.read(rows, samples);
+        for &(place, column, of_pressure) in &columns.commands {
+            let read = column.read(rows, samples);
+            let command = |value: f64| of_pressure.map_or(value, |element| command_for(self.car, element, value));
+            commands[place] = read.map(|Reading { value, age_s }| Reading { value: command(value), age_s });
         }
         let mut pressures = [None; MAX_ELEMENTS];
         for &(place, column) in &columns.pressures {
@@ -325,6 +354,7 @@ pub struct LoggedDrive<'c> {
     gear: Option<usize>,
     unannounced: u64,
     commands: CommandCheck<'c>,
+    delay: CommandDelay<'c>,
     converter: ConverterCheck,
     still: StillCommands,
     holes: Holes,
@@ -389,6 +419,7 @@ impl<'c> LoggedDrive<'c> {
             gear: None,
             unannounced: 0,
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
+            delay: CommandDelay::new(tables),
             converter: ConverterCheck::default(),
             still: StillCommands::default(),
             holes: Holes::default(),
@@ -411,7 +442,10 @@ impl<'c> LoggedDrive<'c> {
         if let Some(degc) = step.oil_degc {
             self.state.take_oil_temperature(degc);
         }
-        let estimate = self.filter.step(&mut self.state, input);
+        let mut estimate = self.filter.step(&mut self.state, input);
+        if self.delay.is_found() {
+            estimate.health = estimate.health.max(Health::CommandsMistimed);
+        }
         self.learning.push(self.state.learnt());
         let readings = [input.engine_rad_s, input.turbine_rad_s, input.output_rad_s];
         let channels = [estimate.channels.engine, estimate.channels.turbine, estimate.channels.output];
@@ -474,6 +508,8 @@ impl<'c> LoggedDrive<'c> {
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
         self.take_jerk();
+        let [_, turbine, output] = self.speeds_rad_s;
+        self.delay.push(step, &estimate, [turbine, output]);
         estimate
     }
 
@@ -565,6 +601,7 @@ impl<'c> LoggedDrive<'c> {
         let complete_s = (gear == shift.to).then_some(time_s - self.begun_s);
         if let Some(row) = self.tables.tables().shift(shift.from, shift.to).filter(|_| complete_s.is_some()) {
             self.still.end(row.clutches.map(|clutch| clutch.element));
+            self.delay.end([shift.from, shift.to], [self.begun_s, time_s]);
         }
         // A log has no slip of the held elements.
         let unknown =
@@ -592,6 +629,7 @@ impl<'c> LoggedDrive<'c> {
         self.end(f64::NAN, usize::MAX);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
         let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
+        warnings.extend(self.delay.warning());
         warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {

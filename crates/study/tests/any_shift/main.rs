@@ -5,6 +5,7 @@
 
 mod attacks;
 mod cars;
+mod command_delay;
 mod drives;
 mod input_clutch;
 mod learning;

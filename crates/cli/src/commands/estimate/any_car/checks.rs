@@ -4,13 +4,14 @@ use std::path::Path;
 
 use config::Car;
 use design::ShiftTables;
-use drivetrain::CommandKind;
+use drivetrain::{ClutchValve, CommandKind};
 use logs::Role;
 use logs::plausibility::Seen;
 use observer::any_shift::GearCommand;
 use observer::{Health, Reading};
 use report::tables::health_meaning;
-use study::any_shift::logged::{LogStep, Unusable, element_commands};
+use study::any_shift::logged::{CarLog, LogStep, Unusable, element_commands};
+use study::any_shift::pressure_command::pressure_command_column;
 use study::log::FIRST_LOOK;
 use trace::{shown_path, signal};
 
@@ -78,15 +79,14 @@ pub(super) fn refused(unusable: Unusable, path: &Path) -> Failure {
 pub(super) struct Columns {
     /// Of the four speeds, the engine torque and then each command.
     watched: WatchedColumns,
-    /// Places of the commands in the filter's tables.
-    places: Vec<usize>,
+    /// Places of the commands in the filter's tables, and the valve where the column has the pressure that is asked of it.
+    places: Vec<(usize, Option<ClutchValve<f64>>)>,
     /// Whether each gear is a forward one.
     is_forward: Vec<bool>,
 }
 
 impl Columns {
-    /// `is_in_si` tells whether a signal is there in its SI unit.
-    pub(super) fn of(car: &Car, tables: &ShiftTables<f64>, is_in_si: impl Fn(&str) -> bool) -> Self {
+    pub(super) fn of(log: &CarLog<'_>, car: &Car, tables: &ShiftTables<f64>) -> Self {
         let has_converter = car.converter.is_some();
         let others = [
             (Role::EngineSpeed, signal::ENGINE_SPEED, has_converter),
@@ -98,17 +98,22 @@ impl Columns {
         let others = others.map(|(role, column, is_needed)| WatchedColumn {
             role,
             name: role.name().to_owned(),
-            is_in_si: is_in_si(column),
+            is_in_si: log.is_in_si(column),
             is_needed,
         });
         let commands = element_commands(car).into_iter().filter_map(|(element, column)| {
-            let role = match car.clutches[element].as_ref()?.valve.command_kind() {
-                CommandKind::Current => Role::ElementCurrent,
-                CommandKind::DutyCycle => Role::ElementDuty,
+            let valve = car.clutches[element].as_ref()?.valve;
+            let (role, column) = match valve.command_kind() {
+                _ if log.has_pressure_command(element) => {
+                    (Role::ElementPressureCommand, pressure_command_column(&car.gearbox.elements[element].name))
+                }
+                CommandKind::Current => (Role::ElementCurrent, column),
+                CommandKind::DutyCycle => (Role::ElementDuty, column),
             };
             let name = column.rsplit_once('_').map_or(column.as_str(), |(name, _)| name).to_owned();
-            let watched = WatchedColumn { role, name, is_in_si: is_in_si(&column), is_needed: true };
-            Some((tables.place(element)?, watched))
+            let watched = WatchedColumn { role, name, is_in_si: log.is_in_si(&column), is_needed: true };
+            let pressure_of = (role == Role::ElementPressureCommand).then_some(valve);
+            Some(((tables.place(element)?, pressure_of), watched))
         });
         let (places, commands): (Vec<_>, Vec<_>) = commands.unzip();
         let is_forward = car.gearbox.gears.iter().map(|gear| gear.ratio > 0.0).collect();
@@ -124,7 +129,11 @@ impl Columns {
         let [output, wheel] = [input.output_rad_s, input.wheel_rad_s]
             .map(|reading| value(reading).map(|speed| if is_forward { speed } else { speed.abs() }));
         let others = [value(input.engine_rad_s), value(input.turbine_rad_s), output, wheel, value(input.engine_n_m)];
-        self.watched.push(others.into_iter().chain(self.places.iter().map(|place| value(input.commands[*place]))));
+        let command = |(place, pressure_of): &(usize, Option<ClutchValve<f64>>)| {
+            let command = value(input.commands[*place])?;
+            Some(pressure_of.as_ref().map_or(command, |valve| valve.settled_pressure(command)))
+        };
+        self.watched.push(others.into_iter().chain(self.places.iter().map(command)));
     }
 
     /// Refuses a table in which a column that is needed has no value, or whose unit cannot be right.

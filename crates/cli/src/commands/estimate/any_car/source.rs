@@ -80,7 +80,7 @@ impl<'a> CarSource<'a> {
     /// What watches the columns of a table; mapped channels are watched by their readings.
     pub(super) fn columns(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<Columns> {
         match self {
-            Self::Rows(rows) => Some(Columns::of(car, tables, |name| rows.is_in_si(name))),
+            Self::Rows(rows) => Some(Columns::of(rows, car, tables)),
             Self::Channels(_) => None,
         }
     }

@@ -1,0 +1,63 @@
+//! Logs of cars with a gearbox whose commands come late or early against the speeds.
+
+use crate::any_car::{column, estimate, numbers, simulated_twice};
+use crate::support::said;
+
+/// The log with its commands so many rows late.
+fn late(text: &str, rows: isize) -> String {
+    let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let (names, lines) = lines.split_first().unwrap();
+    let is_command = |name: &str| name.starts_with("element_") && name.ends_with("_current_a");
+    let row = |at: usize| {
+        let then = at.saturating_add_signed(-rows).min(lines.len() - 1);
+        let cells = names.iter().zip(&lines[at]).zip(&lines[then]);
+        cells.map(|((name, now), then)| if is_command(name) { *then } else { *now }).collect::<Vec<_>>().join(",")
+    };
+    names.join(",") + "\n" + &(0..lines.len()).map(|at| row(at) + "\n").collect::<String>()
+}
+
+/// A channel map for the names of the program, with this more in the entries of the commands.
+fn map(text: &str, more: &str) -> String {
+    let commands = text.lines().next().unwrap().split(',').filter_map(|name| name.strip_suffix("_current_a"));
+    let commands = commands.filter(|name| name.starts_with("element_"));
+    let entry = |key: &str, name: &str, more: &str| format!("[channel.{key}]\nname = \"{name}\"\n{more}\n");
+    let speeds = ["engine_speed", "turbine_speed", "output_speed", "wheel_speed"]
+        .map(|key| entry(key, &format!("{key}_rad_s"), ""));
+    let others = ["gear", "target_gear", "lock_up_applied"].map(|key| entry(key, key, ""));
+    let torque = entry("engine_torque", "reported_engine_torque_n_m", "");
+    let commands = commands.map(|name| entry(&format!("{name}_current"), &format!("{name}_current_a"), more));
+    speeds.into_iter().chain(others).chain([torque]).chain(commands).collect()
+}
+
+#[test]
+fn a_delay_of_the_commands_is_said_and_moved_by_the_channel_map() {
+    let folder = simulated_twice("late-commands");
+    let text = folder.read("sim/short_measured.csv");
+    let right = said(&estimate(&folder, "sim/short_measured.csv", &["-o", &folder.path("right.csv")]));
+    assert!(
+        !right.contains("the commands of the valves come") && !folder.read("right.csv").contains("commands_mistimed")
+    );
+    for (rows, words) in [(12, "ms too late"), (-12, "ms too early")] {
+        let wrong = late(&text, rows);
+        folder.write("wrong.csv", &wrong);
+        let told = said(&estimate(&folder, "wrong.csv", &["-o", &folder.path("told.csv")]));
+        let told = told.lines().find(|line| line.contains("the commands of the valves come about")).unwrap().to_owned();
+        assert!(told.contains(words) && told.contains("`late_s = "), "{told}");
+        assert!(folder.read("told_report.html").contains("the commands of the valves come about"));
+        assert!(folder.read("told_report.html").contains("commands mistimed"));
+        // From the shift on that shows it.
+        let health = column(&folder.read("told.csv"), "health");
+        assert!(health.first().unwrap() != "commands_mistimed" && health.last().unwrap() == "commands_mistimed");
+        // The map moves them: the estimates are those of the right log.
+        let map = folder.write("map.toml", map(&wrong, &format!("late_s = {}", 0.01 * rows as f64)));
+        let moved = said(&estimate(&folder, "wrong.csv", &["--map", &map, "-o", &folder.path("moved.csv")]));
+        assert!(!moved.contains("the commands of the valves come"), "{moved}");
+        let torques = ["right.csv", "moved.csv"].map(|name| {
+            let torques = numbers(&folder.read(name), "oncoming_torque_estimate_n_m");
+            torques.into_iter().filter(|torque| !torque.is_nan()).collect::<Vec<_>>()
+        });
+        assert_eq!(torques[0].len(), torques[1].len());
+        let most = torques[0].iter().zip(&torques[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(most < 0.5, "{most}");
+    }
+}

@@ -1,0 +1,46 @@
+//! Commanded pressures of elements in place of the commands of their valves.
+//!
+//! Many gearbox controllers log the pressure that they ask of a clutch. It counts as the command at which the valve of the vehicle file ends at
+//! this pressure. Where the map of the controller is another one, the difference is an error of the valve's gain.
+
+use config::Car;
+
+use super::logged::element_column;
+
+/// Line pressures up to which a command means the line pressure: a clutch that holds is often commanded more. Beyond it is no pressure of
+/// this car.
+const MOST_LINE_PRESSURES: f64 = 3.0;
+
+/// The column with the commanded pressure of an element, Pa.
+pub fn pressure_command_column(element: &str) -> String {
+    format!("{}_pressure_command_pa", element_column(element))
+}
+
+/// The command, A or %, at which the valve of an element ends at a commanded pressure, Pa; not a number where it has no valve.
+pub(super) fn command_for(car: &Car, element: usize, pressure_pa: f64) -> f64 {
+    let most_pa = car.line_pressure_pa;
+    let limited_pa = if pressure_pa <= MOST_LINE_PRESSURES * most_pa { pressure_pa.min(most_pa) } else { pressure_pa };
+    let clutch = car.clutches.get(element).and_then(Option::as_ref);
+    clutch.map_or(f64::NAN, |clutch| clutch.valve.command_for(limited_pa.clamp(0.0, f64::INFINITY)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_ends_at_the_pressure_that_is_asked_for() {
+        let car = Car::eight_speed().unwrap();
+        let valve = &car.clutches[0].as_ref().unwrap().valve;
+        let most_pa = car.line_pressure_pa;
+        for (asked_pa, pressure_pa) in
+            [(-1e4, 0.0), (0.0, 0.0), (2e5, 2e5), (most_pa, most_pa), (1.5 * most_pa, most_pa)]
+        {
+            let settled_pa = valve.settled_pressure(command_for(&car, 0, asked_pa));
+            assert!((settled_pa - pressure_pa).abs() < 1.0, "{asked_pa}: {settled_pa}");
+        }
+        // A hundred times too much stays too much.
+        assert!(valve.settled_pressure(command_for(&car, 0, 1e7)) > 0.9e7);
+        assert!(command_for(&car, 0, f64::NAN).is_nan() && command_for(&car, 99, 1e5).is_nan());
+    }
+}

@@ -1,0 +1,90 @@
+//! Logs whose commands come late or early against the speeds.
+
+use config::Car;
+use design::ShiftErrors;
+use observer::Health;
+use observer::any_shift::ShiftInput;
+use plant::car::CarModel;
+use study::any_shift::ShiftDraw;
+use study::any_shift::drive::ScoredDrive;
+use study::any_shift::logged::{LogStep, LoggedDrive};
+use study::any_shift::recording::Recording;
+use study::any_shift::tour::drive_tour;
+
+use crate::cars::{Random, cars, cars_with_strokes, one_way, sensors};
+
+/// Cars that are drawn of each gearbox; with more than one there are more cars and delays.
+fn draws() -> u64 {
+    std::env::var("DELAY_DRAWS").map_or(1, |draws| draws.parse().unwrap())
+}
+
+/// A drive through all gears of this car.
+fn recorded(truth: Car, known: &Car) -> Recording {
+    let (model, mut recording) = (CarModel::new(truth).unwrap(), Recording::default());
+    drive_tour(&model, known, |sample| recording.push(sample), || ()).unwrap();
+    recording
+}
+
+/// A car whose friction, converter, valves and strokes are within their bounds of the known one.
+fn drawn(known: &Car, seed: u64) -> Car {
+    let (mut random, errors) = (Random(seed), ShiftErrors::STANDARD);
+    let draw = ShiftDraw::within(known, &errors, || random.uniform()).with_timing(known, &errors, || random.uniform());
+    draw.with_strokes(known, || random.uniform()).car(known)
+}
+
+/// What is said of a drive whose commands come so many rows of 10 ms late.
+fn said(known: &Car, recording: &Recording, late: isize) -> ScoredDrive {
+    let (tables, sensors) = (LoggedDrive::tables(known).unwrap(), sensors());
+    let mut logged = LoggedDrive::new(known, &tables, Some(&sensors), None);
+    let inputs: Vec<_> = recording.inputs(known, &tables, &sensors, 1).collect();
+    for (at, (sample, input)) in recording.samples.iter().zip(&inputs).enumerate() {
+        let then = at.saturating_add_signed(-late).min(inputs.len() - 1);
+        let input = ShiftInput { commands: inputs[then].commands, ..*input };
+        logged.push(&LogStep::of(sample.time_s, input));
+    }
+    logged.finish()
+}
+
+/// The delay that is said, ms: positive for commands that come late.
+fn delay_ms(drive: &ScoredDrive) -> Option<f64> {
+    let said = drive.warnings.iter().find_map(|warning| warning.split_once("come about "))?.1;
+    let (number, rest) = said.split_once(" ms").unwrap();
+    let late = if rest.trim_start_matches(" or more").starts_with(" too late") { 1.0 } else { -1.0 };
+    Some(late * number.parse::<f64>().unwrap())
+}
+
+fn has_word(drive: &ScoredDrive) -> bool {
+    drive.states.iter().any(|state| state.health == Health::CommandsMistimed)
+}
+
+/// Cars within the budget are right; of the same with commands that come 100 ms and more late or early it is said.
+#[test]
+fn commands_that_come_late_or_early_are_noticed() {
+    let more = if draws() > 1 { cars_with_strokes() } else { Vec::new() };
+    for known in cars().into_iter().chain([one_way()]).chain(more) {
+        for seed in 1..=draws() {
+            let recording = recorded(drawn(&known, seed), &known);
+            let label = format!("{} {seed}", known.gearbox.name);
+            let right = said(&known, &recording, 0);
+            assert_eq!((delay_ms(&right), has_word(&right)), (None, false), "{label}: {:?}", right.warnings);
+            for late in if draws() > 1 { vec![10, -10, 20, -20] } else { vec![10, -10] } {
+                let wrong = said(&known, &recording, late);
+                let found = delay_ms(&wrong).unwrap_or(f64::NAN);
+                println!("{label}: {} ms, said {found} ms", 10 * late);
+                assert!((found - 10.0 * late as f64).abs() < 45.0 && has_word(&wrong), "{label} {late}: {found}");
+            }
+        }
+    }
+}
+
+/// All valves at one end of their bounds of lag and delay: as far as a right car can seem late or early.
+#[test]
+fn slow_and_fast_valves_are_no_delay_of_the_commands() {
+    let known = cars().remove(0);
+    for end in [0.0, 1.0] {
+        let errors = ShiftErrors::STANDARD;
+        let draw = ShiftDraw::within(&known, &errors, || 0.5).with_timing(&known, &errors, || end);
+        let drive = said(&known, &recorded(draw.car(&known), &known), 0);
+        assert_eq!(delay_ms(&drive), None, "{end}: {:?}", drive.warnings);
+    }
+}
