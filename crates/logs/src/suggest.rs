@@ -91,7 +91,7 @@ enum Fit {
 /// From so many commands of elements on they are those of a whole gearbox.
 const WHOLE_GEARBOX: usize = 3;
 
-/// The element whose valve has this command, and the role; none if the channel is no such command.
+/// The element whose valve has this command, or whose pressure is measured here, and the role; none if the channel is neither.
 fn element(channel: &Channel) -> Option<(Role, String)> {
     const ELEMENT: &[&str] = &["element", "brake", "bremse", "elem"];
     const PRESSURE: &[&str] = &["pressure", "druck", "p", "prs", "press"];
@@ -102,8 +102,9 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
     let own = name.strip_prefix("element_").and_then(|rest| {
         let current = ["_current_a", "_current_ma"].into_iter().find_map(|ending| rest.strip_suffix(ending));
         let duty = || Some((Role::ElementDuty, rest.strip_suffix("_duty_percent")?));
-        let pressure = || Some((Role::ElementPressureCommand, rest.split_once("_pressure_command")?.0));
-        current.map(|name| (Role::ElementCurrent, name)).or_else(duty).or_else(pressure)
+        let asked = || Some((Role::ElementPressureCommand, rest.split_once("_pressure_command")?.0));
+        let measured = || Some((Role::ElementPressure, rest.split_once("_pressure")?.0));
+        current.map(|name| (Role::ElementCurrent, name)).or_else(duty).or_else(asked).or_else(measured)
     });
     if let Some((role, name)) = own {
         return Some((role, name.to_owned()));
@@ -112,7 +113,8 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
     let is_about = |list: &[&str]| met(list, &words);
     let role = match Unit::parse(&channel.unit)?.quantity {
         Quantity::Current => Role::ElementCurrent,
-        Quantity::Pressure => Role::ElementPressureCommand,
+        Quantity::Pressure if is_about(COMMAND) => Role::ElementPressureCommand,
+        Quantity::Pressure => Role::ElementPressure,
         _ => return None,
     };
     // `I_A`, `I_K1`: a current and a letter, with or without a number.
@@ -123,15 +125,15 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
         }
         _ => false,
     };
-    let is_command = match role {
+    let is_of_element = match role {
         Role::ElementCurrent => is_lettered || is_about(CURRENT) && (is_about(CLUTCH) || is_about(ELEMENT)),
-        _ => is_about(PRESSURE) && is_about(COMMAND),
+        _ => is_about(PRESSURE),
     };
     const OTHERS: &[&str] = &[
         "line", "tcc", "lockup", "battery", "off", "offgoing", "oncoming", "main", "sys", "system", "oil", "fuel",
         "rail", "boost", "air",
     ];
-    if !is_command || is_about(OTHERS) {
+    if !is_of_element || is_about(OTHERS) {
         return None;
     }
     let is_name = |word: &&String| {
@@ -146,23 +148,33 @@ fn element(channel: &Channel) -> Option<(Role, String)> {
     (1..=3).contains(&name.len()).then_some((role, name))
 }
 
-/// The commands of the elements of a whole gearbox: their keys in a map, and their channels. None if there are but a few, or two
-/// with one key.
+/// The commands of the elements of a whole gearbox, and what is measured of their pressures: keys in a map, and channels. None if there are
+/// but a few commands, or two with one key.
 fn elements(channels: &[Channel]) -> Vec<(String, usize)> {
-    let commands: Vec<(Role, String, usize)> = channels
+    let (measured, commands): (Vec<_>, Vec<_>) = channels
         .iter()
         .enumerate()
         .filter_map(|(at, channel)| element(channel).map(|(role, name)| (role, name, at)))
-        .collect();
+        .partition(|(role, ..)| *role == Role::ElementPressure);
     // The command of the valve itself is better than the pressure that is asked for.
     let is_best = |(role, name, _): &&(Role, String, usize)| {
         let is_other = |(other, of, _): &(Role, String, usize)| *other != Role::ElementPressureCommand && of == name;
         *role != Role::ElementPressureCommand || !commands.iter().any(is_other)
     };
-    let best = commands.iter().filter(is_best);
-    let found: Vec<(String, usize)> = best.map(|(role, name, at)| (role.name().replace("NAME", name), *at)).collect();
+    let key = |(role, name, at): &(Role, String, usize)| (role.name().replace("NAME", name), *at);
+    let mut found: Vec<(String, usize)> = commands.iter().filter(is_best).map(key).collect();
     let keys: std::collections::BTreeSet<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
-    if keys.len() == found.len() && found.len() >= WHOLE_GEARBOX { found } else { Vec::new() }
+    if keys.len() != found.len() || found.len() < WHOLE_GEARBOX {
+        return Vec::new();
+    }
+    // Of an element that has a command, the first one.
+    for one in measured.iter().filter(|(_, name, _)| commands.iter().any(|(_, of, _)| of == name)) {
+        let one = key(one);
+        if found.iter().all(|(known, _)| *known != one.0) {
+            found.push(one);
+        }
+    }
+    found
 }
 
 /// Unused channels that are named at most; a bus has hundreds.
@@ -203,14 +215,17 @@ pub fn suggest(channels: &[Channel], dbc: Option<&str>) -> String {
     }
     if !elements.is_empty() {
         text.push_str(
-            "\n# Commands of the elements of a whole gearbox: check that these are the names of the gearbox file.\n",
+            "\n# Commands and measured pressures of the elements of a whole gearbox: check that these are the names of the gearbox file.\n",
         );
     }
     for (key, at) in &elements {
         let role = Role::of_element(key).map_or(Role::ElementCurrent, |(role, _)| role);
         text += &table_of(key, role, *at, channels);
     }
-    let perhaps = channels.iter().zip(&taken).filter(|(channel, taken)| !**taken && element(channel).is_some());
+    let perhaps = channels
+        .iter()
+        .zip(&taken)
+        .filter(|(channel, taken)| !**taken && element(channel).is_some_and(|(role, _)| role != Role::ElementPressure));
     let perhaps: Vec<String> = perhaps.take(UNUSED).map(|(channel, _)| error::shown(&channel.name)).collect();
     if !perhaps.is_empty() {
         let _ = writeln!(text, "\n# Perhaps commands of clutches, which an estimate needs: {}", perhaps.join(", "));
