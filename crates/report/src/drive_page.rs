@@ -5,6 +5,7 @@ use minijinja::{Value, context};
 use observer::Health;
 use study::any_shift::drive::{DriveState, ScoredDrive, ScoredShift};
 use study::any_shift::matrix::{ErrorsByPhase, controlling_of};
+use study::any_shift::worth_a_look::BY_EACH;
 use study::any_shift::{ClutchRow, ShiftDraw, ShiftScoreRow, SquaredErrors, TruePhase};
 use trace::Cell;
 use trace::units::{km_h, mpa, rpm};
@@ -17,7 +18,7 @@ use crate::palette::{RANGE, Weight};
 use crate::shift_figure::{INERTIA_PHASE, TORQUE_PHASE};
 use crate::tables::{coverage, health_meaning, number};
 
-/// Shifts that are drawn; of a drive with more, the worst.
+/// Shifts that are drawn; of a drive with more, the worst, or those worth a look.
 pub const MOST_DRAWN: usize = 60;
 /// Worst shifts that are named.
 const WORST: usize = 5;
@@ -92,6 +93,7 @@ impl DrivePage<'_> {
             figures => figures.collect::<Vec<_>>(),
             worst => named.collect::<Vec<_>>(),
             undrawn => drive.shifts.len() - drawn.len(),
+            by_each => BY_EACH,
             draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
             converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
             seed => self.draw.map(|(_, seed)| seed),

@@ -26,6 +26,7 @@ pub mod shift_summary;
 mod still_commands;
 mod thinned;
 pub mod tour;
+pub mod worth_a_look;
 
 use config::{Car, ElementErrorBounds, Sensors, ShiftClutch};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};

@@ -11,6 +11,7 @@ use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift};
 use super::recording::Recording;
 use super::shift_summary::{ShiftSummary, spans_s};
 use super::thinned::thinned;
+use super::worth_a_look::chosen;
 use super::{AnyShiftError, ShiftScoreRow, TruePhase, row};
 
 /// The place of no element among those of the gearbox.
@@ -191,6 +192,9 @@ pub(super) struct PassingShifts {
     /// Shifts that are drawn, by their places, as far as it is decided; and how many shifts it is decided of.
     drawn: Vec<usize>,
     decided: usize,
+    /// Shifts that are wanted among these, and whether the truth is known of any.
+    wanted: usize,
+    has_truth: bool,
 }
 
 impl PassingShifts {
@@ -222,8 +226,8 @@ impl PassingShifts {
         }));
     }
 
-    /// Keeps what figures need of at most so many of the shifts that are wanted: those with the largest errors, of equal ones the first. In
-    /// the end they are the same ones however often it is called.
+    /// Keeps what figures need of at most so many of the shifts that are wanted: those with the largest errors, of equal ones the first; where
+    /// the truth is not known, those that are worth a look ([`super::worth_a_look`]). In the end they are the same ones however often it is called.
     pub(super) fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
         let shifts = &mut self.drive.shifts;
         for at in self.decided..shifts.len() {
@@ -231,6 +235,14 @@ impl PassingShifts {
                 self.drawn.push(at);
             } else {
                 shifts[at].leave_undrawn();
+            }
+            self.has_truth |= shifts[at].has_truth();
+            self.wanted += usize::from(self.drawn.last() == Some(&at));
+            if self.wanted > most && most > 0 && !self.has_truth {
+                let kept = chosen(shifts, &self.drawn);
+                let left = self.drawn.iter().filter(|place| !kept.contains(place));
+                left.for_each(|place| shifts[*place].leave_undrawn());
+                self.drawn = kept;
             }
             if self.drawn.len() > most {
                 let error = |place: &usize| shifts[self.drawn[*place]].worst_error_n_m();
@@ -452,6 +464,48 @@ mod tests {
         assert_eq!(drawn(true, 6), [1, 3, 5, 8, 9, 11]);
         assert_eq!(drawn(true, 0), [0; 0]);
         assert_eq!(drawn(true, 60), [1, 2, 3, 4, 5, 7, 8, 9, 10, 11]);
+    }
+
+    /// Rows without truth whose estimate is so far from the valve model, of this health.
+    fn unknown(number: usize, (away_n_m, width_n_m, health): (f64, f64, Health), kind: ShiftKind) -> ScoredShift {
+        let mut rows = rows(0.0);
+        for row in &mut rows {
+            for clutch in &mut row.clutches {
+                clutch.torque_n_m = [f64::NAN, 50.0 + away_n_m, 50.0];
+                clutch.torque_range_n_m = Some([0.0, width_n_m]);
+            }
+            row.health = health;
+        }
+        ScoredShift { summary: ShiftSummary::of(&rows, Some(kind)), rows, kind: Some(kind), ..shift(number, 0.0) }
+    }
+
+    #[test]
+    fn of_a_drive_without_truth_the_shifts_with_the_most_to_see_stay_drawn() {
+        let usual = (1.0, 10.0, Health::Good);
+        let with = |number: usize| match number {
+            71 => unknown(71, (30.0, 10.0, Health::Good), ShiftKind::PowerOnUp),
+            83 => unknown(83, (1.0, 80.0, Health::Good), ShiftKind::PowerOnUp),
+            90 => unknown(90, (1.0, 10.0, Health::Flare), ShiftKind::PowerOnUp),
+            95 | 96 => unknown(number, usual, ShiftKind::CoastDown),
+            _ => unknown(number, usual, ShiftKind::PowerOnUp),
+        };
+        let drawn = |each: bool, count: usize| {
+            let mut passing = PassingShifts::default();
+            for number in 1..=count {
+                passing.drive.shifts.push(with(number));
+                if each {
+                    passing.draw_at_most(60, |_| true);
+                }
+            }
+            passing.draw_at_most(60, |_| true);
+            let shifts = passing.drive.shifts.iter();
+            shifts.filter(|shift| shift.is_drawn).map(|shift| shift.number).collect::<Vec<_>>()
+        };
+        assert_eq!(drawn(true, 60), (1..=60).collect::<Vec<_>>());
+        // The widest and the furthest with 17 usual ones each, the remarked one, and the first coasting one.
+        let most: Vec<usize> = (1..=17).chain([71, 83, 90, 95]).collect();
+        assert_eq!(drawn(true, 100), most);
+        assert_eq!(drawn(false, 100), most);
     }
 
     #[test]

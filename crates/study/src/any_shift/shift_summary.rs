@@ -4,6 +4,7 @@ use drivetrain::ShiftKind;
 use observer::Health;
 
 use super::matrix::{ErrorsByPhase, MatrixCounts, controlling_of, counts, errors_by_phase};
+use super::worth_a_look::{Measures, measures};
 use super::{ClutchRow, SAMPLE_S, ShiftScoreRow, TruePhase};
 
 /// Sums and means over the rows of a shift.
@@ -34,6 +35,8 @@ pub struct ShiftSummary {
     pub tie_up_n_m: f64,
     /// Of a gearbox by its ratios alone: mean torque of the clutches together at the turbine in the inertia phase, and of its deviation, N m.
     pub mean_at_turbine_n_m: Option<[f64; 2]>,
+    /// How much there is to see in it.
+    pub(super) measures: Measures,
 }
 
 impl ShiftSummary {
@@ -60,6 +63,7 @@ impl ShiftSummary {
             mean_torque_n_m: [0, 1]
                 .map(|clutch| mean(rows, clutch, |clutch| (clutch.torque_n_m[1], clutch.torque_range_n_m))),
             mean_at_turbine_n_m: mean_at_turbine(rows),
+            measures: measures(rows, kind),
         }
     }
 
