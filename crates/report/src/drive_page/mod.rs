@@ -1,0 +1,208 @@
+//! The page of a simulated drive of a car with any gearbox: the drive, the table of its shifts, shifts drawn.
+
+mod figures;
+mod shifts;
+
+use config::{Car, Source};
+use minijinja::{Value, context};
+use observer::Health;
+use study::any_shift::drive::{ScoredDrive, ScoredShift};
+use study::any_shift::worth_a_look::BY_EACH;
+use study::any_shift::{ShiftDraw, TruePhase};
+
+use crate::log_page::compact;
+use crate::matrix_page::kind_rows;
+use crate::page::{PageError, inline, origin, templates};
+use crate::tables::{health_meaning, number};
+use figures::{overview_figure, shift_figure};
+use shifts::filled_columns;
+pub use shifts::{shift_cells, shift_rows, shift_words};
+
+/// Shifts that are drawn; of a drive with more, the worst, or those worth a look.
+pub const MOST_DRAWN: usize = 60;
+/// Worst shifts that are named.
+const WORST: usize = 5;
+
+/// What a page is made from.
+pub struct DrivePage<'a> {
+    /// The name of the drive.
+    pub name: &'a str,
+    /// The car that the filter and the shift controller know.
+    pub car: &'a Car,
+    /// How the driven car differs from it, and the seed of that, where the drive was simulated.
+    pub draw: Option<(&'a ShiftDraw, u64)>,
+    /// The drive.
+    pub drive: &'a ScoredDrive,
+    /// The files that the drive follows from.
+    pub sources: &'a [&'a Source],
+}
+
+impl DrivePage<'_> {
+    /// The page; it needs nothing but itself.
+    ///
+    /// # Errors
+    /// None in a released program; the tests render the template.
+    pub fn html(&self) -> Result<String, PageError> {
+        let (car, drive) = (self.car, self.drive);
+        let worst = worst_first(&drive.shifts);
+        let mut drawn: Vec<&ScoredShift> =
+            worst.iter().filter(|shift| shift.is_drawn).take(MOST_DRAWN).copied().collect();
+        drawn.sort_by_key(|shift| shift.number);
+        let is_drawn = |shift: &ScoredShift| drawn.iter().any(|other| other.number == shift.number);
+        let (columns, (_, rows)) = (filled_columns(drive, car), shift_rows(drive, car));
+        let rows = rows.into_iter().zip(&drive.shifts);
+        let rows: Vec<Value> = rows.map(|(cells, shift)| context! { cells, linked => is_drawn(shift) }).collect();
+        let (kind_titles, kinds) = kind_rows(&drive.matrix(car));
+        let figures = drawn.iter().map(|shift| {
+            context! {
+                number => shift.number,
+                title => title(shift, car),
+                at => number(shift.time_s[0], 2),
+                clutches => clutch_words(shift, car),
+                svg => inline(&compact(&shift_figure(shift, drive, car).svg())),
+            }
+        });
+        let named = worst.iter().take(WORST).map(|shift| {
+            context! { number => shift.number, gears => gears(shift, car), error => number(shift.worst_error_n_m(), 1) }
+        });
+        Ok(templates()?.get_template("drive.html")?.render(context! {
+            name => self.name,
+            title => "drive",
+            version => env!("CARGO_PKG_VERSION"),
+            vehicle_name => &car.name,
+            gearbox_name => &car.gearbox.name,
+            overview => inline(&compact(&overview_figure(drive, car).svg())),
+            findings => findings(drive),
+            kind_titles,
+            kinds,
+            columns => columns.iter().map(|column| context! { title => column.title, meaning => column.meaning }).collect::<Vec<_>>(),
+            rows,
+            healths => healths(drive),
+            figures => figures.collect::<Vec<_>>(),
+            worst => named.collect::<Vec<_>>(),
+            undrawn => drive.shifts.len() - drawn.len(),
+            by_each => BY_EACH,
+            draw => self.draw.map(|(draw, _)| draw_rows(draw, car)),
+            converter => self.draw.filter(|_| car.converter.is_some()).map(|(draw, _)| number(draw.converter, 3)),
+            seed => self.draw.map(|(_, seed)| seed),
+            has_truth => drive.has_truth(),
+            inputs => origin(self.sources),
+        })?)
+    }
+}
+
+/// What an estimate by ratios alone is, and what is missing for more.
+const RATIOS_ALONE: &str = "Of this gearbox the ratios alone are known: torques are those of all clutches together, as the turbine feels them. The \
+                            torque of a clutch needs the holding torques of the gears (level = \"shares\" in the gearbox file), its pressure \
+                            plates and piston besides (`pack`).";
+
+/// The healths of the drive, each with its meaning.
+fn healths(drive: &ScoredDrive) -> Vec<Value> {
+    let there = |health: &Health| {
+        let in_states = drive.states.iter().any(|state| state.health == *health);
+        in_states || drive.shifts.iter().any(|shift| shift.summary.rows_with(*health) > 0)
+    };
+    let value =
+        |health: Health| context! { name => health.name().replace('_', " "), meaning => health_meaning(health) };
+    Health::ALL.into_iter().filter(|health| *health != Health::Good).filter(there).map(value).collect()
+}
+
+fn name(car: &Car, gear: usize) -> &str {
+    car.gearbox.gears.get(gear).map_or("N", |gear| gear.name.as_str())
+}
+
+fn gears(shift: &ScoredShift, car: &Car) -> String {
+    format!("{}-{}", name(car, shift.from), name(car, shift.to))
+}
+
+fn title(shift: &ScoredShift, car: &Car) -> String {
+    format!("{}, {}", gears(shift, car), kind_name(shift).unwrap_or("shift without torque"))
+}
+
+/// The kind of a shift that has one.
+fn kind_name(shift: &ScoredShift) -> Option<&'static str> {
+    if shift.is_garage { Some("garage shift") } else { shift.kind.map(|kind| kind.name()) }
+}
+
+/// How long a phase lasts, s; not a number in a garage shift, which has none.
+fn phase_s(shift: &ScoredShift, phase: TruePhase) -> f64 {
+    if shift.is_garage { f64::NAN } else { shift.length_s(phase) }
+}
+
+/// Offgoing and oncoming element; empty where the shift has none that is known.
+fn clutch_names<'a>(shift: &ScoredShift, car: &'a Car) -> [&'a str; 2] {
+    shift.elements.map(|at| car.gearbox.elements.get(at).map_or("", |element| element.name.as_str()))
+}
+
+/// What the clutches of a shift do, in words.
+fn clutch_words(shift: &ScoredShift, car: &Car) -> String {
+    let named = clutch_names(shift, car).into_iter().zip(["opens", "closes"]).filter(|(name, _)| !name.is_empty());
+    named.map(|(name, does)| format!("{name} {does}")).collect::<Vec<_>>().join(", ")
+}
+
+/// The shifts with the largest error first.
+fn worst_first(shifts: &[ScoredShift]) -> Vec<&ScoredShift> {
+    let mut worst: Vec<&ScoredShift> = shifts.iter().collect();
+    worst.sort_by(|a, b| b.worst_error_n_m().total_cmp(&a.worst_error_n_m()));
+    worst
+}
+
+/// Friction and valve gain of each element of the driven car over those of the known one.
+fn draw_rows(draw: &ShiftDraw, car: &Car) -> Vec<Value> {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).zip(draw.friction.iter().zip(&draw.valve_gain));
+    let with_plates = elements.filter(|((_, clutch), _)| clutch.is_some());
+    let row = with_plates.map(|((element, _), (friction, gain))| {
+        context! { element => &element.name, friction => number(*friction, 3), gain => number(*gain, 3) }
+    });
+    row.collect()
+}
+
+/// What happened, in sentences.
+pub fn findings(drive: &ScoredDrive) -> Vec<String> {
+    let shifts = &drive.shifts;
+    if shifts.is_empty() {
+        let none = "The drive has no shift.".to_owned();
+        return drive.warnings.iter().cloned().chain([none]).collect();
+    }
+    let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
+    let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
+    let sum = |of: fn(&ScoredShift) -> u64| shifts.iter().map(of).sum::<u64>();
+    let [all, inside] = [sum(|shift| 2 * shift.summary.clutches()[0]), sum(|shift| 2 * shift.summary.clutches()[1])];
+    let good = sum(|shift| shift.summary.rows_with(Health::Good));
+    let mut sentences = drive.warnings.clone();
+    sentences.extend([format!(
+        "{completed} of {} shifts were completed; the longest took {} s.",
+        shifts.len(),
+        number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
+    )]);
+    if shifts.iter().any(|shift| !shift.is_garage) {
+        sentences.push(format!(
+            "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",
+            number(most(|shift| shift.quality.flare_rad_s), 1),
+            number(most(|shift| shift.quality.past_synchronous_rad_s), 1),
+        ));
+    }
+    sentences.extend([format!(
+        "Health is good in {good} of {} samples of the shifts.",
+        sum(|shift| shift.summary.counts.rows)
+    )]);
+    if drive.has_truth() {
+        sentences.push(format!(
+            "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
+        ));
+    }
+    let hidden = |is_garage: bool| shifts.iter().filter(|s| !s.is_estimated() && s.is_garage == is_garage).count();
+    if shifts.iter().any(|shift| shift.mean_at_turbine_n_m().is_some()) {
+        sentences.push(RATIOS_ALONE.to_owned());
+    }
+    if hidden(false) > 0 {
+        sentences.push(format!("Of {} shifts the filter has no tables: nothing is estimated.", hidden(false)));
+    }
+    if hidden(true) > 0 {
+        sentences.push(format!(
+            "Of {} garage shifts nothing is estimated: the filter has tables of shifts from one clutch to another only.",
+            hidden(true)
+        ));
+    }
+    sentences
+}
