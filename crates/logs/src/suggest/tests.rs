@@ -70,6 +70,7 @@ fn usual_names_in_two_languages_are_found() {
             ("Kupplung_E_Strom_Ist", "mA", "element_e_current"),
             ("TCC_State", "", "lock_up_applied"),
             ("TCC_Sol_Current", "mA", ""),
+            ("Lockup_on_time", "s", ""),
         ],
     ];
     for log in logs {

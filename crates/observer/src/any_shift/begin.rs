@@ -51,7 +51,11 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         if state.running.is_none() {
             let (running, slips) = self.begin(state, input, torque);
-            state.running = running.filter(|running| running.x.is_sound());
+            // In a match, and not moved through a filter: it is large, and there is none in most steps without speeds.
+            match running {
+                Some(running) if running.x.is_sound() => state.running = Some(running),
+                _ => {}
+            }
             let slow = self.is_slow(state);
             let stands = state.running.is_none();
             state.launches = stands && self.turbine.converter.is_none() && (state.launches || slow || opens);
@@ -72,21 +76,24 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         health
     }
 
-    /// Slip of the gear that is commanded, where a one-way clutch holds it.
-    fn one_way_slip(&self, gear: GearCommand, speeds: [T; 2]) -> Option<Slip<T>> {
-        let row = self.tables.gears.get(gear.to).filter(|_| gear.from == gear.to && self.tables.is_one_way(gear.to))?;
+    /// Slip of the gear that is commanded.
+    fn slip_in_gear(&self, gear: GearCommand, speeds: [T; 2]) -> Option<Slip<T>> {
+        let row = self.tables.gears.get(gear.to).filter(|_| gear.from == gear.to)?;
         Some(self.slip(row.ratio, speeds))
     }
 
     /// Whether the turbine turns slower than the gear would let it, behind a one-way clutch that overruns.
     fn overruns(&self, gear: GearCommand, speeds: [T; 2]) -> bool {
-        self.one_way_slip(gear, speeds).is_some_and(|slip| slip.is_over() && slip.value < T::zero())
+        // The slip comes first: the tables are not searched in every step.
+        let is_slower = self.slip_in_gear(gear, speeds).is_some_and(|slip| slip.is_over() && slip.value < T::zero());
+        is_slower && self.tables.is_one_way(gear.to)
     }
 
     /// Whether it may begin to do so where the readings do not show it yet: an element that slips makes the turbine faster. In a shift
     /// it does while the car coasts.
     fn may_overrun(&self, running: &Running<T>, gear: GearCommand, speeds: [T; 2]) -> bool {
-        let in_gear = self.one_way_slip(gear, speeds).is_some_and(|slip| !slip.is_over() || slip.value < T::zero());
+        let in_gear = self.slip_in_gear(gear, speeds).is_some_and(|slip| !slip.is_over() || slip.value < T::zero())
+            && self.tables.is_one_way(gear.to);
         let coasts = running.phase.phase == ShiftPhase::BothSlip && running.slow_n_m <= T::zero();
         in_gear || coasts && running.shift.is_some_and(|shift| shift.clutches.iter().any(ShiftClutch::is_one_way))
     }
