@@ -149,8 +149,9 @@ impl HybridIntegrator {
             known: None,
         };
         let capacities_n_m = powertrain.capacities_n_m(&state);
-        let likely = [0, 1].map(|clutch| if_at_rest(directions[clutch], capacities_n_m[clutch]));
-        let without_slip = [0, 1].map(|clutch| (slips[clutch].abs() < MARGIN_SLACK).then_some(capacities_n_m[clutch]));
+        let is_at_rest = slips.map(|slip| slip.abs() < MARGIN_SLACK);
+        let without_slip = [0, 1].map(|clutch| is_at_rest[clutch].then_some(capacities_n_m[clutch]));
+        let likely = start.sticking(powertrain, inputs, start.mode.contacts(), is_at_rest);
         start.settle(powertrain, inputs, likely, without_slip)?;
         Ok(start)
     }
@@ -278,20 +279,45 @@ impl HybridIntegrator {
         let holding_n_m = [holding.offgoing_n_m, holding.oncoming_n_m];
         let margins = self.margins(powertrain, inputs, &self.state);
         let (capacities_n_m, mut likely) = (powertrain.capacities_n_m(&self.state), self.mode.contacts());
-        let mut without_slip = [None; CLUTCHES];
+        let (mut without_slip, mut comes_to_rest) = ([None; CLUTCHES], [false; CLUTCHES]);
         for clutch in 0..CLUTCHES {
             let (capacity_n_m, holding_n_m) = (capacities_n_m[clutch], holding_n_m[clutch]);
-            let is_used_up = margins[clutch] <= AT_EVENT;
-            (likely[clutch], without_slip[clutch]) = match likely[clutch] {
-                Contact::Slipping(direction) if is_used_up => (if_at_rest(direction, capacity_n_m), Some(capacity_n_m)),
-                slipping @ Contact::Slipping(_) => (slipping, None),
-                Contact::Stuck if is_used_up => {
-                    (Contact::Slipping(Direction::of(holding_n_m)), Some(capacity_n_m.min(holding_n_m.abs())))
+            match (likely[clutch], margins[clutch] <= AT_EVENT) {
+                (Contact::Slipping(_), is_used_up) => {
+                    comes_to_rest[clutch] = is_used_up;
+                    without_slip[clutch] = is_used_up.then_some(capacity_n_m);
                 }
-                Contact::Stuck => (Contact::Stuck, Some(capacity_n_m)),
-            };
+                (Contact::Stuck, true) => {
+                    likely[clutch] = Contact::Slipping(Direction::of(holding_n_m));
+                    without_slip[clutch] = Some(capacity_n_m.min(holding_n_m.abs()));
+                }
+                (Contact::Stuck, false) => without_slip[clutch] = Some(capacity_n_m),
+            }
         }
+        let likely = self.sticking(powertrain, inputs, likely, comes_to_rest);
         self.settle(powertrain, inputs, likely, without_slip)
+    }
+
+    /// These contacts, where clutches that come to rest stick if they can hold what they then must, and else give way to it.
+    fn sticking(
+        &self,
+        powertrain: &Powertrain,
+        inputs: &Inputs,
+        mut contacts: [Contact; CLUTCHES],
+        comes_to_rest: [bool; CLUTCHES],
+    ) -> [Contact; CLUTCHES] {
+        for (contact, _) in contacts.iter_mut().zip(comes_to_rest).filter(|(_, comes_to_rest)| *comes_to_rest) {
+            *contact = Contact::Stuck;
+        }
+        let holding = powertrain.torques(Mode::of(contacts), &self.state, inputs).shift;
+        let holding_n_m = [holding.offgoing_n_m, holding.oncoming_n_m];
+        let capacities_n_m = powertrain.capacities_n_m(&self.state);
+        for clutch in (0..CLUTCHES).filter(|&clutch| comes_to_rest[clutch]) {
+            if holding_n_m[clutch].abs() > capacities_n_m[clutch] {
+                contacts[clutch] = Contact::Slipping(Direction::of(holding_n_m[clutch]));
+            }
+        }
+        contacts
     }
 
     /// Decides all clutches without slip together, those with a capacity, N m, from contacts that are likely, and makes the speeds
@@ -333,11 +359,6 @@ impl HybridIntegrator {
             Engagement::BothSlipping => (turbine, output),
         };
     }
-}
-
-/// What a clutch that slipped in this direction is likely to do without slip: it sticks if it can hold a torque, else it slips on.
-fn if_at_rest(direction: Direction, capacity_n_m: f64) -> Contact {
-    if capacity_n_m > 0.0 { Contact::Stuck } else { Contact::Slipping(direction) }
 }
 
 /// Where in `(0, 1]` a function that is not negative at 0 turns negative, by the Illinois variant of the false
