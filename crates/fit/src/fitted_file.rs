@@ -6,7 +6,7 @@ use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
 use crate::driving::backlash;
 use crate::parameters::HYSTERESIS_UNIT_PA;
-use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
+use crate::vehicle_text::{Step, VehicleText, headed, kept, keys, shaft_inertia};
 use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
 
 /// Standard deviations on either side of a stated interval.
@@ -36,8 +36,8 @@ impl Fit {
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
-        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
-        let source = Source { path: vehicle.source.path.clone(), text: head + &text.finish() };
+        let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
+        let source = Source { path: vehicle.source.path.clone(), text: headed(&head, &text.finish()) };
         Vehicle::from_source(source).map_err(|error| {
             FitError::Work(format!(
                 "the fitted values are not those of a possible car: {error}\n\
@@ -51,8 +51,7 @@ impl Fit {
     /// # Errors
     /// None that the given file does not have itself.
     pub fn kept_file(&self, vehicle: &Vehicle, reason: &str) -> Result<Vehicle, FitError> {
-        let reason = reason.replace(char::is_control, " ");
-        let text = format!("{FITTED}all values are those of the given file. {reason}\n{}", vehicle.source.text);
+        let text = headed(&kept(reason), &vehicle.source.text);
         let source = Source { path: vehicle.source.path.clone(), text };
         Vehicle::from_source(source).map_err(|error| FitError::Work(error.to_string()))
     }
