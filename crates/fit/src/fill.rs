@@ -41,6 +41,8 @@ pub struct FillFit {
     pub log_volume: f64,
     /// Its standard deviation as it is stated, and before.
     pub sd: [f64; 2],
+    /// Factor on the preload of the spring beside the kiss point that goes with this volume.
+    pub preload: f64,
     /// How many shifts show it.
     pub shifts: usize,
     /// Whether pressures were measured that do not follow the model.
@@ -76,7 +78,7 @@ impl FillFit {
         let found: Vec<Found> = chosen.iter().map(|log| log.search(filling, before)).collect();
         let is_misfit = found.iter().any(|found| found.difference > MISFIT);
         if found.is_empty() || is_misfit {
-            return Self { log_volume: 0.0, sd: [before; 2], shifts: 0, is_misfit };
+            return Self { log_volume: 0.0, sd: [before; 2], preload: 1.0, shifts: 0, is_misfit };
         }
         let of = |found: &[Found]| found.iter().map(|found| found.log_volume).sum::<f64>() / found.len() as f64;
         let log_volume = of(&found);
@@ -87,7 +89,8 @@ impl FillFit {
             (of(&moved) - log_volume).powi(2)
         });
         let variance = FILL_FLOOR * FILL_FLOOR + scatter + by_others.sum::<f64>();
-        Self { log_volume, sd: [variance.sqrt().min(before), before], shifts: count, is_misfit }
+        let preload = found.iter().map(|found| found.preload).sum::<f64>() / count as f64;
+        Self { log_volume, sd: [variance.sqrt().min(before), before], preload, shifts: count, is_misfit }
     }
 
     /// What the logs tell of it.
@@ -98,6 +101,11 @@ impl FillFit {
     /// Factor on the volume in the fitted file: that of the given file where it is not told.
     pub(crate) fn factor(&self) -> f64 {
         if self.verdict() == Verdict::NotTold { 1.0 } else { self.log_volume.exp() }
+    }
+
+    /// Factor on the preload of its spring beside the fitted kiss point: volume and preload were found together, and are written together.
+    pub(crate) fn preload_factor(&self) -> f64 {
+        if self.verdict() == Verdict::NotTold { 1.0 } else { self.preload }
     }
 
     /// A warning about pressures that do not follow the model.
@@ -115,6 +123,7 @@ impl FillFit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Found {
     log_volume: f64,
+    preload: f64,
     difference: f64,
 }
 
@@ -142,8 +151,13 @@ impl FillLog<'_> {
         let preloads = || (-PRELOADS..=PRELOADS).map(|i| 1.0 + PRELOAD * f64::from(i) / f64::from(PRELOADS));
         let best = |volumes: &[f64]| {
             let all = volumes.iter().flat_map(|volume| preloads().map(move |preload| (*volume, preload)));
-            let errors = all.map(|(volume, preload)| (volume, self.difference(filling, volume, preload)));
-            errors.min_by(|one, other| one.1.total_cmp(&other.1)).unwrap_or((0.0, f64::INFINITY))
+            let found = all.map(|(log_volume, preload)| Found {
+                log_volume,
+                preload,
+                difference: self.difference(filling, log_volume, preload),
+            });
+            let none = Found { log_volume: 0.0, preload: 1.0, difference: f64::INFINITY };
+            found.min_by(|one, other| one.difference.total_cmp(&other.difference)).unwrap_or(none)
         };
         let around = |middle: f64, count: i32, step: f64| -> Vec<f64> {
             (-count..=count).map(|i| middle + step * f64::from(i)).collect()
@@ -152,12 +166,12 @@ impl FillLog<'_> {
         let mut found = best(&around(0.0, COARSE, step));
         for _ in 0..2 {
             step /= f64::from(FINE);
-            found = best(&around(found.0, FINE, step));
+            found = best(&around(found.log_volume, FINE, step));
         }
         let ends = self.readings().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], (_, pressure)| {
             [least.min(pressure), most.max(pressure)]
         });
-        Found { log_volume: found.0, difference: found.1 / (ends[1] - ends[0]).max(f64::MIN_POSITIVE) }
+        Found { difference: found.difference / (ends[1] - ends[0]).max(f64::MIN_POSITIVE), ..found }
     }
 
     /// Mean size of the difference of measured and computed pressures, Pa.

@@ -6,7 +6,7 @@ use crate::budget::{self, BUDGET_COMMENT, BUDGET_SIDES, CONVERTER_SHARE_MIN};
 use crate::car::Car;
 use crate::driving::backlash;
 use crate::parameters::HYSTERESIS_UNIT_PA;
-use crate::vehicle_text::{FITTED, Step, VehicleText, keys, shaft_inertia};
+use crate::vehicle_text::{FITTED, Step, VehicleText, headed, kept, keys, number, shaft_inertia};
 use crate::{FillFit, Fit, FitError, Map, Parameter, ReadingAges, Verdict, parameters};
 
 /// Standard deviations on either side of a stated interval.
@@ -26,9 +26,7 @@ impl Fit {
         for prior in &self.priors {
             self.write(&mut text, &fitted, &oncoming, prior.parameter)?;
         }
-        if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) {
-            write_fill(&mut text, vehicle, &oncoming, &fill)?;
-        }
+        self.write_fill(&mut text, vehicle, &oncoming)?;
         if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
             text.put(&["driveline"], "backlash_rad", backlash.rad, &backlash.comment())?;
             let most_rad = (backlash.rad + BUDGET_SIDES * backlash.sd_rad).min(backlash::MOST_RAD);
@@ -36,8 +34,8 @@ impl Fit {
         }
         self.write_budget(&mut text, vehicle)?;
         let logs = logs.replace(char::is_control, " ");
-        let head = format!("{FITTED}values below lines like this one come from {} shifts of {logs}\n", self.shifts);
-        let source = Source { path: vehicle.source.path.clone(), text: head + &text.finish() };
+        let head = format!("values below lines like this one come from {} shifts of {logs}", self.shifts);
+        let source = Source { path: vehicle.source.path.clone(), text: headed(&head, &text.finish()) };
         Vehicle::from_source(source).map_err(|error| {
             FitError::Work(format!(
                 "the fitted values are not those of a possible car: {error}\n\
@@ -51,8 +49,7 @@ impl Fit {
     /// # Errors
     /// None that the given file does not have itself.
     pub fn kept_file(&self, vehicle: &Vehicle, reason: &str) -> Result<Vehicle, FitError> {
-        let reason = reason.replace(char::is_control, " ");
-        let text = format!("{FITTED}all values are those of the given file. {reason}\n{}", vehicle.source.text);
+        let text = headed(&kept(reason), &vehicle.source.text);
         let source = Source { path: vehicle.source.path.clone(), text };
         Vehicle::from_source(source).map_err(|error| FitError::Work(error.to_string()))
     }
@@ -152,14 +149,55 @@ impl Fit {
         self.write_fill_budget(text, vehicle)
     }
 
+    /// Writes the stroke of the oncoming clutch's piston, and the preload of its spring, which moves with the fitted kiss point.
+    fn write_fill(&self, text: &mut VehicleText, vehicle: &Vehicle, clutch: &str) -> Result<(), FitError> {
+        let table = ["clutch", clutch, "fill"];
+        let spring = self.value(Parameter::Spring).unwrap_or(1.0);
+        let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) else {
+            let preload = keys(&["clutch", clutch, "fill", "preload_n"]);
+            let words = Some("keeps its ratio to the fitted return spring");
+            return if text.has(&preload) { text.map(&preload, |force| spring * force, words) } else { Ok(()) };
+        };
+        let (cylinder, area_m2) = (&vehicle.oncoming.cylinder, vehicle.oncoming.clutch.piston_area_m2);
+        let stroke_m = fill.factor() * cylinder.stroke_m3 / area_m2;
+        let preload_pa = spring * self.preload_factor(vehicle) * cylinder.preload_pa;
+        let values = [
+            ("stroke_m", stroke_m, fill_comment(&fill)),
+            ("preload_n", preload_pa * area_m2, "goes with the fitted return spring and fill volume".to_owned()),
+        ];
+        if text.has(&keys(&table)) {
+            return values.iter().try_for_each(|(key, value, words)| text.put(&table, key, *value, words));
+        }
+        let line = |(key, value, words): &(&str, f64, String)| {
+            format!("{FITTED}{words}; the file had none\n{key} = {}\n", number(*value))
+        };
+        text.add_table(&keys(&table), &values.iter().map(line).collect::<String>());
+        Ok(())
+    }
+
+    /// Factor on the preload beside the kiss point.
+    fn preload_factor(&self, vehicle: &Vehicle) -> f64 {
+        /// Most of the force at the kiss point that it may become \[chosen: the limits of the error budget, 10 % to each side, stay below those of
+        /// the kiss point\].
+        const MOST: f64 = 0.9;
+        let cylinder = &vehicle.oncoming.cylinder;
+        let most = MOST * cylinder.kiss_pa / cylinder.preload_pa;
+        self.fill.map_or(1.0, |fill| fill.preload_factor()).min(most.max(1.0))
+    }
+
     /// The limits of the piston's stroke: pressures move with the spring, the volume has what the fit leaves open of it.
     fn write_fill_budget(&self, text: &mut VehicleText, vehicle: &Vehicle) -> Result<(), FitError> {
         let Some(given) = &vehicle.error_bounds.fill else { return Ok(()) };
         let bound = |key: &str| keys(&["design", "error_bounds", "fill", key]);
         let spring = self.value(Parameter::Spring).unwrap_or(1.0);
-        for key in ["kiss_pressure_pa", "preload_pressure_pa"] {
+        let preload = self.preload_factor(vehicle);
+        let [kiss_pa, preload_pa] =
+            [given.kiss_pressure_pa, given.preload_pressure_pa].map(|limits| limits.map(|pa| spring * pa));
+        // The spring is longer with the piston on its stop than at the kiss point.
+        let preload_pa = [0, 1].map(|i| (preload * preload_pa[i]).min(kiss_pa[i]));
+        for (key, limits_pa) in [("kiss_pressure_pa", kiss_pa), ("preload_pressure_pa", preload_pa)] {
             if text.has(&bound(key)) {
-                text.map(&bound(key), |pressure| spring * pressure, Some("moves with the fitted return spring"))?;
+                text.set(&bound(key), &limits_pa, Some("moves with the fitted return spring"))?;
             }
         }
         if let Some(fill) = self.fill.filter(|fill| fill.verdict() != Verdict::NotTold) {
@@ -193,13 +231,7 @@ fn write_clutch(
             let more = "keeps its ratio to the fitted friction, and is not below it";
             text.map(&of_clutch(&["static_friction"]), |mu| (value * mu).max(1.0001 * at_rest), Some(more))
         }
-        Parameter::Spring => {
-            let preload = of_clutch(&["fill", "preload_n"]);
-            if text.has(&preload) {
-                text.map(&preload, |force| value * force, Some("keeps its ratio to the fitted return spring"))?;
-            }
-            text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment)
-        }
+        Parameter::Spring => text.map(&of_clutch(&["return_spring_n"]), |force| value * force, comment),
         Parameter::CommandDelay => {
             text.map(&of_clutch(&["valve", "delay", "delay_s"]), |delay_s| (delay_s + value).max(0.0), comment)
         }
@@ -224,13 +256,6 @@ pub(crate) fn fill_comment(fill: &FillFit) -> String {
             told.name()
         ),
     }
-}
-
-/// Writes the stroke of its piston.
-fn write_fill(text: &mut VehicleText, vehicle: &Vehicle, clutch: &str, fill: &FillFit) -> Result<(), FitError> {
-    let words = &fill_comment(fill);
-    let stroke_m = fill.factor() * vehicle.oncoming.cylinder.stroke_m3 / vehicle.oncoming.clutch.piston_area_m2;
-    text.put(&["clutch", clutch, "fill"], "stroke_m", stroke_m, words)
 }
 
 /// Writes gain or lag of its valve, and of the observer's.

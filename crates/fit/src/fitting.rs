@@ -22,7 +22,8 @@ use crate::{Channel, FitError, Parameter, ReadingAges, ShiftRecord, freeing};
 
 /// More shifts only shrink what is below the floor of the intervals.
 pub const SHIFTS_MAX: usize = 30;
-/// So many shifts are fitted first; the others start from their result.
+/// So many shifts are fitted first, with the shapes of the file; the others start from their result. So few do not tell the shapes: with these
+/// free, the first steps led to another minimum in some cars, with another friction and spring and much higher cost.
 const FIRST_SHIFTS: usize = 5;
 
 /// On these; on all shifts, with all shapes free; and with those bound that the shifts do not ask for.
@@ -137,14 +138,15 @@ fn fit_with(
         let held = if available.pressure { Vec::new() } else { hold(&mut priors) };
         (priors, held)
     };
-    let (free, all_held) = with_shapes(file.knots.maps());
-    let problem = Problem { file: &file, shafts, priors: &free, drives };
-    let first = fit_some(&problem, shifts, progress)?;
+    let (few, _) = with_shapes(&[]);
+    let first = fit_some(&Problem { file: &file, shafts, priors: &few, drives }, shifts, progress)?;
     // Now the delay of the output speed is known, and small slips of the offgoing clutch can be seen.
-    let clock = OutputClock { delay_s: file.with(shafts, &free, &first.at.shared).output_delay_s, ages };
+    let clock = OutputClock { delay_s: file.with(shafts, &few, &first.at.shared).output_delay_s, ages };
     let (models, unusable) = usable(vehicle, &file, shifts, clock)?;
     let own = models.iter().map(ShiftModel::start).collect();
-    let at = Unknowns { own, ..first.at };
+    let (free, all_held) = with_shapes(file.knots.maps());
+    let problem = Problem { file: &file, shafts, priors: &free, drives };
+    let at = Unknowns { own, shared: taken_over(&few, &first.at.shared, &free), ..first.at };
     let mut say = |iteration| progress(Progress { shifts: models.len(), iteration });
     let solved = problem.solve(&models, at, first.weights, FREE, &mut say)?;
     let freed = freed(&problem, &solved, &all_held)?;

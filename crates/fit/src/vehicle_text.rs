@@ -9,6 +9,23 @@ use crate::FitError;
 /// How the comment of a fitted value begins.
 pub(crate) const FITTED: &str = "# fit: ";
 
+/// How the first line of a file with the given values goes on.
+const KEPT: &str = "all values are those of the given file. ";
+
+/// The text of a file that a fit writes, with a line at its head. A line of an earlier fit that kept the given values goes.
+pub(crate) fn headed(head: &str, text: &str) -> String {
+    let mut rest = text;
+    while let Some((_, below)) = rest.strip_prefix(FITTED).and_then(|line| line.strip_prefix(KEPT)?.split_once('\n')) {
+        rest = below;
+    }
+    format!("{FITTED}{head}\n{rest}")
+}
+
+/// The head of a file with the given values: the reason why they are kept.
+pub(crate) fn kept(reason: &str) -> String {
+    format!("{KEPT}{}", reason.replace(char::is_control, " "))
+}
+
 /// A step of the way to a value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Step {

@@ -44,6 +44,33 @@ fn a_pressure_in_one_shift_tells_the_fill_volume_and_the_file_gets_it() {
     assert!((file.oncoming.cylinder.stroke_m3 / volumes[1] - 1.0).abs() < 1e-9, "{}", file.source.text);
 }
 
+/// A piston that is still on its way when the pulse of the fill is over goes on with what the pressure is above its spring.
+#[test]
+fn the_preload_that_was_found_with_the_volume_is_written_with_it() {
+    let mut car = TestCar::with_stroke(1);
+    let shifts = shifts(&mut car, 2);
+    let fit = fitted(&car, &shifts, &[]);
+    let file = fit.vehicle_file(&car.file, "a simulation").unwrap();
+    let share = |vehicle: &Vehicle| vehicle.oncoming.cylinder.preload_pa / vehicle.oncoming.cylinder.kiss_pa;
+    let [given, after, truth] = [&car.file, &file, &car.car].map(share);
+    assert!((after - truth).abs() < 0.4 * (given - truth).abs(), "{given} {after} {truth}");
+    // The limits of the preload move with it, and contain the true one.
+    let limits = file.error_bounds.fill.unwrap().preload_pressure_pa;
+    assert!((limits[0]..limits[1]).contains(&car.car.oncoming.cylinder.preload_pa), "{limits:?}");
+    // A spring whose preload is nearly its force at the kiss point keeps below that.
+    let text = car
+        .file
+        .source
+        .text
+        .replace("preload_n = 450 ", "preload_n = 560 ")
+        .replace("[40.5e3, 49.5e3]", "[50.4e3, 61.6e3]");
+    let strong = Vehicle::from_source(Source { text, ..car.file.source.clone() }).unwrap();
+    assert!(share(&strong) > 0.9, "{}", share(&strong));
+    let file = fit.vehicle_file(&strong, "a simulation").unwrap();
+    // To the digits that are written.
+    assert!((share(&file) / share(&strong) - 1.0).abs() < 1e-5, "{}", share(&file));
+}
+
 #[test]
 fn without_a_measured_pressure_the_fill_volume_is_said_not_to_be_told() {
     let mut car = TestCar::with_stroke(5);

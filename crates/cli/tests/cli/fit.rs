@@ -6,7 +6,8 @@ pub(crate) mod common;
 use common::{Logs, TestCar};
 use trace::signal;
 
-use crate::support::{BENCH, Folder, VEHICLE, printed, stderr, wetclutch};
+use crate::any_car::with_column;
+use crate::support::{BENCH, Folder, VEHICLE, printed, said, stderr, wetclutch};
 
 /// RMS error of the torque that the valve maps of a vehicle file give, N m, over logs with their truth.
 fn torque_error(folder: &Folder, vehicle: &str, logs: &[(String, trace::Trace)]) -> f64 {
@@ -113,6 +114,48 @@ fn what_a_log_lacks_is_said_and_no_file_is_written() {
     let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &other]);
     assert!(stderr(&output).contains("exists and is no vehicle file"), "{}", stderr(&output));
     assert!(folder.read("other.csv") == text);
+}
+
+/// A current that is read three times too large asks for values that no car of the file can have.
+#[test]
+fn values_that_are_not_written_leave_the_given_file_with_the_reason_and_no_failure() {
+    let folder = Folder::new("kept");
+    let column = "oncoming_current_a";
+    let log = folder.write(
+        "log.csv",
+        &with_column(&one_shift(1), column, |cell| {
+            cell.parse::<f64>().map_or(cell.to_owned(), |current_a| (3.0 * current_a).to_string())
+        }),
+    );
+    let [fitted, again] = ["fitted.toml", "again.toml"].map(|name| folder.path(name));
+    let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "--sensors", BENCH, "-o", &fitted]);
+    assert!(
+        said(&output).contains("warning: the given values are kept: at the end of what is held possible: "),
+        "{}",
+        stderr(&output)
+    );
+    let text = folder.read("fitted.toml");
+    let (head, rest) = text.split_once('\n').unwrap();
+    assert!(
+        head.starts_with("# fit: all values are those of the given file. at the end of what is held possible: "),
+        "{head}"
+    );
+    assert_eq!(rest, std::fs::read_to_string(VEHICLE).unwrap());
+    // A fit of that file says nothing of this one.
+    let log = folder.write("right.csv", &one_shift(1));
+    said(&wetclutch(&["fit", &log, "--vehicle", &fitted, "--sensors", BENCH, "-o", &again]));
+    let text = folder.read("again.toml");
+    assert!(text.starts_with("# fit: values below lines like this one come from 1 shifts"), "{text}");
+    assert!(!text.contains("all values are those of the given file"), "{text}");
+    // Without a fit the file stays as it was, and the command fails.
+    let log = folder.write("none.csv", "time_s\n");
+    let output = wetclutch(&["fit", &log, "--vehicle", VEHICLE, "-o", &fitted]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(folder.read("fitted.toml").starts_with("# fit: all values"));
+    // Nor does a result that cannot be written end well.
+    let below_a_file = folder.path("right.csv/fitted.toml");
+    let output = wetclutch(&["fit", &folder.path("right.csv"), "--vehicle", VEHICLE, "-o", &below_a_file]);
+    assert!(matches!(output.status.code(), Some(1 | 2)), "{}", stderr(&output));
 }
 
 #[test]

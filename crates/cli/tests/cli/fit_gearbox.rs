@@ -100,7 +100,12 @@ fn commands_in_each_others_place_are_not_fitted() {
     let exchanged = folder.write("exchanged.csv", format!("{names}\n{rows}"));
     let output = wetclutch(&["fit", &exchanged, "--vehicle", CAR, "-o", &folder.path("fitted.toml")]);
     let notes = said(&output);
-    assert!(notes.contains("the fitted values are not written: the turbine does not turn as any car"), "{notes}");
+    assert!(notes.contains("the given values are kept: the turbine does not turn as any car"), "{notes}");
+    assert!(
+        folder
+            .read("fitted.toml")
+            .starts_with("# fit: all values are those of the given file. the turbine does not turn")
+    );
     assert!(notes.contains("the commands of two elements may be exchanged"), "{notes}");
 }
 

@@ -10,7 +10,7 @@ use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use super::validation::HeldOut;
 use crate::driving::DRAG_UNIT_N_M;
 use crate::fitted_file::{SIDES, fill_comment};
-use crate::vehicle_text::{FITTED, Step, VehicleText, keys, number};
+use crate::vehicle_text::{FITTED, Step, VehicleText, headed, kept, keys, number};
 use crate::{FitError, Verdict};
 
 /// A clutch that sticks holds at least so much more than it carries as it begins to slip, as a factor.
@@ -57,9 +57,8 @@ impl GearboxFit {
     /// # Errors
     /// None that the given file does not have itself.
     pub fn kept_file(&self, car: &Car, path: &Path, reason: &str) -> Result<Car, FitError> {
-        let reason = reason.replace(char::is_control, " ");
         let text = Written::new(&car.source.text)?;
-        written(text, car, path, &format!("all values are those of the given file. {reason}"))
+        written(text, car, path, &kept(reason))
     }
 
     fn write_converter(&self, text: &mut Written, car: &Car) -> Result<(), FitError> {
@@ -238,7 +237,7 @@ impl GearboxFit {
 fn written(mut text: Written, car: &Car, path: &Path, head: &str) -> Result<Car, FitError> {
     let gearbox = gearbox_path(car)?;
     text.set_gearbox(car, path, &gearbox)?;
-    let source = Source { path: path.to_owned(), text: format!("{FITTED}{head}\n{}", text.finish()) };
+    let source = Source { path: path.to_owned(), text: headed(head, &text.finish()) };
     let gearbox = if gearbox.exists() { Source::read(&gearbox)? } else { return Err(no_gearbox(&gearbox)) };
     Car::from_sources(source, gearbox).map_err(|error| {
         FitError::Work(format!(

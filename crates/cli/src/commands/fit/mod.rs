@@ -79,8 +79,8 @@ fn said_of_file(options: &Fit, shifts: usize, against: Option<String>) {
     output::note(&match against {
         None => format!("fitted to {shifts}: {output}"),
         Some(reason) => format!(
-            "warning: the fitted values are not written: {reason}. {output} has the values of the given file; do not use others before the reason is \
-             known"
+            "warning: the given values are kept: {reason}. {output} is the given file with this reason in its first line; do not use other values \
+             before the reason is known"
         ),
     });
 }
