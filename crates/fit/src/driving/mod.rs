@@ -17,7 +17,9 @@ mod car;
 mod model;
 mod recorder;
 mod stretch;
+mod twist;
 mod usable;
+mod wheel;
 mod whitening;
 
 pub use backlash::BacklashFit;
@@ -26,7 +28,10 @@ pub(crate) use car::DrivenCar;
 pub(crate) use model::{Balance, DrivingModel, DrivingWeights, Evaluated};
 pub(crate) use recorder::{DrivingRecorder, RowState, turns_by};
 pub use stretch::Driving;
+pub(crate) use twist::InputTorque;
 pub(crate) use usable::{Usable, usable};
+pub(crate) use wheel::fit_wheel;
+pub use wheel::{Known, WheelFit};
 
 /// What the torque at the gearbox input has beside its model: drag of the open elements, N m \[chosen\], and a share of the torque by the shape of the
 /// converter's maps \[chosen, as in the filter\].

@@ -1,8 +1,8 @@
 //! From the steps of a log to stretches of driving in which the engine pulls.
 
 use super::DrivenCar;
-use super::backlash::TwistRecorder;
 use super::stretch::{Driving, Stretch, StretchReadings};
+use super::twist::TwistRecorder;
 use crate::Series;
 
 /// After a shift clutches and shafts come to rest, s.

@@ -3,8 +3,8 @@
 use drivetrain::clutch::drag_torque;
 use observer::any_shift::MAX_ELEMENTS;
 
-use super::backlash::Cell;
 use super::car::{CAPACITIES, DrivenCar, OpenElement};
+use super::twist::Cell;
 use crate::Series;
 
 /// Length of a step, s: over some periods of the oscillation of the drive shafts, which the model leaves out and which acts back on the torque of

@@ -102,6 +102,11 @@ impl GearboxFit {
         if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
             text.put(&["driveline"], "backlash_rad", &number(backlash.rad), &backlash.comment())?;
         }
+        if let Some(wheel) = self.wheel.as_ref().ok().filter(|wheel| wheel.tells_stiffness()) {
+            let value = number(car.driveline.shaft_stiffness_n_m_rad * wheel.stiffness_factor());
+            let comment = factor_comment(wheel.stiffness_factor(), wheel.stiffness.sd, wheel.stiffness.verdict());
+            text.put(&["driveline"], "shaft_stiffness_n_m_rad", &value, &comment)?;
+        }
         Ok(())
     }
 

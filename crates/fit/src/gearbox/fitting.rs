@@ -1,18 +1,18 @@
 //! The fit of a car to its shifts.
 
 use config::Car;
-use design::ShiftTables;
+use design::{ShiftErrors, ShiftTables};
 use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
 use super::precision::stated;
-use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, deviation_of};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
 use super::unfitted::Unfitted;
-use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, fit_backlash};
+use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, InputTorque, WheelFit, fit_backlash, fit_wheel};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::fitted_file::SIDES;
 use crate::pressure::Hydraulics;
@@ -54,6 +54,8 @@ pub struct GearboxFit {
     pub fills: Vec<Option<FillFit>>,
     /// The backlash of the driveline, or what the logs lack for it.
     pub backlash: Result<BacklashFit, String>,
+    /// Channel of the wheel speed and stiffness of the drive shafts, or what the logs lack for them.
+    pub wheel: Result<WheelFit, String>,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
     pub(crate) above_one_share: f64,
     /// Pairs of gears whose inertia is taken to be that of the file, and the unknown that the logs draw it to.
@@ -131,9 +133,17 @@ fn fit_with(
         is_converged: solved.is_converged,
         driving_s: [driving.time_s(), driving.reported_s()],
         backlash: fit_backlash(&driven, std::iter::once(driving)),
+        wheel: Err(String::new()),
         balances: balances.clone(),
         quantities,
     };
+    let input = InputTorque {
+        capacity: fit.unknown(Quantity::Input).exp(),
+        ratio: fit.unknown(Quantity::TorqueRatio).exp(),
+        sd: fit.input_sd(),
+    };
+    let stiffness_sd = deviation_of(ShiftErrors::STANDARD.of_car(car).stiffness);
+    fit.wheel = fit_wheel(&driven, driving, &input, stiffness_sd);
     fit.fills = (0..fit.quantities.elements.len()).map(|place| fit.fill_of(car, tables, shifts, place)).collect();
     Ok((fit, scales))
 }

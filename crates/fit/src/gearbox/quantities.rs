@@ -279,7 +279,7 @@ impl Known<'_> {
 }
 
 /// Standard deviation of a uniform distribution with this bound.
-fn deviation_of(bound: f64) -> f64 {
+pub(crate) fn deviation_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 

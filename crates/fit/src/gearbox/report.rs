@@ -9,7 +9,7 @@ use crate::driving::DRAG_UNIT_N_M;
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row};
-use crate::{BacklashFit, ReportRow, Verdict, correlated};
+use crate::{BacklashFit, ReportRow, Verdict, WheelFit, correlated};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -17,7 +17,7 @@ const MISFIT: f64 = 2.0;
 const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
-const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, hysteresis of the valves and the shapes of all maps. \
+const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, damping of the drive shafts, tyres, hysteresis of the valves and the shapes of all maps. \
      The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them";
 
 impl GearboxFit {
@@ -92,6 +92,7 @@ impl GearboxFit {
         }));
         lines.extend(self.said_of_driving());
         lines.push(BacklashFit::statement(&self.backlash));
+        lines.extend(WheelFit::statements(&self.wheel));
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
