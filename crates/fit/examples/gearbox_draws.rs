@@ -108,7 +108,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let quantities = &fit.quantities;
     // The sensor's scale is none of the car, and a gain that is not measured is not fitted.
     let is_known = |quantity: Quantity| match quantity {
-        Quantity::PressureScale | Quantity::InputDelay => false,
+        Quantity::PressureScale | Quantity::InputDelay | Quantity::EngineDelay => false,
         Quantity::Gain(place) => quantities.measured[place],
         // Drawn delays are constant, those of the file depend on the command.
         Quantity::Delay(_) => case != Case::WithTiming,
@@ -156,6 +156,15 @@ fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
         ]),
         Err(reason) => println!("wheel speed: {reason}"),
     }
+    match &fit.channels.output {
+        Ok(found) => all.extend([
+            told("output speed: scale", &found.scale, 0.0),
+            told("output speed: delay s", &found.late_s, channels.late_s[2]),
+        ]),
+        Err(reason) => println!("output speed: {reason}"),
+    }
+    let engine = fit.engine_late_s();
+    all.extend(engine.map(|found| told("engine speed: delay s", &found, channels.late_s[0])));
     all
 }
 

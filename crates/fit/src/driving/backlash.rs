@@ -9,7 +9,7 @@
 //! ([`twist`](super::twist)). `b` is the backlash at the wheels. Times soon after a reversal, in which the teeth are on their way and
 //! the shafts oscillate, are left out.
 
-use super::twist::{Cell, InputTorque, Told, changes, rests};
+use super::twist::{Cell, InputTorque, changes, rests, told};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
 use crate::fitted_file::SIDES;
@@ -110,7 +110,7 @@ pub(crate) fn fit_backlash<'a>(
     }
     let stiffness = car.driveline.shaft_stiffness_n_m_rad;
     let compliance = stiffness.recip();
-    let found = Told::of(&changes, compliance, STIFFNESS);
+    let found = told(&changes, compliance, STIFFNESS);
     let found =
         found.ok_or_else(|| format!("the speeds of output and wheels do not fit together; {BACKLASH_TOLD_BY}"))?;
     let (rad, sd_rad) = (found.value[3], found.sd[3]);

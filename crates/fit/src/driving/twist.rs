@@ -8,12 +8,9 @@
 //! torque `T` of the converter at the wheels, less what accelerates the gearbox. Least squares over the changes from one time of rest to the next, whose
 //! errors are independent as far as those of the speeds are; robust by Huber's weights.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::DrivenCar;
+use super::lines::{Line, Told};
 use crate::Series;
-use crate::intervals::cluster;
-use crate::weights::{FACTOR, HUBER, correlation};
 
 /// Length of a cell, s, and time between the points of its means, s.
 pub(crate) const CELL_S: f64 = 0.1;
@@ -36,8 +33,6 @@ pub(crate) const DELAY_S: f64 = 0.03;
 const FREE_RAD: f64 = 1.0;
 /// Scale, delay, compliance, backlash.
 const UNKNOWNS: usize = 4;
-/// Turns in which the weights follow the errors.
-const TURNS: u32 = 5;
 
 /// A tenth of a second in a gear.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -171,17 +166,6 @@ pub(crate) fn rests(cells: &[Cell]) -> Vec<usize> {
     (before..cells.len()).filter(rests).collect()
 }
 
-/// A change of the angle by which the output is ahead of the wheels.
-pub(crate) struct Change {
-    /// Derivatives by the unknowns, and the angle.
-    row: [f64; UNKNOWNS],
-    angle_rad: f64,
-    /// Its length, s.
-    pub(crate) span_s: f64,
-    /// Changes whose errors may be alike.
-    pub(crate) group: usize,
-}
-
 /// The points of rest from which changes are taken: of those in a row every so many, and both ends.
 fn points(cells: &[Cell], apart: usize, least_rad_s: f64) -> Vec<usize> {
     let rests: Vec<usize> = rests(cells).into_iter().filter(|at| cells[*at].wheel_rad_s > least_rad_s).collect();
@@ -200,14 +184,13 @@ fn points(cells: &[Cell], apart: usize, least_rad_s: f64) -> Vec<usize> {
 }
 
 /// The changes of the stretches from one time of rest to the next, and how many of them are reversals, which count as groups of their own. Angles are those
-/// at the middles of the cells.
-/// In a row of cells they are so many of them long; slower wheels are left out.
+/// at the middles of the cells. In a row of cells they are so many of them long; slower wheels are left out.
 pub(crate) fn changes(
     stretches: &[&Vec<Cell>],
     apart: usize,
     least_rad_s: f64,
     torque: &InputTorque,
-) -> (Vec<Change>, usize) {
+) -> (Vec<Line<UNKNOWNS>>, usize) {
     let mut all = Vec::new();
     let (mut group, mut reversals) = (0, 0);
     for cells in stretches {
@@ -223,14 +206,14 @@ pub(crate) fn changes(
             }
             group += usize::from(is_reversal);
             reversals += usize::from(is_reversal);
-            all.push(Change {
+            all.push(Line {
                 row: [
                     sum(|cell| cell.turned_rad),
                     to.wheel_rad_s - from.wheel_rad_s,
                     torque.at_wheels(to) - torque.at_wheels(from),
                     0.5 * (to.sign() - from.sign()),
                 ],
-                angle_rad: sum(|cell| cell.ahead_rad),
+                value: sum(|cell| cell.ahead_rad),
                 span_s,
                 group,
             });
@@ -240,74 +223,8 @@ pub(crate) fn changes(
     (all, reversals)
 }
 
-/// What the changes tell of scale, delay, compliance and backlash: their values, and the larger of two standard deviations, with the correlation of the errors in sequence, and by the
-/// scatter of the groups.
-pub(crate) struct Told {
-    pub(crate) value: [f64; UNKNOWNS],
-    pub(crate) sd: [f64; UNKNOWNS],
-}
-
-impl Told {
-    /// From changes, and the compliance of before with its deviation as a share; none if the equations have no finite solution.
-    pub(crate) fn of(changes: &[Change], compliance: f64, share: f64) -> Option<Self> {
-        let sd = [SCALE, DELAY_S, share * compliance, FREE_RAD];
-        let root = |i: usize| changes[i].span_s.sqrt();
-        let problem = Regression {
-            rows: DMatrix::from_fn(changes.len(), UNKNOWNS, |i, j| changes[i].row[j] / root(i)),
-            angles: DVector::from_fn(changes.len(), |i, _| changes[i].angle_rad / root(i)),
-            before: DVector::from_row_slice(&[0.0, 0.0, compliance, 0.0]),
-            precision: DMatrix::from_diagonal(&DVector::from_row_slice(&sd.map(|sd| sd.powi(-2)))),
-        };
-        let mut at = problem.before.clone();
-        let mut covariance = problem.precision.clone();
-        for _ in 0..TURNS {
-            (at, covariance) = problem.step(&problem.weights(&at))?;
-        }
-        let weighed = problem.weights(&at).component_mul(&(&problem.angles - &problem.rows * &at));
-        let mut scores = vec![DVector::zeros(UNKNOWNS); changes.last()?.group + 1];
-        for (i, change) in changes.iter().enumerate() {
-            scores[change.group] += problem.rows.row(i).transpose() * weighed[i];
-        }
-        let cluster = cluster(&covariance, &scores, &problem.precision);
-        let found = Self {
-            value: std::array::from_fn(|j| at[j]),
-            sd: std::array::from_fn(|j| covariance[(j, j)].max(cluster[(j, j)]).sqrt()),
-        };
-        found.value.iter().chain(&found.sd).all(|number| number.is_finite()).then_some(found)
-    }
-}
-
-/// The changes, each over the root of its time, so that their errors are alike.
-struct Regression {
-    rows: DMatrix<f64>,
-    angles: DVector<f64>,
-    before: DVector<f64>,
-    precision: DMatrix<f64>,
-}
-
-impl Regression {
-    /// Weights of the changes at unknowns.
-    fn weights(&self, at: &DVector<f64>) -> DVector<f64> {
-        let errors = &self.angles - &self.rows * at;
-        let scale = scale_of(&errors);
-        let in_scales: Vec<f64> = errors.iter().map(|error| error / scale).collect();
-        let variance = scale * scale * FACTOR * FACTOR * correlation(&[&in_scales], 0.0, 1.0);
-        errors.map(|error| (HUBER * scale / error.abs()).min(1.0) / variance)
-    }
-
-    /// The unknowns with these weights, and their covariance.
-    fn step(&self, weights: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let mut weighed = self.rows.clone();
-        weighed.row_iter_mut().zip(weights.iter()).for_each(|(mut row, weight)| row *= *weight);
-        let cholesky = (self.rows.tr_mul(&weighed) + &self.precision).cholesky()?;
-        let right = weighed.tr_mul(&self.angles) + &self.precision * &self.before;
-        Some((cholesky.solve(&right), cholesky.inverse()))
-    }
-}
-
-/// Robust standard deviation.
-fn scale_of(errors: &DVector<f64>) -> f64 {
-    let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    (1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)).max(1e-9)
+/// What changes tell of scale, delay, compliance and backlash, with the compliance of before and its deviation as a share; none if the equations have no finite
+/// solution.
+pub(crate) fn told(changes: &[Line<UNKNOWNS>], compliance: f64, share: f64) -> Option<Told<UNKNOWNS>> {
+    Told::of(changes, [0.0, 0.0, compliance, 0.0], [SCALE, DELAY_S, share * compliance, FREE_RAD])
 }

@@ -3,7 +3,8 @@
 //! The unknowns are those of [`twist`](super::twist), with the backlash as one that is in the way. Changes are half a second long: in a shorter one the noise
 //! of the torque is as large as its change, and the shafts would seem too stiff (errors in variables).
 
-use super::twist::{Cell, DELAY_S, InputTorque, SCALE, Told, changes};
+use super::known::{Known, LEAST_SCALE, said_of_delay};
+use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, told};
 use super::{DrivenCar, Driving};
 use crate::Verdict;
 use crate::fitted_file::SIDES;
@@ -17,33 +18,12 @@ const GROUPS: usize = 4;
 const OUTPUT_LEAST_RAD_S: f64 = 15.0;
 /// Least deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
 const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
-/// Errors of scale, and delays, ms, that are nothing to correct \[chosen\].
-const LEAST_SCALE: f64 = 1e-3;
-const LEAST_MS: f64 = 1.0;
 
 /// Which drive tells it.
 const WHEEL_TOLD_BY: &str =
     "press and release the accelerator in a gear on a straight road, with the speed of the driven wheels logged";
 const STIFFNESS_TOLD_BY: &str =
     "press and release the accelerator in a low gear, each for 2 s and by different amounts, some twenty times";
-
-/// A value with its standard deviation as it is stated, and before.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation.
-    pub sd: f64,
-    /// That of before.
-    pub before: f64,
-}
-
-impl Known {
-    /// What the logs tell of it.
-    pub fn verdict(&self) -> Verdict {
-        Verdict::of(self.sd, self.before)
-    }
-}
 
 /// What was found of the wheel speed and the drive shafts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,26 +97,6 @@ impl WheelFit {
     }
 }
 
-/// What is said of the delay of a channel against another one, and where it belongs.
-pub(crate) fn said_of_delay(role: &str, against: &str, late_s: &Known, told_by: &str) -> String {
-    let [late_ms, half_ms] = [late_s.value, SIDES * late_s.sd].map(|time_s| 1e3 * time_s);
-    let found = format!("{role} is {late_ms:+.1} +- {half_ms:.1} ms behind {against}");
-    if late_s.verdict() == Verdict::NotTold {
-        return format!("{found}: its delay is not told by these logs; {told_by}");
-    }
-    match late_ms {
-        late_ms if late_ms.abs() <= half_ms.max(LEAST_MS) => format!("{found}: they belong together"),
-        late_ms if late_ms > 0.0 => {
-            format!("{found}: add {:.4} to `delay_s` of its channel in the channel map", late_s.value)
-        }
-        _ => format!(
-            "{found}, ahead of it: take {:.4} off `delay_s` of its channel in the channel map; where that would be below 0, add as much to `delay_s` of all \
-             other channels",
-            -late_s.value
-        ),
-    }
-}
-
 /// The wheel speed and the drive shafts of a car in the gears of its logs; `stiffness_sd` is what is known of the stiffness before, as a share.
 ///
 /// # Errors
@@ -163,18 +123,16 @@ pub(crate) fn fit_wheel(
         ));
     }
     let compliance = car.driveline.shaft_stiffness_n_m_rad.recip();
-    let found = Told::of(&changes, compliance, stiffness_sd)
+    let found = told(&changes, compliance, stiffness_sd)
         .filter(|found| found.value[2] > 0.0)
         .ok_or_else(|| format!("the speeds of output and wheels do not fit together; {WHEEL_TOLD_BY}"))?;
-    let known =
-        |value: f64, sd: f64, at: usize, before: f64| Known { value, sd: sd.hypot(FLOORS[at]).min(before), before };
     let [scale, late_s, shafts, _] = found.value;
     // The twist tells the compliance per torque.
     let stiffness_sd_found = (found.sd[2] / shafts).hypot(torque.sd);
     Ok(WheelFit {
-        scale: known(scale, found.sd[0], 0, SCALE),
-        late_s: known(late_s, found.sd[1], 1, DELAY_S),
-        stiffness: known((compliance / shafts).ln(), stiffness_sd_found, 2, stiffness_sd),
+        scale: Known::of(scale, found.sd[0], FLOORS[0], SCALE),
+        late_s: Known::of(late_s, found.sd[1], FLOORS[1], DELAY_S),
+        stiffness: Known::of((compliance / shafts).ln(), stiffness_sd_found, FLOORS[2], stiffness_sd),
         time_s,
     })
 }

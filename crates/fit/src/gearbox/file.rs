@@ -211,7 +211,7 @@ impl GearboxFit {
         let (value, half) = (self.unknown(quantity), SIDES * self.sd(quantity));
         let told = self.verdict(quantity).name();
         match quantity {
-            Quantity::Delay(_) | Quantity::InputDelay | Quantity::ReportedDelay => {
+            Quantity::Delay(_) | Quantity::InputDelay | Quantity::EngineDelay | Quantity::ReportedDelay => {
                 let ms = 1e3 * DELAY_UNIT_S;
                 format!("delays {:+.1} ms, 95 % within {:.1} ms, {told}", ms * value, ms * half)
             }

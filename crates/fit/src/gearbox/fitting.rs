@@ -6,6 +6,7 @@ use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
+use super::channels::ChannelFits;
 use super::precision::stated;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, deviation_of};
 use super::shift::ShiftModel;
@@ -16,7 +17,7 @@ use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, InputTorque,
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::fitted_file::SIDES;
 use crate::pressure::Hydraulics;
-use crate::{FitError, Verdict};
+use crate::{FitError, Known, Verdict};
 
 /// How far a fit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,6 +57,8 @@ pub struct GearboxFit {
     pub backlash: Result<BacklashFit, String>,
     /// Channel of the wheel speed and stiffness of the drive shafts, or what the logs lack for them.
     pub wheel: Result<WheelFit, String>,
+    /// Channels of output and engine speed against the turbine speed.
+    pub channels: ChannelFits,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
     pub(crate) above_one_share: f64,
     /// Pairs of gears whose inertia is taken to be that of the file, and the unknown that the logs draw it to.
@@ -77,10 +80,13 @@ pub fn fit(
     driving: &Driving,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<GearboxFit, FitError> {
+    let channels = ChannelFits::of(car, driving);
+    let shifts = &channels.moved(shifts, tables, 0.0);
     let mut balances = Balances::of(&DrivenCar::with_gearbox(car, tables, &|_, _| None), driving);
     loop {
-        let (fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
+        let (mut fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
         if !balances.leave_out(scales) {
+            fit.channels = channels;
             return Ok(fit);
         }
     }
@@ -134,6 +140,7 @@ fn fit_with(
         driving_s: [driving.time_s(), driving.reported_s()],
         backlash: fit_backlash(&driven, std::iter::once(driving)),
         wheel: Err(String::new()),
+        channels: ChannelFits { output: Err(String::new()), engine: None },
         balances: balances.clone(),
         quantities,
     };
@@ -220,6 +227,15 @@ impl GearboxFit {
     /// Standard deviation of the unknown of a quantity as it is stated.
     pub fn sd(&self, quantity: Quantity) -> f64 {
         self.quantities.place(quantity).map_or(f64::INFINITY, |place| self.stated[(place, place)].sqrt())
+    }
+
+    /// By how much the engine speed is late against the turbine speed in front of a converter, s.
+    pub fn engine_late_s(&self) -> Option<Known> {
+        let place = self.quantities.place(Quantity::EngineDelay)?;
+        let [value, sd, before] =
+            [self.unknowns[place], self.sd(Quantity::EngineDelay), self.quantities.sd_before(place)]
+                .map(|unknown| DELAY_UNIT_S * unknown);
+        Some(Known { value: self.channels.late_s()[1] + value, sd, before })
     }
 
     /// Standard deviation of the logarithm of the torque at the gearbox input in shifts: the torque ratio acts on what is above 1 alone.

@@ -1,8 +1,10 @@
 //! Scale and delays of the channels, and the stiffness of the drive shafts.
 
 use config::Car;
-use fit::gearbox::{Driving, GearboxFit, fit};
-use fit::{Known, Verdict};
+use fit::gearbox::{Driving, GearboxFit, Recorder, fit};
+use fit::{Known, ReadingAges, Verdict};
+use observer::Reading;
+use observer::any_shift::{GearCommand, ShiftInput};
 
 use crate::drawn::{Case, Drawn, car, city, hilly, with_tip_ins};
 
@@ -29,7 +31,7 @@ fn stiffness(car: &Car) -> f64 {
 
 #[test]
 fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals() {
-    let drawn = drawn(31).with_backlash();
+    let drawn = drawn(31).with_backlash().without_hysteresis();
     let fit = fitted(&drawn, &with_tip_ins(2));
     let found = fit.wheel.clone().unwrap();
     let channels = drawn.channels;
@@ -38,6 +40,12 @@ fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals()
     assert!(holds(&found.late_s, late_s) && found.late_s.sd < 5e-4, "{found:?} {channels:?}");
     let truth = (stiffness(&drawn.truth) / stiffness(&drawn.file)).ln();
     assert!(holds(&found.stiffness, truth) && found.stiffness.verdict() == Verdict::Partly, "{found:?} {truth}");
+    // Output and engine speed against the turbine speed.
+    let output = fit.channels.output.clone().unwrap();
+    assert!(holds(&output.late_s, channels.late_s[2]) && output.late_s.sd < 5e-4, "{output:?} {channels:?}");
+    assert!(output.scale.value.abs() < 1e-3 && fit.channels.engine.as_ref().is_some_and(Result::is_err), "{output:?}");
+    let engine = fit.engine_late_s().unwrap();
+    assert!(holds(&engine, channels.late_s[0]) && engine.verdict() == Verdict::Measured, "{engine:?} {channels:?}");
     let file = written(&drawn, &fit);
     assert!((stiffness(&file) / stiffness(&drawn.file) / found.stiffness.value.exp() - 1.0).abs() < 1e-3);
     let share = file.error_bounds.shaft_stiffness_share.unwrap();
@@ -46,6 +54,9 @@ fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals()
     for words in [
         format!("multiply `scale` of its channel in the channel map by {:.4}", 1.0 + found.scale.value),
         format!("wheel_speed is {:+.1} +- ", 1e3 * found.late_s.value),
+        format!("output_speed is {:+.1} +- ", 1e3 * output.late_s.value),
+        format!("engine_speed is {:+.1} +- ", 1e3 * engine.value),
+        "the fit has counted with these delays of output and engine speed".to_owned(),
         "the speeds tell the product alone".to_owned(),
         "stiffness of the drive shafts: x ".to_owned(),
     ] {
@@ -74,5 +85,52 @@ fn what_the_wheel_speed_does_not_tell_stays_as_in_the_file_and_is_said() {
         // The text of the file is not that of the drawn one.
         assert_eq!(stiffness(&file), stiffness(&car("eight_speed.toml")));
         assert_eq!(file.error_bounds.shaft_stiffness_share, None);
+    }
+}
+
+/// Speeds that go up and down in two gears, with the lock-up clutch closed: an output speed that is early and has another scale, an engine speed that is late.
+fn locked(drawn: &Drawn, output_s: f64, output_scale: f64, engine_s: f64) -> Driving {
+    let tables = drawn.tables();
+    let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::default());
+    for at in 0..6000 {
+        let time_s = 0.01 * f64::from(at);
+        let gear = if at / 700 % 2 == 0 { 3 } else { 4 };
+        let ratio = drawn.file.gearbox.gears[gear].ratio;
+        let noise = |channel: i32| 0.1 * (1.7 * f64::from((at * at + 13 * channel * at) % 101)).sin();
+        let output = |late_s: f64| 120.0 + 30.0 * (0.7 * (time_s - late_s)).sin();
+        let reading = |value: f64| Some(Reading::now(value));
+        let input = ShiftInput {
+            dt_s: 0.01,
+            engine_rad_s: reading(ratio * output(engine_s) + noise(1)),
+            turbine_rad_s: reading(ratio * output(0.0) + noise(2)),
+            output_rad_s: reading(output(output_s) / output_scale + noise(3)),
+            wheel_rad_s: None,
+            engine_n_m: None,
+            lock_up_applied: true,
+            commands: [None; 8],
+            gear: GearCommand { from: gear, to: gear },
+        };
+        recorder.push(time_s, &input);
+    }
+    recorder.finish().driving
+}
+
+#[test]
+fn a_closed_lock_up_clutch_tells_the_delay_of_the_engine_speed_and_the_ratio_a_wrong_scale() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 33, Case::Usual);
+    let (recorded, _) = drawn.driven(&city(1));
+    let driving = locked(&drawn, -0.006, 1.004, 0.008);
+    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| ()).unwrap();
+    let (output, engine) = (fit.channels.output.clone().unwrap(), fit.channels.engine.clone().unwrap().unwrap());
+    assert!(holds(&output.late_s, -0.006) && output.late_s.sd < 1e-3, "{output:?}");
+    assert!(holds(&output.scale, 0.004) && output.scale.sd < 3e-4, "{output:?}");
+    assert!(holds(&engine.late_s, 0.008) && holds(&engine.scale, 0.0), "{engine:?}");
+    let said = fit.statements().join("\n");
+    for words in [
+        "engine_speed with the lock-up clutch closed is +8.",
+        "`scale` of one of both channels, or a ratio, is wrong",
+        "ahead of it: take 0.00",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
     }
 }

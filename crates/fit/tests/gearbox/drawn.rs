@@ -309,6 +309,7 @@ impl Drawn {
             Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) => 0.0,
             Quantity::Lag(place) => self.draw.timing[element(place)].map_or(0.0, |timing| timing.lag.ln()),
             Quantity::InputDelay | Quantity::PressureScale => 0.0,
+            Quantity::EngineDelay => self.channels.late_s[0] / 0.01,
             Quantity::Mass => self.vehicle[0].ln(),
             Quantity::Rolling => self.vehicle[1].ln(),
             Quantity::Air => self.vehicle[2].ln(),
