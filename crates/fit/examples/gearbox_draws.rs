@@ -2,7 +2,8 @@
 //!
 //! `FIT_CARS=20 cargo run --release -p fit --example gearbox_draws`; `FIT_FIRST` is the first seed, `FIT_DRIVES` how often the drive of
 //! three minutes is driven (5), on a road with hills unless `FIT_ROAD=level`; with `FIT_TORQUE=1` the engine torque is reported, with
-//! `FIT_WEIGHED=1` the mass is known to a percent, with `FIT_BACKLASH=1` each car has a backlash of its own, and with `FIT_DRIVING=off` driving between shifts is not fitted; `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
+//! `FIT_WEIGHED=1` the mass is known to a percent, with `FIT_BACKLASH=1` each car has a backlash of its own, with `FIT_CHANNELS=1` the channels of the speeds have delays and a scale, with `FIT_TIPS=1` each drive has a minute of
+//! pressing and releasing the accelerator, and with `FIT_DRIVING=off` driving between shifts is not fitted; `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
 //! sensor; `FIT_HYSTERESIS=none` says in the error bounds of the file that no valve has a hysteresis; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
 //! the WLTC with the given file, with the fitted one without its error bounds, without the check of its valves, and with all of it.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement may panic, and this one prints a table")]
@@ -15,7 +16,8 @@ mod estimated;
 use config::{Car, Drive, DriveSegment};
 use drawn::{Case, Drawn, every_fifth};
 use estimated::{Estimated, estimated};
-use fit::gearbox::{Driving, Quantity};
+use fit::Known;
+use fit::gearbox::{Driving, GearboxFit, Quantity};
 
 /// Of a quantity the error of the fit, and the standard deviations stated and before, in its unknown.
 struct Told {
@@ -30,6 +32,7 @@ struct Outcome {
     /// RMS error of the torques by the valve models on held-out shifts, N m: given file, fitted file.
     torque_n_m: [f64; 2],
     told: Vec<Told>,
+    channels: Vec<Told>,
     estimates: Vec<Estimated>,
 }
 
@@ -101,10 +104,11 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         ),
         Err(reason) => println!("backlash: {reason}"),
     }
+    let channels = of_channels(drawn, &fit);
     let quantities = &fit.quantities;
     // The sensor's scale is none of the car, and a gain that is not measured is not fitted.
     let is_known = |quantity: Quantity| match quantity {
-        Quantity::PressureScale | Quantity::InputDelay => false,
+        Quantity::PressureScale | Quantity::InputDelay | Quantity::EngineDelay => false,
         Quantity::Gain(place) => quantities.measured[place],
         // Drawn delays are constant, those of the file depend on the command.
         Quantity::Delay(_) => case != Case::WithTiming,
@@ -126,7 +130,42 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
         }
         Err(_) => Vec::new(),
     };
-    Outcome { torque_n_m, told, estimates }
+    Outcome { torque_n_m, told, channels, estimates }
+}
+
+/// What was found of the channels of the speeds and the drive shafts.
+fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
+    let told = |name: &str, known: &Known, truth: f64| {
+        let error = known.value - truth;
+        println!(
+            "{name}: {:+.5}, true {truth:+.5}, sd {:.5}, off by {:+.1} sd",
+            known.value,
+            known.sd,
+            error / known.sd
+        );
+        Told { name: name.to_owned(), error, stated: known.sd, before: known.before }
+    };
+    let channels = drawn.channels;
+    let stiffness = |car: &Car| car.driveline.shaft_stiffness_n_m_rad;
+    let mut all = Vec::new();
+    match &fit.wheel {
+        Ok(found) => all.extend([
+            told("wheel speed: scale", &found.scale, channels.wheel_scale),
+            told("wheel speed: delay s", &found.late_s, channels.late_s[3] - channels.late_s[2]),
+            told("drive shafts", &found.stiffness, (stiffness(&drawn.truth) / stiffness(&drawn.file)).ln()),
+        ]),
+        Err(reason) => println!("wheel speed: {reason}"),
+    }
+    match &fit.channels.output {
+        Ok(found) => all.extend([
+            told("output speed: scale", &found.scale, 0.0),
+            told("output speed: delay s", &found.late_s, channels.late_s[2]),
+        ]),
+        Err(reason) => println!("output speed: {reason}"),
+    }
+    let engine = fit.engine_late_s();
+    all.extend(engine.map(|found| told("engine speed: delay s", &found, channels.late_s[0])));
+    all
 }
 
 /// A drive on a level road.
@@ -141,9 +180,9 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Of each quantity how many truths lie in the stated 95 %, bias and spread of the errors.
-fn print_quantities(outcomes: &[Outcome]) {
+fn print_quantities(outcomes: &[Outcome], told: fn(&Outcome) -> &[Told]) {
     let is_inside = |told: &&Told| told.error.abs() <= 1.96 * told.stated;
-    let all = || outcomes.iter().flat_map(|outcome| &outcome.told);
+    let all = || outcomes.iter().flat_map(told);
     let mut names: Vec<&str> = Vec::new();
     for told in all() {
         if !names.contains(&told.name.as_str()) {
@@ -190,7 +229,8 @@ fn print_estimates(outcomes: &[Outcome]) {
 fn main() {
     let vehicle = std::env::var("FIT_VEHICLE").unwrap_or("eight_speed.toml".to_owned());
     let (first, cars) = (number("FIT_FIRST", 0), number("FIT_CARS", 3));
-    let drive = drawn::city(number("FIT_DRIVES", 5).try_into().unwrap());
+    let count = number("FIT_DRIVES", 5).try_into().unwrap();
+    let drive = if std::env::var("FIT_TIPS").is_ok() { drawn::with_tip_ins(count) } else { drawn::city(count) };
     let case = match std::env::var("FIT_CASE").as_deref() {
         Err(_) => Case::Usual,
         Ok("timing") => Case::WithTiming,
@@ -200,6 +240,7 @@ fn main() {
     let (is_hilly, is_reported) = (std::env::var("FIT_ROAD").is_err(), std::env::var("FIT_TORQUE").is_ok());
     let has_hysteresis = std::env::var("FIT_HYSTERESIS").is_err();
     let has_backlash = std::env::var("FIT_BACKLASH").is_ok();
+    let has_channels = std::env::var("FIT_CHANNELS").is_ok();
     let is_weighed = std::env::var("FIT_WEIGHED").is_ok();
     let of_car = |seed: u64| {
         let drawn = Drawn::of(drawn::car(&vehicle), seed, case);
@@ -207,11 +248,13 @@ fn main() {
         let drawn = if is_weighed { drawn.weighed() } else { drawn };
         let drawn = if has_hysteresis { drawn } else { drawn.without_hysteresis() };
         let drawn = if has_backlash { drawn.with_backlash() } else { drawn };
+        let drawn = if has_channels { drawn.with_channels() } else { drawn };
         let drive = if is_hilly { drawn::hilly(&drive, seed) } else { level(&drive) };
         outcome(&drawn, case, &drive)
     };
     let outcomes: Vec<Outcome> = (first..first + cars).map(of_car).collect();
-    print_quantities(&outcomes);
+    print_quantities(&outcomes, |outcome| &outcome.told);
+    print_quantities(&outcomes, |outcome| &outcome.channels);
     print_estimates(&outcomes);
     let rms = [0, 1].map(|which| mean(outcomes.iter().map(|outcome| outcome.torque_n_m[which].powi(2))).sqrt());
     let mut ratios: Vec<f64> = outcomes.iter().map(|outcome| outcome.torque_n_m[1] / outcome.torque_n_m[0]).collect();

@@ -40,7 +40,7 @@ mod weights;
 
 pub use car::ReadingAges;
 pub use collect::{Collected, collect};
-pub use driving::{BacklashFit, Driving};
+pub use driving::{BacklashFit, Driving, Known, SkewFit, WheelFit};
 pub use error::FitError;
 pub use fill::FillFit;
 pub use fitting::{Fit, Progress, SHIFTS_MAX, available, fit};

@@ -14,19 +14,30 @@
 
 pub(crate) mod backlash;
 mod car;
+mod known;
+mod lines;
 mod model;
 mod recorder;
+mod skew;
 mod stretch;
+mod twist;
 mod usable;
+mod wheel;
 mod whitening;
 
 pub use backlash::BacklashFit;
 pub(crate) use backlash::fit_backlash;
 pub(crate) use car::DrivenCar;
+pub use known::Known;
+pub(crate) use known::{LEAST_DELAY_S, said_of_delay};
 pub(crate) use model::{Balance, DrivingModel, DrivingWeights, Evaluated};
 pub(crate) use recorder::{DrivingRecorder, RowState, turns_by};
+pub use skew::SkewFit;
 pub use stretch::Driving;
+pub(crate) use twist::InputTorque;
 pub(crate) use usable::{Usable, usable};
+pub use wheel::WheelFit;
+pub(crate) use wheel::fit_wheel;
 
 /// What the torque at the gearbox input has beside its model: drag of the open elements, N m \[chosen\], and a share of the torque by the shape of the
 /// converter's maps \[chosen, as in the filter\].

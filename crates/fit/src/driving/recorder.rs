@@ -1,8 +1,9 @@
 //! From the steps of a log to stretches of driving in which the engine pulls.
 
 use super::DrivenCar;
-use super::backlash::TwistRecorder;
+use super::skew::SkewRecorder;
 use super::stretch::{Driving, Stretch, StretchReadings};
+use super::twist::TwistRecorder;
 use crate::Series;
 
 /// After a shift clutches and shafts come to rest, s.
@@ -47,6 +48,8 @@ pub(crate) struct DrivingRecorder {
     open: Option<(usize, f64)>,
     unsettled_s: f64,
     twist: TwistRecorder,
+    output: SkewRecorder,
+    engine: SkewRecorder,
     found: Driving,
 }
 
@@ -58,6 +61,8 @@ impl DrivingRecorder {
             open: None,
             unsettled_s: f64::NEG_INFINITY,
             twist: TwistRecorder::default(),
+            output: SkewRecorder::default(),
+            engine: SkewRecorder::default(),
             found: Driving::default(),
         }
     }
@@ -72,6 +77,12 @@ impl DrivingRecorder {
         }
         let gear = state.gear.filter(|_| !state.lock_up);
         self.twist.push(&self.car, time_s, speeds, gear);
+        let ratio = state.gear.and_then(|gear| Some((gear, self.car.gears.get(gear)?.ratio)));
+        let ratio = ratio.filter(|(_, ratio)| *ratio > 0.0);
+        let [of_engine, of_turbine, of_output, _] = speeds;
+        self.output.push(time_s, [of_turbine, of_output], ratio);
+        let locked = state.gear.filter(|_| state.lock_up && self.car.converter.is_some()).map(|gear| (gear, 1.0));
+        self.engine.push(time_s, [of_turbine, of_engine], locked);
         if gear.is_none() || gear != self.open.map(|(gear, _)| gear).or(gear) {
             self.unsettled_s = time_s;
         }
@@ -99,6 +110,10 @@ impl DrivingRecorder {
         self.close();
         self.twist.close(&self.car);
         self.found.twists = self.twist.stretches;
+        self.output.close();
+        self.found.outputs = self.output.stretches;
+        self.engine.close();
+        self.found.engines = self.engine.stretches;
         self.found
     }
 

@@ -3,8 +3,9 @@
 use drivetrain::clutch::drag_torque;
 use observer::any_shift::MAX_ELEMENTS;
 
-use super::backlash::Cell;
 use super::car::{CAPACITIES, DrivenCar, OpenElement};
+use super::skew::Pair;
+use super::twist::Cell;
 use crate::Series;
 
 /// Length of a step, s: over some periods of the oscillation of the drive shafts, which the model leaves out and which acts back on the torque of
@@ -24,8 +25,11 @@ const STEPS_MIN: usize = 3;
 pub struct Driving {
     /// Stretches in their order.
     pub(crate) stretches: Vec<Stretch>,
-    /// Stretches with reversals of the torque.
+    /// Stretches in a gear with a wheel speed.
     pub(crate) twists: Vec<Vec<Cell>>,
+    /// Output speed against the turbine speed in a gear, and engine speed with the lock-up clutch closed.
+    pub(crate) outputs: Vec<Vec<Pair>>,
+    pub(crate) engines: Vec<Vec<Pair>>,
     /// Whether the log was longer than what is kept.
     pub(crate) is_cut: bool,
 }
@@ -38,6 +42,10 @@ impl Driving {
         self.stretches.extend(new);
         let new = more.twists.into_iter().filter(|twist| !self.twists.contains(twist)).collect::<Vec<_>>();
         self.twists.extend(new);
+        for (all, more) in [(&mut self.outputs, more.outputs), (&mut self.engines, more.engines)] {
+            let new = more.into_iter().filter(|pairs| !all.contains(pairs)).collect::<Vec<_>>();
+            all.extend(new);
+        }
         self.is_cut |= more.is_cut;
     }
 

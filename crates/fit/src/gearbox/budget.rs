@@ -32,6 +32,10 @@ impl GearboxFit {
             let share = edge(self.sd(Quantity::Mass));
             text.put(&["error_bounds"], "mass_share", &number(share), comment)?;
         }
+        if let Some(wheel) = self.wheel.as_ref().ok().filter(|wheel| wheel.tells_stiffness()) {
+            let share = edge(wheel.stiffness.sd).min(given.stiffness);
+            text.put(&["error_bounds"], "shaft_stiffness_share", &number(share), comment)?;
+        }
         // One number for all shifts: that of the pair of gears that is known least.
         let inertias = (0..self.quantities.pairs.len()).map(|at| edge(self.sd(Quantity::Inertia(at))));
         let share = inertias.fold(0.0, f64::max).min(given.inertia);

@@ -101,6 +101,11 @@ impl GearboxFit {
         if let Some(backlash) = self.backlash.as_ref().ok().filter(|backlash| backlash.is_told()) {
             text.put(&["driveline"], "backlash_rad", &number(backlash.rad), &backlash.comment())?;
         }
+        if let Some(wheel) = self.wheel.as_ref().ok().filter(|wheel| wheel.tells_stiffness()) {
+            let value = number(car.driveline.shaft_stiffness_n_m_rad * wheel.stiffness_factor());
+            let comment = factor_comment(wheel.stiffness_factor(), wheel.stiffness.sd, wheel.stiffness.verdict());
+            text.put(&["driveline"], "shaft_stiffness_n_m_rad", &value, &comment)?;
+        }
         Ok(())
     }
 
@@ -205,7 +210,7 @@ impl GearboxFit {
         let (value, half) = (self.unknown(quantity), SIDES * self.sd(quantity));
         let told = self.verdict(quantity).name();
         match quantity {
-            Quantity::Delay(_) | Quantity::InputDelay | Quantity::ReportedDelay => {
+            Quantity::Delay(_) | Quantity::InputDelay | Quantity::EngineDelay | Quantity::ReportedDelay => {
                 let ms = 1e3 * DELAY_UNIT_S;
                 format!("delays {:+.1} ms, 95 % within {:.1} ms, {told}", ms * value, ms * half)
             }

@@ -1,22 +1,23 @@
 //! The fit of a car to its shifts.
 
 use config::Car;
-use design::ShiftTables;
+use design::{ShiftErrors, ShiftTables};
 use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
+use super::channels::ChannelFits;
 use super::precision::stated;
-use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity};
+use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, deviation_of};
 use super::shift::ShiftModel;
 use super::shift_log::ShiftLog;
 use super::solver::{Models, Problem};
 use super::unfitted::Unfitted;
-use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, fit_backlash};
+use crate::driving::{BacklashFit, DrivenCar, Driving, DrivingModel, InputTorque, WheelFit, fit_backlash, fit_wheel};
 use crate::fill::{FillFit, FillLog, Filling};
 use crate::fitted_file::SIDES;
 use crate::pressure::Hydraulics;
-use crate::{FitError, Verdict};
+use crate::{FitError, Known, Verdict};
 
 /// How far a fit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +55,10 @@ pub struct GearboxFit {
     pub fills: Vec<Option<FillFit>>,
     /// The backlash of the driveline, or what the logs lack for it.
     pub backlash: Result<BacklashFit, String>,
+    /// Channel of the wheel speed and stiffness of the drive shafts, or what the logs lack for them.
+    pub wheel: Result<WheelFit, String>,
+    /// Channels of output and engine speed against the turbine speed.
+    pub channels: ChannelFits,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
     pub(crate) above_one_share: f64,
     /// Pairs of gears whose inertia is taken to be that of the file, and the unknown that the logs draw it to.
@@ -75,10 +80,13 @@ pub fn fit(
     driving: &Driving,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<GearboxFit, FitError> {
+    let channels = ChannelFits::of(car, driving);
+    let shifts = &channels.moved(shifts, tables, 0.0);
     let mut balances = Balances::of(&DrivenCar::with_gearbox(car, tables, &|_, _| None), driving);
     loop {
-        let (fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
+        let (mut fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
         if !balances.leave_out(scales) {
+            fit.channels = channels;
             return Ok(fit);
         }
     }
@@ -131,9 +139,18 @@ fn fit_with(
         is_converged: solved.is_converged,
         driving_s: [driving.time_s(), driving.reported_s()],
         backlash: fit_backlash(&driven, std::iter::once(driving)),
+        wheel: Err(String::new()),
+        channels: ChannelFits { output: Err(String::new()), engine: None },
         balances: balances.clone(),
         quantities,
     };
+    let input = InputTorque {
+        capacity: fit.unknown(Quantity::Input).exp(),
+        ratio: fit.unknown(Quantity::TorqueRatio).exp(),
+        sd: fit.input_sd(),
+    };
+    let stiffness_sd = deviation_of(ShiftErrors::STANDARD.of_car(car).stiffness);
+    fit.wheel = fit_wheel(&driven, driving, &input, stiffness_sd);
     fit.fills = (0..fit.quantities.elements.len()).map(|place| fit.fill_of(car, tables, shifts, place)).collect();
     Ok((fit, scales))
 }
@@ -210,6 +227,15 @@ impl GearboxFit {
     /// Standard deviation of the unknown of a quantity as it is stated.
     pub fn sd(&self, quantity: Quantity) -> f64 {
         self.quantities.place(quantity).map_or(f64::INFINITY, |place| self.stated[(place, place)].sqrt())
+    }
+
+    /// By how much the engine speed is late against the turbine speed in front of a converter, s.
+    pub fn engine_late_s(&self) -> Option<Known> {
+        let place = self.quantities.place(Quantity::EngineDelay)?;
+        let [value, sd, before] =
+            [self.unknowns[place], self.sd(Quantity::EngineDelay), self.quantities.sd_before(place)]
+                .map(|unknown| DELAY_UNIT_S * unknown);
+        Some(Known { value: self.channels.late_s()[1] + value, sd, before })
     }
 
     /// Standard deviation of the logarithm of the torque at the gearbox input in shifts: the torque ratio acts on what is above 1 alone.

@@ -12,6 +12,7 @@
 
 mod balances;
 mod budget;
+mod channels;
 mod clutch;
 mod file;
 mod fitting;
@@ -26,6 +27,7 @@ mod unfitted;
 mod validation;
 
 pub use crate::driving::Driving;
+pub use channels::ChannelFits;
 pub use fitting::{GearboxFit, Progress, fit};
 pub use quantities::{Quantities, Quantity};
 pub use recorder::{Recorded, Recorder};

@@ -20,7 +20,7 @@ const COMMON: f64 = 1.0 / 3.0;
 /// Bound of the torque ratio above 1, as a share \[chosen\].
 const TORQUE_RATIO: f64 = 0.10;
 
-/// Bound of the delay of the reported engine torque, s: one cycle of a bus, and whether it is held or interpolated.
+/// Bound of the delay of the reported engine torque, and of the engine speed in front of a converter, s: one cycle of a bus, and whether it is held or interpolated.
 const INPUT_DELAY_S: f64 = 0.01;
 /// Bound of the delay of the reported engine torque beside a converter, s \[chosen: the torque that is asked for comes some strokes later\].
 const REPORTED_DELAY_S: f64 = 0.05;
@@ -39,6 +39,8 @@ pub enum Quantity {
     TorqueRatio,
     /// Without a converter the delay of the reported engine torque against the turbine speed.
     InputDelay,
+    /// Delay of the engine speed against the turbine speed, in front of a converter.
+    EngineDelay,
     /// Peak of the drag of an element that is open or slips.
     Drag(usize),
     /// Torque of an element: friction times valve gain.
@@ -97,8 +99,10 @@ impl Quantities {
     pub fn of(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog], balances: [bool; 2]) -> Self {
         let (pairs, measured) = (pairs(car, tables, shifts), measured(tables, shifts));
         let has_converter = car.converter.is_some();
-        let input = if has_converter { Quantity::TorqueRatio } else { Quantity::InputDelay };
-        let mut all = vec![Quantity::Input, input];
+        let mut all = match has_converter {
+            true => vec![Quantity::Input, Quantity::TorqueRatio, Quantity::EngineDelay],
+            false => vec![Quantity::Input, Quantity::InputDelay],
+        };
         all.extend((0..measured.len()).flat_map(|at| {
             [Quantity::Torque(at), Quantity::Kiss(at), Quantity::Lag(at), Quantity::Delay(at), Quantity::Gain(at)]
         }));
@@ -173,6 +177,7 @@ impl Quantities {
             Quantity::Input => "reported engine torque".to_owned(),
             Quantity::TorqueRatio => "converter torque ratio above 1".to_owned(),
             Quantity::InputDelay => "reported engine torque, delay".to_owned(),
+            Quantity::EngineDelay => "engine speed, delay".to_owned(),
             Quantity::Delay(at) => format!("{}: valve delay", element(at)),
             Quantity::Drag(at) => format!("{}: drag", element(at)),
             Quantity::Torque(at) => format!("{}: friction x valve gain", element(at)),
@@ -228,7 +233,7 @@ impl Known<'_> {
             Quantity::Input if self.has_converter => self.filter.turbine.converter_share,
             Quantity::Input => self.filter.turbine.engine_share,
             Quantity::TorqueRatio => deviation_of(TORQUE_RATIO),
-            Quantity::InputDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
+            Quantity::InputDelay | Quantity::EngineDelay => deviation_of(INPUT_DELAY_S / DELAY_UNIT_S),
             Quantity::Delay(_) => known.valve_delay_s / DELAY_UNIT_S,
             Quantity::Drag(_) => DRAG_N_M / DRAG_UNIT_N_M,
             Quantity::Torque(_) => known.torque_share,
@@ -279,7 +284,7 @@ impl Known<'_> {
 }
 
 /// Standard deviation of a uniform distribution with this bound.
-fn deviation_of(bound: f64) -> f64 {
+pub(crate) fn deviation_of(bound: f64) -> f64 {
     bound / 3.0_f64.sqrt()
 }
 
@@ -328,6 +333,8 @@ impl Quantity {
     fn floor_of_car(self) -> f64 {
         match self {
             Self::Delay(_) | Self::InputDelay => 0.3e-3 / DELAY_UNIT_S,
+            // Errors of the torques act like it: in drawn cars without a delay it is 0.3 to 1.5 ms in the mean.
+            Self::EngineDelay => 1e-3 / DELAY_UNIT_S,
             // Whether a reading is held or interpolated until the next one is not known: half a cycle of 5 ms.
             Self::ReportedDelay => 2.5e-3 / DELAY_UNIT_S,
             Self::Drag(_) => 0.2 / DRAG_UNIT_N_M,

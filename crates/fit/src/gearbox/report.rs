@@ -4,12 +4,11 @@ use drivetrain::ShiftKind;
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
-use crate::driving::Balance;
-use crate::driving::DRAG_UNIT_N_M;
+use crate::driving::{Balance, DRAG_UNIT_N_M, LEAST_DELAY_S, said_of_delay};
 use crate::fill::{FILL_TOLD_BY, FillFit};
 use crate::fitted_file::SIDES;
 use crate::report::{MEAN_GRADE, cautions, fill_row};
-use crate::{BacklashFit, ReportRow, Verdict, correlated};
+use crate::{BacklashFit, ReportRow, Verdict, WheelFit, correlated};
 
 /// Errors of the torque at the turbine, in their deviations, above which the shifts are not those of the model \[chosen\].
 const MISFIT: f64 = 2.0;
@@ -17,7 +16,7 @@ const MISFIT: f64 = 2.0;
 const SIDES_OF_ALL: f64 = 3.3;
 
 /// What no shift tells, or no fit looks for, and which manoeuvre would tell it.
-const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, drive shafts, hysteresis of the valves and the shapes of all maps. \
+const NOT_FITTED: &str = "not fitted, and as in the given file: wheel radius, damping of the drive shafts, tyres, hysteresis of the valves and the shapes of all maps. \
      The intervals contain what a hysteresis within the error bounds may do; a smaller `valve_hysteresis_pa` there, where it is known, narrows them";
 
 impl GearboxFit {
@@ -37,7 +36,8 @@ impl GearboxFit {
     }
 
     fn row(&self, place: usize, quantity: Quantity) -> ReportRow {
-        let (x, sd) = (self.unknowns[place], self.sd(quantity));
+        let by_driving = if quantity == Quantity::EngineDelay { self.channels.late_s()[1] / DELAY_UNIT_S } else { 0.0 };
+        let (x, sd) = (self.unknowns[place] + by_driving, self.sd(quantity));
         let half = SIDES * sd;
         let plain = |unit: f64, name: &str| {
             (
@@ -46,7 +46,9 @@ impl GearboxFit {
             )
         };
         let (value, interval) = match quantity {
-            Quantity::Delay(_) | Quantity::InputDelay | Quantity::ReportedDelay => plain(1e3 * DELAY_UNIT_S, "ms"),
+            Quantity::Delay(_) | Quantity::InputDelay | Quantity::EngineDelay | Quantity::ReportedDelay => {
+                plain(1e3 * DELAY_UNIT_S, "ms")
+            }
             Quantity::Kiss(_) => plain(1e-3 * KISS_UNIT_PA, "kPa"),
             Quantity::Drag(_) => plain(DRAG_UNIT_N_M, "N m"),
             _ => (format!("x {:.3}", x.exp()), format!("{:.3} to {:.3}", (x - half).exp(), (x + half).exp())),
@@ -92,6 +94,8 @@ impl GearboxFit {
         }));
         lines.extend(self.said_of_driving());
         lines.push(BacklashFit::statement(&self.backlash));
+        lines.extend(self.said_of_channels());
+        lines.extend(WheelFit::statements(&self.wheel));
         lines.extend(self.given_is_possible().then(|| {
             "no value of the given vehicle file lies outside of what these logs leave open: they do not ask for another file".to_owned()
         }));
@@ -169,12 +173,28 @@ impl GearboxFit {
         text
     }
 
+    /// Delays of output and engine speed, for the channel map.
+    fn said_of_channels(&self) -> Vec<String> {
+        const TOLD_BY: &str = "shifts in which the engine changes its speed quickly would tell it";
+        let mut lines = self.channels.statements();
+        let engine = self.engine_late_s();
+        lines.extend(engine.map(|late_s| said_of_delay("engine_speed", "the turbine speed", &late_s, TOLD_BY)));
+        let is_off = engine.is_some_and(|late_s| late_s.is_off_by(LEAST_DELAY_S));
+        if is_off || self.channels.late_s() != [0.0; 2] {
+            lines.push(
+                "the fit has counted with these delays of output and engine speed in the shifts; `estimate` needs them in the channel map".to_owned(),
+            );
+        }
+        lines
+    }
+
     /// Whether the values of the given file lie in intervals that all hold in 95 %, by Bonferroni; those with the common factor of all
     /// torques also beside it.
     fn given_is_possible(&self) -> bool {
         use Quantity as Q;
-        let is_of_signals =
-            |quantity| matches!(quantity, Q::InputDelay | Q::PressureScale | Q::ReportedDelay | Q::ReportedScale);
+        let is_of_signals = |quantity| {
+            matches!(quantity, Q::InputDelay | Q::EngineDelay | Q::PressureScale | Q::ReportedDelay | Q::ReportedScale)
+        };
         let is_of_car = |quantity| !matches!(quantity, Q::Drag(_)) && !is_of_signals(quantity);
         let seen = || self.quantities.all.iter().copied().filter(|quantity| self.is_seen(*quantity));
         let mut car = seen().filter(|quantity| is_of_car(*quantity));

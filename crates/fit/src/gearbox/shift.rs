@@ -34,6 +34,8 @@ pub(crate) struct ShiftModel {
     /// Torque at the input by the file, and the part of it by the torque ratio above 1, N m.
     input_n_m: Vec<f64>,
     above_one_n_m: Vec<f64>,
+    /// By how much both change with the unknown of the delay of the engine speed in front of a converter, N m.
+    by_engine_delay_n_m: Vec<[f64; 2]>,
     /// Torque at the turbine by the drag of the elements that slip: by the file, and by each with a peak of 1 N m, N m.
     drag_n_m: Vec<f64>,
     drag_of_one_n_m: Vec<(usize, Vec<f64>)>,
@@ -96,6 +98,7 @@ impl ShiftModel {
         let times = || (0..points).map(|i| grid.time_s(i));
         let torques = times().map(|time_s| input(car, log, time_s));
         let (input_n_m, above_one_n_m): (Vec<f64>, Vec<f64>) = torques.unzip();
+        let by_engine_delay_n_m = times().map(|time_s| by_engine_delay(car, log, time_s)).collect();
         let clutches = [0, 1].map(|which| ClutchModel::new((car, tables, quantities), row, (log, which), grid));
         let [Some(offgoing), Some(oncoming)] = clutches else { return None };
         let (time_s, reading): (Vec<f64>, Vec<f64>) = log.turbine.between(log.slip_s).unzip();
@@ -114,6 +117,7 @@ impl ShiftModel {
             reported: car.converter.is_none().then(|| log.engine_torque.clone()),
             input_n_m,
             above_one_n_m,
+            by_engine_delay_n_m,
             drag_n_m,
             drag_of_one_n_m,
             inertia_kg_m2: row.mass_kg_m2[0][0],
@@ -175,15 +179,22 @@ impl ShiftModel {
         let [capacity, ratio] = [Quantity::Input, Quantity::TorqueRatio].map(|quantity| unknowns.of(quantity).exp());
         let late = unknowns.of(Quantity::InputDelay);
         let late_n_m = self.reported_n_m(late);
+        let engine_late = unknowns.of(Quantity::EngineDelay);
         let torques = late_n_m.as_ref().unwrap_or(&self.input_n_m).iter().zip(&self.above_one_n_m);
-        let input: Vec<f64> = torques.map(|(all, above)| capacity * (all + (ratio - 1.0) * above)).collect();
+        let (input, above): (Vec<f64>, Vec<f64>) = (torques.zip(&self.by_engine_delay_n_m))
+            .map(|((all, above), by)| {
+                let [all, above] = [all + engine_late * by[0], above + engine_late * by[1]];
+                (capacity * (all + (ratio - 1.0) * above), capacity * ratio * above)
+            })
+            .unzip();
+        let by_late = self.by_engine_delay_n_m.iter().map(|[all, above]| capacity * (all + (ratio - 1.0) * above));
+        unknowns.put(Quantity::EngineDelay, &self.integral(&by_late.collect::<Vec<_>>()));
         let mut momentum = self.integral(&input);
         unknowns.put(Quantity::Input, &momentum);
         if let (Some(now), Some(later)) = (&late_n_m, self.reported_n_m(late + DELAY_STEP)) {
             let change = later.iter().zip(now).map(|(later, now)| capacity * (later - now) / DELAY_STEP);
             unknowns.put(Quantity::InputDelay, &self.integral(&change.collect::<Vec<_>>()));
         }
-        let above: Vec<f64> = self.above_one_n_m.iter().map(|above| capacity * ratio * above).collect();
         unknowns.put(Quantity::TorqueRatio, &self.integral(&above));
         momentum.iter_mut().zip(self.integral(&self.drag_n_m)).for_each(|(sum, more)| *sum += more);
         for (place, of_one_n_m) in &self.drag_of_one_n_m {
@@ -245,6 +256,17 @@ fn input(car: &Car, log: &ShiftLog, time_s: f64) -> (f64, f64) {
         }
         None => (log.engine_torque.at(time_s), 0.0),
     }
+}
+
+/// By how much both change with the unknown of a delay of the engine speed: a reading that is late belongs to an earlier time.
+fn by_engine_delay(car: &Car, log: &ShiftLog, time_s: f64) -> [f64; 2] {
+    let Some(converter) = &car.converter else { return [0.0; 2] };
+    // A unit to each side, so that the noise of single readings counts less.
+    let [later, earlier] = [DELAY_UNIT_S, -DELAY_UNIT_S].map(|late_s| {
+        let torques = converter.torques(log.engine.at(time_s + late_s), log.turbine.at(time_s));
+        [torques.turbine_n_m, torques.turbine_n_m - torques.pump_n_m]
+    });
+    [0, 1].map(|part| 0.5 * (later[part] - earlier[part]))
 }
 
 /// Torque at the turbine by the drag of the elements that are not held, at the points of the grid: of all by the file, and of each with a peak of

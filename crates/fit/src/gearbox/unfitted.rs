@@ -1,6 +1,6 @@
 //! What a fit takes from the file of the way to a pressure, and what its error does to the quantities.
 //!
-//! Hysteresis of a valve and volume of a piston's stroke are not fitted: the speeds hardly show them, and what they seem to say of a hysteresis comes
+//! Delays of the channels are fitted or found before, here is what stays. Hysteresis of a valve and volume of a piston's stroke are not fitted: the speeds hardly show them, and what they seem to say of a hysteresis comes
 //! from the noise of the command. An error of one deviation changes the gradients at the minimum, and the step of the fit by that change is what it
 //! does to the quantities: `H^-1 (s(file + deviation) - s(file))`. The deviation is taken whole, not as a derivative: the noise of a command hides
 //! a small hysteresis.

@@ -6,7 +6,7 @@ use config::Car;
 use design::ShiftTables;
 
 use super::fitting::GearboxFit;
-use super::quantities::{Quantities, Quantity};
+use super::quantities::{DELAY_UNIT_S, Quantities, Quantity};
 use super::shift::{Linearised, ShiftModel};
 use super::shift_log::ShiftLog;
 use crate::validation::reason_to_keep;
@@ -69,6 +69,7 @@ impl GearboxFit {
         fitted: (&Car, &ShiftTables<f64>),
         held_out: &[ShiftLog],
     ) -> Option<HeldOut> {
+        let held_out = &self.channels.moved(held_out, fitted.1, DELAY_UNIT_S * self.unknown(Quantity::EngineDelay));
         let of_fitted = Quantities::of(fitted.0, fitted.1, held_out, [false; 2]);
         let compared: Vec<Compared> = (held_out.iter())
             .filter_map(|log| {

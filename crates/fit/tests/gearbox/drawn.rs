@@ -88,6 +88,53 @@ pub(crate) fn hilly(drive: &Drive, seed: u64) -> Drive {
     Drive { segments, repetitions: 1, ..drive.clone() }
 }
 
+/// The drive in town, so many times, each followed by a minute of pressing and releasing the accelerator.
+pub(crate) fn with_tip_ins(repetitions: u32) -> Drive {
+    let city = city(1);
+    let segment = |duration_s: f64, throttle: f64| DriveSegment {
+        duration_s,
+        throttle: [throttle; 2],
+        brake: [0.0; 2],
+        ..city.segments[0]
+    };
+    let mut segments = city.segments.clone();
+    segments.push(segment(3.0, 0.25));
+    for depth in [0.25, 0.35, 0.3, 0.4].into_iter().cycle().take(16) {
+        segments.extend([segment(2.0, 0.04), segment(1.6, depth)]);
+    }
+    Drive { segments: segments.repeat(repetitions.try_into().unwrap()), repetitions: 1, ..city }
+}
+
+/// What the channels of a log have of errors.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Channels {
+    /// By how much engine, turbine, output and wheel speed are stamped late, s.
+    pub(crate) late_s: [f64; 4],
+    /// What the wheel speed has to be multiplied with, less 1.
+    pub(crate) wheel_scale: f64,
+    /// By how much all commands are stamped late, s.
+    pub(crate) commands_s: f64,
+}
+
+impl Channels {
+    /// The row as the log has it.
+    pub(crate) fn of(&self, input: &ShiftInput<f64>) -> ShiftInput<f64> {
+        let late = |reading: Reading<f64>, late_s: f64| Reading { age_s: reading.age_s - late_s, ..reading };
+        let [engine, turbine, output, wheel] = self.late_s;
+        let true_over_read = 1.0 + self.wheel_scale;
+        ShiftInput {
+            engine_rad_s: input.engine_rad_s.map(|reading| late(reading, engine)),
+            turbine_rad_s: input.turbine_rad_s.map(|reading| late(reading, turbine)),
+            output_rad_s: input.output_rad_s.map(|reading| late(reading, output)),
+            wheel_rad_s: input
+                .wheel_rad_s
+                .map(|reading| late(Reading { value: reading.value / true_over_read, ..reading }, wheel)),
+            commands: input.commands.map(|reading| reading.map(|reading| late(reading, self.commands_s))),
+            ..*input
+        }
+    }
+}
+
 /// In what a car differs from its file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Case {
@@ -115,6 +162,7 @@ pub(crate) struct Drawn {
     vehicle: [f64; 4],
     /// What the engine's controller reports of its torque.
     pub(crate) reported: Option<ReportedErrors>,
+    pub(crate) channels: Channels,
 }
 
 /// Errors of a reported engine torque.
@@ -209,7 +257,7 @@ impl Drawn {
         file.engine.inertia_kg_m2 /= vehicle[3];
         file.driveline.shaft_stiffness_n_m_rad /= factor(STIFFNESS);
         file.tyre.slip_scale /= factor(TYRE);
-        Self { file, truth, seed, draw, kiss_pa, fill, inertia, vehicle, reported: None }
+        Self { file, truth, seed, draw, kiss_pa, fill, inertia, vehicle, reported: None, channels: Channels::default() }
     }
 
     /// With a mass in its file that is known to a percent.
@@ -234,6 +282,15 @@ impl Drawn {
         self
     }
 
+    /// With channels that are up to 10 ms late or early, the wheel speed 30 ms, with a scale of it that is off by up to 1.5 %.
+    pub(crate) fn with_channels(mut self) -> Self {
+        let mut random = Random(!self.seed ^ BACKLASH_STREAM);
+        let mut within = |bound: f64| bound * (2.0 * random.uniform() - 1.0);
+        let late_s = [within(0.01), 0.0, within(0.01), within(0.03)];
+        self.channels = Channels { late_s, wheel_scale: within(0.015), commands_s: 0.0 };
+        self
+    }
+
     /// With a reported engine torque.
     pub(crate) fn with_reported(self, case: Case) -> Self {
         let share = if case == Case::Right { 0.0 } else { 1.0 };
@@ -252,6 +309,7 @@ impl Drawn {
             Quantity::Input | Quantity::TorqueRatio | Quantity::Delay(_) => 0.0,
             Quantity::Lag(place) => self.draw.timing[element(place)].map_or(0.0, |timing| timing.lag.ln()),
             Quantity::InputDelay | Quantity::PressureScale => 0.0,
+            Quantity::EngineDelay => self.channels.late_s[0] / 0.01,
             Quantity::Mass => self.vehicle[0].ln(),
             Quantity::Rolling => self.vehicle[1].ln(),
             Quantity::Air => self.vehicle[2].ln(),
@@ -324,7 +382,9 @@ impl Drawn {
         mut read: impl FnMut(f64, &ShiftInput<f64>),
     ) {
         let tables = self.tables();
-        self.each_measured(drive, self.seed, sampled, |row| read(row.sample.time_s, &row.input(&self.file, &tables)));
+        self.each_measured(drive, self.seed, sampled, |row| {
+            read(row.sample.time_s, &self.channels.of(&row.input(&self.file, &tables)));
+        });
     }
 
     /// The same with readings by sensors of this seed.

@@ -1,6 +1,7 @@
 //! Fits of cars with a whole gearbox to drives behind sensors.
 #![expect(clippy::unwrap_used, reason = "a test may")]
 
+mod channels;
 mod drawn;
 mod driving;
 mod estimated;

@@ -1,0 +1,56 @@
+//! Values that logs tell, and the words for those of a channel.
+
+use crate::Verdict;
+use crate::fitted_file::SIDES;
+
+/// Errors of scale, and delays, s, that are nothing to correct \[chosen\].
+pub(crate) const LEAST_SCALE: f64 = 1e-3;
+pub(crate) const LEAST_DELAY_S: f64 = 1e-3;
+
+/// A value with its standard deviation as it is stated, and before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// That of before.
+    pub before: f64,
+}
+
+impl Known {
+    /// What the logs tell of it.
+    pub fn verdict(&self) -> Verdict {
+        Verdict::of(self.sd, self.before)
+    }
+
+    /// With a floor for what the model leaves out, and not less known than before.
+    pub(super) fn of(value: f64, sd: f64, floor: f64, before: f64) -> Self {
+        Self { value, sd: sd.hypot(floor).min(before), before }
+    }
+
+    /// Whether it is told, and more than this and its interval away from zero.
+    pub(crate) fn is_off_by(&self, least: f64) -> bool {
+        self.verdict() != Verdict::NotTold && self.value.abs() > (SIDES * self.sd).max(least)
+    }
+}
+
+/// What is said of the delay of a channel against another one, and where it belongs.
+pub(crate) fn said_of_delay(role: &str, against: &str, late_s: &Known, told_by: &str) -> String {
+    let [late_ms, half_ms] = [late_s.value, SIDES * late_s.sd].map(|time_s| 1e3 * time_s);
+    let found = format!("{role} is {late_ms:+.1} +- {half_ms:.1} ms behind {against}");
+    if late_s.verdict() == Verdict::NotTold {
+        return format!("{found}: its delay is not told by these logs; {told_by}");
+    }
+    match late_ms {
+        _ if !late_s.is_off_by(LEAST_DELAY_S) => format!("{found}: they belong together"),
+        late_ms if late_ms > 0.0 => {
+            format!("{found}: add {:.4} to `delay_s` of its channel in the channel map", late_s.value)
+        }
+        _ => format!(
+            "{found}, ahead of it: take {:.4} off `delay_s` of its channel in the channel map; where that would be below 0, add as much to `delay_s` of all \
+             other channels",
+            -late_s.value
+        ),
+    }
+}

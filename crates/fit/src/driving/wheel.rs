@@ -1,0 +1,138 @@
+//! The channel of the wheel speed and the stiffness of the drive shafts, from driving in a gear with the engine pulling.
+//!
+//! The unknowns are those of [`twist`](super::twist), with the backlash as one that is in the way. Changes are half a second long: in a shorter one the noise
+//! of the torque is as large as its change, and the shafts would seem too stiff (errors in variables).
+
+use super::known::{Known, LEAST_SCALE, said_of_delay};
+use super::twist::{Cell, DELAY_S, InputTorque, SCALE, changes, told};
+use super::{DrivenCar, Driving};
+use crate::Verdict;
+use crate::fitted_file::SIDES;
+
+/// Cells of a change: 0.5 s.
+const APART: usize = 5;
+/// Least time of driving, s, and fewest stretches: their scatter is part of the intervals.
+const TIME_S: f64 = 20.0;
+const GROUPS: usize = 4;
+/// Speed of the gearbox output below which the readings of toothed wheels are too old, rad/s \[chosen, as in the filter\].
+const OUTPUT_LEAST_RAD_S: f64 = 15.0;
+/// Least deviations that are stated, as in the one-shift fit: of scale, delay, s, and stiffness.
+const FLOORS: [f64; 3] = [1e-4, 0.3e-3, 0.015];
+
+/// Which drive tells it.
+const WHEEL_TOLD_BY: &str =
+    "press and release the accelerator in a gear on a straight road, with the speed of the driven wheels logged";
+const STIFFNESS_TOLD_BY: &str =
+    "press and release the accelerator in a low gear, each for 2 s and by different amounts, some twenty times";
+
+/// What was found of the wheel speed and the drive shafts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelFit {
+    /// What the readings of the wheel speed have to be multiplied with, less 1.
+    pub scale: Known,
+    /// By how much they are late against those of the output speed, s.
+    pub late_s: Known,
+    /// Logarithm of the factor on the stiffness of the shafts of the file.
+    pub stiffness: Known,
+    /// Time of driving that was used, s.
+    pub time_s: f64,
+}
+
+impl WheelFit {
+    /// Whether the stiffness goes into the file.
+    pub(crate) fn tells_stiffness(&self) -> bool {
+        self.stiffness.verdict() != Verdict::NotTold
+    }
+
+    /// Factor on the stiffness of the file.
+    pub(crate) fn stiffness_factor(&self) -> f64 {
+        self.stiffness.value.exp()
+    }
+
+    /// What a fit says of it: what belongs into the channel map, and the stiffness.
+    pub(crate) fn statements(found: &Result<Self, String>) -> Vec<String> {
+        match found {
+            Ok(found) => vec![found.said_of_scale(), found.said_of_delay(), found.said_of_stiffness()],
+            Err(reason) => vec![format!("wheel speed and drive shafts: not told: {reason}")],
+        }
+    }
+
+    fn said_of_scale(&self) -> String {
+        let Known { value, sd, .. } = self.scale;
+        let half = SIDES * sd;
+        let found = format!(
+            "wheel_speed x {:.4} +- {half:.4} is the output speed over the final ratio ({:.0} s in gear)",
+            1.0 + value,
+            self.time_s
+        );
+        if self.scale.verdict() == Verdict::NotTold {
+            return format!("{found}: its scale is not told by these logs; {WHEEL_TOLD_BY}");
+        }
+        if value.abs() <= half.max(LEAST_SCALE) {
+            return format!("{found}: its scale and the final ratio fit together");
+        }
+        format!(
+            "{found}: multiply `scale` of its channel in the channel map by {:.4}, or the final ratio of the vehicle file is wrong. For a wheel speed in km/h it may \
+             be the wheel radius: the speeds tell the product alone",
+            1.0 + value
+        )
+    }
+
+    fn said_of_delay(&self) -> String {
+        said_of_delay("wheel_speed", "the output speed", &self.late_s, WHEEL_TOLD_BY)
+    }
+
+    fn said_of_stiffness(&self) -> String {
+        let half = 100.0 * SIDES * self.stiffness.sd;
+        match self.stiffness.verdict() {
+            Verdict::NotTold => {
+                format!("stiffness of the drive shafts: not told by these logs, +- {half:.0} %; {STIFFNESS_TOLD_BY}")
+            }
+            told => format!(
+                "stiffness of the drive shafts: x {:.3} +- {half:.0} %, {}; the common factor of all torques is in it. Their damping is not looked for",
+                self.stiffness_factor(),
+                told.name()
+            ),
+        }
+    }
+}
+
+/// The wheel speed and the drive shafts of a car in the gears of its logs; `stiffness_sd` is what is known of the stiffness before, as a share.
+///
+/// # Errors
+/// What the logs lack for it.
+pub(crate) fn fit_wheel(
+    car: &DrivenCar,
+    driving: &Driving,
+    torque: &InputTorque,
+    stiffness_sd: f64,
+) -> Result<WheelFit, String> {
+    if car.converter.is_none() {
+        return Err("the torque of a car without converter is not computed for it".to_owned());
+    }
+    let stretches: Vec<&Vec<Cell>> = driving.twists.iter().collect();
+    let least_rad_s = OUTPUT_LEAST_RAD_S / car.driveline.final_ratio;
+    let (changes, _) = changes(&stretches, APART, least_rad_s, torque);
+    let mut groups: Vec<usize> = changes.iter().map(|change| change.group).collect();
+    groups.dedup();
+    let time_s = changes.iter().fold(0.0, |sum, change| sum + change.span_s);
+    if time_s < TIME_S || groups.len() < GROUPS {
+        return Err(format!(
+            "{time_s:.0} s of driving in a gear with a wheel speed, in {} stretches; {TIME_S:.0} s in {GROUPS} are needed; {WHEEL_TOLD_BY}",
+            groups.len()
+        ));
+    }
+    let compliance = car.driveline.shaft_stiffness_n_m_rad.recip();
+    let found = told(&changes, compliance, stiffness_sd)
+        .filter(|found| found.value[2] > 0.0)
+        .ok_or_else(|| format!("the speeds of output and wheels do not fit together; {WHEEL_TOLD_BY}"))?;
+    let [scale, late_s, shafts, _] = found.value;
+    // The twist tells the compliance per torque.
+    let stiffness_sd_found = (found.sd[2] / shafts).hypot(torque.sd);
+    Ok(WheelFit {
+        scale: Known::of(scale, found.sd[0], FLOORS[0], SCALE),
+        late_s: Known::of(late_s, found.sd[1], FLOORS[1], DELAY_S),
+        stiffness: Known::of((compliance / shafts).ln(), stiffness_sd_found, FLOORS[2], stiffness_sd),
+        time_s,
+    })
+}

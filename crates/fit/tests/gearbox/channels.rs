@@ -1,0 +1,136 @@
+//! Scale and delays of the channels, and the stiffness of the drive shafts.
+
+use config::Car;
+use fit::gearbox::{Driving, GearboxFit, Recorder, fit};
+use fit::{Known, ReadingAges, Verdict};
+use observer::Reading;
+use observer::any_shift::{GearCommand, ShiftInput};
+
+use crate::drawn::{Case, Drawn, car, city, hilly, with_tip_ins};
+
+fn drawn(seed: u64) -> Drawn {
+    Drawn::of(car("eight_speed.toml"), seed, Case::Usual).with_channels()
+}
+
+fn fitted(drawn: &Drawn, drive: &config::Drive) -> GearboxFit {
+    let (recorded, _) = drawn.driven(&hilly(drive, drawn.seed));
+    fit(&drawn.file, &drawn.tables(), &recorded.shifts, &recorded.driving, &mut |_| ()).unwrap()
+}
+
+fn holds(known: &Known, truth: f64) -> bool {
+    (known.value - truth).abs() <= 2.0 * known.sd
+}
+
+fn written(drawn: &Drawn, fit: &GearboxFit) -> Car {
+    fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a drive", None).unwrap()
+}
+
+fn stiffness(car: &Car) -> f64 {
+    car.driveline.shaft_stiffness_n_m_rad
+}
+
+#[test]
+fn scale_and_delay_of_the_wheel_speed_and_the_stiffness_lie_in_their_intervals() {
+    let drawn = drawn(31).with_backlash().without_hysteresis();
+    let fit = fitted(&drawn, &with_tip_ins(2));
+    let found = fit.wheel.clone().unwrap();
+    let channels = drawn.channels;
+    let late_s = channels.late_s[3] - channels.late_s[2];
+    assert!(holds(&found.scale, channels.wheel_scale) && found.scale.sd < 2e-4, "{found:?} {channels:?}");
+    assert!(holds(&found.late_s, late_s) && found.late_s.sd < 5e-4, "{found:?} {channels:?}");
+    let truth = (stiffness(&drawn.truth) / stiffness(&drawn.file)).ln();
+    assert!(holds(&found.stiffness, truth) && found.stiffness.verdict() == Verdict::Partly, "{found:?} {truth}");
+    // Output and engine speed against the turbine speed.
+    let output = fit.channels.output.clone().unwrap();
+    assert!(holds(&output.late_s, channels.late_s[2]) && output.late_s.sd < 5e-4, "{output:?} {channels:?}");
+    assert!(output.scale.value.abs() < 1e-3 && fit.channels.engine.as_ref().is_some_and(Result::is_err), "{output:?}");
+    let engine = fit.engine_late_s().unwrap();
+    assert!(holds(&engine, channels.late_s[0]) && engine.verdict() == Verdict::Measured, "{engine:?} {channels:?}");
+    let file = written(&drawn, &fit);
+    assert!((stiffness(&file) / stiffness(&drawn.file) / found.stiffness.value.exp() - 1.0).abs() < 1e-3);
+    let share = file.error_bounds.shaft_stiffness_share.unwrap();
+    assert!((share / (3.0_f64.sqrt() * found.stiffness.sd) - 1.0).abs() < 1e-3, "{share}");
+    let said = fit.statements().join("\n");
+    for words in [
+        format!("multiply `scale` of its channel in the channel map by {:.4}", 1.0 + found.scale.value),
+        format!("wheel_speed is {:+.1} +- ", 1e3 * found.late_s.value),
+        format!("output_speed is {:+.1} +- ", 1e3 * output.late_s.value),
+        format!("engine_speed is {:+.1} +- ", 1e3 * engine.value),
+        "the fit has counted with these delays of output and engine speed".to_owned(),
+        "the speeds tell the product alone".to_owned(),
+        "stiffness of the drive shafts: x ".to_owned(),
+    ] {
+        assert!(said.contains(&words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn what_the_wheel_speed_does_not_tell_stays_as_in_the_file_and_is_said() {
+    // In town the accelerator is not pressed often enough in a gear; the wheel speed of the second car is right.
+    let in_town = Drawn::of(car("eight_speed.toml"), 32, Case::Usual);
+    let (recorded, _) = in_town.driven(&city(1));
+    let of = |driving: &Driving| fit(&in_town.file, &in_town.tables(), &recorded.shifts, driving, &mut |_| ()).unwrap();
+    let usual = of(&recorded.driving);
+    let said = usual.statements().join("\n");
+    assert!(said.contains("stiffness of the drive shafts: not told by these logs"), "{said}");
+    assert!(said.contains("its scale and the final ratio fit together") && said.contains("they belong together"));
+    let none = of(&Driving::default());
+    let said = none.statements().join("\n");
+    assert!(
+        said.contains("wheel speed and drive shafts: not told: 0 s of driving in a gear with a wheel speed"),
+        "{said}"
+    );
+    for fit in [&usual, &none] {
+        let file = written(&in_town, fit);
+        // The text of the file is not that of the drawn one.
+        assert_eq!(stiffness(&file), stiffness(&car("eight_speed.toml")));
+        assert_eq!(file.error_bounds.shaft_stiffness_share, None);
+    }
+}
+
+/// Speeds that go up and down in two gears, with the lock-up clutch closed: an output speed that is early and has another scale, an engine speed that is late.
+fn locked(drawn: &Drawn, output_s: f64, output_scale: f64, engine_s: f64) -> Driving {
+    let tables = drawn.tables();
+    let mut recorder = Recorder::new(&drawn.file, &tables, ReadingAges::default());
+    for at in 0..6000 {
+        let time_s = 0.01 * f64::from(at);
+        let gear = if at / 700 % 2 == 0 { 3 } else { 4 };
+        let ratio = drawn.file.gearbox.gears[gear].ratio;
+        let noise = |channel: i32| 0.1 * (1.7 * f64::from((at * at + 13 * channel * at) % 101)).sin();
+        let output = |late_s: f64| 120.0 + 30.0 * (0.7 * (time_s - late_s)).sin();
+        let reading = |value: f64| Some(Reading::now(value));
+        let input = ShiftInput {
+            dt_s: 0.01,
+            engine_rad_s: reading(ratio * output(engine_s) + noise(1)),
+            turbine_rad_s: reading(ratio * output(0.0) + noise(2)),
+            output_rad_s: reading(output(output_s) / output_scale + noise(3)),
+            wheel_rad_s: None,
+            engine_n_m: None,
+            lock_up_applied: true,
+            commands: [None; 8],
+            gear: GearCommand { from: gear, to: gear },
+        };
+        recorder.push(time_s, &input);
+    }
+    recorder.finish().driving
+}
+
+#[test]
+fn a_closed_lock_up_clutch_tells_the_delay_of_the_engine_speed_and_the_ratio_a_wrong_scale() {
+    let drawn = Drawn::of(car("eight_speed.toml"), 33, Case::Usual);
+    let (recorded, _) = drawn.driven(&city(1));
+    let driving = locked(&drawn, -0.006, 1.004, 0.008);
+    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| ()).unwrap();
+    let (output, engine) = (fit.channels.output.clone().unwrap(), fit.channels.engine.clone().unwrap().unwrap());
+    assert!(holds(&output.late_s, -0.006) && output.late_s.sd < 1e-3, "{output:?}");
+    assert!(holds(&output.scale, 0.004) && output.scale.sd < 3e-4, "{output:?}");
+    assert!(holds(&engine.late_s, 0.008) && holds(&engine.scale, 0.0), "{engine:?}");
+    let said = fit.statements().join("\n");
+    for words in [
+        "engine_speed with the lock-up clutch closed is +8.",
+        "`scale` of one of both channels, or a ratio, is wrong",
+        "ahead of it: take 0.00",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
