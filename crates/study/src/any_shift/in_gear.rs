@@ -152,6 +152,7 @@ fn is_usable(health: Health) -> bool {
         | Health::TooSlow
         | Health::ClutchOpen
         | Health::OneWayOverruns
+        | Health::ShiftNotModelled
         | Health::SpeedsRejected
         | Health::HeldClutchSlips
         | Health::Restarted

@@ -514,6 +514,8 @@ impl<'c> LoggedDrive<'c> {
         let at_turbine_n_m = estimate.at_turbine.map(|clutches| [clutches.torque_n_m, clutches.deviation_n_m]);
         let clutches = match (found, self.car.gearbox.has_ratios_alone()) {
             (Some(found), _) => [0, 1].map(|c| clutch_row(&found[c], step.truth[c])),
+            // A shift past a gear has no inertias.
+            (None, true) if estimate.health == Health::ShiftNotModelled => return,
             (None, true) => {
                 let holds = [ShiftPhase::OffgoingHolds, ShiftPhase::OncomingHolds];
                 holds.map(|holds| ClutchRow::unknown(estimate.phase == Some(holds)))
