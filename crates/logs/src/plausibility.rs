@@ -191,6 +191,10 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
         let ratio = entry.extremes.speed() / of.extremes.speed();
         let is_small = most < 1.0;
         if entry.unit_name == unit && (least..most).contains(&ratio) && !(is_small && seen == Seen::Beginning) {
+            if let Some(finding) = slow_output(of, entry, summary) {
+                findings.push(finding);
+                continue;
+            }
             let reference = of.name.as_str();
             let why = format!("its greatest value is {ratio:.2} times that of {reference}; it looks like {likely}");
             findings.push(finding(entry, unit, &why, likely));
@@ -202,6 +206,20 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// An output speed that is too small, where the wheels seem too fast for it: the turbine, too, is faster than any gear makes it.
+fn slow_output(output: &RoleSummary, wheel: &RoleSummary, summary: &[RoleSummary]) -> Option<Finding> {
+    const MOST_RATIO: f64 = 6.0;
+    let turbine = summary.iter().find(|entry| entry.role == Role::TurbineSpeed)?;
+    let [by_wheel, by_turbine] = [wheel, turbine].map(|entry| entry.extremes.speed() / output.extremes.speed());
+    let likely = if output.unit_name == "rpm" { "rad/s" } else { "another unit or scale" };
+    let (of_wheel, of_turbine) = (&wheel.name, &turbine.name);
+    let why = format!(
+        "the greatest value of {of_wheel} is {by_wheel:.2} times its own, and that of {of_turbine} {by_turbine:.1} times; it looks like {likely}"
+    );
+    let is_slow = wheel.role == Role::WheelSpeed && by_turbine > MOST_RATIO;
+    is_slow.then(|| finding(output, &output.unit_name, &why, likely))
 }
 
 /// A speed that is the same in all samples, while one changes that takes it along.

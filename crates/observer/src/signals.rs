@@ -216,6 +216,9 @@ pub enum Health {
     /// The one-way clutch of the gear overruns: the turbine turns slower than the wheels would turn it, as in coasting. In a gear the
     /// estimate is from the valve model alone.
     OneWayOverruns,
+    /// The filter has no equations for this change of gear: two shifts at once, from or to neutral, between gears of the same ratio, or past a
+    /// gear where the ratios alone are known. Only the valve models, if there are any, give an estimate.
+    ShiftNotModelled,
     /// The speeds cannot be used: the estimate is from the valve model alone.
     SpeedsRejected,
     /// The speeds fit no phase of the gear or shift: an element slips that has to hold.
@@ -228,7 +231,7 @@ pub enum Health {
 
 impl Health {
     /// All of them, in their order.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Good,
         Self::ReadingRefused,
         Self::ChannelLost,
@@ -241,6 +244,7 @@ impl Health {
         Self::TooSlow,
         Self::ClutchOpen,
         Self::OneWayOverruns,
+        Self::ShiftNotModelled,
         Self::SpeedsRejected,
         Self::HeldClutchSlips,
         Self::Restarted,
@@ -263,6 +267,7 @@ impl Health {
             Self::TooSlow => "too_slow",
             Self::ClutchOpen => "clutch_open",
             Self::OneWayOverruns => "one_way_overruns",
+            Self::ShiftNotModelled => "shift_not_modelled",
             Self::SpeedsRejected => "speeds_rejected",
             Self::Restarted => "restarted",
             Self::TimeRejected => "time_rejected",

@@ -43,6 +43,9 @@ pub fn health_meaning(health: Health) -> &'static str {
             "the one-way clutch of the gear overruns: the car coasts, and the engine does not drive it"
         }
         Health::ClutchOpen => "no gear drives the car: neutral, or a clutch that is open or slips at a launch",
+        Health::ShiftNotModelled => {
+            "a change of gear without equations: two shifts at once, from or to neutral, between gears of the same ratio, or past a gear where the ratios alone are known"
+        }
         Health::SpeedsRejected => "an unusable speed: the estimate is from the valve model alone",
         Health::Restarted => "a restart: the observer lost its state and starts again",
         Health::TimeRejected => "an unusable time step: the estimate is that of the sample before",

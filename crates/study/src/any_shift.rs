@@ -20,6 +20,7 @@ pub mod matrix;
 pub mod measured;
 mod nominal;
 pub mod pressure_command;
+mod ratio_scale;
 pub mod recording;
 pub mod sensitivity;
 pub mod shift_summary;

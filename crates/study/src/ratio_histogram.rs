@@ -41,6 +41,20 @@ impl<const FINE: u32> RatioHistogram<FINE> {
         self.counts[self.last] = self.counts[self.last].saturating_add(1);
     }
 
+    /// Share of the ratios that are within this share of one.
+    pub fn share_near(&self, ratio: f64, within: f64) -> f64 {
+        let place = |ratio: f64| ratio.ln() * Self::FINE + Self::ONE;
+        let [least, most] = [1.0 - within, 1.0 + within].map(|factor| place(ratio * factor));
+        let (mut all, mut near) = (0.0, 0.0);
+        for (bin, count) in (0_u32..).zip(&self.counts) {
+            all += f64::from(*count);
+            if (least..most).contains(&(f64::from(bin) + 0.5)) {
+                near += f64::from(*count);
+            }
+        }
+        near / all
+    }
+
     /// The middle ratio, to half a bin; not a number without any.
     pub fn middle(&self) -> f64 {
         let all: u64 = self.counts.iter().map(|count| u64::from(*count)).sum();
@@ -86,5 +100,7 @@ mod tests {
             (0..times).for_each(|_| histogram.push(ratio));
         }
         assert!((histogram.middle() / 2.8123 - 1.0).abs() < 0.0006, "{}", histogram.middle());
+        assert!((histogram.share_near(2.8123, 0.01) - 100.0 / 190.0).abs() < 1e-9);
+        assert!((histogram.share_near(2.8123, 0.03) - 150.0 / 190.0).abs() < 1e-9);
     }
 }

@@ -447,6 +447,8 @@ fn a_gearbox_whose_first_gear_is_held_by_a_one_way_clutch_is_driven_through_all_
     let (health, offgoing) = (column(&estimate, "health"), column(&estimate, "offgoing"));
     let said = |word: &str| health.iter().filter(|health| *health == word).count();
     assert!(said("one_way_overruns") > 300 && said("held_clutch_slips") == 0 && said("clutch_open") == 0);
+    // Between 1 and L, gears of one ratio, there are no equations.
+    assert!(said("shift_not_modelled") > 20 && said("speeds_rejected") == 0);
     // Its torque is estimated, and it has no pressure.
     let (torque, pressure) =
         (column(&estimate, "offgoing_torque_estimate_n_m"), column(&estimate, "offgoing_pressure_estimate_pa"));

@@ -257,7 +257,7 @@ fn a_drive_of_which_no_estimate_can_be_used_is_refused() {
     folder.write("log.csv", slow_output(&text, 0.104_72));
     let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
     assert!(error.contains("the turbine speed is not the output speed times the ratio of that gear"), "{error}");
-    assert!(error.contains("hint: check the units of both speeds"), "{error}");
+    assert!(error.contains("check unit and scale of output_speed, which would fit with `scale` times"), "{error}");
     assert!(!folder.names().iter().any(|name| name.starts_with("out")));
     // Of a car without a converter the turbine turns at a standstill, too: there the health of the estimates tells.
     let (drive, car) = (folder.path("drive.toml"), format!("{ROOT}vehicles/dual_clutch.toml"));
@@ -483,4 +483,40 @@ fn a_late_gear_makes_no_shifts_that_were_not_driven() {
     assert_eq!(driven[1][5..], ["8", "7", "6", "4"]);
     assert_eq!(shifts(&late, &[], true), driven);
     assert_eq!(shifts(&late, &["--map", &map], true), driven);
+}
+
+/// Of a wrong scale the speed is named, with the factor: by the wheels, or by the engine where there are none.
+#[test]
+fn an_output_speed_of_another_scale_is_named() {
+    let folder = simulated("output-scale");
+    let text = folder.read("sim/short_measured.csv");
+    let scaled = |factor: f64| {
+        with_column(&text, "output_speed_rad_s", |value| {
+            value.parse::<f64>().map_or(value.to_owned(), |value| format!("{:.6}", factor * value))
+        })
+    };
+    for factor in [3.0, 0.5, 0.25] {
+        folder.write("log.csv", scaled(factor));
+        let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        assert!(
+            error.contains("hint: turbine_speed is ") && error.contains("output_speed is off against wheel_speed"),
+            "{error}"
+        );
+        let (_, found) = error.split_once("which would fit with `scale` times ").unwrap();
+        let found: f64 = found.split([';', '\n']).next().unwrap().trim().parse().unwrap();
+        assert!((found * factor - 1.0).abs() < 0.01, "{factor}: {error}");
+        folder.write("log.csv", with_column(&scaled(factor), "wheel_speed_rad_s", |_| String::new()));
+        let error = refused(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        assert!(error.contains("check unit and scale of output_speed"), "{error}");
+    }
+    // So little off that the log is not refused: the wheels are not blamed.
+    folder.write("log.csv", scaled(1.06));
+    let told = said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+    assert!(
+        told.contains("check unit and scale of output_speed") && !told.contains("Correct the scale of wheel_speed"),
+        "{told}"
+    );
+    // Of a right log nothing is said.
+    folder.write("log.csv", scaled(1.0));
+    assert!(!said(&estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")])).contains("check unit and scale"));
 }

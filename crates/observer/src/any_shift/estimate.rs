@@ -145,13 +145,19 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 });
             }
             None => {
-                let at_turbine = input.gear.from != input.gear.to && self.is_at_turbine(input.gear);
+                let GearCommand { from, to } = input.gear;
+                let at_turbine = from != to && self.is_at_turbine(input.gear);
+                let is_modelled = from == to || at_turbine || self.tables.shift(from, to).is_some();
+                let without = match is_modelled || !self.are_read(&state.newest) {
+                    true => Health::SpeedsRejected,
+                    false => Health::ShiftNotModelled,
+                };
                 let phase = self.phase_at_turbine(state, input.gear).filter(|_| at_turbine && turbine_n_m.is_some());
                 let estimate = &mut state.estimate;
                 if phase.is_some() {
                     (estimate.phase, estimate.turbine_n_m) = (phase, turbine_n_m);
                 } else if health < Health::TooSlow {
-                    health = Health::SpeedsRejected;
+                    health = without;
                 }
                 let then = self.measured(&state.newest, None);
                 estimate.clutches =

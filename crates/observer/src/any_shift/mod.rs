@@ -470,7 +470,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                     match (opens, self.is_at_turbine(command)) {
                         (true, _) => Health::ClutchOpen,
                         (_, true) => Health::Good,
-                        _ => Health::SpeedsRejected,
+                        _ if in_gear => Health::SpeedsRejected,
+                        _ => Health::ShiftNotModelled,
                     }
                 }
             },

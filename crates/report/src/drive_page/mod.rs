@@ -196,7 +196,11 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
         sentences.push(RATIOS_ALONE.to_owned());
     }
     if hidden(false) > 0 {
-        sentences.push(format!("Of {} shifts the filter has no tables: nothing is estimated.", hidden(false)));
+        sentences.push(format!(
+            "Of {} shifts the filter has no tables: nothing is estimated. They are two shifts at once, between gears of the same ratio, or past a gear where \
+             the ratios alone are known.",
+            hidden(false)
+        ));
     }
     if hidden(true) > 0 {
         sentences.push(format!(

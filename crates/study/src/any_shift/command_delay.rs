@@ -4,7 +4,8 @@
 //! models give the torque that they can carry. Both are compared with the pressures moved by -300 to 300 ms: where both clutches slip, `U` is
 //! the sum of what they can carry; where one holds, it carries the rest, up to what it can. The move with the least difference over the shifts
 //! of the log is the delay of its commands. An error of friction, valve gain or turbine torque moves upshifts and downshifts in opposite
-//! directions, a delay in the same one.
+//! directions, a delay in the same one. So that a wrong scale or offset of the commands is not taken for a delay, each move is tried with other
+//! gains and offsets of the pressures, and it has to be better than all of them are without a move.
 
 use std::collections::VecDeque;
 
@@ -14,12 +15,12 @@ use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 use super::logged::LogStep;
 
 /// Time between two points of a shift, and between two moves, s.
-const GRID_S: f64 = 0.01;
+const GRID_S: f64 = 0.02;
 /// Moves to either side, and all of them.
-const TO_ONE_SIDE: usize = 30;
+const TO_ONE_SIDE: usize = 15;
 const MOVES: usize = 2 * TO_ONE_SIDE + 1;
 /// Points to either side over which the rate of a speed is taken.
-const RATE: usize = 3;
+const RATE: usize = 1;
 /// Points that are needed before and after a shift.
 const AROUND: usize = TO_ONE_SIDE + RATE;
 /// Longest shift that is compared, s \[chosen\].
@@ -29,7 +30,7 @@ const SPARSE_S: f64 = 0.055;
 /// Slip at the turbine below which a clutch holds, rad/s \[chosen\]: the noise of toothed wheels.
 const HOLDS_RAD_S: f64 = 5.0;
 /// Points of a shift with a slip that are needed.
-const ENOUGH_POINTS: u32 = 10;
+const ENOUGH_POINTS: u32 = 5;
 /// By how much the torques may differ in a car within its error budget, as a share and beside it, N m; a difference counts up to so many
 /// times this \[chosen\].
 const SHARE: f64 = 0.15;
@@ -41,6 +42,14 @@ const ENOUGH_SHIFTS: u32 = 4;
 const SAID_S: f64 = 0.055;
 /// Share of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
+
+/// Gains of the pressures by the valve models, and offsets, Pa, that are tried \[chosen\]: twice the bounds of valves.
+const GAINS: [f64; 5] = [0.75, 0.87, 1.0, 1.15, 1.3];
+const OFFSETS_PA: [f64; 3] = [-40e3, 0.0, 40e3];
+const PRESSURES: usize = GAINS.len() * OFFSETS_PA.len();
+
+/// By gain and offset of the pressures, then by move.
+type Differences = [[f64; MOVES]; PRESSURES];
 
 /// What a row says.
 #[derive(Debug, Clone, Copy)]
@@ -82,9 +91,9 @@ pub(super) struct CommandDelay<'c> {
     waiting: VecDeque<Waiting>,
     /// Greatest age that the commands of a row have had by themselves, s: so much of the delay the filter knows.
     age_s: f64,
-    /// Shifts that were compared, and the sum of their mean differences at each move.
+    /// Shifts that were compared, and the sums of their mean differences.
     shifts: u32,
-    differences: [f64; MOVES],
+    differences: Box<Differences>,
     /// The delay, s, and whether it is beyond the last move, if the shifts show one.
     found: Option<(f64, bool)>,
 }
@@ -97,7 +106,7 @@ impl<'c> CommandDelay<'c> {
             waiting: VecDeque::new(),
             age_s: 0.0,
             shifts: 0,
-            differences: [0.0; MOVES],
+            differences: Box::new([[0.0; MOVES]; PRESSURES]),
             found: None,
         }
     }
@@ -149,7 +158,8 @@ impl<'c> CommandDelay<'c> {
         let Some(points) = self.points(waiting) else { return };
         let Some(differences) = self.differences(&shift, &points) else { return };
         self.shifts += 1;
-        self.differences.iter_mut().zip(differences).for_each(|(sum, difference)| *sum += difference);
+        let sums = self.differences.iter_mut().flatten().zip(differences.iter().flatten());
+        sums.for_each(|(sum, difference)| *sum += difference);
         self.found = self.delay();
     }
 
@@ -172,56 +182,61 @@ impl<'c> CommandDelay<'c> {
         Some(points)
     }
 
-    /// Mean difference of the torques of a shift at each move; none of a shift without enough slip.
-    fn differences(&self, shift: &ShiftRow<f64>, points: &[Point]) -> Option<[f64; MOVES]> {
+    /// Mean differences of the torques of a shift; none of one without enough slip.
+    fn differences(&self, shift: &ShiftRow<f64>, points: &[Point]) -> Option<Differences> {
         let clutches = shift.clutches.map(|of| (of, &self.tables.tables().elements[of.element].clutch));
-        let forces: Vec<[f64; 2]> = (points.iter())
-            .map(|point| clutches.map(|(of, clutch)| clutch.clamp_force(point.valve_pa[of.element])))
-            .collect();
+        let pressures = GAINS.into_iter().flat_map(|gain| OFFSETS_PA.map(|offset_pa| (gain, offset_pa)));
+        let force = |point: &Point, (gain, offset_pa): (f64, f64)| {
+            clutches.map(|(of, clutch)| clutch.clamp_force(gain * point.valve_pa[of.element] + offset_pa))
+        };
+        let forces: Vec<Vec<[f64; 2]>> =
+            pressures.map(|pressure| points.iter().map(|point| force(point, pressure)).collect()).collect();
         let [m11, m12] = shift.mass_kg_m2[0];
-        let (mut sums, mut used) = ([0.0; MOVES], 0);
+        let (mut sums, mut used) = ([[0.0; MOVES]; PRESSURES], 0);
         for at in AROUND..points.len().saturating_sub(AROUND) {
             let (point, before, after) = (&points[at], &points[at - RATE], &points[at + RATE]);
             let rate = |of: fn(&Point) -> f64| (of(after) - of(before)) / (2.0 * span_s(RATE));
-            let needed = point.turbine_n_m - m11 * rate(|of| of.turbine_rad_s) - m12 * rate(|of| of.output_rad_s);
+            let needed_n_m = point.turbine_n_m - m11 * rate(|of| of.turbine_rad_s) - m12 * rate(|of| of.output_rad_s);
             let slips = clutches.map(|(of, _)| point.turbine_rad_s - of.ratio * point.output_rad_s);
             let holds = slips.map(|slip| slip.abs() < HOLDS_RAD_S);
-            if !needed.is_finite() || holds == [true; 2] {
+            if !needed_n_m.is_finite() || holds == [true; 2] {
                 continue;
             }
             used += 1;
-            let per_force: [f64; 2] = std::array::from_fn(|c| {
+            let per_force = [0, 1].map(|c| {
                 let (of, clutch) = clutches[c];
                 of.alpha.abs() * clutch.torque_per_force(of.alpha * slips[c]) * slips[c].signum()
             });
-            let scale = SHARE * needed.abs().max(point.turbine_n_m.abs()) + BESIDE_N_M;
-            for (sum, forces) in sums.iter_mut().zip(&forces[at - TO_ONE_SIDE..]) {
-                let carried = [per_force[0] * forces[0], per_force[1] * forces[1]];
-                let beyond = |held: usize| ((needed - carried[1 - held]).abs() - carried[held].abs()).max(0.0);
-                let difference = match holds {
-                    [true, _] => beyond(0),
-                    [_, true] => beyond(1),
-                    _ => (needed - carried[0] - carried[1]).abs(),
-                };
-                *sum += (difference / scale).min(MOST);
+            let balance = Balance { needed_n_m, per_force, holds };
+            let scale = (SHARE * needed_n_m.abs().max(point.turbine_n_m.abs()) + BESIDE_N_M).recip();
+            for (sums, forces) in sums.iter_mut().zip(&forces) {
+                for (sum, forces) in sums.iter_mut().zip(&forces[at - TO_ONE_SIDE..]) {
+                    *sum += (scale * balance.difference_n_m(*forces)).min(MOST);
+                }
             }
         }
-        (used >= ENOUGH_POINTS).then(|| sums.map(|sum| sum / f64::from(used)))
+        (used >= ENOUGH_POINTS).then(|| sums.map(|sums| sums.map(|sum| sum / f64::from(used))))
     }
 
     /// The delay of the log, s, and whether it may be larger, if its shifts show one.
     fn delay(&self) -> Option<(f64, bool)> {
-        let least = (0..MOVES).min_by(|a, b| self.differences[*a].total_cmp(&self.differences[*b]))?;
-        let moved_s = moved_s(least);
+        let least =
+            |sums: &[f64; MOVES]| (0..MOVES).min_by(|a, b| sums[*a].total_cmp(&sums[*b])).unwrap_or(TO_ONE_SIDE);
+        let best =
+            self.differences.iter().map(|sums| (sums, least(sums))).min_by(|(a, i), (b, j)| a[*i].total_cmp(&b[*j]));
+        let (sums, place) = best?;
+        let unmoved = self.differences.iter().map(|sums| sums[TO_ONE_SIDE]).fold(f64::INFINITY, f64::min);
+        let moved_s = moved_s(place) + GRID_S * between(sums, place);
         let delay_s = if moved_s > 0.0 { (moved_s - self.age_s).max(0.0) } else { moved_s };
-        let is_explained = self.differences[least] <= LEFT * self.differences[TO_ONE_SIDE];
-        let is_found = self.shifts >= ENOUGH_SHIFTS && delay_s.abs() >= SAID_S && is_explained;
-        is_found.then_some((delay_s, least == 0 || least == MOVES - 1))
+        let is_found = self.shifts >= ENOUGH_SHIFTS && delay_s.abs() >= SAID_S && sums[place] <= LEFT * unmoved;
+        is_found.then_some((delay_s, place == 0 || place == MOVES - 1))
     }
 
     /// The delay of the log, in a sentence.
     pub(super) fn warning(&self) -> Option<String> {
         let (delay_s, is_at_end) = self.found?;
+        // It is not known to the millisecond.
+        let delay_s = 0.01 * (delay_s / 0.01).round();
         let late = if delay_s > 0.0 { "late" } else { "early" };
         let or_more = if is_at_end { " or more" } else { "" };
         Some(format!(
@@ -232,6 +247,39 @@ impl<'c> CommandDelay<'c> {
             self.shifts
         ))
     }
+}
+
+/// What the turbine's balance says at one time.
+struct Balance {
+    /// Torque of both clutches together at the turbine, N m.
+    needed_n_m: f64,
+    /// Torque at the turbine per force that presses the plates, in the direction of the slip, m.
+    per_force: [f64; 2],
+    holds: [bool; 2],
+}
+
+impl Balance {
+    /// How far the clutches with these forces, N, are from it, N m.
+    #[inline]
+    fn difference_n_m(&self, forces: [f64; 2]) -> f64 {
+        let carried = [self.per_force[0] * forces[0], self.per_force[1] * forces[1]];
+        let beyond = |held: usize| ((self.needed_n_m - carried[1 - held]).abs() - carried[held].abs()).max(0.0);
+        match self.holds {
+            [true, _] => beyond(0),
+            [_, true] => beyond(1),
+            _ => (self.needed_n_m - carried[0] - carried[1]).abs(),
+        }
+    }
+}
+
+/// Where the least of a parabola through the least sum and its neighbours is, in moves from it.
+fn between(sums: &[f64; MOVES], place: usize) -> f64 {
+    if place == 0 || place + 1 == MOVES {
+        return 0.0;
+    }
+    let [before, least, after] = [sums[place - 1], sums[place], sums[place + 1]];
+    let bend = before - 2.0 * least + after;
+    if bend > 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
 /// How far the pressures of a place among the moves are moved, s: positive for commands that come late.

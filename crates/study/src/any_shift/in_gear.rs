@@ -3,6 +3,7 @@
 use config::Car;
 use observer::{Health, Reading};
 
+use super::ratio_scale::{RatioScale, WrongScale};
 use crate::ratio_histogram::RatioHistogram;
 use crate::swapped_speeds::SwappedSpeeds;
 
@@ -32,6 +33,7 @@ pub(super) struct InGear<'c> {
     /// Rows with each health while the car moves, in the order of [`Health::ALL`].
     health: [u64; Health::ALL.len()],
     swapped: SwappedSpeeds,
+    scale: RatioScale,
     /// Output over wheel speed in the rows that have both; how many there are, and how long they are, s.
     output_over_wheel: RatioHistogram<1000>,
     wheel_rows: (u64, f64),
@@ -61,6 +63,7 @@ impl<'c> InGear<'c> {
             rows: [0; 2],
             health: [0; Health::ALL.len()],
             swapped: SwappedSpeeds::default(),
+            scale: RatioScale::new(car),
             output_over_wheel: RatioHistogram::default(),
             wheel_rows: (0, 0.0),
             wheel_rad_s: f64::NAN,
@@ -91,6 +94,7 @@ impl<'c> InGear<'c> {
         }
         let by_output = ratio * output;
         self.swapped.push(engine, turbine, &[by_output]);
+        self.scale.push(row.gear, ratio, row.came_rad_s);
         self.rows[0] += 1;
         self.rows[1] += u64::from((turbine - by_output).abs() > RATIO_SHARE * by_output.abs());
         if let (Some(output), Some(wheel)) = (row.output, row.wheel) {
@@ -122,6 +126,11 @@ impl<'c> InGear<'c> {
         if rows < ENOUGH.0 || time_s < ENOUGH.1 { f64::NAN } else { self.output_over_wheel.middle() }
     }
 
+    /// A speed whose scale is wrong.
+    pub(super) fn wrong_scale(&self) -> Option<WrongScale> {
+        self.scale.sentence(self.car, self.output_over_wheel() / self.car.driveline.final_ratio)
+    }
+
     /// What contradicts the channels of engine and turbine speed, in a sentence.
     pub(super) fn swapped_speeds(&self) -> Option<String> {
         self.swapped.contradiction()
@@ -143,6 +152,7 @@ fn is_usable(health: Health) -> bool {
         | Health::TooSlow
         | Health::ClutchOpen
         | Health::OneWayOverruns
+        | Health::ShiftNotModelled
         | Health::SpeedsRejected
         | Health::HeldClutchSlips
         | Health::Restarted

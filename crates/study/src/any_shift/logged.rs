@@ -25,6 +25,7 @@ use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
 use super::log_beside::{CarriedPressures, ShiftJerk};
 use super::pressure_command::{command_for, pressure_command_column};
+pub use super::ratio_scale::WrongScale;
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
 use crate::frozen_rows::FrozenRows;
@@ -543,6 +544,11 @@ impl<'c> LoggedDrive<'c> {
         self.in_gear.swapped_speeds()
     }
 
+    /// A speed whose scale is wrong by the ratios in the gears.
+    pub fn wrong_scale(&self) -> Option<WrongScale> {
+        self.in_gear.wrong_scale()
+    }
+
     fn during(&mut self, step: &LogStep, estimate: &ShiftEstimate<f64>) {
         let GearCommand { from, to } = step.input.gear;
         let elements = self.tables.tables().shift(from, to).map(|row| row.clutches.map(|clutch| clutch.element));
@@ -577,6 +583,8 @@ impl<'c> LoggedDrive<'c> {
                     }
                 })
             }
+            // A shift past a gear has no inertias.
+            (None, true) if estimate.health == Health::ShiftNotModelled => return,
             (None, true) => {
                 let holds = [ShiftPhase::OffgoingHolds, ShiftPhase::OncomingHolds];
                 holds.map(|holds| ClutchRow::unknown(estimate.phase == Some(holds)))
@@ -648,7 +656,9 @@ impl<'c> LoggedDrive<'c> {
         let final_ratio = self.car.driveline.final_ratio;
         let (off, bound) =
             (self.output_over_wheel() / final_ratio - 1.0, ShiftErrors::LOGGED.of_car(self.car).wheel_scale);
-        if off.abs() > bound {
+        let wrong = self.wrong_scale();
+        warnings.extend(wrong.iter().map(|wrong| format!("warning: {}", wrong.text)));
+        if off.abs() > bound && wrong.is_none_or(|wrong| !wrong.is_output) {
             warnings.push(format!(
                 "warning: output_speed over wheel_speed is {:.3} in the middle, {:+.1} % from the final ratio {final_ratio:.3}: the filter learns the \
                  scale of wheel_speed within {:.1} % and refuses what is further off. Correct the scale of wheel_speed or `driveline.final_ratio`, or \

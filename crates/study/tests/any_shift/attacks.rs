@@ -464,6 +464,14 @@ fn an_unknown_gear_and_a_lost_command_are_said() {
     assert_eq!(said(|_| ()).health, Health::Good);
     let unknown = said(|input| input.gear = GearCommand { from: 77, to: 77 });
     assert_eq!((unknown.health, unknown.gear), (Health::SpeedsRejected, None));
+    // From and to neutral there are no equations.
+    let not_modelled = said(|input| input.gear = GearCommand { from: GearCommand::NEUTRAL, to: 3 });
+    assert_eq!((not_modelled.health, not_modelled.gear), (Health::ShiftNotModelled, None));
+    let blind = said(|input| {
+        input.gear = GearCommand { from: GearCommand::NEUTRAL, to: 3 };
+        input.turbine_rad_s = Some(Reading::now(f64::NAN));
+    });
+    assert_eq!(blind.health, Health::SpeedsRejected);
     let lost = said(|input| input.commands[2] = None);
     assert_eq!((lost.commands[1], lost.commands[2]), (ChannelHealth::Good, ChannelHealth::Lost));
     // The converter's maps do without it; what makes no sense is refused.

@@ -34,12 +34,18 @@ fn drawn(known: &Car, seed: u64) -> Car {
 
 /// What is said of a drive whose commands come so many rows of 10 ms late.
 fn said(known: &Car, recording: &Recording, late: isize) -> ScoredDrive {
+    said_with(known, recording, late, |_| ())
+}
+
+/// The same with another change of the readings.
+fn said_with(known: &Car, recording: &Recording, late: isize, change: impl Fn(&mut ShiftInput<f64>)) -> ScoredDrive {
     let (tables, sensors) = (LoggedDrive::tables(known).unwrap(), sensors());
     let mut logged = LoggedDrive::new(known, &tables, Some(&sensors), None);
     let inputs: Vec<_> = recording.inputs(known, &tables, &sensors, 1).collect();
     for (at, (sample, input)) in recording.samples.iter().zip(&inputs).enumerate() {
         let then = at.saturating_add_signed(-late).min(inputs.len() - 1);
-        let input = ShiftInput { commands: inputs[then].commands, ..*input };
+        let mut input = ShiftInput { commands: inputs[then].commands, ..*input };
+        change(&mut input);
         logged.push(&LogStep::of(sample.time_s, input));
     }
     logged.finish()
@@ -87,4 +93,21 @@ fn slow_and_fast_valves_are_no_delay_of_the_commands() {
         let drive = said(&known, &recorded(draw.car(&known), &known), 0);
         assert_eq!(delay_ms(&drive), None, "{end}: {:?}", drive.warnings);
     }
+}
+
+/// What is outside the budget in another way is not called a delay.
+#[test]
+fn readings_of_another_scale_are_no_delay_of_the_commands() {
+    let known = cars().remove(0);
+    let recording = recorded(drawn(&known, 1), &known);
+    let scaled = |commands: f64, engine: f64| {
+        let drive = said_with(&known, &recording, 0, |input| {
+            input.commands.iter_mut().flatten().for_each(|reading| reading.value *= commands);
+            input.engine_rad_s.iter_mut().for_each(|reading| reading.value *= engine);
+        });
+        assert_eq!(delay_ms(&drive), None, "{commands} {engine}: {:?}", drive.warnings);
+    };
+    [(1.2, 1.0), (0.8, 1.0), (1.0, 0.95), (1.0, 1.1)]
+        .into_iter()
+        .for_each(|(commands, engine)| scaled(commands, engine));
 }

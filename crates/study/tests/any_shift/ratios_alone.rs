@@ -6,8 +6,10 @@ use config::{Car, Drive, Source};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use observer::Health;
 use observer::any_shift::ShiftPhase;
-use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
+use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_drive};
+use study::any_shift::logged::{LogStep, LoggedDrive};
 use study::any_shift::recording::Recording;
+use study::any_shift::{inputs, simulated};
 
 use crate::cars::{cars, sensors};
 
@@ -91,4 +93,25 @@ fn the_clutches_have_their_torque_at_the_turbine() {
             }
         }
     }
+}
+
+/// Past a gear nothing is known of the inertias: it is said so, in every row, and no speed is accused.
+#[test]
+fn a_shift_past_a_gear_is_not_modelled() {
+    let truth = cars().remove(0);
+    let known = by_ratios(&truth, false);
+    let gear = |name: &str| truth.gearbox.gear(name).unwrap();
+    let tables = LoggedDrive::tables(&known).unwrap();
+    let samples = simulated(&truth, &truth, &CarShift::usual(&truth, gear("5"), gear("7"), 0.15)).unwrap();
+    let mut logged = LoggedDrive::new(&known, &tables, Some(&sensors()), None);
+    let mut healths = Vec::new();
+    for (at, input) in inputs(&known, &tables, &samples, &sensors(), 1) {
+        let estimate = logged.push(&LogStep::of(samples[at].time_s, input));
+        if input.gear.from != input.gear.to {
+            healths.push(estimate.health);
+        }
+    }
+    assert!(healths.len() > 20 && healths.iter().all(|health| *health == Health::ShiftNotModelled), "{healths:?}");
+    let drive = logged.finish();
+    assert!(drive.shifts.len() == 1 && !drive.shifts[0].is_estimated());
 }

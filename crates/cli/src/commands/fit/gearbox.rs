@@ -90,7 +90,7 @@ fn record(
         bar.set_message(format!("reading {}", log.display()));
         bar.tick();
         let one = record_one(log, &map, Recorder::new(car, tables, ages), (car, tables), bar)?;
-        check_ratios(one.in_gear, &options.vehicle, log)?;
+        check_ratios(one.in_gear, None, &options.vehicle, log)?;
         all.add(one);
     }
     Ok(all)

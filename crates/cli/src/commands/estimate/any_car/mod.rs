@@ -165,7 +165,8 @@ fn check_speeds(drive: &LoggedDrive<'_>, setup: &CarSetup<'_>, path: &Path, say:
     if let Some(swapped) = drive.swapped_speeds().filter(|_| does_not_fit(drive.rows_in_gear())) {
         say.note(&format!("warning: {swapped}"));
     }
-    check_ratios(drive.rows_in_gear(), &setup.options.vehicle, path)?;
+    let wrong_scale = drive.wrong_scale().map(|wrong| wrong.text);
+    check_ratios(drive.rows_in_gear(), wrong_scale.as_deref(), &setup.options.vehicle, path)?;
     check_wheel(drive.output_over_wheel(), setup.car.driveline.final_ratio)?;
     drive.unusable().map_or(Ok(()), |unusable| Err(refused(unusable, path)))
 }
@@ -175,16 +176,23 @@ fn does_not_fit([all, unfit]: [u64; 2]) -> bool {
     2 * unfit > all
 }
 
-/// Refuses a log whose speeds are not those of the gearbox in most rows.
-pub(in crate::commands) fn check_ratios(rows: [u64; 2], vehicle: &Path, log: &Path) -> Result<(), Failure> {
+/// Refuses a log whose speeds are not those of the gearbox in most rows; `wrong_scale` says which speed has a wrong scale, if it is known.
+pub(in crate::commands) fn check_ratios(
+    rows: [u64; 2],
+    wrong_scale: Option<&str>,
+    vehicle: &Path,
+    log: &Path,
+) -> Result<(), Failure> {
     if !does_not_fit(rows) {
         return Ok(());
     }
     let [all, unfit] = rows;
     Err(Failure::Input(format!(
-        "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\nhint: check the units of both speeds, the gear, and whether this is the vehicle file of the car",
+        "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\nhint: {}",
         shown_path(log),
-        vehicle.display()
+        vehicle.display(),
+        wrong_scale
+            .unwrap_or("check the units of both speeds, the gear, and whether this is the vehicle file of the car")
     )))
 }
 
