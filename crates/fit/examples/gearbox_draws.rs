@@ -2,7 +2,7 @@
 //!
 //! `FIT_CARS=20 cargo run --release -p fit --example gearbox_draws`; `FIT_FIRST` is the first seed, `FIT_DRIVES` how often the drive of
 //! three minutes is driven (5), on a road with hills unless `FIT_ROAD=level`; with `FIT_TORQUE=1` the engine torque is reported, with
-//! `FIT_WEIGHED=1` the mass is known to a percent, with `FIT_BACKLASH=1` each car has a backlash of its own, with `FIT_CHANNELS=1` the channels of the speeds have delays and a scale, with `FIT_TIPS=1` each drive has a minute of
+//! `FIT_WEIGHED=1` the mass is known to a percent, with `FIT_BACKLASH=1` each car has a backlash of its own, with `FIT_CHANNELS=1` the channels of the speeds have delays and a scale, with `FIT_COMMANDS_MS=100` all commands are so late, with `FIT_TIPS=1` each drive has a minute of
 //! pressing and releasing the accelerator, and with `FIT_DRIVING=off` driving between shifts is not fitted; `FIT_VEHICLE` the vehicle file (`eight_speed.toml`), `FIT_PRESSURE` the name of an element with a pressure
 //! sensor; `FIT_HYSTERESIS=none` says in the error bounds of the file that no valve has a hysteresis; `FIT_CASE=timing` draws lag, delay and hysteresis of each valve too, and with `FIT_CASE=right` the file is the car. With `FIT_ESTIMATE=1` the filter of `estimate` then drives through
 //! the WLTC with the given file, with the fitted one without its error bounds, without the check of its valves, and with all of it.
@@ -47,6 +47,10 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let driving = if is_left_out { Driving::default() } else { recorded.driving };
     let number = recorded.shifts.len();
     let [mut fitted, held_out] = every_fifth(recorded.shifts);
+    // The torques are those with a right channel map.
+    let mut in_time = held_out.clone();
+    let commands = in_time.iter_mut().flat_map(|log| &mut log.commands).flat_map(|commands| &mut commands.time_s);
+    commands.for_each(|time_s| *time_s -= drawn.channels.commands_s);
     if let Ok(name) = std::env::var("FIT_PRESSURE") {
         let at = drawn.file.gearbox.elements.iter().position(|element| element.name == name).unwrap();
         truth.measure(&mut fitted, &tables, tables.place(at).unwrap(), !drawn.seed);
@@ -57,7 +61,7 @@ fn outcome(drawn: &Drawn, case: Case, drive: &Drive) -> Outcome {
     let seconds = begin.elapsed().as_secs_f64();
     let file = |checked| fit.vehicle_file(&drawn.file, &drawn.file.source.path, "a simulation", checked).unwrap();
     let unchecked = file(None);
-    let torque_n_m = [&drawn.file, &unchecked].map(|car| truth.squared_error(car, &held_out).sqrt());
+    let torque_n_m = [&drawn.file, &unchecked].map(|car| truth.squared_error(car, &in_time).sqrt());
     let checked = fit.validate((&drawn.file, &tables), (&unchecked, &drawn::tables(&unchecked)), &held_out).unwrap();
     let file = file(Some(&checked));
     println!(
@@ -148,6 +152,9 @@ fn of_channels(drawn: &Drawn, fit: &GearboxFit) -> Vec<Told> {
     let channels = drawn.channels;
     let stiffness = |car: &Car| car.driveline.shaft_stiffness_n_m_rad;
     let mut all = Vec::new();
+    if let Some(late_s) = fit.commands_late_s() {
+        println!("commands are {:+.0} ms late, true {:+.0} ms", 1e3 * late_s, 1e3 * channels.commands_s);
+    }
     match &fit.wheel {
         Ok(found) => all.extend([
             told("wheel speed: scale", &found.scale, channels.wheel_scale),
@@ -240,6 +247,7 @@ fn main() {
     let (is_hilly, is_reported) = (std::env::var("FIT_ROAD").is_err(), std::env::var("FIT_TORQUE").is_ok());
     let has_hysteresis = std::env::var("FIT_HYSTERESIS").is_err();
     let has_backlash = std::env::var("FIT_BACKLASH").is_ok();
+    let commands_ms: f64 = std::env::var("FIT_COMMANDS_MS").map_or(0.0, |text| text.parse().unwrap());
     let has_channels = std::env::var("FIT_CHANNELS").is_ok();
     let is_weighed = std::env::var("FIT_WEIGHED").is_ok();
     let of_car = |seed: u64| {
@@ -248,7 +256,8 @@ fn main() {
         let drawn = if is_weighed { drawn.weighed() } else { drawn };
         let drawn = if has_hysteresis { drawn } else { drawn.without_hysteresis() };
         let drawn = if has_backlash { drawn.with_backlash() } else { drawn };
-        let drawn = if has_channels { drawn.with_channels() } else { drawn };
+        let mut drawn = if has_channels { drawn.with_channels() } else { drawn };
+        drawn.channels.commands_s = 1e-3 * commands_ms;
         let drive = if is_hilly { drawn::hilly(&drive, seed) } else { level(&drive) };
         outcome(&drawn, case, &drive)
     };

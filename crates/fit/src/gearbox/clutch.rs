@@ -96,6 +96,11 @@ impl ClutchModel {
         change(&mut self.hydraulics);
     }
 
+    /// Moves the commands to later times.
+    pub(super) fn move_commands(&mut self, later_s: f64) {
+        self.commands.time_s.iter_mut().for_each(|time_s| *time_s += later_s);
+    }
+
     /// Pressures on the plates at the points of a grid, by the gain of the file, Pa.
     pub(super) fn pressures(&self, grid: Grid, at: &AtValve) -> Vec<f64> {
         self.pressures_of(&self.hydraulics, grid, at)

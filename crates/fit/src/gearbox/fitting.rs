@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::balances::Balances;
 use super::channels::ChannelFits;
+use super::command_delay::{common_delay_s, with_commands_earlier};
 use super::precision::stated;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, deviation_of};
 use super::shift::ShiftModel;
@@ -57,6 +58,8 @@ pub struct GearboxFit {
     pub backlash: Result<BacklashFit, String>,
     /// Channel of the wheel speed and stiffness of the drive shafts, or what the logs lack for them.
     pub wheel: Result<WheelFit, String>,
+    /// By how much the fit has moved all commands to earlier times, s, where the logs have them so late.
+    pub(crate) commands_moved_s: Option<f64>,
     /// Channels of output and engine speed against the turbine speed.
     pub channels: ChannelFits,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
@@ -82,14 +85,26 @@ pub fn fit(
 ) -> Result<GearboxFit, FitError> {
     let channels = ChannelFits::of(car, driving);
     let shifts = &channels.moved(shifts, tables, 0.0);
+    let commands_late_s = commands_late_s(car, tables, shifts)?;
+    let moved = commands_late_s.map(|late_s| with_commands_earlier(shifts, late_s));
+    let shifts = moved.as_ref().unwrap_or(shifts);
     let mut balances = Balances::of(&DrivenCar::with_gearbox(car, tables, &|_, _| None), driving);
     loop {
         let (mut fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
         if !balances.leave_out(scales) {
             fit.channels = channels;
+            fit.commands_moved_s = commands_late_s;
             return Ok(fit);
         }
     }
+}
+
+/// The common delay of all commands, where it is much larger than that of a valve, s.
+fn commands_late_s(car: &Car, tables: &ShiftTables<f64>, shifts: &[ShiftLog]) -> Result<Option<f64>, FitError> {
+    let quantities = Quantities::of(car, tables, shifts, [false; 2]);
+    let models: Vec<ShiftModel> =
+        shifts.iter().filter_map(|log| ShiftModel::new(car, tables, &quantities, log)).collect();
+    Ok(common_delay_s(&Problem::new(&quantities)?, &models))
 }
 
 /// The fit with some balances, and the scales of their errors.
@@ -140,6 +155,7 @@ fn fit_with(
         driving_s: [driving.time_s(), driving.reported_s()],
         backlash: fit_backlash(&driven, std::iter::once(driving)),
         wheel: Err(String::new()),
+        commands_moved_s: None,
         channels: ChannelFits { output: Err(String::new()), engine: None },
         balances: balances.clone(),
         quantities,
@@ -227,6 +243,15 @@ impl GearboxFit {
     /// Standard deviation of the unknown of a quantity as it is stated.
     pub fn sd(&self, quantity: Quantity) -> f64 {
         self.quantities.place(quantity).map_or(f64::INFINITY, |place| self.stated[(place, place)].sqrt())
+    }
+
+    /// By how much all commands of the logs are late, s, where it is so much that the fit has moved them: with the mean of the delays that it has found besides.
+    pub fn commands_late_s(&self) -> Option<f64> {
+        let seen = (0..self.elements_seen.len()).filter(|at| self.elements_seen[*at]).map(Quantity::Delay);
+        let weights = seen.map(|delay| (DELAY_UNIT_S * self.unknown(delay), self.sd(delay).powi(-2)));
+        let (sum, weight) =
+            weights.fold((0.0, 0.0), |(sum, all), (late_s, weight)| (sum + weight * late_s, all + weight));
+        self.commands_moved_s.map(|moved_s| moved_s + sum / weight)
     }
 
     /// By how much the engine speed is late against the turbine speed in front of a converter, s.

@@ -14,6 +14,7 @@ mod balances;
 mod budget;
 mod channels;
 mod clutch;
+mod command_delay;
 mod file;
 mod fitting;
 mod precision;

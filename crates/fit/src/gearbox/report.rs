@@ -2,6 +2,7 @@
 
 use drivetrain::ShiftKind;
 
+use super::command_delay::said_of_commands;
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
 use crate::driving::{Balance, DRAG_UNIT_N_M, LEAST_DELAY_S, said_of_delay};
@@ -221,6 +222,12 @@ impl GearboxFit {
 
     fn warnings(&self) -> Vec<String> {
         let mut lines = Vec::new();
+        lines.extend(self.commands_late_s().map(|late_s| {
+            format!(
+                "warning: {}. The values above are those with commands at the right times",
+                said_of_commands(late_s)
+            )
+        }));
         if self.torque_misfit > MISFIT {
             lines.push(format!(
                 "warning: the shifts ask for torques that the model does not have: their errors are {:.1} times what drag and the converter's \

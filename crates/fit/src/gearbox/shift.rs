@@ -146,6 +146,13 @@ impl ShiftModel {
         Some(other)
     }
 
+    /// The same shift with all commands so much earlier.
+    pub(crate) fn with_commands_earlier(&self, late_s: f64) -> Self {
+        let mut other = self.clone();
+        other.clutches.iter_mut().for_each(|clutch| clutch.move_commands(-late_s));
+        other
+    }
+
     /// Residuals and derivatives at unknowns.
     pub(crate) fn linearised(&self, quantities: &Quantities, at: &[f64]) -> Linearised {
         let rows = self.reading.len();

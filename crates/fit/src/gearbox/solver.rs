@@ -173,6 +173,23 @@ impl<'a> Problem<'a> {
         profiled(shift, &shift.linearised(self.quantities, at), weights).score
     }
 
+    /// Cost of shifts after one step from the values of the file, with the usual weights; infinite where there is no step.
+    pub(crate) fn cost_after_a_step(&self, shifts: &[ShiftModel]) -> f64 {
+        let profiled_at = |at: &[f64]| -> Vec<Profiled> {
+            shifts.iter().map(|shift| profiled(shift, &shift.linearised(self.quantities, at), Weights::START)).collect()
+        };
+        let (mut information, mut score) = (self.precision.clone(), DVector::zeros(self.quantities.all.len()));
+        for shift in profiled_at(&vec![0.0; score.len()]) {
+            information += shift.information;
+            score += shift.score;
+        }
+        let Some(curvature) = information.cholesky() else { return f64::INFINITY };
+        let at = curvature.solve(&score);
+        let before = 0.5 * at.dot(&(&self.precision * &at));
+        let cost = before + profiled_at(at.as_slice()).iter().map(|shift| shift.cost).sum::<f64>();
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
     fn point(&self, models: &Models<'_>, at: Vec<f64>, weights: Weights) -> Point {
         let shift = |shift: &ShiftModel| profiled(shift, &shift.linearised(self.quantities, &at), weights);
         Point {

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use config::Car;
 use design::ShiftTables;
 
+use super::command_delay::{said_of_commands, with_commands_earlier};
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, Quantities, Quantity};
 use super::shift::{Linearised, ShiftModel};
@@ -50,6 +51,9 @@ const MOST_ONE_STEP_RAD_S: f64 = 4.0;
 impl GearboxFit {
     /// Why the fitted file is not to be used in place of the given one, if so.
     pub fn reason_against(&self, checked: Option<&HeldOut>) -> Option<String> {
+        if let Some(late_s) = self.commands_late_s() {
+            return Some(said_of_commands(late_s));
+        }
         let [one_step, _] = self.scale_and_gain;
         // An error that is not a number counts against the fit.
         if !matches!(one_step.partial_cmp(&MOST_ONE_STEP_RAD_S), Some(Ordering::Less | Ordering::Equal)) {
@@ -70,6 +74,7 @@ impl GearboxFit {
         held_out: &[ShiftLog],
     ) -> Option<HeldOut> {
         let held_out = &self.channels.moved(held_out, fitted.1, DELAY_UNIT_S * self.unknown(Quantity::EngineDelay));
+        let held_out = &with_commands_earlier(held_out, self.commands_moved_s.unwrap_or(0.0));
         let of_fitted = Quantities::of(fitted.0, fitted.1, held_out, [false; 2]);
         let compared: Vec<Compared> = (held_out.iter())
             .filter_map(|log| {

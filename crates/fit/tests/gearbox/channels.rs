@@ -1,7 +1,7 @@
 //! Scale and delays of the channels, and the stiffness of the drive shafts.
 
 use config::Car;
-use fit::gearbox::{Driving, GearboxFit, Recorder, fit};
+use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, fit};
 use fit::{Known, ReadingAges, Verdict};
 use observer::Reading;
 use observer::any_shift::{GearCommand, ShiftInput};
@@ -132,5 +132,33 @@ fn a_closed_lock_up_clutch_tells_the_delay_of_the_engine_speed_and_the_ratio_a_w
         "ahead of it: take 0.00",
     ] {
         assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn commands_that_are_stored_late_or_early_are_noticed_and_the_given_values_are_kept() {
+    let found = |commands_s: f64| {
+        let mut drawn = Drawn::of(car("eight_speed.toml"), 34, Case::Usual);
+        drawn.channels.commands_s = commands_s;
+        fitted(&drawn, &city(1))
+    };
+    let usual = found(0.0);
+    assert_eq!((usual.commands_late_s(), usual.reason_against(None)), (None, None));
+    for (commands_s, words) in [
+        (0.12, ["late against the speeds: add ", " to `delay_s` of the channel of each command"]),
+        (-0.1, ["early against the speeds: add ", " to `delay_s` of all channels but the commands"]),
+    ] {
+        let late = found(commands_s);
+        let late_s = late.commands_late_s().unwrap();
+        assert!((late_s - commands_s).abs() < 0.01, "{late_s}");
+        let words = format!("about {:.0} ms {}{:.3}{}", 1e3 * late_s.abs(), words[0], late_s.abs(), words[1]);
+        assert!(late.statements().iter().any(|line| line.starts_with("warning: ") && line.contains(&words)), "{words}");
+        assert!(late.reason_against(None).is_some_and(|reason| reason.contains(&words)));
+        // The values are those of commands in time.
+        assert!((late.torque_scale_sd() / usual.torque_scale_sd() - 1.0).abs() < 0.2);
+        for quantity in [Quantity::Input, Quantity::Torque(0), Quantity::Torque(2)] {
+            let change = late.unknown(quantity) - usual.unknown(quantity);
+            assert!(change.abs() < 0.5 * usual.sd(quantity), "{quantity:?} {change}");
+        }
     }
 }
