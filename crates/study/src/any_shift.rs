@@ -5,6 +5,7 @@
 //! carries torque while it slips; in the *inertia phase* both slip.
 
 pub mod campaign;
+pub mod car_log;
 pub mod channels;
 mod command_delay;
 mod contradictions;

@@ -11,8 +11,8 @@ use observer::Reading as Measured;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
+use super::car_log::{LogStep, element_column, element_commands, element_pressures};
 use super::gear_signal::Gears;
-use super::logged::{LogStep, element_column, element_commands, element_pressures};
 use super::pressure_command::{command_for, pressure_command_column};
 
 /// The newest reading of each entry of a map since the step before.

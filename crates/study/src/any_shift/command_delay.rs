@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 use design::ShiftTables;
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 
-use super::logged::LogStep;
+use super::car_log::LogStep;
 
 /// Time between two points of a shift, and between two moves, s.
 const GRID_S: f64 = 0.02;

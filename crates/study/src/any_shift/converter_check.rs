@@ -6,7 +6,7 @@
 use config::Car;
 use design::ShiftErrors;
 
-use super::logged::LogStep;
+use super::car_log::LogStep;
 use crate::ratio_histogram::RatioHistogram;
 
 /// Engine speed counts as steady if it has changed by no more than so much, rad/s, in so long, s \[chosen\]: the engine's inertia takes some 3 N m.
@@ -76,7 +76,7 @@ impl ConverterCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::any_shift::{SAMPLE_S, logged::LogStep};
+    use crate::any_shift::{SAMPLE_S, car_log::LogStep};
     use observer::Reading;
     use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 

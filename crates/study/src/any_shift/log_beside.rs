@@ -4,7 +4,7 @@ use design::ShiftTables;
 use drivetrain::jerk::PeakJerk;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS};
 
-use super::logged::LogStep;
+use super::car_log::LogStep;
 
 /// Measured pressures are compared up to this age, s.
 const OLDEST_S: f64 = 0.05;

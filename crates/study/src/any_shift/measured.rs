@@ -14,7 +14,7 @@ use observer::any_shift::ShiftInput;
 use plant::car::CarSample;
 use plant::sensors::{Channel, Readings, Rows, dealt, read_current, read_speed};
 
-use super::logged::element_commands;
+use super::car_log::element_commands;
 use super::recording::input;
 use crate::campaign::plan::mixed;
 

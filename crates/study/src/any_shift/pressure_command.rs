@@ -5,7 +5,7 @@
 
 use config::Car;
 
-use super::logged::element_column;
+use super::car_log::element_column;
 
 /// Line pressures up to which a command means the line pressure: a clutch that holds is often commanded more. Beyond it is no pressure of
 /// this car.

@@ -6,8 +6,9 @@ use observer::Health;
 use observer::any_shift::ShiftInput;
 use plant::car::CarModel;
 use study::any_shift::ShiftDraw;
+use study::any_shift::car_log::LogStep;
 use study::any_shift::drive::ScoredDrive;
-use study::any_shift::logged::{LogStep, LoggedDrive};
+use study::any_shift::logged::LoggedDrive;
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::drive_tour;
 

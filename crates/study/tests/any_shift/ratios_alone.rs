@@ -7,7 +7,8 @@ use design::{ShiftErrors, ShiftTables, any_shift_filter};
 use observer::Health;
 use observer::any_shift::ShiftPhase;
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_drive};
-use study::any_shift::logged::{LogStep, LoggedDrive};
+use study::any_shift::car_log::LogStep;
+use study::any_shift::logged::LoggedDrive;
 use study::any_shift::recording::Recording;
 use study::any_shift::{inputs, simulated};
 

@@ -3,8 +3,8 @@
 use config::Car;
 use observer::any_shift::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
+use study::any_shift::car_log::element_column;
 use study::any_shift::channels::gear_number;
-use study::any_shift::logged::element_column;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};
 

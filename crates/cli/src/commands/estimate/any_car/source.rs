@@ -9,8 +9,8 @@ use std::sync::atomic::AtomicBool;
 use config::Car;
 use design::ShiftTables;
 use logs::{ChannelMap, Log, LogError};
+use study::any_shift::car_log::{CarLog, LogStep};
 use study::any_shift::channels::{CarChannels, own_map};
-use study::any_shift::logged::{CarLog, LogStep};
 use trace::{CsvRows, Following, shown_path};
 
 use super::super::Messages;

@@ -1,0 +1,316 @@
+//! A log of a drive of a car with any gearbox as a table: its columns, and what the filter is shown of a row.
+//!
+//! The columns have the names of `wetclutch simulate`. Time, turbine and output speed, gear, target gear and the command of every
+//! element's valve are needed, with a converter the engine speed too, without one the reported engine torque. True values and measured
+//! pressures are compared where the log has them.
+
+use config::Car;
+use design::ShiftTables;
+use drivetrain::CommandKind;
+use observer::Reading;
+use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+use plant::car::NO_GEAR;
+use trace::{CsvRows, TraceError, signal};
+
+use super::gear_signal::Gears;
+use super::pressure_command::{command_for, pressure_command_column};
+use crate::frozen_rows::FrozenRows;
+use crate::row_clock::{RowClock, RowTime};
+use crate::row_samples::RowSamples;
+
+/// Names for neither a forward gear nor reverse.
+const NEUTRAL: [&str; 2] = ["N", "P"];
+
+/// The columns with the commands of the valves: element of the gearbox, and name.
+pub fn element_commands(car: &Car) -> Vec<(usize, String)> {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
+    let columns = elements.filter_map(|(at, (element, clutch))| {
+        let unit = match clutch.as_ref()?.valve.command_kind() {
+            CommandKind::Current => "current_a",
+            CommandKind::DutyCycle => "duty_percent",
+        };
+        Some((at, format!("{}_{unit}", element_column(&element.name))))
+    });
+    columns.collect()
+}
+
+/// The columns with the measured pressures of the elements: element of the gearbox, and name.
+pub fn element_pressures(car: &Car) -> impl Iterator<Item = (usize, String)> + '_ {
+    let elements = car.gearbox.elements.iter().zip(&car.clutches).enumerate();
+    let pressed = elements.filter(|(_, (_, clutch))| clutch.is_some());
+    pressed.map(|(at, (element, _))| (at, format!("{}_pressure_pa", element_column(&element.name))))
+}
+
+/// The column with the age of a command or a pressure: how long before its row it was read, s.
+pub fn command_age(command: &str) -> String {
+    let name = command.rsplit_once('_').map_or(command, |(name, _)| name);
+    format!("{name}_age_s")
+}
+
+/// How the names of an element's columns begin.
+pub fn element_column(element: &str) -> String {
+    let plain = |c: char| if c.is_alphanumeric() { c } else { '_' };
+    format!("element_{}", element.to_lowercase().chars().map(plain).collect::<String>())
+}
+
+/// Places of a speed or a command in the log, and of the age of its readings.
+#[derive(Debug, Clone, Copy)]
+struct ReadingColumn {
+    value: usize,
+    age: Option<usize>,
+}
+
+impl ReadingColumn {
+    fn find(rows: &CsvRows, name: &str) -> Option<Self> {
+        let age = signal::age_of(name).and_then(|age| rows.find(age));
+        rows.find(name).map(|value| Self { value, age })
+    }
+
+    fn require(rows: &CsvRows, name: &str) -> Result<Self, TraceError> {
+        let value = rows.require(name)?;
+        Ok(Self { value, age: signal::age_of(name).and_then(|age| rows.find(age)) })
+    }
+
+    fn read(self, rows: &CsvRows, samples: &RowSamples) -> Option<Reading<f64>> {
+        let value = samples.number(rows, self.value);
+        let age_s = self.age.map_or(0.0, |age| samples.number(rows, age));
+        (!value.is_nan()).then_some(Reading { value, age_s: if age_s.is_nan() { 0.0 } else { age_s } })
+    }
+}
+
+/// Where the columns are.
+struct Columns {
+    engine: Option<ReadingColumn>,
+    turbine: ReadingColumn,
+    output: ReadingColumn,
+    wheel: Option<ReadingColumn>,
+    engine_torque: Option<ReadingColumn>,
+    lock_up: Option<usize>,
+    gear: usize,
+    target: usize,
+    /// Place in the filter's tables, column, and the element where the column has the pressure that is asked of it.
+    commands: Vec<(usize, ReadingColumn, Option<usize>)>,
+    /// Place and column of measured pressures.
+    pressures: Vec<(usize, ReadingColumn)>,
+    pedals: [Option<usize>; 2],
+    vehicle: Option<usize>,
+    oil: Option<usize>,
+    /// Pressure, torque and slip of offgoing and oncoming clutch.
+    truth: [[Option<usize>; 3]; 2],
+}
+
+impl Columns {
+    fn of(rows: &CsvRows, car: &Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
+        let find = |name: &str| ReadingColumn::find(rows, name);
+        let require = |name: &str| ReadingColumn::require(rows, name);
+        let commands = element_commands(car).into_iter().filter_map(|(element, name)| {
+            let place = tables.place(element)?;
+            let found = |name: &str, value| ReadingColumn { value, age: rows.find(&command_age(name)) };
+            let pressure = pressure_command_column(&car.gearbox.elements[element].name);
+            Some(match (rows.find(&name), rows.find(&pressure)) {
+                (None, Some(value)) => Ok((place, found(&pressure, value), Some(element))),
+                _ => rows.require(&name).map(|value| (place, found(&name, value), None)),
+            })
+        });
+        let pressures = element_pressures(car).filter_map(|(element, name)| {
+            let age = rows.find(&command_age(&name));
+            Some((tables.place(element)?, ReadingColumn { value: rows.find(&name)?, age }))
+        });
+        let truth = |names: [&str; 3]| names.map(|name| rows.find(name));
+        let offgoing = truth([signal::OFFGOING_PRESSURE, signal::OFFGOING_TORQUE, signal::OFFGOING_SLIP]);
+        let oncoming = truth([signal::ONCOMING_PRESSURE, signal::ONCOMING_TORQUE, signal::ONCOMING_SLIP]);
+        let has_converter = car.converter.is_some();
+        Ok(Self {
+            engine: if has_converter { Some(require(signal::ENGINE_SPEED)?) } else { find(signal::ENGINE_SPEED) },
+            turbine: require(signal::TURBINE_SPEED)?,
+            output: require(signal::OUTPUT_SPEED)?,
+            wheel: find(signal::WHEEL_SPEED),
+            engine_torque: match has_converter {
+                true => find(signal::REPORTED_ENGINE_TORQUE),
+                false => Some(require(signal::REPORTED_ENGINE_TORQUE)?),
+            },
+            lock_up: rows.find(signal::LOCK_UP_APPLIED),
+            gear: rows.require(signal::GEAR)?,
+            target: rows.require(signal::TARGET_GEAR)?,
+            commands: commands.collect::<Result<_, _>>()?,
+            pedals: [signal::THROTTLE, signal::BRAKE].map(|name| rows.find(name)),
+            vehicle: rows.find(signal::VEHICLE_SPEED),
+            oil: rows.find(signal::OIL_TEMPERATURE),
+            pressures: pressures.collect(),
+            truth: [offgoing, oncoming],
+        })
+    }
+}
+
+/// A row of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogStep {
+    /// Time, s.
+    pub time_s: f64,
+    /// What the filter is shown.
+    pub input: ShiftInput<f64>,
+    /// Throttle and brake, 0 to 1; not a number where the log has none.
+    pub pedals: [f64; 2],
+    /// Vehicle speed, m/s; by the wheels where the log has none.
+    pub vehicle_m_s: f64,
+    /// Temperature of the oil in the gearbox, degC, where there is a reading of it.
+    pub oil_degc: Option<f64>,
+    /// Engine torque as the engine's controller reports it, N m, also where the filter is not shown it.
+    pub reported_n_m: Option<Reading<f64>>,
+    /// Speed of the car, m/s, where this row has a reading of it.
+    pub speed_m_s: Option<Reading<f64>>,
+    /// Measured pressures of elements, Pa, by their places in the filter's tables.
+    pub pressures: [Option<Reading<f64>>; MAX_ELEMENTS],
+    /// Pressure, Pa, torque, N m, and slip, rad/s, of offgoing and oncoming clutch; not a number where the log has none.
+    pub truth: [[f64; 3]; 2],
+}
+
+impl LogStep {
+    /// A row with nothing beside what the filter is shown.
+    pub fn of(time_s: f64, input: ShiftInput<f64>) -> Self {
+        Self {
+            time_s,
+            input,
+            pedals: [f64::NAN; 2],
+            vehicle_m_s: f64::NAN,
+            oil_degc: None,
+            reported_n_m: None,
+            speed_m_s: None,
+            pressures: [None; MAX_ELEMENTS],
+            truth: [[f64::NAN; 3]; 2],
+        }
+    }
+
+    /// Measured pressures of the offgoing and the oncoming clutch of the shift that is under way, Pa, where this row has readings of them.
+    pub fn shift_pressures(&self, tables: &ShiftTables<f64>) -> [Option<Reading<f64>>; 2] {
+        let GearCommand { from, to } = self.input.gear;
+        let clutches = tables.tables().shift(from, to).map(|row| row.clutches);
+        [0, 1].map(|c| {
+            let of_shift = self.truth[c][0];
+            if of_shift.is_finite() {
+                return Some(Reading { value: of_shift, age_s: 0.0 });
+            }
+            *self.pressures.get(clutches?[c].element)?
+        })
+    }
+}
+
+/// A log, read row by row.
+pub struct CarLog<'c> {
+    car: &'c Car,
+    rows: CsvRows,
+    columns: Columns,
+    clock: RowClock,
+    frozen: FrozenRows,
+    samples: RowSamples,
+    gears: Gears,
+}
+
+impl<'c> CarLog<'c> {
+    /// Finds the columns.
+    ///
+    /// # Errors
+    /// One that is needed is missing.
+    pub fn of(rows: CsvRows, car: &'c Car, tables: &ShiftTables<f64>) -> Result<Self, TraceError> {
+        let rows = rows.with_wheel_radius(car.road.wheel_radius_m)?;
+        let columns = Columns::of(&rows, car, tables)?;
+        let (clock, frozen, samples) = (RowClock::default(), FrozenRows::new(), RowSamples::new(&rows));
+        let gears = Gears::new([signal::GEAR, signal::TARGET_GEAR]);
+        Ok(Self { car, columns, rows, clock, frozen, samples, gears })
+    }
+
+    /// What was met in the time stamps, the samples, the gears and of frozen speeds, in sentences.
+    ///
+    /// # Errors
+    /// Most rows, or most samples of a column, could not be used, or no row has a gear.
+    pub fn check_readings(&self) -> Result<Vec<String>, TraceError> {
+        let mut notes = self.clock.notes(&self.rows)?;
+        notes.extend(self.samples.notes(&self.rows)?);
+        let gears = format!("its gears are {}", self.gear_names());
+        if self.gears.is_without_gear() {
+            return Err(self.rows.refused(format!("the gear is missing in all rows\nhint: {gears}")));
+        }
+        notes.extend(self.gears.notes(&gears).map_err(|message| self.rows.refused(message))?);
+        notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
+        Ok(notes)
+    }
+
+    /// Whether the table has the pressure that is asked of an element in place of the command of its valve.
+    pub fn has_pressure_command(&self, element: usize) -> bool {
+        self.columns.commands.iter().any(|(.., of_pressure)| *of_pressure == Some(element))
+    }
+
+    /// Whether the table has a signal, of this name in SI, in its SI unit.
+    pub fn is_in_si(&self, name: &str) -> bool {
+        self.rows.find(name).is_none_or(|column| self.rows.factor(column) == 1.0)
+    }
+
+    /// The next row; `None` at the end.
+    ///
+    /// # Errors
+    /// The file cannot be read, or a time is no number.
+    pub fn next_step(&mut self) -> Result<Option<LogStep>, TraceError> {
+        let Some(RowTime { time_s, dt_s }) = self.clock.advance(&mut self.rows)? else { return Ok(None) };
+        self.take_gears();
+        let (rows, columns, samples) = (&self.rows, &self.columns, &self.samples);
+        let mut commands = [None; MAX_ELEMENTS];
+        for &(place, column, of_pressure) in &columns.commands {
+            let read = column.read(rows, samples);
+            let command = |value: f64| of_pressure.map_or(value, |element| command_for(self.car, element, value));
+            commands[place] = read.map(|Reading { value, age_s }| Reading { value: command(value), age_s });
+        }
+        let mut pressures = [None; MAX_ELEMENTS];
+        for &(place, column) in &columns.pressures {
+            pressures[place] = column.read(rows, samples);
+        }
+        let reading = |column: Option<ReadingColumn>| column.and_then(|column| column.read(rows, samples));
+        let [engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, reported_n_m] =
+            [columns.engine, Some(columns.turbine), Some(columns.output), columns.wheel, columns.engine_torque]
+                .map(reading);
+        let number = |column: Option<usize>| column.map_or(f64::NAN, |column| samples.number(rows, column));
+        let by_wheels = wheel_rad_s.map_or(f64::NAN, |wheel| wheel.value * self.car.road.wheel_radius_m);
+        let of_car = number(columns.vehicle);
+        let vehicle_m_s = if columns.vehicle.is_some() { of_car } else { by_wheels };
+        let speed_m_s = Some(Reading { value: of_car, age_s: 0.0 }).filter(|speed| !speed.value.is_nan());
+        let truth = columns.truth.map(|clutch| clutch.map(number));
+        let lock_up_applied = number(columns.lock_up) > 0.5;
+        // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
+        let mut input = ShiftInput {
+            dt_s,
+            engine_rad_s,
+            turbine_rad_s,
+            output_rad_s,
+            wheel_rad_s,
+            engine_n_m: reported_n_m.filter(|_| self.car.converter.is_none() || lock_up_applied),
+            lock_up_applied,
+            commands,
+            gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),
+        };
+        let pedals = columns.pedals.map(number);
+        let oil_degc = Some(number(columns.oil)).filter(|degc| !degc.is_nan());
+        let ShiftInput { engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s, .. } = &mut input;
+        self.frozen.take_out([engine_rad_s, turbine_rad_s, output_rad_s, wheel_rad_s], time_s);
+        Ok(Some(LogStep { time_s, input, pedals, vehicle_m_s, oil_degc, reported_n_m, speed_m_s, pressures, truth }))
+    }
+
+    /// Takes the cells of `gear` and `target_gear`; an empty one says nothing new.
+    fn take_gears(&mut self) {
+        for (which, column) in [self.columns.gear, self.columns.target].into_iter().enumerate() {
+            let text = self.rows.text(column);
+            if text.is_empty() {
+                continue;
+            }
+            let gears = &self.car.gearbox.gears;
+            // A logger may write the gear as a number with decimals.
+            let whole = text.parse::<f64>().ok().map(|number| format!("{number}"));
+            let named = |name: &str| gears.iter().position(|gear| gear.name == name);
+            let neutral = (NEUTRAL.contains(&&*text) && named(&text).is_none()).then_some(NO_GEAR);
+            let found = named(&text).or(neutral).or_else(|| named(&whole?));
+            self.gears.take(which, found, || text.escape_debug().to_string());
+        }
+    }
+
+    fn gear_names(&self) -> String {
+        self.car.gearbox.gears.iter().map(|gear| gear.name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+}
