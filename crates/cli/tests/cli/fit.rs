@@ -123,7 +123,7 @@ fn values_that_are_not_written_leave_the_given_file_with_the_reason_and_no_failu
     let column = "oncoming_current_a";
     let log = folder.write(
         "log.csv",
-        &with_column(&one_shift(1), column, |cell| {
+        with_column(&one_shift(1), column, |cell| {
             cell.parse::<f64>().map_or(cell.to_owned(), |current_a| (3.0 * current_a).to_string())
         }),
     );
@@ -142,7 +142,7 @@ fn values_that_are_not_written_leave_the_given_file_with_the_reason_and_no_failu
     );
     assert_eq!(rest, std::fs::read_to_string(VEHICLE).unwrap());
     // A fit of that file says nothing of this one.
-    let log = folder.write("right.csv", &one_shift(1));
+    let log = folder.write("right.csv", one_shift(1));
     said(&wetclutch(&["fit", &log, "--vehicle", &fitted, "--sensors", BENCH, "-o", &again]));
     let text = folder.read("again.toml");
     assert!(text.starts_with("# fit: values below lines like this one come from 1 shifts"), "{text}");
