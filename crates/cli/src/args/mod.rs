@@ -164,8 +164,9 @@ pub(crate) enum Command {
     /// wheel speed, command of the offgoing clutch's valve, engine torque, pressure of the oncoming clutch. Columns with
     /// the names of `estimate` need no channel map. The last fifth of the shifts is held out to check the result.
     ///
-    /// Where the fitted values are worse on these, or are not those of a possible car, the new file has the given values and the
-    /// reason in its first line; a warning says so, and the exit code is 0. Without a fit no file is written; the exit code is 1 or 2.
+    /// Where the fitted values are worse on those, or end at the limit of what is held possible, the new file has the given values
+    /// and the reason in its first line; a warning says so, and the exit code is 0. Without a fit no file is written; the exit code
+    /// is 1 or 2.
     ///
     ///   wetclutch fit drive1.mf4 drive2.mf4 --map map.toml --vehicle car.toml -o fitted.toml
     #[command(verbatim_doc_comment)]
