@@ -75,7 +75,7 @@ impl Places for OfOneShift {
             Role::TurbineSpeed => Some(&mut self.turbine),
             Role::OutputSpeed => Some(&mut self.output),
             Role::WheelSpeed => Some(&mut self.wheel),
-            Role::OncomingCurrent | Role::OncomingDuty => Some(&mut self.command),
+            Role::OncomingCurrent | Role::OncomingDuty | Role::OncomingPressureCommand => Some(&mut self.command),
             Role::OffgoingCurrent | Role::OffgoingDuty => Some(&mut self.offgoing_command),
             Role::EngineTorque => Some(&mut self.engine_torque),
             _ => None,

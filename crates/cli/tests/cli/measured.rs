@@ -56,6 +56,49 @@ fn a_suggested_map_gives_the_same_estimate_as_the_names_of_the_program() {
     );
 }
 
+/// The rows of a table with another last column in place of one: its title, and what becomes of its cells.
+fn with_other(text: &str, column: &str, title: &str, cell: impl Fn(f64) -> f64) -> String {
+    let at = text.lines().next().unwrap().split(',').position(|name| name == column).unwrap();
+    let row = |(number, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let other = cells.remove(at);
+        cells.push(if number == 0 { title.to_owned() } else { other.parse().map_or(other, |x| cell(x).to_string()) });
+        cells.join(",") + "\n"
+    };
+    text.lines().enumerate().map(row).collect()
+}
+
+#[test]
+fn the_pressure_that_is_asked_of_the_clutch_stands_for_the_command_of_its_valve() {
+    let folder = Folder::new("asked");
+    printed(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("")]));
+    let log = folder.path("e1_measured.csv");
+    let map = printed(&wetclutch(&["inspect", &log, "--suggest"]));
+    let valve = config::Vehicle::built_in().unwrap().oncoming.valve;
+    let asked_bar = |current_a: f64| 1e-5 * valve.settled_pressure(current_a);
+    let text = with_other(&folder.read("e1_measured.csv"), "oncoming_current_a", "P_cmd [bar]", asked_bar);
+    let other = folder.write("asked.csv", text);
+    let at = map.find("[channel.oncoming_current]").unwrap();
+    let end = map[at + 1..].find("\n[").map_or(map.len(), |end| at + 1 + end);
+    let map = folder.write("map.toml", format!("{}{}", &map[..at], &map[end..]));
+    let arguments = ["estimate", &other, "--vehicle", VEHICLE, "--map", &map];
+    let missing = wetclutch(&arguments);
+    assert!(stderr(&missing).contains("or oncoming_pressure_command if it has the pressure"), "{}", stderr(&missing));
+    let of = |text: &str| -> Vec<f64> {
+        let at =
+            text.lines().next().unwrap().split(',').position(|name| name == "oncoming_pressure_estimate_pa").unwrap();
+        text.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().parse().unwrap()).collect()
+    };
+    let expected = of(&printed(&wetclutch(&["estimate", &log, "--vehicle", VEHICLE])));
+    let entry = "oncoming_pressure_command=P_cmd [bar]";
+    let asked = wetclutch(&[&arguments[..], &["--channel", entry]].concat());
+    let found = of(&printed(&asked));
+    assert!(found.len() == expected.len() && expected.iter().copied().fold(0.0, f64::max) > 3e5);
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!((found - expected).abs() < 50.0, "{found} {expected}");
+    }
+}
+
 #[test]
 fn what_an_estimate_lacks_is_said_before_anything_is_written() {
     let folder = Folder::new("lacks");

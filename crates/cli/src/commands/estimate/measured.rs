@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use config::Vehicle;
-use drivetrain::CommandKind;
+use drivetrain::{ClutchValve, CommandKind};
 use logs::plausibility::{Seen, likely_time_unit, too_fast_a_time};
 use logs::{
     ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
@@ -60,6 +60,8 @@ struct Rows {
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
 struct Channels<'a> {
     steps: Steps<'a>,
+    /// The valve for whose command the pressure that is asked of it stands, where the map has no other command.
+    asked_of: Option<ClutchValve<f64>>,
     looked_at: VecDeque<(Step, Vec<Reading>)>,
     median_step_s: f64,
     has_wheel_speed: bool,
@@ -190,11 +192,14 @@ impl<'a> Measured<'a> {
             CommandKind::Current => Role::OncomingCurrent,
             CommandKind::DutyCycle => Role::OncomingDuty,
         };
+        let asked = Role::OncomingPressureCommand;
+        let command = if !map.has(command) && map.has(asked) { asked } else { command };
         if !map.has(command) {
             return Err(Failure::Input(format!(
                 "the channel map has no {0}, the command of this vehicle's valve: without it no pressure can be estimated\n\
-                 hint: add `[channel.{0}]` or --channel {0}=NAME if the log has it",
-                command.name()
+                 hint: add `[channel.{0}]` or --channel {0}=NAME if the log has it, or {1} if it has the pressure that is asked of the clutch",
+                command.name(),
+                asked.name()
             )));
         }
         let needed = [Role::EngineSpeed, Role::TurbineSpeed, Role::OutputSpeed, command];
@@ -206,10 +211,10 @@ impl<'a> Measured<'a> {
                 missing.name(),
             )));
         }
-        // The other kind of command is no reading of this valve.
+        // Another kind of command is no reading of this valve.
         let mut map = map.clone();
-        map.channels
-            .retain(|entry| entry.role == command || !matches!(entry.role, Role::OncomingCurrent | Role::OncomingDuty));
+        let commands = [Role::OncomingCurrent, Role::OncomingDuty, asked];
+        map.channels.retain(|entry| entry.role == command || !commands.contains(&entry.role));
         let own = of_vehicle(vehicle);
         let gearbox = Gearbox {
             ratios: if map.gearbox.ratios.len() >= 2 { map.gearbox.ratios.clone() } else { own.ratios },
@@ -220,6 +225,7 @@ impl<'a> Measured<'a> {
         let look = if is_followed { FOLLOWED_LOOK } else { FIRST_LOOK };
         let mut channels = Channels {
             steps: Steps::new(Readings::new(log, &map)?),
+            asked_of: (command == asked).then(|| vehicle.oncoming.valve.clone()),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,
             has_wheel_speed: map.has(Role::WheelSpeed),
@@ -474,7 +480,10 @@ impl Channels<'_> {
         let mut readings = Vec::new();
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;
         let resets = self.steps.readings().resets();
-        Some(step.map_err(Failure::from).map(|step| {
+        Some(step.map_err(Failure::from).map(|mut step| {
+            if let (Some(valve), Some(command)) = (&self.asked_of, &mut step.input.command) {
+                command.value = valve.command_for(command.value.max(0.0));
+            }
             let step = Step::of_channels(step.time_s, step.input, resets, &readings);
             (step, readings)
         }))
