@@ -6,6 +6,7 @@
 mod attacks;
 mod cars;
 mod drives;
+mod engine_torque;
 mod input_clutch;
 mod learning;
 mod limits;
@@ -13,6 +14,7 @@ mod one_way;
 mod ratios_alone;
 mod sensitivity;
 mod strokes;
+mod valve_timing;
 mod wheel;
 
 use cars::{cars, sensors};
