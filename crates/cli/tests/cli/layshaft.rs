@@ -73,6 +73,7 @@ fn a_car_behind_one_clutch_says_that_only_dogs_change_between_its_gears() {
         &["simulate", &drive, "--vehicle", &car, "-o", &out][..],
         &["sensitivity", &car],
         &["bench", "--vehicle", &car],
+        &["demo", "--vehicle", &car, "-o", &out],
     ] {
         let error = refused(&wetclutch(command));
         assert!(error.contains(why) && error.contains("hint: ") && !error.contains("need plates"), "{error}");

@@ -166,7 +166,7 @@ pub fn drive_tour(
     let legs = legs(known, &tables);
     let Some(first) = legs.first() else {
         let message = "the gearbox has no shift from one clutch to another\nhint: `wetclutch check` lists its shifts";
-        return Err(CarError::Request(message.to_owned()).into());
+        return Err(CarError::Request(known.why_not_driven().unwrap_or_else(|| message.to_owned())).into());
     };
     let speed_m_s = |leg: &Leg| CarShift::usual(known, leg.from, leg.to, leg.throttle).vehicle_m_s;
     let start_m_s = if known.converter.is_some() { 0.0 } else { START * speed_m_s(first) };

@@ -34,6 +34,11 @@ impl Drive {
         Self { car: car.clone(), shifts }
     }
 
+    /// The same shifts with a filter of this car. The controller is told nothing of it.
+    pub(crate) fn told(&self, car: &Car) -> Self {
+        Self { car: car.clone(), shifts: self.shifts.clone() }
+    }
+
     /// What is learnt in so many of its shifts in a random order, and the errors with it.
     pub(crate) fn after(&self, count: usize, inertia: f64, seed: u64) -> (Learnt<f64>, Errors) {
         let tables = tables_with_inertia(&self.car, inertia).unwrap();
@@ -151,11 +156,6 @@ fn after(drives: &[Drive], count: usize) -> Errors {
     sum
 }
 
-/// The same shifts with a filter that is told what the car truly is. The controller is told nothing.
-fn told(drives: &[Drive], truth: &Car) -> Vec<Drive> {
-    drives.iter().map(|drive| Drive { car: truth.clone(), shifts: drive.shifts.clone() }).collect()
-}
-
 #[test]
 fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
     let converters: &[f64] = if draws() > 2 { &[1.0, 0.9, 1.1] } else { &[1.0] };
@@ -182,7 +182,8 @@ fn after_thirty_shifts_wrong_friction_and_gain_cost_little() {
                 );
                 println!("  after {SHIFTS} shifts {}", learnt.show());
                 if draws() > 2 {
-                    let told = told(&wrong, &draw(&wrong[0].car).car(&wrong[0].car));
+                    let truth = draw(&wrong[0].car).car(&wrong[0].car);
+                    let told: Vec<Drive> = wrong.iter().map(|drive| drive.told(&truth)).collect();
                     let [before, after] = [0, SHIFTS].map(|count| over_known(&after(&told, count)));
                     println!(
                         "  told what the car is: {before:.2} of the known car's, after {SHIFTS} shifts {after:.2}"
@@ -280,7 +281,7 @@ fn a_bad_log_is_harmless_after_a_few_good_shifts() {
     let unlearnt = in_drive(&drive, &nothing);
     println!("unlearnt, after {GOOD:?} good shifts: {unlearnt:.2?} N m");
     for (name, damage) in damages {
-        let mut bad = Drive { car: drive.car.clone(), shifts: drive.shifts.clone() };
+        let mut bad = drive.told(&drive.car);
         let mut random = Random(4);
         bad.shifts.iter_mut().flat_map(RecordedShift::inputs_mut).for_each(|input| damage(input, &mut random));
         let learnt = bad.after(SHIFTS, 1.0, 7).0;

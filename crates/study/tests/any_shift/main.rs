@@ -7,6 +7,7 @@ mod attacks;
 mod cars;
 mod command_delay;
 mod drives;
+mod engine_torque;
 mod input_clutch;
 mod learning;
 mod limits;
@@ -14,6 +15,7 @@ mod one_way;
 mod ratios_alone;
 mod sensitivity;
 mod strokes;
+mod valve_timing;
 mod wheel;
 
 use cars::{cars, sensors};
