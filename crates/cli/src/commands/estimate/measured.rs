@@ -225,7 +225,7 @@ impl<'a> Measured<'a> {
         let look = if is_followed { FOLLOWED_LOOK } else { FIRST_LOOK };
         let mut channels = Channels {
             steps: Steps::new(Readings::new(log, &map)?),
-            asked_of: (command == asked).then(|| vehicle.oncoming.valve),
+            asked_of: (command == asked).then_some(vehicle.oncoming.valve),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,
             has_wheel_speed: map.has(Role::WheelSpeed),
