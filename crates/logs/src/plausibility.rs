@@ -305,6 +305,8 @@ fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
         Quantity::Share if unit == "%" && !is_duty(entry.role) && size <= 0.0101 && size > 0.0 => {
             say(format!("its greatest value is {:.2} %", 100.0 * size), "a share from 0 to 1 (unit `1`)")
         }
+        // That of an element which no shift applies is small in any unit.
+        Quantity::Pressure if entry.role == Role::ElementPressure && !(0.3..100.0).contains(&size) => None,
         Quantity::Pressure if size < 5e3 => {
             say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
         }

@@ -86,10 +86,18 @@ fn a_pressure_that_is_measured_at_one_element_is_compared_in_the_shifts_of_that_
 
     // A sensor that reads 200 kPa too much is seen.
     with_columns(&folder, "wrong.csv", "element_c_pressure_pa", |_, row| pressure(row, 2e5, 1.0));
-    let (wrong, _) = shifts_of(&folder, "wrong.csv", &[]);
+    assert!(!words.contains("lie outside"), "{words}");
+    let (wrong, words) = shifts_of(&folder, "wrong.csv", &[]);
+    assert!(words.contains("warning: measured pressures lie outside") && words.contains(": C ("), "{words}");
     for (wrong, right) in wrong.iter().zip(&only_c).filter(|(_, right)| number(right, ERROR).is_finite()) {
         assert!((number(wrong, ERROR) - 2e5).abs() < 2e4 && number(wrong, INSIDE) < 0.5, "{right:?}");
     }
+
+    // Nor can pressures in Pa be some in bar.
+    with_columns(&folder, "bar.csv", "element_c_pressure_bar", |_, row| pressure(row, 0.0, 1.0));
+    let (car, log) = (format!("{ROOT}vehicles/eight_speed.toml"), folder.path("bar.csv"));
+    let text = refused(&wetclutch(&["estimate", &log, "--vehicle", &car, "-o", &folder.path("no.csv")]));
+    assert!(text.contains("element_c_pressure") && text.contains("MPa"), "{text}");
 
     // By a channel map, with a clock of its own.
     with_columns(
@@ -166,4 +174,7 @@ fn friction_work_and_jerk_of_a_measured_drive_are_those_of_the_simulation() {
         let [bus, exact] = [bus, exact].map(|shift| number(shift, "jerk_m_s3"));
         assert!((0.4..8.0).contains(&exact) && (bus - exact).abs() < 0.5 + 0.1 * exact, "{bus} {exact}");
     }
+    with_columns(&folder, "frozen.csv", "vehicle_speed_m_s", |_, _| "13.5".to_owned());
+    let (frozen, _) = shifts_of(&folder, "frozen.csv", &[]);
+    assert!(frozen.iter().all(|shift| shift["jerk_m_s3"].is_empty()));
 }

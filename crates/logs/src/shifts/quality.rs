@@ -71,23 +71,46 @@ fn jerk(shift: &Shift, tracks: &[Track], output_rad_per_m: Option<f64>) -> Optio
         _ => return None,
     };
     let around_s = AROUND_S + 0.5 * WINDOW_S;
-    let (mut jerk, mut strays, mut before_s) = (PeakJerk::default(), Strays::default(), None);
-    for (time_s, value) in track.between(shift.start_s() - around_s, shift.end_s() + around_s) {
-        // A hole would leave the parabola free.
-        if before_s.replace(time_s).is_some_and(|before_s| time_s - before_s > APART_S) {
+    let points = || track.between(shift.start_s() - around_s, shift.end_s() + around_s);
+    if acceleration.is_none() {
+        return peak_jerk_m_s3(points().map(|(time_s, value)| (time_s, factor * value)));
+    }
+    let (mut jerk, mut holes) = (PeakJerk::default(), Holes::default());
+    for (time_s, value) in points() {
+        if holes.is_behind_one(time_s) {
             return None;
         }
-        match acceleration {
-            Some(_) => jerk.acceleration(time_s, value),
-            None => {
-                if let Some((time_s, speed_m_s)) = strays.next(time_s, factor * value) {
-                    jerk.speed(time_s, speed_m_s);
-                }
-            }
+        jerk.acceleration(time_s, value);
+    }
+    jerk.peak_m_s3()
+}
+
+/// The jerk of a car whose speeds, m/s, are these at their times, s, by the definition of [`drivetrain::jerk`], m/s^3: single wrong
+/// speeds are left out; none where a hole would leave the parabola free, or where there are too few.
+pub fn peak_jerk_m_s3(speeds: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let (mut jerk, mut strays, mut holes) = (PeakJerk::default(), Strays::default(), Holes::default());
+    for (time_s, speed_m_s) in speeds {
+        if holes.is_behind_one(time_s) {
+            return None;
+        }
+        if let Some((time_s, speed_m_s)) = strays.next(time_s, speed_m_s) {
+            jerk.speed(time_s, speed_m_s);
         }
     }
     strays.last().into_iter().for_each(|(time_s, speed_m_s)| jerk.speed(time_s, speed_m_s));
     jerk.peak_m_s3()
+}
+
+/// Tells where readings are too far apart.
+#[derive(Default)]
+struct Holes {
+    before_s: Option<f64>,
+}
+
+impl Holes {
+    fn is_behind_one(&mut self, time_s: f64) -> bool {
+        self.before_s.replace(time_s).is_some_and(|before_s| time_s - before_s > APART_S)
+    }
 }
 
 /// Leaves single wrong speeds out: those from which the car would have to come back faster than it can.

@@ -242,7 +242,8 @@ impl<'c> CommandDelay<'c> {
         Some(format!(
             "warning: the commands of the valves come about {:.0} ms{or_more} too {late} against the speeds, by the turbine's torques in {} shifts: the \
              guaranteed ranges do not hold, and the estimates are worse. `late_s = {delay_s:.2}` in each `channel.element_NAME_...` of a channel map moves \
-             them to their time (in those of gear and target_gear too if they have the same delay); `wetclutch inspect LOG --suggest` makes a map",
+             them to their time (in those of gear and target_gear too if they have the same delay); `wetclutch inspect LOG --suggest` makes a map. An \
+             offset of all commands looks alike: check their zero first",
             1e3 * delay_s.abs(),
             self.shifts
         ))

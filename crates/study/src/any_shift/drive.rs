@@ -7,6 +7,7 @@ use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
+use super::log_beside::is_of_shift;
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift};
 use super::recording::Recording;
 use super::shift_summary::{ShiftSummary, spans_s};
@@ -216,12 +217,22 @@ impl PassingShifts {
         self.open.as_ref().is_some_and(|open| gears != Some([open.from, open.to]))
     }
 
+    /// Gives its jerk to the shift that ended last, m/s^3, where it is known.
+    pub(super) fn take_jerk(&mut self, jerk_m_s3: Option<f64>) {
+        if let Some((jerk_m_s3, shift)) = jerk_m_s3.zip(self.drive.shifts.last_mut()) {
+            shift.quality.jerk_m_s3 = jerk_m_s3;
+        }
+    }
+
     pub(super) fn end(&mut self, mut quality: CarShiftQuality) {
         if self.open.as_ref().is_some_and(|open| open.is_garage) {
             (quality.flare_rad_s, quality.past_synchronous_rad_s) = (f64::NAN, f64::NAN);
         }
         self.drive.shifts.extend(self.open.take().map(|shift| {
-            let summary = ShiftSummary::of(&shift.rows, shift.kind);
+            let mut summary = ShiftSummary::of(&shift.rows, shift.kind);
+            if !is_of_shift(&quality) {
+                summary.friction_work_j = [None; 2];
+            }
             ScoredShift { quality, summary, ..shift }
         }));
     }

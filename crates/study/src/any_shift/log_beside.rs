@@ -1,38 +1,42 @@
 //! What a log of a car has beside the readings that the filter takes: measured pressures, and the speed of the car.
 
+use std::collections::VecDeque;
+
+use config::Car;
 use design::ShiftTables;
-use drivetrain::jerk::PeakJerk;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS};
+use plant::car::CarShiftQuality;
 
 use super::car_log::LogStep;
+use super::{ROUNDING_PA, ShiftScoreRow, within};
 
 /// Measured pressures are compared up to this age, s.
-const OLDEST_S: f64 = 0.05;
-/// The jerk of a shift counts up to this time after its end, s, as in a simulation.
-const RATED_AFTER_S: f64 = 0.5;
-/// No car changes its speed faster, m/s^2, beside the error of one reading, m/s: what does is a wrong reading.
-const FASTEST_M_S2: f64 = 20.0;
-const READING_M_S: f64 = 0.3;
+const OLDEST_S: f64 = 0.25;
+/// The jerk of a shift is that of the speeds from so long before it to so long after it, s, as in `logs::shifts`.
+const AROUND_S: f64 = 0.45;
+/// Speeds that are kept at most: those of a shift of ten minutes at 100 Hz.
+const MOST_SPEEDS: usize = 60_000;
+/// Rows of an element's measured pressure from which on, and share of them outside of the range above which, the log is doubted.
+const LEAST_ROWS: u64 = 50;
+const DOUBTED: f64 = 0.1;
 
 /// Measured pressures at the time of a row: a reading is older, and is carried on by what the models of the valves change since.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct CarriedPressures {
-    valve_pa: [f64; MAX_ELEMENTS],
-    rate_pa_s: [f64; MAX_ELEMENTS],
-}
-
-impl Default for CarriedPressures {
-    fn default() -> Self {
-        Self { valve_pa: [f64::NAN; MAX_ELEMENTS], rate_pa_s: [0.0; MAX_ELEMENTS] }
-    }
+    /// Times and pressures by the models of the valves, s and Pa, as far back as a reading may be.
+    models: VecDeque<(f64, [f64; MAX_ELEMENTS])>,
 }
 
 impl CarriedPressures {
     /// Takes the pressures by the models of the valves after a row, Pa.
-    pub(super) fn push(&mut self, dt_s: f64, valve_pa: &[f64; MAX_ELEMENTS]) {
-        for ((rate, last), now) in self.rate_pa_s.iter_mut().zip(&mut self.valve_pa).zip(valve_pa) {
-            let change = (now - *last) / dt_s;
-            (*rate, *last) = (if change.is_finite() { change } else { 0.0 }, *now);
+    pub(super) fn push(&mut self, time_s: f64, valve_pa: &[f64; MAX_ELEMENTS]) {
+        if self.models.back().is_some_and(|(last_s, _)| *last_s >= time_s) {
+            self.models.clear();
+        }
+        self.models.push_back((time_s, *valve_pa));
+        // One that is older than any reading stays, for a line to the next one.
+        while self.models.get(1).is_some_and(|(second_s, _)| *second_s < time_s - OLDEST_S) {
+            self.models.pop_front();
         }
     }
 
@@ -43,49 +47,155 @@ impl CarriedPressures {
         let readings = step.shift_pressures(tables);
         [0, 1].map(|c| {
             let Some(reading) = readings[c].filter(|reading| reading.age_s <= OLDEST_S) else { return f64::NAN };
-            let rate_pa_s = row.and_then(|row| self.rate_pa_s.get(row.clutches[c].element)).copied().unwrap_or(0.0);
-            reading.value + rate_pa_s * reading.age_s
+            let change = row.and_then(|row| self.change_pa(row.clutches[c].element, step.time_s - reading.age_s));
+            reading.value + change.unwrap_or(0.0)
+        })
+    }
+
+    /// What the model of a valve has changed since a time, Pa.
+    fn change_pa(&self, element: usize, since_s: f64) -> Option<f64> {
+        let of = |(_, models): &(f64, [f64; MAX_ELEMENTS])| models.get(element).copied();
+        let now = of(self.models.back()?)?;
+        let after = self.models.partition_point(|(time_s, _)| *time_s < since_s);
+        let then = match (after.checked_sub(1).and_then(|before| self.models.get(before)), self.models.get(after)) {
+            (Some(before), Some(next)) => {
+                let share = (since_s - before.0) / (next.0 - before.0);
+                of(before)? + share * (of(next)? - of(before)?)
+            }
+            (None, Some(first)) => of(first)?,
+            _ => now,
+        };
+        Some(now - then).filter(|change| change.is_finite())
+    }
+}
+
+/// How often the measured pressures of each element lie outside of their guaranteed ranges.
+#[derive(Debug, Default)]
+pub(super) struct DoubtedPressures {
+    /// Rows with a measured pressure, and those of them that are outside, by the place of the element among those of the gearbox.
+    rows: Vec<[u64; 2]>,
+}
+
+impl DoubtedPressures {
+    /// Takes a row of a shift between these elements.
+    pub(super) fn push(&mut self, elements: [usize; 2], row: &ShiftScoreRow) {
+        for (element, clutch) in elements.into_iter().zip(row.clutches) {
+            let [measured_pa, ..] = clutch.pressure_pa;
+            if !measured_pa.is_finite() || clutch.torque_n_m[0].is_finite() || element > MAX_ELEMENTS * 2 {
+                continue;
+            }
+            self.rows.resize(self.rows.len().max(element + 1), [0; 2]);
+            let [all, outside] = &mut self.rows[element];
+            *all += 1;
+            *outside += u64::from(!within(clutch.pressure_range_pa, measured_pa, ROUNDING_PA));
+        }
+    }
+
+    /// A warning that names the elements whose pressures contradict their commands.
+    #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
+    pub(super) fn warning(&self, car: &Car) -> Option<String> {
+        let doubted = self.rows.iter().enumerate().filter_map(|(element, [all, outside])| {
+            let share = *outside as f64 / *all as f64;
+            let name = &car.gearbox.elements.get(element)?.name;
+            (*all >= LEAST_ROWS && share > DOUBTED).then(|| format!("{name} ({:.0} %)", 100.0 * share))
+        });
+        let doubted: Vec<String> = doubted.collect();
+        (!doubted.is_empty()).then(|| {
+            format!(
+                "warning: measured pressures lie outside of their guaranteed ranges in many rows of the shifts: {}. Either unit, sign, offset or delay \
+                 of these channels are wrong, or they are of other elements, or the valve is beyond the error bounds of the vehicle file. A `fit` would \
+                 believe them",
+                doubted.join(", ")
+            )
         })
     }
 }
 
-/// The jerk of a shift, from its request to some tenths of a second after its end.
+/// The jerk of the shifts: speeds around the shift that is under way, or was the last one.
 #[derive(Debug, Default)]
 pub(super) struct ShiftJerk {
-    of: Option<(PeakJerk, f64)>,
-    /// Time, s, and speed, m/s, of the last reading that counted.
-    last: Option<[f64; 2]>,
+    /// Times, s, and speeds, m/s: of the last tenths of a second, from the request of a shift on all of them.
+    speeds: VecDeque<(f64, f64)>,
+    /// Whether a shift is under way or has just ended, and until when its speeds count, s.
+    until_s: Option<f64>,
 }
 
 impl ShiftJerk {
     /// Takes a row.
     pub(super) fn push(&mut self, step: &LogStep) {
-        self.of = self.of.filter(|(_, until_s)| step.time_s <= *until_s);
-        let (Some((peak, _)), Some(speed)) = (&mut self.of, step.speed_m_s) else { return };
-        let (time_s, speed_m_s) = (step.time_s - speed.age_s, speed.value);
-        let can_be = |[last_s, last]: [f64; 2]| {
-            time_s > last_s && (speed_m_s - last).abs() <= READING_M_S + FASTEST_M_S2 * (time_s - last_s)
-        };
-        if speed_m_s.is_finite() && self.last.is_none_or(can_be) {
-            self.last = Some([time_s, speed_m_s]);
-            peak.speed(time_s, speed_m_s);
+        if let Some(speed) = step.speed_m_s.filter(|speed| speed.value.is_finite()) {
+            let time_s = step.time_s - speed.age_s;
+            match self.speeds.back() {
+                Some((last_s, _)) if *last_s > time_s + 1.0 => self.speeds.clear(),
+                Some((last_s, _)) if *last_s >= time_s => return,
+                _ => {}
+            }
+            self.speeds.push_back((time_s, speed.value));
+        }
+        let keeps = |(time_s, _): &(f64, f64)| *time_s >= step.time_s - AROUND_S;
+        while self.speeds.len() > MOST_SPEEDS
+            || self.until_s.is_none() && self.speeds.front().is_some_and(|s| !keeps(s))
+        {
+            self.speeds.pop_front();
         }
     }
 
-    /// Begins a shift with this row.
-    pub(super) fn begin(&mut self, step: &LogStep) {
-        (self.of, self.last) = (Some((PeakJerk::default(), f64::INFINITY)), None);
-        self.push(step);
+    /// Begins a shift; the jerk of the one before, if it was still under way.
+    pub(super) fn begin(&mut self, time_s: f64) -> Option<f64> {
+        let before = self.until_s.filter(|until_s| until_s.is_finite()).and_then(|_| self.jerk_m_s3());
+        self.speeds.retain(|(speed_s, _)| *speed_s >= time_s - AROUND_S);
+        self.until_s = Some(f64::INFINITY);
+        before
     }
 
     /// The shift ends at this time, s; not a number where the rest of it is not seen.
     pub(super) fn end(&mut self, time_s: f64) {
-        self.of = self.of.filter(|_| time_s.is_finite()).map(|(peak, _)| (peak, time_s + RATED_AFTER_S));
+        self.until_s = Some(time_s + AROUND_S).filter(|until_s| until_s.is_finite());
     }
 
-    /// The jerk of a shift that has ended, m/s^3; none where there were too few speeds.
-    pub(super) fn ended(&self) -> Option<f64> {
-        let (peak, until_s) = self.of.as_ref()?;
-        peak.peak_m_s3().filter(|_| until_s.is_finite())
+    /// The jerk of the shift that has ended, m/s^3, once its speeds are all there, or at the end of the log.
+    pub(super) fn ended(&mut self, time_s: f64) -> Option<f64> {
+        self.until_s.filter(|until_s| until_s.is_finite() && time_s >= *until_s)?;
+        self.until_s = None;
+        self.jerk_m_s3()
+    }
+
+    fn jerk_m_s3(&self) -> Option<f64> {
+        // A car that moves has no speed that stays to the last digit.
+        let first = self.speeds.front()?.1;
+        let stands = self.speeds.iter().all(|(_, speed)| *speed == first);
+        if stands { None } else { logs::shifts::peak_jerk_m_s3(self.speeds.iter().copied()) }
+    }
+}
+
+/// Slip beyond the old or the new gear above which the speeds are not those of this shift, rad/s \[chosen\].
+const OTHER_SHIFT_RAD_S: f64 = 30.0;
+
+/// Whether turbine and output speed stayed between the two gears of a shift, as far as a flare or an overshoot may go.
+pub(super) fn is_of_shift(quality: &CarShiftQuality) -> bool {
+    !(quality.flare_rad_s > OTHER_SHIFT_RAD_S || quality.past_synchronous_rad_s > OTHER_SHIFT_RAD_S)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reading_is_carried_on_by_what_the_model_changed_since() {
+        let mut carried = CarriedPressures::default();
+        // A parabola, so that its slope now is not that of a moment ago.
+        for row in 0..60_u32 {
+            let time_s = 0.01 * f64::from(row);
+            let mut models = [f64::NAN; MAX_ELEMENTS];
+            models[2] = 1e6 * time_s * time_s;
+            carried.push(time_s, &models);
+        }
+        for age_s in [0.0, 0.004, 0.013, 0.1, 0.2] {
+            let expected = 1e6 * (0.59_f64.powi(2) - (0.59_f64 - age_s).powi(2));
+            let change = carried.change_pa(2, 0.59 - age_s).unwrap();
+            assert!((change - expected).abs() < 30.0, "{age_s}: {change} {expected}");
+        }
+        assert_eq!(carried.change_pa(1, 0.5), None);
+        assert!(carried.models.len() < 30, "{}", carried.models.len());
     }
 }

@@ -17,7 +17,7 @@ use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShi
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
-use super::log_beside::{CarriedPressures, ShiftJerk};
+use super::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk};
 pub use super::ratio_scale::WrongScale;
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
@@ -53,6 +53,7 @@ pub struct LoggedDrive<'c> {
     still: StillCommands,
     holes: Holes,
     carried: CarriedPressures,
+    doubted: DoubtedPressures,
     jerk: ShiftJerk,
 }
 
@@ -118,6 +119,7 @@ impl<'c> LoggedDrive<'c> {
             still: StillCommands::default(),
             holes: Holes::default(),
             carried: CarriedPressures::default(),
+            doubted: DoubtedPressures::default(),
             jerk: ShiftJerk::default(),
         }
     }
@@ -150,7 +152,7 @@ impl<'c> LoggedDrive<'c> {
                 self.speeds_rad_s[at] = value;
             }
         }
-        self.carried.push(input.dt_s, &estimate.valve_pa);
+        self.carried.push(step.time_s, &estimate.valve_pa);
         self.jerk.push(step);
         let GearCommand { from, to } = input.gear;
         self.passing.state(DriveState {
@@ -201,7 +203,8 @@ impl<'c> LoggedDrive<'c> {
         }
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
-        self.take_jerk();
+        let jerk_m_s3 = self.jerk.ended(step.time_s);
+        self.passing.take_jerk(jerk_m_s3);
         let [_, turbine, output] = self.speeds_rad_s;
         self.delay.push(step, &estimate, [turbine, output]);
         estimate
@@ -251,7 +254,8 @@ impl<'c> LoggedDrive<'c> {
             let turbine_n_m = estimate.turbine_n_m.unwrap_or(f64::NAN);
             self.passing.begin(self.car, [from, to], elements, (step.time_s, turbine_n_m));
             self.begun_s = step.time_s;
-            self.jerk.begin(step);
+            let jerk_m_s3 = self.jerk.begin(step.time_s);
+            self.passing.take_jerk(jerk_m_s3);
             self.still.begin();
             let ratios = [from, to].map(|gear| self.car.gearbox.gears.get(gear).map_or(f64::NAN, |gear| gear.ratio));
             self.beyond = BeyondGears::new(&self.car.gearbox, [from, to], ratios);
@@ -284,7 +288,7 @@ impl<'c> LoggedDrive<'c> {
             }
             (None, false) => return,
         };
-        shift.rows.push(ShiftScoreRow {
+        let row = ShiftScoreRow {
             time_s: step.time_s,
             clutches,
             turbine_n_m: [f64::NAN, estimate.turbine_n_m.unwrap_or(f64::NAN)],
@@ -293,7 +297,9 @@ impl<'c> LoggedDrive<'c> {
             phase: estimate.phase.map_or("-", |phase| phase.name()),
             health: estimate.health,
             flare_rad_s: estimate.flare_rad_s,
-        });
+        };
+        self.doubted.push(shift.elements, &row);
+        shift.rows.push(row);
     }
 
     /// Ends the open shift with the first row after it, which is in this gear.
@@ -311,13 +317,6 @@ impl<'c> LoggedDrive<'c> {
         self.jerk.end(time_s);
     }
 
-    /// Gives the jerk to the shift that ended last, some tenths of a second after its end.
-    fn take_jerk(&mut self) {
-        if let Some((jerk_m_s3, shift)) = self.jerk.ended().zip(self.passing.drive.shifts.last_mut()) {
-            shift.quality.jerk_m_s3 = jerk_m_s3;
-        }
-    }
-
     /// Keeps what figures need of at most so many of the shifts up to now that are wanted, those with the largest errors, or without truth those
     /// worth a look: called after each row, it bounds what is held of a long drive.
     pub fn draw_at_most(&mut self, most: usize, is_wanted: impl Fn(&ScoredShift) -> bool) {
@@ -326,10 +325,13 @@ impl<'c> LoggedDrive<'c> {
 
     /// The drive.
     pub fn finish(mut self) -> ScoredDrive {
+        let jerk_m_s3 = self.jerk.ended(f64::INFINITY);
+        self.passing.take_jerk(jerk_m_s3);
         // A shift that the log cuts off is not complete.
         self.end(f64::NAN, usize::MAX);
         let swapped = self.in_gear.swapped_speeds().map(|swapped| format!("warning: {swapped}"));
         let mut warnings: Vec<String> = swapped.into_iter().chain(self.commands.warnings()).collect();
+        warnings.extend(self.doubted.warning(self.car));
         warnings.extend(self.delay.warning());
         warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.still.warnings(self.car, self.tables));

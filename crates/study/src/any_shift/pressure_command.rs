@@ -16,9 +16,18 @@ pub fn pressure_command_column(element: &str) -> String {
     format!("{}_pressure_command_pa", element_column(element))
 }
 
-/// The command, A or %, at which the valve of an element ends at a commanded pressure, Pa; not a number where it has no valve.
+/// Share of the line pressure below zero down to which a commanded pressure is none; below it is a wrong sign or offset.
+const LEAST_LINE_PRESSURES: f64 = -0.05;
+/// A command that no valve takes.
+const REFUSED: f64 = -1e3;
+
+/// The command, A or %, at which the valve of an element ends at a commanded pressure, Pa; not a number where it has no valve, and none that
+/// a valve takes where the pressure is negative.
 pub(super) fn command_for(car: &Car, element: usize, pressure_pa: f64) -> f64 {
     let most_pa = car.line_pressure_pa;
+    if pressure_pa < LEAST_LINE_PRESSURES * most_pa {
+        return REFUSED;
+    }
     let limited_pa = if pressure_pa <= MOST_LINE_PRESSURES * most_pa { pressure_pa.min(most_pa) } else { pressure_pa };
     let clutch = car.clutches.get(element).and_then(Option::as_ref);
     clutch.map_or(f64::NAN, |clutch| clutch.valve.command_for(limited_pa.clamp(0.0, f64::INFINITY)))
@@ -39,6 +48,7 @@ mod tests {
             let settled_pa = valve.settled_pressure(command_for(&car, 0, asked_pa));
             assert!((settled_pa - pressure_pa).abs() < 1.0, "{asked_pa}: {settled_pa}");
         }
+        assert!(command_for(&car, 0, -2e5) < -1.0);
         // A hundred times too much stays too much.
         assert!(valve.settled_pressure(command_for(&car, 0, 1e7)) > 0.9e7);
         assert!(command_for(&car, 0, f64::NAN).is_nan() && command_for(&car, 99, 1e5).is_nan());

@@ -47,7 +47,7 @@ impl WatchedColumns {
             let unit_name = match role {
                 _ if is_in_si => role.unit(),
                 Role::OncomingCurrent | Role::ElementCurrent => "mA",
-                Role::ElementPressureCommand => "the unit of its name",
+                Role::ElementPressureCommand | Role::ElementPressure => "the unit of its name",
                 _ => "rpm",
             };
             let (counts, extremes) = (QualityCounts::default(), Extremes::default());

@@ -10,7 +10,7 @@ use logs::plausibility::Seen;
 use observer::any_shift::GearCommand;
 use observer::{Health, Reading};
 use report::tables::health_meaning;
-use study::any_shift::car_log::{CarLog, LogStep, element_commands};
+use study::any_shift::car_log::{CarLog, LogStep, element_commands, element_pressures};
 use study::any_shift::logged::Unusable;
 use study::any_shift::pressure_command::pressure_command_column;
 use study::log::FIRST_LOOK;
@@ -78,10 +78,12 @@ pub(super) fn refused(unusable: Unusable, path: &Path) -> Failure {
 
 /// The columns of a table of a drive, to tell wrong units and empty columns.
 pub(super) struct Columns {
-    /// Of the four speeds, the engine torque and then each command.
+    /// Of the four speeds, the engine torque, each command and then each measured pressure.
     watched: WatchedColumns,
     /// Places of the commands in the filter's tables, and the valve where the column has the pressure that is asked of it.
     places: Vec<(usize, Option<ClutchValve<f64>>)>,
+    /// Places of the measured pressures in the filter's tables.
+    pressures: Vec<usize>,
     /// Whether each gear is a forward one.
     is_forward: Vec<bool>,
 }
@@ -117,8 +119,15 @@ impl Columns {
             Some(((tables.place(element)?, pressure_of), watched))
         });
         let (places, commands): (Vec<_>, Vec<_>) = commands.unzip();
+        let pressures = element_pressures(car).filter_map(|(element, column)| {
+            let name = column.rsplit_once('_').map_or(column.as_str(), |(name, _)| name).to_owned();
+            let (role, is_in_si) = (Role::ElementPressure, log.is_in_si(&column));
+            Some((tables.place(element)?, WatchedColumn { role, name, is_in_si, is_needed: false }))
+        });
+        let (pressures, measured): (Vec<_>, Vec<_>) = pressures.unzip();
         let is_forward = car.gearbox.gears.iter().map(|gear| gear.ratio > 0.0).collect();
-        Self { watched: WatchedColumns::new(FIRST_LOOK, others.into_iter().chain(commands)), places, is_forward }
+        let watched = WatchedColumns::new(FIRST_LOOK, others.into_iter().chain(commands).chain(measured));
+        Self { watched, places, pressures, is_forward }
     }
 
     pub(super) fn push(&mut self, step: &LogStep) {
@@ -134,7 +143,9 @@ impl Columns {
             let command = value(input.commands[*place])?;
             Some(pressure_of.as_ref().map_or(command, |valve| valve.settled_pressure(command)))
         };
-        self.watched.push(others.into_iter().chain(self.places.iter().map(command)));
+        let commands = self.places.iter().map(command);
+        let pressures = self.pressures.iter().map(|place| value(step.pressures[*place]));
+        self.watched.push(others.into_iter().chain(commands).chain(pressures));
     }
 
     /// Refuses a table in which a column that is needed has no value, or whose unit cannot be right.
