@@ -146,6 +146,14 @@ impl ClutchModel {
         Pressures { kiss_pa: self.kiss_at(&here), by: by.collect(), pressure_pa }
     }
 
+    /// Measured pressures, Pa, each beside that by the valve of the file.
+    pub(super) fn beside(&self, grid: Grid) -> Vec<[f64; 2]> {
+        let hydraulics = self.hydraulics.cylinder.map_or(self.hydraulics, |_| self.hydraulics.filled());
+        let modelled = self.pressures_of(&hydraulics, grid, &AtValve::default());
+        let readings = self.measured.time_s.iter().zip(&self.measured.value);
+        readings.map(|(time_s, value)| [*value, grid.at(&modelled, *time_s)]).collect()
+    }
+
     /// Residuals of the measured pressure, and derivatives of its prediction; `found` is what acts on the plates at the same unknowns.
     pub(super) fn measured(&self, grid: Grid, unknowns: &Unknowns<'_>, found: &Pressures) -> Option<MeasuredPressure> {
         let Unknowns { quantities, at, .. } = unknowns;

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::balances::Balances;
 use super::channels::ChannelFits;
 use super::command_delay::{common_delay_s, with_commands_earlier};
+use super::contradicted::{contradicted, without_pressures};
 use super::precision::stated;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantities, Quantity, deviation_of};
 use super::shift::ShiftModel;
@@ -60,6 +61,8 @@ pub struct GearboxFit {
     pub wheel: Result<WheelFit, String>,
     /// By how much the fit has moved all commands to earlier times, s, where the logs have them so late.
     pub(crate) commands_moved_s: Option<f64>,
+    /// Places of the elements whose measured pressures contradict their commands, and are not used.
+    pub(crate) contradicted: Vec<usize>,
     /// Channels of output and engine speed against the turbine speed.
     pub channels: ChannelFits,
     /// Part of the torque at the gearbox input that is by the torque ratio above 1, RMS over the fitted shifts.
@@ -88,12 +91,16 @@ pub fn fit(
     let commands_late_s = commands_late_s(car, tables, shifts)?;
     let moved = commands_late_s.map(|late_s| with_commands_earlier(shifts, late_s));
     let shifts = moved.as_ref().unwrap_or(shifts);
+    let contradicted = contradicted(car, tables, shifts);
+    let without = (!contradicted.is_empty()).then(|| without_pressures(shifts, tables, &contradicted));
+    let shifts = without.as_deref().unwrap_or(shifts);
     let mut balances = Balances::of(&DrivenCar::with_gearbox(car, tables, &|_, _| None), driving);
     loop {
         let (mut fit, scales) = fit_with(car, tables, shifts, (driving, &balances), progress)?;
         if !balances.leave_out(scales) {
             fit.channels = channels;
             fit.commands_moved_s = commands_late_s;
+            fit.contradicted = contradicted;
             return Ok(fit);
         }
     }
@@ -156,6 +163,7 @@ fn fit_with(
         backlash: fit_backlash(&driven, std::iter::once(driving)),
         wheel: Err(String::new()),
         commands_moved_s: None,
+        contradicted: Vec::new(),
         channels: ChannelFits { output: Err(String::new()), engine: None },
         balances: balances.clone(),
         quantities,

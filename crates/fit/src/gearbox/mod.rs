@@ -15,6 +15,7 @@ mod budget;
 mod channels;
 mod clutch;
 mod command_delay;
+mod contradicted;
 mod file;
 mod fitting;
 mod precision;

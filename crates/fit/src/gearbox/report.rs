@@ -228,6 +228,14 @@ impl GearboxFit {
                 said_of_commands(late_s)
             )
         }));
+        if !self.contradicted.is_empty() {
+            let names = self.contradicted.iter().filter_map(|place| self.quantities.elements.get(*place));
+            lines.push(format!(
+                "warning: the measured pressure of {} is not that of its commands with any valve of the error bounds: it is not used. Unit, sign or offset \
+                 of the channel may be wrong, or it is of another element",
+                names.map(String::as_str).collect::<Vec<_>>().join(", ")
+            ));
+        }
         if self.torque_misfit > MISFIT {
             lines.push(format!(
                 "warning: the shifts ask for torques that the model does not have: their errors are {:.1} times what drag and the converter's \

@@ -146,6 +146,14 @@ impl ShiftModel {
         Some(other)
     }
 
+    /// Measured pressures of both clutches, Pa, by their places, each beside that by the valve of the file.
+    pub(super) fn pressures_beside(&self) -> Vec<(usize, [f64; 2])> {
+        let of = |clutch: &ClutchModel| {
+            clutch.beside(self.grid).into_iter().map(|both| (clutch.place, both)).collect::<Vec<_>>()
+        };
+        self.clutches.iter().flat_map(of).collect()
+    }
+
     /// The same shift with all commands so much earlier.
     pub(crate) fn with_commands_earlier(&self, late_s: f64) -> Self {
         let mut other = self.clone();

@@ -338,6 +338,20 @@ fn a_measured_pressure_tells_friction_and_gain_apart() {
     let said = [&without, &with].map(|fit| fit.statements().join("\n").contains("gain apart of C"));
     assert_eq!(said, [false, true]);
     assert!(with.report().iter().any(|row| row.name == "C: valve gain"), "{:?}", with.report());
+
+    // A pressure that no valve of the bounds makes is not used, and named.
+    assert!(!with.statements().join("\n").contains("is not that of its commands"));
+    let wrongs: [fn(f64) -> f64; 3] = [|pa| 0.01 * pa, |pa| -pa, |_| 5e5];
+    for wrong in wrongs {
+        let mut shifts = recorded.shifts.clone();
+        truth.measure(&mut shifts, &tables, place, 1);
+        let values = shifts.iter_mut().flat_map(|log| &mut log.pressure).flat_map(|series| &mut series.value);
+        values.for_each(|pa| *pa = wrong(*pa));
+        let fit = fitted(&drawn, &shifts);
+        assert_eq!(fit.unknowns, without.unknowns);
+        let said = fit.statements().join("\n");
+        assert!(said.contains("the measured pressure of C is not that of its commands"), "{said}");
+    }
 }
 
 /// The pressure of an element tells the volume of its stroke, and only of that one.
