@@ -178,3 +178,28 @@ fn friction_work_and_jerk_of_a_measured_drive_are_those_of_the_simulation() {
     let (frozen, _) = shifts_of(&folder, "frozen.csv", &[]);
     assert!(frozen.iter().all(|shift| shift["jerk_m_s3"].is_empty()));
 }
+
+#[test]
+fn gear_signals_that_are_lost_in_a_shift_are_said_and_have_no_friction_work() {
+    let folder = town("lost-gears");
+    let (shifts, words) = shifts_of(&folder, "sim/city_measured.csv", &[]);
+    assert!(!words.contains("of the shifts take longer"), "{words}");
+    let measured = folder.read("sim/city_measured.csv");
+    let names: Vec<&str> = measured.lines().next().unwrap().split(',').collect();
+    let gears = ["gear", "target_gear"].map(|name| names.iter().position(|other| *other == name).unwrap());
+    // The signals are lost in 1-2, until 2-3 is over; or in 5-6, for half a minute.
+    for (number, lost_s) in [(1, 9.0..11.2), (5, 21.3..55.0)] {
+        let row = |line: &str| {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            if cells[0].parse().is_ok_and(|time_s: f64| lost_s.contains(&time_s)) {
+                gears.iter().for_each(|at| cells[*at] = "");
+            }
+            cells.join(",") + "\n"
+        };
+        folder.write("lost.csv", measured.lines().map(row).collect::<String>());
+        let (lost, words) = shifts_of(&folder, "lost.csv", &[]);
+        assert!(words.contains(&format!("1 of the shifts take longer than 10 s, or the turbine is far below the speeds of both gears (number {number})")), "{words}");
+        let work = |shifts: &[BTreeMap<String, String>]| shifts[number - 1]["oncoming_friction_work_j"].clone();
+        assert!(work(&lost).is_empty() && !work(&shifts).is_empty());
+    }
+}

@@ -7,7 +7,7 @@ use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use plant::car::{CarModel, CarSample, CarShift, CarShiftQuality, CarShiftRating, NO_GEAR};
 
-use super::log_beside::is_of_shift;
+use super::log_beside::is_of_its_gears;
 use super::matrix::{ErrorsByPhase, Matrix, MatrixRow, MatrixShift};
 use super::recording::Recording;
 use super::shift_summary::{ShiftSummary, spans_s};
@@ -230,7 +230,7 @@ impl PassingShifts {
         }
         self.drive.shifts.extend(self.open.take().map(|shift| {
             let mut summary = ShiftSummary::of(&shift.rows, shift.kind);
-            if !is_of_shift(&quality) {
+            if !is_of_its_gears(shift.kind, &quality, shift.time_s[1] - shift.time_s[0]) {
                 summary.friction_work_j = [None; 2];
             }
             ScoredShift { quality, summary, ..shift }

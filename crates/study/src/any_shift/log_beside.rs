@@ -4,10 +4,12 @@ use std::collections::VecDeque;
 
 use config::Car;
 use design::ShiftTables;
+use drivetrain::ShiftKind;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS};
 use plant::car::CarShiftQuality;
 
 use super::car_log::LogStep;
+use super::drive::ScoredShift;
 use super::{ROUNDING_PA, ShiftScoreRow, within};
 
 /// Measured pressures are compared up to this age, s.
@@ -168,12 +170,39 @@ impl ShiftJerk {
     }
 }
 
-/// Slip beyond the old or the new gear above which the speeds are not those of this shift, rad/s \[chosen\].
+/// How far below the speeds of both gears the turbine has those of another shift, rad/s \[chosen\]: a flare is above them.
 const OTHER_SHIFT_RAD_S: f64 = 30.0;
+/// Shifts that last longer have other gear signals than theirs, s \[chosen\].
+const LONGEST_S: f64 = 10.0;
 
-/// Whether turbine and output speed stayed between the two gears of a shift, as far as a flare or an overshoot may go.
-pub(super) fn is_of_shift(quality: &CarShiftQuality) -> bool {
-    !(quality.flare_rad_s > OTHER_SHIFT_RAD_S || quality.past_synchronous_rad_s > OTHER_SHIFT_RAD_S)
+/// Whether the gear signals can be those of a shift by its length, s, and the speeds of the turbine.
+pub(super) fn is_of_its_gears(kind: Option<ShiftKind>, quality: &CarShiftQuality, length_s: f64) -> bool {
+    let below_rad_s = match kind {
+        Some(ShiftKind::PowerOnUp | ShiftKind::PowerOffUp) => quality.past_synchronous_rad_s,
+        Some(ShiftKind::PowerOnDown | ShiftKind::CoastDown) => quality.flare_rad_s,
+        None => 0.0,
+    };
+    length_s <= LONGEST_S && (below_rad_s.is_nan() || below_rad_s <= OTHER_SHIFT_RAD_S)
+}
+
+/// A warning of shifts whose gear signals are not theirs.
+pub(super) fn not_of_their_gears(shifts: &[ScoredShift]) -> Option<String> {
+    /// Shifts that are named.
+    const NAMED: usize = 10;
+    let is_other = |shift: &&ScoredShift| {
+        let [begin_s, end_s] = shift.time_s;
+        !shift.is_garage && shift.is_estimated() && !is_of_its_gears(shift.kind, &shift.quality, end_s - begin_s)
+    };
+    let others: Vec<String> = shifts.iter().filter(is_other).map(|shift| shift.number.to_string()).collect();
+    let more = if others.len() > NAMED { ", ..." } else { "" };
+    (!others.is_empty()).then(|| {
+        format!(
+            "warning: {} of the shifts take longer than {LONGEST_S:.0} s, or the turbine is far below the speeds of both gears (number {}{more}): `gear` and \
+             `target_gear` are missing, late or wrong there, and what the table says of these shifts is not of them",
+            others.len(),
+            others[..others.len().min(NAMED)].join(", ")
+        )
+    })
 }
 
 #[cfg(test)]

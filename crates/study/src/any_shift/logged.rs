@@ -17,7 +17,7 @@ use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShi
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
-use super::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk};
+use super::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
 pub use super::ratio_scale::WrongScale;
 use super::still_commands::StillCommands;
 use super::{AnyShiftError, ClutchRow, DRAG_N_M, ROUNDING_PA, ShiftScoreRow, within};
@@ -341,6 +341,7 @@ impl<'c> LoggedDrive<'c> {
                 self.holes.count
             ));
         }
+        warnings.extend(not_of_their_gears(&self.passing.drive.shifts));
         if self.unannounced > 0 {
             warnings.push(format!(
                 "warning: gear changes without a target_gear that says so before (so often: {}): these shifts are not estimated. target_gear has to \
