@@ -93,6 +93,12 @@ fn a_pressure_that_is_measured_at_one_element_is_compared_in_the_shifts_of_that_
         assert!((number(wrong, ERROR) - 2e5).abs() < 2e4 && number(wrong, INSIDE) < 0.5, "{right:?}");
     }
 
+    // What is not read is named.
+    assert!(!words.contains("not read"), "{words}");
+    with_columns(&folder, "names.csv", "element_c_pressure_psi,element_q_pressure_pa", |_, _| "3,4".to_owned());
+    let (_, words) = shifts_of(&folder, "names.csv", &[]);
+    assert!(words.contains("not read: `element_c_pressure_psi`, `element_q_pressure_pa`."), "{words}");
+
     // Nor can pressures in Pa be some in bar.
     with_columns(&folder, "bar.csv", "element_c_pressure_bar", |_, row| pressure(row, 0.0, 1.0));
     let (car, log) = (format!("{ROOT}vehicles/eight_speed.toml"), folder.path("bar.csv"));

@@ -232,7 +232,32 @@ impl<'c> CarLog<'c> {
         }
         notes.extend(self.gears.notes(&gears).map_err(|message| self.rows.refused(message))?);
         notes.extend(self.frozen.notes().map_err(|message| self.rows.refused(message))?);
+        notes.extend(self.unread());
         Ok(notes)
+    }
+
+    /// Columns whose names begin as those of an element and are none that is read, in a sentence.
+    fn unread(&self) -> Option<String> {
+        // What an estimate writes of an element is not read again.
+        const WRITTEN: [&str; 4] =
+            ["_valve_model_pressure_pa", "_pressure_least_pa", "_pressure_greatest_pa", "_command_reading"];
+        let is_used = |place: usize| {
+            let commands = self.columns.commands.iter().map(|(_, column, _)| column);
+            let mut columns = commands.chain(self.columns.pressures.iter().map(|(_, column)| column));
+            columns.any(|column| column.value == place || column.age == Some(place))
+        };
+        let of_element = |name: &str| name.starts_with("element_") && !WRITTEN.iter().any(|end| name.ends_with(end));
+        let names = self.rows.names().enumerate();
+        let unread: Vec<String> = names
+            .filter(|(place, name)| of_element(name) && !is_used(*place))
+            .map(|(_, name)| format!("`{}`", name.escape_debug()))
+            .collect();
+        (!unread.is_empty()).then(|| {
+            format!(
+                "not read: {}. No element of this car has such a command or pressure, or the name does not end with its unit (docs/estimates.md)",
+                unread.join(", ")
+            )
+        })
     }
 
     /// Whether the table has the pressure that is asked of an element in place of the command of its valve.
