@@ -47,7 +47,7 @@ pub(crate) fn long_table<R: Iterator<Item = Vec<String>>>(left: usize, rows: imp
 pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>]) -> Vec<String> {
     let length = |text: &str| text.chars().count();
     let widest = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| length(cell)).max().unwrap_or(0);
-    let word = |title: &str| title.split(' ').map(length).max().unwrap_or(0);
+    let word = |title: &str| words(title).map(|word| length(&word)).max().unwrap_or(0);
     let widths: Vec<usize> = titles.iter().enumerate().map(|(j, title)| widest(j).max(word(title))).collect();
     let titles: Vec<Vec<String>> = titles.iter().zip(&widths).map(|(title, &width)| wrapped(title, width)).collect();
     let height = titles.iter().map(Vec::len).max().unwrap_or(0);
@@ -61,16 +61,23 @@ pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>])
     titles.iter().chain(rows).map(|row| line_of(left, row, &widths)).collect()
 }
 
-/// A text in lines of at most this width, as far as its words are no wider.
+/// A text in lines of at most this width, as far as its words are no wider. The two words of a unit stay together.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split(' ') {
+    for word in words(text) {
         match lines.last_mut().filter(|line| line.chars().count() + 1 + word.chars().count() <= width) {
             Some(line) => *line = format!("{line} {word}"),
-            None => lines.push(word.to_owned()),
+            None => lines.push(word),
         }
     }
     lines
+}
+
+/// The words of a title; `N m` is one.
+fn words(title: &str) -> impl Iterator<Item = String> {
+    const JOINED: char = '\u{a0}';
+    let joined = title.replace("N m", &format!("N{JOINED}m"));
+    joined.split(' ').map(|word| word.replace(JOINED, " ")).collect::<Vec<_>>().into_iter()
 }
 
 /// A line of a table with columns of these widths.
@@ -110,9 +117,13 @@ mod tests {
 
     #[test]
     fn a_title_that_is_wider_than_its_cells_takes_several_lines() {
-        let words = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
-        let titles = words(&["shift", "past new gear rad/s", "torque N m"]);
-        let rows = [words(&["1-2", "0.5", "62 (23 to 102)"]), words(&["2-1", "11.5", "1"])];
+        let cells = |cells: &[&str]| cells.iter().map(|&cell| cell.to_owned()).collect::<Vec<_>>();
+        let titles = cells(&["shift", "past new gear rad/s", "torque N m"]);
+        let rows = [cells(&["1-2", "0.5", "62 (23 to 102)"]), cells(&["2-1", "11.5", "1"])];
+        assert_eq!(
+            titled_lines(1, &cells(&["at the turbine N m"]), &[cells(&["1"])])[..4],
+            ["at", "the", "turbine", "N m"]
+        );
         let expected = ["        past", "         new", "        gear", "shift  rad/s      torque N m"];
         assert_eq!(titled_lines(1, &titles, &rows)[..4], expected);
         assert_eq!(
