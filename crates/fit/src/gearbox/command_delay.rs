@@ -56,18 +56,13 @@ pub(crate) fn with_commands_earlier(shifts: &[ShiftLog], late_s: f64) -> Vec<Shi
 
 /// What a fit says of commands that are late by so much, s.
 pub(crate) fn said_of_commands(late_s: f64) -> String {
-    let size_s = late_s.abs();
-    let (late, what) = match late_s > 0.0 {
-        true => ("late", format!("add {size_s:.3} to `delay_s` of the channel of each command in the channel map")),
-        false => (
-            "early",
-            format!(
-                "add {size_s:.3} to `delay_s` of all channels but the commands in the channel map. Or the valves react so much later than the vehicle file says"
-            ),
-        ),
+    let (late, or) = match late_s > 0.0 {
+        true => ("late", ""),
+        false => ("early", ", unless the valves react so much later than the vehicle file says"),
     };
     format!(
-        "the commands of these logs are about {:.0} ms {late} against the speeds: {what}. Then fit again",
-        1e3 * size_s
+        "the commands of these logs are about {:.0} ms too {late} against the speeds: add {late_s:.3} to `late_s` of the channel of each command in the channel map{or}. \
+         Then fit again",
+        1e3 * late_s.abs()
     )
 }

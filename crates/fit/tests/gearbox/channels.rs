@@ -145,13 +145,13 @@ fn commands_that_are_stored_late_or_early_are_noticed_and_the_given_values_are_k
     let usual = found(0.0);
     assert_eq!((usual.commands_late_s(), usual.reason_against(None)), (None, None));
     for (commands_s, words) in [
-        (0.12, ["late against the speeds: add ", " to `delay_s` of the channel of each command"]),
-        (-0.1, ["early against the speeds: add ", " to `delay_s` of all channels but the commands"]),
+        (0.12, ["too late against the speeds: add ", " to `late_s` of the channel of each command"]),
+        (-0.1, ["too early against the speeds: add ", " to `late_s` of the channel of each command"]),
     ] {
         let late = found(commands_s);
         let late_s = late.commands_late_s().unwrap();
         assert!((late_s - commands_s).abs() < 0.01, "{late_s}");
-        let words = format!("about {:.0} ms {}{:.3}{}", 1e3 * late_s.abs(), words[0], late_s.abs(), words[1]);
+        let words = format!("about {:.0} ms {}{:.3}{}", 1e3 * late_s.abs(), words[0], late_s, words[1]);
         assert!(late.statements().iter().any(|line| line.starts_with("warning: ") && line.contains(&words)), "{words}");
         assert!(late.reason_against(None).is_some_and(|reason| reason.contains(&words)));
         // The values are those of commands in time.

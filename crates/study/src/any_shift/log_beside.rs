@@ -9,7 +9,7 @@ use observer::any_shift::{GearCommand, MAX_ELEMENTS};
 use plant::car::CarShiftQuality;
 
 use super::car_log::LogStep;
-use super::drive::ScoredShift;
+use super::drive::{NO_ELEMENT, ScoredShift};
 use super::{ROUNDING_PA, ShiftScoreRow, within};
 
 /// Measured pressures are compared up to this age, s.
@@ -83,7 +83,7 @@ impl DoubtedPressures {
     pub(super) fn push(&mut self, elements: [usize; 2], row: &ShiftScoreRow) {
         for (element, clutch) in elements.into_iter().zip(row.clutches) {
             let [measured_pa, ..] = clutch.pressure_pa;
-            if !measured_pa.is_finite() || clutch.torque_n_m[0].is_finite() || element > MAX_ELEMENTS * 2 {
+            if !measured_pa.is_finite() || clutch.torque_n_m[0].is_finite() || element == NO_ELEMENT {
                 continue;
             }
             self.rows.resize(self.rows.len().max(element + 1), [0; 2]);

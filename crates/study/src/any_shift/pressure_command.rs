@@ -4,6 +4,7 @@
 //! this pressure. Where the map of the controller is another one, the difference is an error of the valve's gain.
 
 use config::Car;
+use drivetrain::ClutchValve;
 
 use super::car_log::element_column;
 
@@ -24,13 +25,17 @@ const REFUSED: f64 = -1e3;
 /// The command, A or %, at which the valve of an element ends at a commanded pressure, Pa; not a number where it has no valve, and none that
 /// a valve takes where the pressure is negative.
 pub(super) fn command_for(car: &Car, element: usize, pressure_pa: f64) -> f64 {
-    let most_pa = car.line_pressure_pa;
+    let clutch = car.clutches.get(element).and_then(Option::as_ref);
+    clutch.map_or(f64::NAN, |clutch| command_of_valve(&clutch.valve, car.line_pressure_pa, pressure_pa))
+}
+
+/// The same of a valve whose greatest pressure this is, Pa.
+pub fn command_of_valve(valve: &ClutchValve<f64>, most_pa: f64, pressure_pa: f64) -> f64 {
     if pressure_pa < LEAST_LINE_PRESSURES * most_pa {
         return REFUSED;
     }
     let limited_pa = if pressure_pa <= MOST_LINE_PRESSURES * most_pa { pressure_pa.min(most_pa) } else { pressure_pa };
-    let clutch = car.clutches.get(element).and_then(Option::as_ref);
-    clutch.map_or(f64::NAN, |clutch| clutch.valve.command_for(limited_pa.clamp(0.0, f64::INFINITY)))
+    valve.command_for(limited_pa.clamp(0.0, f64::INFINITY))
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use logs::{
     ChannelMap, Gearbox, GearsOfShift, Log, LogError, Quality, Reading, Readings, Role, Shift, ShiftFinder, Steps,
 };
 use observer::{ChannelHealth, Input, Reading as Measurement};
+use study::any_shift::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use study::shift_estimates::is_refused;
 use trace::{CsvRows, Following, TraceError, shown_path, signal};
@@ -60,8 +61,8 @@ struct Rows {
 /// Steps of mapped channels. The first are looked at before the first estimate, as those of a table are.
 struct Channels<'a> {
     steps: Steps<'a>,
-    /// The valve for whose command the pressure that is asked of it stands, where the map has no other command.
-    asked_of: Option<ClutchValve<f64>>,
+    /// The valve for whose command the pressure that is asked of it stands, and its greatest pressure, Pa, where the map has no other command.
+    asked_of: Option<(ClutchValve<f64>, f64)>,
     looked_at: VecDeque<(Step, Vec<Reading>)>,
     median_step_s: f64,
     has_wheel_speed: bool,
@@ -225,7 +226,7 @@ impl<'a> Measured<'a> {
         let look = if is_followed { FOLLOWED_LOOK } else { FIRST_LOOK };
         let mut channels = Channels {
             steps: Steps::new(Readings::new(log, &map)?),
-            asked_of: (command == asked).then_some(vehicle.oncoming.valve),
+            asked_of: (command == asked).then_some((vehicle.oncoming.valve, vehicle.limits.pressure_max_pa)),
             looked_at: VecDeque::new(),
             median_step_s: f64::NAN,
             has_wheel_speed: map.has(Role::WheelSpeed),
@@ -481,8 +482,8 @@ impl Channels<'_> {
         let step = self.steps.next_seeing(|reading| readings.push(reading))?;
         let resets = self.steps.readings().resets();
         Some(step.map_err(Failure::from).map(|mut step| {
-            if let (Some(valve), Some(command)) = (&self.asked_of, &mut step.input.command) {
-                command.value = valve.command_for(command.value.max(0.0));
+            if let (Some((valve, most_pa)), Some(command)) = (&self.asked_of, &mut step.input.command) {
+                command.value = command_of_valve(valve, *most_pa, command.value);
             }
             let step = Step::of_channels(step.time_s, step.input, resets, &readings);
             (step, readings)
