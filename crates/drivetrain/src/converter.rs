@@ -51,6 +51,13 @@ impl<T: Real> Converter<T> {
         (ratio * capacity * engine_rad_s * engine_rad_s, per_speed_ratio * engine_rad_s)
     }
 
+    /// Derivative of the turbine torque by the engine speed, N m s/rad, where [`turbine_with_slope`](Self::turbine_with_slope) is this.
+    #[inline]
+    pub fn engine_slope((turbine_n_m, slope_n_m_s): (T, T), engine_rad_s: T, turbine_rad_s: T) -> T {
+        // The torque is of second degree in both speeds (Euler's theorem).
+        (T::of(2.0) * turbine_n_m - turbine_rad_s * slope_n_m_s) / engine_rad_s.at_least(T::one())
+    }
+
     /// Least and greatest turbine torque with both speeds anywhere in these ranges, N m.
     pub fn turbine_range(&self, engine_rad_s: [T; 2], turbine_rad_s: [T; 2]) -> [T; 2] {
         let engine = engine_rad_s.map(|speed| speed.at_least(T::of(SLOWEST_ENGINE_RAD_S)));

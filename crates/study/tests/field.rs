@@ -107,6 +107,30 @@ fn a_hole_in_the_commands_is_no_gain_of_the_valve() {
     assert!(with_hole < 1.5 * whole, "{with_hole} {whole}");
 }
 
+/// The turbine torque is then not known. What the speeds show of it is no torque of the shafts and no pressure.
+#[test]
+fn a_hole_in_the_engine_speed_spoils_no_other_torque() {
+    let field = Field::new();
+    let whole = field.rows("nominal");
+    let torque = whole.iter().position(|(_, phase, _)| *phase == Phase::TorquePhase).unwrap();
+    let shafts = |rows: &[Row]| -> Vec<f64> {
+        field.kalman(rows).iter().map(|estimate| estimate.shaft_torque_n_m.unwrap_or(f64::NAN)).collect()
+    };
+    let undisturbed = shafts(&whole);
+    let begin = torque - 30;
+    // The second hole is that of a bus with the commands.
+    for commands in [false, true] {
+        let mut rows = whole.clone();
+        for row in &mut rows[begin..begin + 22] {
+            row.0.engine_rad_s = None;
+            row.0.command = row.0.command.filter(|_| !commands);
+        }
+        let off = shafts(&rows).iter().zip(&undisturbed).skip(begin).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // 8 and 10 %; more than twice as much where the torque that is missing counts as noise from step to step.
+        assert!(off < 0.15 * undisturbed[begin], "{commands}: {off} N m of {}", undisturbed[begin]);
+    }
+}
+
 #[test]
 fn what_is_missing_or_refused_is_said_of_its_channel() {
     let field = Field::new();

@@ -405,7 +405,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             match &torque {
                 Some(torque) => {
                     let speeds = self.measured(&state.newest, Some(running));
-                    self.advance(running, &state.elements, torque, speeds, dt_s);
+                    let same_s = state.engine.and_then(|engine| engine.same_error_s());
+                    self.advance(running, &state.elements, (torque, same_s), speeds, dt_s);
                     [channels.turbine, channels.output, channels.wheel] =
                         self.take_speeds(running, input, &channels, speeds);
                 }

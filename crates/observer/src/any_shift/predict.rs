@@ -58,12 +58,13 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         elements.get(at)?.as_ref().zip(self.tables.elements.get(at))
     }
 
-    /// Predicts over the step, and decides which clutches hold.
+    /// Predicts over the step, and decides which clutches hold. The noise of the turbine torque may be one error that has lasted for
+    /// a time, s.
     pub(super) fn advance(
         &self,
         running: &mut Running<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
-        torque: &turbine::Found<T>,
+        (torque, same_s): (&turbine::Found<T>, Option<T>),
         speeds: [T; 2],
         dt_s: T,
     ) {
@@ -81,8 +82,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let mean = running.torques.map_or(now, |before| before.mean(&now)).without(running.phase.phase.holding());
         if dt_s > T::zero() {
             let (pieces, piece_s) = pieces(dt_s);
+            let noise = same_s.map_or(torque.noise, |same_s| torque.noise * T::of(2.0) * same_s / piece_s);
             for _ in 0..pieces {
-                self.predict(running, &mean, torque.noise, piece_s);
+                self.predict(running, &mean, noise, piece_s);
             }
         }
         for silent_s in &mut running.silent_s {

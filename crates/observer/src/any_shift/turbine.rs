@@ -102,7 +102,6 @@ pub(super) fn by_maps<T: Real>(
     [turbine, turbine_variance]: [T; 2],
 ) -> (T, T) {
     let (torque, slope) = converter.turbine_with_slope(engine, turbine);
-    // The torque is of second degree in both speeds (Euler's theorem).
-    let per_engine = (T::of(2.0) * torque - turbine * slope) / engine.max(T::one());
+    let per_engine = Converter::engine_slope((torque, slope), engine, turbine);
     (torque, square(slope) * turbine_variance + square(per_engine) * engine_variance)
 }

@@ -7,6 +7,8 @@ use crate::InputLimits;
 
 /// Time without a reading after which the acceleration is taken to fade, and in which it does, s.
 const SILENT_S: f64 = 0.05;
+/// Time without a reading after which its error is one that lasts, and no noise, s: longer than from one reading to the next.
+const LATE_S: f64 = 0.025;
 
 /// Innovation beyond which a reading is refused, in its deviations: fewer than for the other speeds, as nothing else tells
 /// the engine speed, and it is the turbine torque within the same step.
@@ -80,6 +82,13 @@ impl<T: Real> Engine<T> {
     #[inline]
     pub(crate) fn variance(&self) -> T {
         self.speed_variance
+    }
+
+    /// For how long the speed has had one error, s, where that is longer than from one reading to the next. What it moves has a
+    /// variance that grows with the square of this time, by `2 dt` of it in a step.
+    #[inline]
+    pub(crate) fn same_error_s(&self) -> Option<T> {
+        (self.silent_s > T::of(LATE_S)).then_some(self.silent_s)
     }
 
     /// Lets time pass.

@@ -1,6 +1,6 @@
 //! The prediction over a step, and the first state.
 
-use drivetrain::{Real, clutch::direction};
+use drivetrain::{Converter, Real, clutch::direction};
 
 use super::covariance::Covariance;
 use super::engine::Engine;
@@ -266,14 +266,22 @@ impl<T: Real> KalmanFilter<T> {
             if released { two * dt / u.offgoing_release_s * square(x[OFFGOING]) } else { dt * square(u.offgoing_n_m) };
         p.add(OFFGOING, offgoing);
         p.add(LOAD, dt * square(if shifting { u.load_shifting_n_m } else { u.load_in_gear_n_m }));
-        if engine.silent_s > T::of(0.5) * T::of(FIRST_S) {
+        if let Some(same_s) = engine.same_error_s() {
             // A missing engine speed leaves the turbine torque open.
-            let torque =
-                square(step.turbine[0]) * engine.variance() / square(engine.speed_before(T::zero())).at_least(one);
+            let variance = two * dt * same_s * square(self.open_torque(engine, x[TURBINE]));
             for (k, row) in [(TURBINE, &step.rows[0]), (OUTPUT, &step.rows[1])] {
-                p.add(k, square(two * dt * row.per_turbine_torque) * torque);
+                p.add(k, square(row.per_turbine_torque) * variance);
             }
         }
+    }
+
+    /// Standard deviation of the turbine torque by that of the engine speed, N m. Near the coupling point the torque is small and
+    /// changes most.
+    #[cold]
+    fn open_torque(&self, engine: &Engine<T>, turbine_rad_s: T) -> T {
+        let speed = engine.speed_before(T::zero());
+        let torque = self.model.rigid.converter.turbine_with_slope(speed, turbine_rad_s);
+        Converter::engine_slope(torque, speed, turbine_rad_s) * engine.variance().sqrt()
     }
 }
 
