@@ -8,6 +8,7 @@
 //! - the friction torque of the engine, where it is mapped, is taken off the engine torque.
 
 use crate::frozen::{FrozenSpeed, NO_SPEEDS, Speeds};
+use crate::held::HeldSpeed;
 use crate::in_order::InOrder;
 use crate::map::Resolved;
 use crate::plausibility::{Extremes, Finding, Likely, Seen};
@@ -51,6 +52,7 @@ struct Channels {
     counts: QualityCounts,
     extremes: Extremes,
     frozen: FrozenSpeed,
+    held: HeldSpeed,
 }
 
 /// The readings of a log in the order of their time stamps.
@@ -92,6 +94,7 @@ impl<'a> Readings<'a> {
             parts: vec![None; resolved.channels.len()],
             parts_s: f64::NAN,
             frozen: FrozenSpeed::new(resolved.entry.role),
+            held: HeldSpeed::new(),
             resolved,
             counts: QualityCounts::default(),
             extremes: Extremes::default(),
@@ -169,7 +172,8 @@ impl<'a> Readings<'a> {
         let summary = self.summary();
         for (role, channels) in summary.iter().zip(&self.roles) {
             let name = channels.resolved.entry.key();
-            let (good, total) = (role.counts.of(Quality::Good), role.counts.total());
+            // A held sample could be used, were it not the one before.
+            let (good, total) = (role.counts.of(Quality::Good) + role.counts.of(Quality::Held), role.counts.total());
             if total == 0 {
                 return Err(LogError::map(format!(
                     "the channel of {name} has no samples\nhint: check it with `wetclutch inspect`, or leave `channel.{name}` out"
@@ -237,6 +241,9 @@ impl<'a> Readings<'a> {
                 quality = Quality::Frozen;
             } else {
                 self.speeds[kind as usize] = value;
+            }
+            if channels.held.is_held(value) && quality == Quality::Good {
+                quality = Quality::Held;
             }
         }
         channels.counts.push(quality);

@@ -25,11 +25,13 @@ pub enum Quality {
     OutOfRange,
     /// The value stands still while another speed changes, see [`crate::frozen`].
     Frozen,
+    /// The speed of the sample before, which a table holds until the next one comes, see [`crate::held`]: the first of them counts.
+    Held,
 }
 
 impl Quality {
     /// All of them, in their order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Good,
         Self::Missing,
         Self::Invalid,
@@ -38,6 +40,7 @@ impl Quality {
         Self::Backward,
         Self::OutOfRange,
         Self::Frozen,
+        Self::Held,
     ];
 
     /// A word for tables.
@@ -51,6 +54,7 @@ impl Quality {
             Self::Backward => "backward",
             Self::OutOfRange => "out of range",
             Self::Frozen => "frozen",
+            Self::Held => "held",
         }
     }
 }

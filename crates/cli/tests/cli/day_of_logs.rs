@@ -210,6 +210,50 @@ fn faults_of_time_stamps_in_a_table_are_counted_and_read_as_with_a_map() {
     assert!(mapped == found && mapped.lines().count() == lines.len() - 20);
 }
 
+/// A table with rows every 10 ms of speeds that come every 20 ms: a logger repeats them, or leaves the cells empty.
+#[test]
+fn a_speed_that_a_table_holds_counts_once() {
+    let folder = Folder::new("held");
+    let clean = shift_log(&folder);
+    let with_turbine = |other_rows: fn(&str) -> &str| {
+        let names = clean.lines().next().unwrap();
+        let at = names.split(',').position(|name| name == "turbine_speed_rad_s").unwrap();
+        let mut newest = String::new();
+        let row = |(i, line): (usize, &str)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if i % 2 == 0 {
+                newest.clone_from(&cells[at]);
+            } else {
+                cells[at] = other_rows(&newest).to_owned();
+            }
+            cells.join(",") + "\n"
+        };
+        format!("{names}\n{}", clean.lines().skip(1).enumerate().map(row).collect::<String>())
+    };
+    let logs = [("held.csv", with_turbine(|newest| newest)), ("empty.csv", with_turbine(|_| ""))];
+    let map = folder.path("map.toml");
+    std::fs::write(&map, wetclutch(&["inspect", &folder.write("clean.csv", &clean), "--suggest"]).stdout).unwrap();
+    for more in [&[][..], &["--map", &map]] {
+        let [held, empty] = logs.each_ref().map(|(name, text)| {
+            let log = folder.write(name, text);
+            said(&wetclutch(&[&["estimate", &log, "--vehicle", VEHICLE], more].concat()))
+        });
+        let said = if more.is_empty() { "readings of turbine_speed are those of a row before, held" } else { " held" };
+        assert!(held[1].contains(said), "{}", held[1]);
+        // In the first tenths of a second it is not yet known.
+        let moving = |text: &str| -> Vec<String> {
+            let late = |line: &&str| line.split(',').next().unwrap().parse().is_ok_and(|time: f64| time > 5.0);
+            text.lines().filter(late).map(str::to_owned).collect()
+        };
+        let pressures = |text: &str| -> Vec<f64> {
+            moving(text).iter().map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect()
+        };
+        assert_eq!(moving(&held[0]).len(), moving(&empty[0]).len());
+        let off = pressures(&held[0]).iter().zip(pressures(&empty[0])).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 500.0, "{off} Pa");
+    }
+}
+
 /// The drive with one column changed.
 fn changed(drive: &str, column: &str, change: impl Fn(f64) -> f64) -> String {
     let names = drive.lines().next().unwrap();

@@ -9,6 +9,9 @@ const LONGEST_S: f64 = 0.05;
 /// Rate of an acceleration that a powertrain can have over the time of two readings, rad/s^3 \[chosen\]: a clutch that grips,
 /// and the swing of the shafts.
 const JERK_RAD_S3: f64 = 10_000.0;
+/// By how much a speed may bend away from the line through the oldest readings where it is carried on before them, rad/s \[chosen\]:
+/// less than the threshold of a slip.
+const BENT_RAD_S: f64 = 0.3;
 /// Deviations of a reading from the line through the two before it beyond which it is no speed of this shaft.
 const DEVIATIONS: f64 = 5.0;
 
@@ -101,6 +104,22 @@ impl<T: Real> Newest<T> {
         late.0
     }
 
+    /// The speed a time ago as [`at`](Self::at); none where it is too far before the oldest reading.
+    pub(super) fn reached(&self, age_s: T) -> Option<T> {
+        let [near, far] = self.before;
+        let (oldest, next) = match (near, far) {
+            (Some(near), Some(far)) if far.1 - near.1 <= T::of(LONGEST_S) => (far, near),
+            (Some(near), _) if near.1 - self.age_s <= T::of(LONGEST_S) => (near, (self.value, self.age_s)),
+            _ => return (age_s <= self.age_s).then_some(self.value),
+        };
+        let (beyond_s, span_s) = (age_s - oldest.1, oldest.1 - next.1);
+        if beyond_s <= T::zero() {
+            return Some(self.at(age_s));
+        }
+        let bent = T::of(0.5 * JERK_RAD_S3) * beyond_s * (beyond_s + span_s);
+        (bent <= T::of(BENT_RAD_S)).then(|| oldest.0 + (oldest.0 - next.0) / span_s * beyond_s)
+    }
+
     /// Rate between the two newest readings, rad/s^2, and the time between them, s; none where they are far apart.
     pub(super) fn rate(&self) -> Option<(T, T)> {
         let (early, early_s) = self.before[0]?;
@@ -149,6 +168,21 @@ mod tests {
         assert!((newest.at(0.009) - 101.0).abs() < 1e-9);
         assert!((newest.at(0.0) - 102.8).abs() < 1e-9);
         assert_eq!(newest.at(0.02), 100.0);
+    }
+
+    #[test]
+    fn before_the_oldest_reading_the_line_reaches_as_far_as_it_is_sure() {
+        let mut newest = None;
+        for value in [100.0, 101.0, 103.0] {
+            newest.iter_mut().for_each(|newest: &mut Newest<f64>| newest.pass(0.01));
+            assert!(Newest::take(&mut newest, value, [0.004, 0.0], 0.1));
+        }
+        let newest = newest.unwrap();
+        // Ages 4, 14 and 24 ms. An acceleration that changes by 10,000 rad/s^3 bends by 0.28 rad/s over 4 ms behind 10 ms.
+        assert_eq!(newest.reached(0.014), Some(101.0));
+        assert!((newest.reached(0.028).unwrap() - 99.6).abs() < 1e-9);
+        assert_eq!(newest.reached(0.029), None);
+        assert_eq!(newest.at(0.035), 100.0);
     }
 
     #[test]

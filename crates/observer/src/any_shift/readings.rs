@@ -155,18 +155,21 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
     }
 
-    /// Speeds of turbine and output at one time, that of the older reading; where there are none the estimates.
+    /// Speeds of turbine and output at one time, that of the older reading. Where the readings of one do not reach back to the last one
+    /// of the other, both are the estimates: two speeds of different times show a slip wherever the car accelerates.
     pub(super) fn measured(&self, newest: &[Option<Newest<T>>; SPEEDS], running: Option<&Running<T>>) -> [T; 2] {
         let fresh = |k: usize| newest[k].as_ref().filter(|newest| newest.age_s <= T::of(FIRST_S));
         let (turbine, output) = (fresh(TURBINE), fresh(OUTPUT));
         let age_s = |newest: Option<&Newest<T>>| newest.map_or(T::zero(), |newest| newest.age_s);
         let older_s = age_s(turbine).at_least(age_s(output));
-        let speed = |newest: Option<&Newest<T>>, k: usize| match (newest, running) {
-            (Some(newest), _) => newest.at(older_s),
-            (None, Some(running)) => running.x.mean[k],
-            (None, None) => T::zero(),
-        };
-        [speed(turbine, TURBINE), speed(output, OUTPUT)]
+        if let Some(running) = running {
+            let reached = |newest: Option<&Newest<T>>| newest.and_then(|newest| newest.reached(older_s));
+            return match (reached(turbine), reached(output)) {
+                (Some(turbine), Some(output)) => [turbine, output],
+                _ => [TURBINE, OUTPUT].map(|k| running.x.mean[k]),
+            };
+        }
+        [turbine, output].map(|newest| newest.map_or(T::zero(), |newest| newest.at(older_s)))
     }
 
     /// Whether turbine and output have been read of late.
