@@ -147,12 +147,13 @@ mod tests {
             |text: &str| read_learnt(&gearbox, &Source::built_in("learnt.toml", text)).unwrap_err().to_string();
         let other = refused(&text.replace("\"E\"", "\"F\""));
         assert!(other.starts_with("learnt.toml:4: `gearbox`: was learnt of the gearbox"), "{other}");
-        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains("has 36 numbers, expected 35"));
-        // Of a version before the scale of the wheel speed was learnt.
-        let (end, of_wheel) = (text.find("]\ncovariance").unwrap(), ", ");
-        let earlier = format!("{}{}", &text[..text[..end].rfind(of_wheel).unwrap()], &text[end..]);
+        let numbers = |count: usize| format!("has {count} numbers, expected {LEARNT}");
+        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains(&numbers(LEARNT + 1)));
+        // Of a version in which one quantity less was learnt.
+        let end = text.find("]\ncovariance").unwrap();
+        let earlier = format!("{}{}", &text[..text[..end].rfind(", ").unwrap()], &text[end..]);
         let earlier = refused(&earlier);
-        assert!(earlier.contains("has 34 numbers, expected 35") && earlier.contains("another version"), "{earlier}");
+        assert!(earlier.contains(&numbers(LEARNT - 1)) && earlier.contains("another version"), "{earlier}");
         assert!(refused(&text.replace("7e-1", "-7e-1")).contains("no covariance"));
         assert!(refused(&text.replace("7e-1", "nan")).contains("no covariance"));
         assert!(refused(&text.replace("81.5", "815")).contains("bounds"));

@@ -6,9 +6,9 @@
 //! | `k` | element | its kiss point |
 //! | `m` | pair of gears | turbine-side inertia `M11` |
 //! | `c` | car | torque at the gearbox input: the converter's capacity |
-//!
 //! | `e` | car | stiffness of the drive shafts: it is in what is seen, and the filter has no state of it |
 //! | `s` | car | scale of the wheel speed |
+//! | `q` | car | torque that the engine's controller reports, beside an open converter |
 //!
 //! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the six of
 //! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`Shown`])
@@ -31,6 +31,9 @@
 //! **Wheel speed.** Its scale shows in a gear, because the twist of the drive shafts is bounded. It acts in no shift's measurements:
 //! the filter goes on with its own state of it from gear to gear, and what is kept here is where another run begins.
 //!
+//! **Reported torque.** It acts in no shift either. In a gear it shows the sum of its error and that of the converter
+//! ([`super::reported`]).
+//!
 //! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
 //! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.
 
@@ -42,14 +45,16 @@ use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
-/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed.
+/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed,
+/// reported engine torque.
 const KISS_AT: usize = MAX_ELEMENTS;
 const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
 const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
 const STIFFNESS_AT: usize = TURBINE_AT + 1;
 const WHEEL_AT: usize = STIFFNESS_AT + 1;
+const REPORTED_AT: usize = WHEEL_AT + 1;
 /// How many quantities are learnt.
-pub const LEARNT: usize = WHEEL_AT + 1;
+pub const LEARNT: usize = REPORTED_AT + 1;
 /// How many of them act in a shift.
 pub(super) const ACTING: usize = 6;
 
@@ -81,7 +86,7 @@ const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the
-/// oil; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
+/// oil, and with the engine its reported torque; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
 /// common, and fade together: else their correlation could not last.
 const WITH_OIL_S: f64 = 7200.0;
 const INERTIA_S: f64 = 3.6e6;
@@ -96,7 +101,7 @@ const OIL_DEGC: [f64; 2] = [-60.0, 220.0];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt<T> {
     /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
-    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed.
+    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed, reported engine torque.
     pub mean: [T; LEARNT],
     /// Their covariance, in the same units.
     pub covariance: [[T; LEARNT]; LEARNT],
@@ -228,6 +233,34 @@ impl<T: Real> Learnt<T> {
         }
     }
 
+    /// Takes a measurement of the sum of two errors, as a share: of the converter's capacity and of the reported engine torque, whose deviations
+    /// unlearnt are these. Where it is further from what is known than both may be, at their bounds and with three deviations of the noise,
+    /// one of them is not that of this car, and nothing follows.
+    pub(super) fn take_capacity(&mut self, share: T, [capacity, reported]: [T; 2], noise: T) {
+        let bound = T::of(EDGE) * (capacity + reported) + T::of(3.0) * noise.sqrt();
+        let with = self.covariance.map(|row| capacity * row[TURBINE_AT] + reported * row[REPORTED_AT]);
+        let variance = capacity * with[TURBINE_AT] + reported * with[REPORTED_AT] + noise;
+        let expected = capacity * self.mean[TURBINE_AT] + reported * self.mean[REPORTED_AT];
+        if !(share.abs() <= bound && variance > T::zero()) {
+            return;
+        }
+        let per = variance.sqrt().recip();
+        let with = with.map(|covariance| per * covariance);
+        let innovation = per * (share - expected);
+        for (k, (mean, with)) in self.mean.iter_mut().zip(&with).enumerate() {
+            let edge = T::of(edge(k));
+            *mean = (*mean + *with * innovation).max(-edge).min(edge);
+        }
+        for (row, of_row) in self.covariance.iter_mut().zip(&with) {
+            for (p, other) in row.iter_mut().zip(&with) {
+                *p = *p - *of_row * *other;
+            }
+        }
+        for k in [TURBINE_AT, REPORTED_AT] {
+            self.covariance[k][k] = (self.covariance[k][k] + T::of(PER_SHIFT)).min(T::one());
+        }
+    }
+
     /// What the acting quantities are before a shift, by what is learnt alone.
     fn of_car(&self, acting: &Acting<T>) -> Known<T> {
         let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
@@ -353,7 +386,7 @@ impl<T: Real> Learnt<T> {
     pub(super) fn pass(&mut self, dt_s: T, correlations: &Correlations<T>) {
         let one = T::one();
         let [oil, inertia] = [WITH_OIL_S, INERTIA_S].map(|s| (-dt_s / T::of(s)).exp());
-        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || k >= STIFFNESS_AT;
+        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || (STIFFNESS_AT..REPORTED_AT).contains(&k);
         let stay = |k: usize| if lasts(k) { inertia } else { oil };
         for i in 0..LEARNT {
             self.mean[i] = stay(i) * self.mean[i];

@@ -1,9 +1,9 @@
 //! Begin and end of a shift, and what is kept from shift to shift.
 
 use super::{
-    ACTING, Acting, AnyShiftFilter, Correlations, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS, Known, LASTING,
-    Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE, SLOW_SHARE, ShiftPhase,
-    ShiftRow, ShiftUncertainty, Slip,
+    ACTING, Acting, AnyShiftFilter, Compared, Correlations, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS, Known,
+    LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE, SLOW_SHARE,
+    ShiftPhase, ShiftRow, ShiftUncertainty, Slip,
 };
 use drivetrain::Real;
 
@@ -188,6 +188,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         self.take_turbine(running, learnt);
         running.renew_shift();
+        running.compared = Compared::nothing();
         (running.gear, running.shift, running.torques) = (gear, None, None);
         running.phase = PhaseMemory::new(ShiftPhase::InGear);
     }
@@ -212,6 +213,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let from_gear = running.shift.is_none();
         if from_gear {
             self.learn_turbine(running, learnt);
+            self.learn_capacity(running, learnt);
+            self.take_turbine(running, learnt);
             if running.misfit <= T::of(MISFIT) {
                 self.keep_wheel_scale(running, learnt);
             }
@@ -238,7 +241,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         after.mean[TURBINE_ACTS] = running.x.mean[SLOW_SHARE];
         after.covariance[TURBINE_ACTS][TURBINE_ACTS] = running.x.covariance[SLOW_SHARE][SLOW_SHARE];
         learnt.take(&acting, &before, &after, &self.correlations());
-        self.take_turbine(running, learnt);
     }
 
     /// Another shift before the one under way has ended: a change of mind.

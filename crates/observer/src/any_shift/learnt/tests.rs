@@ -299,3 +299,38 @@ fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
         assert!((learnt.mean[place] / 0.8 - share).abs() < 3e-3, "{place}: {}", learnt.mean[place]);
     }
 }
+
+/// Two errors of which only the sum is seen: each gets its share of it, and the same sum again is no news.
+#[test]
+fn a_reported_torque_moves_the_capacity_by_its_share_of_the_variance_and_once() {
+    let (deviations, noise) = ([0.05, 0.035], 1e-8);
+    let part = 0.05_f64.powi(2) / (0.05_f64.powi(2) + 0.035_f64.powi(2));
+    let mut learnt = Learnt::nothing(&CORRELATIONS);
+    let capacity = |learnt: &Learnt<f64>| 0.05 * learnt.mean[TURBINE_AT];
+    learnt.take_capacity(0.04, deviations, noise);
+    let (once, left) = (capacity(&learnt), learnt.covariance[TURBINE_AT][TURBINE_AT]);
+    assert!((once - 0.04 * part).abs() < 1e-5 && (left - (1.0 - part)).abs() < 1e-3, "{once} {left}");
+    (0..100).for_each(|_| learnt.take_capacity(0.04, deviations, noise));
+    assert!((capacity(&learnt) - once).abs() < 1e-3, "{}", capacity(&learnt));
+    assert!(learnt.covariance[TURBINE_AT][TURBINE_AT] > 0.9 * left && learnt.checked().is_some());
+    // Of neither of these cars, and no numbers.
+    let known = learnt;
+    for share in [0.2, -0.3, f64::NAN, f64::INFINITY] {
+        learnt.take_capacity(share, deviations, noise);
+    }
+    for (deviations, noise) in [([f64::NAN, 0.1], 0.1), ([0.05, 0.035], f64::NAN), ([0.0, 0.0], 0.0)] {
+        learnt.take_capacity(0.01, deviations, noise);
+    }
+    assert_eq!(learnt, known);
+}
+
+/// In single precision too, for as long as a car lives.
+#[test]
+fn a_hundred_thousand_comparisons_leave_a_covariance() {
+    let correlations = CORRELATIONS.map(|correlation| correlation as f32);
+    let (mut learnt, mut seed) = (Learnt::<f32>::nothing(&correlations), 7);
+    for _ in 0..100_000 {
+        learnt.take_capacity(0.1 * random(&mut seed) as f32, [0.05, 0.035], 1e-3);
+    }
+    assert!(learnt.checked().is_some(), "{learnt:?}");
+}
