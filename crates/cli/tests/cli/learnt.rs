@@ -166,6 +166,13 @@ fn a_friction_above_the_file_is_said_in_words() {
         assert!(kiss_kpa.abs() < 3.0 * deviation, "{element}: {text}");
     }
     assert!(text.contains("\nlearnt scale of the wheel speed: it reads "), "{text}");
+    // The converter is that of the file, and the simulated engine reports its torque as it is.
+    for name in ["learnt torque at the gearbox input: ", "learnt reported engine torque: "] {
+        let number = |text: &str| text.split(' ').next().unwrap().trim_start_matches("+-").parse::<f64>().unwrap();
+        let said = text.split_once(name).unwrap().1;
+        let deviation = number(said.split_once(' ').unwrap().1);
+        assert!(number(said).abs() < 3.0 * deviation && deviation < 5.0, "{name}: {text}");
+    }
 }
 
 /// The log with a column of the oil's temperature, degC.

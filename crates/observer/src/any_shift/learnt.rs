@@ -212,6 +212,11 @@ impl<T: Real> Learnt<T> {
         (pair < MAX_PAIRS).then_some([self.mean[place], self.covariance[place][place].sqrt()])
     }
 
+    /// Mean and deviation of the torque at the gearbox input, and of the reported engine torque.
+    pub(super) fn of_sources(&self) -> [[T; 2]; 2] {
+        [TURBINE_AT, REPORTED_AT].map(|at| [self.mean[at], self.covariance[at][at].sqrt()])
+    }
+
     /// Mean and variance of the scale of the wheel speed.
     pub(super) fn of_wheel(&self) -> [T; 2] {
         [self.mean[WHEEL_AT], self.covariance[WHEEL_AT][WHEEL_AT]]

@@ -14,7 +14,7 @@ const INERTIA_ACTS: usize = 4;
 
 impl<T: Real> ShiftUncertainty<T> {
     /// Deviation of the part of the turbine torque's error that lasts, from that of the whole, as shares.
-    pub(super) fn slow_share(&self, share: T) -> T {
+    pub fn slow_share(&self, share: T) -> T {
         (share * share - self.turbine_share * self.turbine_share).max(T::zero()).sqrt()
     }
 
@@ -110,6 +110,15 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub fn learnt_inertia(&self, learnt: &Learnt<T>, from: usize, to: usize) -> Option<[T; 2]> {
         let of = learnt.of_pair(self.tables.pair(from, to)?)?;
         Some(of.map(|value| self.uncertainty.inertia_share * value))
+    }
+
+    /// What is learnt of the torque at the gearbox input, as a share of that by the converter's maps (without a converter, of the reported one);
+    /// and of the reported engine torque beside a converter, as a share of the true one: error and deviation.
+    pub fn learnt_sources(&self, learnt: &Learnt<T>) -> [[T; 2]; 2] {
+        let (of, turbine) = (learnt.of_sources(), &self.turbine);
+        let first = if turbine.converter.is_some() { turbine.converter_share } else { turbine.engine_share };
+        let shares = [first, turbine.engine_share].map(|share| self.uncertainty.slow_share(share));
+        [of[0].map(|x| shares[0] * x), of[1].map(|x| shares[1] * x)]
     }
 
     /// What is learnt of the scale of the wheel speed: its error as a share, and the deviation.
