@@ -14,6 +14,9 @@ use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
 /// pressure are thousands of this.
 const RESTS_PA: f64 = 1.0;
 
+/// Least factor on the lag of a valve \[chosen\]: the bounds of the standard budget end at half the lag.
+const LAG_LEAST: f64 = 0.1;
+
 /// What is known of the errors of an element's pressure and kiss point, in their deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PressureError<T> {
@@ -84,6 +87,20 @@ impl<T: Real> Pressing<T> {
     }
 }
 
+/// What is learnt of lag and delay of a valve, in deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ValveTiming<T> {
+    pub(super) mean: [T; 2],
+    /// Of all errors of both, also of those that are others in each shift.
+    pub(super) variance: [T; 2],
+}
+
+impl<T: Real> ValveTiming<T> {
+    pub(super) fn unlearnt() -> Self {
+        Self { mean: [T::zero(); 2], variance: [T::one(); 2] }
+    }
+}
+
 /// The newest command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct NewestCommand<T> {
@@ -106,6 +123,11 @@ pub(super) struct ElementState<T> {
     rate_pa_s: T,
     /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
     per_lag_pa: T,
+    /// What is learnt of lag and delay.
+    timing: ValveTiming<T>,
+    /// Factor on the lag, and delay, s, with it.
+    lag: T,
+    delay_s: T,
     newest: Option<NewestCommand<T>>,
     /// Where the piston has a stroke, once a command has come.
     pistons: Option<Pistons<T>>,
@@ -119,10 +141,31 @@ impl<T: Real> ElementState<T> {
             valve_pa: T::zero(),
             rate_pa_s: T::zero(),
             per_lag_pa: T::zero(),
+            timing: ValveTiming::unlearnt(),
+            lag: T::one(),
+            delay_s: element.valve.delay_s,
             newest: None,
             pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
         }
+    }
+
+    /// Goes on with what is learnt of lag and delay. A lag has a length, and no command arrives before it was sent.
+    pub(super) fn take_timing(
+        &mut self,
+        element: &FrictionElement<T>,
+        u: &ShiftUncertainty<T>,
+        timing: &ValveTiming<T>,
+    ) {
+        let [lag, delay] = timing.mean;
+        self.timing = *timing;
+        self.lag = (T::one() + u.valve_lag_share * lag).at_least(T::of(LAG_LEAST));
+        self.delay_s = (element.valve.delay_s + u.valve_delay_s * delay).at_least(T::zero());
+    }
+
+    /// The errors of lag and delay that the valve model has taken off, in deviations.
+    pub(super) fn taken_off(&self) -> [T; 2] {
+        self.timing.mean
     }
 
     /// Lets time pass, and takes a command if there is one.
@@ -166,7 +209,7 @@ impl<T: Real> ElementState<T> {
         if let Some(newest) = &mut self.newest {
             let end_pa = limits.possible_pressure(newest.settled_pa);
             let near = (self.valve_pa - end_pa).abs().at_least(self.per_lag_pa.abs()) <= T::of(RESTS_PA);
-            if near && newest.alike_s - dt_s >= element.valve.delay_s {
+            if near && newest.alike_s - dt_s >= self.delay_s {
                 (self.valve_pa, self.rate_pa_s, self.per_lag_pa) = (end_pa, T::zero(), T::zero());
                 newest.rests_s = Some(T::zero());
             }
@@ -178,8 +221,9 @@ impl<T: Real> ElementState<T> {
         let (pieces, piece_s) = pieces(dt_s);
         for _ in 0..pieces {
             self.commands.pass(piece_s);
-            let settled_pa = element.valve.target_pa(&self.commands, piece_s);
-            let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
+            let settled_pa = element.valve.target_after_pa(&self.commands, self.delay_s, piece_s);
+            // A lag that is longer by a factor is a time that passes slower by it.
+            let step = element.valve.step(settled_pa, self.valve_pa, piece_s / self.lag);
             let before_pa = self.valve_pa;
             self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
             self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
@@ -200,7 +244,7 @@ impl<T: Real> ElementState<T> {
     /// Takes a usable command.
     #[inline]
     fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
-        let needed_s = element.valve.needed_s(T::of(PIECE_S));
+        let needed_s = self.delay_s.at_least(element.valve.delay_s) + T::of(PIECE_S);
         if let Some(newest) = &mut self.newest {
             // Commands arrive in their order.
             newest.age_s = newest.age_s.at_most(reading.age_s);
@@ -254,8 +298,14 @@ impl<T: Real> ElementState<T> {
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
     fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
-        let moving = square(u.valve_lag_share * self.per_lag_pa) + square(u.valve_delay_s * self.rate_pa_s);
-        (moving + square(u.pressure_pa)).sqrt()
+        let [lag, delay] = self.timing.variance;
+        let [by_lag_pa, by_delay_pa] = self.by_timing_pa(u);
+        (lag * square(by_lag_pa) + delay * square(by_delay_pa) + square(u.pressure_pa)).sqrt()
+    }
+
+    /// Change of the pressure by a lag and a delay that are longer by one deviation, Pa.
+    fn by_timing_pa(&self, u: &ShiftUncertainty<T>) -> [T; 2] {
+        [-u.valve_lag_share * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
     }
 
     /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the
@@ -289,12 +339,15 @@ impl<T: Real> ElementState<T> {
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
         let pressing = self.pressing(clutch, u, wrong);
         let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa, by_fill_pa, per_fill_pa } = pressing;
+        let per_pressure_pa = slope * moving_pa + per_fill_pa;
+        let per_timing = if per_pressure_pa > T::zero() { slope / per_pressure_pa } else { T::zero() };
         ClutchTorque {
             ratio: shift.ratio,
             base_n_m: per_pa * (pressed_pa - slope * error_pa - by_fill_pa),
             per_friction_n_m: u.torque_share * per_pa * pressed_pa,
             per_kiss_n_m: -per_pa * slope * kiss_pa,
-            per_pressure_n_m: per_pa * slope * moving_pa + per_pa * per_fill_pa,
+            per_pressure_n_m: per_pa * per_pressure_pa,
+            by_timing: self.by_timing_pa(u).map(|by_pa| per_timing * by_pa),
             open_loop_n_m: shift.alpha.abs() * direction.signum() * clutch.torque_capacity(self.pressure_pa(), slip),
         }
     }

@@ -4,7 +4,7 @@ use super::*;
 
 const CORRELATIONS: Correlations<f64> = [-0.3; MAX_ELEMENTS];
 const PART: f64 = 0.75;
-const STIFFNESS: [f64; ACTING] = [0.9, 0.9, 0.0, 0.0, 1.0, 2.3];
+const STIFFNESS: [f64; ACTING] = [0.9, 0.9, 0.0, 0.0, 1.0, 2.3, 0.0, 0.0, 0.0, 0.0];
 
 fn shift() -> Acting<f64> {
     Acting::new([1, 4], Some(2), PART, STIFFNESS)
@@ -43,7 +43,7 @@ fn what_a_shift_shows_reaches_all_quantities_as_in_one_filter() {
         let before = learnt.known(&acting, &CORRELATIONS);
         assert!(learnt.take(&acting, &before, &after(&before, &h, 0.5, 0.1), &CORRELATIONS));
     }
-    let (before, h) = (learnt.known(&acting, &CORRELATIONS), [0.9, -0.2, 0.4, 0.1, -0.7, 0.8]);
+    let (before, h) = (learnt.known(&acting, &CORRELATIONS), [0.9, -0.2, 0.4, 0.1, -0.7, 0.8, 0.3, -0.5, 0.2, 0.6]);
     let mut taken = learnt;
     assert!(taken.take(&acting, &before, &after(&before, &h, 0.8, 0.2), &CORRELATIONS));
     let mut row = [0.0; LEARNT];
@@ -82,12 +82,12 @@ fn a_shift_that_shows_nothing_teaches_nothing() {
 #[test]
 fn what_cannot_be_is_refused_and_often_refused_is_another_car() {
     let (acting, mut learnt) = (shift(), Learnt::nothing(&CORRELATIONS));
-    let h = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let h = core::array::from_fn(|a| f64::from(u8::from(a == 0)));
     let before = learnt.known(&acting, &CORRELATIONS);
     assert!(learnt.take(&acting, &before, &after(&before, &h, 1.0, 0.01), &CORRELATIONS));
     learnt.count(true, &CORRELATIONS);
     let known = learnt;
-    for value in [9.0, -9.0, f64::NAN, f64::INFINITY] {
+    for value in [12.0, -12.0, f64::NAN, f64::INFINITY] {
         let before = learnt.known(&acting, &CORRELATIONS);
         assert!(!learnt.take(&acting, &before, &after(&before, &h, value, 0.01), &CORRELATIONS), "{value}");
         let mut odd = before;
