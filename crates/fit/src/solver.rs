@@ -10,7 +10,7 @@ use crate::car::Car;
 use crate::drives::{DriveNormal, Drives};
 use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
 use crate::parameters::{Prior, Shaft};
-use crate::shift_model::{Block, Linearised, ShiftModel};
+use crate::shift_model::{Block, Changed, Linearised, ShiftModel};
 use crate::weights::{HUBER, Weights};
 
 /// What does not change during a fit.
@@ -118,10 +118,9 @@ impl Problem<'_> {
     }
 
     pub(crate) fn linearised(&self, shifts: &[ShiftModel], at: &Unknowns) -> Vec<Linearised> {
-        let linearised = |(shift, own): (&ShiftModel, &Vec<f64>)| {
-            shift.linearised(self.file, self.shafts, self.priors, &at.shared, own)
-        };
-        shifts.iter().zip(&at.own).map(linearised).collect()
+        let car = self.file.with(self.shafts, self.priors, &at.shared);
+        let changed = Changed::all(self.file, self.shafts, self.priors, &at.shared);
+        shifts.iter().zip(&at.own).map(|(shift, own)| shift.linearised(&car, &changed, own)).collect()
     }
 
     /// The normal equations.
