@@ -231,6 +231,7 @@ struct Field<'a, const N: usize> {
     damping_n_m_s_rad: Lanes<N>,
     wheel_inertia_kg_m2: Lanes<N>,
     per_radius: Lanes<N>,
+    rolling_n_m: Lanes<N>,
     drag_kg_m: Lanes<N>,
     load_n: Lanes<N>,
     mass_kg: Lanes<N>,
@@ -291,6 +292,7 @@ impl<'a, const N: usize> Field<'a, N> {
             damping_n_m_s_rad: of(&|run| run.car.driveline.shaft_damping_n_m_s_rad),
             wheel_inertia_kg_m2: of(&|run| run.car.driveline.wheel_inertia_kg_m2),
             per_radius: of(&|run| run.car.road.wheel_radius_m.recip()),
+            rolling_n_m: of(&|run| run.car.road.rolling_moment_n_m),
             drag_kg_m: of(&|run| run.car.road.drag_factor()),
             load_n: of(&|run| run.of.load_n + run.car.road.grade_force() * (1.0 + run.of.mass_share)),
             mass_kg: of(&mass_kg),
@@ -363,6 +365,17 @@ impl<'a, const N: usize> Field<'a, N> {
         direction * car.offgoing.torque_capacity(*pressure_pa, slip.at_least(0.0))
     }
 
+    /// Rolling moment of each car at the speeds of its wheels.
+    #[inline]
+    fn rolling(&self, wheel_rad_s: &Lanes<N>) -> Lanes<N> {
+        /// Where it does not depend on the speed any more, for sure.
+        const MOVING_RAD_S: f64 = 20.0;
+        if wheel_rad_s.iter().all(|speed| *speed > MOVING_RAD_S) {
+            return self.rolling_n_m;
+        }
+        each(|i| self.runs[i].car.road.rolling_moment(wheel_rad_s[i]))
+    }
+
     /// Shafts, wheels and car at a state.
     ///
     /// The damping of the shafts needs the speed of the wheels, and the slip of the tyres the torque of the shafts. Each pass leaves about
@@ -371,7 +384,7 @@ impl<'a, const N: usize> Field<'a, N> {
     fn wheels(&self, states: &States<N>) -> Wheels<N> {
         let vehicle_m_s = &states.vehicle_m_s;
         let free_rad_s: Lanes<N> = each(|i| vehicle_m_s[i] * self.per_radius[i]);
-        let rolling_n_m: Lanes<N> = each(|i| self.runs[i].car.road.rolling_moment(free_rad_s[i]));
+        let rolling_n_m = self.rolling(&free_rad_s);
         let against_n: Lanes<N> =
             each(|i| self.drag_kg_m[i] * vehicle_m_s[i] * vehicle_m_s[i].abs() + self.load_n[i]);
         let spring_n_m: Lanes<N> = each(|i| self.stiffness_n_m_rad[i] * states.twist_rad[i]);
@@ -405,21 +418,33 @@ struct Wheels<const N: usize> {
     vehicle_m_s2: Lanes<N>,
 }
 
-/// `atanh`, by its series where that is exact to 1e-6: most of the time of a fit would be spent here. At the tyre's limit it
+/// `atanh`, by a fraction where that is exact to 1e-6: much of the time of a fit would be spent here. At the tyre's limit it
 /// ends at a finite slip.
 #[inline]
 fn inverse_tanh<const N: usize>(x: Lanes<N>) -> Lanes<N> {
+    /// Square of the argument up to which it is used.
+    const FRACTION_TO: f64 = 0.4;
     let squares: Lanes<N> = each(|i| x[i] * x[i]);
+    // The seventh fraction of Lambert's continued fraction x/(1 - x^2/(3 - 4 x^2/(5 - 9 x^2/(7 - ...)))).
     let mut result: Lanes<N> = each(|i| {
         let xx = squares[i];
-        x[i] * (1.0 + xx * (1.0 / 3.0 + xx * (0.2 + xx / 7.0)))
+        let above = 1.0 - xx * (50.0 / 39.0 - xx * (283.0 / 715.0 - xx * (256.0 / 15015.0)));
+        let below = 1.0 - xx * (21.0 / 13.0 - xx * (105.0 / 143.0 - xx * (35.0 / 429.0)));
+        x[i] * above / below
     });
-    for i in 0..N {
-        if squares[i] >= 0.06 {
-            result[i] = x[i].clamp(-0.999, 0.999).atanh();
+    if !squares.iter().all(|xx| *xx <= FRACTION_TO) {
+        for i in (0..N).filter(|i| squares[*i] > FRACTION_TO) {
+            result[i] = at_tyre_limit(x[i]);
         }
     }
     result
+}
+
+/// Not a part of the loops over the motions, which the compiler can then do for all of them at once.
+#[cold]
+#[inline(never)]
+fn at_tyre_limit(x: f64) -> f64 {
+    x.clamp(-0.999, 0.999).atanh()
 }
 
 #[cfg(test)]
