@@ -277,9 +277,8 @@ impl<'a, const N: usize> Field<'a, N> {
     fn new(kind: SegmentKind, runs: [&'a Run<'a>; N]) -> Self {
         let of = |number: &dyn Fn(&Run<'_>) -> f64| runs.map(number);
         let mass_kg = |run: &Run<'_>| run.car.road.mass_kg * (1.0 + run.of.mass_share);
-        let moved_kg = |run: &Run<'_>| {
-            mass_kg(run) + run.car.driveline.wheel_inertia_kg_m2 / run.car.road.wheel_radius_m.powi(2)
-        };
+        let moved_kg =
+            |run: &Run<'_>| mass_kg(run) + run.car.driveline.wheel_inertia_kg_m2 / run.car.road.wheel_radius_m.powi(2);
         let slip_per_n_m = |run: &Run<'_>| {
             0.5 * run.car.tyre.slip_scale / (run.car.road.wheel_radius_m.powi(2) * run.car.tyre.max_force_n)
         };
@@ -385,15 +384,13 @@ impl<'a, const N: usize> Field<'a, N> {
         let vehicle_m_s = &states.vehicle_m_s;
         let free_rad_s: Lanes<N> = each(|i| vehicle_m_s[i] * self.per_radius[i]);
         let rolling_n_m = self.rolling(&free_rad_s);
-        let against_n: Lanes<N> =
-            each(|i| self.drag_kg_m[i] * vehicle_m_s[i] * vehicle_m_s[i].abs() + self.load_n[i]);
+        let against_n: Lanes<N> = each(|i| self.drag_kg_m[i] * vehicle_m_s[i] * vehicle_m_s[i].abs() + self.load_n[i]);
         let spring_n_m: Lanes<N> = each(|i| self.stiffness_n_m_rad[i] * states.twist_rad[i]);
         let per_n_m: Lanes<N> = each(|i| self.slip_per_n_m[i] * vehicle_m_s[i]);
         let mut wheel_rad_s: Lanes<N> = each(|i| free_rad_s[i] + per_n_m[i] * (spring_n_m[i] - rolling_n_m[i]));
         let (mut shaft_n_m, mut vehicle_m_s2) = (spring_n_m, [0.0; N]);
         for _ in 0..2 {
-            let rate_rad_s: Lanes<N> =
-                each(|i| states.output_rad_s[i] * self.per_final_ratio[i] - wheel_rad_s[i]);
+            let rate_rad_s: Lanes<N> = each(|i| states.output_rad_s[i] * self.per_final_ratio[i] - wheel_rad_s[i]);
             shaft_n_m = each(|i| spring_n_m[i] + self.damping_n_m_s_rad[i] * rate_rad_s[i]);
             vehicle_m_s2 = each(|i| {
                 let slip_rad_s2 = per_n_m[i] * self.stiffness_n_m_rad[i] * rate_rad_s[i];

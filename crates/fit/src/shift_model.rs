@@ -88,6 +88,8 @@ pub(crate) struct ShiftModel {
     pub(crate) rows: usize,
     pub(crate) own: Vec<OwnUnknown>,
     has_engine_torque: bool,
+    /// Readings of the engine speed at the half steps.
+    engine_rad_s: Vec<f64>,
     offgoing_pa: Vec<f64>,
     directions: [f64; 2],
 }
@@ -136,6 +138,7 @@ impl ShiftModel {
             rows: 0,
             own: Vec::new(),
             has_engine_torque,
+            engine_rad_s: (0..points).map(|i| record.engine.at(half_steps.time_s(i))).collect(),
             offgoing_pa,
             directions: directions(&record, car),
             record,
@@ -241,13 +244,8 @@ impl ShiftModel {
 
     fn engine(&self, car: &Car) -> Vec<f64> {
         let late = |speed: f64| car.engine_delay_s + age_s(car.ages.engine_rad, speed);
-        (0..self.half_steps.points)
-            .map(|i| {
-                let time_s = self.half_steps.time_s(i);
-                let near = self.record.engine.at(time_s);
-                self.record.engine.at(time_s + late(near))
-            })
-            .collect()
+        let times = (0..self.half_steps.points).map(|i| self.half_steps.time_s(i));
+        times.zip(&self.engine_rad_s).map(|(time_s, near)| self.record.engine.at(time_s + late(*near))).collect()
     }
 
     fn engine_torque(&self, car: &Car) -> Vec<f64> {
@@ -393,27 +391,36 @@ impl ShiftModel {
         changed
     }
 
-    /// Residuals, and how they change per unit of what is moved. All motions of a segment run side by side.
+    /// Residuals, and how they change per unit of what is moved.
     fn differences(&self, base: &Moved<'_>, moved: &[Moved<'_>]) -> (DVector<f64>, DMatrix<f64>) {
+        let motions: Vec<Vec<Motion>> = (0..self.parts.len()).map(|i| self.motions_of(i, base, moved)).collect();
         let mut residuals = DVector::zeros(self.rows);
-        let mut columns = DMatrix::zeros(self.rows, moved.len());
-        for (i, segment) in self.record.segments.iter().enumerate() {
-            let acting = moved.iter().filter(|moved| moved.acts_in(i, segment.kind));
-            let runs: Vec<Run<'_>> = std::iter::once(base).chain(acting).map(|of| self.run(i, of)).collect();
-            let motions = Motion::run_all(segment.kind, self.parts[i], &runs);
+        for (i, motions) in motions.iter().enumerate() {
             self.segment(i, base.car, &motions[0], residuals.as_mut_slice());
-            let mut others = motions[1..].iter();
-            for (mut column, moved) in columns.column_iter_mut().zip(moved) {
-                let other = if moved.acts_in(i, segment.kind) { others.next() } else { None };
-                self.segment(i, moved.car, other.unwrap_or(&motions[0]), column.as_mut_slice());
-            }
         }
         self.pressure(base.car, base.inputs, residuals.as_mut_slice());
+        let mut others: Vec<_> = motions.iter().map(|motions| motions[1..].iter()).collect();
+        let mut columns = DMatrix::zeros(self.rows, moved.len());
         for (mut column, moved) in columns.column_iter_mut().zip(moved) {
+            column.copy_from(&residuals);
+            for (i, segment) in self.record.segments.iter().enumerate() {
+                let other = if moved.acts_in(i, segment.kind) { others[i].next() } else { None };
+                if other.is_some() || moved.leaves_motion() {
+                    self.segment(i, moved.car, other.unwrap_or(&motions[i][0]), column.as_mut_slice());
+                }
+            }
             self.pressure(moved.car, moved.inputs, column.as_mut_slice());
             column.iter_mut().zip(&residuals).for_each(|(row, base)| *row = (*row - base) / DIFFERENCE);
         }
         (residuals, columns)
+    }
+
+    /// The motion in a segment, and those of everything moved that acts in it.
+    fn motions_of(&self, i: usize, base: &Moved<'_>, moved: &[Moved<'_>]) -> Vec<Motion> {
+        let kind = self.record.segments[i].kind;
+        let acting = moved.iter().filter(|moved| moved.acts_in(i, kind));
+        let runs: Vec<Run<'_>> = std::iter::once(base).chain(acting).map(|of| self.run(i, of)).collect();
+        Motion::run_all(kind, self.parts[i], &runs)
     }
 }
 
@@ -463,6 +470,11 @@ impl Moved<'_> {
             By::Parameter(parameter) => !parameter.leaves_motion() && acts_in(parameter, kind),
             By::Own(of) => of.is_none_or(|of| of == segment),
         }
+    }
+
+    /// Whether it changes only how a motion is read.
+    fn leaves_motion(&self) -> bool {
+        matches!(self.by, By::Parameter(parameter) if parameter.leaves_motion())
     }
 }
 
