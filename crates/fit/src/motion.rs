@@ -102,7 +102,7 @@ impl<const N: usize> States<N> {
 }
 
 /// Speeds at the steps of a segment, each with its rate.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Motion {
     begin_s: f64,
     turbine: Vec<(f64, f64)>,
@@ -451,33 +451,77 @@ mod tests {
     use super::*;
     use crate::ReadingAges;
 
-    /// A torque that changes its sign with the slip would hold the slip near zero, step by step to and fro: such a motion is a rough function of
-    /// the parameters, and a fit gets stuck in it.
-    #[test]
-    fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
-        let car = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
-        let part = Part { begin_s: 0.0, first: 0, steps: 10 };
-        let points = 2 * part.steps + 1;
+    /// A car in a segment in which both clutches slip, with the pressure of the oncoming one and the speed of the car.
+    fn slipping(car: &Car, oncoming_pa: f64, output_rad_s: f64) -> (Inputs, Circumstances, State) {
+        let points = 2 * PART.steps + 1;
         let inputs = Inputs {
             engine_rad_s: vec![200.0; points],
-            oncoming_pa: vec![0.7e6; points],
+            oncoming_pa: vec![oncoming_pa; points],
             offgoing_pa: Vec::new(),
             engine_n_m: Vec::new(),
         };
-        let of = Circumstances { directions: [1.0, -1.0], ..Circumstances::default() };
-        let output_rad_s = 60.0;
         let start = State {
             turbine_rad_s: car.shift.ratio_oncoming() * output_rad_s + 20.0,
             output_rad_s,
             vehicle_m_s: output_rad_s / car.driveline.final_ratio * car.road.wheel_radius_m,
             ..State::default()
         };
-        let run = Run { car: &car, of, inputs: &inputs, start };
-        let motion = Motion::run(SegmentKind::Slipping, part, &run);
+        (inputs, Circumstances { directions: [1.0, -1.0], ..Circumstances::default() }, start)
+    }
+
+    const PART: Part = Part { begin_s: 0.0, first: 0, steps: 10 };
+
+    /// A torque that changes its sign with the slip would hold the slip near zero, step by step to and fro: such a motion is a rough function of
+    /// the parameters, and a fit gets stuck in it.
+    #[test]
+    fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
+        let car = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
+        let (inputs, of, start) = slipping(&car, 0.7e6, 60.0);
+        let motion = Motion::run(SegmentKind::Slipping, PART, &Run { car: &car, of, inputs: &inputs, start });
         let slips: Vec<f64> = (motion.turbine.iter().zip(&motion.output))
             .map(|(turbine, output)| car.shift.oncoming_slip(turbine.0, output.0))
             .collect();
         assert!(slips[0] > 0.0 && *slips.last().unwrap() < 0.0, "{slips:?}");
         assert!(slips.windows(2).all(|pair| pair[1] < pair[0]), "{slips:?}");
+    }
+
+    /// Other cars, pressures, loads, speeds and tyre forces: none may act on the motion beside it, not even in the last digit, which would be a
+    /// part of a derivative. One stands nearly, and one pulls at the limit of its tyres.
+    #[test]
+    fn motions_side_by_side_are_those_of_each_alone() {
+        let file = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
+        let mut weak_tyres = file.clone();
+        weak_tyres.tyre.max_force_n *= 0.05;
+        let cars = [&file, &file, &weak_tyres, &file, &file, &weak_tyres];
+        let [outputs, twists] = [[60.0, 70.0, 60.0, 1.0, 65.0, 66.0], [0.01, 0.02, 0.05, 0.0, 0.04, 0.06]];
+        let all: Vec<(Inputs, Circumstances, State)> = (0..cars.len())
+            .map(|i| {
+                let (inputs, of, start) = slipping(cars[i], 0.1e6 * (i + 1) as f64, outputs[i]);
+                (inputs, Circumstances { load_n: 100.0 * i as f64, ..of }, State { twist_rad: twists[i], ..start })
+            })
+            .collect();
+        for kind in [SegmentKind::Held, SegmentKind::Slipping, SegmentKind::Locked] {
+            let runs: Vec<Run<'_>> = (all.iter().zip(cars))
+                .map(|((inputs, of, start), car)| Run { car, of: *of, inputs, start: *start })
+                .collect();
+            let motions = Motion::run_all(kind, PART, &runs);
+            assert_eq!(motions.len(), runs.len());
+            for (motion, run) in motions.iter().zip(&runs) {
+                assert_eq!(*motion, Motion::run(kind, PART, run));
+            }
+            assert!(motions.windows(2).all(|pair| pair[0].turbine != pair[1].turbine));
+        }
+    }
+
+    /// Over the whole range, with the end of the fraction and the limit of the tyre.
+    #[test]
+    fn the_inverse_of_the_tangent_is_exact_to_a_millionth() {
+        for i in -998..=998 {
+            let x = 1e-3 * f64::from(i);
+            let [found, other] = inverse_tanh([x, 0.5]);
+            assert!((found - x.atanh()).abs() <= 1e-6 * x.abs().atanh(), "{x}: {found}");
+            assert_eq!([other], inverse_tanh([0.5]), "beside {x}");
+        }
+        assert_eq!(inverse_tanh([2.0, -2.0]), [0.999_f64.atanh(), (-0.999_f64).atanh()]);
     }
 }
