@@ -48,7 +48,7 @@ impl HeldSpeed {
     /// Whether the next value is the one before, held.
     pub fn is_held(&mut self, value: f64) -> bool {
         if value == self.value {
-            let again = self.rows % (self.held_rows + u32::from(self.one_more)).max(1) == 0;
+            let again = self.rows.is_multiple_of((self.held_rows + u32::from(self.one_more)).max(1));
             self.rows = self.rows.saturating_add(1);
             return self.seen >= ENOUGH && !again;
         }
