@@ -85,7 +85,7 @@ pub(crate) struct Estimate {
     /// Only the Nth shift of the log: its estimates, quality and figure
     #[arg(long, value_name = "N", conflicts_with = "shifts", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) shift: Option<u32>,
-    /// Only shifts between these gears, such as 1-2,2-3
+    /// Only shifts between these gears, called as in the table of shifts, such as 1-2,2-3
     #[arg(long, value_name = "FROM-TO,...", value_delimiter = ',')]
     pub(crate) shifts: Vec<GearPair>,
     /// Estimate a log while it is written, until Ctrl-C or the end of the pipe: CSV, candump or ASC, a file or `-`
@@ -141,23 +141,26 @@ impl FormatChoice {
     }
 }
 
-/// The gears of a shift.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The gears of a shift by their names.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct GearPair {
-    /// The gear before, from 1.
-    pub(crate) from: u32,
+    /// The gear before.
+    from: String,
     /// The gear after.
-    pub(crate) to: u32,
+    to: String,
 }
 
 impl FromStr for GearPair {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let gears = text.trim().split_once('-').and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
-        match gears {
-            Some((from, to)) if from != to && from > 0 && to > 0 => Ok(Self { from, to }),
-            _ => Err("expected two gears from 1, such as 1-2".to_owned()),
+        // A number is the gear with this number, also with zeros in front of it.
+        let name = |text: &str| text.parse().map_or_else(|_| text.to_owned(), |number: u32| number.to_string());
+        match text.trim().split_once('-').map(|(from, to)| [name(from), name(to)]) {
+            Some([from, to]) if from != to && [&from, &to].iter().all(|name| !["", "0"].contains(&name.as_str())) => {
+                Ok(Self { from, to })
+            }
+            _ => Err("expected two gears by their names, such as 1-2".to_owned()),
         }
     }
 }

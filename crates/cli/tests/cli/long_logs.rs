@@ -132,11 +132,13 @@ fn chosen_shifts_have_only_their_rows_and_a_choice_that_fits_none_is_refused() {
     let times: Vec<f64> = rows(&folder.read("two.csv")).iter().map(|row| row["time_s"].parse().unwrap()).collect();
     assert!(times.iter().all(|time_s| (18.0..22.0).contains(time_s)) && times.len() > 100, "{times:?}");
     assert_eq!(rows(&folder.read("two_shifts.csv"))[0]["number"], "2");
-    said(&estimate(&log, &["--shifts", "2-1,1-2", "-o", &folder.path("all.csv")]));
+    said(&estimate(&log, &["--shifts", "1-2", "-o", &folder.path("all.csv")]));
     assert_eq!(rows(&folder.read("all_shifts.csv")).len(), 3);
-    for (more, hint) in
-        [(["--shift", "4"], "it has 3, in this order: 1-2, 1-2, 1-2"), (["--shifts", "2-1"], "it has 3")]
-    {
+    for (more, hint) in [
+        (["--shift", "4"], "it has 3, in this order: 1-2, 1-2, 1-2"),
+        (["--shifts", "2-1"], "it has 3"),
+        (["--shifts", "2-1,1-2"], "it has 3"),
+    ] {
         let text = refused(&estimate(&log, &[&more[..], &["-o", &folder.path("none.csv")]].concat()));
         assert!(text.contains("the log has no such shift") && text.contains(hint), "{text}");
         assert!(!Path::new(&folder.path("none.csv")).exists());

@@ -22,7 +22,8 @@ pub(super) struct Selection {
     pub(super) seen: usize,
     /// Gears of the first ones.
     gears: Vec<String>,
-    is_found: bool,
+    /// Whether the wanted number was seen, or each of the wanted pairs.
+    found: Vec<bool>,
 }
 
 impl Selection {
@@ -32,7 +33,12 @@ impl Selection {
             None if options.shifts.is_empty() => Wanted::All,
             None => Wanted::Between(options.shifts.clone()),
         };
-        Self { wanted, seen: 0, gears: Vec::new(), is_found: false }
+        Self::new(wanted)
+    }
+
+    fn new(wanted: Wanted) -> Self {
+        let count = if let Wanted::Between(pairs) = &wanted { pairs.len() } else { 1 };
+        Self { wanted, seen: 0, gears: Vec::new(), found: vec![false; count] }
     }
 
     /// Whether only some shifts are wanted, and only their estimates.
@@ -47,7 +53,13 @@ impl Selection {
             self.gears.push(gears.to_owned());
         }
         let wants = self.wants(self.seen, gears);
-        self.is_found |= wants;
+        match &self.wanted {
+            Wanted::Between(pairs) => {
+                let fits = pairs.iter().map(|pair| pair.to_string() == gears);
+                self.found.iter_mut().zip(fits).for_each(|(found, fits)| *found |= fits);
+            }
+            _ => self.found.iter_mut().for_each(|found| *found |= wants),
+        }
         wants
     }
 
@@ -60,14 +72,15 @@ impl Selection {
         }
     }
 
-    /// Refuses a selection that no shift is in; `hint` says what tells a shift.
+    /// Refuses a selection of which a part fits no shift; `hint` says what tells a shift.
     pub(super) fn check(&self, hint: &str) -> Result<(), Failure> {
         let what = match &self.wanted {
             Wanted::All => return Ok(()),
-            _ if self.is_found => return Ok(()),
+            _ if self.found.iter().all(|found| *found) => return Ok(()),
             Wanted::Number(number) => format!("--shift {number}"),
             Wanted::Between(pairs) => {
-                let pairs: Vec<String> = pairs.iter().map(GearPair::to_string).collect();
+                let missing = pairs.iter().zip(&self.found).filter(|(_, found)| !**found);
+                let pairs: Vec<String> = missing.map(|(pair, _)| pair.to_string()).collect();
                 format!("--shifts {}", pairs.join(","))
             }
         };
@@ -79,5 +92,37 @@ impl Selection {
                 self.gears.join(", ")
             ),
         }))
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may")]
+mod tests {
+    use super::{Selection, Wanted};
+    use crate::failure::Failure;
+
+    fn chosen(pairs: &[&str], shifts: &[&str]) -> Result<(), String> {
+        let pairs = pairs.iter().map(|pair| pair.parse().unwrap()).collect();
+        let mut selection = Selection::new(Wanted::Between(pairs));
+        shifts.iter().for_each(|gears| _ = selection.begins(gears));
+        selection.check("").map_err(|failure| match failure {
+            Failure::Input(message) => message,
+            _ => String::new(),
+        })
+    }
+
+    #[test]
+    fn each_pair_of_gears_has_to_fit_a_shift() {
+        assert_eq!(chosen(&["2-3", "1-2"], &["1-2", "2-3", "1-2"]), Ok(()));
+        let missing = chosen(&["2-3", "3-1", "4-3"], &["1-2", "2-3"]).unwrap_err();
+        assert!(
+            missing.starts_with("--shifts 3-1,4-3: the log has no such shift\nhint: it has 2, in this order: 1-2, 2-3"),
+            "{missing}"
+        );
+    }
+
+    #[test]
+    fn gears_are_called_as_in_the_table_of_shifts() {
+        assert_eq!(chosen(&["1st-2nd", "02-3"], &["1st-2nd", "2-3"]), Ok(()));
     }
 }
