@@ -150,7 +150,7 @@ impl SpeedsPage<'_> {
         );
         let mut said: Vec<&str> = Vec::new();
         if !self.has_command {
-            said.push("No pressure: the log has no valve current, duty cycle or pressure command. With one of them and a vehicle file, `wetclutch estimate` gives it with its range.");
+            said.push("No pressure: the log has no valve current, duty cycle or pressure command. With one of them and a vehicle file, the command estimate gives it with its range.");
         }
         said.push("No torque of a clutch itself: ratios alone do not say which share of the turbine's torque a clutch holds. U is that torque as felt at the turbine; friction work does not need the share.");
         said.push(

@@ -197,8 +197,13 @@ fn unscored(shift: &ScoredShift, cell: impl Fn(&ScoredShift) -> Option<String>) 
 
 /// A mean with the means of the ends of its range, in another unit.
 fn ranged([mean, low, high]: &[f64; 3], unit: f64, decimals: usize) -> String {
-    let [mean, low, high] = [mean, low, high].map(|value| number(unit * value, decimals));
-    format!("{mean} ({low} to {high})")
+    let [mean, low, high] = [mean, low, high].map(|value| unit * value);
+    let text = number(mean, decimals);
+    // What a one-way clutch carries has no range.
+    if low.is_nan() && high.is_nan() {
+        return text;
+    }
+    format!("{text} ({} to {})", number(low, decimals), number(high, decimals))
 }
 
 fn health((worst, share): (Health, f64)) -> String {

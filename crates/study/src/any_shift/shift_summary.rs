@@ -133,7 +133,7 @@ fn friction_work_j(rows: &[ShiftScoreRow], clutch: usize) -> Option<[f64; 3]> {
 fn tie_up_n_m(rows: &[ShiftScoreRow]) -> f64 {
     let against = rows.iter().map(|row| {
         let [off, on] = row.clutches.map(|clutch| clutch.alpha * clutch.torque_n_m[1]);
-        if off * on < 0.0 { off.abs().min(on.abs()) } else { off * on * 0.0 }
+        if off * on < 0.0 { off.abs().min(on.abs()) } else { (off * on).abs() * 0.0 }
     });
     against.filter(|n_m| n_m.is_finite()).fold(f64::NAN, f64::max)
 }

@@ -96,7 +96,6 @@ impl Selection {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test may")]
 mod tests {
     use super::{Selection, Wanted};
     use crate::failure::Failure;
