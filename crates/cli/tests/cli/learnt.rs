@@ -122,7 +122,7 @@ fn a_file_that_was_not_learnt_of_this_car_is_refused_before_anything_is_written(
         message
     };
     assert!(refused_with(&text.replace("\"E\"", "\"F\"")).contains("was learnt of the gearbox"));
-    assert!(refused_with(&text.replace("mean = [", "mean = [9, ")).contains("has 36 numbers, expected 35"));
+    assert!(refused_with(&text.replace("mean = [", "mean = [9, ")).contains("has 52 numbers, expected 51"));
     assert!(refused_with(&text.replace("mean = [", "mean = [9")).contains("not within the bounds"));
     assert!(refused_with(&text[..text.len() / 2]).contains("hint: --learnt takes a file that"));
     assert!(refused_with("").contains("missing field `gearbox`"));

@@ -22,6 +22,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let Some(torques) = running.torques else { return health.map(unused) };
         let torques = torques.without(running.phase.phase.holding());
         let rates = Rates::new(&self.response(running), &torques, &self.driveline, self.wheels_kg_m2);
+        let by_timing = torques.by_timing();
+        running.x.timing.add_pressure(&by_timing);
         for k in 0..SPEEDS {
             let Some(reading) = given[k].filter(|_| health[k] == ChannelHealth::Good) else { continue };
             if unseen && k != WHEEL {
@@ -31,6 +33,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             }
             health[k] = self.correct(running, k, &reading, &rates);
         }
+        running.x.timing.add_pressure(&by_timing.map(|by| by.map(|by| -by)));
         running.rates = [TURBINE, OUTPUT, WHEEL].map(|k| rates.of(k, &running.x));
         if running.silent_s[TURBINE].max(running.silent_s[OUTPUT]) > T::of(GAP_S) {
             running.before = None;

@@ -4,6 +4,7 @@ use drivetrain::Real;
 
 use super::elements::PressureError;
 use super::powertrain::{CORE, dot};
+use super::timing::{TIMINGS, Timing};
 use super::{IN_GEAR, KISS, N, OUTPUT, PRESSURE, TURBINE};
 
 /// Mean and covariance.
@@ -13,6 +14,8 @@ pub(super) struct Gaussian<T> {
     pub(super) covariance: [[T; N]; N],
     /// How many states are not independent of all others; those behind them are left out.
     pub(super) active: usize,
+    /// What the readings of a shift have shown of lag and delay of its valves.
+    pub(super) timing: Timing<T>,
 }
 
 /// A scalar measurement, as a row over the states.
@@ -31,6 +34,8 @@ pub(super) struct Look<T> {
     pub(super) variance: T,
     /// Covariance of the states with it.
     with: [T; N],
+    /// By how much it is off per deviation of the timing.
+    by_timing: [T; TIMINGS],
 }
 
 impl<T: Real> Gaussian<T> {
@@ -40,7 +45,7 @@ impl<T: Real> Gaussian<T> {
         for (k, deviation) in deviations.into_iter().enumerate() {
             covariance[k][k] = deviation * deviation;
         }
-        Self { mean, covariance, active: N }
+        Self { mean, covariance, active: N, timing: Timing::nothing([[T::zero(); 2]; 2]) }
     }
 
     /// Whether only the states of a gear are active. Loops over a number of states that the compiler knows are unrolled; so
@@ -51,7 +56,11 @@ impl<T: Real> Gaussian<T> {
 
     /// Carries the first states on by their rows; the others stay as they are.
     pub(super) fn pass(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
-        if self.in_gear() { self.pass_first::<IN_GEAR>(rows, rest) } else { self.pass_first::<N>(rows, rest) }
+        if self.in_gear() {
+            return self.pass_first::<IN_GEAR>(rows, rest);
+        }
+        self.timing.pass(rows);
+        self.pass_first::<N>(rows, rest);
     }
 
     fn pass_first<const M: usize>(&mut self, rows: &[[T; N]; CORE], rest: &[T; CORE]) {
@@ -87,6 +96,7 @@ impl<T: Real> Gaussian<T> {
     pub(super) fn fade(&mut self, state: usize, factor: T) {
         let (state, active) = (state.min(N - 1), self.active);
         self.mean[state] = factor * self.mean[state];
+        self.timing.fade(state, factor);
         for row in self.covariance.iter_mut().take(active) {
             row[state] = factor * row[state];
         }
@@ -111,6 +121,7 @@ impl<T: Real> Gaussian<T> {
             self.covariance[k][state] = T::zero();
             self.covariance[state][k] = T::zero();
         }
+        self.timing.fade(state, T::zero());
         self.mean[state] = mean;
         self.covariance[state][state] = variance;
     }
@@ -155,6 +166,7 @@ impl<T: Real> Gaussian<T> {
         let joined = |a: T, b: T| share[0] * a + share[1] * b;
         let output = joined(self.mean[TURBINE], self.mean[OUTPUT]);
         (self.mean[TURBINE], self.mean[OUTPUT]) = (ratio * output, output);
+        self.timing.tie(ratio, share);
         let p = &mut self.covariance;
         for row in p.iter_mut() {
             let output = joined(row[TURBINE], row[OUTPUT]);
@@ -188,13 +200,16 @@ impl<T: Real> Gaussian<T> {
 
     /// What a measurement says beside the states.
     pub(super) fn look(&self, measured: &Measured<T>) -> Look<T> {
-        if self.in_gear() { self.look_first::<IN_GEAR>(measured) } else { self.look_first::<N>(measured) }
+        if self.in_gear() {
+            return self.look_first::<IN_GEAR>(measured);
+        }
+        Look { by_timing: self.timing.of(&measured.row), ..self.look_first::<N>(measured) }
     }
 
     fn look_first<const M: usize>(&self, measured: &Measured<T>) -> Look<T> {
         let with = self.with_first::<M>(&measured.row);
         let variance = dot_first::<T, M>(&with, &measured.row).at_least(T::zero()) + measured.noise;
-        Look { innovation: measured.innovation, variance, with }
+        Look { innovation: measured.innovation, variance, with, by_timing: [T::zero(); TIMINGS] }
     }
 
     /// Corrects by a measurement: `x + S e/V`, `P - S S'/V`. The product is made of two equal factors, so that `P` stays
@@ -203,7 +218,12 @@ impl<T: Real> Gaussian<T> {
         if look.variance <= T::zero() {
             return;
         }
-        if self.in_gear() { self.correct_first::<IN_GEAR>(look) } else { self.correct_first::<N>(look) }
+        if self.in_gear() {
+            return self.correct_first::<IN_GEAR>(look);
+        }
+        let per = look.variance.sqrt().recip();
+        self.timing.take(&look.by_timing.map(|by| per * by), per * look.innovation, &look.with.map(|with| per * with));
+        self.correct_first::<N>(look);
     }
 
     fn correct_first<const M: usize>(&mut self, look: &Look<T>) {

@@ -14,6 +14,9 @@ use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
 /// pressure are thousands of this.
 const RESTS_PA: f64 = 1.0;
 
+/// Least factor on the lag of a valve \[chosen\]: the bounds of the standard budget end at half the lag.
+const LAG_LEAST: f64 = 0.1;
+
 /// What is known of the errors of an element's pressure and kiss point, in their deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PressureError<T> {
@@ -84,6 +87,20 @@ impl<T: Real> Pressing<T> {
     }
 }
 
+/// What is learnt of lag and delay of a valve, in deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ValveTiming<T> {
+    pub(super) mean: [T; 2],
+    /// Of all errors of both, also of those that are others in each shift.
+    pub(super) variance: [T; 2],
+}
+
+impl<T: Real> ValveTiming<T> {
+    pub(super) fn unlearnt() -> Self {
+        Self { mean: [T::zero(); 2], variance: [T::one(); 2] }
+    }
+}
+
 /// The newest command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct NewestCommand<T> {
@@ -106,6 +123,11 @@ pub(super) struct ElementState<T> {
     rate_pa_s: T,
     /// Change of the pressure per share by which the lag is longer, Pa: `q' = -q/tau - p'`, with the other sign.
     per_lag_pa: T,
+    /// What is learnt of lag and delay.
+    timing: ValveTiming<T>,
+    /// Factor on the lag, and delay, s, with it.
+    lag: T,
+    delay_s: T,
     newest: Option<NewestCommand<T>>,
     /// Where the piston has a stroke, once a command has come.
     pistons: Option<Pistons<T>>,
@@ -119,10 +141,31 @@ impl<T: Real> ElementState<T> {
             valve_pa: T::zero(),
             rate_pa_s: T::zero(),
             per_lag_pa: T::zero(),
+            timing: ValveTiming::unlearnt(),
+            lag: T::one(),
+            delay_s: element.valve.delay_s,
             newest: None,
             pistons: None,
             range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
         }
+    }
+
+    /// Goes on with what is learnt of lag and delay. A lag has a length, and no command arrives before it was sent.
+    pub(super) fn take_timing(
+        &mut self,
+        element: &FrictionElement<T>,
+        u: &ShiftUncertainty<T>,
+        timing: &ValveTiming<T>,
+    ) {
+        let [lag, delay] = timing.mean;
+        self.timing = *timing;
+        self.lag = (T::one() + u.valve_lag_share * lag).at_least(T::of(LAG_LEAST));
+        self.delay_s = (element.valve.delay_s + u.valve_delay_s * delay).at_least(T::zero());
+    }
+
+    /// The errors of lag and delay that the valve model has taken off, in deviations.
+    pub(super) fn taken_off(&self) -> [T; 2] {
+        self.timing.mean
     }
 
     /// Lets time pass, and takes a command if there is one.
@@ -166,7 +209,7 @@ impl<T: Real> ElementState<T> {
         if let Some(newest) = &mut self.newest {
             let end_pa = limits.possible_pressure(newest.settled_pa);
             let near = (self.valve_pa - end_pa).abs().at_least(self.per_lag_pa.abs()) <= T::of(RESTS_PA);
-            if near && newest.alike_s - dt_s >= element.valve.delay_s {
+            if near && newest.alike_s - dt_s >= self.delay_s {
                 (self.valve_pa, self.rate_pa_s, self.per_lag_pa) = (end_pa, T::zero(), T::zero());
                 newest.rests_s = Some(T::zero());
             }
@@ -178,8 +221,9 @@ impl<T: Real> ElementState<T> {
         let (pieces, piece_s) = pieces(dt_s);
         for _ in 0..pieces {
             self.commands.pass(piece_s);
-            let settled_pa = element.valve.target_pa(&self.commands, piece_s);
-            let step = element.valve.step(settled_pa, self.valve_pa, piece_s);
+            let settled_pa = element.valve.target_after_pa(&self.commands, self.delay_s, piece_s);
+            // A lag that is longer by a factor is a time that passes slower by it.
+            let step = element.valve.step(settled_pa, self.valve_pa, piece_s / self.lag);
             let before_pa = self.valve_pa;
             self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
             self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
@@ -200,7 +244,7 @@ impl<T: Real> ElementState<T> {
     /// Takes a usable command.
     #[inline]
     fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
-        let needed_s = element.valve.needed_s(T::of(PIECE_S));
+        let needed_s = self.delay_s.at_least(element.valve.delay_s) + T::of(PIECE_S);
         if let Some(newest) = &mut self.newest {
             // Commands arrive in their order.
             newest.age_s = newest.age_s.at_most(reading.age_s);
@@ -254,8 +298,14 @@ impl<T: Real> ElementState<T> {
     /// Standard deviation of the pressure by the valve model beside what lasts, Pa: errors of lag and delay while it
     /// moves, and at rest.
     fn deviation_pa(&self, u: &ShiftUncertainty<T>) -> T {
-        let moving = square(u.valve_lag_share * self.per_lag_pa) + square(u.valve_delay_s * self.rate_pa_s);
-        (moving + square(u.pressure_pa)).sqrt()
+        let [lag, delay] = self.timing.variance;
+        let [by_lag_pa, by_delay_pa] = self.by_timing_pa(u);
+        (lag * square(by_lag_pa) + delay * square(by_delay_pa) + square(u.pressure_pa)).sqrt()
+    }
+
+    /// Change of the pressure by a lag and a delay that are longer by one deviation, Pa.
+    fn by_timing_pa(&self, u: &ShiftUncertainty<T>) -> [T; 2] {
+        [-u.valve_lag_share * self.per_lag_pa / self.lag, -u.valve_delay_s * self.rate_pa_s]
     }
 
     /// The pressure on the plates, by what is known of its errors. The plates do not pull: near the kiss point the mean of the
@@ -289,12 +339,15 @@ impl<T: Real> ElementState<T> {
         let per_pa = size * clutch.torque_per_force(slip) * clutch.piston_area_m2;
         let pressing = self.pressing(clutch, u, wrong);
         let Pressing { pressed_pa, slope, error_pa, kiss_pa, moving_pa, by_fill_pa, per_fill_pa } = pressing;
+        let per_pressure_pa = slope * moving_pa + per_fill_pa;
+        let per_timing = if per_pressure_pa > T::zero() { slope / per_pressure_pa } else { T::zero() };
         ClutchTorque {
             ratio: shift.ratio,
             base_n_m: per_pa * (pressed_pa - slope * error_pa - by_fill_pa),
             per_friction_n_m: u.torque_share * per_pa * pressed_pa,
             per_kiss_n_m: -per_pa * slope * kiss_pa,
-            per_pressure_n_m: per_pa * slope * moving_pa + per_pa * per_fill_pa,
+            per_pressure_n_m: per_pa * per_pressure_pa,
+            by_timing: self.by_timing_pa(u).map(|by_pa| per_timing * by_pa),
             open_loop_n_m: shift.alpha.abs() * direction.signum() * clutch.torque_capacity(self.pressure_pa(), slip),
         }
     }
@@ -364,166 +417,4 @@ fn pressing_of_pistons<T: Real>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ValveModel;
-    use crate::any_shift::Piston;
-    use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
-
-    const LIMITS: InputLimits<f64> =
-        InputLimits { speed_max_rad_s: 1e3, command_max: 1.2, pressure_max_pa: 1.1e6, shaft_torque_max_n_m: 1e4 };
-
-    const UNCERTAINTY: ShiftUncertainty<f64> = ShiftUncertainty {
-        torque_share: 0.12,
-        slow_part: 0.75,
-        torque_share_s: 3.0,
-        valve_gain: 0.06,
-        kiss_point_pa: 7e3,
-        valve_lag_share: 0.3,
-        valve_delay_s: 9e-3,
-        pressure_pa: 7e3,
-        pressure_s: 0.15,
-        turbine_share: 0.03,
-        turbine_share_s: 3.0,
-        inertia_share: 0.14,
-        stiffness_share: 0.12,
-        wheel_scale: 0.0115,
-        wheel_scale_walk: 4e-5,
-        rate_rad_s: 0.1,
-        rate_walk: 0.01,
-        load_walk: 1500.0,
-        output_least_rad_s: 15.0,
-    };
-
-    fn element() -> FrictionElement<f64> {
-        let maps = ValveMaps {
-            time_constant_s: Table1::new(&[0.0, 1e5, 1e6], &[0.1, 0.06, 0.03]).unwrap(),
-            gain_pa_a: Table1::new(&[0.0, 0.5, 1.0], &[0.7e6, 1.0e6, 1.2e6]).unwrap(),
-            delay_s: Table1::constant(0.015),
-        };
-        FrictionElement {
-            clutch: Clutch {
-                mean_radius_m: 0.13,
-                friction_faces: 3.0,
-                piston_area_m2: 0.01,
-                return_spring_n: 600.0,
-                friction: Table1::constant(0.13),
-                static_friction: 0.14,
-            },
-            valve: ValveModel { valve: ClutchValve::Proportional(maps), delay_s: 0.015 },
-            piston: None,
-            budget: None,
-        }
-    }
-
-    fn with_stroke() -> FrictionElement<f64> {
-        let element = element();
-        let piston = Piston::new(Cylinder::of_clutch(&element.clutch), 0.16);
-        FrictionElement { piston: Some(piston), ..element }
-    }
-
-    /// With late and missing readings, and commands above what the supply gives.
-    #[test]
-    fn a_valve_that_rests_goes_on_as_one_that_never_does() {
-        [element(), with_stroke()].iter().for_each(rests_as_one_that_never_does);
-    }
-
-    fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
-        let mut rests = ElementState::new(element, &LIMITS);
-        let (mut moves, mut rested) = (rests, 0);
-        for k in 0..6000_usize {
-            // Every new command is late, after two that were lost or out of order.
-            let (held, at) = (k / 495, k % 11);
-            let value = [0.3, 0.0, 1.0, 0.31, 0.9][held % 5];
-            let age_s = if at == 0 { 0.025 } else { 0.0 };
-            let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
-            let health = [&mut rests, &mut moves]
-                .map(|valve: &mut ElementState<f64>| valve.step(element, &LIMITS, command, 0.01));
-            assert_eq!(health[0], health[1]);
-            [&mut rests, &mut moves].into_iter().for_each(|valve| valve.move_pistons(element, &UNCERTAINTY, 0.01));
-            // So it never begins to rest.
-            moves.newest.iter_mut().for_each(|newest| newest.alike_s = 0.0);
-            rested += usize::from(rests.rate_pa_s == 0.0);
-            assert!((rests.valve_pa - moves.valve_pa).abs() <= RESTS_PA, "{k}: {} {}", rests.valve_pa, moves.valve_pa);
-            let both = [rests, moves].map(|valve| valve.pressure_pa());
-            assert!((both[0] - both[1]).abs() <= 5.0 * RESTS_PA, "{k}: {both:?}");
-            assert!((rests.per_lag_pa - moves.per_lag_pa).abs() <= RESTS_PA, "{k}");
-            assert!((rests.rate_pa_s - moves.rate_pa_s).abs() <= 100.0 * RESTS_PA, "{k}");
-        }
-        assert!(rested > 3000 && moves.newest.is_some_and(|newest| newest.rests_s.is_none()), "{rested}");
-    }
-
-    /// Near the kiss point and above it, with errors that are known.
-    #[test]
-    fn an_element_holds_what_it_carries_by_the_estimate() {
-        let u = UNCERTAINTY;
-        let (element, shift) = (element(), ShiftClutch { element: 0, alpha: -1.4, ratio: 2.0 });
-        let mut state = ElementState::new(&element, &LIMITS);
-        for (valve_pa, factor, pressure, kiss) in [
-            (2e5, 0.0, 0.0, 0.0),
-            (2e5, 0.8, 0.5, -0.7),
-            (6e4, -1.0, 0.3, 0.4),
-            (6.5e4, 0.5, -0.6, 0.9),
-            (1e4, 0.5, 0.0, 0.0),
-        ] {
-            (state.valve_pa, state.rate_pa_s) = (valve_pa, 3e5);
-            let wrong = PressureError { pressure, kiss, variance: [0.5, 0.7], covariance: -0.2 };
-            let slips = state.torque(&element, &shift, &u, [0.0, -1.0], &wrong);
-            let carries = slips.base_n_m
-                + factor * slips.per_friction_n_m
-                + kiss * slips.per_kiss_n_m
-                + pressure * slips.per_pressure_n_m;
-            // Its static friction is larger.
-            let holds = state.holds(&element, &shift, &u, factor, &wrong);
-            assert!((holds + carries * 0.14 / 0.13).abs() < 1e-9, "{valve_pa}: {holds} {carries}");
-            assert!((holds > 0.0) == (valve_pa > 1.5e4), "{valve_pa}: {holds}");
-        }
-    }
-
-    /// While its piston strokes it carries nothing, whatever the pressure at the valve; then it is as one without a stroke.
-    #[test]
-    fn an_element_whose_plates_do_not_touch_carries_nothing() {
-        let u = UNCERTAINTY;
-        let (with, without) = (with_stroke(), element());
-        let shift = ShiftClutch { element: 0, alpha: 1.0, ratio: 2.0 };
-        let wrong = PressureError { pressure: 0.4, kiss: 0.3, variance: [0.8, 0.9], covariance: 0.0 };
-        let mut states = [with, without].map(|element| (element, ElementState::new(&element, &LIMITS)));
-        let mut carried = [0.0; 300];
-        for (k, carried) in carried.iter_mut().enumerate() {
-            let command = Some(Reading::now(if k < 5 { 0.0 } else { 0.25 }));
-            let [stroke, none] = states.each_mut().map(|(element, state)| {
-                state.step(element, &LIMITS, command, 0.01);
-                state.move_pistons(element, &u, 0.01);
-                let torque = state.torque(element, &shift, &u, [50.0, 1.0], &wrong);
-                let all = torque.base_n_m + 0.3 * torque.per_kiss_n_m + 0.4 * torque.per_pressure_n_m;
-                // The static friction is larger.
-                let holds = state.holds(element, &shift, &u, 0.0, &wrong);
-                assert!((holds - all * 0.14 / 0.13).abs() < 1e-9 || all < 0.0, "{k}: {holds} {all}");
-                (all, torque.open_loop_n_m, state.pressure_pa())
-            });
-            *carried = stroke.0;
-            if k < 20 {
-                assert_eq!((stroke.0, stroke.1), (0.0, 0.0), "{k}");
-            }
-            if k > 200 {
-                assert!((stroke.0 - none.0).abs() < 0.01 * none.0, "{k}: {stroke:?} {none:?}");
-                assert!((stroke.2 - none.2).abs() < 1e3, "{k}: the leak takes little");
-            }
-        }
-        assert!(carried.windows(2).all(|pair| pair[1] > pair[0] - 0.5) && carried[250] > 30.0);
-        // Both rest then.
-        assert!(states.iter().all(|(_, state)| state.newest.is_some_and(|newest| newest.rests_s.is_some())));
-    }
-
-    #[test]
-    fn a_command_that_is_lost_while_the_valve_rests_is_said_to_be() {
-        let element = element();
-        let mut state = ElementState::new(&element, &LIMITS);
-        (0..500).for_each(|_| {
-            state.step(&element, &LIMITS, Some(Reading::now(0.3)), 0.01);
-        });
-        assert!(state.newest.is_some_and(|newest| newest.rests_s.is_some()));
-        let health: [ChannelHealth; 200] = core::array::from_fn(|_| state.step(&element, &LIMITS, None, 0.01));
-        assert_eq!((health[0], health[199]), (ChannelHealth::Absent, ChannelHealth::Lost));
-    }
-}
+mod tests;

@@ -9,10 +9,11 @@
 //!
 //! | `e` | car | stiffness of the drive shafts: it is in what is seen, and the filter has no state of it |
 //! | `s` | car | scale of the wheel speed |
+//! | `l`, `d` | element | lag and delay of its valve: the valve model is changed by them, and the filter has no states of them |
 //!
-//! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the six of
+//! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the ten of
 //! them that act in it, `a = H theta + d`, where `d` is the part that is another in each shift. What it shows ([`Shown`])
-//! are up to six measurements of these, with noise of variance one, and one Kalman filter of all quantities takes them:
+//! are up to ten measurements of these, with noise of variance one, and one Kalman filter of all quantities takes them:
 //!
 //! ```text
 //! y = R (a + s e) + noise          S = R ((H, s) P (H, s)' + D) R' + 1
@@ -36,27 +37,31 @@
 
 use drivetrain::Real;
 
+use super::elements::ValveTiming;
 use super::powertrain::dot;
 use super::shown::{Matrix, Shown, around, cholesky, lower_inverse};
 use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
-/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed.
+/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed, lags, delays.
 const KISS_AT: usize = MAX_ELEMENTS;
 const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
 const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
 const STIFFNESS_AT: usize = TURBINE_AT + 1;
 const WHEEL_AT: usize = STIFFNESS_AT + 1;
+const LAG_AT: usize = WHEEL_AT + 1;
+const DELAY_AT: usize = LAG_AT + MAX_ELEMENTS;
 /// How many quantities are learnt.
-pub const LEARNT: usize = WHEEL_AT + 1;
-/// How many of them act in a shift.
-pub(super) const ACTING: usize = 6;
+pub const LEARNT: usize = DELAY_AT + MAX_ELEMENTS;
+/// How many of them act in a shift: so many states, and lag and delay of both valves.
+pub(super) const ACTING: usize = STATES_ACTING + 4;
+pub(super) const STATES_ACTING: usize = 6;
 
 /// Squared distance of what a shift says from what was known, in its deviations, beyond which it counts for less, and
-/// beyond which it is refused \[chosen\]: six quantities reach them by chance in one of 70 and in 2 of a million shifts.
-const LIKELY: f64 = 16.0;
-const GATE: f64 = 36.0;
+/// beyond which it is refused \[chosen\]: ten quantities reach them by chance in one of 70 and in 2 of a million shifts.
+const LIKELY: f64 = 22.0;
+const GATE: f64 = 46.0;
 /// Refused shifts in a row after which all is forgotten \[chosen\]: the car is another, as after a repair.
 const REFUSED_MOST: u8 = 8;
 /// Variance by which each quantity is another in the next shift, in that of the budget \[chosen\]: 9 % of its deviation in 30
@@ -96,7 +101,8 @@ const OIL_DEGC: [f64; 2] = [-60.0, 220.0];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt<T> {
     /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
-    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed.
+    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed, lags and delays of
+    /// the valves by element.
     pub mean: [T; LEARNT],
     /// Their covariance, in the same units.
     pub covariance: [[T; LEARNT]; LEARNT],
@@ -120,6 +126,10 @@ pub struct LearntElement<T> {
     /// Of the valve's gain, as a share. Speeds and commands do not tell it apart from a friction and a kiss point of the
     /// element: its deviation stays large.
     pub valve_gain: [T; 2],
+    /// Of the valve's lag, as a share.
+    pub valve_lag: [T; 2],
+    /// Of its delay, s.
+    pub valve_delay_s: [T; 2],
 }
 
 /// Correlation of torque factor and kiss point of each element unlearnt: the valve's gain is in both.
@@ -130,7 +140,7 @@ pub(super) type Correlations<T> = [T; MAX_ELEMENTS];
 pub(super) struct Acting<T> {
     /// Place of each, if it is learnt; else it is its own in this shift.
     places: [Option<usize>; ACTING],
-    /// Part of the variance of torque factors and kiss points that lasts.
+    /// Part of the variance of torque factors, kiss points, lags and delays that lasts.
     slow_part: T,
     /// How an error of the stiffness shows in each, per deviation of it.
     by_stiffness: [T; ACTING],
@@ -144,18 +154,22 @@ pub(super) struct Known<T> {
 }
 
 impl<T: Real> Acting<T> {
-    /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input.
+    /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input; then lag and delay of either clutch.
     pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T, by_stiffness: [T; ACTING]) -> Self {
         let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
         let kiss = |at: usize| element(at).map(|at| KISS_AT + at);
         let inertia = pair.filter(|&pair| pair < MAX_PAIRS).map(|pair| INERTIA_AT + pair);
-        let places = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
+        let [lag, delay] = [LAG_AT, DELAY_AT].map(|first| move |at: usize| (at < MAX_ELEMENTS).then_some(first + at));
+        let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
+        let timings = [lag(off), delay(off), lag(on), delay(on)];
+        let places = core::array::from_fn(|a| states.iter().chain(&timings).nth(a).copied().flatten());
         Self { places, slow_part, by_stiffness }
     }
 
     /// Only the torque at the gearbox input, as in a gear.
     pub(super) fn turbine(by_stiffness: [T; ACTING]) -> Self {
-        let places = [None, None, None, None, None, Some(TURBINE_AT)];
+        let mut places = [None; ACTING];
+        places[STATES_ACTING - 1] = Some(TURBINE_AT);
         Self { places, slow_part: T::one(), by_stiffness }
     }
 
@@ -176,7 +190,7 @@ impl<T: Real> Acting<T> {
     fn per_unit(&self, a: usize) -> (T, T) {
         match self.place(a) {
             None => (T::zero(), T::one()),
-            Some(INERTIA_AT..) => (T::one(), T::zero()),
+            Some(INERTIA_AT..LAG_AT) => (T::one(), T::zero()),
             Some(_) => (self.slow_part.sqrt(), T::one() - self.slow_part),
         }
     }
@@ -199,6 +213,24 @@ impl<T: Real> Learnt<T> {
         let places = [at, KISS_AT + at].map(|place| place.min(LEARNT - 1));
         let covariance = places.map(|a| places.map(|b| self.covariance[a][b]));
         (at < MAX_ELEMENTS).then_some((places.map(|place| self.mean[place]), covariance))
+    }
+
+    /// Mean and variance of lag and delay of the valve of an element.
+    pub(super) fn of_timing(&self, at: usize) -> Option<([T; 2], [T; 2])> {
+        let places = [LAG_AT, DELAY_AT].map(|first| (first + at.min(MAX_ELEMENTS - 1)).min(LEARNT - 1));
+        (at < MAX_ELEMENTS).then_some((places.map(|k| self.mean[k]), places.map(|k| self.covariance[k][k])))
+    }
+
+    /// Lag and delay of the valve of an element in its next shift by what is learnt and the budget together. `slow_part` is the
+    /// part of their variance that lasts.
+    pub(super) fn known_timing(&self, at: usize, slow_part: T) -> ValveTiming<T> {
+        let Some((mean, variance)) = self.of_timing(at) else { return ValveTiming::unlearnt() };
+        let (car, one) = (self.probability(), T::one());
+        let both = |k: usize| car * variance[k] + (one - car) * (one + car * mean[k] * mean[k]);
+        ValveTiming {
+            mean: mean.map(|mean| slow_part.sqrt() * car * mean),
+            variance: [0, 1].map(|k| slow_part * both(k) + one - slow_part),
+        }
     }
 
     /// Mean and deviation of the inertia of a pair of gears.
@@ -353,7 +385,7 @@ impl<T: Real> Learnt<T> {
     pub(super) fn pass(&mut self, dt_s: T, correlations: &Correlations<T>) {
         let one = T::one();
         let [oil, inertia] = [WITH_OIL_S, INERTIA_S].map(|s| (-dt_s / T::of(s)).exp());
-        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || k >= STIFFNESS_AT;
+        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || (STIFFNESS_AT..LAG_AT).contains(&k);
         let stay = |k: usize| if lasts(k) { inertia } else { oil };
         for i in 0..LEARNT {
             self.mean[i] = stay(i) * self.mean[i];

@@ -43,6 +43,7 @@ mod readings;
 mod running;
 mod shown;
 mod tables;
+mod timing;
 mod turbine;
 
 use drivetrain::{Clutch, Driveline, Real};
@@ -52,10 +53,11 @@ use crate::kalman::gate::{Gate, Verdict};
 use crate::{ChannelHealth, Channels, EngineNoise, Health, InputLimits, LOST_S, Reading, SpeedReading};
 use covariance::{Gaussian, Measured};
 use elements::ElementState;
-use learnt::{ACTING, Acting, Correlations, Known};
+use learnt::{ACTING, Acting, Correlations, Known, STATES_ACTING};
 use newest::Newest;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
+use timing::Timing;
 use turbine::InputSide;
 
 pub use at_turbine::ClutchesAtTurbine;
@@ -85,8 +87,8 @@ const FRICTION: [usize; 2] = [9, 10];
 const KISS: [usize; 2] = [11, 12];
 const PRESSURE: [usize; 2] = [13, 14];
 const INERTIA: usize = 15;
-/// The states that are learnt.
-const LASTING: [usize; ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_SHARE];
+/// The states that are learnt. Lag and delay of the valves are learnt beside them, and are none.
+const LASTING: [usize; STATES_ACTING] = [FRICTION[0], FRICTION[1], KISS[0], KISS[1], INERTIA, SLOW_SHARE];
 
 /// Longest time that is predicted at once, s; a longer one is cut.
 const PIECE_S: f64 = 0.0125;
@@ -355,6 +357,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         for (state, element) in elements.iter_mut().zip(self.tables.elements) {
             *state = Some(ElementState::new(element, &self.limits));
         }
+        self.take_timing(&mut elements, learnt);
         AnyShiftState {
             started: false,
             elements,
@@ -443,7 +446,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     /// Follows the shift command.
     fn take_gear(&self, state: &mut AnyShiftState<T>, command: GearCommand) -> Health {
         let opens = self.is_open(state, command);
-        let (learnt, fading_s) = (&mut state.learnt, &mut state.fading_s);
+        let (learnt, fading_s, elements) = (&mut state.learnt, &mut state.fading_s, &mut state.elements);
         let Some(running) = &mut state.running else { return Health::Good };
         let in_gear = command.from == command.to;
         match running.shift {
@@ -461,7 +464,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 Some(shift) => {
                     let speeds = self.measured(&state.newest, Some(running));
                     let slips = shift.clutches.map(|clutch| self.slip(clutch.ratio, speeds));
-                    self.begin_shift(running, *shift, slips, learnt, core::mem::replace(fading_s, T::zero()));
+                    learnt.pass(core::mem::replace(fading_s, T::zero()), &self.correlations());
+                    self.begin_shift(running, *shift, slips, learnt);
+                    self.take_timing(elements, learnt);
+                    running.x.timing = Timing::nothing(self.taken_off(elements, shift));
                     Health::Good
                 }
                 None => {

@@ -12,6 +12,7 @@
 use drivetrain::{Driveline, Real};
 
 use super::covariance::Gaussian;
+use super::timing::ByTiming;
 use super::{
     FRICTION, INERTIA, KISS, LOAD, N, OUTPUT, PRESSURE, RATE, SHARE, SLOW_SHARE, SPEEDS, SPRING, TURBINE, WHEEL,
 };
@@ -50,6 +51,8 @@ pub(super) struct ClutchTorque<T> {
     pub(super) per_friction_n_m: T,
     pub(super) per_kiss_n_m: T,
     pub(super) per_pressure_n_m: T,
+    /// Pressure by a lag and a delay that are longer by one deviation, in deviations of the pressure's error.
+    pub(super) by_timing: [T; 2],
     /// By the valve model and the budget's friction and kiss point alone, of full size also where the direction is uncertain.
     pub(super) open_loop_n_m: T,
 }
@@ -63,6 +66,7 @@ impl<T: Real> ClutchTorque<T> {
             per_friction_n_m: zero,
             per_kiss_n_m: zero,
             per_pressure_n_m: zero,
+            by_timing: [zero; 2],
             open_loop_n_m: zero,
         }
     }
@@ -76,7 +80,9 @@ impl<T: Real> ClutchTorque<T> {
 
     fn mean(&self, other: &Self) -> Self {
         let half = T::of(0.5);
+        let [lag, delay] = self.by_timing;
         Self {
+            by_timing: [half * (lag + other.by_timing[0]), half * (delay + other.by_timing[1])],
             ratio: self.ratio,
             base_n_m: half * (self.base_n_m + other.base_n_m),
             per_friction_n_m: half * (self.per_friction_n_m + other.per_friction_n_m),
@@ -113,6 +119,11 @@ impl<T: Real> Torques<T> {
             inertia_n_m: half * (self.inertia_n_m + other.inertia_n_m),
             clutches: [self.clutches[0].mean(&other.clutches[0]), self.clutches[1].mean(&other.clutches[1])],
         }
+    }
+
+    /// Pressure of both clutches by their timing.
+    pub(super) fn by_timing(&self) -> ByTiming<T> {
+        self.clutches.each_ref().map(|clutch| clutch.by_timing)
     }
 
     /// Without the torque of a clutch that holds.
@@ -310,6 +321,7 @@ mod tests {
             per_friction_n_m: 0.12 * base_n_m,
             per_kiss_n_m: -2.0,
             per_pressure_n_m: 3.0,
+            by_timing: [0.0; 2],
             open_loop_n_m: base_n_m,
         };
         let (slow_share_n_m, inertia_n_m) = (6.0, -3.0);

@@ -105,7 +105,10 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let in_shift = running.shift.is_some();
         let x = &mut running.x;
         let twist_rate = self.driveline.twist_rate(x.mean[OUTPUT], x.mean[WHEEL]) + x.mean[RATE];
+        let by_timing = torques.by_timing();
+        x.timing.add_pressure(&by_timing);
         x.pass(&rows, &rest);
+        x.timing.add_pressure(&by_timing.map(|by| by.map(|by| -by)));
         x.fade(SHARE, share);
         // An error of the stiffness that does not last: in one direction of the torque it is another than in the other.
         let by_stiffness = u.stiffness_share * self.driveline.shaft_stiffness_n_m_rad * twist_rate;

@@ -1,14 +1,15 @@
 //! Begin and end of a shift, and what is kept from shift to shift.
 
+use super::timing::ByTiming;
 use super::{
-    ACTING, Acting, AnyShiftFilter, Correlations, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS, Known, LASTING,
-    Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE, SLOW_SHARE, ShiftPhase,
-    ShiftRow, ShiftUncertainty, Slip,
+    ACTING, Acting, AnyShiftFilter, Correlations, ElementState, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS,
+    Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE, SLOW_SHARE,
+    STATES_ACTING, ShiftPhase, ShiftRow, ShiftUncertainty, Slip,
 };
 use drivetrain::Real;
 
 /// Place of the torque at the gearbox input among the lasting states.
-pub(super) const TURBINE_ACTS: usize = ACTING - 1;
+pub(super) const TURBINE_ACTS: usize = STATES_ACTING - 1;
 /// That of the inertia.
 const INERTIA_ACTS: usize = 4;
 
@@ -66,12 +67,16 @@ impl<T: Real> Running<T> {
         self.x.active = IN_GEAR;
     }
 
-    /// The lasting states now.
+    /// The lasting states now, with the timing as the valve models have it.
     fn lasting(&self) -> Known<T> {
-        Known {
-            mean: LASTING.map(|state| self.x.mean[state]),
-            covariance: LASTING.map(|a| LASTING.map(|b| self.x.covariance[a][b])),
+        let mut lasting = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
+        for ((mean, row), a) in lasting.mean.iter_mut().zip(&mut lasting.covariance).zip(LASTING) {
+            *mean = self.x.mean[a];
+            for (covariance, b) in row.iter_mut().zip(LASTING) {
+                *covariance = self.x.covariance[a][b];
+            }
         }
+        lasting
     }
 }
 
@@ -89,6 +94,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub fn learnt_element(&self, learnt: &Learnt<T>, at: usize) -> Option<LearntElement<T>> {
         let (u, element) = (&self.uncertainty, self.tables.elements.get(at).filter(|_| at < MAX_ELEMENTS)?);
         let ([s, k], [[s_s, s_k], [_, k_k]]) = learnt.of_element(at)?;
+        let (means, variances) = learnt.of_timing(at)?;
+        let of_timing = |k: usize, per: T| [means[k], variances[k].sqrt()].map(|x| per * u.slow_part.sqrt() * x);
         let torque = u.torque_share * u.slow_part.sqrt();
         let kiss_pa = u.kiss_deviation_pa(&element.clutch) * u.slow_part.sqrt();
         let [by_s, by_k] = u.gain_by(element, T::one());
@@ -102,6 +109,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torque_share: [torque * s, torque * s_s.sqrt()],
             kiss_pa: [kiss_pa * k, kiss_pa * k_k.sqrt()],
             valve_gain: [by_s * s + by_k * k, gain],
+            valve_lag: of_timing(0, u.valve_lag_share),
+            valve_delay_s: of_timing(1, u.valve_delay_s),
         })
     }
 
@@ -139,14 +148,38 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     }
 
     /// How an error of the stiffness of the drive shafts shows in the lasting states, per deviation of it: as one of all
-    /// torques alike, and of none of the kiss points.
+    /// torques alike, and of no kiss point and no timing.
     fn by_stiffness(&self) -> [T; ACTING] {
         let u = &self.uncertainty;
         let source =
             if self.turbine.converter.is_some() { self.turbine.converter_share } else { self.turbine.engine_share };
         let in_shares =
             [u.torque_share, u.torque_share, T::infinity(), T::infinity(), u.inertia_share, u.slow_share(source)];
-        in_shares.map(|share| if share > T::zero() { u.stiffness_share / share } else { T::zero() })
+        let mut by = [T::zero(); ACTING];
+        for (by, share) in by.iter_mut().zip(in_shares).filter(|(_, share)| *share > T::zero()) {
+            *by = u.stiffness_share / share;
+        }
+        by
+    }
+
+    /// Lets the valve models go on with what is learnt of lag and delay.
+    pub(super) fn take_timing(&self, elements: &mut [Option<ElementState<T>>; MAX_ELEMENTS], learnt: &Learnt<T>) {
+        let u = &self.uncertainty;
+        for (at, (memory, element)) in elements.iter_mut().zip(self.tables.elements).enumerate() {
+            if let Some(memory) = memory {
+                memory.take_timing(element, u, &learnt.known_timing(at, u.slow_part));
+            }
+        }
+    }
+
+    /// The errors of the timing that the valve models of a shift have taken off.
+    pub(super) fn taken_off(
+        &self,
+        elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
+        shift: &ShiftRow<T>,
+    ) -> ByTiming<T> {
+        let of = |at: usize| self.element(elements, at).map_or([T::zero(); 2], |(memory, _)| memory.taken_off());
+        shift.clutches.map(|clutch| of(clutch.element))
     }
 
     /// What is known before a shift, or in a gear.
@@ -182,8 +215,9 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub(super) fn end_shift(&self, running: &mut Running<T>, gear: usize, learnt: &mut Learnt<T>) {
         if let Some((before, shift)) = running.before.take().zip(running.shift) {
             let correlations = self.correlations();
+            let shown = running.x.timing.together(before, running.lasting()).filter(|_| running.x.is_sound());
             let taken =
-                running.x.is_sound() && learnt.take(&self.acting(&shift), &before, &running.lasting(), &correlations);
+                shown.is_some_and(|(before, after)| learnt.take(&self.acting(&shift), &before, &after, &correlations));
             learnt.count(taken, &correlations);
         }
         self.take_turbine(running, learnt);
@@ -206,9 +240,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         shift: ShiftRow<T>,
         slips: [Slip<T>; 2],
         learnt: &mut Learnt<T>,
-        fading_s: T,
     ) {
-        learnt.pass(fading_s, &self.correlations());
         let from_gear = running.shift.is_none();
         if from_gear {
             self.learn_turbine(running, learnt);

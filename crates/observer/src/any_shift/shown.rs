@@ -67,9 +67,9 @@ pub(super) fn around<T: Real>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
 }
 
 /// `L` with `L L'` a covariance, or `None` if it is none.
-pub(super) fn cholesky<T: Real>(of: &Matrix<T>) -> Option<Matrix<T>> {
-    let mut lower = [[T::zero(); ACTING]; ACTING];
-    for i in 0..ACTING {
+pub(super) fn cholesky<T: Real, const L: usize>(of: &[[T; L]; L]) -> Option<[[T; L]; L]> {
+    let mut lower = [[T::zero(); L]; L];
+    for i in 0..L {
         for j in 0..=i {
             let left = of[i][j] - dot(&lower[i], &lower[j]);
             if i != j {
@@ -85,10 +85,10 @@ pub(super) fn cholesky<T: Real>(of: &Matrix<T>) -> Option<Matrix<T>> {
 }
 
 /// The inverse of a lower triangular matrix.
-pub(super) fn lower_inverse<T: Real>(of: &Matrix<T>) -> Matrix<T> {
-    let mut inverse = [[T::zero(); ACTING]; ACTING];
-    for i in 0..ACTING {
-        let mut row = [T::zero(); ACTING];
+pub(super) fn lower_inverse<T: Real, const L: usize>(of: &[[T; L]; L]) -> [[T; L]; L] {
+    let mut inverse = [[T::zero(); L]; L];
+    for i in 0..L {
+        let mut row = [T::zero(); L];
         row[i] = T::one();
         for k in 0..i {
             for j in 0..=k {
@@ -135,7 +135,7 @@ fn directions<T: Real>(mut of: Matrix<T>) -> ([T; ACTING], Matrix<T>) {
 mod tests {
     use super::*;
 
-    const SOME: Matrix<f64> = [
+    const FIRST: [[f64; 6]; 6] = [
         [1.0, 0.3, -0.2, 0.1, 0.0, 0.2],
         [0.3, 0.8, 0.1, -0.3, 0.2, 0.0],
         [-0.2, 0.1, 0.9, 0.2, 0.1, 0.1],
@@ -144,21 +144,31 @@ mod tests {
         [0.2, 0.0, 0.1, -0.1, 0.3, 0.6],
     ];
 
+    fn some() -> Matrix<f64> {
+        core::array::from_fn(|i| {
+            core::array::from_fn(|j| match (i, j) {
+                (0..6, 0..6) => FIRST[i][j],
+                _ if i == j => 0.4 + 0.1 * i as f64,
+                _ => 0.02 * (i + j) as f64 - 0.2,
+            })
+        })
+    }
+
     #[test]
     fn directions_and_roots_make_the_matrix_again() {
-        let (values, rows) = directions(SOME);
-        let lower = cholesky(&SOME).unwrap();
+        let (values, rows) = directions(some());
+        let lower = cholesky(&some()).unwrap();
         let inverse = lower_inverse(&lower);
         for i in 0..ACTING {
             for j in 0..ACTING {
                 let sum: f64 = (0..ACTING).map(|k| rows[k][i] * values[k] * rows[k][j]).sum();
-                assert!((sum - SOME[i][j]).abs() < 1e-12, "{i} {j}: {sum}");
-                assert!((dot(&lower[i], &lower[j]) - SOME[i][j]).abs() < 1e-12);
+                assert!((sum - some()[i][j]).abs() < 1e-12, "{i} {j}: {sum}");
+                assert!((dot(&lower[i], &lower[j]) - some()[i][j]).abs() < 1e-12);
                 let unit: f64 = (0..ACTING).map(|k| inverse[i][k] * lower[k][j]).sum();
                 assert!((unit - f64::from(u8::from(i == j))).abs() < 1e-12);
             }
         }
-        let mut none = SOME;
+        let mut none = some();
         none[2][2] = -0.1;
         assert_eq!(cholesky(&none), None);
         none[2][2] = f64::NAN;
@@ -168,10 +178,10 @@ mod tests {
     /// One measurement in, the same measurement out.
     #[test]
     fn a_measurement_is_found_again() {
-        let before = Known { mean: [0.3, -0.2, 0.1, 0.5, -0.4, 0.2], covariance: SOME };
-        let h = [0.9, -0.2, 0.4, 0.1, -0.7, 0.8];
+        let before = Known { mean: [0.3, -0.2, 0.1, 0.5, -0.4, 0.2, 0.1, 0.0, 0.3, -0.6], covariance: some() };
+        let h = [0.9, -0.2, 0.4, 0.1, -0.7, 0.8, 0.3, 0.0, -0.5, 0.2];
         let (value, noise) = (0.8, 0.2_f64);
-        let with = SOME.map(|row| dot(&row, &h));
+        let with = some().map(|row| dot(&row, &h));
         let variance = dot(&with, &h) + noise;
         let mut after = before;
         for a in 0..ACTING {

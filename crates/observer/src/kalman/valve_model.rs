@@ -110,7 +110,13 @@ impl<T: Real> ValveModel<T> {
     /// Mean of what the commands in effect over the last `dt_s` end at, Pa.
     #[inline]
     pub(crate) fn target_pa(&self, commands: &Commands<T>, dt_s: T) -> T {
-        commands.mean_pa(self.delay_s, dt_s).unwrap_or_else(T::zero)
+        self.target_after_pa(commands, self.delay_s, dt_s)
+    }
+
+    /// The same with another delay, s.
+    #[inline]
+    pub(crate) fn target_after_pa(&self, commands: &Commands<T>, delay_s: T, dt_s: T) -> T {
+        commands.mean_pa(delay_s, dt_s).unwrap_or_else(T::zero)
     }
 
     /// How long a command is needed after the next one was sent, for steps up to `dt_s`, s.
