@@ -39,7 +39,7 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     format!(
         "# What the filter for any shift has learnt of a car. Each number is in units of the deviation that the quantity has\n\
          # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input, stiffness\n\
-         # of the drive shafts, scale of the wheel speed, lags and delays of the valves by element.\n\
+         # of the drive shafts, scale of the wheel speed.\n\
          gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\n{oil}mean = [{}]\ncovariance = [\n{}]\n",
         toml_string(&gearbox.name),
         elements.join(", "),
@@ -147,12 +147,13 @@ mod tests {
             |text: &str| read_learnt(&gearbox, &Source::built_in("learnt.toml", text)).unwrap_err().to_string();
         let other = refused(&text.replace("\"E\"", "\"F\""));
         assert!(other.starts_with("learnt.toml:4: `gearbox`: was learnt of the gearbox"), "{other}");
-        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains("has 52 numbers, expected 51"));
-        // Of a version that learnt less.
-        let (end, last) = (text.find("]\ncovariance").unwrap(), ", ");
-        let earlier = format!("{}{}", &text[..text[..end].rfind(last).unwrap()], &text[end..]);
+        let numbers = |count: usize| format!("has {count} numbers, expected {LEARNT}");
+        assert!(refused(&text.replace("mean = [", "mean = [0.0, ")).contains(&numbers(LEARNT + 1)));
+        // Of a version in which one quantity less was learnt.
+        let end = text.find("]\ncovariance").unwrap();
+        let earlier = format!("{}{}", &text[..text[..end].rfind(", ").unwrap()], &text[end..]);
         let earlier = refused(&earlier);
-        assert!(earlier.contains("has 50 numbers, expected 51") && earlier.contains("another version"), "{earlier}");
+        assert!(earlier.contains(&numbers(LEARNT - 1)) && earlier.contains("another version"), "{earlier}");
         assert!(refused(&text.replace("7e-1", "-7e-1")).contains("no covariance"));
         assert!(refused(&text.replace("7e-1", "nan")).contains("no covariance"));
         assert!(refused(&text.replace("81.5", "815")).contains("bounds"));

@@ -4,7 +4,7 @@
 //! The wheel speed is not a state: the tyre makes it a fast one. Its slip follows from the force of the tyre, and the inertia
 //! of the wheels takes the acceleration that the slip has without it. Fourth-order Runge-Kutta; within a segment nothing sticks or lets go, so the result is a smooth function of every parameter.
 
-use drivetrain::ShiftTorques;
+use drivetrain::{AccelerationRow, Real};
 
 use crate::car::Car;
 use crate::record::SegmentKind;
@@ -45,20 +45,64 @@ pub(crate) struct State {
     pub(crate) engine_rad_s: f64,
 }
 
-impl State {
-    fn plus(self, rate: &Self, dt_s: f64) -> Self {
+/// What makes a motion in a segment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Run<'a> {
+    pub(crate) car: &'a Car,
+    pub(crate) of: Circumstances,
+    pub(crate) inputs: &'a Inputs,
+    pub(crate) start: State,
+}
+
+/// Motions that are computed side by side. Every operation of a step waits for the one before it: a processor computes four motions in little
+/// more time than one.
+const LANES: usize = 4;
+
+/// A number of each of some motions.
+type Lanes<const N: usize> = [f64; N];
+
+/// A number of each motion.
+#[inline]
+fn each<const N: usize>(number: impl FnMut(usize) -> f64) -> Lanes<N> {
+    std::array::from_fn(number)
+}
+
+/// States of some motions.
+#[derive(Clone, Copy)]
+struct States<const N: usize> {
+    turbine_rad_s: Lanes<N>,
+    output_rad_s: Lanes<N>,
+    twist_rad: Lanes<N>,
+    vehicle_m_s: Lanes<N>,
+    engine_rad_s: Lanes<N>,
+}
+
+impl<const N: usize> States<N> {
+    fn of(states: [State; N]) -> Self {
         Self {
-            turbine_rad_s: self.turbine_rad_s + dt_s * rate.turbine_rad_s,
-            output_rad_s: self.output_rad_s + dt_s * rate.output_rad_s,
-            twist_rad: self.twist_rad + dt_s * rate.twist_rad,
-            vehicle_m_s: self.vehicle_m_s + dt_s * rate.vehicle_m_s,
-            engine_rad_s: self.engine_rad_s + dt_s * rate.engine_rad_s,
+            turbine_rad_s: states.map(|state| state.turbine_rad_s),
+            output_rad_s: states.map(|state| state.output_rad_s),
+            twist_rad: states.map(|state| state.twist_rad),
+            vehicle_m_s: states.map(|state| state.vehicle_m_s),
+            engine_rad_s: states.map(|state| state.engine_rad_s),
+        }
+    }
+
+    #[inline]
+    fn plus(&self, rates: &Self, dt_s: f64) -> Self {
+        let after = |value: &Lanes<N>, rate: &Lanes<N>| each(|i| value[i] + dt_s * rate[i]);
+        Self {
+            turbine_rad_s: after(&self.turbine_rad_s, &rates.turbine_rad_s),
+            output_rad_s: after(&self.output_rad_s, &rates.output_rad_s),
+            twist_rad: after(&self.twist_rad, &rates.twist_rad),
+            vehicle_m_s: after(&self.vehicle_m_s, &rates.vehicle_m_s),
+            engine_rad_s: after(&self.engine_rad_s, &rates.engine_rad_s),
         }
     }
 }
 
 /// Speeds at the steps of a segment, each with its rate.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Motion {
     begin_s: f64,
     turbine: Vec<(f64, f64)>,
@@ -77,41 +121,61 @@ pub(crate) struct Part {
 }
 
 impl Motion {
-    /// Runs a segment from a state.
-    pub(crate) fn run(
-        car: &Car,
-        kind: SegmentKind,
-        of: &Circumstances,
-        inputs: &Inputs,
-        part: Part,
-        start: State,
-    ) -> Self {
-        let mut motion = Self { begin_s: part.begin_s, ..Self::default() };
-        for series in [&mut motion.turbine, &mut motion.output, &mut motion.engine] {
-            series.reserve(part.steps + 1);
+    /// Runs a segment.
+    pub(crate) fn run(kind: SegmentKind, part: Part, run: &Run<'_>) -> Self {
+        let [motion] = Self::side_by_side(kind, part, [run]);
+        motion
+    }
+
+    /// Runs a segment many times.
+    pub(crate) fn run_all(kind: SegmentKind, part: Part, runs: &[Run<'_>]) -> Vec<Self> {
+        let mut motions = Vec::with_capacity(runs.len());
+        for some in runs.chunks(LANES) {
+            // Where fewer are left, the last one fills the rest.
+            let lanes: [&Run<'_>; LANES] = std::array::from_fn(|i| &some[i.min(some.len() - 1)]);
+            motions.extend(Self::side_by_side(kind, part, lanes).into_iter().take(some.len()));
         }
-        motion.wheel.reserve(part.steps + 1);
-        let field = Field::new(car, kind, of, inputs);
-        let mut state = start;
+        motions
+    }
+
+    fn side_by_side<const N: usize>(kind: SegmentKind, part: Part, runs: [&Run<'_>; N]) -> [Self; N] {
+        let mut motions: [Self; N] = std::array::from_fn(|_| Self::resting(part));
+        let field = Field::new(kind, runs);
+        let mut states = States::of(runs.map(|run| run.start));
         for step in 0..=part.steps {
             let at = part.first + 2 * step;
-            let (k1, wheel) = field.rates(&state, at);
-            motion.turbine.push((state.turbine_rad_s, k1.turbine_rad_s));
-            motion.output.push((state.output_rad_s, k1.output_rad_s));
-            motion.engine.push((state.engine_rad_s, k1.engine_rad_s));
-            motion.wheel.push(wheel);
+            let (k1, wheel) = field.rates(&states, at);
+            for (i, motion) in motions.iter_mut().enumerate() {
+                motion.turbine[step] = (states.turbine_rad_s[i], k1.turbine_rad_s[i]);
+                motion.output[step] = (states.output_rad_s[i], k1.output_rad_s[i]);
+                motion.engine[step] = (states.engine_rad_s[i], k1.engine_rad_s[i]);
+                motion.wheel[step] = wheel[i];
+            }
             if step < part.steps {
-                let (k2, _) = field.rates(&state.plus(&k1, 0.5 * STEP_S), at + 1);
-                let (k3, _) = field.rates(&state.plus(&k2, 0.5 * STEP_S), at + 1);
-                let (k4, _) = field.rates(&state.plus(&k3, STEP_S), at + 2);
-                state = state
+                let (k2, _) = field.rates(&states.plus(&k1, 0.5 * STEP_S), at + 1);
+                let (k3, _) = field.rates(&states.plus(&k2, 0.5 * STEP_S), at + 1);
+                let (k4, _) = field.rates(&states.plus(&k3, STEP_S), at + 2);
+                states = states
                     .plus(&k1, STEP_S / 6.0)
                     .plus(&k2, STEP_S / 3.0)
                     .plus(&k3, STEP_S / 3.0)
                     .plus(&k4, STEP_S / 6.0);
             }
         }
-        motion
+        motions
+    }
+
+    /// All speeds zero.
+    fn resting(part: Part) -> Self {
+        let points = part.steps + 1;
+        let zero = vec![(0.0, 0.0); points];
+        Self {
+            begin_s: part.begin_s,
+            turbine: zero.clone(),
+            output: zero.clone(),
+            engine: zero,
+            wheel: vec![0.0; points],
+        }
     }
 
     pub(crate) fn turbine_at(&self, time_s: f64) -> f64 {
@@ -156,81 +220,159 @@ impl Motion {
     }
 }
 
-/// The rates of the states in a segment.
-struct Field<'a> {
-    car: &'a Car,
+/// The rates of the states of some motions in a segment. What does not change within it is divided once.
+struct Field<'a, const N: usize> {
     kind: SegmentKind,
-    inputs: &'a Inputs,
-    mass_kg: f64,
-    /// Mass with the wheels.
-    moved_kg: f64,
-    load_n: f64,
-    engine_torque_factor: f64,
-    directions: [f64; 2],
+    runs: [&'a Run<'a>; N],
+    turbine: Row<N>,
+    output: Row<N>,
+    per_final_ratio: Lanes<N>,
+    stiffness_n_m_rad: Lanes<N>,
+    damping_n_m_s_rad: Lanes<N>,
+    wheel_inertia_kg_m2: Lanes<N>,
+    per_radius: Lanes<N>,
+    rolling_n_m: Lanes<N>,
+    drag_kg_m: Lanes<N>,
+    load_n: Lanes<N>,
+    mass_kg: Lanes<N>,
+    /// One over the mass with the wheels.
+    per_moved_kg: Lanes<N>,
+    per_max_force_n: Lanes<N>,
+    /// Half the slip of the tyres' scale.
+    half_slip: Lanes<N>,
+    /// Difference of the wheels' speed to that of the car per torque and speed of the car, for small slips.
+    slip_per_n_m: Lanes<N>,
 }
 
-impl<'a> Field<'a> {
-    fn new(car: &'a Car, kind: SegmentKind, of: &Circumstances, inputs: &'a Inputs) -> Self {
-        let radius = car.road.wheel_radius_m;
-        let mass_kg = car.road.mass_kg * (1.0 + of.mass_share);
+/// Acceleration per torque of each motion.
+struct Row<const N: usize> {
+    per_turbine_torque: Lanes<N>,
+    per_offgoing_torque: Lanes<N>,
+    per_oncoming_torque: Lanes<N>,
+    per_output_torque: Lanes<N>,
+}
+
+impl<const N: usize> Row<N> {
+    fn of(rows: [&AccelerationRow<f64>; N]) -> Self {
         Self {
-            car,
+            per_turbine_torque: rows.map(|row| row.per_turbine_torque),
+            per_offgoing_torque: rows.map(|row| row.per_offgoing_torque),
+            per_oncoming_torque: rows.map(|row| row.per_oncoming_torque),
+            per_output_torque: rows.map(|row| row.per_output_torque),
+        }
+    }
+
+    #[inline]
+    fn at(&self, turbine: &Lanes<N>, offgoing: &Lanes<N>, oncoming: &Lanes<N>, output: &Lanes<N>) -> Lanes<N> {
+        each(|i| {
+            self.per_turbine_torque[i] * turbine[i]
+                + self.per_offgoing_torque[i] * offgoing[i]
+                + self.per_oncoming_torque[i] * oncoming[i]
+                + self.per_output_torque[i] * output[i]
+        })
+    }
+}
+
+impl<'a, const N: usize> Field<'a, N> {
+    fn new(kind: SegmentKind, runs: [&'a Run<'a>; N]) -> Self {
+        let of = |number: &dyn Fn(&Run<'_>) -> f64| runs.map(number);
+        let mass_kg = |run: &Run<'_>| run.car.road.mass_kg * (1.0 + run.of.mass_share);
+        let moved_kg =
+            |run: &Run<'_>| mass_kg(run) + run.car.driveline.wheel_inertia_kg_m2 / run.car.road.wheel_radius_m.powi(2);
+        let slip_per_n_m = |run: &Run<'_>| {
+            0.5 * run.car.tyre.slip_scale / (run.car.road.wheel_radius_m.powi(2) * run.car.tyre.max_force_n)
+        };
+        Self {
             kind,
-            inputs,
-            mass_kg,
-            moved_kg: mass_kg + car.driveline.wheel_inertia_kg_m2 / (radius * radius),
-            load_n: of.load_n + car.road.grade_force() * (1.0 + of.mass_share),
-            engine_torque_factor: car.engine_torque_scale.recip() * (1.0 + of.engine_torque_share),
-            directions: of.directions,
+            turbine: Row::of(runs.map(|run| &run.car.coefficients(kind).turbine)),
+            output: Row::of(runs.map(|run| &run.car.coefficients(kind).output)),
+            per_final_ratio: of(&|run| run.car.driveline.final_ratio.recip()),
+            stiffness_n_m_rad: of(&|run| run.car.driveline.shaft_stiffness_n_m_rad),
+            damping_n_m_s_rad: of(&|run| run.car.driveline.shaft_damping_n_m_s_rad),
+            wheel_inertia_kg_m2: of(&|run| run.car.driveline.wheel_inertia_kg_m2),
+            per_radius: of(&|run| run.car.road.wheel_radius_m.recip()),
+            rolling_n_m: of(&|run| run.car.road.rolling_moment_n_m),
+            drag_kg_m: of(&|run| run.car.road.drag_factor()),
+            load_n: of(&|run| run.of.load_n + run.car.road.grade_force() * (1.0 + run.of.mass_share)),
+            mass_kg: of(&mass_kg),
+            per_moved_kg: of(&|run| moved_kg(run).recip()),
+            per_max_force_n: of(&|run| run.car.tyre.max_force_n.recip()),
+            half_slip: of(&|run| 0.5 * run.car.tyre.slip_scale),
+            slip_per_n_m: of(&slip_per_n_m),
+            runs,
         }
     }
 
     /// Rates, and the speed of the wheels.
     #[inline]
-    fn rates(&self, state: &State, at: usize) -> (State, f64) {
-        let car = self.car;
-        let engine_rad_s = self.inputs.engine_rad_s[at];
-        let converter = car.converter.torques(engine_rad_s, state.turbine_rad_s);
-        let Wheels { shaft_n_m, wheel_rad_s, vehicle_m_s2 } = self.wheels(state);
+    fn rates(&self, states: &States<N>, at: usize) -> (States<N>, Lanes<N>) {
+        let Wheels { shaft_n_m, wheel_rad_s, vehicle_m_s2 } = self.wheels(states);
+        let (mut turbine_n_m, mut engine_rad_s2) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            (turbine_n_m[i], engine_rad_s2[i]) = self.converter(i, states.turbine_rad_s[i], at);
+        }
+        let speeds = |i: usize| (states.turbine_rad_s[i], states.output_rad_s[i]);
         let (offgoing_n_m, oncoming_n_m) = match self.kind {
-            SegmentKind::Locked => (0.0, 0.0),
-            SegmentKind::Held => (0.0, self.oncoming(state, at)),
-            SegmentKind::Slipping => (self.offgoing(state, at), self.oncoming(state, at)),
+            SegmentKind::Locked => ([0.0; N], [0.0; N]),
+            SegmentKind::Held => ([0.0; N], each(|i| self.oncoming(i, speeds(i), at))),
+            SegmentKind::Slipping => {
+                (each(|i| self.offgoing(i, speeds(i), at)), each(|i| self.oncoming(i, speeds(i), at)))
+            }
         };
-        let torques = ShiftTorques {
-            turbine_n_m: converter.turbine_n_m,
-            offgoing_n_m,
-            oncoming_n_m,
-            output_n_m: shaft_n_m / car.driveline.final_ratio,
-        };
-        let rows = car.coefficients(self.kind);
-        let engine = self.inputs.engine_n_m.get(at).map_or(0.0, |engine_n_m| {
-            let torque_n_m = self.engine_torque_factor * engine_n_m;
-            (torque_n_m - car.engine_drag_n_m_s * engine_rad_s - converter.pump_n_m) / car.engine_inertia_kg_m2
-        });
-        let rates = State {
-            turbine_rad_s: rows.turbine.at(&torques),
-            output_rad_s: rows.output.at(&torques),
-            twist_rad: car.driveline.twist_rate(state.output_rad_s, wheel_rad_s),
+        let output_n_m: Lanes<N> = each(|i| shaft_n_m[i] * self.per_final_ratio[i]);
+        let rates = States {
+            turbine_rad_s: self.turbine.at(&turbine_n_m, &offgoing_n_m, &oncoming_n_m, &output_n_m),
+            output_rad_s: self.output.at(&turbine_n_m, &offgoing_n_m, &oncoming_n_m, &output_n_m),
+            twist_rad: each(|i| states.output_rad_s[i] * self.per_final_ratio[i] - wheel_rad_s[i]),
             vehicle_m_s: vehicle_m_s2,
-            engine_rad_s: engine,
+            engine_rad_s: engine_rad_s2,
         };
         (rates, wheel_rad_s)
     }
 
-    /// A slip that would turn around keeps its direction and has the friction at rest: in a segment in which the clutch slips, a torque that
-    /// changed its sign would have no derivative.
-    fn oncoming(&self, state: &State, at: usize) -> f64 {
-        let direction = self.directions[0];
-        let slip = direction * self.car.shift.oncoming_slip(state.turbine_rad_s, state.output_rad_s);
-        direction * self.car.clutch.torque_capacity(self.inputs.oncoming_pa[at], slip.max(0.0))
+    /// Turbine torque of a motion, and the acceleration of its engine, zero where its torque is not known.
+    #[inline]
+    fn converter(&self, i: usize, turbine_rad_s: f64, at: usize) -> (f64, f64) {
+        let Run { car, of, inputs, .. } = self.runs[i];
+        let engine_rad_s = inputs.engine_rad_s[at];
+        let torques = car.converter.torques(engine_rad_s, turbine_rad_s);
+        let engine_rad_s2 = inputs.engine_n_m.get(at).map_or(0.0, |engine_n_m| {
+            let torque_n_m = engine_n_m / car.engine_torque_scale * (1.0 + of.engine_torque_share);
+            (torque_n_m - car.engine_drag_n_m_s * engine_rad_s - torques.pump_n_m) / car.engine_inertia_kg_m2
+        });
+        (torques.turbine_n_m, engine_rad_s2)
     }
 
-    fn offgoing(&self, state: &State, at: usize) -> f64 {
-        let Some(pressure_pa) = self.inputs.offgoing_pa.get(at) else { return 0.0 };
-        let direction = self.directions[1];
-        let slip = direction * self.car.shift.offgoing_slip(state.turbine_rad_s, state.output_rad_s);
-        direction * self.car.offgoing.torque_capacity(*pressure_pa, slip.max(0.0))
+    /// Torque of the oncoming clutch of a motion at its turbine and output speed.
+    ///
+    /// A slip that would turn around keeps its direction and has the friction at rest: in a segment in which the clutch slips, a torque that
+    /// changed its sign would have no derivative.
+    #[inline]
+    fn oncoming(&self, i: usize, (turbine_rad_s, output_rad_s): (f64, f64), at: usize) -> f64 {
+        let Run { car, of, inputs, .. } = self.runs[i];
+        let direction = of.directions[0];
+        let slip = direction * car.shift.oncoming_slip(turbine_rad_s, output_rad_s);
+        direction * car.clutch.torque_capacity(inputs.oncoming_pa[at], slip.at_least(0.0))
+    }
+
+    #[inline]
+    fn offgoing(&self, i: usize, (turbine_rad_s, output_rad_s): (f64, f64), at: usize) -> f64 {
+        let Run { car, of, inputs, .. } = self.runs[i];
+        let Some(pressure_pa) = inputs.offgoing_pa.get(at) else { return 0.0 };
+        let direction = of.directions[1];
+        let slip = direction * car.shift.offgoing_slip(turbine_rad_s, output_rad_s);
+        direction * car.offgoing.torque_capacity(*pressure_pa, slip.at_least(0.0))
+    }
+
+    /// Rolling moment of each car at the speeds of its wheels.
+    #[inline]
+    fn rolling(&self, wheel_rad_s: &Lanes<N>) -> Lanes<N> {
+        /// Where it does not depend on the speed any more, for sure.
+        const MOVING_RAD_S: f64 = 20.0;
+        if wheel_rad_s.iter().all(|speed| *speed > MOVING_RAD_S) {
+            return self.rolling_n_m;
+        }
+        each(|i| self.runs[i].car.road.rolling_moment(wheel_rad_s[i]))
     }
 
     /// Shafts, wheels and car at a state.
@@ -238,43 +380,68 @@ impl<'a> Field<'a> {
     /// The damping of the shafts needs the speed of the wheels, and the slip of the tyres the torque of the shafts. Each pass leaves about
     /// a fiftieth of the error. The torque's rate is that of the spring.
     #[inline]
-    fn wheels(&self, state: &State) -> Wheels {
-        let (driveline, road, tyre) = (&self.car.driveline, &self.car.road, &self.car.tyre);
-        let radius = road.wheel_radius_m;
-        let rolling_n_m = road.rolling_moment(state.vehicle_m_s / radius);
-        let against_n = road.drag_force(state.vehicle_m_s) + self.load_n;
-        let spring_n_m = driveline.shaft_stiffness_n_m_rad * state.twist_rad;
-        let per_n_m = 0.5 * tyre.slip_scale * state.vehicle_m_s / (radius * radius * tyre.max_force_n);
-        let mut wheel_rad_s = state.vehicle_m_s / radius + per_n_m * (spring_n_m - rolling_n_m);
-        let (mut shaft_n_m, mut vehicle_m_s2) = (spring_n_m, 0.0);
+    fn wheels(&self, states: &States<N>) -> Wheels<N> {
+        let vehicle_m_s = &states.vehicle_m_s;
+        let free_rad_s: Lanes<N> = each(|i| vehicle_m_s[i] * self.per_radius[i]);
+        let rolling_n_m = self.rolling(&free_rad_s);
+        let against_n: Lanes<N> = each(|i| self.drag_kg_m[i] * vehicle_m_s[i] * vehicle_m_s[i].abs() + self.load_n[i]);
+        let spring_n_m: Lanes<N> = each(|i| self.stiffness_n_m_rad[i] * states.twist_rad[i]);
+        let per_n_m: Lanes<N> = each(|i| self.slip_per_n_m[i] * vehicle_m_s[i]);
+        let mut wheel_rad_s: Lanes<N> = each(|i| free_rad_s[i] + per_n_m[i] * (spring_n_m[i] - rolling_n_m[i]));
+        let (mut shaft_n_m, mut vehicle_m_s2) = (spring_n_m, [0.0; N]);
         for _ in 0..2 {
-            let rate_rad_s = driveline.twist_rate(state.output_rad_s, wheel_rad_s);
-            shaft_n_m = spring_n_m + driveline.shaft_damping_n_m_s_rad * rate_rad_s;
-            let slip_rad_s2 = per_n_m * driveline.shaft_stiffness_n_m_rad * rate_rad_s;
-            let free_n_m = shaft_n_m - rolling_n_m - driveline.wheel_inertia_kg_m2 * slip_rad_s2;
-            vehicle_m_s2 = (free_n_m / radius - against_n) / self.moved_kg;
-            let force_n = self.mass_kg * vehicle_m_s2 + against_n;
-            let slip = 0.5 * tyre.slip_scale * inverse_tanh(force_n / tyre.max_force_n);
-            let rim_m_s = if slip > 0.0 { state.vehicle_m_s / (1.0 - slip) } else { state.vehicle_m_s * (1.0 + slip) };
-            wheel_rad_s = rim_m_s / radius;
+            let rate_rad_s: Lanes<N> = each(|i| states.output_rad_s[i] * self.per_final_ratio[i] - wheel_rad_s[i]);
+            shaft_n_m = each(|i| spring_n_m[i] + self.damping_n_m_s_rad[i] * rate_rad_s[i]);
+            vehicle_m_s2 = each(|i| {
+                let slip_rad_s2 = per_n_m[i] * self.stiffness_n_m_rad[i] * rate_rad_s[i];
+                let free_n_m = shaft_n_m[i] - rolling_n_m[i] - self.wheel_inertia_kg_m2[i] * slip_rad_s2;
+                (free_n_m * self.per_radius[i] - against_n[i]) * self.per_moved_kg[i]
+            });
+            let used: Lanes<N> = each(|i| (self.mass_kg[i] * vehicle_m_s2[i] + against_n[i]) * self.per_max_force_n[i]);
+            let reached: Lanes<N> = inverse_tanh(used);
+            wheel_rad_s = each(|i| {
+                let slip = self.half_slip[i] * reached[i];
+                free_rad_s[i] * (1.0 + slip.at_most(0.0)) / (1.0 - slip.at_least(0.0))
+            });
         }
         Wheels { shaft_n_m, wheel_rad_s, vehicle_m_s2 }
     }
 }
 
 /// What follows from a state beyond the gearbox.
-struct Wheels {
-    shaft_n_m: f64,
-    wheel_rad_s: f64,
-    vehicle_m_s2: f64,
+struct Wheels<const N: usize> {
+    shaft_n_m: Lanes<N>,
+    wheel_rad_s: Lanes<N>,
+    vehicle_m_s2: Lanes<N>,
 }
 
-/// `atanh`, by its series where that is exact to 1e-6: most of the time of a fit would be spent here. At the tyre's limit it
+/// `atanh`, by a fraction where that is exact to 1e-6: much of the time of a fit would be spent here. At the tyre's limit it
 /// ends at a finite slip.
 #[inline]
-fn inverse_tanh(x: f64) -> f64 {
-    let xx = x * x;
-    if xx < 0.06 { x * (1.0 + xx * (1.0 / 3.0 + xx * (0.2 + xx / 7.0))) } else { x.clamp(-0.999, 0.999).atanh() }
+fn inverse_tanh<const N: usize>(x: Lanes<N>) -> Lanes<N> {
+    /// Square of the argument up to which it is used.
+    const FRACTION_TO: f64 = 0.4;
+    let squares: Lanes<N> = each(|i| x[i] * x[i]);
+    // The seventh fraction of Lambert's continued fraction x/(1 - x^2/(3 - 4 x^2/(5 - 9 x^2/(7 - ...)))).
+    let mut result: Lanes<N> = each(|i| {
+        let xx = squares[i];
+        let above = 1.0 - xx * (50.0 / 39.0 - xx * (283.0 / 715.0 - xx * (256.0 / 15015.0)));
+        let below = 1.0 - xx * (21.0 / 13.0 - xx * (105.0 / 143.0 - xx * (35.0 / 429.0)));
+        x[i] * above / below
+    });
+    if !squares.iter().all(|xx| *xx <= FRACTION_TO) {
+        for i in (0..N).filter(|i| squares[*i] > FRACTION_TO) {
+            result[i] = at_tyre_limit(x[i]);
+        }
+    }
+    result
+}
+
+/// Not a part of the loops over the motions, which the compiler can then do for all of them at once.
+#[cold]
+#[inline(never)]
+fn at_tyre_limit(x: f64) -> f64 {
+    x.clamp(-0.999, 0.999).atanh()
 }
 
 #[cfg(test)]
@@ -284,32 +451,77 @@ mod tests {
     use super::*;
     use crate::ReadingAges;
 
-    /// A torque that changes its sign with the slip would hold the slip near zero, step by step to and fro: such a motion is a rough function of
-    /// the parameters, and a fit gets stuck in it.
-    #[test]
-    fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
-        let car = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
-        let part = Part { begin_s: 0.0, first: 0, steps: 10 };
-        let points = 2 * part.steps + 1;
+    /// A car in a segment in which both clutches slip, with the pressure of the oncoming one and the speed of the car.
+    fn slipping(car: &Car, oncoming_pa: f64, output_rad_s: f64) -> (Inputs, Circumstances, State) {
+        let points = 2 * PART.steps + 1;
         let inputs = Inputs {
             engine_rad_s: vec![200.0; points],
-            oncoming_pa: vec![0.7e6; points],
+            oncoming_pa: vec![oncoming_pa; points],
             offgoing_pa: Vec::new(),
             engine_n_m: Vec::new(),
         };
-        let of = Circumstances { directions: [1.0, -1.0], ..Circumstances::default() };
-        let output_rad_s = 60.0;
         let start = State {
             turbine_rad_s: car.shift.ratio_oncoming() * output_rad_s + 20.0,
             output_rad_s,
             vehicle_m_s: output_rad_s / car.driveline.final_ratio * car.road.wheel_radius_m,
             ..State::default()
         };
-        let motion = Motion::run(&car, SegmentKind::Slipping, &of, &inputs, part, start);
+        (inputs, Circumstances { directions: [1.0, -1.0], ..Circumstances::default() }, start)
+    }
+
+    const PART: Part = Part { begin_s: 0.0, first: 0, steps: 10 };
+
+    /// A torque that changes its sign with the slip would hold the slip near zero, step by step to and fro: such a motion is a rough function of
+    /// the parameters, and a fit gets stuck in it.
+    #[test]
+    fn a_torque_keeps_its_sign_where_the_slip_would_turn_around() {
+        let car = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
+        let (inputs, of, start) = slipping(&car, 0.7e6, 60.0);
+        let motion = Motion::run(SegmentKind::Slipping, PART, &Run { car: &car, of, inputs: &inputs, start });
         let slips: Vec<f64> = (motion.turbine.iter().zip(&motion.output))
             .map(|(turbine, output)| car.shift.oncoming_slip(turbine.0, output.0))
             .collect();
         assert!(slips[0] > 0.0 && *slips.last().unwrap() < 0.0, "{slips:?}");
         assert!(slips.windows(2).all(|pair| pair[1] < pair[0]), "{slips:?}");
+    }
+
+    /// Other cars, pressures, loads, speeds and tyre forces: none may act on the motion beside it, not even in the last digit, which would be a
+    /// part of a derivative. One stands nearly, and one pulls at the limit of its tyres.
+    #[test]
+    fn motions_side_by_side_are_those_of_each_alone() {
+        let file = Car::of_file(&Vehicle::built_in().unwrap(), ReadingAges::default());
+        let mut weak_tyres = file.clone();
+        weak_tyres.tyre.max_force_n *= 0.05;
+        let cars = [&file, &file, &weak_tyres, &file, &file, &weak_tyres];
+        let [outputs, twists] = [[60.0, 70.0, 60.0, 1.0, 65.0, 66.0], [0.01, 0.02, 0.05, 0.0, 0.04, 0.06]];
+        let all: Vec<(Inputs, Circumstances, State)> = (0..cars.len())
+            .map(|i| {
+                let (inputs, of, start) = slipping(cars[i], 0.1e6 * (i + 1) as f64, outputs[i]);
+                (inputs, Circumstances { load_n: 100.0 * i as f64, ..of }, State { twist_rad: twists[i], ..start })
+            })
+            .collect();
+        for kind in [SegmentKind::Held, SegmentKind::Slipping, SegmentKind::Locked] {
+            let runs: Vec<Run<'_>> = (all.iter().zip(cars))
+                .map(|((inputs, of, start), car)| Run { car, of: *of, inputs, start: *start })
+                .collect();
+            let motions = Motion::run_all(kind, PART, &runs);
+            assert_eq!(motions.len(), runs.len());
+            for (motion, run) in motions.iter().zip(&runs) {
+                assert_eq!(*motion, Motion::run(kind, PART, run));
+            }
+            assert!(motions.windows(2).all(|pair| pair[0].turbine != pair[1].turbine));
+        }
+    }
+
+    /// Over the whole range, with the end of the fraction and the limit of the tyre.
+    #[test]
+    fn the_inverse_of_the_tangent_is_exact_to_a_millionth() {
+        for i in -998..=998 {
+            let x = 1e-3 * f64::from(i);
+            let [found, other] = inverse_tanh([x, 0.5]);
+            assert!((found - x.atanh()).abs() <= 1e-6 * x.abs().atanh(), "{x}: {found}");
+            assert_eq!([other], inverse_tanh([0.5]), "beside {x}");
+        }
+        assert_eq!(inverse_tanh([2.0, -2.0]), [0.999_f64.atanh(), (-0.999_f64).atanh()]);
     }
 }

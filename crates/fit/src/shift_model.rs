@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::car::Car;
 use crate::fill::{FillLog, fill_begin_s};
-use crate::motion::{Circumstances, Inputs, Motion, Part, STEP_S, State};
+use crate::motion::{Circumstances, Inputs, Motion, Part, Run, STEP_S, State};
 use crate::parameters::{Prior, Shaft};
 use crate::pressure::{Grid, pressures};
 use crate::record::{SHORTEST_S, Segment, SegmentKind, ShiftRecord, age_s};
@@ -88,6 +88,8 @@ pub(crate) struct ShiftModel {
     pub(crate) rows: usize,
     pub(crate) own: Vec<OwnUnknown>,
     has_engine_torque: bool,
+    /// Readings of the engine speed at the half steps.
+    engine_rad_s: Vec<f64>,
     offgoing_pa: Vec<f64>,
     directions: [f64; 2],
 }
@@ -136,6 +138,7 @@ impl ShiftModel {
             rows: 0,
             own: Vec::new(),
             has_engine_torque,
+            engine_rad_s: (0..points).map(|i| record.engine.at(half_steps.time_s(i))).collect(),
             offgoing_pa,
             directions: directions(&record, car),
             record,
@@ -241,13 +244,8 @@ impl ShiftModel {
 
     fn engine(&self, car: &Car) -> Vec<f64> {
         let late = |speed: f64| car.engine_delay_s + age_s(car.ages.engine_rad, speed);
-        (0..self.half_steps.points)
-            .map(|i| {
-                let time_s = self.half_steps.time_s(i);
-                let near = self.record.engine.at(time_s);
-                self.record.engine.at(time_s + late(near))
-            })
-            .collect()
+        let times = (0..self.half_steps.points).map(|i| self.half_steps.time_s(i));
+        times.zip(&self.engine_rad_s).map(|(time_s, near)| self.record.engine.at(time_s + late(*near))).collect()
     }
 
     fn engine_torque(&self, car: &Car) -> Vec<f64> {
@@ -260,32 +258,34 @@ impl ShiftModel {
 
     /// Readings less what the model says.
     pub(crate) fn residuals(&self, car: &Car, inputs: &Inputs, own: &[f64]) -> DVector<f64> {
-        self.compared(car, inputs, &self.motions(car, inputs, own))
+        self.compared(car, inputs, &self.motions(&Moved { car, inputs, own, by: By::Nothing }))
     }
 
     /// The motion in each segment.
-    fn motions(&self, car: &Car, inputs: &Inputs, own: &[f64]) -> Vec<Motion> {
-        (0..self.parts.len()).map(|i| self.motion(i, car, inputs, own)).collect()
+    fn motions(&self, of: &Moved<'_>) -> Vec<Motion> {
+        let parts = self.parts.iter().zip(&self.record.segments).enumerate();
+        parts.map(|(i, (part, segment))| Motion::run(segment.kind, *part, &self.run(i, of))).collect()
     }
 
-    fn motion(&self, i: usize, car: &Car, inputs: &Inputs, own: &[f64]) -> Motion {
-        let kind = self.record.segments[i].kind;
-        let (of, start) = self.circumstances(i, kind, car, own);
-        Motion::run(car, kind, &of, inputs, self.parts[i], start)
+    /// What makes the motion in a segment.
+    fn run<'a>(&self, i: usize, of: &Moved<'a>) -> Run<'a> {
+        let Moved { car, inputs, own, .. } = *of;
+        let (of, start) = self.circumstances(i, self.record.segments[i].kind, car, own);
+        Run { car, of, inputs, start }
     }
 
     /// Readings less what these motions say.
     fn compared(&self, car: &Car, inputs: &Inputs, motions: &[Motion]) -> DVector<f64> {
         let mut rows = DVector::zeros(self.rows);
         for (i, motion) in motions.iter().enumerate() {
-            self.segment(i, car, motion, &mut rows);
+            self.segment(i, car, motion, rows.as_mut_slice());
         }
-        self.pressure(car, inputs, &mut rows);
+        self.pressure(car, inputs, rows.as_mut_slice());
         rows
     }
 
     /// The rows of one segment.
-    fn segment(&self, i: usize, car: &Car, motion: &Motion, rows: &mut DVector<f64>) {
+    fn segment(&self, i: usize, car: &Car, motion: &Motion, rows: &mut [f64]) {
         let ages = car.ages;
         for block in self.blocks.iter().filter(|block| block.segment == Some(i)) {
             for (row, (time_s, reading)) in block.rows.clone().zip(&block.readings) {
@@ -303,7 +303,7 @@ impl ShiftModel {
         }
     }
 
-    fn pressure(&self, car: &Car, inputs: &Inputs, rows: &mut DVector<f64>) {
+    fn pressure(&self, car: &Car, inputs: &Inputs, rows: &mut [f64]) {
         for block in self.blocks.iter().filter(|block| block.segment.is_none()) {
             for (row, (time_s, reading)) in block.rows.clone().zip(&block.readings) {
                 let seen_s = time_s - car.pressure_delay_s;
@@ -353,70 +353,128 @@ impl ShiftModel {
         (of, State { turbine_rad_s, output_rad_s, twist_rad, vehicle_m_s, engine_rad_s })
     }
 
-    /// Residuals and their derivatives, by forward differences.
-    pub(crate) fn linearised(
-        &self,
-        file: &Car,
-        shafts: &[Shaft],
-        priors: &[Prior],
-        unknowns: &[f64],
-        own: &[f64],
-    ) -> Linearised {
-        let car = file.with(shafts, priors, unknowns);
-        let inputs = self.inputs(&car);
-        let motions = self.motions(&car, &inputs, own);
-        let residuals = self.compared(&car, &inputs, &motions);
-        let mut by_parameter = DMatrix::zeros(self.rows, priors.len());
-        let mut moved = unknowns.to_vec();
-        for (j, prior) in priors.iter().enumerate() {
-            moved[j] += DIFFERENCE;
-            let other = file.with(shafts, priors, &moved);
-            moved[j] = unknowns[j];
-            let mut changed = None;
-            match prior.parameter {
-                P::Gain | P::Lag | P::CommandDelay | P::Hysteresis | P::Shape(Map::Lag | Map::Gain, _) => {
-                    changed.get_or_insert_with(|| inputs.clone()).oncoming_pa = self.oncoming(&other);
-                }
-                P::EngineDelay => {
-                    changed.get_or_insert_with(|| inputs.clone()).engine_rad_s = self.engine(&other);
-                }
-                P::EngineTorqueDelay => {
-                    changed.get_or_insert_with(|| inputs.clone()).engine_n_m = self.engine_torque(&other);
-                }
-                _ => {}
-            }
-            let rows = if prior.parameter.leaves_motion() {
-                self.compared(&other, &inputs, &motions)
-            } else {
-                let inputs = changed.as_ref().unwrap_or(&inputs);
-                let segments = motions.iter().zip(&self.record.segments).enumerate();
-                let moved = |(i, (motion, segment)): (usize, (&Motion, &Segment))| {
-                    let is_moved = acts_in(prior.parameter, segment.kind);
-                    if is_moved { self.motion(i, &other, inputs, own) } else { motion.clone() }
-                };
-                self.compared(&other, inputs, &segments.map(moved).collect::<Vec<_>>())
-            };
-            by_parameter.set_column(j, &((rows - &residuals) / DIFFERENCE));
-        }
-        let by_own = self.by_own(&car, &inputs, own, &residuals);
-        Linearised { residuals, by_parameter, by_own }
+    /// Residuals and their derivatives, by forward differences: those of a car by its own unknowns, and by the parameters which these other
+    /// cars have changed.
+    pub(crate) fn linearised(&self, car: &Car, changed: &[Changed], own: &[f64]) -> Linearised {
+        let inputs = self.inputs(car);
+        let base = Moved { car, inputs: &inputs, own, by: By::Nothing };
+        let changed_inputs: Vec<Option<Inputs>> =
+            changed.iter().map(|changed| self.changed_inputs(&inputs, changed)).collect();
+        let changed_own: Vec<Vec<f64>> = (0..own.len())
+            .map(|j| own.iter().enumerate().map(|(i, x)| if i == j { x + DIFFERENCE } else { *x }).collect())
+            .collect();
+        let by_parameter = changed.iter().zip(&changed_inputs).map(|(changed, own_inputs)| Moved {
+            car: &changed.car,
+            inputs: own_inputs.as_ref().unwrap_or(&inputs),
+            own,
+            by: By::Parameter(changed.parameter),
+        });
+        let by_own = self.own.iter().zip(&changed_own);
+        let by_own = by_own.map(|(unknown, own)| Moved { own, by: By::Own(unknown.segment), ..base });
+        let moved: Vec<Moved<'_>> = by_parameter.chain(by_own).collect();
+        let (residuals, differences) = self.differences(&base, &moved);
+        let by_own = differences.columns(changed.len(), own.len()).into_owned();
+        Linearised { residuals, by_parameter: differences.remove_columns(changed.len(), own.len()), by_own }
     }
 
-    /// Derivatives by the own unknowns.
-    fn by_own(&self, car: &Car, inputs: &Inputs, own: &[f64], residuals: &DVector<f64>) -> DMatrix<f64> {
-        let mut by_own = DMatrix::zeros(self.rows, self.own.len());
-        let mut moved = own.to_vec();
-        for (j, unknown) in self.own.iter().enumerate() {
-            moved[j] += DIFFERENCE;
-            let mut rows = residuals.clone();
-            match unknown.segment {
-                Some(i) => self.segment(i, car, &self.motion(i, car, inputs, &moved), &mut rows),
-                None => rows = self.residuals(car, inputs, &moved),
+    /// The inputs of a changed car where they are others.
+    fn changed_inputs(&self, inputs: &Inputs, Changed { parameter, car }: &Changed) -> Option<Inputs> {
+        let mut changed = None;
+        match parameter {
+            P::Gain | P::Lag | P::CommandDelay | P::Hysteresis | P::Shape(Map::Lag | Map::Gain, _) => {
+                changed.get_or_insert_with(|| inputs.clone()).oncoming_pa = self.oncoming(car);
             }
-            moved[j] = own[j];
-            by_own.set_column(j, &((rows - residuals) / DIFFERENCE));
+            P::EngineDelay => changed.get_or_insert_with(|| inputs.clone()).engine_rad_s = self.engine(car),
+            P::EngineTorqueDelay => changed.get_or_insert_with(|| inputs.clone()).engine_n_m = self.engine_torque(car),
+            _ => {}
         }
-        by_own
+        changed
+    }
+
+    /// Residuals, and how they change per unit of what is moved.
+    fn differences(&self, base: &Moved<'_>, moved: &[Moved<'_>]) -> (DVector<f64>, DMatrix<f64>) {
+        let motions: Vec<Vec<Motion>> = (0..self.parts.len()).map(|i| self.motions_of(i, base, moved)).collect();
+        let mut residuals = DVector::zeros(self.rows);
+        for (i, motions) in motions.iter().enumerate() {
+            self.segment(i, base.car, &motions[0], residuals.as_mut_slice());
+        }
+        self.pressure(base.car, base.inputs, residuals.as_mut_slice());
+        let mut others: Vec<_> = motions.iter().map(|motions| motions[1..].iter()).collect();
+        let mut columns = DMatrix::zeros(self.rows, moved.len());
+        for (mut column, moved) in columns.column_iter_mut().zip(moved) {
+            column.copy_from(&residuals);
+            for (i, segment) in self.record.segments.iter().enumerate() {
+                let other = if moved.acts_in(i, segment.kind) { others[i].next() } else { None };
+                if other.is_some() || moved.leaves_motion() {
+                    self.segment(i, moved.car, other.unwrap_or(&motions[i][0]), column.as_mut_slice());
+                }
+            }
+            self.pressure(moved.car, moved.inputs, column.as_mut_slice());
+            column.iter_mut().zip(&residuals).for_each(|(row, base)| *row = (*row - base) / DIFFERENCE);
+        }
+        (residuals, columns)
+    }
+
+    /// The motion in a segment, and those of everything moved that acts in it.
+    fn motions_of(&self, i: usize, base: &Moved<'_>, moved: &[Moved<'_>]) -> Vec<Motion> {
+        let kind = self.record.segments[i].kind;
+        let acting = moved.iter().filter(|moved| moved.acts_in(i, kind));
+        let runs: Vec<Run<'_>> = std::iter::once(base).chain(acting).map(|of| self.run(i, of)).collect();
+        Motion::run_all(kind, self.parts[i], &runs)
+    }
+}
+
+/// A car in which one parameter is changed by the step of the differences.
+pub(crate) struct Changed {
+    parameter: P,
+    car: Car,
+}
+
+impl Changed {
+    /// One for each of the parameters.
+    pub(crate) fn all(file: &Car, shafts: &[Shaft], priors: &[Prior], unknowns: &[f64]) -> Vec<Self> {
+        let mut moved = unknowns.to_vec();
+        let mut changed = |(j, prior): (usize, &Prior)| {
+            moved[j] += DIFFERENCE;
+            let car = file.with(shafts, priors, &moved);
+            moved[j] = unknowns[j];
+            Self { parameter: prior.parameter, car }
+        };
+        priors.iter().enumerate().map(&mut changed).collect()
+    }
+}
+
+/// A shift with one thing changed.
+#[derive(Clone, Copy)]
+struct Moved<'a> {
+    car: &'a Car,
+    inputs: &'a Inputs,
+    own: &'a [f64],
+    by: By,
+}
+
+/// What is changed.
+#[derive(Clone, Copy)]
+enum By {
+    Nothing,
+    Parameter(P),
+    /// An own unknown, with the segment that it is of.
+    Own(Option<usize>),
+}
+
+impl Moved<'_> {
+    /// Whether the motion in a segment is another one.
+    fn acts_in(&self, segment: usize, kind: SegmentKind) -> bool {
+        match self.by {
+            By::Nothing => false,
+            By::Parameter(parameter) => !parameter.leaves_motion() && acts_in(parameter, kind),
+            By::Own(of) => of.is_none_or(|of| of == segment),
+        }
+    }
+
+    /// Whether it changes only how a motion is read.
+    fn leaves_motion(&self) -> bool {
+        matches!(self.by, By::Parameter(parameter) if parameter.leaves_motion())
     }
 }
 

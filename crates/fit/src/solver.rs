@@ -10,7 +10,7 @@ use crate::car::Car;
 use crate::drives::{DriveNormal, Drives};
 use crate::least_squares::{Equations, Iterations, Minimum, Objective, minimised};
 use crate::parameters::{Prior, Shaft};
-use crate::shift_model::{Block, Linearised, ShiftModel};
+use crate::shift_model::{Block, Changed, Linearised, ShiftModel};
 use crate::weights::{HUBER, Weights};
 
 /// What does not change during a fit.
@@ -118,10 +118,9 @@ impl Problem<'_> {
     }
 
     pub(crate) fn linearised(&self, shifts: &[ShiftModel], at: &Unknowns) -> Vec<Linearised> {
-        let linearised = |(shift, own): (&ShiftModel, &Vec<f64>)| {
-            shift.linearised(self.file, self.shafts, self.priors, &at.shared, own)
-        };
-        shifts.iter().zip(&at.own).map(linearised).collect()
+        let car = self.file.with(self.shafts, self.priors, &at.shared);
+        let changed = Changed::all(self.file, self.shafts, self.priors, &at.shared);
+        shifts.iter().zip(&at.own).map(|(shift, own)| shift.linearised(&car, &changed, own)).collect()
     }
 
     /// The normal equations.
@@ -148,18 +147,19 @@ impl Problem<'_> {
             all.columns_mut(count, own.len()).copy_from(&lines.by_own);
             let mut errors = lines.residuals.clone();
             weights.errors(&shift.blocks, errors.as_mut_slice());
-            for mut column in all.column_iter_mut() {
-                weights.errors(&shift.blocks, column.as_mut_slice());
-            }
+            let mut roots = DVector::zeros(shift.rows);
             for block in &shift.blocks {
                 for row in block.rows.clone() {
                     let robust = (HUBER / errors[row].abs()).min(1.0);
-                    let root = (robust / weights.inflation[block.channel as usize]).sqrt();
-                    errors[row] *= root;
-                    all.row_mut(row).iter_mut().for_each(|cell| *cell *= root);
+                    roots[row] = (robust / weights.inflation[block.channel as usize]).sqrt();
                 }
             }
-            let squares = all.tr_mul(&all);
+            errors.component_mul_assign(&roots);
+            for mut column in all.column_iter_mut() {
+                weights.errors(&shift.blocks, column.as_mut_slice());
+                column.component_mul_assign(&roots);
+            }
+            let squares = squares(&all);
             let gradient = all.tr_mul(&errors);
             let own_count = own.len();
             let mut own_square = squares.view((count, count), (own_count, own_count)).into_owned();
@@ -194,6 +194,18 @@ impl Problem<'_> {
             minimised(&mut weighed, Point { unknowns: at, residuals }, iterations, progress)?;
         Ok(Solved { at: unknowns, weights: weighed.weights, is_converged, normal: line })
     }
+}
+
+/// `A' A`, of which only one half is computed.
+fn squares(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut squares = DMatrix::zeros(a.ncols(), a.ncols());
+    for j in 0..a.ncols() {
+        for i in 0..=j {
+            squares[(i, j)] = a.column(i).dot(&a.column(j));
+        }
+    }
+    squares.fill_lower_triangle_with_upper_triangle();
+    squares
 }
 
 /// A problem with weights.

@@ -48,7 +48,7 @@ impl HeldSpeed {
     /// Whether the next value is the one before, held.
     pub fn is_held(&mut self, value: f64) -> bool {
         if value == self.value {
-            let again = self.rows % (self.held_rows + u32::from(self.one_more)).max(1) == 0;
+            let again = self.rows.is_multiple_of((self.held_rows + u32::from(self.one_more)).max(1));
             self.rows = self.rows.saturating_add(1);
             return self.seen >= ENOUGH && !again;
         }
@@ -132,7 +132,7 @@ mod tests {
     fn a_clock_that_does_not_fit_the_rows_is_seen() {
         // 25 ms in rows of 10 ms: two and three rows.
         let rows = held(rising(400), |i| i % 5 == 0 || i % 5 == 3, 0.01);
-        assert!((100..400).all(|i| rows[i] == !(i % 5 == 0 || i % 5 == 3)), "{rows:?}");
+        assert!((100..400).all(|i| rows[i] != (i % 5 == 0 || i % 5 == 3)), "{rows:?}");
         // 19.9 ms: a value in one row now and then.
         let sent = |i: u32| i == 0 || (i * 100 / 199) != ((i - 1) * 100 / 199);
         let rows = held(rising(2000), sent, 0.01);

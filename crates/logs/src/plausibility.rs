@@ -14,7 +14,7 @@ pub struct Extremes {
     pub least: f64,
     /// The greatest.
     pub greatest: f64,
-    /// Values away from zero by their size: how many lie between two powers of two.
+    /// Values away from zero by their size: how many lie between two powers of the eighth root of two.
     sizes: [u32; SIZES],
     count: u64,
     /// Values above and below zero by more than `SMALL_RAD_S`.
@@ -28,11 +28,16 @@ const SMALL_RAD_S: f64 = 60.0;
 /// Wheels of a car that drives at all turn faster, rad/s: 4 m/s.
 const MOVING_RAD_S: f64 = 13.0;
 
+/// An engine that drives a car turns faster at times, rad/s: 1000 rpm.
+const DRIVEN_RAD_S: f64 = 105.0;
+
 /// An engine that is driven is mostly slower, rad/s: 6000 rpm.
 const ENGINE_RAD_S: f64 = 630.0;
 
-/// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has.
-const SIZES: usize = 64;
+/// Powers of two from 2^-32 to 2^32, which hold every value in SI that a car has; and parts of each.
+const OCTAVES: usize = 64;
+const PARTS: usize = 8;
+const SIZES: usize = OCTAVES * PARTS;
 
 impl Default for Extremes {
     fn default() -> Self {
@@ -50,22 +55,28 @@ impl Extremes {
         self.greatest = self.greatest.max(value);
         if value != 0.0 {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the table")]
-            let size = (value.abs().log2().floor() + 32.0).clamp(0.0, 63.0) as usize;
+            let size = ((value.abs().log2() + 32.0) * PARTS as f64).clamp(0.0, (SIZES - 1) as f64) as usize;
             self.sizes[size] = self.sizes[size].saturating_add(1);
         }
     }
 
-    /// The middle of the sizes of the values that are not zero, to a factor of the root of two; none without such values.
+    /// The middle of the sizes of the values that are not zero, to 5 %; none without such values.
     pub fn middle(&self) -> Option<f64> {
         let all: u64 = self.sizes.iter().map(|count| u64::from(*count)).sum();
         let mut below = 0;
-        for (size, count) in (0_i32..).zip(&self.sizes) {
+        for (size, count) in (0_u32..).zip(&self.sizes) {
             below += u64::from(*count);
             if 2 * below > all {
-                return Some(f64::from(size - 32).exp2() * std::f64::consts::SQRT_2);
+                return Some(((f64::from(size) + 0.5) / PARTS as f64 - 32.0).exp2());
             }
         }
         None
+    }
+
+    /// How many values lie between two powers of two.
+    fn octaves(&self) -> [u64; OCTAVES] {
+        let (octaves, _) = self.sizes.as_chunks::<PARTS>();
+        std::array::from_fn(|at| octaves.get(at).map_or(0, |parts| parts.iter().map(|count| u64::from(*count)).sum()))
     }
 
     /// Whether it turns forward, but for a few readings that may be wrong.
@@ -86,10 +97,10 @@ impl Extremes {
 
     /// The greatest size, without the greatest hundredth of the values where that is of another order: a few readings may be wrong.
     fn size(&self) -> f64 {
-        let all: u64 = self.sizes.iter().map(|count| u64::from(*count)).sum();
-        let mut below = 0;
-        let nearly_all = (0_i32..).zip(&self.sizes).find(|(_, count)| {
-            below += u64::from(**count);
+        let octaves = self.octaves();
+        let (all, mut below) = (octaves.iter().sum::<u64>(), 0);
+        let nearly_all = (0_i32..).zip(&octaves).find(|(_, count)| {
+            below += **count;
             100 * below >= 99 * all
         });
         let limit = nearly_all.map_or(f64::INFINITY, |(size, _)| f64::from(size - 31).exp2());
@@ -99,13 +110,14 @@ impl Extremes {
     /// The greatest size of a speed. A shaft passes every speed between two others: a tenth of the values or less that is parted from all
     /// others by a factor of two and more are readings that are wrong, as of a sensor that says by a number that it has no value.
     fn speed(&self) -> f64 {
-        let all: u64 = self.sizes.iter().map(|count| u64::from(*count)).sum();
+        let octaves = self.octaves();
+        let all: u64 = octaves.iter().sum();
         let (mut above, mut limit) = (0, f64::INFINITY);
-        for (size, count) in (0_i32..64).zip(&self.sizes).rev() {
+        for (size, count) in (0_i32..64).zip(&octaves).rev() {
             if *count == 0 && above > 0 {
                 limit = f64::from(size - 32).exp2();
             }
-            above += u64::from(*count);
+            above += *count;
             if 10 * above > all {
                 break;
             }
@@ -171,9 +183,11 @@ pub fn too_fast_a_time(step_s: f64, span_s: f64) -> Option<String> {
 
 /// What cannot be right.
 pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
+    // A turbine of a car that creeps is as slow.
+    let creeps = |of: &RoleSummary, role: Role| role == Role::TurbineSpeed && of.extremes.speed() < DRIVEN_RAD_S;
     let turning =
         |role: Role| summary.iter().find(|entry| entry.role == role).filter(|entry| entry.extremes.speed() > 1.0);
-    let mut findings: Vec<Finding> = summary.iter().filter_map(|entry| alone(entry, seen)).collect();
+    let mut findings: Vec<Finding> = summary.iter().filter_map(|entry| alone(entry, summary, seen)).collect();
     if !findings.is_empty() {
         return findings;
     }
@@ -190,7 +204,8 @@ pub fn findings(summary: &[RoleSummary], seen: Seen) -> Vec<Finding> {
         let (Some(of), Some(entry)) = (turning(of), turning(role)) else { continue };
         let ratio = entry.extremes.speed() / of.extremes.speed();
         let is_small = most < 1.0;
-        if entry.unit_name == unit && (least..most).contains(&ratio) && !(is_small && seen == Seen::Beginning) {
+        let may_be = is_small && (seen == Seen::Beginning || creeps(of, role));
+        if entry.unit_name == unit && (least..most).contains(&ratio) && !may_be {
             if let Some(finding) = slow_output(of, entry, summary) {
                 findings.push(finding);
                 continue;
@@ -253,8 +268,8 @@ fn finding(entry: &RoleSummary, found: &str, why: &str, likely: &'static str) ->
     }
 }
 
-/// What cannot be right by the values of the signal alone.
-fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
+/// What cannot be right by the values of the signal, and of those of its kind.
+fn alone(entry: &RoleSummary, summary: &[RoleSummary], seen: Seen) -> Option<Finding> {
     let middle = entry.extremes.middle()?;
     if entry.role == Role::EngineSpeed && entry.extremes.is_backward() {
         let (role, name) = (entry.role, entry.name.clone());
@@ -299,19 +314,24 @@ fn alone(entry: &RoleSummary, seen: Seen) -> Option<Finding> {
         Quantity::Rotation if unit == "rpm" && entry.role == Role::EngineSpeed && size > 2.0 && middle < 42.0 => {
             say(format!("most values would be about {:.0} rpm, below idle", rpm(middle)), "rad/s")
         }
+        // That of an element which no shift applies is small in any unit, and the others of its kind tell.
+        Quantity::Current | Quantity::Pressure if greatest_of_kind(entry, summary) > size => None,
         Quantity::Current if unit == "mA" && size < 0.003 => {
             say(format!("its greatest value would be {:.3} mA", 1e3 * size), "A")
         }
-        Quantity::Share if unit == "%" && !is_duty(entry.role) && size <= 0.0101 && size > 0.0 => {
-            say(format!("its greatest value is {:.2} %", 100.0 * size), "a share from 0 to 1 (unit `1`)")
-        }
-        // That of an element which no shift applies is small in any unit.
+        // No other element is measured, and this one may not be applied.
         Quantity::Pressure if entry.role == Role::ElementPressure && !(0.3..100.0).contains(&size) => None,
         Quantity::Pressure if size < 5e3 => {
             say(format!("its greatest value would be {size:.0} Pa"), "a larger unit (kPa, bar or MPa)")
         }
         _ => None,
     }
+}
+
+/// The greatest size of a value of this kind in this unit.
+fn greatest_of_kind(entry: &RoleSummary, summary: &[RoleSummary]) -> f64 {
+    let of_kind = summary.iter().filter(|other| other.role == entry.role && other.unit_name == entry.unit_name);
+    of_kind.map(|other| other.extremes.size()).fold(0.0, f64::max)
 }
 
 /// What is likely where speeds are too fast for a car in this unit; of those in Hz the middle one tells, rad/s.
@@ -382,6 +402,31 @@ mod tests {
             let found = findings(&[summary(role, unit, &values)], Seen::All);
             assert!(found.len() == 1 && found[0].message.contains(&format!("looks like {likely}")), "{found:?}");
         }
+    }
+
+    #[test]
+    fn fast_slow_and_unused_signals_of_right_units_pass() {
+        let of = |role: Role, unit: &str, values: std::ops::Range<u32>, size: f64| {
+            summary(role, unit, &values.map(|i| size * f64::from(i)).collect::<Vec<_>>())
+        };
+        // Full throttle, 4900 to 5990 rpm; above 6000 rpm in the middle it is refused.
+        let rpm = std::f64::consts::PI / 30.0;
+        for unit in ["rpm", "rad/s"] {
+            assert_eq!(findings(&[of(Role::EngineSpeed, unit, 490..599, 10.0 * rpm)], Seen::All), [], "{unit}");
+            assert_eq!(findings(&[of(Role::EngineSpeed, unit, 640..700, 10.0 * rpm)], Seen::All).len(), 1, "{unit}");
+        }
+        // An element that no shift applies beside one that is; all of them together are too small.
+        for (role, unit, used, idle) in
+            [(Role::ElementCurrent, "mA", 0.8, 0.002), (Role::ElementPressureCommand, "bar", 6e5, 2e3)]
+        {
+            let log = |most: f64| [of(role, unit, 0..100, most / 99.0), of(role, unit, 0..100, idle / 99.0)];
+            assert_eq!(findings(&log(used), Seen::All), []);
+            assert!(!findings(&log(idle), Seen::All).is_empty(), "{role:?}");
+        }
+        // A car that creeps, 750 and 80 rpm; an accelerator that is hardly pressed.
+        let creeping = [of(Role::EngineSpeed, "rpm", 70..79, 1.0), of(Role::TurbineSpeed, "rpm", 0..84, 0.1)];
+        assert_eq!(findings(&creeping, Seen::All), []);
+        assert_eq!(findings(&[of(Role::Throttle, "%", 0..80, 1e-4)], Seen::All), []);
     }
 
     #[test]

@@ -368,28 +368,20 @@ fn mean(values: impl Iterator<Item = Ranged>) -> Option<Ranged> {
     (count > 0.0).then(|| Ranged { value: sum / count, range: ends.map(|ends| ends.map(|end| end / count)) })
 }
 
-/// Torque times slip over time. A channel that is slower than the steps stands for as long as its last reading.
+/// Torque times slip over time.
 fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: &ReducedShift<f64>) -> Ranged {
-    const SPEEDS: [usize; 2] = [1, 2];
-    let mut newest_rad_s = SPEEDS.map(|speed| {
-        let read =
-            samples[..shift.start].iter().rev().map(|sample| sample.speeds_rad_s[speed]).find(|speed| !speed.is_nan());
-        read.unwrap_or(f64::NAN)
-    });
-    let mut power = Vec::with_capacity(shift.len());
-    for sample in &samples[shift] {
-        for (newest, speed) in newest_rad_s.iter_mut().zip(SPEEDS.map(|speed| sample.speeds_rad_s[speed])) {
-            *newest = if speed.is_nan() { *newest } else { speed };
-        }
-        let [turbine_rad_s, output_rad_s] = newest_rad_s;
-        let slip_rad_s = reduced.oncoming_slip(turbine_rad_s, output_rad_s);
-        let Ranged { value, range } = torque(sample);
+    let of = |at: usize| {
+        let [turbine, output] = [1, 2].map(|speed| SpeedAt::of(samples, at, speed));
+        let slip_rad_s = reduced.oncoming_slip(turbine.rad_s, output.rad_s);
+        let slips = turbine.around_rad_s.map(|turbine| output.around_rad_s.map(|o| reduced.oncoming_slip(turbine, o)));
+        let Ranged { value, range } = torque(&samples[at]);
         let ends = range.map(|range| {
-            let [a, b] = range.map(|n_m| n_m * slip_rad_s);
-            [a.min(b), a.max(b)]
+            let all = slips.iter().flatten().flat_map(|slip| range.map(|n_m| n_m * slip));
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], power| [low.min(power), high.max(power)])
         });
-        power.push((sample.time_s, Ranged { value: value * slip_rad_s, range: ends }));
-    }
+        (samples[at].time_s, Ranged { value: value * slip_rad_s, range: ends })
+    };
+    let power: Vec<(f64, Ranged)> = shift.map(of).collect();
     let mut work = Ranged { value: 0.0, range: Some([0.0; 2]) };
     for pair in power.windows(2) {
         let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
@@ -401,6 +393,37 @@ fn friction_work(samples: &[LogSample], shift: std::ops::Range<usize>, reduced: 
             .map(|(work, (from, to))| [work[0] + half_s * (from[0] + to[0]), work[1] + half_s * (from[1] + to[1])]);
     }
     work
+}
+
+/// A speed at a sample.
+struct SpeedAt {
+    /// By the line through the readings around it: a channel may be slower than the steps, and a log may have holes. A reading that stood until
+    /// the next one would make a slip that went to zero in a hole last as long as the hole. After the last reading its value; not a number
+    /// before the first one.
+    rad_s: f64,
+    /// Lowest and highest that it can be taken to have been: those readings, where they are further apart than those of a channel.
+    around_rad_s: [f64; 2],
+}
+
+impl SpeedAt {
+    fn of(samples: &[LogSample], at: usize, speed: usize) -> Self {
+        /// Readings that are further apart are those at the ends of a hole, s.
+        const HOLE_S: f64 = 0.03;
+        let reading = |sample: &LogSample| {
+            let rad_s = sample.speeds_rad_s[speed];
+            (!rad_s.is_nan()).then_some((sample.time_s, rad_s))
+        };
+        let before = samples[..=at].iter().rev().find_map(reading);
+        let Some((before_s, before_rad_s)) = before else {
+            return Self { rad_s: f64::NAN, around_rad_s: [f64::NAN; 2] };
+        };
+        let (after_s, after_rad_s) = samples[at..].iter().find_map(reading).unwrap_or((before_s, before_rad_s));
+        let span_s = after_s - before_s;
+        let share = if span_s > 0.0 { (samples[at].time_s - before_s) / span_s } else { 0.0 };
+        let rad_s = before_rad_s + share * (after_rad_s - before_rad_s);
+        let around_rad_s = if span_s > HOLE_S { [before_rad_s, after_rad_s] } else { [rad_s; 2] };
+        Self { rad_s, around_rad_s }
+    }
 }
 
 impl MeasuredError {
@@ -463,7 +486,7 @@ mod tests {
     const NO_INPUT: Input<f64> = Input::none(0.01);
 
     #[test]
-    fn friction_work_counts_the_last_reading_from_before_the_shift() {
+    fn friction_work_follows_the_line_between_readings() {
         let reduced = ReducedShift {
             mass_kg_m2: [[1.0, 0.0], [0.0, 1.0]],
             slip_offgoing: [1.0, -2.0],
@@ -477,14 +500,46 @@ mod tests {
             pressure_pa: None,
             torque_n_m: None,
         };
-        let speeds = [(Some(900.0), Some(5.0)), (Some(200.0), None), (None, None), (None, Some(100.0)), (None, None)];
+        let speeds = [(Some(900.0), Some(5.0)), (Some(200.0), None), (None, None), (None, Some(80.0)), (None, None)];
         let samples: Vec<_> = (0..).zip(speeds).map(|(at, (turbine, output))| sample(at, turbine, output)).collect();
-        // Slips of 195, 100 and 100 rad/s at 50 N m, each 10 ms apart.
+        // The turbine stays at its last reading, 200 rad/s; the output is read before the shift and in it: slips of 145, 120 and 120 rad/s at
+        // 50 N m, each 10 ms apart.
         let work = friction_work(&samples, 2..5, &reduced);
-        assert!((work.value - 50.0 * 0.01 * (0.5 * 195.0 + 100.0 + 0.5 * 100.0)).abs() < 1e-9, "{}", work.value);
+        assert!((work.value - 50.0 * 0.01 * (0.5 * 145.0 + 120.0 + 0.5 * 120.0)).abs() < 1e-9, "{}", work.value);
         // No reading has come before the shift, nor in it: the slip is not known.
         assert!(friction_work(&samples[2..], 0..1, &reduced).value == 0.0);
         assert!(friction_work(&samples[2..], 0..2, &reduced).value.is_nan());
+    }
+
+    /// A log without speeds from 20 ms after the beginning of the inertia phase to after the lock-up: with a last reading that stood until the next
+    /// one, the work was twice what it is.
+    #[test]
+    fn the_slip_in_a_hole_is_between_those_at_its_ends() {
+        let reduced = &Vehicle::built_in().unwrap().shift;
+        let slip = |step: u32| 100.0 - 5.0 * f64::from(step.min(20));
+        let output_rad_s = 50.0;
+        let bounds =
+            observer::Bounds { clutch_torque_n_m: [80.0, 130.0], pressure_pa: [0.0; 2], shaft_torque_n_m: None };
+        let work = |has_hole: bool| {
+            let sample = |step: u32| {
+                let is_read = !has_hole || !(2..=20).contains(&step);
+                let speed = |rad_s: f64| is_read.then(|| Reading::now(rad_s));
+                let turbine_rad_s =
+                    speed((slip(step) - reduced.slip_oncoming[1] * output_rad_s) / reduced.slip_oncoming[0]);
+                let input = Input { turbine_rad_s, output_rad_s: speed(output_rad_s), ..NO_INPUT };
+                let estimate = Estimate { clutch_torque_n_m: 100.0, bounds: Some(bounds), ..no_estimate() };
+                LogSample::new(0.01 * f64::from(step), &input, estimate)
+            };
+            let samples: Vec<LogSample> = (0..30).map(sample).collect();
+            friction_work(&samples, 0..22, reduced)
+        };
+        let (all, hole) = (work(false), work(true));
+        assert!((all.value - 1000.0).abs() < 1e-6, "{}", all.value);
+        assert!((hole.value - all.value).abs() < 0.05 * all.value, "{} {}", hole.value, all.value);
+        let [range, wider] = [all, hole].map(|work| work.range.unwrap());
+        assert!((range[0] - 800.0).abs() < 1e-6 && (range[1] - 1300.0).abs() < 1e-6, "{range:?}");
+        // Within the hole the slip may have been that of either end.
+        assert!(wider[0] < 200.0 && wider[1] > 2200.0, "{wider:?}");
     }
 
     #[test]

@@ -5,9 +5,11 @@
 
 use config::{Car, Sensors};
 use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
 use plant::car::{CarSample, CarShift};
 
+use crate::any_shift::recording::reported_engine_n_m;
 use crate::any_shift::{AnyShiftError, ShiftScoreRow, inputs, score_from, simulated};
 
 /// A shift of the true car with what the filter is shown of it.
@@ -40,6 +42,14 @@ impl RecordedShift {
     /// What the filter is shown, which a test may change.
     pub fn inputs_mut(&mut self) -> impl Iterator<Item = &mut ShiftInput<f64>> {
         self.inputs.iter_mut().map(|(_, input)| input)
+    }
+
+    /// Lets the engine's controller report its torque times a factor, some samples late.
+    pub fn report_engine_torque(&mut self, truth: &Car, factor: f64, late: usize) {
+        for (at, input) in &mut self.inputs {
+            let reported_n_m = reported_engine_n_m(truth, &self.samples[at.saturating_sub(late)]);
+            input.engine_n_m = Some(Reading::now(factor * reported_n_m));
+        }
     }
 
     /// Truth and estimates while the shift is under way, by a filter that has learnt this.

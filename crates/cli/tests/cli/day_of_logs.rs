@@ -136,16 +136,22 @@ fn a_day_with_an_eight_speed_gearbox_gives_the_same_from_mdf_and_from_csv() {
     assert!(estimate[1].contains("samples are in gears that the vehicle file does not describe"), "{}", estimate[1]);
     let shifts: Vec<Vec<String>> = mdf.4[1].lines().map(|line| line.split(',').map(str::to_owned).collect()).collect();
     let column = |name: &str| shifts[0].iter().position(|title| title == name).unwrap();
-    let (of_vehicle, work) = (column("of_vehicle"), column("friction_work_j"));
-    let works: Vec<f64> = shifts[1..]
-        .iter()
-        .filter(|row| row[of_vehicle] == "yes")
-        .map(|row| row[work].parse().unwrap_or(f64::NAN))
+    let of_vehicle = column("of_vehicle");
+    let [work, least, greatest] = ["friction_work_j", "friction_work_least_j", "friction_work_greatest_j"].map(column);
+    let works: Vec<[f64; 3]> = (shifts[1..].iter().filter(|row| row[of_vehicle] == "yes"))
+        .map(|row| [work, least, greatest].map(|at| row[at].parse().unwrap_or(f64::NAN)))
+        .filter(|[work, ..]| !work.is_nan())
         .collect();
-    // The simulated clutch takes 1149 J in each; the vehicle file has never seen this car.
-    let upshifts: Vec<f64> = works.into_iter().filter(|work| !work.is_nan()).collect();
-    assert!(upshifts.len() as u32 >= repetitions, "{upshifts:?}");
-    assert!(upshifts.iter().all(|work| (750.0..1300.0).contains(work)), "{upshifts:?}");
+    assert!(works.len() as u32 >= repetitions, "{works:?}");
+    // The simulated clutch takes 1149 J in each; the vehicle file has never seen this car. What the log lost of a shift, up to half a second of both
+    // speeds, makes single values worse than the others, which the middle one does not feel.
+    const TRUE_WORK_J: f64 = 1149.0;
+    let mut values: Vec<f64> = works.iter().map(|[work, ..]| *work).collect();
+    values.sort_by(f64::total_cmp);
+    let middle = values[values.len() / 2];
+    assert!((middle / TRUE_WORK_J - 1.0).abs() < 0.1, "{values:?}");
+    assert!(values.iter().all(|work| (750.0..1300.0).contains(work)), "{values:?}");
+    assert!(works.iter().all(|[_, least, greatest]| (*least..=*greatest).contains(&TRUE_WORK_J)), "{works:?}");
 }
 
 #[test]

@@ -122,7 +122,9 @@ fn a_file_that_was_not_learnt_of_this_car_is_refused_before_anything_is_written(
         message
     };
     assert!(refused_with(&text.replace("\"E\"", "\"F\"")).contains("was learnt of the gearbox"));
-    assert!(refused_with(&text.replace("mean = [", "mean = [9, ")).contains("has 52 numbers, expected 51"));
+    let numbers = observer::any_shift::LEARNT;
+    let one_more = format!("has {} numbers, expected {numbers}", numbers + 1);
+    assert!(refused_with(&text.replace("mean = [", "mean = [9, ")).contains(&one_more));
     assert!(refused_with(&text.replace("mean = [", "mean = [9")).contains("not within the bounds"));
     assert!(refused_with(&text[..text.len() / 2]).contains("hint: --learnt takes a file that"));
     assert!(refused_with("").contains("missing field `gearbox`"));
@@ -166,6 +168,13 @@ fn a_friction_above_the_file_is_said_in_words() {
         assert!(kiss_kpa.abs() < 3.0 * deviation, "{element}: {text}");
     }
     assert!(text.contains("\nlearnt scale of the wheel speed: it reads "), "{text}");
+    // The converter is that of the file, and the simulated engine reports its torque as it is.
+    for name in ["learnt torque at the gearbox input: ", "learnt reported engine torque: "] {
+        let number = |text: &str| text.split(' ').next().unwrap().trim_start_matches("+-").parse::<f64>().unwrap();
+        let said = text.split_once(name).unwrap().1;
+        let deviation = number(said.split_once(' ').unwrap().1);
+        assert!(number(said).abs() < 3.0 * deviation && deviation < 5.0, "{name}: {text}");
+    }
 }
 
 /// The log with a column of the oil's temperature, degC.

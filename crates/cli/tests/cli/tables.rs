@@ -74,3 +74,33 @@ fn an_output_speed_of_a_wrong_scale_is_told_by_the_wheels() {
     let error = refused(&estimate(&folder, VEHICLE, &log.replacen("wheel_speed_rad_s", "other", 1)));
     assert!(error.contains("error: turbine_speed over output_speed") && !error.contains("warning:"), "{error}");
 }
+
+/// A logger that repeats the newest value in rows of 10 ms, of a speed that comes every 20 ms: each value is one reading.
+#[test]
+fn a_speed_of_a_gearbox_that_a_table_holds_counts_once() {
+    let folder = simulated("held-car");
+    let log = folder.read("sim/short_measured.csv");
+    let torques = |log: &str| -> (Vec<f64>, String) {
+        folder.write("log.csv", log);
+        let text = said(&crate::any_car::estimate(&folder, "log.csv", &["-o", &folder.path("out.csv")]));
+        let cells = column(&folder.read("out.csv"), "offgoing_torque_estimate_n_m");
+        (cells.iter().map(|cell| cell.parse().unwrap_or(f64::NAN)).collect(), text)
+    };
+    let (clean, _) = torques(&log);
+    for name in ["turbine_speed_rad_s", "output_speed_rad_s"] {
+        let (mut row, mut newest) = (0, String::new());
+        let held = with_column(&log, name, |cell| {
+            row += 1;
+            if row % 2 == 1 {
+                newest = cell.to_owned();
+            }
+            newest.clone()
+        });
+        let (held, text) = torques(&held);
+        assert!(text.contains("are those of a row before, held until the next comes, and count once"), "{text}");
+        let off: Vec<f64> = held.iter().zip(&clean).map(|(a, b)| (a - b).powi(2)).filter(|it| !it.is_nan()).collect();
+        let rms = (off.iter().sum::<f64>() / off.len() as f64).sqrt();
+        println!("{name}: {rms:.2} N m");
+        assert!(off.len() > 300 && rms < 8.0, "{name}: {rms} N m in {} rows", off.len());
+    }
+}

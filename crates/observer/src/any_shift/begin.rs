@@ -2,10 +2,10 @@
 
 use super::running::TURBINE_ACTS;
 use super::{
-    AnyShiftFilter, AnyShiftState, FIRST_S, GATE, Gate, Gaussian, GearCommand, Health, LOAD, LOAD_START, LOST_S,
-    MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR, SLOW_SHARE,
-    SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL, WHEEL_START_RAD_S, at_start,
-    square, turbine,
+    AnyShiftFilter, AnyShiftState, Compared, FIRST_S, GATE, Gate, Gaussian, GearCommand, Health, LOAD, LOAD_START,
+    LOST_S, MISFIT, N, NOT_CAUGHT, OUTPUT, PhaseMemory, RATE, Running, SCALE, SHAFT_START, SHARE, SLIPS_IN_GEAR,
+    SLOW_SHARE, SPEEDS, SPRING, ShiftClutch, ShiftInput, ShiftPhase, ShiftRow, Slip, TURBINE, WHEEL, WHEEL_START_RAD_S,
+    at_start, square, turbine,
 };
 use drivetrain::Real;
 
@@ -167,6 +167,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             wheel_off_rad_s: T::zero(),
             misfit: T::one(),
             before: None,
+            compared: Compared::nothing(),
         };
         running.renew_shift();
         if phase == ShiftPhase::BothSlip {

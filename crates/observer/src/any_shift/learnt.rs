@@ -6,9 +6,9 @@
 //! | `k` | element | its kiss point |
 //! | `m` | pair of gears | turbine-side inertia `M11` |
 //! | `c` | car | torque at the gearbox input: the converter's capacity |
-//!
 //! | `e` | car | stiffness of the drive shafts: it is in what is seen, and the filter has no state of it |
 //! | `s` | car | scale of the wheel speed |
+//! | `q` | car | torque that the engine's controller reports, beside an open converter |
 //! | `l`, `d` | element | lag and delay of its valve: the valve model is changed by them, and the filter has no states of them |
 //!
 //! Together they are one Gaussian, each in units of the deviation that it has unlearnt. A shift begins with the ten of
@@ -32,6 +32,9 @@
 //! **Wheel speed.** Its scale shows in a gear, because the twist of the drive shafts is bounded. It acts in no shift's measurements:
 //! the filter goes on with its own state of it from gear to gear, and what is kept here is where another run begins.
 //!
+//! **Reported torque.** It acts in no shift either. In a gear it shows the sum of its error and that of the converter
+//! ([`super::reported`]).
+//!
 //! Friction and gain are not told apart here: what the speeds show of both is `f` and `k`. A gain moves both, a
 //! friction only `f`, and [`LearntElement`] has what follows of each from what the budget says of them.
 
@@ -44,13 +47,15 @@ use super::tables::MAX_ELEMENTS;
 
 /// Most pairs of gears whose inertia is learnt.
 pub const MAX_PAIRS: usize = 16;
-/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed, lags, delays.
+/// Places of the quantities: torque factors, kiss points, inertias, torque at the gearbox input, stiffness, scale of the wheel speed,
+/// reported engine torque, lags, delays.
 const KISS_AT: usize = MAX_ELEMENTS;
 const INERTIA_AT: usize = 2 * MAX_ELEMENTS;
 const TURBINE_AT: usize = INERTIA_AT + MAX_PAIRS;
 const STIFFNESS_AT: usize = TURBINE_AT + 1;
 const WHEEL_AT: usize = STIFFNESS_AT + 1;
-const LAG_AT: usize = WHEEL_AT + 1;
+const REPORTED_AT: usize = WHEEL_AT + 1;
+const LAG_AT: usize = REPORTED_AT + 1;
 const DELAY_AT: usize = LAG_AT + MAX_ELEMENTS;
 /// How many quantities are learnt.
 pub const LEARNT: usize = DELAY_AT + MAX_ELEMENTS;
@@ -86,7 +91,7 @@ const COMMON_INERTIA: f64 = 0.5;
 /// Variance above which a covariance was not made here, in that of the budget.
 const VARIANCE_MOST: f64 = 2.0;
 /// Time after which a quantity is another, s \[chosen\]: friction, gain, kiss point and converter with the
-/// oil; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
+/// oil, and with the engine its reported torque; inertia, shafts and tyres with nothing but a repair and wear. Torque factor and kiss point have the gain in
 /// common, and fade together: else their correlation could not last.
 const WITH_OIL_S: f64 = 7200.0;
 const INERTIA_S: f64 = 3.6e6;
@@ -101,8 +106,8 @@ const OIL_DEGC: [f64; 2] = [-60.0, 220.0];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learnt<T> {
     /// Means, in units of the deviation that each quantity has unlearnt: torque factors and kiss points by element, inertias
-    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed, lags and delays of
-    /// the valves by element.
+    /// by pair of gears, torque at the gearbox input, stiffness of the drive shafts, scale of the wheel speed, reported engine torque,
+    /// lags and delays of the valves by element.
     pub mean: [T; LEARNT],
     /// Their covariance, in the same units.
     pub covariance: [[T; LEARNT]; LEARNT],
@@ -126,10 +131,6 @@ pub struct LearntElement<T> {
     /// Of the valve's gain, as a share. Speeds and commands do not tell it apart from a friction and a kiss point of the
     /// element: its deviation stays large.
     pub valve_gain: [T; 2],
-    /// Of the valve's lag, as a share.
-    pub valve_lag: [T; 2],
-    /// Of its delay, s.
-    pub valve_delay_s: [T; 2],
 }
 
 /// Correlation of torque factor and kiss point of each element unlearnt: the valve's gain is in both.
@@ -142,8 +143,6 @@ pub(super) struct Acting<T> {
     places: [Option<usize>; ACTING],
     /// Part of the variance of torque factors, kiss points, lags and delays that lasts.
     slow_part: T,
-    /// Its root.
-    slow: T,
     /// How an error of the stiffness shows in each, per deviation of it.
     by_stiffness: [T; ACTING],
 }
@@ -165,14 +164,14 @@ impl<T: Real> Acting<T> {
         let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
         let timings = [lag(off), delay(off), lag(on), delay(on)];
         let places = core::array::from_fn(|a| states.iter().chain(&timings).nth(a).copied().flatten());
-        Self { places, slow_part, slow: slow_part.sqrt(), by_stiffness }
+        Self { places, slow_part, by_stiffness }
     }
 
     /// Only the torque at the gearbox input, as in a gear.
     pub(super) fn turbine(by_stiffness: [T; ACTING]) -> Self {
         let mut places = [None; ACTING];
         places[STATES_ACTING - 1] = Some(TURBINE_AT);
-        Self { places, slow_part: T::one(), slow: T::one(), by_stiffness }
+        Self { places, slow_part: T::one(), by_stiffness }
     }
 
     /// Place of a quantity among all.
@@ -181,28 +180,11 @@ impl<T: Real> Acting<T> {
     }
 
     /// Each of the acting quantities as it shows, `(H, s) x`, from all of them.
-    #[inline]
-    fn seen(&self, all: impl Fn(usize) -> T) -> [T; ACTING] {
-        let stiffness = all(STIFFNESS_AT);
+    fn seen(&self, all: &[T; LEARNT]) -> [T; ACTING] {
         core::array::from_fn(|a| {
-            let own = self.place(a).map_or(T::zero(), |place| self.per_unit(a).0 * all(place));
-            own + self.by_stiffness[a] * stiffness
+            let own = self.place(a).map_or(T::zero(), |place| self.per_unit(a).0 * all[place]);
+            own + self.by_stiffness[a] * all[STIFFNESS_AT]
         })
-    }
-
-    /// The acting quantities with this covariance of all, and the mean zero.
-    fn known(&self, of_all: impl Fn(usize, usize) -> Option<T>) -> Known<T> {
-        let per_unit: [(T, T); ACTING] = core::array::from_fn(|a| self.per_unit(a));
-        let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
-        for (a, row) in known.covariance.iter_mut().enumerate() {
-            row[a] = per_unit[a].1;
-            let Some(place) = self.place(a) else { continue };
-            for (b, value) in row.iter_mut().enumerate() {
-                let covariance = self.place(b).and_then(|other| of_all(place, other));
-                *value = *value + per_unit[a].0 * per_unit[b].0 * covariance.unwrap_or(T::zero());
-            }
-        }
-        known
     }
 
     /// How a quantity acts per unit, `H`, and the variance beside it, `D`.
@@ -210,7 +192,7 @@ impl<T: Real> Acting<T> {
         match self.place(a) {
             None => (T::zero(), T::one()),
             Some(INERTIA_AT..LAG_AT) => (T::one(), T::zero()),
-            Some(_) => (self.slow, T::one() - self.slow_part),
+            Some(_) => (self.slow_part.sqrt(), T::one() - self.slow_part),
         }
     }
 }
@@ -258,6 +240,11 @@ impl<T: Real> Learnt<T> {
         (pair < MAX_PAIRS).then_some([self.mean[place], self.covariance[place][place].sqrt()])
     }
 
+    /// Mean and deviation of the torque at the gearbox input, and of the reported engine torque.
+    pub(super) fn of_sources(&self) -> [[T; 2]; 2] {
+        [TURBINE_AT, REPORTED_AT].map(|at| [self.mean[at], self.covariance[at][at].sqrt()])
+    }
+
     /// Mean and variance of the scale of the wheel speed.
     pub(super) fn of_wheel(&self) -> [T; 2] {
         [self.mean[WHEEL_AT], self.covariance[WHEEL_AT][WHEEL_AT]]
@@ -279,19 +266,54 @@ impl<T: Real> Learnt<T> {
         }
     }
 
+    /// Takes a measurement of the sum of two errors, as a share: of the converter's capacity and of the reported engine torque, whose deviations
+    /// unlearnt are these. Where it is further from what is known than both may be, at their bounds and with three deviations of the noise,
+    /// one of them is not that of this car, and nothing follows.
+    pub(super) fn take_capacity(&mut self, share: T, [capacity, reported]: [T; 2], noise: T) {
+        let bound = T::of(EDGE) * (capacity + reported) + T::of(3.0) * noise.sqrt();
+        let with = self.covariance.map(|row| capacity * row[TURBINE_AT] + reported * row[REPORTED_AT]);
+        let variance = capacity * with[TURBINE_AT] + reported * with[REPORTED_AT] + noise;
+        let expected = capacity * self.mean[TURBINE_AT] + reported * self.mean[REPORTED_AT];
+        if !(share.abs() <= bound && variance > T::zero()) {
+            return;
+        }
+        let per = variance.sqrt().recip();
+        let with = with.map(|covariance| per * covariance);
+        let innovation = per * (share - expected);
+        for (k, (mean, with)) in self.mean.iter_mut().zip(&with).enumerate() {
+            let edge = T::of(edge(k));
+            *mean = (*mean + *with * innovation).max(-edge).min(edge);
+        }
+        for (row, of_row) in self.covariance.iter_mut().zip(&with) {
+            for (p, other) in row.iter_mut().zip(&with) {
+                *p = *p - *of_row * *other;
+            }
+        }
+        for k in [TURBINE_AT, REPORTED_AT] {
+            self.covariance[k][k] = (self.covariance[k][k] + T::of(PER_SHIFT)).min(T::one());
+        }
+    }
+
     /// What the acting quantities are before a shift, by what is learnt alone.
     fn of_car(&self, acting: &Acting<T>) -> Known<T> {
-        let mut known = acting.known(|i, j| self.covariance.get(i)?.get(j).copied());
-        known.mean = core::array::from_fn(|a| {
-            let mean = acting.place(a).and_then(|place| self.mean.get(place).copied());
-            acting.per_unit(a).0 * mean.unwrap_or(T::zero())
-        });
+        let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
+        for (a, place) in acting.places.iter().enumerate() {
+            let (per_unit, more) = acting.per_unit(a);
+            known.covariance[a][a] = more;
+            let Some(place) = place else { continue };
+            known.mean[a] = per_unit * self.mean.get(*place).copied().unwrap_or(T::zero());
+            for (b, other) in acting.places.iter().enumerate() {
+                let covariance = other.and_then(|other| self.covariance.get(*place)?.get(other).copied());
+                let Some(covariance) = covariance else { continue };
+                known.covariance[a][b] = known.covariance[a][b] + per_unit * acting.per_unit(b).0 * covariance;
+            }
+        }
         known
     }
 
     /// What the acting quantities are before a shift: mean and covariance of what is learnt and of the budget together.
     pub(super) fn known(&self, acting: &Acting<T>, correlations: &Correlations<T>) -> Known<T> {
-        let (mut known, budget) = (self.of_car(acting), acting.known(|i, j| Some(unlearnt(correlations, i, j))));
+        let (mut known, budget) = (self.of_car(acting), Self::nothing(correlations).of_car(acting));
         let car = self.probability();
         let rest = T::one() - car;
         let mean = known.mean;
@@ -340,9 +362,9 @@ impl<T: Real> Learnt<T> {
         correlations: &Correlations<T>,
     ) -> bool {
         let Some(shown) = Shown::between(before, after) else { return false };
-        let by_car = Innovation::of(|k| self.mean[k], |i, j| self.covariance[i][j], acting, &shown);
-        let by_budget = Innovation::of(|_| T::zero(), |i, j| unlearnt(correlations, i, j), acting, &shown);
-        let (Some(mut by_car), Some(by_budget)) = (by_car, by_budget) else {
+        let nothing = Self::nothing(correlations);
+        let by_budget = Innovation::of(&nothing, acting, &shown);
+        let (Some(mut by_car), Some(by_budget)) = (Innovation::of(self, acting, &shown), by_budget) else {
             return false;
         };
         // What no car of the budget shows speaks for none.
@@ -353,7 +375,7 @@ impl<T: Real> Learnt<T> {
         self.odds = self.odds + (by_car.likelihood - by_budget.likelihood).max(-of_shift).min(of_shift);
         self.odds = self.odds.min(most);
         if self.odds < -most {
-            (*self, by_car) = (Self::nothing(correlations), by_budget);
+            (*self, by_car) = (nothing, by_budget);
         }
         if !by_car.is_possible() {
             return false;
@@ -366,22 +388,18 @@ impl<T: Real> Learnt<T> {
     /// symmetric to the last digit. A shift that says more than is likely counts for less, by `w`.
     fn correct(&mut self, by: &Innovation<T>) {
         let weight = (T::of(LIKELY) / by.distance.max(T::of(LIKELY))).sqrt();
-        let root = weight.sqrt();
+        let with: [[T; ACTING]; LEARNT] = core::array::from_fn(|k| by.with[k].map(|x| x * weight.sqrt()));
         for (k, mean) in self.mean.iter_mut().enumerate() {
             let edge = T::of(edge(k));
             *mean = (*mean + weight * dot(&by.with[k], &by.innovation)).max(-edge).min(edge);
         }
-        // In a gear one direction is seen, in a shift some.
-        for direction in 0..ACTING {
-            let with = by.with.each_ref().map(|row| root * row[direction]);
-            for (row, own) in self.covariance.iter_mut().zip(&with).filter(|(_, own)| **own != T::zero()) {
-                for (p, other) in row.iter_mut().zip(&with) {
-                    *p = *p - *own * *other;
-                }
+        for (i, row) in self.covariance.iter_mut().enumerate() {
+            for (p, other) in row.iter_mut().zip(&with) {
+                *p = *p - dot(&with[i], other);
             }
-        }
-        for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, row)| row[*i] < T::one()) {
-            row[i] = row[i] + T::of(PER_SHIFT);
+            if row[i] < T::one() {
+                row[i] = row[i] + T::of(PER_SHIFT);
+            }
         }
     }
 
@@ -401,14 +419,13 @@ impl<T: Real> Learnt<T> {
     pub(super) fn pass(&mut self, dt_s: T, correlations: &Correlations<T>) {
         let one = T::one();
         let [oil, inertia] = [WITH_OIL_S, INERTIA_S].map(|s| (-dt_s / T::of(s)).exp());
-        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || (STIFFNESS_AT..LAG_AT).contains(&k);
+        let lasts = |k: usize| (INERTIA_AT..TURBINE_AT).contains(&k) || (STIFFNESS_AT..REPORTED_AT).contains(&k);
         let stay = |k: usize| if lasts(k) { inertia } else { oil };
         for i in 0..LEARNT {
             self.mean[i] = stay(i) * self.mean[i];
-            for j in 0..=i {
+            for j in 0..LEARNT {
                 let both = stay(i) * stay(j);
-                let passed = both * self.covariance[i][j] + (one - both) * unlearnt(correlations, i, j);
-                (self.covariance[i][j], self.covariance[j][i]) = (passed, passed);
+                self.covariance[i][j] = both * self.covariance[i][j] + (one - both) * unlearnt(correlations, i, j);
             }
         }
     }
@@ -495,16 +512,13 @@ impl<T: Real> Innovation<T> {
         self.distance <= T::of(GATE)
     }
 
-    /// By this mean and covariance of all.
-    fn of(
-        mean: impl Fn(usize) -> T,
-        covariance_of_all: impl Fn(usize, usize) -> T,
-        acting: &Acting<T>,
-        shown: &Shown<T>,
-    ) -> Option<Self> {
-        let seen: [[T; ACTING]; LEARNT] = core::array::from_fn(|k| acting.seen(|place| covariance_of_all(k, place)));
+    fn of(learnt: &Learnt<T>, acting: &Acting<T>, shown: &Shown<T>) -> Option<Self> {
+        let seen = learnt.covariance.map(|row| acting.seen(&row));
         // `(H, s) P (H, s)' + D`, by its rows: `seen` is `P (H, s)'`.
-        let mut covariance: Matrix<T> = core::array::from_fn(|b| acting.seen(|place| seen[place][b]));
+        let mut covariance: Matrix<T> = core::array::from_fn(|b| {
+            let column: [T; LEARNT] = core::array::from_fn(|k| seen[k][b]);
+            acting.seen(&column)
+        });
         for (a, row) in covariance.iter_mut().enumerate() {
             row[a] = row[a] + acting.per_unit(a).1;
         }
@@ -514,7 +528,7 @@ impl<T: Real> Innovation<T> {
         }
         let lower = cholesky(&noisy)?;
         let inverse = lower_inverse(&lower);
-        let expected = acting.seen(mean);
+        let expected = acting.seen(&learnt.mean);
         let beside: [T; ACTING] = core::array::from_fn(|i| shown.values[i] - dot(&shown.rows[i], &expected));
         let innovation = inverse.map(|row| dot(&row, &beside));
         let with = seen.map(|row| {

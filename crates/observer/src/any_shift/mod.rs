@@ -40,6 +40,7 @@ mod pistons;
 mod powertrain;
 mod predict;
 mod readings;
+mod reported;
 mod running;
 mod shown;
 mod tables;
@@ -57,6 +58,7 @@ use learnt::{ACTING, Acting, Correlations, Known, STATES_ACTING};
 use newest::Newest;
 use phases::{Contact, PhaseMemory, Slip};
 use powertrain::{CORE, ClutchTorque, Motion, Rates, Response, Torques, free, output_rate, tied};
+use reported::Compared;
 use timing::Timing;
 use turbine::InputSide;
 
@@ -279,6 +281,8 @@ struct Running<T> {
     misfit: T,
     /// What was known of the lasting states when the shift began; none if it cannot be learnt from.
     before: Option<Known<T>>,
+    /// The converter's maps against the reported engine torque, in this gear.
+    compared: Compared<T>,
 }
 
 impl<T: Real> ShiftUncertainty<T> {
@@ -405,6 +409,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let input_clutch = side.as_ref().and_then(|side| self.input_clutch(state, input, side));
         let at_turbine = torque.as_ref().and_then(|torque| self.at_turbine(state, input.gear, torque));
         if let Some(running) = &mut state.running {
+            running.compared.step(&self.turbine, side.as_ref().filter(|_| running.shift.is_none()), dt_s);
             match &torque {
                 Some(torque) => {
                     let speeds = self.measured(&state.newest, Some(running));

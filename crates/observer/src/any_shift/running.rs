@@ -2,9 +2,9 @@
 
 use super::timing::ByTiming;
 use super::{
-    ACTING, Acting, AnyShiftFilter, Correlations, ElementState, FRICTION, FrictionElement, IN_GEAR, INERTIA, KISS,
-    Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE, SLOW_SHARE,
-    STATES_ACTING, ShiftPhase, ShiftRow, ShiftUncertainty, Slip,
+    ACTING, Acting, AnyShiftFilter, Compared, Correlations, ElementState, FRICTION, FrictionElement, IN_GEAR, INERTIA,
+    KISS, Known, LASTING, Learnt, LearntElement, MAX_ELEMENTS, MISFIT, N, PRESSURE, PhaseMemory, Running, SCALE,
+    SLOW_SHARE, STATES_ACTING, ShiftPhase, ShiftRow, ShiftUncertainty, Slip,
 };
 use drivetrain::Real;
 
@@ -15,7 +15,7 @@ const INERTIA_ACTS: usize = 4;
 
 impl<T: Real> ShiftUncertainty<T> {
     /// Deviation of the part of the turbine torque's error that lasts, from that of the whole, as shares.
-    pub(super) fn slow_share(&self, share: T) -> T {
+    pub fn slow_share(&self, share: T) -> T {
         (share * share - self.turbine_share * self.turbine_share).max(T::zero()).sqrt()
     }
 
@@ -94,8 +94,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub fn learnt_element(&self, learnt: &Learnt<T>, at: usize) -> Option<LearntElement<T>> {
         let (u, element) = (&self.uncertainty, self.tables.elements.get(at).filter(|_| at < MAX_ELEMENTS)?);
         let ([s, k], [[s_s, s_k], [_, k_k]]) = learnt.of_element(at)?;
-        let (means, variances) = learnt.of_timing(at)?;
-        let of_timing = |k: usize, per: T| [means[k], variances[k].sqrt()].map(|x| per * u.slow_part.sqrt() * x);
         let torque = u.torque_share * u.slow_part.sqrt();
         let kiss_pa = u.kiss_deviation_pa(&element.clutch) * u.slow_part.sqrt();
         let [by_s, by_k] = u.gain_by(element, T::one());
@@ -109,8 +107,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torque_share: [torque * s, torque * s_s.sqrt()],
             kiss_pa: [kiss_pa * k, kiss_pa * k_k.sqrt()],
             valve_gain: [by_s * s + by_k * k, gain],
-            valve_lag: of_timing(0, u.valve_lag_share),
-            valve_delay_s: of_timing(1, u.valve_delay_s),
         })
     }
 
@@ -119,6 +115,15 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub fn learnt_inertia(&self, learnt: &Learnt<T>, from: usize, to: usize) -> Option<[T; 2]> {
         let of = learnt.of_pair(self.tables.pair(from, to)?)?;
         Some(of.map(|value| self.uncertainty.inertia_share * value))
+    }
+
+    /// What is learnt of the torque at the gearbox input, as a share of that by the converter's maps (without a converter, of the reported one);
+    /// and of the reported engine torque beside a converter, as a share of the true one: error and deviation.
+    pub fn learnt_sources(&self, learnt: &Learnt<T>) -> [[T; 2]; 2] {
+        let (of, turbine) = (learnt.of_sources(), &self.turbine);
+        let first = if turbine.converter.is_some() { turbine.converter_share } else { turbine.engine_share };
+        let shares = [first, turbine.engine_share].map(|share| self.uncertainty.slow_share(share));
+        [of[0].map(|x| shares[0] * x), of[1].map(|x| shares[1] * x)]
     }
 
     /// What is learnt of the scale of the wheel speed: its error as a share, and the deviation.
@@ -222,6 +227,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         }
         self.take_turbine(running, learnt);
         running.renew_shift();
+        running.compared = Compared::nothing();
         (running.gear, running.shift, running.torques) = (gear, None, None);
         running.phase = PhaseMemory::new(ShiftPhase::InGear);
     }
@@ -244,6 +250,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let from_gear = running.shift.is_none();
         if from_gear {
             self.learn_turbine(running, learnt);
+            self.learn_capacity(running, learnt);
+            self.take_turbine(running, learnt);
             if running.misfit <= T::of(MISFIT) {
                 self.keep_wheel_scale(running, learnt);
             }
@@ -270,7 +278,6 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         after.mean[TURBINE_ACTS] = running.x.mean[SLOW_SHARE];
         after.covariance[TURBINE_ACTS][TURBINE_ACTS] = running.x.covariance[SLOW_SHARE][SLOW_SHARE];
         learnt.take(&acting, &before, &after, &self.correlations());
-        self.take_turbine(running, learnt);
     }
 
     /// Another shift before the one under way has ended: a change of mind.

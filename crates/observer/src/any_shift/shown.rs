@@ -135,7 +135,7 @@ fn directions<T: Real>(mut of: Matrix<T>) -> ([T; ACTING], Matrix<T>) {
 mod tests {
     use super::*;
 
-    const FIRST: [[f64; 6]; 6] = [
+    const CORNER: [[f64; 6]; 6] = [
         [1.0, 0.3, -0.2, 0.1, 0.0, 0.2],
         [0.3, 0.8, 0.1, -0.3, 0.2, 0.0],
         [-0.2, 0.1, 0.9, 0.2, 0.1, 0.1],
@@ -144,31 +144,30 @@ mod tests {
         [0.2, 0.0, 0.1, -0.1, 0.3, 0.6],
     ];
 
+    /// A covariance with this corner.
     fn some() -> Matrix<f64> {
-        core::array::from_fn(|i| {
-            core::array::from_fn(|j| match (i, j) {
-                (0..6, 0..6) => FIRST[i][j],
-                _ if i == j => 0.4 + 0.1 * i as f64,
-                _ => 0.02 * (i + j) as f64 - 0.2,
-            })
-        })
+        let own = |i: usize, j: usize| if i == j { 0.5 + 0.1 * i as f64 } else { 0.02 };
+        let value = |i: usize, j: usize| CORNER.get(i).and_then(|row| row.get(j)).copied().unwrap_or(own(i, j));
+        core::array::from_fn(|i| core::array::from_fn(|j| value(i, j)))
     }
 
     #[test]
+    #[expect(clippy::needless_range_loop, reason = "as the sums are written")]
     fn directions_and_roots_make_the_matrix_again() {
-        let (values, rows) = directions(some());
-        let lower = cholesky(&some()).unwrap();
+        let some = some();
+        let (values, rows) = directions(some);
+        let lower = cholesky(&some).unwrap();
         let inverse = lower_inverse(&lower);
         for i in 0..ACTING {
             for j in 0..ACTING {
                 let sum: f64 = (0..ACTING).map(|k| rows[k][i] * values[k] * rows[k][j]).sum();
-                assert!((sum - some()[i][j]).abs() < 1e-12, "{i} {j}: {sum}");
-                assert!((dot(&lower[i], &lower[j]) - some()[i][j]).abs() < 1e-12);
+                assert!((sum - some[i][j]).abs() < 1e-12, "{i} {j}: {sum}");
+                assert!((dot(&lower[i], &lower[j]) - some[i][j]).abs() < 1e-12);
                 let unit: f64 = (0..ACTING).map(|k| inverse[i][k] * lower[k][j]).sum();
                 assert!((unit - f64::from(u8::from(i == j))).abs() < 1e-12);
             }
         }
-        let mut none = some();
+        let mut none = some;
         none[2][2] = -0.1;
         assert_eq!(cholesky(&none), None);
         none[2][2] = f64::NAN;
@@ -178,8 +177,9 @@ mod tests {
     /// One measurement in, the same measurement out.
     #[test]
     fn a_measurement_is_found_again() {
-        let before = Known { mean: [0.3, -0.2, 0.1, 0.5, -0.4, 0.2, 0.1, 0.0, 0.3, -0.6], covariance: some() };
-        let h = [0.9, -0.2, 0.4, 0.1, -0.7, 0.8, 0.3, 0.0, -0.5, 0.2];
+        let mean = [0.3, -0.2, 0.1, 0.5, -0.4, 0.2, 0.1, 0.0, -0.3, 0.6];
+        let before = Known { mean, covariance: some() };
+        let h = [0.9, -0.2, 0.4, 0.1, -0.7, 0.8, 0.3, -0.5, 0.2, 0.6];
         let (value, noise) = (0.8, 0.2_f64);
         let with = some().map(|row| dot(&row, &h));
         let variance = dot(&with, &h) + noise;

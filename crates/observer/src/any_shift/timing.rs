@@ -31,8 +31,8 @@ pub(super) type ByTiming<T> = [[T; 2]; 2];
 pub(super) struct Timing<T> {
     /// Errors of the timing that the valve models have taken off, in deviations.
     taken_off: [T; TIMINGS],
-    /// By how much each state is off per deviation of each.
-    off: [[T; TIMINGS]; N],
+    /// By how much the states are off per deviation of each.
+    off: [[T; N]; TIMINGS],
     information: [[T; TIMINGS]; TIMINGS],
     /// Information times mean.
     value: [T; TIMINGS],
@@ -42,59 +42,57 @@ impl<T: Real> Timing<T> {
     /// Nothing is shown yet. The valve models of both clutches have taken off these errors.
     pub(super) fn nothing(taken_off: ByTiming<T>) -> Self {
         let [[a, b], [c, d]] = taken_off;
-        let off = [[T::zero(); TIMINGS]; N];
+        let off = [[T::zero(); N]; TIMINGS];
         Self { taken_off: [a, b, c, d], off, information: [[T::zero(); TIMINGS]; TIMINGS], value: [T::zero(); TIMINGS] }
     }
 
     /// Adds the pressure by the timing to what the states are off by, for as long as the states act.
     pub(super) fn add_pressure(&mut self, by: &ByTiming<T>) {
-        let [[off_lag, off_delay], [on_lag, on_delay]] = *by;
-        let zero = T::zero();
-        add(&mut self.off[PRESSURE[0]], T::one(), &[off_lag, off_delay, zero, zero]);
-        add(&mut self.off[PRESSURE[1]], T::one(), &[zero, zero, on_lag, on_delay]);
+        let states = [PRESSURE[0], PRESSURE[0], PRESSURE[1], PRESSURE[1]];
+        for ((off, by), state) in self.off.iter_mut().zip(by.iter().flatten()).zip(states) {
+            off[state] = off[state] + *by;
+        }
     }
 
     /// Carries it on with the first states.
     pub(super) fn pass(&mut self, rows: &[[T; N]; CORE]) {
-        let carried = rows.each_ref().map(|row| self.of(row));
-        self.off[..CORE].copy_from_slice(&carried);
+        for off in &mut self.off {
+            let carried = rows.each_ref().map(|row| dot(row, off));
+            off[..CORE].copy_from_slice(&carried);
+        }
     }
 
     /// A state fades by a factor; with zero it is another one.
     pub(super) fn fade(&mut self, state: usize, factor: T) {
-        let off = &mut self.off[state.min(N - 1)];
-        *off = off.map(|off| factor * off);
+        let state = state.min(N - 1);
+        self.off.iter_mut().for_each(|off| off[state] = factor * off[state]);
     }
 
     /// Turbine and output speed become one.
     pub(super) fn tie(&mut self, ratio: T, share: [T; 2]) {
-        let mut output = [T::zero(); TIMINGS];
-        add(&mut output, share[0], &self.off[TURBINE]);
-        add(&mut output, share[1], &self.off[OUTPUT]);
-        (self.off[TURBINE], self.off[OUTPUT]) = (output.map(|off| ratio * off), output);
+        for off in &mut self.off {
+            let output = share[0] * off[TURBINE] + share[1] * off[OUTPUT];
+            (off[TURBINE], off[OUTPUT]) = (ratio * output, output);
+        }
     }
 
     /// By how much a combination of the states is off.
-    #[inline]
     pub(super) fn of(&self, row: &[T; N]) -> [T; TIMINGS] {
-        let mut sum = [T::zero(); TIMINGS];
-        for (per, off) in row.iter().zip(&self.off) {
-            add(&mut sum, *per, off);
-        }
-        sum
+        self.off.each_ref().map(|off| dot(row, off))
     }
 
     /// Takes a reading that the timing moves by `seen`, with its innovation and what that moves the states, all in deviations of
     /// the innovation.
-    #[inline]
     pub(super) fn take(&mut self, seen: &[T; TIMINGS], innovation: T, moves: &[T; N]) {
-        for (off, moves) in self.off.iter_mut().zip(moves) {
-            add(off, -*moves, seen);
+        for (k, of) in seen.iter().enumerate() {
+            for (off, moves) in self.off[k].iter_mut().zip(moves) {
+                *off = *off - *moves * *of;
+            }
+            for (sum, other) in self.information[k].iter_mut().zip(seen) {
+                *sum = *sum + *of * *other;
+            }
+            self.value[k] = self.value[k] + *of * innovation;
         }
-        for (sum, of) in self.information.iter_mut().zip(seen) {
-            add(sum, *of, seen);
-        }
-        add(&mut self.value, innovation, seen);
     }
 
     /// What was known before the shift, and what is known after it, of all that acts in it. `before` and `after` are that of the states with the
@@ -114,7 +112,7 @@ impl<T: Real> Timing<T> {
         // By how much all that acts is off.
         let mut off = [[zero; TIMINGS]; ACTING];
         for (row, state) in off.iter_mut().zip(LASTING) {
-            *row = self.off[state];
+            *row = self.off.each_ref().map(|off| off[state]);
         }
         for k in 0..TIMINGS {
             let a = STATES_ACTING + k;
@@ -137,140 +135,122 @@ impl<T: Real> Timing<T> {
     }
 }
 
-/// Adds so many times a row.
-#[inline]
-fn add<T: Real>(to: &mut [T; TIMINGS], times: T, row: &[T; TIMINGS]) {
-    for (to, x) in to.iter_mut().zip(row) {
-        *to = *to + times * *x;
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::covariance::{Gaussian, Measured};
+    use super::super::{FRICTION, KISS};
     use super::*;
-    use crate::any_shift::covariance::{Gaussian, Measured};
 
     /// Numbers between -1 and 1 without order.
     fn number(seed: usize) -> f64 {
         (seed as f64 * 12.9898).sin() * 43758.5453 % 1.0
     }
 
-    /// A filter of all states with the timing of one valve as one more of them, straight on.
+    const ALL: usize = N + TIMINGS;
+    type Full = [[f64; ALL]; ALL];
+
+    fn product(a: &Full, b: &Full) -> Full {
+        core::array::from_fn(|i| core::array::from_fn(|j| (0..ALL).map(|k| a[i][k] * b[k][j]).sum()))
+    }
+
+    fn turned(a: &Full) -> Full {
+        core::array::from_fn(|i| core::array::from_fn(|j| a[j][i]))
+    }
+
+    /// A Kalman filter with the timing as four more states.
     struct Whole {
-        mean: [f64; N + 1],
-        covariance: [[f64; N + 1]; N + 1],
+        mean: [f64; ALL],
+        covariance: Full,
     }
 
     impl Whole {
-        fn new(x: &Gaussian<f64>) -> Self {
-            let mut whole = Self { mean: [0.0; N + 1], covariance: [[0.0; N + 1]; N + 1] };
-            whole.mean[..N].copy_from_slice(&x.mean);
-            for (row, of) in whole.covariance.iter_mut().zip(&x.covariance) {
-                row[..N].copy_from_slice(of);
+        fn pass(&mut self, rows: &[[f64; N]; CORE], by: &ByTiming<f64>) {
+            let mut f: Full = core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j))));
+            for (f, row) in f.iter_mut().zip(rows) {
+                f[..N].copy_from_slice(row);
+                for (k, by) in by.iter().flatten().enumerate() {
+                    f[N + k] = row[PRESSURE[k / 2]] * by;
+                }
             }
-            whole.covariance[N][N] = 1.0;
-            whole
+            self.mean = core::array::from_fn(|i| (0..ALL).map(|k| f[i][k] * self.mean[k]).sum());
+            self.covariance = product(&product(&f, &self.covariance), &turned(&f));
         }
 
-        fn carry(&mut self, of: impl Fn(&[f64; N + 1]) -> [f64; N + 1]) {
-            self.mean = of(&self.mean);
-            self.covariance = self.covariance.each_ref().map(&of);
-            let columns: [[f64; N + 1]; N + 1] =
-                core::array::from_fn(|j| of(&core::array::from_fn(|i| self.covariance[i][j])));
-            self.covariance = core::array::from_fn(|i| core::array::from_fn(|j| columns[j][i]));
-        }
-
-        fn correct(&mut self, row: &[f64; N + 1], innovation: f64, noise: f64) {
-            let with = self.covariance.each_ref().map(|line| dot(line, row));
-            let per = 1.0 / (dot(&with, row) + noise);
-            for i in 0..=N {
-                self.mean[i] += per * with[i] * innovation;
-                for j in 0..=N {
-                    self.covariance[i][j] -= per * with[i] * with[j];
+        fn correct(&mut self, row: &[f64; N], by: &ByTiming<f64>, value: f64, noise: f64) {
+            let mut h = [0.0; ALL];
+            h[..N].copy_from_slice(row);
+            for (k, by) in by.iter().flatten().enumerate() {
+                h[N + k] = row[PRESSURE[k / 2]] * by;
+            }
+            let with = self.covariance.map(|line| dot(&line, &h));
+            let variance = dot(&with, &h) + noise;
+            let innovation = value - dot(&h, &self.mean);
+            for i in 0..ALL {
+                self.mean[i] += with[i] / variance * innovation;
+                for j in 0..ALL {
+                    self.covariance[i][j] -= with[i] * with[j] / variance;
                 }
             }
         }
     }
 
-    fn with_pressure(row: &[f64; N], by: f64) -> [f64; N + 1] {
-        core::array::from_fn(|k| if k < N { row[k] } else { row[PRESSURE[1]] * by })
-    }
-
-    /// The oncoming valve's delay: what two stages say of it and of the lasting states is what one filter with it as a state says.
+    /// Friedland's filter in two stages has the result of the filter with the timing among its states.
     #[test]
-    fn two_stages_are_one_filter_with_the_timing_as_a_state() {
-        let mut x = Gaussian::of(core::array::from_fn(number), [1.0; N]);
-        x.timing = Timing::nothing([[0.0; 2], [0.0, 0.6]]);
-        let mut whole = Whole::new(&x);
-        let before = Known { mean: [0.0; ACTING], covariance: core::array::from_fn(|_| [0.5; ACTING]) };
-        for step in 0..20 {
-            let by = 1.5 * number(step + 7);
-            let rows: [[f64; N]; CORE] =
-                core::array::from_fn(|i| core::array::from_fn(|j| 0.4 * number(31 * i + j + step)));
-            let pressures = [[0.0; 2], [0.0, by]];
-            x.timing.add_pressure(&pressures);
-            x.pass(&rows, &[0.1; CORE]);
-            let row: [f64; N] = core::array::from_fn(|k| number(50 + k + 3 * step));
-            let reading = 2.0 * number(step);
-            let innovation = reading - x.value(&row);
-            let look = x.look(&Measured { row, innovation, noise: 0.3 });
-            x.correct(&look);
-            x.timing.add_pressure(&pressures.map(|by| by.map(|by| -by)));
-            whole.carry(|of| {
-                let mut carried = *of;
-                (0..CORE).for_each(|i| carried[i] = dot(&with_pressure(&rows[i], by), of));
-                carried
-            });
-            (0..CORE).for_each(|i| whole.mean[i] += 0.1);
-            let row = with_pressure(&row, by);
-            whole.correct(&row, reading - dot(&row, &whole.mean), 0.3);
-            x.fade(PRESSURE[1], 0.9);
-            whole.carry(|of| core::array::from_fn(|k| if k == PRESSURE[1] { 0.9 * of[k] } else { of[k] }));
-            if step % 7 == 3 {
-                x.tie(1.5, [0.3, 0.4]);
-                whole.carry(|of| {
-                    let (mut tied, output) = (*of, 0.3 * of[TURBINE] + 0.4 * of[OUTPUT]);
-                    (tied[TURBINE], tied[OUTPUT]) = (1.5 * output, output);
-                    tied
-                });
-            }
+    fn two_stages_are_the_filter_with_lag_and_delay_as_states() {
+        let start: [f64; N] = core::array::from_fn(|k| 0.3 * number(k + 1));
+        let mut x = Gaussian::of(start, core::array::from_fn(|k| 0.5 + 0.3 * number(k + 40).abs()));
+        let mut whole = Whole { mean: [0.0; ALL], covariance: [[0.0; ALL]; ALL] };
+        whole.mean[..N].copy_from_slice(&x.mean);
+        for k in 0..ALL {
+            whole.covariance[k][k] = if k < N { x.covariance[k][k] } else { 1.0 };
         }
-        let mut states = before;
+        for step in 0..40 {
+            let seed = 1000 * step + 100;
+            let rows: [[f64; N]; CORE] = core::array::from_fn(|i| {
+                core::array::from_fn(|j| f64::from(u8::from(i == j)) + 0.2 * number(seed + 20 * i + j))
+            });
+            let by: ByTiming<f64> =
+                core::array::from_fn(|c| core::array::from_fn(|k| 2.0 * number(seed + 90 + 2 * c + k)));
+            let back = by.map(|by| by.map(|by| -by));
+            x.timing.add_pressure(&by);
+            x.pass(&rows, &[0.0; CORE]);
+            x.timing.add_pressure(&back);
+            whole.pass(&rows, &by);
+            let row: [f64; N] = core::array::from_fn(|k| number(seed + 300 + k));
+            let (value, noise) = (number(seed + 400), 0.3);
+            x.timing.add_pressure(&by);
+            let look = x.look(&Measured { row, innovation: value - dot(&row, &x.mean), noise });
+            x.correct(&look);
+            x.timing.add_pressure(&back);
+            whole.correct(&row, &by, value, noise);
+        }
+        let mut states = Known { mean: [0.0; ACTING], covariance: [[0.0; ACTING]; ACTING] };
         for (a, i) in LASTING.into_iter().enumerate() {
             states.mean[a] = x.mean[i];
             for (b, j) in LASTING.into_iter().enumerate() {
                 states.covariance[a][b] = x.covariance[i][j];
             }
         }
-        let (known, shown) = x.timing.together(before, states).unwrap();
-        let places: [usize; ACTING] = core::array::from_fn(|a| if a < STATES_ACTING { LASTING[a] } else { N });
-        let (delay, taken_off) = (ACTING - 1, 0.6);
-        assert_eq!(
-            (known.mean[delay], known.covariance[delay][delay], known.covariance[delay][0]),
-            (taken_off, 1.0, 0.0)
-        );
-        let acts = |a: usize| a < STATES_ACTING || a == delay;
-        for a in (0..ACTING).filter(|&a| acts(a)) {
-            let off = if a == delay { taken_off } else { 0.0 };
-            assert!((shown.mean[a] - off - whole.mean[places[a]]).abs() < 1e-9, "{a}");
-            for b in (0..ACTING).filter(|&b| acts(b)) {
-                let expected = whole.covariance[places[a]][places[b]];
-                assert!((shown.covariance[a][b] - expected).abs() < 1e-9, "{a} {b}");
+        let (before, after) = x.timing.together(states, states).unwrap();
+        let place = |a: usize| LASTING.get(a).copied().unwrap_or(N + a - STATES_ACTING);
+        for a in 0..ACTING {
+            assert!((after.mean[a] - whole.mean[place(a)]).abs() < 1e-9, "{a}");
+            for b in 0..ACTING {
+                let error = after.covariance[a][b] - whole.covariance[place(a)][place(b)];
+                assert!(error.abs() < 1e-9, "{a} {b}: {error}");
             }
         }
-        // The other three did not act.
-        assert!((shown.covariance[delay][delay] - 1.0).abs() > 0.1);
-        for a in STATES_ACTING..delay {
-            assert_eq!((shown.mean[a], shown.covariance[a][a], shown.covariance[a][0]), (0.0, 1.0, 0.0));
-        }
+        assert!((STATES_ACTING..ACTING).all(|a| before.covariance[a][a] == 1.0 && after.covariance[a][a] < 0.9));
+        assert_eq!((place(0), place(3)), (FRICTION[0], KISS[1]));
     }
 
     #[test]
     fn what_is_no_number_shows_nothing() {
-        let known = Known { mean: [0.0; ACTING], covariance: core::array::from_fn(|_| [0.5; ACTING]) };
-        let mut timing = Timing::nothing([[0.0; 2]; 2]);
-        assert!(timing.together(known, known).is_some());
-        timing.take(&[f64::NAN; TIMINGS], 1.0, &[0.1; N]);
+        let known = Known { mean: [0.0; ACTING], covariance: [[0.0; ACTING]; ACTING] };
+        let mut timing = Timing::nothing([[0.5, 0.0], [0.0, -0.5]]);
+        let (_, after) = timing.together(known, known).unwrap();
+        assert_eq!(after.mean[STATES_ACTING..], [0.5, 0.0, 0.0, -0.5], "what the valve models have taken off");
+        timing.take(&[f64::NAN, 0.0, 0.0, 0.0], 1.0, &[0.0; N]);
         assert!(timing.together(known, known).is_none());
     }
 }

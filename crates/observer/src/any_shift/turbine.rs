@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! by the maps       T_1 = t(lambda) C(lambda) w_e^2
-//! by the engine     T_2 = T_e - I_e w_e' + (t - 1) T_p        whatever the lock-up clutch does
+//! by the engine     T_2 = T_e - I_e w_e'          with the lock-up clutch applied, when t is 1
 //! ```
 //!
-//! Where both are known the mean is taken, weighted by their variances; that of `T_2` has the variance of `I_e w_e'` in it, and
-//! the maps' part of `(t - 1) T_p`. With the lock-up clutch applied only the second
-//! holds. Without a converter the engine is on the input shaft: its inertia belongs to the mass of the shifts.
+//! With the lock-up clutch open the first one holds, and what the second one says of the converter's capacity is learnt
+//! ([`super::reported`]): at each moment the second one has the error of `I_e w_e'`, which is large in a shift. With the lock-up clutch
+//! applied only the second holds. Without a converter the engine is on the input shaft: its inertia belongs to the mass of the shifts.
 
 use drivetrain::{Converter, Real};
 
@@ -51,35 +51,18 @@ impl<T: Real> TurbineTorque<T> {
     /// The torque at the gearbox input, if it is known.
     #[inline]
     pub(super) fn at(&self, side: &InputSide<T>) -> Option<Found<T>> {
-        let (zero, one, least) = (T::zero(), T::one(), T::of(LEAST_N_M));
         let Some(converter) = &self.converter else {
-            return side.reported_n_m.map(|turbine_n_m| Found { turbine_n_m, noise: zero, share: self.engine_share });
+            let found = |turbine_n_m| Found { turbine_n_m, noise: T::zero(), share: self.engine_share };
+            return side.reported_n_m.map(found);
         };
         let [engine, engine_variance, acceleration, acceleration_variance] = side.engine?;
-        let turbine = side.turbine[0];
-        let (by_maps, noise) = by_maps(converter, [engine, engine_variance], side.turbine);
-        let maps = Found { turbine_n_m: by_maps, noise, share: self.converter_share };
-        let Some(reported) = side.reported_n_m else {
-            return (!side.lock_up_applied).then_some(maps);
-        };
-        let torques = converter.torques(engine, turbine);
-        let pump = if side.lock_up_applied { zero } else { torques.turbine_n_m - torques.pump_n_m };
-        let by_engine = reported - self.engine_inertia_kg_m2 * acceleration + pump;
-        let by_engine_noise = square(self.engine_inertia_kg_m2) * acceleration_variance;
         if side.lock_up_applied {
-            return Some(Found { turbine_n_m: by_engine, noise: by_engine_noise, share: self.engine_share });
+            let turbine_n_m = side.reported_n_m? - self.engine_inertia_kg_m2 * acceleration;
+            let noise = square(self.engine_inertia_kg_m2) * acceleration_variance;
+            return Some(Found { turbine_n_m, noise, share: self.engine_share });
         }
-        // Variances of what lasts: of the maps, and of the reported torque with the part that the maps have in it.
-        let maps_variance = square(self.converter_share * by_maps.abs().max(least));
-        let reported_variance =
-            square(self.engine_share * reported.abs().max(least)) + square(self.converter_share * pump);
-        let (by_maps_all, by_engine_all) = (maps_variance + noise, reported_variance + by_engine_noise);
-        let weight = by_engine_all / (by_engine_all + by_maps_all);
-        let rest = one - weight;
-        let turbine_n_m = weight * by_maps + rest * by_engine;
-        let lasting = square(weight) * maps_variance + square(rest) * reported_variance;
-        let noise = square(weight) * noise + square(rest) * by_engine_noise;
-        Some(Found { turbine_n_m, noise, share: lasting.sqrt() / turbine_n_m.abs().max(least) })
+        let (turbine_n_m, noise) = by_maps(converter, [engine, engine_variance], side.turbine);
+        Some(Found { turbine_n_m, noise, share: self.converter_share })
     }
 
     /// The same in another precision.

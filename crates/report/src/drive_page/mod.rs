@@ -165,16 +165,14 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
         return drive.warnings.iter().cloned().chain([none]).collect();
     }
     let most = |value: fn(&ScoredShift) -> f64| shifts.iter().map(value).fold(0.0, f64::max);
+    let longest = number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2);
     let completed = shifts.iter().filter(|shift| shift.quality.complete_s.is_some()).count();
     let sum = |of: fn(&ScoredShift) -> u64| shifts.iter().map(of).sum::<u64>();
     let [all, inside] = [sum(|shift| 2 * shift.summary.clutches()[0]), sum(|shift| 2 * shift.summary.clutches()[1])];
     let good = sum(|shift| shift.summary.rows_with(Health::Good));
     let mut sentences = drive.warnings.clone();
-    sentences.extend([format!(
-        "{completed} of {} shifts were completed; the longest took {} s.",
-        shifts.len(),
-        number(most(|shift| shift.quality.complete_s.unwrap_or(0.0)), 2)
-    )]);
+    let longest = if completed > 0 { format!("; the longest took {longest} s") } else { String::new() };
+    sentences.push(format!("{completed} of {} shifts were completed{longest}.", shifts.len()));
     if shifts.iter().any(|shift| !shift.is_garage) {
         sentences.push(format!(
             "Largest flare of an old gear {} rad/s, largest slip beyond a new gear {} rad/s.",

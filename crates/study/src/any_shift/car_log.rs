@@ -299,14 +299,13 @@ impl<'c> CarLog<'c> {
         let speed_m_s = Some(Reading { value: of_car, age_s: 0.0 }).filter(|speed| !speed.value.is_nan());
         let truth = columns.truth.map(|clutch| clutch.map(number));
         let lock_up_applied = number(columns.lock_up) > 0.5;
-        // Beside the converter's maps the engine torque makes the inertia phase worse: the acceleration of the engine comes late.
         let mut input = ShiftInput {
             dt_s,
             engine_rad_s,
             turbine_rad_s,
             output_rad_s,
             wheel_rad_s,
-            engine_n_m: reported_n_m.filter(|_| self.car.converter.is_none() || lock_up_applied),
+            engine_n_m: reported_n_m,
             lock_up_applied,
             commands,
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),

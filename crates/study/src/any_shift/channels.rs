@@ -158,8 +158,7 @@ impl<'a> CarChannels<'a> {
             turbine_rad_s,
             output_rad_s,
             wheel_rad_s,
-            // As with the rows of a table: beside the converter's maps the engine torque makes the inertia phase worse.
-            engine_n_m: engine_n_m.filter(|_| self.car.converter.is_none() || self.lock_up_applied),
+            engine_n_m,
             lock_up_applied: self.lock_up_applied,
             commands,
             gear: self.gears.row(self.car, [turbine_rad_s, output_rad_s]),

@@ -36,10 +36,11 @@ const ENOUGH_POINTS: u32 = 5;
 const SHARE: f64 = 0.15;
 const BESIDE_N_M: f64 = 5.0;
 const MOST: f64 = 3.0;
-/// Shifts that are needed to judge \[chosen\].
-const ENOUGH_SHIFTS: u32 = 4;
-/// Delay from which on it is said, s \[chosen\]: above what errors of friction, valves and strokes within their bounds look like.
-const SAID_S: f64 = 0.055;
+/// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
+const ENOUGH_SHIFTS: u32 = 2;
+/// Delay from which on it is said, s \[chosen\]: above what errors of friction, valves and strokes within their bounds look like. Valves whose
+/// delay is off by 15 ms and whose lag of 60 ms by half of it look 45 ms early or late by themselves, errors of other kinds 20 ms more.
+const SAID_S: f64 = 0.075;
 /// Share of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 
@@ -91,8 +92,8 @@ pub(super) struct CommandDelay<'c> {
     waiting: VecDeque<Waiting>,
     /// Greatest age that the commands of a row have had by themselves, s: so much of the delay the filter knows.
     age_s: f64,
-    /// Shifts that were compared, and the sums of their mean differences.
-    shifts: u32,
+    /// Shifts up and shifts down that were compared, and the sums of their mean differences.
+    shifts: [u32; 2],
     differences: Box<Differences>,
     /// The delay, s, and whether it is beyond the last move, if the shifts show one.
     found: Option<(f64, bool)>,
@@ -105,7 +106,7 @@ impl<'c> CommandDelay<'c> {
             rows: VecDeque::new(),
             waiting: VecDeque::new(),
             age_s: 0.0,
-            shifts: 0,
+            shifts: [0; 2],
             differences: Box::new([[0.0; MOVES]; PRESSURES]),
             found: None,
         }
@@ -157,7 +158,8 @@ impl<'c> CommandDelay<'c> {
         }
         let Some(points) = self.points(waiting) else { return };
         let Some(differences) = self.differences(&shift, &points) else { return };
-        self.shifts += 1;
+        let [off, on] = shift.clutches.map(|clutch| clutch.ratio);
+        self.shifts[usize::from(on > off)] += 1;
         let sums = self.differences.iter_mut().flatten().zip(differences.iter().flatten());
         sums.for_each(|(sum, difference)| *sum += difference);
         self.found = self.delay();
@@ -228,7 +230,8 @@ impl<'c> CommandDelay<'c> {
         let unmoved = self.differences.iter().map(|sums| sums[TO_ONE_SIDE]).fold(f64::INFINITY, f64::min);
         let moved_s = moved_s(place) + GRID_S * between(sums, place);
         let delay_s = if moved_s > 0.0 { (moved_s - self.age_s).max(0.0) } else { moved_s };
-        let is_found = self.shifts >= ENOUGH_SHIFTS && delay_s.abs() >= SAID_S && sums[place] <= LEFT * unmoved;
+        let is_enough = self.shifts.iter().all(|shifts| *shifts >= ENOUGH_SHIFTS);
+        let is_found = is_enough && delay_s.abs() >= SAID_S && sums[place] <= LEFT * unmoved;
         is_found.then_some((delay_s, place == 0 || place == MOVES - 1))
     }
 
@@ -240,12 +243,13 @@ impl<'c> CommandDelay<'c> {
         let late = if delay_s > 0.0 { "late" } else { "early" };
         let or_more = if is_at_end { " or more" } else { "" };
         Some(format!(
-            "warning: the commands of the valves come about {:.0} ms{or_more} too {late} against the speeds, by the turbine's torques in {} shifts: the \
+            "warning: the commands of the valves come about {:.0} ms{or_more} too {late} against the speeds, by the turbine's torques in {} shifts: then the \
              guaranteed ranges do not hold, and the estimates are worse. `late_s = {delay_s:.2}` in each `channel.element_NAME_...` of a channel map moves \
              them to their time (in those of gear and target_gear too if they have the same delay); `wetclutch inspect LOG --suggest` makes a map. An \
-             offset of all commands looks alike: check their zero first",
+             offset of all commands looks alike, and valves that are further off than their bounds do: check both first, as the ranges do not hold either where \
+             commands are moved that were in time",
             1e3 * delay_s.abs(),
-            self.shifts
+            self.shifts.iter().sum::<u32>()
         ))
     }
 }

@@ -197,8 +197,9 @@ pub(super) fn not_of_their_gears(shifts: &[ScoredShift]) -> Option<String> {
     let more = if others.len() > NAMED { ", ..." } else { "" };
     (!others.is_empty()).then(|| {
         format!(
-            "warning: {} of the shifts take longer than {LONGEST_S:.0} s, or the turbine is far below the speeds of both gears (number {}{more}): `gear` and \
-             `target_gear` are missing, late or wrong there, and what the table says of these shifts is not of them",
+            "warning: {} of the shifts take longer than {LONGEST_S:.0} s, or the turbine is {OTHER_SHIFT_RAD_S:.0} rad/s and more below the speeds of both gears (number {}{more}): \
+             either `gear` and `target_gear` are missing, late or wrong there, and what the table says of these shifts is not of them, or neither clutch held \
+             the turbine; the table gives no friction work of them",
             others.len(),
             others[..others.len().min(NAMED)].join(", ")
         )

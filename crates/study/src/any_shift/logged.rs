@@ -17,6 +17,7 @@ use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShi
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
+use super::lock_up_check::LockUpCheck;
 use super::log_beside::{CarriedPressures, DoubtedPressures, ShiftJerk, not_of_their_gears};
 pub use super::ratio_scale::WrongScale;
 use super::still_commands::StillCommands;
@@ -50,6 +51,7 @@ pub struct LoggedDrive<'c> {
     commands: CommandCheck<'c>,
     delay: CommandDelay<'c>,
     converter: ConverterCheck,
+    lock_up: LockUpCheck,
     still: StillCommands,
     holes: Holes,
     carried: CarriedPressures,
@@ -116,6 +118,7 @@ impl<'c> LoggedDrive<'c> {
             commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
             delay: CommandDelay::new(tables),
             converter: ConverterCheck::default(),
+            lock_up: LockUpCheck::default(),
             still: StillCommands::default(),
             holes: Holes::default(),
             carried: CarriedPressures::default(),
@@ -200,6 +203,7 @@ impl<'c> LoggedDrive<'c> {
         let [engine, turbine, output] = self.came_rad_s;
         if gears.is_none() {
             self.converter.push(self.car, step, [engine, turbine]);
+            self.lock_up.push(self.car, step, [engine, turbine]);
         }
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
@@ -334,6 +338,7 @@ impl<'c> LoggedDrive<'c> {
         warnings.extend(self.doubted.warning(self.car));
         warnings.extend(self.delay.warning());
         warnings.extend(self.converter.warning(self.car));
+        warnings.extend(self.lock_up.warning());
         warnings.extend(self.still.warnings(self.car, self.tables));
         if self.holes.count > 0 {
             warnings.push(format!(

@@ -8,6 +8,7 @@ mod cars;
 mod command_delay;
 mod drives;
 mod engine_torque;
+mod holes;
 mod input_clutch;
 mod learning;
 mod limits;

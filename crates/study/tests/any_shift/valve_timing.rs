@@ -1,4 +1,4 @@
-//! What is learnt of lag and delay of the valves, and what it would bring to know them.
+//! What it would bring to know lag and delay of the valves, which are not learnt.
 
 use config::Car;
 use design::ShiftErrors;
@@ -52,7 +52,7 @@ impl Found {
         }
     }
 
-    /// Errors of a filter that is told nothing, unlearnt and after thirty shifts, N m.
+    /// Errors after thirty shifts, N m: of a filter that is told nothing, and of one that is told the timing.
     fn print(&self, name: &str) -> [f64; 2] {
         let of = |count: usize| self.0.each_ref().map(|sums| sums[count].all()[0]);
         let ([before, before_told], [after, after_told]) = (of(0), of(1));
@@ -65,7 +65,7 @@ impl Found {
         for (who, sums) in ["told nothing", "told"].iter().zip(&self.0) {
             println!("    {who}: {}", sums[1].show());
         }
-        [before, after]
+        [after, after_told]
     }
 }
 
@@ -83,22 +83,20 @@ fn print_given(car: &Car) {
     for (name, timing) in timings {
         let mut found = Found::default();
         (1..=draws()).for_each(|seed| found.add(car, &timed(car, |_| timing), seed));
-        let [before, after] = found.print(&format!("all valves, {name}"));
-        assert!(after < before, "{name}: {after} {before}");
+        found.print(&format!("all valves, {name}"));
     }
     for (name, timing) in &timings[1..5] {
         let mut found = Found::default();
         for (at, seed) in (0..car.clutches.len()).filter(|&at| car.clutches[at].is_some()).zip(1..) {
             found.add(car, &timed(car, |element| if element == at { *timing } else { (1.0, None) }), seed);
         }
-        let [before, after] = found.print(&format!("one valve, {name}"));
-        assert!(after < before, "{name}: {after} {before}");
+        found.print(&format!("one valve, {name}"));
     }
 }
 
 /// The numbers of the documentation: `LEARNING_DRAWS=4 cargo test --release -p study --test any_shift valve_timing -- --nocapture`.
 #[test]
-fn lag_and_delay_of_the_valves_are_learnt() {
+fn cars_of_the_whole_budget_have_a_third_of_their_error_from_lag_and_delay() {
     let car = cars().remove(0);
     if draws() > 2 {
         print_given(&car);
@@ -113,7 +111,6 @@ fn lag_and_delay_of_the_valves_are_learnt() {
             |at: usize| draw.timing[at].map_or((1.0, None), |ValveTiming { lag, delay_s, .. }| (lag, Some(delay_s)));
         found.add(&car, &[truth, told(&car, timing)], seed);
     }
-    let [before, after] = found.print("cars of the whole budget");
-    // Not learnt they leave 0.93 of the error unlearnt, told they are 0.5 of it.
-    assert!(after < 0.75 * before, "{after} {before}");
+    let [after, after_told] = found.print("cars of the whole budget");
+    assert!(after_told < 0.75 * after, "{after_told} {after}");
 }

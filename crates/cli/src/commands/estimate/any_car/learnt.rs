@@ -108,6 +108,20 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
         ),
         format!("learnt kiss points, kPa above the vehicle file: {}", list(&|of| of.kiss_pa, 1e-3)),
     ];
+    let [input, reported] = filter.learnt_sources(learnt).map(|of| of.map(|value| 100.0 * value));
+    let source =
+        if car.converter.is_some() { "by the converter of the vehicle file" } else { "that the engine reports" };
+    said.push(format!(
+        "learnt torque at the gearbox input: {:+.1} +-{:.1} % above the one {source}",
+        input[0], input[1]
+    ));
+    let unlearnt = 100.0 * filter.uncertainty.slow_share(filter.turbine.engine_share);
+    if car.converter.is_some() && reported[1] < SHOWN * unlearnt {
+        said.push(format!(
+            "learnt reported engine torque: {:+.1} +-{:.1} % above the true one",
+            reported[0], reported[1]
+        ));
+    }
     let [scale, deviation] = filter.learnt_wheel_scale(learnt);
     if deviation < SHOWN * filter.uncertainty.wheel_scale {
         said.push(format!(

@@ -1,0 +1,140 @@
+//! Whether the lock-up clutch was closed while a log says nothing of it.
+//!
+//! The converter's maps then give the turbine no torque, whatever the engine has: both speeds are alike. With a reported torque the engine
+//! gives far more than the pump takes at these speeds; without one the speeds are alike for longer than a car without torque drives.
+
+use config::Car;
+
+use super::car_log::LogStep;
+
+/// Speed ratio from which on the lock-up clutch may be closed or slip \[chosen\]: a slip-controlled one slips by some rad/s.
+const LEAST_SPEED_RATIO: f64 = 0.9;
+/// What the reported torque is above that of the pump, N m and as a share of it \[chosen\]: more than the engine's inertia takes, and than both may err by.
+const MORE_N_M: f64 = 25.0;
+const MORE_SHARE: f64 = 0.4;
+/// Difference of speeds that are alike, rad/s, and for how long without a break, s \[chosen\]: a car that drives without torque soon pulls or coasts.
+const ALIKE_RAD_S: f64 = 1.5;
+const ALIKE_S: f64 = 10.0;
+/// Speed of a turbine that is driven, rad/s, and the change of the engine speed that is slow, rad/s^2 \[chosen\].
+const DRIVEN_RAD_S: f64 = 80.0;
+const SLOW_RAD_S2: f64 = 40.0;
+/// Time that is said, s \[chosen\].
+const ENOUGH_S: f64 = 3.0;
+
+/// The time in which it was closed, so far.
+#[derive(Default)]
+pub(super) struct LockUpCheck {
+    is_named: bool,
+    reported_n_m: Option<f64>,
+    /// By the reported torque, s; by the speeds alone, and since the last break.
+    by_torque_s: f64,
+    alike_s: f64,
+    since_s: f64,
+    /// Engine speed, rad/s, when it was taken, s, and whether it changed slowly up to then.
+    before: Option<(f64, f64)>,
+    is_slow: bool,
+}
+
+impl LockUpCheck {
+    /// Takes a row with the newest speeds of engine and turbine, rad/s.
+    pub(super) fn push(&mut self, car: &Car, step: &LogStep, [engine, turbine]: [f64; 2]) {
+        const RATE_S: f64 = 0.2;
+        let Some(converter) = car.converter.as_ref() else { return };
+        self.is_named |= step.input.lock_up_applied;
+        if let Some(reported) = step.reported_n_m {
+            self.reported_n_m = Some(reported.value);
+        }
+        let (before, at_s) = self.before.unwrap_or((engine, step.time_s));
+        let passed_s = step.time_s - at_s;
+        if !(0.0..RATE_S).contains(&passed_s) || self.before.is_none() {
+            self.is_slow = (engine - before).abs() <= SLOW_RAD_S2 * passed_s;
+            self.before = Some((engine, step.time_s));
+        }
+        let dt_s = step.input.dt_s.clamp(0.0, 1.0);
+        let is_driven = turbine > DRIVEN_RAD_S && turbine >= LEAST_SPEED_RATIO * engine;
+        let pump_n_m = converter.torques(engine, turbine).pump_n_m.max(0.0);
+        if let Some(reported_n_m) = self.reported_n_m
+            && is_driven
+            && self.is_slow
+            && reported_n_m - pump_n_m > MORE_N_M + MORE_SHARE * pump_n_m
+        {
+            self.by_torque_s += dt_s;
+        }
+        self.since_s = if is_driven && (engine - turbine).abs() <= ALIKE_RAD_S { self.since_s + dt_s } else { 0.0 };
+        if self.since_s >= ALIKE_S {
+            // With the time up to now once.
+            self.alike_s += if self.since_s - dt_s < ALIKE_S { self.since_s } else { dt_s };
+        }
+    }
+
+    /// What the log leaves out, in a sentence.
+    pub(super) fn warning(&self) -> Option<String> {
+        let closed_s = if self.reported_n_m.is_some() { self.by_torque_s } else { self.alike_s };
+        let why = match self.reported_n_m {
+            Some(_) => "the engine reports far more torque than the converter takes at these speeds",
+            None => "engine and turbine turn alike",
+        };
+        (!self.is_named && closed_s >= ENOUGH_S).then(|| {
+            format!(
+                "warning: the lock-up clutch seems to be closed or to slip for {closed_s:.0} s, {why}, and the log does not say so: the estimates of those times \
+                 take the torque of an open converter\nhint: give `lock_up_applied` (1 while the clutch carries, also while it slips) with \
+                 `reported_engine_torque`, which is the torque at the gearbox input then"
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::any_shift::SAMPLE_S;
+    use observer::Reading;
+    use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
+
+    /// What is said of so long a log with this slip, rad/s, an engine that reports the pump's torque and more, N m, and a flag.
+    fn said(seconds: u32, slip: f64, more_n_m: Option<f64>, lock_up_applied: bool) -> Option<String> {
+        let car = Car::eight_speed().unwrap();
+        let mut check = LockUpCheck::default();
+        for row in 0..100 * seconds {
+            let time_s = f64::from(row) * SAMPLE_S;
+            let turbine = 150.0 + 20.0 * (0.3 * time_s).sin();
+            let speeds = [turbine + slip + 0.2 * (57.0 * time_s).sin(), turbine];
+            let input = ShiftInput {
+                dt_s: SAMPLE_S,
+                engine_rad_s: Some(Reading::now(speeds[0])),
+                turbine_rad_s: Some(Reading::now(turbine)),
+                output_rad_s: None,
+                wheel_rad_s: None,
+                engine_n_m: None,
+                lock_up_applied,
+                commands: [None; MAX_ELEMENTS],
+                gear: GearCommand { from: 1, to: 1 },
+            };
+            let pump_n_m = car.converter.unwrap().torques(speeds[0], turbine).pump_n_m;
+            let reported_n_m = more_n_m.map(|more_n_m| Reading::now(pump_n_m + more_n_m));
+            check.push(&car, &LogStep { reported_n_m, ..LogStep::of(time_s, input) }, speeds);
+        }
+        check.warning()
+    }
+
+    #[test]
+    fn a_closed_or_slipping_lock_up_clutch_that_is_not_named_is_said() {
+        for slip in [0.0, 4.0] {
+            assert!(
+                said(10, slip, Some(80.0), false).is_some_and(|text| text.contains("closed or to slip for")),
+                "{slip}"
+            );
+            assert_eq!(said(10, slip, Some(80.0), true), None);
+        }
+        // Without a reported torque the speeds tell, after a while.
+        assert!(said(30, 0.0, None, false).is_some_and(|text| text.contains("for 30 s")));
+        assert_eq!((said(9, 0.0, None, false), said(30, 4.0, None, false)), (None, None));
+    }
+
+    #[test]
+    fn of_an_open_converter_nothing_is_said() {
+        for (slip, more_n_m) in [(10.0, 10.0), (40.0, 40.0), (0.0, 5.0), (0.0, -80.0)] {
+            assert_eq!(said(60, slip, Some(more_n_m), false), None, "{slip} {more_n_m}");
+        }
+    }
+}
