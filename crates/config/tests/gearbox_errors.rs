@@ -91,6 +91,28 @@ fn an_element_that_slips_at_the_torque_asked_names_gear_and_torques() {
     assert!(error.contains("hint: with 1.1 times the friction faces"), "{error}");
 }
 
+/// A table with two columns of one name could not be read.
+#[test]
+fn elements_whose_columns_have_one_name_are_refused() {
+    let hint = "hint: names of elements differ in more than capital letters, spaces and signs: rename one of them, in the gears too";
+    let renamed = |text: &str, first: &str, second: &str| {
+        text.replace("\"A\"", &format!("\"{first}\"")).replace("name = \"B\"", &format!("name = \"{second}\""))
+    };
+    for (first, second, column) in [("FWD", "fwd", "element_fwd"), ("C/1", "C 1", "element_c_1")] {
+        for text in [EIGHT_SPEED, SHARES] {
+            let error = error_in(&renamed(text, first, "B"), "name = \"B\"", &format!("name = \"{second}\""));
+            assert!(
+                error.contains(&format!(
+                    "\"{first}\" and \"{second}\" have the same columns in a table: {column}_...\n{hint}"
+                )),
+                "{error}"
+            );
+        }
+    }
+    let dog = error_in(DUAL_CLUTCH, "dog = \"D2\"", "dog = \"d1\"");
+    assert!(dog.starts_with("`gear_pair.dog`: \"D1\" and \"d1\" have"), "{dog}");
+}
+
 #[test]
 fn the_level_must_be_given_and_known() {
     let missing = error_in(EIGHT_SPEED, "level = \"stick-diagram\"", "level = \"drawing\"");

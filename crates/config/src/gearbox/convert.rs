@@ -9,6 +9,7 @@ use geartrain::{
 };
 use toml::Spanned;
 
+use super::element_column;
 use super::raw::{
     RawEngagedGear, RawGearPair, RawKind, RawPack, RawPlanetarySet, RawPlanets, RawRatios, RawShares, RawShiftMass,
     RawStickDiagram,
@@ -92,6 +93,9 @@ pub(super) fn stick_diagram(check: &Check<'_>, raw: &RawStickDiagram) -> Result<
             check.number(format_args!("shaft.{name}.inertia_kg_m2"), &shaft.inertia_kg_m2, 1e-5..=50.0)?;
         Ok(Shaft { name, inertia_kg_m2 })
     });
+    let dogs = raw.gear_pair.iter().filter_map(|pair| pair.get_ref().dog.as_ref());
+    let named = raw.element.iter().map(|entry| ("element.name", &entry.name));
+    columns_differ(check, named.chain(dogs.map(|dog| ("gear_pair.dog", dog))))?;
     let elements = raw.element.iter().map(|element| {
         let name = name(check, "element.name", &element.name)?;
         Ok(Element {
@@ -120,6 +124,7 @@ pub(super) fn shares(check: &Check<'_>, raw: &RawShares) -> Result<Read, ConfigE
     spans.named("element", raw.element.iter().map(|entry| &entry.name));
     spans.named("gear", raw.gear.get_ref().iter().map(|entry| &entry.name));
     spans.unnamed("shift_mass", raw.shift_mass.iter());
+    columns_differ(check, raw.element.iter().map(|entry| ("element.name", &entry.name)))?;
     let elements = raw.element.iter().map(|element| {
         let name = name(check, "element.name", &element.name)?;
         let pack = element.pack.as_ref().map(|raw| pack(check, &name, raw)).transpose()?;
@@ -177,6 +182,25 @@ fn read(
 
 fn name(check: &Check<'_>, key: &str, name: &Word) -> Result<String, ConfigError> {
     check.name(key, name.get_ref(), start(name))
+}
+
+/// Refuses elements whose columns in a table would have the same name. The same name twice is an error of the gearbox itself.
+fn columns_differ<'w>(
+    check: &Check<'_>,
+    elements: impl Iterator<Item = (&'static str, &'w Word)>,
+) -> Result<(), ConfigError> {
+    let mut known: BTreeMap<String, &str> = BTreeMap::new();
+    for (key, word) in elements {
+        let column = element_column(word.get_ref());
+        let Some(first) = known.get(&column).filter(|first| **first != word.get_ref()) else {
+            known.insert(column, word.get_ref());
+            continue;
+        };
+        let message = format!("\"{first}\" and \"{}\" have the same columns in a table: {column}_...", word.get_ref());
+        let hint = "names of elements differ in more than capital letters, spaces and signs: rename one of them, in the gears too";
+        return Err(check.meaning(key, start(word), message, Some(hint.to_owned())));
+    }
+    Ok(())
 }
 
 fn kind(raw: RawKind) -> ElementKind {

@@ -11,14 +11,20 @@ use crate::driving::{Driving, SkewFit};
 pub struct ChannelFits {
     /// The output speed, by the ratios of the gears.
     pub output: Result<SkewFit, String>,
-    /// The engine speed, with the lock-up clutch closed; none without a converter.
+    /// The engine speed, with the lock-up clutch closed; none without a converter. A lock-up clutch that keeps a slip is applied, and the
+    /// engine is faster than the turbine: such a car tells nothing here.
     pub engine: Option<Result<SkewFit, String>>,
 }
 
 impl ChannelFits {
     pub(crate) fn of(car: &Car, driving: &Driving) -> Self {
-        let with_lock_up =
-            || SkewFit::of(&driving.engines, "with the lock-up clutch closed and the engine as fast as the turbine");
+        let is_slip_controlled = car.lock_up.is_some_and(|lock_up| lock_up.slip_rad_s > 0.0);
+        let with_lock_up = || {
+            if is_slip_controlled {
+                return Err("the lock-up clutch of the vehicle file is slip-controlled".to_owned());
+            }
+            SkewFit::of(&driving.engines, "with the lock-up clutch closed and the engine as fast as the turbine")
+        };
         Self {
             output: SkewFit::of(
                 &driving.outputs,

@@ -135,6 +135,26 @@ fn a_closed_lock_up_clutch_tells_the_delay_of_the_engine_speed_and_the_ratio_a_w
     }
 }
 
+/// With the lock-up clutch applied the engine of such a car is faster than the turbine: that is no wrong scale.
+#[test]
+fn a_slip_controlled_lock_up_clutch_tells_nothing_of_the_engine_speed() {
+    let mut drawn = Drawn::of(car("eight_speed.toml"), 33, Case::Usual);
+    drawn.file.lock_up = Some(config::LockUp {
+        capacity_n_m: 300.0,
+        first_gear: 3,
+        on_rad_s: 140.0,
+        off_rad_s: 110.0,
+        ramp_s: 0.5,
+        slip_rad_s: 4.0,
+    });
+    let (recorded, _) = drawn.driven(&city(1));
+    let driving = locked(&drawn, 0.0, 1.0, 0.008);
+    let fit = fit(&drawn.file, &drawn.tables(), &recorded.shifts, &driving, &mut |_| ()).unwrap();
+    assert!(fit.channels.output.is_ok() && fit.channels.engine.as_ref().is_some_and(Result::is_err));
+    let said = fit.statements().join("\n");
+    assert!(!said.contains("with the lock-up clutch closed"), "{said}");
+}
+
 #[test]
 fn commands_that_are_stored_late_or_early_are_noticed_and_the_given_values_are_kept() {
     let found = |commands_s: f64| {

@@ -126,6 +126,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         [of[0].map(|x| shares[0] * x), of[1].map(|x| shares[1] * x)]
     }
 
+    /// What is learnt of the valve of an element: error of its lag as a share, and of its delay beside that of the tables, s, each with its
+    /// deviation; `None` if there is no such element.
+    pub fn learnt_timing(&self, learnt: &Learnt<T>, at: usize) -> Option<[[T; 2]; 2]> {
+        let ([lag, delay], [lag_variance, delay_variance]) = learnt.of_timing(at)?;
+        let u = &self.uncertainty;
+        let [per_lag, per_delay] = [u.valve_lag_share, u.valve_delay_s].map(|deviation| u.slow_part.sqrt() * deviation);
+        let of = |per: T, mean: T, variance: T| [per * mean, per * variance.sqrt()];
+        Some([of(per_lag, lag, lag_variance), of(per_delay, delay, delay_variance)])
+    }
+
     /// What is learnt of the scale of the wheel speed: its error as a share, and the deviation.
     pub fn learnt_wheel_scale(&self, learnt: &Learnt<T>) -> [T; 2] {
         let [mean, variance] = learnt.of_wheel();

@@ -152,7 +152,6 @@ mod tests {
     }
 
     #[test]
-    #[expect(clippy::needless_range_loop, reason = "as the sums are written")]
     fn directions_and_roots_make_the_matrix_again() {
         let some = some();
         let (values, rows) = directions(some);

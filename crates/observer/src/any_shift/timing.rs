@@ -116,10 +116,10 @@ impl<T: Real> Timing<T> {
         for (row, state) in off.iter_mut().zip(LASTING) {
             *row = self.off[state];
         }
-        for k in 0..TIMINGS {
+        for (k, taken_off) in self.taken_off.into_iter().enumerate() {
             let a = STATES_ACTING + k;
             off[a][k] = one;
-            (before.mean[a], after.mean[a]) = (self.taken_off[k], self.taken_off[k]);
+            (before.mean[a], after.mean[a]) = (taken_off, taken_off);
             for b in 0..ACTING {
                 (before.covariance[a][b], before.covariance[b][a]) = (zero, zero);
                 (after.covariance[a][b], after.covariance[b][a]) = (zero, zero);
@@ -129,8 +129,8 @@ impl<T: Real> Timing<T> {
         for a in 0..ACTING {
             after.mean[a] = after.mean[a] + dot(&off[a], &mean);
             let with = covariance.each_ref().map(|row| dot(row, &off[a]));
-            for b in 0..ACTING {
-                after.covariance[a][b] = after.covariance[a][b] + dot(&with, &off[b]);
+            for (value, off) in after.covariance[a].iter_mut().zip(&off) {
+                *value = *value + dot(&with, off);
             }
         }
         Some((before, after))

@@ -5,6 +5,7 @@
 //! pressures are compared where the log has them.
 
 use config::Car;
+use config::gearbox::element_column;
 use design::ShiftTables;
 use drivetrain::CommandKind;
 use observer::Reading;
@@ -45,12 +46,6 @@ pub fn element_pressures(car: &Car) -> impl Iterator<Item = (usize, String)> + '
 pub fn command_age(command: &str) -> String {
     let name = command.rsplit_once('_').map_or(command, |(name, _)| name);
     format!("{name}_age_s")
-}
-
-/// How the names of an element's columns begin.
-pub fn element_column(element: &str) -> String {
-    let plain = |c: char| if c.is_alphanumeric() { c } else { '_' };
-    format!("element_{}", element.to_lowercase().chars().map(plain).collect::<String>())
 }
 
 /// Places of a speed or a command in the log, and of the age of its readings.

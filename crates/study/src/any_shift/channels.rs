@@ -4,6 +4,7 @@
 //! too, without one the engine torque. Gears are numbers: 1 is the first forward gear, 0 none, and a negative number reverse.
 
 use config::Car;
+use config::gearbox::element_column;
 use design::ShiftTables;
 use drivetrain::CommandKind;
 use logs::{ChannelMap, Log, LogError, Mapped, Places, Reading, Readings, Role, Steps};
@@ -11,7 +12,7 @@ use observer::Reading as Measured;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use plant::car::NO_GEAR;
 
-use super::car_log::{LogStep, element_column, element_commands, element_pressures};
+use super::car_log::{LogStep, element_commands, element_pressures};
 use super::gear_signal::Gears;
 use super::pressure_command::{command_for, pressure_command_column};
 

@@ -38,9 +38,9 @@ const BESIDE_N_M: f64 = 5.0;
 const MOST: f64 = 3.0;
 /// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
 const ENOUGH_SHIFTS: u32 = 2;
-/// Delay from which on it is said, s \[chosen\]: above what errors of friction, valves and strokes within their bounds look like. Valves whose
-/// delay is off by 15 ms and whose lag of 60 ms by half of it look 45 ms early or late by themselves, errors of other kinds 20 ms more.
-const SAID_S: f64 = 0.075;
+/// Delay from which on it is said, s \[chosen\]: above what errors of friction, valves and strokes within their bounds look like, as far as the
+/// filter has not learnt lag and delay of the valves.
+const SAID_S: f64 = 0.065;
 /// Share of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 

@@ -4,9 +4,8 @@
 //! this pressure. Where the map of the controller is another one, the difference is an error of the valve's gain.
 
 use config::Car;
+use config::gearbox::element_column;
 use drivetrain::ClutchValve;
-
-use super::car_log::element_column;
 
 /// Line pressures up to which a command means the line pressure: a clutch that holds is often commanded more. Beyond it is no pressure of
 /// this car.

@@ -1,4 +1,4 @@
-//! What it would bring to know lag and delay of the valves, which are not learnt.
+//! Lag and delay of the valves, which the filter learns, against a filter that is told both.
 
 use config::Car;
 use design::ShiftErrors;
@@ -96,7 +96,7 @@ fn print_given(car: &Car) {
 
 /// The numbers of the documentation: `LEARNING_DRAWS=4 cargo test --release -p study --test any_shift valve_timing -- --nocapture`.
 #[test]
-fn cars_of_the_whole_budget_have_a_third_of_their_error_from_lag_and_delay() {
+fn in_thirty_shifts_lag_and_delay_are_learnt() {
     let car = cars().remove(0);
     if draws() > 2 {
         print_given(&car);
@@ -112,5 +112,6 @@ fn cars_of_the_whole_budget_have_a_third_of_their_error_from_lag_and_delay() {
         found.add(&car, &[truth, told(&car, timing)], seed);
     }
     let [after, after_told] = found.print("cars of the whole budget");
-    assert!(after_told < 0.75 * after, "{after_told} {after}");
+    let before = found.0[0][0].all()[0];
+    assert!(after < 0.7 * before && after < 1.4 * after_told, "{before} {after} {after_told}");
 }

@@ -1,9 +1,9 @@
 //! The columns of an estimate of a car with any gearbox.
 
 use config::Car;
+use config::gearbox::element_column;
 use observer::any_shift::{MAX_ELEMENTS, ONE_WAY, ShiftEstimate};
 use observer::{ChannelHealth, Channels};
-use study::any_shift::car_log::element_column;
 use study::any_shift::channels::gear_number;
 use trace::signal::{OFFGOING_COMMAND_READING, ONCOMING_COMMAND_READING, READINGS};
 use trace::{Cell, ColumnKind};

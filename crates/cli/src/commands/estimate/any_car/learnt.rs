@@ -108,6 +108,16 @@ fn sentences(car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> V
         ),
         format!("learnt kiss points, kPa above the vehicle file: {}", list(&|of| of.kiss_pa, 1e-3)),
     ];
+    let timing = |which: usize, per_unit: f64| {
+        let of = |(at, element): (usize, &geartrain::GearboxElement)| {
+            let value = filter.learnt_timing(learnt, tables.place(at)?)?[which].map(|value| per_unit * value);
+            Some(format!("{} {:+.0} +-{:.0}", element.name, value[0], value[1]))
+        };
+        let elements = car.gearbox.elements.iter().enumerate();
+        elements.filter_map(of).collect::<Vec<_>>().join(", ")
+    };
+    said.push(format!("learnt lag of the valves, % above the vehicle file: {}", timing(0, 100.0)));
+    said.push(format!("learnt delay of the valves, ms above the middle of its bounds: {}", timing(1, 1e3)));
     let [input, reported] = filter.learnt_sources(learnt).map(|of| of.map(|value| 100.0 * value));
     let source =
         if car.converter.is_some() { "by the converter of the vehicle file" } else { "that the engine reports" };
