@@ -143,6 +143,8 @@ pub(super) struct Acting<T> {
     places: [Option<usize>; ACTING],
     /// Part of the variance of torque factors, kiss points, lags and delays that lasts.
     slow_part: T,
+    /// Its root.
+    slow: T,
     /// How an error of the stiffness shows in each, per deviation of it.
     by_stiffness: [T; ACTING],
 }
@@ -164,14 +166,14 @@ impl<T: Real> Acting<T> {
         let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
         let timings = [lag(off), delay(off), lag(on), delay(on)];
         let places = core::array::from_fn(|a| states.iter().chain(&timings).nth(a).copied().flatten());
-        Self { places, slow_part, by_stiffness }
+        Self { places, slow_part, slow: slow_part.sqrt(), by_stiffness }
     }
 
     /// Only the torque at the gearbox input, as in a gear.
     pub(super) fn turbine(by_stiffness: [T; ACTING]) -> Self {
         let mut places = [None; ACTING];
         places[STATES_ACTING - 1] = Some(TURBINE_AT);
-        Self { places, slow_part: T::one(), by_stiffness }
+        Self { places, slow_part: T::one(), slow: T::one(), by_stiffness }
     }
 
     /// Place of a quantity among all.
@@ -180,11 +182,28 @@ impl<T: Real> Acting<T> {
     }
 
     /// Each of the acting quantities as it shows, `(H, s) x`, from all of them.
-    fn seen(&self, all: &[T; LEARNT]) -> [T; ACTING] {
+    #[inline]
+    fn seen(&self, all: impl Fn(usize) -> T) -> [T; ACTING] {
+        let stiffness = all(STIFFNESS_AT);
         core::array::from_fn(|a| {
-            let own = self.place(a).map_or(T::zero(), |place| self.per_unit(a).0 * all[place]);
-            own + self.by_stiffness[a] * all[STIFFNESS_AT]
+            let own = self.place(a).map_or(T::zero(), |place| self.per_unit(a).0 * all(place));
+            own + self.by_stiffness[a] * stiffness
         })
+    }
+
+    /// The acting quantities with this covariance of all, and the mean zero.
+    fn known(&self, of_all: impl Fn(usize, usize) -> Option<T>) -> Known<T> {
+        let per_unit: [(T, T); ACTING] = core::array::from_fn(|a| self.per_unit(a));
+        let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
+        for (a, row) in known.covariance.iter_mut().enumerate() {
+            row[a] = per_unit[a].1;
+            let Some(place) = self.place(a) else { continue };
+            for (b, value) in row.iter_mut().enumerate() {
+                let covariance = self.place(b).and_then(|other| of_all(place, other));
+                *value = *value + per_unit[a].0 * per_unit[b].0 * covariance.unwrap_or(T::zero());
+            }
+        }
+        known
     }
 
     /// How a quantity acts per unit, `H`, and the variance beside it, `D`.
@@ -192,7 +211,7 @@ impl<T: Real> Acting<T> {
         match self.place(a) {
             None => (T::zero(), T::one()),
             Some(INERTIA_AT..LAG_AT) => (T::one(), T::zero()),
-            Some(_) => (self.slow_part.sqrt(), T::one() - self.slow_part),
+            Some(_) => (self.slow, T::one() - self.slow_part),
         }
     }
 }
@@ -296,24 +315,17 @@ impl<T: Real> Learnt<T> {
 
     /// What the acting quantities are before a shift, by what is learnt alone.
     fn of_car(&self, acting: &Acting<T>) -> Known<T> {
-        let mut known = Known { mean: [T::zero(); ACTING], covariance: [[T::zero(); ACTING]; ACTING] };
-        for (a, place) in acting.places.iter().enumerate() {
-            let (per_unit, more) = acting.per_unit(a);
-            known.covariance[a][a] = more;
-            let Some(place) = place else { continue };
-            known.mean[a] = per_unit * self.mean.get(*place).copied().unwrap_or(T::zero());
-            for (b, other) in acting.places.iter().enumerate() {
-                let covariance = other.and_then(|other| self.covariance.get(*place)?.get(other).copied());
-                let Some(covariance) = covariance else { continue };
-                known.covariance[a][b] = known.covariance[a][b] + per_unit * acting.per_unit(b).0 * covariance;
-            }
-        }
+        let mut known = acting.known(|i, j| self.covariance.get(i)?.get(j).copied());
+        known.mean = core::array::from_fn(|a| {
+            let mean = acting.place(a).and_then(|place| self.mean.get(place).copied());
+            acting.per_unit(a).0 * mean.unwrap_or(T::zero())
+        });
         known
     }
 
     /// What the acting quantities are before a shift: mean and covariance of what is learnt and of the budget together.
     pub(super) fn known(&self, acting: &Acting<T>, correlations: &Correlations<T>) -> Known<T> {
-        let (mut known, budget) = (self.of_car(acting), Self::nothing(correlations).of_car(acting));
+        let (mut known, budget) = (self.of_car(acting), acting.known(|i, j| Some(unlearnt(correlations, i, j))));
         let car = self.probability();
         let rest = T::one() - car;
         let mean = known.mean;
@@ -362,9 +374,9 @@ impl<T: Real> Learnt<T> {
         correlations: &Correlations<T>,
     ) -> bool {
         let Some(shown) = Shown::between(before, after) else { return false };
-        let nothing = Self::nothing(correlations);
-        let by_budget = Innovation::of(&nothing, acting, &shown);
-        let (Some(mut by_car), Some(by_budget)) = (Innovation::of(self, acting, &shown), by_budget) else {
+        let by_car = Innovation::of(|k| self.mean[k], |i, j| self.covariance[i][j], acting, &shown);
+        let by_budget = Innovation::of(|_| T::zero(), |i, j| unlearnt(correlations, i, j), acting, &shown);
+        let (Some(mut by_car), Some(by_budget)) = (by_car, by_budget) else {
             return false;
         };
         // What no car of the budget shows speaks for none.
@@ -375,7 +387,7 @@ impl<T: Real> Learnt<T> {
         self.odds = self.odds + (by_car.likelihood - by_budget.likelihood).max(-of_shift).min(of_shift);
         self.odds = self.odds.min(most);
         if self.odds < -most {
-            (*self, by_car) = (nothing, by_budget);
+            (*self, by_car) = (Self::nothing(correlations), by_budget);
         }
         if !by_car.is_possible() {
             return false;
@@ -388,18 +400,22 @@ impl<T: Real> Learnt<T> {
     /// symmetric to the last digit. A shift that says more than is likely counts for less, by `w`.
     fn correct(&mut self, by: &Innovation<T>) {
         let weight = (T::of(LIKELY) / by.distance.max(T::of(LIKELY))).sqrt();
-        let with: [[T; ACTING]; LEARNT] = core::array::from_fn(|k| by.with[k].map(|x| x * weight.sqrt()));
+        let root = weight.sqrt();
         for (k, mean) in self.mean.iter_mut().enumerate() {
             let edge = T::of(edge(k));
             *mean = (*mean + weight * dot(&by.with[k], &by.innovation)).max(-edge).min(edge);
         }
-        for (i, row) in self.covariance.iter_mut().enumerate() {
-            for (p, other) in row.iter_mut().zip(&with) {
-                *p = *p - dot(&with[i], other);
+        // In a gear one direction is seen, in a shift some.
+        for direction in 0..ACTING {
+            let with = by.with.each_ref().map(|row| root * row[direction]);
+            for (row, own) in self.covariance.iter_mut().zip(&with).filter(|(_, own)| **own != T::zero()) {
+                for (p, other) in row.iter_mut().zip(&with) {
+                    *p = *p - *own * *other;
+                }
             }
-            if row[i] < T::one() {
-                row[i] = row[i] + T::of(PER_SHIFT);
-            }
+        }
+        for (i, row) in self.covariance.iter_mut().enumerate().filter(|(i, row)| row[*i] < T::one()) {
+            row[i] = row[i] + T::of(PER_SHIFT);
         }
     }
 
@@ -423,9 +439,10 @@ impl<T: Real> Learnt<T> {
         let stay = |k: usize| if lasts(k) { inertia } else { oil };
         for i in 0..LEARNT {
             self.mean[i] = stay(i) * self.mean[i];
-            for j in 0..LEARNT {
+            for j in 0..=i {
                 let both = stay(i) * stay(j);
-                self.covariance[i][j] = both * self.covariance[i][j] + (one - both) * unlearnt(correlations, i, j);
+                let passed = both * self.covariance[i][j] + (one - both) * unlearnt(correlations, i, j);
+                (self.covariance[i][j], self.covariance[j][i]) = (passed, passed);
             }
         }
     }
@@ -512,13 +529,16 @@ impl<T: Real> Innovation<T> {
         self.distance <= T::of(GATE)
     }
 
-    fn of(learnt: &Learnt<T>, acting: &Acting<T>, shown: &Shown<T>) -> Option<Self> {
-        let seen = learnt.covariance.map(|row| acting.seen(&row));
+    /// By this mean and covariance of all.
+    fn of(
+        mean: impl Fn(usize) -> T,
+        covariance_of_all: impl Fn(usize, usize) -> T,
+        acting: &Acting<T>,
+        shown: &Shown<T>,
+    ) -> Option<Self> {
+        let seen: [[T; ACTING]; LEARNT] = core::array::from_fn(|k| acting.seen(|place| covariance_of_all(k, place)));
         // `(H, s) P (H, s)' + D`, by its rows: `seen` is `P (H, s)'`.
-        let mut covariance: Matrix<T> = core::array::from_fn(|b| {
-            let column: [T; LEARNT] = core::array::from_fn(|k| seen[k][b]);
-            acting.seen(&column)
-        });
+        let mut covariance: Matrix<T> = core::array::from_fn(|b| acting.seen(|place| seen[place][b]));
         for (a, row) in covariance.iter_mut().enumerate() {
             row[a] = row[a] + acting.per_unit(a).1;
         }
@@ -528,7 +548,7 @@ impl<T: Real> Innovation<T> {
         }
         let lower = cholesky(&noisy)?;
         let inverse = lower_inverse(&lower);
-        let expected = acting.seen(&learnt.mean);
+        let expected = acting.seen(mean);
         let beside: [T; ACTING] = core::array::from_fn(|i| shown.values[i] - dot(&shown.rows[i], &expected));
         let innovation = inverse.map(|row| dot(&row, &beside));
         let with = seen.map(|row| {

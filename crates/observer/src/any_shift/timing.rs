@@ -31,8 +31,8 @@ pub(super) type ByTiming<T> = [[T; 2]; 2];
 pub(super) struct Timing<T> {
     /// Errors of the timing that the valve models have taken off, in deviations.
     taken_off: [T; TIMINGS],
-    /// By how much the states are off per deviation of each.
-    off: [[T; N]; TIMINGS],
+    /// By how much each state is off per deviation of each.
+    off: [[T; TIMINGS]; N],
     information: [[T; TIMINGS]; TIMINGS],
     /// Information times mean.
     value: [T; TIMINGS],
@@ -42,57 +42,59 @@ impl<T: Real> Timing<T> {
     /// Nothing is shown yet. The valve models of both clutches have taken off these errors.
     pub(super) fn nothing(taken_off: ByTiming<T>) -> Self {
         let [[a, b], [c, d]] = taken_off;
-        let off = [[T::zero(); N]; TIMINGS];
+        let off = [[T::zero(); TIMINGS]; N];
         Self { taken_off: [a, b, c, d], off, information: [[T::zero(); TIMINGS]; TIMINGS], value: [T::zero(); TIMINGS] }
     }
 
     /// Adds the pressure by the timing to what the states are off by, for as long as the states act.
     pub(super) fn add_pressure(&mut self, by: &ByTiming<T>) {
-        let states = [PRESSURE[0], PRESSURE[0], PRESSURE[1], PRESSURE[1]];
-        for ((off, by), state) in self.off.iter_mut().zip(by.iter().flatten()).zip(states) {
-            off[state] = off[state] + *by;
-        }
+        let [[off_lag, off_delay], [on_lag, on_delay]] = *by;
+        let zero = T::zero();
+        add(&mut self.off[PRESSURE[0]], T::one(), &[off_lag, off_delay, zero, zero]);
+        add(&mut self.off[PRESSURE[1]], T::one(), &[zero, zero, on_lag, on_delay]);
     }
 
     /// Carries it on with the first states.
     pub(super) fn pass(&mut self, rows: &[[T; N]; CORE]) {
-        for off in &mut self.off {
-            let carried = rows.each_ref().map(|row| dot(row, off));
-            off[..CORE].copy_from_slice(&carried);
-        }
+        let carried = rows.each_ref().map(|row| self.of(row));
+        self.off[..CORE].copy_from_slice(&carried);
     }
 
     /// A state fades by a factor; with zero it is another one.
     pub(super) fn fade(&mut self, state: usize, factor: T) {
-        let state = state.min(N - 1);
-        self.off.iter_mut().for_each(|off| off[state] = factor * off[state]);
+        let off = &mut self.off[state.min(N - 1)];
+        *off = off.map(|off| factor * off);
     }
 
     /// Turbine and output speed become one.
     pub(super) fn tie(&mut self, ratio: T, share: [T; 2]) {
-        for off in &mut self.off {
-            let output = share[0] * off[TURBINE] + share[1] * off[OUTPUT];
-            (off[TURBINE], off[OUTPUT]) = (ratio * output, output);
-        }
+        let mut output = [T::zero(); TIMINGS];
+        add(&mut output, share[0], &self.off[TURBINE]);
+        add(&mut output, share[1], &self.off[OUTPUT]);
+        (self.off[TURBINE], self.off[OUTPUT]) = (output.map(|off| ratio * off), output);
     }
 
     /// By how much a combination of the states is off.
+    #[inline]
     pub(super) fn of(&self, row: &[T; N]) -> [T; TIMINGS] {
-        self.off.each_ref().map(|off| dot(row, off))
+        let mut sum = [T::zero(); TIMINGS];
+        for (per, off) in row.iter().zip(&self.off) {
+            add(&mut sum, *per, off);
+        }
+        sum
     }
 
     /// Takes a reading that the timing moves by `seen`, with its innovation and what that moves the states, all in deviations of
     /// the innovation.
+    #[inline]
     pub(super) fn take(&mut self, seen: &[T; TIMINGS], innovation: T, moves: &[T; N]) {
-        for (k, of) in seen.iter().enumerate() {
-            for (off, moves) in self.off[k].iter_mut().zip(moves) {
-                *off = *off - *moves * *of;
-            }
-            for (sum, other) in self.information[k].iter_mut().zip(seen) {
-                *sum = *sum + *of * *other;
-            }
-            self.value[k] = self.value[k] + *of * innovation;
+        for (off, moves) in self.off.iter_mut().zip(moves) {
+            add(off, -*moves, seen);
         }
+        for (sum, of) in self.information.iter_mut().zip(seen) {
+            add(sum, *of, seen);
+        }
+        add(&mut self.value, innovation, seen);
     }
 
     /// What was known before the shift, and what is known after it, of all that acts in it. `before` and `after` are that of the states with the
@@ -112,7 +114,7 @@ impl<T: Real> Timing<T> {
         // By how much all that acts is off.
         let mut off = [[zero; TIMINGS]; ACTING];
         for (row, state) in off.iter_mut().zip(LASTING) {
-            *row = self.off.each_ref().map(|off| off[state]);
+            *row = self.off[state];
         }
         for (k, taken_off) in self.taken_off.into_iter().enumerate() {
             let a = STATES_ACTING + k;
@@ -132,6 +134,14 @@ impl<T: Real> Timing<T> {
             }
         }
         Some((before, after))
+    }
+}
+
+/// Adds so many times a row.
+#[inline]
+fn add<T: Real>(to: &mut [T; TIMINGS], times: T, row: &[T; TIMINGS]) {
+    for (to, x) in to.iter_mut().zip(row) {
+        *to = *to + times * *x;
     }
 }
 

@@ -266,7 +266,7 @@ fn the_scale_of_the_wheel_speed_is_kept_within_its_bounds_and_apart_from_all_els
 #[test]
 fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
     let mut learnt = Learnt::nothing(&CORRELATIONS);
-    for place in [1, KISS_AT + 1, INERTIA_AT + 2, TURBINE_AT, STIFFNESS_AT, WHEEL_AT] {
+    for place in [1, KISS_AT + 1, INERTIA_AT + 2, TURBINE_AT, STIFFNESS_AT, WHEEL_AT, LAG_AT + 1, DELAY_AT + 1] {
         learnt.mean[place] = 0.8;
     }
     // The first reading says nothing of a change, nor does the noise of a sensor.
@@ -292,6 +292,8 @@ fn what_depends_on_the_oil_is_forgotten_with_its_temperature() {
         (1, left),
         (KISS_AT + 1, left),
         (TURBINE_AT, left),
+        (LAG_AT + 1, left),
+        (DELAY_AT + 1, left),
         (INERTIA_AT + 2, 1.0),
         (STIFFNESS_AT, 1.0),
         (WHEEL_AT, 1.0),
@@ -333,4 +335,31 @@ fn a_hundred_thousand_comparisons_leave_a_covariance() {
         learnt.take_capacity(0.1 * random(&mut seed) as f32, [0.05, 0.035], 1e-3);
     }
     assert!(learnt.checked().is_some(), "{learnt:?}");
+}
+
+#[test]
+fn lag_and_delay_are_learnt_by_element_as_far_as_they_last() {
+    let (mut learnt, mut seed) = (Learnt::nothing(&CORRELATIONS), 11);
+    assert_eq!(learnt.known_timing(2, PART), ValveTiming::unlearnt());
+    let car = |place: usize| match place {
+        LAG_AT..DELAY_AT => 1.0,
+        DELAY_AT.. => -0.8,
+        _ => 0.0,
+    };
+    shown_by(car, &mut learnt, 40, &mut seed);
+    for at in 0..5 {
+        let ValveTiming { mean: [lag, delay], variance } = learnt.known_timing(at, PART);
+        // The first and the last were in ten shifts, in each with a part that does not last.
+        let off = [lag / PART.sqrt() - 1.0, delay / PART.sqrt() + 0.8];
+        assert!(off.iter().all(|off| off.abs() < 0.15), "{off:?}");
+        assert!(variance.iter().all(|variance| (0.25..0.35).contains(variance)), "{variance:?}");
+    }
+    // No shift had these elements, and there is no ninth.
+    for at in [5, MAX_ELEMENTS, usize::MAX] {
+        assert_eq!(learnt.known_timing(at, PART), ValveTiming::unlearnt(), "{at}");
+    }
+    // What the odds are against is not taken off.
+    learnt.odds = -4.6;
+    let ValveTiming { mean, variance } = learnt.known_timing(1, PART);
+    assert!(mean.iter().all(|mean| mean.abs() < 0.02) && variance.iter().all(|variance| *variance > 0.98));
 }
