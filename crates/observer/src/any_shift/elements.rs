@@ -163,6 +163,11 @@ impl<T: Real> ElementState<T> {
         self.delay_s = (element.valve.delay_s + u.valve_delay_s * delay).at_least(T::zero());
     }
 
+    /// The pressure that the clutch has or goes to, by the newest command, whichever is lower, Pa.
+    pub(super) fn lower_pa(&self) -> T {
+        self.newest.map_or(self.pressure_pa(), |newest| self.pressure_pa().min(newest.settled_pa))
+    }
+
     /// The errors of lag and delay that the valve model has taken off, in deviations.
     pub(super) fn taken_off(&self) -> [T; 2] {
         self.timing.mean
