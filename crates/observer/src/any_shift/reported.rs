@@ -4,12 +4,12 @@
 //! gear
 //!
 //! ```text
-//! sum of (T_e dt - I_e dw_e) = (1 + c + e) sum of T_p dt          T_e: as reported, T_p: by the maps
+//! sum of (T_e dt - I_e dw_e) = (1 + c + q) sum of T_p dt          T_e: as reported, T_p: by the maps
 //! ```
 //!
-//! with the error `c` of the converter's capacity and the error `e` of the reported torque, both as shares. So the reported torque and
+//! with the error `c` of the converter's capacity and the error `q` of the reported torque, both as shares. So the reported torque and
 //! the maps together are known better than either. The sums need no acceleration of the engine, which a filter of its speed has late
-//! and with noise; a reported torque that comes late errs at both ends of the time only. `e` is learnt beside `c`
+//! and with noise; a reported torque that comes late errs at both ends of the time only. `q` is learnt beside `c`
 //! ([`super::Learnt`]): the same error in the next gear is no news.
 
 use drivetrain::Real;
