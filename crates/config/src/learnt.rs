@@ -39,7 +39,7 @@ pub fn write_learnt(gearbox: &Gearbox, learnt: &Learnt<f64>) -> String {
     format!(
         "# What the filter for any shift has learnt of a car. Each number is in units of the deviation that the quantity has\n\
          # unlearnt: torque factors and kiss points by element, inertias by pair of gears, torque at the gearbox input, stiffness\n\
-         # of the drive shafts, scale of the wheel speed.\n\
+         # of the drive shafts, scale of the wheel speed, reported engine torque, lags and delays of the valves by element.\n\
          gearbox = {}\nelements = [{}]\nshifts = {}\nrefused = {}\n{oil}mean = [{}]\ncovariance = [\n{}]\n",
         toml_string(&gearbox.name),
         elements.join(", "),

@@ -160,9 +160,10 @@ impl<T: Real> Acting<T> {
     /// In the order of the filter's states: torque factors, kiss points, inertia, torque at the gearbox input; then lag and delay of either clutch.
     pub(super) fn new([off, on]: [usize; 2], pair: Option<usize>, slow_part: T, by_stiffness: [T; ACTING]) -> Self {
         let element = |at: usize| (at < MAX_ELEMENTS).then_some(at);
-        let kiss = |at: usize| element(at).map(|at| KISS_AT + at);
+        // A one-way clutch has no place among the elements.
+        let [kiss, lag, delay] =
+            [KISS_AT, LAG_AT, DELAY_AT].map(|first| move |at: usize| element(at).map(|at| first + at));
         let inertia = pair.filter(|&pair| pair < MAX_PAIRS).map(|pair| INERTIA_AT + pair);
-        let [lag, delay] = [LAG_AT, DELAY_AT].map(|first| move |at: usize| (at < MAX_ELEMENTS).then_some(first + at));
         let states = [element(off), element(on), kiss(off), kiss(on), inertia, Some(TURBINE_AT)];
         let timings = [lag(off), delay(off), lag(on), delay(on)];
         let places = core::array::from_fn(|a| states.iter().chain(&timings).nth(a).copied().flatten());
