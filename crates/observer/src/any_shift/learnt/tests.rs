@@ -363,3 +363,15 @@ fn lag_and_delay_are_learnt_by_element_as_far_as_they_last() {
     let ValveTiming { mean, variance } = learnt.known_timing(1, PART);
     assert!(mean.iter().all(|mean| mean.abs() < 0.02) && variance.iter().all(|variance| *variance > 0.98));
 }
+
+/// A one-way clutch is in a shift without a place in the tables: nothing is learnt of it.
+#[test]
+fn an_element_that_is_not_in_the_tables_has_no_place() {
+    let acting = Acting::new([usize::MAX, 1], Some(MAX_PAIRS), PART, [0.0; ACTING]);
+    for (a, expected) in [(1, 1), (3, KISS_AT + 1), (5, TURBINE_AT), (8, LAG_AT + 1), (9, DELAY_AT + 1)] {
+        assert_eq!(acting.place(a), Some(expected), "{a}");
+    }
+    for a in [0, 2, 4, 6, 7] {
+        assert_eq!(acting.place(a), None, "{a}");
+    }
+}
