@@ -27,7 +27,7 @@ pub enum CarStudyRuns {
 /// Greatest share by which a car differs from the one that is known, each drawn evenly within it; `None` is that of the error
 /// budget of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct DrawnErrors {
+pub struct SampledErrors {
     /// Of the friction of each clutch.
     pub friction: Option<f64>,
     /// Of the gain of each valve.
@@ -54,7 +54,7 @@ pub struct CarStudy {
     /// Seed of the cars and of their sensors.
     pub seed: u64,
     /// How far they differ.
-    pub errors: DrawnErrors,
+    pub errors: SampledErrors,
     /// Their sensors: of this file, else of the drive file.
     pub sensors: Option<Sensors>,
 }
@@ -143,11 +143,11 @@ impl CarStudy {
 }
 
 impl RawErrors {
-    fn checked(&self, check: &Check<'_>) -> Result<DrawnErrors, ConfigError> {
+    fn checked(&self, check: &Check<'_>) -> Result<SampledErrors, ConfigError> {
         let share = |key: &str, value: &Option<Number>| {
             value.as_ref().map(|value| check.number(format_args!("errors.{key}"), value, 0.0..=0.5)).transpose()
         };
-        Ok(DrawnErrors {
+        Ok(SampledErrors {
             friction: share("friction", &self.friction)?,
             valve_gain: share("valve_gain", &self.valve_gain)?,
             converter: share("converter", &self.converter)?,

@@ -17,7 +17,7 @@ pub mod study;
 mod tree;
 pub mod vehicle;
 
-pub use car_study::{CarStudy, CarStudyRuns, DrawnErrors};
+pub use car_study::{CarStudy, CarStudyRuns, SampledErrors};
 pub use drive::{Drive, DriveSegment, ShiftPlan, ShiftSchedule};
 pub use error::ConfigError;
 pub use experiment::{
@@ -31,6 +31,6 @@ pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
 pub use vehicle::{
     Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ElementErrors,
-    ErrorBounds, FilterSettings, LockUp, OneShiftError, ShiftClutch, ShiftErrors, TURBINE_SIDE_INERTIA_KG_M2,
+    ErrorBounds, ErrorBudget, FilterSettings, LockUp, OneShiftError, ShiftClutch, TURBINE_SIDE_INERTIA_KG_M2,
     Uncertainty, ValveUncertainty, Vehicle,
 };

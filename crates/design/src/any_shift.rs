@@ -1,11 +1,11 @@
 //! The filter for every shift of a gearbox: its tables from the gear train, and what it does not know from budgets.
 
-use config::{Car, Sensors, ShiftErrors};
-use drivetrain::{CommandKind, Cylinder, Real};
-use geartrain::{Change, Gearbox};
+use config::{Car, ElementErrors, ErrorBudget, Sensors};
+use drivetrain::{Cylinder, Real};
+use geartrain::{Change, ElementKind, Gearbox};
 use observer::any_shift::{
     AnyShiftFilter, FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, Piston, ShiftRow,
-    ShiftUncertainty, TurbineTorque,
+    ShiftUncertainty, TurbineTorque, ValveLimits,
 };
 use observer::{Budget, FillBudget, InputLimits, ValveModel};
 
@@ -44,21 +44,21 @@ pub struct ShiftTables<T> {
 }
 
 impl ShiftTables<f64> {
-    /// The tables of a gearbox whose elements have these valves, `None` for an element that has none, as a dog. An element
-    /// without plates or valve is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
+    /// The tables of a gearbox whose elements have these valves and limits of them, `None` for an element that has none, as a dog. An
+    /// element without plates or valve is left out, and the shifts between others remain; so do those between one of them and a one-way clutch. What sits on the input
     /// shaft without being part of the gearbox, as an engine without converter, is added to the mass.
     ///
     /// # Errors
     /// More clutches and brakes than the filter has room for; holds their number.
     pub fn new(
         gearbox: &Gearbox,
-        valve: impl Fn(usize) -> Option<(ValveModel<f64>, Option<Budget<f64>>)>,
+        valve: impl Fn(usize) -> Option<(ValveModel<f64>, ValveLimits<f64>, Option<Budget<f64>>)>,
         more_on_input_kg_m2: f64,
     ) -> Result<Self, usize> {
         let (mut elements, mut places) = (Vec::new(), Vec::new());
         for (at, element) in gearbox.elements.iter().enumerate() {
-            let friction = element.pack.zip(valve(at)).map(|(clutch, (valve, budget))| {
-                elements.push(FrictionElement { clutch, valve, piston: None, budget });
+            let friction = element.pack.zip(valve(at)).map(|(clutch, (valve, limits, budget))| {
+                elements.push(FrictionElement { clutch, valve, limits, piston: None, budget });
                 elements.len() - 1
             });
             places.push(friction);
@@ -80,7 +80,8 @@ impl ShiftTables<f64> {
             if gearbox.is_same_ratio(shift.from, shift.to) || clutches == [ONE_WAY; 2] {
                 return None;
             }
-            Some(ShiftRow::new([shift.from, shift.to], clutches, &reduced))
+            let has_dog = has_dog(gearbox, [shift.from, shift.to]);
+            Some(ShiftRow { has_dog, ..ShiftRow::new([shift.from, shift.to], clutches, &reduced) })
         });
         let shifts: Vec<_> = shift_rows.collect();
         // In a gear the inertia is the same in every shift from it or to it.
@@ -127,38 +128,35 @@ impl<T: Real> ShiftTables<T> {
 const OUTPUT_LEAST_RAD_S: f64 = 15.0;
 /// Largest speed, rad/s: a larger reading is none of a gearbox \[chosen\].
 const SPEED_MOST_RAD_S: f64 = 1500.0;
-/// Error of a reading of a valve's command, as a share of its largest \[chosen\]: five deviations of its sensor.
-const COMMAND_SHARE: f64 = 0.01;
 
 impl ShiftTables<f64> {
-    /// The tables of a car.
+    /// The tables of a car with these bounds of its errors.
     ///
     /// # Errors
     /// More clutches and brakes than the filter has room for; holds their number.
-    pub fn of_car(car: &Car, errors: &ShiftErrors) -> Result<Self, usize> {
+    pub fn of_car(car: &Car, budget: &ErrorBudget) -> Result<Self, usize> {
         let on_input_kg_m2 = if car.converter.is_some() { 0.0 } else { car.engine.inertia_kg_m2 };
         let mut tables = Self::new(
             &car.gearbox,
             |element| {
-                let clutch = car.clutches.get(element)?.as_ref()?;
-                let pressure_max_pa = pressure_max_pa(car, errors);
-                let own = errors.of_element(car, element);
-                let [least_s, most_s] = own.valve_delay_s;
-                let budget = Budget {
+                let (clutch, errors) = (car.clutches.get(element)?.as_ref()?, budget.element(element)?);
+                let [shortest_s, longest_s] = errors.valve_delay_s;
+                let range = Budget {
                     valve: clutch.valve,
-                    lag_factor: own.valve_lag_factor,
-                    gain_factor: own.valve_gain_factor,
-                    delay_s: own.valve_delay_s,
-                    hysteresis_pa: own.valve_hysteresis_pa,
-                    command: COMMAND_SHARE * command_max(car, errors),
-                    command_age_s: errors.command_age_s,
-                    line_pressure_pa: [pressure_max_pa; 2],
-                    pressure_max_pa,
+                    lag_factor: errors.valve_lag_factor,
+                    gain_factor: errors.valve_gain_factor,
+                    delay_s: errors.valve_delay_s,
+                    hysteresis_pa: errors.valve_hysteresis_pa,
+                    command: errors.command,
+                    command_age_s: budget.command_age_s,
+                    line_pressure_pa: [errors.pressure_max_pa; 2],
+                    pressure_max_pa: errors.pressure_max_pa,
                     fill: clutch.standard_fill_budget(car.oil_temperature_degc),
-                    friction_factor: own.friction_factor,
+                    friction_factor: errors.friction_factor,
                     slip_rad_s: 0.0,
                 };
-                Some((ValveModel { valve: clutch.valve, delay_s: 0.5 * (least_s + most_s) }, Some(budget)))
+                let valve = ValveModel { valve: clutch.valve, delay_s: 0.5 * (shortest_s + longest_s) };
+                Some((valve, valve_limits(errors), Some(range)))
             },
             on_input_kg_m2,
         )?;
@@ -174,6 +172,13 @@ impl ShiftTables<f64> {
     }
 }
 
+/// Whether a dog of the gear after is not in the gear before.
+fn has_dog(gearbox: &Gearbox, [from, to]: [usize; 2]) -> bool {
+    let holds = |gear: usize, element: usize| gearbox.gears[gear].holding.iter().any(|of| of.element == element);
+    let is_dog = |element: usize| gearbox.elements[element].kind == ElementKind::Dog;
+    gearbox.gears[to].holding.iter().any(|of| is_dog(of.element) && !holds(from, of.element))
+}
+
 /// A piston whose stroke is within these limits, each the edge of a uniform distribution.
 fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
     let share = |[least, most]: [f64; 2], value: f64| deviation_of(0.5 * (most - least)) / value;
@@ -182,22 +187,13 @@ fn piston(cylinder: &Cylinder<f64>, fill: &FillBudget<f64>) -> Piston<f64> {
     Piston::new(*cylinder, volume.hypot(share([flow(1), flow(0)], cylinder.flow(FILL_PA))))
 }
 
-/// The highest pressure that a valve can give, Pa.
-fn pressure_max_pa(car: &Car, errors: &ShiftErrors) -> f64 {
-    car.line_pressure_pa * (1.0 + errors.valve_gain)
-}
-
-/// The largest command of a valve, A or %.
-fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
-    let commands = car.clutches.iter().flatten().map(|clutch| match clutch.valve.command_kind() {
-        // That of a normally-high valve is the one without pressure.
-        CommandKind::Current => [0.0, pressure_max_pa(car, errors)]
-            .map(|pressure_pa| clutch.valve.command_for(pressure_pa))
-            .into_iter()
-            .fold(0.0, f64::max),
-        CommandKind::DutyCycle => 100.0,
-    });
-    commands.fold(0.0, f64::max)
+/// What the valve of an element can be commanded and can give.
+fn valve_limits(errors: &ElementErrors) -> ValveLimits<f64> {
+    ValveLimits {
+        command_max: errors.command_max,
+        command_error: errors.command,
+        pressure_max_pa: errors.pressure_max_pa,
+    }
 }
 
 /// The filter of a car with these tables, for readings of these sensors; without them the readings are taken to be of the
@@ -207,10 +203,9 @@ fn command_max(car: &Car, errors: &ShiftErrors) -> f64 {
 pub fn any_shift_filter<'a>(
     car: &Car,
     tables: &'a ShiftTables<f64>,
-    errors: &ShiftErrors,
+    budget: &ErrorBudget,
     sensors: Option<&Sensors>,
 ) -> AnyShiftFilter<'a, f64> {
-    let own = errors.of_car(car);
     AnyShiftFilter {
         tables: tables.tables(),
         driveline: car.driveline,
@@ -218,10 +213,10 @@ pub fn any_shift_filter<'a>(
         turbine: TurbineTorque {
             converter: car.converter,
             engine_inertia_kg_m2: car.engine.inertia_kg_m2,
-            converter_share: deviation_of(own.converter),
-            engine_share: deviation_of(own.engine),
+            converter_share: deviation_of(budget.converter),
+            engine_share: deviation_of(budget.engine),
         },
-        uncertainty: uncertainty(&own, car.error_bounds.valve_error_scale.unwrap_or(1.0)),
+        uncertainty: uncertainty(budget, budget.valve_error_scale),
         readings: [
             speed_reading(sensors.map(|sensors| &sensors.turbine), SPEED_QUANTUM_RAD_S),
             speed_reading(sensors.map(|sensors| &sensors.output), SPEED_QUANTUM_RAD_S),
@@ -233,8 +228,9 @@ pub fn any_shift_filter<'a>(
         ),
         limits: InputLimits {
             speed_max_rad_s: SPEED_MOST_RAD_S,
-            command_max: 1.2 * command_max(car, errors),
-            pressure_max_pa: pressure_max_pa(car, errors),
+            // Of any element; each has its own.
+            command_max: budget.widest(|element| element.command_max),
+            pressure_max_pa: budget.widest(|element| element.pressure_max_pa),
             shaft_torque_max_n_m: 3.0 * shaft_n_m(car),
         },
     }
@@ -249,14 +245,16 @@ fn shaft_n_m(car: &Car) -> f64 {
     engine * converter * ratio * car.driveline.final_ratio
 }
 
-/// What the filter of a car does not know by the bounds alone, whatever scale of the errors of its valves the file has of its own.
-pub fn shift_uncertainty(car: &Car, errors: &ShiftErrors) -> ShiftUncertainty<f64> {
-    uncertainty(&errors.of_car(car), 1.0)
+/// What the filter of a car does not know by the bounds alone, whatever scale of the errors of its valves the budget has.
+pub fn shift_uncertainty(budget: &ErrorBudget) -> ShiftUncertainty<f64> {
+    uncertainty(budget, 1.0)
 }
 
-/// What the filter does not know; friction and valve err by this scale times the bounds.
-fn uncertainty(errors: &ShiftErrors, scale: f64) -> ShiftUncertainty<f64> {
-    let parts = [deviation_of(errors.friction), deviation_of(errors.valve_gain), MAP_SHARE];
+/// What the filter does not know; friction and valve err by this scale times the bounds. Of the elements it takes the widest bounds: its
+/// states of both clutches have one standard deviation.
+fn uncertainty(errors: &ErrorBudget, scale: f64) -> ShiftUncertainty<f64> {
+    let widest = |of: fn(&ElementErrors) -> f64| deviation_of(errors.widest(of));
+    let parts = [widest(ElementErrors::friction), widest(ElementErrors::valve_gain), MAP_SHARE];
     let square: f64 = parts.iter().map(|part| part * part).sum();
     let slow_part = 1.0 - parts[2] * parts[2] / square;
     ShiftUncertainty {
@@ -265,8 +263,8 @@ fn uncertainty(errors: &ShiftErrors, scale: f64) -> ShiftUncertainty<f64> {
         torque_share_s: 3.0,
         valve_gain: scale * parts[1],
         kiss_point_pa: scale * KISS_POINT_PA,
-        valve_lag_share: scale * deviation_of(errors.valve_lag),
-        valve_delay_s: scale * deviation_of(0.5 * (errors.valve_delay_s[1] - errors.valve_delay_s[0])),
+        valve_lag_share: scale * widest(ElementErrors::valve_lag),
+        valve_delay_s: scale * widest(ElementErrors::valve_delay),
         pressure_pa: scale * PRESSURE_PA,
         pressure_s: 0.15,
         turbine_share: TURBINE_SHARE,

@@ -45,7 +45,7 @@ pub use any_shift::{ShiftTables, any_shift_filter, shift_uncertainty};
 pub use budget::{ValveErrors, shift_time_constant};
 pub use certificate::{Certificate, VertexMargin, error_bound};
 pub use compliant::{CompliantCertificate, CompliantDesign, best_compliant, compliant_observer, design_compliant};
-pub use config::{ElementErrors, ShiftErrors};
+pub use config::{ElementErrors, ErrorBudget};
 pub use discrete::given::{UnstableCorner, longest_stable_step_s, longest_step_of, unstable_corners};
 pub use discrete::{
     DiscreteCertificate, DiscreteDesign, Model, Quantity, SolverRecord, design_discrete, design_discrete_phase,

@@ -142,9 +142,8 @@ impl Fit {
         }
         if let Some(delay_s) = self.value(Parameter::CommandDelay) {
             let half_s = crate::parameters::DELAY_UNIT_S * half(&[Parameter::CommandDelay]);
-            let delay = |command: f64| (vehicle.oncoming.valve.delay(command) + delay_s).max(0.0);
-            let at_ends_s = [delay(0.0), delay(vehicle.limits.command_max)];
-            set(bound("valve_delay_s"), &budget::delays(at_ends_s, half_s))?;
+            let of_file = vehicle.oncoming.valve.delay_range().map(|own_s| (own_s + delay_s).max(0.0));
+            set(bound("valve_delay_s"), &budget::delays(of_file, half_s))?;
         }
         self.write_fill_budget(text, vehicle)
     }

@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::write(corpus.join("blf/unpacked.blf"), blf())?;
     fs::write(corpus.join("table/runs.csv"), Fuzzer::new(Depth::Short)?.table())?;
     let car = Car::eight_speed()?;
-    let tables = LoggedDrive::tables(&car)?;
+    let tables = LoggedDrive::tables(&car, None)?;
     let drive = LoggedDrive::new(&car, &tables, None, None);
     fs::write(corpus.join("learnt/nothing_yet.toml"), write_learnt(&car.gearbox, drive.learnt().1))?;
     Ok(())

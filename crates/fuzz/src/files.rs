@@ -61,7 +61,7 @@ pub(crate) fn gearbox(fuzzer: &Fuzzer, input: &[u8]) {
 pub(crate) fn learnt(car: &Car, input: &[u8]) {
     let source = Source::built_in("learnt.toml", &String::from_utf8_lossy(input));
     let Ok(learnt) = read_learnt(&car.gearbox, &source) else { return };
-    let Ok(tables) = LoggedDrive::tables(car) else { return };
+    let Ok(tables) = LoggedDrive::tables(car, None) else { return };
     let mut drive = LoggedDrive::new(car, &tables, None, Some(&learnt));
     let reading = |value: f64| Some(Reading { value, age_s: 0.0 });
     for row in 0..20_u32 {

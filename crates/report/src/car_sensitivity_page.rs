@@ -1,6 +1,6 @@
 //! How errors act on the estimates of every shift of a car: rows of tables, and a page.
 
-use config::Car;
+use config::{Car, ErrorBudget};
 use minijinja::{Value, context};
 use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity};
 
@@ -85,7 +85,8 @@ pub fn hidden_phases(shifts: &[ShiftSensitivity]) -> [usize; 2] {
 /// None in a released program; the tests render the template.
 pub fn car_sensitivity_page(shifts: &[ShiftSensitivity], car: &Car) -> Result<String, PageError> {
     let errors: Vec<ShiftErrorKind> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)).collect();
-    let bounds = errors.iter().map(|error| context! { error => error.name(), bound => error.bound() });
+    let budget = ErrorBudget::of_car(car);
+    let bounds = errors.iter().map(|error| context! { error => error.name(), bound => error.bound(&budget) });
     let phases = PHASES.iter().enumerate().map(|(at, name)| {
         let rows = shifts.iter().filter_map(|shift| Some(detail(shift, shift.phases[at].as_ref()?, &errors, car)));
         context! { name => *name, rows => rows.collect::<Vec<_>>() }

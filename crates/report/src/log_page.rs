@@ -241,7 +241,7 @@ fn overview_figure(overview: &Overview, shifts: &[ShiftEstimate]) -> Figure {
         points: both(&|interval| interval.pressure_pa, mpa),
     };
     let ends = |end: usize| overview.intervals().map(|([from_s, _], i)| (from_s, mpa(i.range_pa[end]))).collect();
-    let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: ends(0), upper: ends(1) };
+    let band = Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: ends(0), upper: ends(1) };
     let healths: Vec<(f64, [bool; HEALTHS])> =
         overview.intervals().flat_map(|([from_s, to_s], i)| [(from_s, i.healths), (to_s, i.healths)]).collect();
     let first_s = overview.intervals().next().map_or(0.0, |([from_s, _], _)| from_s);
@@ -328,7 +328,7 @@ impl Samples<'_> {
 
     fn band(&self, range: &dyn Fn(&LogSample) -> Option<[f64; 2]>) -> Option<Band> {
         let end = |end: usize| self.all(&|sample| range(sample).map_or(f64::NAN, |range| range[end]));
-        Some(Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) })
+        Some(Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: end(0), upper: end(1) })
     }
 
     /// The largest value up to a time; at least zero.

@@ -12,6 +12,7 @@ mod contradictions;
 mod converter_check;
 pub mod drive;
 mod gear_signal;
+mod held_commands;
 mod in_gear;
 pub mod influence;
 pub mod learning_count;
@@ -31,8 +32,8 @@ mod thinned;
 pub mod tour;
 pub mod worth_a_look;
 
-use config::{Car, ElementErrorBounds, Sensors, ShiftClutch};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use config::{Car, Sensors, ShiftClutch};
+use design::{ElementErrors, ErrorBudget, ShiftTables, any_shift_filter};
 use drivetrain::{Cylinder, Passage};
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, MAX_ELEMENTS, ONE_WAY, ShiftEstimate, ShiftInput};
@@ -116,27 +117,27 @@ impl ShiftDraw {
         Self { timing, strokes, friction: ones.clone(), valve_gain: ones, converter: 1.0 }
     }
 
-    /// Friction, gain and converter within the bounds, those of the vehicle file first, each factor by a number from 0 to 1.
-    pub fn within(car: &Car, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
-        let mut factor = |own: Option<[f64; 2]>, share: f64| drawn_factor(own, share, uniform());
-        let (own, none) = (&car.error_bounds, ElementErrorBounds::default());
-        let elements = || (0..car.clutches.len()).map(|at| own.elements.get(at).unwrap_or(&none));
-        let friction = elements().map(|own| factor(own.friction_factor, errors.friction)).collect();
-        let valve_gain = elements().map(|own| factor(own.valve_gain_factor, errors.valve_gain)).collect();
-        let converter = factor(None, own.converter_share.unwrap_or(errors.converter));
+    /// Friction, gain and converter within the bounds of a budget, each by a number from 0 to 1.
+    pub fn within(car: &Car, budget: &ErrorBudget, mut uniform: impl FnMut() -> f64) -> Self {
+        let mut of_elements = |range: fn(&ElementErrors) -> [f64; 2]| {
+            let elements = (0..car.clutches.len()).map(|at| budget.element(at));
+            elements.map(|element| between(element.map_or([1.0; 2], range), uniform())).collect()
+        };
+        let friction = of_elements(|element| element.friction_factor);
+        let valve_gain = of_elements(|element| element.valve_gain_factor);
+        let converter = between([1.0 - budget.converter, 1.0 + budget.converter], uniform());
         Self { friction, valve_gain, converter, ..Self::none(car) }
     }
 
-    /// The same with lag, delay and hysteresis of the valves of `car` within the bounds too.
+    /// The same with lag, delay and hysteresis of the valves within the bounds too.
     #[must_use]
-    pub fn with_timing(mut self, car: &Car, errors: &ShiftErrors, mut uniform: impl FnMut() -> f64) -> Self {
+    pub fn with_timing(mut self, budget: &ErrorBudget, mut uniform: impl FnMut() -> f64) -> Self {
         for (at, timing) in self.timing.iter_mut().enumerate() {
-            let own = car.error_bounds.elements.get(at).copied().unwrap_or_default();
-            let [least_s, most_s] = own.valve_delay_s.unwrap_or(errors.valve_delay_s);
-            *timing = Some(ValveTiming {
-                lag: drawn_factor(own.valve_lag_factor, errors.valve_lag, uniform()),
-                delay_s: least_s + uniform() * (most_s - least_s),
-                hysteresis_pa: uniform() * own.valve_hysteresis_pa.unwrap_or(errors.hysteresis_pa),
+            let [lag, delay, hysteresis] = [uniform(), uniform(), uniform()];
+            *timing = budget.element(at).map(|element| ValveTiming {
+                lag: between(element.valve_lag_factor, lag),
+                delay_s: between(element.valve_delay_s, delay),
+                hysteresis_pa: between([0.0, element.valve_hysteresis_pa], hysteresis),
             });
         }
         self
@@ -189,7 +190,6 @@ impl StrokeDraw {
     /// Gives a clutch this stroke. With the pressure at its end the force of the return spring there is another.
     fn change(&self, clutch: &mut ShiftClutch, oil_degc: f64) {
         let Some(budget) = clutch.standard_fill_budget(oil_degc) else { return };
-        let between = |[least, most]: [f64; 2], share: f64| least + share * (most - least);
         let passage = |[wide, narrow]: [Passage<f64>; 2]| Passage {
             laminar_pa_s2_m5: between([wide.laminar_pa_s2_m5, narrow.laminar_pa_s2_m5], self.resistance),
             orifice_pa_s2_m6: between([wide.orifice_pa_s2_m6, narrow.orifice_pa_s2_m6], self.resistance),
@@ -208,12 +208,9 @@ impl StrokeDraw {
     }
 }
 
-/// A factor by a number from 0 to 1, within a range or within a share of 1.
-fn drawn_factor(range: Option<[f64; 2]>, share: f64, uniform: f64) -> f64 {
-    match range {
-        Some([least, most]) => least + uniform * (most - least),
-        None => 1.0 + share * (2.0 * uniform - 1.0),
-    }
+/// The value in a range at this fraction of it, from 0 to 1.
+fn between([minimum, maximum]: [f64; 2], fraction: f64) -> f64 {
+    minimum + fraction * (maximum - minimum)
 }
 
 /// Truth and estimates of one clutch at one time.
@@ -386,9 +383,9 @@ pub fn score_shift(
     seed: u64,
 ) -> Result<Vec<ShiftScoreRow>, AnyShiftError> {
     let samples = simulated(known, truth, shift)?;
-    let errors = ShiftErrors::STANDARD;
-    let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
-    let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
+    let budget = ErrorBudget::of_car(known).read_by(known, Some(sensors));
+    let tables = ShiftTables::of_car(known, &budget).map_err(AnyShiftError::TooManyElements)?;
+    let filter = any_shift_filter(known, &tables, &budget, Some(sensors));
     let inputs = inputs(known, &tables, &samples, sensors, seed);
     Ok(score_samples(&tables, &filter, &samples, &inputs))
 }

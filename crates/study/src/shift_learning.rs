@@ -4,7 +4,7 @@
 //! without power, in a random order. After them each of its shifts is scored with what was learnt up to then.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, Learnt, ShiftInput};
 use plant::car::{CarSample, CarShift};
@@ -77,12 +77,12 @@ impl RecordedShift {
 /// # Errors
 /// The gearbox has more clutches than the filter has room for.
 pub fn tables_with_inertia(car: &Car, factor: f64) -> Result<ShiftTables<f64>, AnyShiftError> {
-    let mut tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+    let mut tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).map_err(AnyShiftError::TooManyElements)?;
     tables.scale_inertia(factor);
     Ok(tables)
 }
 
 /// The filter of a car with these tables behind these sensors.
 pub fn filter<'a>(car: &Car, tables: &'a ShiftTables<f64>, sensors: &Sensors) -> AnyShiftFilter<'a, f64> {
-    any_shift_filter(car, tables, &ShiftErrors::STANDARD, Some(sensors))
+    any_shift_filter(car, tables, &ErrorBudget::of_car(car).read_by(car, Some(sensors)), Some(sensors))
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use config::{Car, Drive, Source};
-use design::ShiftErrors;
+use design::ErrorBudget;
 use plant::car::{CarCalibration, CarModel, simulate_car_drive};
 use report::drive_page::{DrivePage, findings, shift_cells, shift_rows, shift_words};
 use report::matrix_page::kind_rows;
@@ -34,7 +34,7 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let folder = &options.output;
     writable(folder, &[PAGE, SHIFTS])?;
     let mut random = Random(options.seed);
-    let draw = ShiftDraw::within(&car, &ShiftErrors::STANDARD, || random.uniform());
+    let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
     let model = CarModel::new(draw.car(&car)).map_err(|error| Failure::Input(error.to_string()))?;
     let mut recording = Recording::default();
     let name = match &drive {

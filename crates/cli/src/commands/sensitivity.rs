@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::{Car, Kind, Source, Vehicle};
+use config::{Car, ErrorBudget, Kind, Source, Vehicle};
 use report::car_sensitivity_page::{BOUND_AND_DEVIATION, car_sensitivity_page, hidden_phases, sensitivity_rows};
 use report::sensitivity_page;
 use serde_json::json;
@@ -102,7 +102,8 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     let (titles, rows) = sensitivity_rows(&shifts, &car);
     let titles = titles.into_iter().map(str::to_owned).collect();
     output::table(3, &std::iter::once(titles).chain(rows).collect::<Vec<_>>())?;
-    let bound = |error: ShiftErrorKind| format!("{} {}", error.name(), error.bound());
+    let budget = ErrorBudget::of_car(&car);
+    let bound = |error: ShiftErrorKind| format!("{} {}", error.name(), error.bound(&budget));
     let bounds: Vec<String> = ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(&car)).map(bound).collect();
     let [hidden, all] = hidden_phases(&shifts);
     output::line(&format!("\nbounds, either way: {}\nhidden: {hidden} of {all} phases", bounds.join(", ")))?;

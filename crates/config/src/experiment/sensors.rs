@@ -74,6 +74,12 @@ pub struct CurrentSensor {
 }
 
 impl CurrentSensor {
+    /// Maximum error of a reading, A: offset, half of the resolution, and five standard deviations of the noise.
+    pub fn error_max_a(&self) -> f64 {
+        const SIGMAS: f64 = 5.0;
+        self.offset_a.abs() + 0.5 * self.resolution_a + SIGMAS * self.noise_a
+    }
+
     /// A sensor without any error: the command is known exactly, as a duty cycle is.
     pub const EXACT: Self = Self {
         noise_a: 0.0,

@@ -2,15 +2,16 @@
 
 use std::ops::RangeInclusive;
 
-use drivetrain::RoadLoad;
 use drivetrain::road::GRAVITY_M_S2;
+use drivetrain::{CommandKind, RoadLoad};
 use observer::FillBudget;
 use toml::Spanned;
 
+use super::car_bounds::contain_delay;
 use super::raw::RawErrorBounds;
 use super::{HYSTERESES_PA, ShiftClutch, fill_bounds, valves};
-use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
+use crate::{ConfigError, Sensors};
 
 /// Half-width of a valve's hysteresis where the file says nothing, Pa [chosen]: trade data sheets of proportional pressure
 /// reducers give 2 to 4 % of full scale for the whole width.
@@ -186,7 +187,28 @@ pub(super) fn error_bounds(
     })
 }
 
+/// Refuses bounds that do not contain the delay of the oncoming clutch's valve. The other bounds are checked where they are read; this one is
+/// not, so that a study may change the delay of the true car beyond it.
+pub(super) fn contain_vehicle(
+    check: &Check<'_>,
+    raw: &RawErrorBounds,
+    bounds: &ErrorBounds,
+    oncoming: &ShiftClutch,
+) -> Result<(), ConfigError> {
+    let stated = (bounds.valve_delay_s, &raw.valve_delay_s);
+    contain_delay(check, "design.error_bounds.valve_delay_s", stated, &oncoming.valve)
+}
+
 impl ErrorBounds {
+    /// The same for readings by these sensors: a command of this kind errs at least by what its sensor does.
+    #[must_use]
+    pub fn read_by(mut self, kind: CommandKind, sensors: &Sensors) -> Self {
+        if let (CommandKind::Current, Some(current)) = (kind, &sensors.current) {
+            self.command = self.command.max(current.error_max_a());
+        }
+        self
+    }
+
     /// What a grade at its bound does at the wheels of a car with this load, N m.
     pub fn grade_n_m(&self, road: &RoadLoad<f64>) -> f64 {
         road.mass_kg * GRAVITY_M_S2 * road.wheel_radius_m * self.grade_rad.sin()

@@ -302,9 +302,9 @@ fn error_bounds(
 ) -> Result<CarErrorBounds, ConfigError> {
     let elements = gearbox.elements.iter().zip(clutches).map(|(element, clutch)| {
         let own = raw.clutch.get(element.name.as_str()).and_then(|own| own.error_bounds.as_ref());
-        let Some(own) = own else { return Ok(ElementErrorBounds::default()) };
+        let Some((own, clutch)) = own.zip(clutch.as_ref()) else { return Ok(ElementErrorBounds::default()) };
         let table = format!("clutch.{}.error_bounds", element.name);
-        car_bounds::of_element(check, &table, own, clutch.map_or(0.0, |clutch| clutch.hysteresis_pa))
+        car_bounds::of_element(check, &table, own, clutch)
     });
     car_bounds::of_car(check, &raw.error_bounds, elements.collect::<Result<_, _>>()?)
 }

@@ -2,7 +2,10 @@
 
 use serde::Deserialize;
 
-use super::HYSTERESES_PA;
+use drivetrain::{ClutchValve, CommandKind};
+
+use super::valves::DUTY_CYCLES;
+use super::{HYSTERESES_PA, ShiftClutch};
 use crate::ConfigError;
 use crate::check::{Check, Number, Numbers};
 
@@ -40,6 +43,8 @@ pub struct ElementErrorBounds {
     pub valve_delay_s: Option<[f64; 2]>,
     /// Greatest half-width of its hysteresis, Pa.
     pub valve_hysteresis_pa: Option<f64>,
+    /// Maximum error of a reading of its command, A or %.
+    pub command: Option<f64>,
 }
 
 /// `[error_bounds]`.
@@ -64,6 +69,8 @@ pub(super) struct RawElementErrorBounds {
     valve_lag_factor: Option<Numbers>,
     valve_delay_s: Option<Numbers>,
     valve_hysteresis_pa: Option<Number>,
+    current_a: Option<Number>,
+    duty_percent: Option<Number>,
 }
 
 /// The bounds of a car whose elements have these.
@@ -88,12 +95,12 @@ pub(super) fn of_car(
     })
 }
 
-/// The bounds of an element in the table `table`, whose valve has this hysteresis.
+/// The bounds of an element in the table `table` with these plates and valve. The element of the file is within them.
 pub(super) fn of_element(
     check: &Check<'_>,
     table: &str,
     raw: &RawElementErrorBounds,
-    hysteresis_pa: f64,
+    clutch: &ShiftClutch,
 ) -> Result<ElementErrorBounds, ConfigError> {
     let range = |key: &str, values: &Option<Numbers>, allowed| {
         values.as_ref().map(|values| check.pair(format_args!("{table}.{key}"), values, allowed)).transpose()
@@ -112,13 +119,59 @@ pub(super) fn of_element(
         }
     };
     let hysteresis = |value: &Number| {
-        check.number(format!("{table}.valve_hysteresis_pa"), value, hysteresis_pa..=*HYSTERESES_PA.end())
+        check.number(format!("{table}.valve_hysteresis_pa"), value, clutch.hysteresis_pa..=*HYSTERESES_PA.end())
     };
+    let valve_delay_s = range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?;
+    if let (Some(bounds_s), Some(values)) = (valve_delay_s, &raw.valve_delay_s) {
+        contain_delay(check, format_args!("{table}.valve_delay_s"), (bounds_s, values), &clutch.valve)?;
+    }
     Ok(ElementErrorBounds {
         friction_factor: factor("friction_factor", &raw.friction_factor)?,
         valve_gain_factor: factor("valve_gain_factor", &raw.valve_gain_factor)?,
         valve_lag_factor: factor("valve_lag_factor", &raw.valve_lag_factor)?,
-        valve_delay_s: range("valve_delay_s", &raw.valve_delay_s, 0.0..=0.5)?,
+        valve_delay_s,
         valve_hysteresis_pa: raw.valve_hysteresis_pa.as_ref().map(hysteresis).transpose()?,
+        command: command(check, table, raw, clutch.valve.command_kind())?,
     })
+}
+
+/// Maximum error of a reading of the command, A or %, if the file has one.
+fn command(
+    check: &Check<'_>,
+    table: &str,
+    raw: &RawElementErrorBounds,
+    kind: CommandKind,
+) -> Result<Option<f64>, ConfigError> {
+    let (key, value, foreign, range) = match kind {
+        CommandKind::Current => ("current_a", &raw.current_a, ("duty_percent", &raw.duty_percent), 0.0..=1.0),
+        CommandKind::DutyCycle => ("duty_percent", &raw.duty_percent, ("current_a", &raw.current_a), DUTY_CYCLES),
+    };
+    if let (name, Some(given)) = foreign {
+        let message = format!("the valve of this element has no such command; its bound is `{key}`");
+        return Err(check.meaning(format_args!("{table}.{name}"), given.span().start, message, None));
+    }
+    value.as_ref().map(|value| check.number(format_args!("{table}.{key}"), value, range)).transpose()
+}
+
+/// Refuses bounds of the delay of a valve that do not contain the valve's own.
+pub(super) fn contain_delay(
+    check: &Check<'_>,
+    key: impl std::fmt::Display,
+    ([shortest_s, longest_s], values): ([f64; 2], &Numbers),
+    valve: &ClutchValve<f64>,
+) -> Result<(), ConfigError> {
+    let [minimum_s, maximum_s] = valve.delay_range();
+    if shortest_s <= minimum_s && maximum_s <= longest_s {
+        return Ok(());
+    }
+    let own = if minimum_s == maximum_s {
+        format!("{minimum_s} s")
+    } else {
+        format!("{minimum_s} s to {maximum_s} s by the command")
+    };
+    let message = format!(
+        "{shortest_s} to {longest_s} does not contain the delay of the valve in this file, {own}: the car of this file would be outside its own error bounds"
+    );
+    let hint = format!("[{}, {}] contains it", shortest_s.min(minimum_s), longest_s.max(maximum_s));
+    Err(check.meaning(key, values.span().start, message, Some(hint)))
 }

@@ -5,13 +5,13 @@ mod car;
 mod car_bounds;
 mod car_capacity;
 mod clutch;
+mod error_budget;
 mod fill;
 mod fill_bounds;
 mod gear_train;
 mod plausible;
 mod ratios_alone;
 mod raw;
-mod shift_errors;
 pub mod short;
 mod valves;
 
@@ -34,12 +34,12 @@ pub use car::{Car, LockUp};
 pub use car_bounds::{CarErrorBounds, ElementErrorBounds};
 pub use clutch::ShiftClutch;
 pub(crate) use clutch::{FRICTION_FACES, HYSTERESES_PA, PISTON_AREAS_M2, PLATE_RADII_M, RETURN_SPRINGS_N};
+pub use error_budget::{ElementErrors, ErrorBudget};
 pub use ratios_alone::TURBINE_SIDE_INERTIA_KG_M2;
 use raw::{
     RawCompliantRequirement, RawConverter, RawDriveline, RawEngine, RawEngineMap, RawFilter, RawObserver, RawOil,
     RawRequirement, RawRoad, RawTyre, RawVehicleFile,
 };
-pub use shift_errors::{ElementErrors, ShiftErrors};
 pub use short::{DefaultTaken, OneShiftError};
 use short::{Short, of_default, refuse_facts};
 
@@ -213,7 +213,7 @@ impl Vehicle {
 
     fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
         let layers = Layers { source: &source, over: Some(over) };
-        let vehicle = Self::checked(&Check { layers }, &layers.parse()?)?;
+        let vehicle = Self::of_file(&Check { layers }, &layers.parse()?)?;
         let path = format!("{} with {}", source.path.display(), over.path.display());
         Ok(Self { source: Source { path: path.into(), text: source.text + &over.text }, ..vehicle })
     }
@@ -242,12 +242,12 @@ impl Vehicle {
         }
         if let Some(short) = Short::of(&source)? {
             let layers = short.layers(&source);
-            let vehicle = Self::checked(&Check { layers }, &layers.parse()?)
+            let vehicle = Self::of_file(&Check { layers }, &layers.parse()?)
                 .map_err(|error| of_default(error, &short.defaults, &source))?;
             let (source, defaults_taken) = short.complete(&source)?;
             return Ok(Self { source, defaults_taken, ..vehicle });
         }
-        let vehicle = Self::checked(&Check::of(&source), &source.parse_as(Kind::Vehicle)?)?;
+        let vehicle = Self::of_file(&Check::of(&source), &source.parse_as(Kind::Vehicle)?)?;
         Ok(Self { defaults_taken: short::left_out(&source)?, source, ..vehicle })
     }
 
@@ -267,6 +267,14 @@ impl Vehicle {
     pub(crate) fn from_tree(source: &Source, tree: &Tree) -> Result<Self, ConfigError> {
         let vehicle = Self::checked(&Check::of(source), &tree.read(source)?)?;
         Ok(Self { source: source.clone(), ..vehicle })
+    }
+
+    /// The vehicle of a file as it was written, which is within its own error bounds; its source is left to be filled in.
+    fn of_file(check: &Check<'_>, raw: &RawVehicleFile) -> Result<Self, ConfigError> {
+        let vehicle = Self::checked(check, raw)?;
+        let stated = raw.design.error_bounds.get_ref();
+        budget::contain_vehicle(check, stated, &vehicle.error_bounds, &vehicle.oncoming)?;
+        Ok(vehicle)
     }
 
     /// The vehicle that these values describe, whose source is left to be filled in.

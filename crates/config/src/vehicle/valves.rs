@@ -20,7 +20,7 @@ const FLOWS: RangeInclusive<f64> = 100.0..=1e6;
 /// Line pressures, Pa.
 const LINE_PRESSURES_PA: RangeInclusive<f64> = 1e5..=10e6;
 /// Duty cycles, %.
-const DUTY_CYCLES: RangeInclusive<f64> = 0.0..=100.0;
+pub(super) const DUTY_CYCLES: RangeInclusive<f64> = 0.0..=100.0;
 
 /// Refuses keys that belong to another kind of valve than that of their table.
 fn refuse_foreign(check: &Check<'_>, table: &str, foreign: &[Option<usize>], hint: &str) -> Result<(), ConfigError> {

@@ -100,6 +100,15 @@ impl<T: Real> ClutchValve<T> {
         }
     }
 
+    /// Minimum and maximum delay over all commands, s.
+    pub fn delay_range(&self) -> [T; 2] {
+        let (minimum, maximum) = match self {
+            Self::Proportional(maps) | Self::NormallyHigh { maps, .. } => maps.delay_s.range(),
+            Self::PulseWidth { delay_s, .. } => delay_s.range(),
+        };
+        [minimum, maximum]
+    }
+
     /// Over `dt_s` on the way from `pressure_pa` to `settled_pa`, with the lag at `pressure_pa`; of a pulse-width valve
     /// linearised along its own way.
     #[inline]

@@ -1,7 +1,7 @@
 //! The error bounds of a fitted file: what the fit leaves open of each quantity.
 
 use config::{Car, ShiftClutch};
-use design::ShiftErrors;
+use design::{ElementErrors, ErrorBudget};
 
 use super::file::{Written, list};
 use super::fitting::GearboxFit;
@@ -20,7 +20,7 @@ impl GearboxFit {
         car: &Car,
         checked: Option<&HeldOut>,
     ) -> Result<(), FitError> {
-        let given = ShiftErrors::STANDARD.of_car(car);
+        let given = ErrorBudget::of_car(car);
         // The filter takes these as the edge of a uniform distribution.
         let edge = |sd: f64| 3.0_f64.sqrt() * sd;
         let comment = "what the fit leaves open: the edge of a uniform distribution of the stated deviation";
@@ -50,8 +50,8 @@ impl GearboxFit {
         for (place, name) in self.quantities.elements.iter().enumerate() {
             let element = car.gearbox.elements.iter().position(|element| element.name == *name);
             let seen = element.filter(|_| self.elements_seen[place]);
-            if let Some((element, known)) = seen.and_then(|at| Some((at, car.clutches[at].as_ref()?))) {
-                self.write_element_budget(text, car, (element, known), place)?;
+            if let Some((errors, known)) = seen.and_then(|at| given.element(at).zip(car.clutches[at].as_ref())) {
+                self.write_element_budget(text, errors, known, place)?;
             }
         }
         Ok(())
@@ -60,11 +60,10 @@ impl GearboxFit {
     fn write_element_budget(
         &self,
         text: &mut Written,
-        car: &Car,
-        (element, known): (usize, &ShiftClutch),
+        given: &ElementErrors,
+        known: &ShiftClutch,
         place: usize,
     ) -> Result<(), FitError> {
-        let given = ShiftErrors::STANDARD.of_element(car, element);
         let [friction, gain] = match self.quantities.measured[place] {
             true => [
                 factors(self.friction_sd(place), self.friction_factor(place), given.friction_factor),
@@ -74,7 +73,7 @@ impl GearboxFit {
         };
         let lag = Quantity::Lag(place);
         let lag = factors(self.sd(lag), self.unknown(lag).exp(), given.valve_lag_factor);
-        let delay_s = self.delay_s(car, known, place, given.valve_delay_s);
+        let delay_s = self.delay_s(known, place, given.valve_delay_s);
         let table = ["clutch", self.quantities.elements[place].as_str(), "error_bounds"];
         let all = [
             ("friction_factor", friction),
@@ -87,15 +86,15 @@ impl GearboxFit {
 
     /// Least and greatest delay of a valve, s: that of the fitted file over its commands, with what the fit leaves open of it and no more than
     /// was known before; the 95 % interval of their middle stays.
-    fn delay_s(&self, car: &Car, known: &ShiftClutch, place: usize, given: [f64; 2]) -> [f64; 2] {
+    fn delay_s(&self, known: &ShiftClutch, place: usize, given: [f64; 2]) -> [f64; 2] {
         let quantity = Quantity::Delay(place);
         let (late_s, sd_s) = (DELAY_UNIT_S * self.unknown(quantity), DELAY_UNIT_S * self.sd(quantity));
-        let of_file = [0.0, car.line_pressure_pa]
-            .map(|pressure_pa| (known.valve.delay(known.valve.command_for(pressure_pa)) + late_s).max(0.0));
+        let of_file = known.valve.delay_range().map(|delay_s| (delay_s + late_s).max(0.0));
         let middle = 0.5 * (of_file[0] + of_file[1]);
         let [least, greatest] = delays(of_file, BUDGET_SIDES * sd_s);
         let known = delays([given[0].min(middle - SIDES * sd_s), given[1].max(middle + SIDES * sd_s)], 0.0);
-        [least.max(known[0]), greatest.min(known[1])]
+        // The file is within its own bounds.
+        [least.max(known[0]).min(of_file[0]), greatest.min(known[1]).max(of_file[1])]
     }
 
     /// Ranges of friction and valve gain where only their product is told, beside the file that has the product as friction: what the product

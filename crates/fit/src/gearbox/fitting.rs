@@ -1,7 +1,7 @@
 //! The fit of a car to its shifts.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use drivetrain::ShiftKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -173,7 +173,7 @@ fn fit_with(
         ratio: fit.unknown(Quantity::TorqueRatio).exp(),
         sd: fit.input_sd(),
     };
-    let stiffness_sd = deviation_of(ShiftErrors::STANDARD.of_car(car).stiffness);
+    let stiffness_sd = deviation_of(ErrorBudget::of_car(car).stiffness);
     fit.wheel = fit_wheel(&driven, driving, &input, stiffness_sd);
     fit.fills = (0..fit.quantities.elements.len()).map(|place| fit.fill_of(car, tables, shifts, place)).collect();
     Ok((fit, scales))
@@ -345,13 +345,13 @@ impl GearboxFit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use design::ShiftErrors;
+    use design::ErrorBudget;
 
     #[test]
     fn an_inertia_that_is_far_off_and_not_told_is_that_of_the_file() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let car = Car::read(&root.join("vehicles/eight_speed.toml")).unwrap();
-        let tables = ShiftTables::of_car(&car, &ShiftErrors::STANDARD).unwrap();
+        let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
         let quantities = Quantities::of(&car, &tables, &[], [false; 2]);
         let place = quantities.place(Quantity::Inertia(3)).unwrap();
         let before = quantities.sd_before(place);

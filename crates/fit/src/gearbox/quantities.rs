@@ -1,7 +1,7 @@
 //! The quantities of a fit, and what is known of them before.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables, any_shift_filter, shift_uncertainty};
+use design::{ErrorBudget, ShiftTables, any_shift_filter, shift_uncertainty};
 use nalgebra::DMatrix;
 use observer::any_shift::AnyShiftFilter;
 
@@ -116,10 +116,10 @@ impl Quantities {
             [Quantity::ReportedScale, Quantity::ReportedDelay, Quantity::EngineInertia],
         ];
         all.extend(of_balances.into_iter().zip(balances).filter(|(_, is_used)| *is_used).flat_map(|(some, _)| some));
-        let errors = &ShiftErrors::STANDARD;
+        let budget = ErrorBudget::of_car(car);
         // That the valves of an earlier fit agreed with each other does not make the common factor of all torques better known.
-        let uncertainty = shift_uncertainty(car, errors);
-        let filter = AnyShiftFilter { uncertainty, ..any_shift_filter(car, tables, errors, None) };
+        let uncertainty = shift_uncertainty(&budget);
+        let filter = AnyShiftFilter { uncertainty, ..any_shift_filter(car, tables, &budget, None) };
         let mass_share = car.error_bounds.mass_share.unwrap_or(MASS);
         let known = Known { filter: &filter, has_converter, measured: &measured, mass_share };
         let before = DMatrix::from_fn(all.len(), all.len(), |i, j| {

@@ -10,7 +10,7 @@
 //! kiss point, a pressure, has at least the deviation of the hysteresis itself.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::quantities::{KISS_UNIT_PA, Quantity};
@@ -39,13 +39,13 @@ pub(crate) struct Unfitted {
 impl Unfitted {
     /// All of a car within its error bounds.
     pub(crate) fn of(car: &Car, tables: &ShiftTables<f64>) -> Vec<Self> {
-        let mut all = Vec::new();
+        let (mut all, budget) = (Vec::new(), ErrorBudget::of_car(car));
         for (element, clutch) in car.clutches.iter().enumerate() {
             let (Some(place), Some(clutch)) = (tables.place(element), clutch) else { continue };
-            if let Some(budget) = clutch.standard_fill_budget(car.oil_temperature_degc) {
-                all.push(Self { place, error: Error::Stroke(fill_sd(&clutch.cylinder, &budget)) });
+            if let Some(fill) = clutch.standard_fill_budget(car.oil_temperature_degc) {
+                all.push(Self { place, error: Error::Stroke(fill_sd(&clutch.cylinder, &fill)) });
             }
-            let most_pa = ShiftErrors::STANDARD.of_element(car, element).valve_hysteresis_pa;
+            let most_pa = budget.element(element).map_or(clutch.hysteresis_pa, |errors| errors.valve_hysteresis_pa);
             let deviation_pa = deviation_of_width(clutch.hysteresis_pa, most_pa);
             if deviation_pa > 0.0 {
                 all.push(Self { place, error: Error::Hysteresis(deviation_pa) });

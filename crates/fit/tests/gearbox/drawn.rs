@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use config::{Car, Drive, DriveSegment, Sensors};
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use fit::gearbox::{Quantities, Quantity, Recorded, Recorder, ShiftLog};
 use fit::{ReadingAges, Series};
 use observer::Reading;
@@ -211,7 +211,7 @@ impl Drawn {
         // Streams of their own: the other draws do not depend on them.
         let (mut timings, mut drags) = (Random(seed ^ TIMING_STREAM), Random(!seed));
         let draw = match case {
-            Case::WithTiming => draw.with_timing(&file, &ShiftErrors::STANDARD, || timings.uniform()),
+            Case::WithTiming => draw.with_timing(&ErrorBudget::of_car(&file), || timings.uniform()),
             _ => draw,
         };
         let mut truth = draw.car(&file);
@@ -409,7 +409,7 @@ impl Drawn {
 }
 
 pub(crate) fn tables(car: &Car) -> ShiftTables<f64> {
-    ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap()
+    ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap()
 }
 
 /// Shifts to fit, and every fifth to check.

@@ -1,7 +1,7 @@
 //! What the filter of `estimate` says of a drive with a vehicle file.
 
 use config::{Car, Drive};
-use design::{ShiftErrors, any_shift_filter};
+use design::{ErrorBudget, any_shift_filter};
 use plant::car::CarModel;
 use study::any_shift::drive::{DriveScorer, ScoredDrive};
 
@@ -29,7 +29,7 @@ pub(crate) struct Estimated {
 pub(crate) fn estimated(drawn: &Drawn, drive: &Drive, cars: &[Car]) -> Vec<Estimated> {
     let (all_tables, sensors) = (cars.iter().map(tables).collect::<Vec<_>>(), sensors());
     let filters: Vec<_> = (cars.iter().zip(&all_tables))
-        .map(|(car, tables)| any_shift_filter(car, tables, &ShiftErrors::STANDARD, Some(&sensors)))
+        .map(|(car, tables)| any_shift_filter(car, tables, &ErrorBudget::of_car(car), Some(&sensors)))
         .collect();
     let model = CarModel::new(drawn.truth.clone()).unwrap();
     let mut scorers: Vec<_> = (cars.iter().zip(&all_tables).zip(&filters))

@@ -10,7 +10,7 @@ mod pressures;
 use std::path::Path;
 
 use config::{Car, CarErrorBounds, Source};
-use design::{ShiftErrors, any_shift_filter, shift_uncertainty};
+use design::{ErrorBudget, any_shift_filter, shift_uncertainty};
 use drawn::{Case, Drawn, car, city, every_fifth, hilly, tables};
 use fit::gearbox::{Driving, GearboxFit, Quantity, Recorder, ShiftLog, fit};
 use fit::{ReadingAges, Verdict};
@@ -257,24 +257,23 @@ fn error_bounds_of_a_file_come_before_those_of_a_car_in_series() {
     let source = Source { text: format!("{}\n{more}", given.source.text), ..given.source.clone() };
     let own = Car::from_sources(source, gearbox).unwrap();
     let at = own.gearbox.elements.iter().position(|element| element.name == "E").unwrap();
-    let standard = ShiftErrors::STANDARD;
-    assert_eq!(standard.of_element(&own, at).valve_lag_factor, [0.9, 1.2]);
-    assert_eq!(standard.of_element(&own, at).friction_factor, standard.of_element(&given, at).friction_factor);
-    assert_eq!(standard.of_car(&given), standard);
-    // Of the elements the widest.
-    assert_eq!(standard.of_car(&own), ShiftErrors { converter: 0.04, wheel_scale: 0.01, ..standard });
+    let [of_given, of_own] = [&given, &own].map(ErrorBudget::of_car);
+    assert_eq!(of_own.element(at).unwrap().valve_lag_factor, [0.9, 1.2]);
+    assert_eq!(of_own.element(at).unwrap().friction_factor, of_given.element(at).unwrap().friction_factor);
+    let elements = of_own.elements.clone();
+    assert_eq!(of_own, ErrorBudget { converter: 0.04, wheel_scale: 0.01, elements, ..of_given });
     let tables = [&given, &own].map(tables);
     let budget = |car: usize| tables[car].tables().elements[tables[car].place(at).unwrap()].budget.unwrap();
     assert_eq!((budget(0).lag_factor, budget(1).lag_factor), ([0.5, 1.5], [0.9, 1.2]));
     // What the valves err by over their bounds is for the filter alone, and not for the ranges.
     let bounds = CarErrorBounds { valve_error_scale: Some(0.5), ..own.error_bounds.clone() };
     let trusted = Car { error_bounds: bounds, ..own.clone() };
-    let filter = |car: &Car| any_shift_filter(car, &tables[1], &standard, None).uncertainty;
+    let filter = |car: &Car| any_shift_filter(car, &tables[1], &ErrorBudget::of_car(car), None).uncertainty;
     let [usual, half] = [&own, &trusted].map(filter);
     assert_eq!([half.torque_share, half.kiss_point_pa], [0.5 * usual.torque_share, 0.5 * usual.kiss_point_pa]);
     assert_eq!([half.valve_delay_s, half.pressure_pa], [0.5 * usual.valve_delay_s, 0.5 * usual.pressure_pa]);
     assert_eq!((half.slow_part, half.inertia_share), (usual.slow_part, usual.inertia_share));
-    assert_eq!(shift_uncertainty(&trusted, &standard), usual);
+    assert_eq!(shift_uncertainty(&ErrorBudget::of_car(&trusted)), usual);
     assert_eq!(crate::tables(&trusted), tables[1]);
 }
 
@@ -296,7 +295,7 @@ fn the_ranges_of_a_fitted_file_hold_and_are_narrower() {
             let table = format!("[clutch.{name}.error_bounds]");
             assert_eq!(file.source.text.contains(&table), fit.elements_seen[place], "{name}");
         }
-        let bounds = [&drawn.file, &file].map(|car| ShiftErrors::STANDARD.of_car(car));
+        let bounds = [&drawn.file, &file].map(|car| ErrorBudget::of_car(car));
         assert!(bounds[1].converter <= bounds[0].converter && bounds[1].inertia <= bounds[0].inertia, "{bounds:?}");
         let found = estimated::estimated(&drawn, &city(1), &[drawn.file.clone(), file, unchecked]);
         // Where held-out shifts say that the valves err less than the bounds, the filter is better for it.

@@ -8,7 +8,7 @@ use super::tables::{FrictionElement, ShiftClutch};
 use super::{PIECE_S, ShiftUncertainty, pieces, square};
 use crate::bound::pressure_and_torque;
 use crate::kalman::valve_model::Commands;
-use crate::{ChannelHealth, InputLimits, LOST_S, PressureRange, Reading};
+use crate::{ChannelHealth, LOST_S, PressureRange, Reading};
 
 /// Distance from the pressure that the command ends at from which on the valve model rests there, Pa \[chosen\]: errors of a
 /// pressure are thousands of this.
@@ -135,7 +135,7 @@ pub(super) struct ElementState<T> {
 }
 
 impl<T: Real> ElementState<T> {
-    pub(super) fn new(element: &FrictionElement<T>, limits: &InputLimits<T>) -> Self {
+    pub(super) fn new(element: &FrictionElement<T>) -> Self {
         Self {
             commands: Commands::new(),
             valve_pa: T::zero(),
@@ -146,7 +146,7 @@ impl<T: Real> ElementState<T> {
             delay_s: element.valve.delay_s,
             newest: None,
             pistons: None,
-            range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, limits.command_max)),
+            range: element.budget.as_ref().map(|budget| PressureRange::unknown(budget, element.limits.command_max)),
         }
     }
 
@@ -175,26 +175,20 @@ impl<T: Real> ElementState<T> {
 
     /// Lets time pass, and takes a command if there is one.
     #[inline]
-    pub(super) fn step(
-        &mut self,
-        element: &FrictionElement<T>,
-        limits: &InputLimits<T>,
-        command: Option<Reading<T>>,
-        dt_s: T,
-    ) -> ChannelHealth {
+    pub(super) fn step(&mut self, element: &FrictionElement<T>, command: Option<Reading<T>>, dt_s: T) -> ChannelHealth {
         if dt_s > T::zero() {
-            self.pass(element, limits, dt_s);
+            self.pass(element, dt_s);
         }
-        let usable = command.filter(|reading| limits.usable_command(reading));
+        let usable = command.and_then(|reading| element.limits.usable(&reading));
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
-            range.step(budget, dt_s, usable, limits.command_max);
+            range.step(budget, dt_s, usable, element.limits.command_max);
         }
         match (command, usable) {
             (None, _) if self.newest.is_none_or(|newest| newest.age_s > T::of(LOST_S)) => ChannelHealth::Lost,
             (None, _) => ChannelHealth::Absent,
             (Some(_), None) => ChannelHealth::Refused,
             (Some(_), Some(reading)) => {
-                self.take(element, limits, &reading);
+                self.take(element, &reading);
                 ChannelHealth::Good
             }
         }
@@ -202,7 +196,7 @@ impl<T: Real> ElementState<T> {
 
     /// Carries the valve on, unless it rests.
     #[inline]
-    fn pass(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+    fn pass(&mut self, element: &FrictionElement<T>, dt_s: T) {
         if let Some(newest) = &mut self.newest {
             (newest.age_s, newest.alike_s) = (newest.age_s + dt_s, newest.alike_s + dt_s);
             if let Some(rests_s) = &mut newest.rests_s {
@@ -210,9 +204,9 @@ impl<T: Real> ElementState<T> {
                 return;
             }
         }
-        self.move_valve(element, limits, dt_s);
+        self.move_valve(element, dt_s);
         if let Some(newest) = &mut self.newest {
-            let end_pa = limits.possible_pressure(newest.settled_pa);
+            let end_pa = element.limits.possible_pressure(newest.settled_pa);
             let near = (self.valve_pa - end_pa).abs().at_least(self.per_lag_pa.abs()) <= T::of(RESTS_PA);
             if near && newest.alike_s - dt_s >= self.delay_s {
                 (self.valve_pa, self.rate_pa_s, self.per_lag_pa) = (end_pa, T::zero(), T::zero());
@@ -221,7 +215,7 @@ impl<T: Real> ElementState<T> {
         }
     }
 
-    fn move_valve(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, dt_s: T) {
+    fn move_valve(&mut self, element: &FrictionElement<T>, dt_s: T) {
         let start_pa = self.valve_pa;
         let (pieces, piece_s) = pieces(dt_s);
         for _ in 0..pieces {
@@ -230,7 +224,7 @@ impl<T: Real> ElementState<T> {
             // A lag that is longer by a factor is a time that passes slower by it.
             let step = element.valve.step(settled_pa, self.valve_pa, piece_s / self.lag);
             let before_pa = self.valve_pa;
-            self.valve_pa = limits.possible_pressure(step.phi * before_pa + step.drift_pa);
+            self.valve_pa = element.limits.possible_pressure(step.phi * before_pa + step.drift_pa);
             self.per_lag_pa = step.phi * self.per_lag_pa + (self.valve_pa - before_pa);
         }
         self.rate_pa_s = (self.valve_pa - start_pa) / dt_s;
@@ -248,7 +242,7 @@ impl<T: Real> ElementState<T> {
 
     /// Takes a usable command.
     #[inline]
-    fn take(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>, reading: &Reading<T>) {
+    fn take(&mut self, element: &FrictionElement<T>, reading: &Reading<T>) {
         let needed_s = self.delay_s.at_least(element.valve.delay_s) + T::of(PIECE_S);
         if let Some(newest) = &mut self.newest {
             // Commands arrive in their order.
@@ -266,7 +260,7 @@ impl<T: Real> ElementState<T> {
         let settled_pa = element.valve.valve.settled_pressure(reading.value);
         if self.newest.is_none() {
             // The first command is taken to have stood for long.
-            self.valve_pa = limits.possible_pressure(settled_pa);
+            self.valve_pa = element.limits.possible_pressure(settled_pa);
         }
         let age_s = self.newest.map_or(reading.age_s, |newest| newest.age_s);
         self.commands.send(age_s, settled_pa, needed_s);
@@ -274,9 +268,9 @@ impl<T: Real> ElementState<T> {
     }
 
     /// Forgets the range and the rate: time was lost, and with it commands.
-    pub(super) fn forget(&mut self, element: &FrictionElement<T>, limits: &InputLimits<T>) {
+    pub(super) fn forget(&mut self, element: &FrictionElement<T>) {
         if let (Some(range), Some(budget)) = (&mut self.range, &element.budget) {
-            range.forget(budget, limits.command_max);
+            range.forget(budget, element.limits.command_max);
         }
         (self.rate_pa_s, self.per_lag_pa) = (T::zero(), T::zero());
     }

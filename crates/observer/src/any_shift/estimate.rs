@@ -110,6 +110,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             (_, _, true) => Health::ReadingRefused,
             _ => Health::Good,
         });
+        let (_, since_s) = state.gears;
         let mut valve_pa =
             state.elements.each_ref().map(|element| element.as_ref().map_or(T::zero(), |element| element.valve_pa));
         if state.strokes {
@@ -140,7 +141,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                 estimate.clutches = running.shift.map(|shift| {
                     [0, 1].map(|c| {
                         let estimate = self.of_clutch(running, &state.elements, &shift, c);
-                        self.in_range(estimate, &state.elements, &shift.clutches[c.min(1)], &state.newest)
+                        let is_tied = shift.is_tied(c, since_s);
+                        self.in_range(estimate, &state.elements, (&shift.clutches[c.min(1)], is_tied), &state.newest)
                     })
                 });
             }
@@ -170,7 +172,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
                                 let slip = self.slip(clutch.ratio, then);
                                 let direction = Self::direction_by_valve(&slip, turbine_n_m);
                                 let estimate = self.by_valve(&state.elements, clutch, [slip.value, direction], lasting);
-                                self.in_range(estimate, &state.elements, clutch, &state.newest)
+                                let is_tied = shift.is_tied(c, since_s);
+                                self.in_range(estimate, &state.elements, (clutch, is_tied), &state.newest)
                             })
                         },
                     );
@@ -214,16 +217,18 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     ) -> ClutchEstimate<T> {
         let u = &self.uncertainty;
         let zero = T::zero();
-        let (torque, valve_pa, gain, both) =
+        let (torque, valve_pa, pressure_pa, both) =
             self.element(elements, clutch.element).map_or((ClutchTorque::none(), zero, zero, zero), |found| {
                 let (memory, element) = found;
                 let torque = memory.torque(element, clutch, u, slip, &PressureError::unseen(k));
-                (torque, memory.pressure_pa(), u.gain_error(element, f, k), u.correlation_in_shift(element))
+                let valve_pa = memory.pressure_pa();
+                let pressure_pa = element.limits.possible_pressure(valve_pa * (T::one() + u.gain_error(element, f, k)));
+                (torque, valve_pa, pressure_pa, u.correlation_in_shift(element))
             });
         let corrected = torque.base_n_m + f * torque.per_friction_n_m + k * torque.per_kiss_n_m;
         ClutchEstimate {
             element: clutch.element,
-            pressure_pa: self.limits.possible_pressure(valve_pa * (T::one() + gain)),
+            pressure_pa,
             torque_n_m: corrected / clutch.alpha,
             deviation_n_m: (torque.unlearnt_variance(both).sqrt() / clutch.alpha).abs(),
             valve_pa,
@@ -258,19 +263,20 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             torque = zero;
         }
         let deviation = x.variance(&row).sqrt();
-        let (valve_pa, correction, both) =
+        let (valve_pa, pressure_pa, both) =
             self.element(elements, clutch.element).map_or((zero, zero, zero), |(memory, element)| {
                 let modelled_pa = memory.pressure_pa();
                 let gain = modelled_pa * u.gain_error(element, x.mean[FRICTION[c]], x.mean[KISS[c]]);
                 // The error of the pressure itself.
                 let itself = memory.error_pa(u, x.mean[PRESSURE[c]]);
-                (modelled_pa, gain + if holds { zero } else { itself }, u.correlation_in_shift(element))
+                let pressure_pa = modelled_pa + gain + if holds { zero } else { itself };
+                (modelled_pa, element.limits.possible_pressure(pressure_pa), u.correlation_in_shift(element))
             });
         let open_loop_n_m = if holds { own.open_loop_n_m.abs() * torque.signum() } else { own.open_loop_n_m };
         let alone = own.unlearnt_variance(both).sqrt();
         ClutchEstimate {
             element: clutch.element,
-            pressure_pa: self.limits.possible_pressure(valve_pa + correction),
+            pressure_pa,
             torque_n_m: torque / clutch.alpha,
             deviation_n_m: (deviation / clutch.alpha).abs(),
             valve_pa,
@@ -307,15 +313,16 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         (row, rest)
     }
 
-    /// Brings an estimate into the guaranteed ranges, where there are some.
+    /// Brings an estimate into the guaranteed ranges, where there are some. Before the dog of its gear is in, a clutch is not tied to the
+    /// output, and the direction of its slip is not known.
     fn in_range(
         &self,
         mut estimate: ClutchEstimate<T>,
         elements: &[Option<ElementState<T>>; MAX_ELEMENTS],
-        clutch: &ShiftClutch<T>,
+        (clutch, is_tied): (&ShiftClutch<T>, bool),
         newest: &[Option<Newest<T>>; SPEEDS],
     ) -> ClutchEstimate<T> {
-        let slip = self.bounded_slip(clutch.ratio, newest).map(|[slip, error]| {
+        let slip = self.bounded_slip(clutch.ratio, newest).filter(|_| is_tied).map(|[slip, error]| {
             let (middle, half) = (clutch.alpha * slip, clutch.alpha.abs() * error);
             [middle - half, middle + half]
         });

@@ -68,7 +68,9 @@ pub use input_clutch::InputClutch;
 pub use learnt::{LEARNT, Learnt, LearntElement, MAX_PAIRS};
 pub use phases::ShiftPhase;
 pub use pistons::Piston;
-pub use tables::{FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, ShiftClutch, ShiftRow};
+pub use tables::{
+    FrictionElement, GearRow, GearboxTables, MAX_ELEMENTS, NO_ELEMENT, ONE_WAY, ShiftClutch, ShiftRow, ValveLimits,
+};
 pub use turbine::TurbineTorque;
 
 const N: usize = 16;
@@ -250,6 +252,8 @@ pub struct AnyShiftState<T> {
     slips: bool,
     /// Without a converter: whether the clutch of the gear was open, or the car slow, and no gear has fitted since.
     launches: bool,
+    /// The gears of the newest step, and since when they have been these, s.
+    gears: (GearCommand, T),
     learnt: Learnt<T>,
     /// Time since what is learnt was last let fade, s.
     fading_s: T,
@@ -359,7 +363,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
     pub fn go_on_with(&self, learnt: &Learnt<T>) -> AnyShiftState<T> {
         let mut elements = [None; MAX_ELEMENTS];
         for (state, element) in elements.iter_mut().zip(self.tables.elements) {
-            *state = Some(ElementState::new(element, &self.limits));
+            *state = Some(ElementState::new(element));
         }
         self.take_timing(&mut elements, learnt);
         AnyShiftState {
@@ -375,6 +379,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             unfit: 0,
             slips: false,
             launches: false,
+            gears: (GearCommand { from: GearCommand::NEUTRAL, to: GearCommand::NEUTRAL }, T::zero()),
             learnt: *learnt,
             fading_s: T::zero(),
             estimate: ShiftEstimate::nothing(),
@@ -394,6 +399,8 @@ impl<T: Real> AnyShiftFilter<'_, T> {
             state.lose();
         }
         state.fading_s = state.fading_s + dt_s;
+        let since_s = if state.gears.0 == input.gear { state.gears.1 + dt_s } else { T::zero() };
+        state.gears = (input.gear, since_s);
         let mut health = Health::Good;
         let mut channels = Channels::all(ChannelHealth::Absent);
         // Each element has a command of its own.
@@ -436,7 +443,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         state.reported = None;
         for (memory, element) in state.elements.iter_mut().zip(self.tables.elements) {
             if let Some(memory) = memory {
-                memory.forget(element, &self.limits);
+                memory.forget(element);
             }
         }
         for clutch in state.estimate.clutches.iter_mut().flatten() {

@@ -22,7 +22,7 @@ impl<T: Real> AnyShiftFilter<'_, T> {
         let elements = state.elements.iter_mut().zip(self.tables.elements).zip(&input.commands);
         for (health, ((memory, element), command)) in health.iter_mut().zip(elements) {
             if let Some(memory) = memory {
-                *health = memory.step(element, &self.limits, *command, dt_s);
+                *health = memory.step(element, *command, dt_s);
             }
         }
         if state.strokes {

@@ -11,7 +11,7 @@ use drivetrain::{Clutch, Real, ReducedShift};
 
 use super::GearCommand;
 use super::pistons::Piston;
-use crate::{Budget, ValveModel};
+use crate::{Budget, Reading, ValveModel};
 
 /// Most clutches and brakes of a gearbox.
 pub const MAX_ELEMENTS: usize = 8;
@@ -26,10 +26,54 @@ pub struct FrictionElement<T> {
     pub clutch: Clutch<T>,
     /// The valve as the filter knows it.
     pub valve: ValveModel<T>,
+    /// What the valve can be commanded and can give.
+    pub limits: ValveLimits<T>,
     /// Its piston, if that has a stroke; without one the pressure at the valve's outlet acts on the plates.
     pub piston: Option<Piston<T>>,
     /// Largest errors, for the guaranteed ranges; without it there are none.
     pub budget: Option<Budget<T>>,
+}
+
+/// Time from the request of a shift until the dog of its gear is in, s \[chosen\]: synchronisers take 0.1 to 0.2 s.
+const DOG_S: f64 = 0.3;
+
+/// What a valve can be commanded and can give.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValveLimits<T> {
+    /// Largest command, A or %; the smallest is zero.
+    pub command_max: T,
+    /// Maximum error of a reading of the command, A or %: a reading of no current may be below zero.
+    pub command_error: T,
+    /// Highest pressure, Pa; the lowest is zero.
+    pub pressure_max_pa: T,
+}
+
+impl<T: Real> ValveLimits<T> {
+    /// A reading of the command as one that the valve can have; `None` if it is none within its error.
+    #[inline]
+    pub(super) fn usable(&self, reading: &Reading<T>) -> Option<Reading<T>> {
+        let Reading { value, age_s } = *reading;
+        // A comparison with NaN is false, so this refuses non-finite values too.
+        let possible = value >= -self.command_error && value <= self.command_max + self.command_error;
+        (possible && age_s >= T::zero() && age_s.is_finite())
+            .then(|| Reading { value: value.at_least(T::zero()).at_most(self.command_max), age_s })
+    }
+
+    /// The nearest pressure that the valve can give, Pa.
+    #[inline]
+    pub(super) fn possible_pressure(&self, pressure_pa: T) -> T {
+        pressure_pa.at_least(T::zero()).at_most(self.pressure_max_pa)
+    }
+
+    /// The same limits in another precision.
+    pub fn cast<U: Real>(&self) -> ValveLimits<U> {
+        let to = |x: T| U::of(x.to_f64_exact());
+        ValveLimits {
+            command_max: to(self.command_max),
+            command_error: to(self.command_error),
+            pressure_max_pa: to(self.pressure_max_pa),
+        }
+    }
 }
 
 /// A gear.
@@ -73,6 +117,9 @@ pub struct ShiftRow<T> {
     pub clutches: [ShiftClutch<T>; 2],
     /// Mass `M` in turbine and output speed, kg m^2.
     pub mass_kg_m2: [[T; 2]; 2],
+    /// Whether a dog of the gear after has to be put in, which is not in the gear before: until it is, the shaft of the oncoming clutch
+    /// turns at another ratio.
+    pub has_dog: bool,
 }
 
 /// The tables of a gearbox.
@@ -87,7 +134,7 @@ pub struct GearboxTables<'a, T> {
 }
 
 impl<T: Real> ShiftRow<T> {
-    /// The shift between two gears with these offgoing and oncoming elements.
+    /// The shift between two gears with these offgoing and oncoming elements, without dogs.
     pub fn new(gears: [usize; 2], elements: [usize; 2], reduced: &ReducedShift<T>) -> Self {
         let clutch = |element: usize, slip: [T; 2]| ShiftClutch { element, alpha: slip[0], ratio: -slip[1] / slip[0] };
         Self {
@@ -95,7 +142,13 @@ impl<T: Real> ShiftRow<T> {
             to: gears[1],
             clutches: [clutch(elements[0], reduced.slip_offgoing), clutch(elements[1], reduced.slip_oncoming)],
             mass_kg_m2: reduced.mass_kg_m2,
+            has_dog: false,
         }
+    }
+
+    /// Whether the slip of its offgoing (0) or oncoming clutch (1) is that of the speeds, so long after the request.
+    pub(super) fn is_tied(&self, clutch: usize, since_s: T) -> bool {
+        clutch == 0 || !self.has_dog || since_s >= T::of(DOG_S)
     }
 
     /// Inertia at the output while both speeds are tied by a ratio, kg m^2.
@@ -116,6 +169,7 @@ impl<T: Real> ShiftRow<T> {
                 ratio: to(clutch.ratio),
             }),
             mass_kg_m2: self.mass_kg_m2.map(|row| row.map(to)),
+            has_dog: self.has_dog,
         }
     }
 }
@@ -134,6 +188,7 @@ impl<T: Real> FrictionElement<T> {
         FrictionElement {
             clutch: self.clutch.cast(),
             valve: self.valve.cast(),
+            limits: self.limits.cast(),
             piston: self.piston.as_ref().map(Piston::cast),
             budget: self.budget.as_ref().map(Budget::cast),
         }

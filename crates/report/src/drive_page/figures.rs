@@ -214,6 +214,6 @@ fn clutch_panel(
     if !is_one_way(rows, c) {
         series.push(curve(2, "valve model", OPEN_LOOP));
     }
-    let band = Band { label: "guaranteed range".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
+    let band = Band { label: "range by the error budget".to_owned(), colour: RANGE, lower: end(0), upper: end(1) };
     Panel { y_label, height, series, band: Some(band), axis }
 }

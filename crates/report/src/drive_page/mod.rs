@@ -186,7 +186,7 @@ pub fn findings(drive: &ScoredDrive) -> Vec<String> {
     )]);
     if drive.has_truth() {
         sentences.push(format!(
-            "{inside} of {all} pressures and torques of the shift clutches are within their guaranteed ranges."
+            "{inside} of {all} pressures and torques of the shift clutches are within their ranges by the error budget."
         ));
     }
     let hidden = |is_garage: bool| shifts.iter().filter(|s| !s.is_estimated() && s.is_garage == is_garage).count();

@@ -59,7 +59,7 @@ const COLUMNS: &[Column] = &[
     ),
     column(
         "friction work kJ",
-        "torque times slip of both clutches over the shift by the estimate; in brackets by the ends of the guaranteed range",
+        "torque times slip of both clutches over the shift by the estimate; in brackets by the ends of the range by the error budget",
         |s, _| friction_work(s).map_or(String::new(), |work| ranged(&work, 1e-3, 1)),
     ),
     column("inertia phase", "error of the controlling clutch's torque over that of the open loop", |s, _| {
@@ -75,7 +75,7 @@ const COLUMNS: &[Column] = &[
     }),
     column(
         "in range",
-        "share of the true pressures and torques of both clutches within their guaranteed ranges",
+        "share of the true pressures and torques of both clutches within their ranges by the error budget",
         |s, _| {
             if s.has_truth() { s.inside().map_or(String::new(), coverage) } else { String::new() }
         },
@@ -90,7 +90,7 @@ const COLUMNS: &[Column] = &[
             })
         },
     ),
-    column("pressures in range", "share of the measured pressures within their guaranteed ranges", |s, _| {
+    column("pressures in range", "share of the measured pressures within their ranges by the error budget", |s, _| {
         let [all, inside] = s.summary.pressures;
         #[expect(clippy::cast_precision_loss, reason = "fewer rows than a double has integers")]
         let share = inside as f64 / all as f64;
@@ -101,12 +101,12 @@ const COLUMNS: &[Column] = &[
     }),
     column(
         "pressure MPa",
-        "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
+        "of the controlling clutch, mean of the inertia phase; in brackets of its range by the error budget",
         |s, _| unscored(s, |s| Some(ranged(&s.mean_pressure_pa(controlling_of(&s.rows, s.kind?))?, 1e-6, 3))),
     ),
     column(
         "torque N m",
-        "of the controlling clutch, mean of the inertia phase; in brackets of its guaranteed range",
+        "of the controlling clutch, mean of the inertia phase; in brackets of its range by the error budget",
         |s, _| unscored(s, |s| Some(ranged(&s.mean_torque_n_m(controlling_of(&s.rows, s.kind?))?, 1.0, 0))),
     ),
     column(

@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use config::{Car, Drive, Experiment, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::any_shift::{AnyShiftFilter, FrictionElement, GearboxTables, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_drive};
 use study::any_shift::recording::Recording;
@@ -26,12 +26,12 @@ struct Known {
 impl Known {
     fn eight_speed() -> &'static Self {
         let car = Car::eight_speed().unwrap();
-        let tables = ShiftTables::of_car(&car, &ShiftErrors::STANDARD).unwrap();
+        let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
         Box::leak(Box::new(Self { car, tables, sensors: Experiment::bench().unwrap().sensors.unwrap() }))
     }
 
     fn filter(&self) -> AnyShiftFilter<'_, f64> {
-        any_shift_filter(&self.car, &self.tables, &ShiftErrors::STANDARD, Some(&self.sensors))
+        any_shift_filter(&self.car, &self.tables, &ErrorBudget::of_car(&self.car), Some(&self.sensors))
     }
 
     fn truth(&self) -> Car {

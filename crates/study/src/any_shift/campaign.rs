@@ -4,8 +4,8 @@
 
 use std::fmt::Write;
 
-use config::{Car, CarStudy, CarStudyRuns, Drive, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use config::{Car, CarStudy, CarStudyRuns, Drive, SampledErrors, Sensors};
+use design::{ElementErrors, ErrorBudget, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use plant::car::{CarCalibration, CarModel, CarShift, simulate_car_drive};
 
@@ -54,7 +54,10 @@ pub struct CarCampaign {
     /// The study.
     pub study: CarStudy,
     sensors: Sensors,
-    errors: ShiftErrors,
+    /// What filter and ranges know of the errors: of the vehicle file and the sensors.
+    budget: ErrorBudget,
+    /// What the cars are sampled from.
+    sampled: ErrorBudget,
     groups: Vec<Group>,
 }
 
@@ -79,21 +82,28 @@ struct Sums {
     counts: MatrixCounts,
 }
 
+/// The budget with the bounds of a study in place of its own, where the study has them.
+fn sampled_budget(budget: &ErrorBudget, errors: &SampledErrors) -> ErrorBudget {
+    let mut sampled = budget.clone();
+    let around = |relative: f64| [1.0 - relative, 1.0 + relative];
+    for element in sampled.elements.iter_mut().flatten() {
+        element.friction_factor = errors.friction.map_or(element.friction_factor, around);
+        element.valve_gain_factor = errors.valve_gain.map_or(element.valve_gain_factor, around);
+    }
+    sampled.converter = errors.converter.unwrap_or(sampled.converter);
+    sampled
+}
+
 impl CarCampaign {
     /// Makes a study ready; `sensors` are those of a study that names none.
     ///
     /// # Errors
     /// The gearbox has more clutches than the filter has room for, or the filter has tables for none of the shifts.
-    pub fn new(mut study: CarStudy, sensors: &Sensors) -> Result<Self, StudyError> {
-        // What the study says comes before what the vehicle file says.
-        for own in &mut study.car.error_bounds.elements {
-            own.friction_factor = own.friction_factor.filter(|_| study.errors.friction.is_none());
-            own.valve_gain_factor = own.valve_gain_factor.filter(|_| study.errors.valve_gain.is_none());
-        }
-        let own_converter = &mut study.car.error_bounds.converter_share;
-        *own_converter = own_converter.filter(|_| study.errors.converter.is_none());
+    pub fn new(study: CarStudy, sensors: &Sensors) -> Result<Self, StudyError> {
         let car = &study.car;
-        let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+        let sensors = study.sensors.unwrap_or(*sensors);
+        let budget = ErrorBudget::of_car(car).read_by(car, Some(&sensors));
+        let tables = ShiftTables::of_car(car, &budget).map_err(AnyShiftError::TooManyElements)?;
         let pairs: Vec<[usize; 2]> = match &study.what {
             CarStudyRuns::Shifts(pairs) => pairs.clone(),
             CarStudyRuns::Drive(_) => {
@@ -110,19 +120,34 @@ impl CarCampaign {
         let gain = |[from, to]: &[usize; 2]| gain(car, *from, *to);
         let classes = (0..CLASSES.len()).filter(|&at| pairs.iter().any(|pair| class(gain(pair)) == at));
         let groups = classes.flat_map(|class| ShiftKind::ALL.map(|kind| Group { kind, class })).collect();
-        let standard = ShiftErrors::STANDARD;
-        let errors = ShiftErrors {
-            friction: study.errors.friction.unwrap_or(standard.friction),
-            valve_gain: study.errors.valve_gain.unwrap_or(standard.valve_gain),
-            converter: study.errors.converter.unwrap_or(standard.converter),
-            ..standard
-        };
-        Ok(Self { sensors: study.sensors.unwrap_or(*sensors), errors, groups, study })
+        let sampled = sampled_budget(&budget, &study.errors);
+        Ok(Self { sensors, budget, sampled, groups, study })
     }
 
-    /// The drawn cars differ by at most these shares.
-    pub fn errors(&self) -> &ShiftErrors {
-        &self.errors
+    /// The bounds within which the cars are sampled.
+    pub fn sampled(&self) -> &ErrorBudget {
+        &self.sampled
+    }
+
+    /// Where the sampled cars exceed the error bounds of the vehicle file, by which the ranges are made: a phrase each.
+    pub fn exceeded(&self) -> Vec<String> {
+        let mut exceeded = Vec::new();
+        for (at, element) in self.study.car.gearbox.elements.iter().enumerate() {
+            let (Some(bounds), Some(sampled)) = (self.budget.element(at), self.sampled.element(at)) else { continue };
+            let of: [(&str, fn(&ElementErrors) -> [f64; 2]); 2] =
+                [("friction", |element| element.friction_factor), ("valve gain", |element| element.valve_gain_factor)];
+            for (what, of) in of {
+                let ([low, high], [from, to]) = (of(bounds), of(sampled));
+                if from < low || to > high {
+                    exceeded.push(format!("{what} of {} {from} to {to} (bounds {low} to {high})", element.name));
+                }
+            }
+        }
+        let (bound, sampled) = (self.budget.converter, self.sampled.converter);
+        if sampled > bound && self.study.car.converter.is_some() {
+            exceeded.push(format!("converter capacity +-{:.0} % (bound {:.0} %)", 100.0 * sampled, 100.0 * bound));
+        }
+        exceeded
     }
 
     /// The names of the columns.
@@ -149,7 +174,7 @@ impl CarCampaign {
         let seed = mixed(self.study.seed, run);
         let mut random = Random(seed);
         let known = &self.study.car;
-        let truth = ShiftDraw::within(known, &self.errors, || random.uniform()).car(known);
+        let truth = ShiftDraw::within(known, &self.sampled, || random.uniform()).car(known);
         let sensors = Sensors { seed, ..self.sensors };
         let sums = match &self.study.what {
             CarStudyRuns::Drive(drive) => self.driven(&truth, drive, &sensors),
@@ -166,8 +191,8 @@ impl CarCampaign {
 
     fn driven(&self, truth: &Car, drive: &Drive, sensors: &Sensors) -> Result<Vec<Sums>, AnyShiftError> {
         let known = &self.study.car;
-        let tables = ShiftTables::of_car(known, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
-        let filter = any_shift_filter(known, &tables, &ShiftErrors::STANDARD, Some(sensors));
+        let tables = ShiftTables::of_car(known, &self.budget).map_err(AnyShiftError::TooManyElements)?;
+        let filter = any_shift_filter(known, &tables, &self.budget, Some(sensors));
         let model = CarModel::new(truth.clone())?;
         let mut sensed = SensedDrive::new(known, sensors, SAMPLE_S);
         let drive = Drive { sample_time_s: sensed.record_s(), ..drive.clone() };

@@ -9,7 +9,7 @@
 
 use std::collections::VecDeque;
 
-use design::ShiftTables;
+use design::{ElementErrors, ErrorBudget, ShiftTables};
 use observer::any_shift::{MAX_ELEMENTS, ShiftEstimate, ShiftRow};
 
 use super::car_log::LogStep;
@@ -38,16 +38,23 @@ const BESIDE_N_M: f64 = 5.0;
 const MOST: f64 = 3.0;
 /// Shifts up and shifts down that are needed to judge, each \[chosen\]: an error of friction, gain or torque moves them in opposite directions.
 const ENOUGH_SHIFTS: u32 = 2;
-/// Delay from which on it is said, s \[chosen\]: above what errors of friction, valves and strokes within their bounds look like, as far as the
-/// filter has not learnt lag and delay of the valves.
-const SAID_S: f64 = 0.065;
+/// Delay from which on it is reported, s \[chosen\]: above what errors of friction, valves and strokes within the default bounds look like, as far
+/// as the filter has not learnt lag and delay of the valves.
+const REPORTED_S: f64 = 0.065;
+/// Half of the range of the delay of a valve, s, and its relative error of the lag in the default bounds, and a lag, s: wider bounds report later by
+/// what they add.
+const DEFAULT_DELAY_S: f64 = 0.015;
+const DEFAULT_LAG: f64 = 0.5;
+const LAG_S: f64 = 0.04;
 /// Share of the difference that the delay leaves at most \[chosen\].
 const LEFT: f64 = 0.9;
 
-/// Gains of the pressures by the valve models, and offsets, Pa, that are tried \[chosen\]: twice the bounds of valves.
-const GAINS: [f64; 5] = [0.75, 0.87, 1.0, 1.15, 1.3];
-const OFFSETS_PA: [f64; 3] = [-40e3, 0.0, 40e3];
-const PRESSURES: usize = GAINS.len() * OFFSETS_PA.len();
+/// Errors of the gain of the valves, over its bound, and offsets of the pressures, over the bound of the hysteresis, that are tried \[chosen\].
+const GAINS: [f64; 5] = [-2.5, -1.3, 0.0, 1.5, 3.0];
+const OFFSETS: [f64; 3] = [-4.0, 0.0, 4.0];
+/// Lowest gain that is tried.
+const GAIN_MIN: f64 = 0.2;
+const PRESSURES: usize = GAINS.len() * OFFSETS.len();
 
 /// By gain and offset of the pressures, then by move.
 type Differences = [[f64; MOVES]; PRESSURES];
@@ -87,6 +94,10 @@ struct Waiting {
 /// The delays of a log's shifts, so far.
 pub(super) struct CommandDelay<'c> {
     tables: &'c ShiftTables<f64>,
+    /// Gains and offsets, Pa, of the pressures by the valve models that are tried.
+    pressures: [(f64, f64); PRESSURES],
+    /// Delay from which on it is reported, s.
+    reported_s: f64,
     /// The last rows, at least about [`GRID_S`] apart.
     rows: VecDeque<Point>,
     waiting: VecDeque<Waiting>,
@@ -100,9 +111,19 @@ pub(super) struct CommandDelay<'c> {
 }
 
 impl<'c> CommandDelay<'c> {
-    pub(super) fn new(tables: &'c ShiftTables<f64>) -> Self {
+    pub(super) fn new(tables: &'c ShiftTables<f64>, budget: &ErrorBudget) -> Self {
+        let gain = budget.widest(ElementErrors::valve_gain);
+        let hysteresis_pa = budget.widest(|element| element.valve_hysteresis_pa);
+        let pressures = std::array::from_fn(|at| {
+            let (of_gain, of_offset) = (GAINS[at / OFFSETS.len()], OFFSETS[at % OFFSETS.len()]);
+            ((1.0 + of_gain * gain).max(GAIN_MIN), of_offset * hysteresis_pa)
+        });
+        let more_delay_s = (budget.widest(ElementErrors::valve_delay) - DEFAULT_DELAY_S).max(0.0);
+        let more_lag_s = LAG_S * (budget.widest(ElementErrors::valve_lag) - DEFAULT_LAG).max(0.0);
         Self {
             tables,
+            pressures,
+            reported_s: REPORTED_S + more_delay_s + more_lag_s,
             rows: VecDeque::new(),
             waiting: VecDeque::new(),
             age_s: 0.0,
@@ -187,12 +208,14 @@ impl<'c> CommandDelay<'c> {
     /// Mean differences of the torques of a shift; none of one without enough slip.
     fn differences(&self, shift: &ShiftRow<f64>, points: &[Point]) -> Option<Differences> {
         let clutches = shift.clutches.map(|of| (of, &self.tables.tables().elements[of.element].clutch));
-        let pressures = GAINS.into_iter().flat_map(|gain| OFFSETS_PA.map(|offset_pa| (gain, offset_pa)));
         let force = |point: &Point, (gain, offset_pa): (f64, f64)| {
             clutches.map(|(of, clutch)| clutch.clamp_force(gain * point.valve_pa[of.element] + offset_pa))
         };
-        let forces: Vec<Vec<[f64; 2]>> =
-            pressures.map(|pressure| points.iter().map(|point| force(point, pressure)).collect()).collect();
+        let forces: Vec<Vec<[f64; 2]>> = self
+            .pressures
+            .iter()
+            .map(|&pressure| points.iter().map(|point| force(point, pressure)).collect())
+            .collect();
         let [m11, m12] = shift.mass_kg_m2[0];
         let (mut sums, mut used) = ([[0.0; MOVES]; PRESSURES], 0);
         for at in AROUND..points.len().saturating_sub(AROUND) {
@@ -231,7 +254,7 @@ impl<'c> CommandDelay<'c> {
         let moved_s = moved_s(place) + GRID_S * between(sums, place);
         let delay_s = if moved_s > 0.0 { (moved_s - self.age_s).max(0.0) } else { moved_s };
         let is_enough = self.shifts.iter().all(|shifts| *shifts >= ENOUGH_SHIFTS);
-        let is_found = is_enough && delay_s.abs() >= SAID_S && sums[place] <= LEFT * unmoved;
+        let is_found = is_enough && delay_s.abs() >= self.reported_s && sums[place] <= LEFT * unmoved;
         is_found.then_some((delay_s, place == 0 || place == MOVES - 1))
     }
 

@@ -5,7 +5,7 @@
 //! that is open in that gear and whose command presses.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use observer::any_shift::MAX_ELEMENTS;
 
 /// A gear is steady after so long, s \[chosen\]: the clutches have been filled, and the shift controller is done.
@@ -39,17 +39,26 @@ struct OfGear {
 }
 
 impl<'c> CommandCheck<'c> {
-    pub(super) fn new(car: &'c Car, tables: &ShiftTables<f64>, errors: &ShiftErrors) -> Self {
+    pub(super) fn new(car: &'c Car, tables: &ShiftTables<f64>, budget: &ErrorBudget) -> Self {
         let places = (0..car.gearbox.elements.len()).filter_map(|element| Some((element, tables.place(element)?)));
-        let limits_pa = tables.tables().elements.iter().map(|element| {
-            let kiss_pa = element.clutch.kiss_pressure();
-            [
-                (kiss_pa - errors.hysteresis_pa) / (1.0 + errors.valve_gain),
-                (kiss_pa + errors.hysteresis_pa) / (1.0 - errors.valve_gain),
-            ]
-        });
+        let places: Vec<(usize, usize)> = places.collect();
+        let mut limits_pa = vec![[f64::NEG_INFINITY, f64::INFINITY]; places.len()];
+        for &(element, place) in &places {
+            let (Some(errors), Some(limits_pa)) = (budget.element(element), limits_pa.get_mut(place)) else { continue };
+            let of_tables = &tables.tables().elements[place];
+            let kiss_pa = of_tables.clutch.kiss_pressure();
+            let valve = &of_tables.valve.valve;
+            let kiss_command = valve.command_for(kiss_pa);
+            // What an error of the reading of the command does to the pressure.
+            let off_pa = |command: f64| (valve.settled_pressure(command) - valve.settled_pressure(kiss_command)).abs();
+            let by_command_pa = off_pa(kiss_command + errors.command).max(off_pa(kiss_command - errors.command));
+            let ([weakest, strongest], hysteresis_pa) = (errors.valve_gain_factor, errors.valve_hysteresis_pa);
+            *limits_pa = [
+                (kiss_pa - hysteresis_pa) / strongest - by_command_pa,
+                (kiss_pa + hysteresis_pa) / weakest + by_command_pa,
+            ];
+        }
         let of_gears = vec![OfGear::default(); car.gearbox.gears.len()];
-        let (places, limits_pa) = (places.collect(), limits_pa.collect());
         Self { car, places, limits_pa, gear: usize::MAX, since_s: f64::NAN, of_gears }
     }
 

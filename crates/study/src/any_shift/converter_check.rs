@@ -4,7 +4,7 @@
 //! capacity: where both differ by more than their bounds, one of them is not that of this car.
 
 use config::Car;
-use design::ShiftErrors;
+use design::ErrorBudget;
 
 use super::car_log::LogStep;
 use crate::ratio_histogram::RatioHistogram;
@@ -59,7 +59,7 @@ impl ConverterCheck {
     /// What contradicts the vehicle file, in a sentence.
     pub(super) fn warning(&self, car: &Car) -> Option<String> {
         let (rows, time_s) = self.rows;
-        let errors = ShiftErrors::LOGGED.of_car(car);
+        let errors = ErrorBudget::of_logged_car(car);
         let ratio = self.ratio.middle();
         let most = (1.0 + errors.converter) * (1.0 + errors.engine) + MORE;
         if rows < ENOUGH.0 || time_s < ENOUGH.1 || (most.recip()..=most).contains(&ratio) {

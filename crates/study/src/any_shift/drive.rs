@@ -1,7 +1,7 @@
 //! A whole drive: what the filter says of every shift of it, beside the truth and the valve model alone.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Health;
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
@@ -309,9 +309,9 @@ pub fn score_drive(
     sensors: &Sensors,
     seed: u64,
 ) -> Result<ScoredDrive, AnyShiftError> {
-    let errors = ShiftErrors::STANDARD;
-    let tables = ShiftTables::of_car(known, &errors).map_err(AnyShiftError::TooManyElements)?;
-    let filter = any_shift_filter(known, &tables, &errors, Some(sensors));
+    let budget = ErrorBudget::of_car(known).read_by(known, Some(sensors));
+    let tables = ShiftTables::of_car(known, &budget).map_err(AnyShiftError::TooManyElements)?;
+    let filter = any_shift_filter(known, &tables, &budget, Some(sensors));
     let mut scorer = DriveScorer::new(known, model, &tables, &filter);
     for (sample, input) in recording.samples.iter().zip(recording.inputs(known, &tables, sensors, seed)) {
         scorer.push(sample, &input);

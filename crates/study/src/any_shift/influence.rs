@@ -4,7 +4,7 @@
 //! changed by its stated uncertainty, one way and the other.
 
 use config::{Car, Sensors, ShiftClutch};
-use design::{ElementErrors, ShiftErrors};
+use design::{ElementErrors, ErrorBudget};
 use drivetrain::Table1;
 
 use super::matrix::controlling_of;
@@ -28,7 +28,7 @@ enum Off {
     /// By a share of it.
     Share(f64),
     /// By the share that the bounds of the car allow.
-    Car(fn(&ShiftErrors) -> f64),
+    Car(fn(&ErrorBudget) -> f64),
     /// Between the factors that the bounds of each element allow.
     Element(fn(&ElementErrors) -> [f64; 2]),
 }
@@ -71,8 +71,8 @@ impl Value {
     fn limits(&self, car: &Car, element: usize) -> [f64; 2] {
         match self.off {
             Off::Share(share) => around(share),
-            Off::Car(share) => around(share(&ERRORS.of_car(car))),
-            Off::Element(factors) => factors(&ERRORS.of_element(car, element)),
+            Off::Car(relative) => around(relative(&ErrorBudget::of_car(car))),
+            Off::Element(factors) => ErrorBudget::of_car(car).element(element).map_or([1.0; 2], factors),
         }
     }
 
@@ -97,9 +97,6 @@ impl Value {
         changed
     }
 }
-
-/// Limits of the errors of a car in series.
-const ERRORS: ShiftErrors = ShiftErrors::STANDARD;
 
 const fn around(share: f64) -> [f64; 2] {
     [1.0 - share, 1.0 + share]
@@ -249,8 +246,9 @@ pub fn car_influences(car: &Car, sensors: &Sensors) -> Result<Option<CarInfluenc
 fn errors(file: &Car, sensors: &Sensors, shifts: &[NominalShift]) -> Result<(usize, ErrorOfEstimate), AnyShiftError> {
     let [mut torque, mut pressure] = [SquaredErrors::default(); 2];
     let mut slipping = 0;
+    let budget = ErrorBudget::of_car(file).read_by(file, Some(sensors));
     for nominal in shifts {
-        let rows = nominal.estimated(file, sensors, ERRORS.valve_delay_s, &nominal.inputs)?;
+        let rows = nominal.estimated(file, sensors, &budget, &nominal.inputs)?;
         let clutch = controlling_of(&rows, nominal.shift.kind);
         let before = torque.rows;
         for phase in [TruePhase::Torque, TruePhase::Inertia] {

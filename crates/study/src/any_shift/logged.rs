@@ -1,7 +1,7 @@
 //! The filter of a car with any gearbox on its way through a log, and what it says of the shifts.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::any_shift::{
     AnyShiftFilter, AnyShiftState, ClutchEstimate, GearCommand, Learnt, MAX_ELEMENTS, ONE_WAY, ShiftEstimate,
     ShiftPhase,
@@ -14,6 +14,7 @@ use super::command_delay::CommandDelay;
 use super::contradictions::CommandCheck;
 use super::converter_check::ConverterCheck;
 use super::drive::{DriveState, NO_ELEMENT, PassingShifts, ScoredDrive, ScoredShift};
+use super::held_commands::HeldCommands;
 pub use super::in_gear::Unusable;
 use super::in_gear::{InGear, InGearRow};
 use super::learning_count::LearningCount;
@@ -53,6 +54,7 @@ pub struct LoggedDrive<'c> {
     converter: ConverterCheck,
     lock_up: LockUpCheck,
     still: StillCommands,
+    held: HeldCommands,
     holes: Holes,
     carried: CarriedPressures,
     doubted: DoubtedPressures,
@@ -91,15 +93,22 @@ impl Holes {
     }
 }
 
+/// The error budget of a car whose log was recorded with these sensors.
+fn logged_budget(car: &Car, sensors: Option<&Sensors>) -> ErrorBudget {
+    ErrorBudget::of_logged_car(car).read_by(car, sensors)
+}
+
 impl<'c> LoggedDrive<'c> {
-    /// The filter of a car with these tables, for readings of these sensors, and with what was learnt in an earlier log.
+    /// The filter of a car with these tables, which are [`Self::tables`] with the same sensors, for readings of these sensors, and with what
+    /// was learnt in an earlier log.
     pub fn new(
         car: &'c Car,
         tables: &'c ShiftTables<f64>,
         sensors: Option<&Sensors>,
         learnt: Option<&Learnt<f64>>,
     ) -> Self {
-        let filter = any_shift_filter(car, tables, &ShiftErrors::LOGGED, sensors);
+        let budget = logged_budget(car, sensors);
+        let filter = any_shift_filter(car, tables, &budget, sensors);
         let state = learnt.map_or_else(|| filter.start(), |learnt| filter.start_with(learnt));
         Self {
             car,
@@ -115,11 +124,12 @@ impl<'c> LoggedDrive<'c> {
             in_gear: InGear::new(car),
             gear: None,
             unannounced: 0,
-            commands: CommandCheck::new(car, tables, &ShiftErrors::STANDARD),
-            delay: CommandDelay::new(tables),
+            commands: CommandCheck::new(car, tables, &budget),
+            delay: CommandDelay::new(tables, &budget),
             converter: ConverterCheck::default(),
             lock_up: LockUpCheck::default(),
             still: StillCommands::default(),
+            held: HeldCommands::default(),
             holes: Holes::default(),
             carried: CarriedPressures::default(),
             doubted: DoubtedPressures::default(),
@@ -127,12 +137,12 @@ impl<'c> LoggedDrive<'c> {
         }
     }
 
-    /// The tables of a car.
+    /// The tables of a car behind these sensors.
     ///
     /// # Errors
     /// The gearbox has more clutches than the filter has room for.
-    pub fn tables(car: &Car) -> Result<ShiftTables<f64>, AnyShiftError> {
-        ShiftTables::of_car(car, &ShiftErrors::LOGGED).map_err(AnyShiftError::TooManyElements)
+    pub fn tables(car: &Car, sensors: Option<&Sensors>) -> Result<ShiftTables<f64>, AnyShiftError> {
+        ShiftTables::of_car(car, &logged_budget(car, sensors)).map_err(AnyShiftError::TooManyElements)
     }
 
     /// Takes a row and returns the estimate for it.
@@ -207,6 +217,7 @@ impl<'c> LoggedDrive<'c> {
         }
         self.commands.push(step.time_s, gears.is_none().then_some(from), [turbine, output], &estimate.valve_pa);
         self.still.push(&input.commands);
+        self.held.push(step.time_s, &input.commands);
         let jerk_m_s3 = self.jerk.ended(step.time_s);
         self.passing.take_jerk(jerk_m_s3);
         let [_, turbine, output] = self.speeds_rad_s;
@@ -340,6 +351,7 @@ impl<'c> LoggedDrive<'c> {
         warnings.extend(self.converter.warning(self.car));
         warnings.extend(self.lock_up.warning());
         warnings.extend(self.still.warnings(self.car, self.tables));
+        warnings.extend(self.held.warning(self.car, self.tables));
         if self.holes.count > 0 {
             warnings.push(format!(
                 "warning: {} shifts have a hole of more than {HOLE_S} s in the recording: they end with it and count as not completed",
@@ -355,8 +367,7 @@ impl<'c> LoggedDrive<'c> {
             ));
         }
         let final_ratio = self.car.driveline.final_ratio;
-        let (off, bound) =
-            (self.output_over_wheel() / final_ratio - 1.0, ShiftErrors::LOGGED.of_car(self.car).wheel_scale);
+        let (off, bound) = (self.output_over_wheel() / final_ratio - 1.0, ErrorBudget::of_car(self.car).wheel_scale);
         let wrong = self.wrong_scale();
         warnings.extend(wrong.iter().map(|wrong| format!("warning: {}", wrong.text)));
         if off.abs() > bound && wrong.is_none_or(|wrong| !wrong.is_output) {

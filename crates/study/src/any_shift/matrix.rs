@@ -4,7 +4,7 @@
 //! depend on the number of threads.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use drivetrain::ShiftKind;
 use observer::Health;
 use plant::car::CarShift;
@@ -52,9 +52,10 @@ pub fn drawn_car(known: &Car, from: usize, to: usize, seed: u64) -> Car {
 
 fn draw(known: &Car, from: usize, to: usize, seed: u64, timing: bool) -> ShiftDraw {
     let mut random = Random(seed.wrapping_mul(1000).wrapping_add(from as u64 * 37 + to as u64));
-    let mut draw = ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform());
+    let budget = ErrorBudget::of_car(known);
+    let mut draw = ShiftDraw::within(known, &budget, || random.uniform());
     if timing {
-        draw = draw.with_timing(known, &ShiftErrors::STANDARD, || random.uniform());
+        draw = draw.with_timing(&budget, || random.uniform());
     }
     draw.with_strokes(known, || random.uniform())
 }
@@ -306,7 +307,7 @@ pub fn counts(rows: &[ShiftScoreRow], errors: &ErrorsByPhase) -> MatrixCounts {
 /// # Errors
 /// The gearbox has more clutches than the filter has room for, or there are no threads.
 pub fn matrix(known: &Car, plan: &MatrixPlan<'_>, mut done: impl FnMut()) -> Result<Matrix, StudyError> {
-    let tables = ShiftTables::of_car(known, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+    let tables = ShiftTables::of_car(known, &ErrorBudget::of_car(known)).map_err(AnyShiftError::TooManyElements)?;
     let (shifts, without_tables) = neighbouring_shifts(known, &tables);
     let row = |shift: &MatrixShift| MatrixRow {
         shift: *shift,
@@ -340,7 +341,7 @@ pub fn matrix(known: &Car, plan: &MatrixPlan<'_>, mut done: impl FnMut()) -> Res
 /// # Errors
 /// The gearbox has more clutches than the filter has room for.
 pub fn runs(known: &Car, draws: u64) -> Result<u64, StudyError> {
-    let tables = ShiftTables::of_car(known, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+    let tables = ShiftTables::of_car(known, &ErrorBudget::of_car(known)).map_err(AnyShiftError::TooManyElements)?;
     Ok(neighbouring_shifts(known, &tables).0.len() as u64 * draws)
 }
 

@@ -1,7 +1,7 @@
 //! The shifts between neighbouring gears of a car as its file has it, read by sensors: what a changed file is tried on.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::any_shift::ShiftInput;
 use plant::car::{CarSample, CarShift};
 
@@ -17,7 +17,7 @@ pub(super) struct NominalShift {
 
 /// Every shift between neighbouring gears in every kind; none if the filter has no tables for them.
 pub(super) fn nominal_shifts(car: &Car, sensors: &Sensors) -> Result<Vec<NominalShift>, AnyShiftError> {
-    let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).map_err(AnyShiftError::TooManyElements)?;
     let (shifts, _) = neighbouring_shifts(car, &tables);
     let nominal = |(seed, shift): (u64, MatrixShift)| {
         let samples = simulated(car, car, &CarShift::usual(car, shift.from, shift.to, shift.throttle()))?;
@@ -34,17 +34,16 @@ impl NominalShift {
         Some([shift.offgoing.element, shift.oncoming.element])
     }
 
-    /// The estimates by a filter of this file, whose valves have delays between these.
+    /// The estimates by a filter of this file with these bounds of its errors.
     pub(super) fn estimated(
         &self,
         file: &Car,
         sensors: &Sensors,
-        valve_delay_s: [f64; 2],
+        budget: &ErrorBudget,
         inputs: &[(usize, ShiftInput<f64>)],
     ) -> Result<Vec<ShiftScoreRow>, AnyShiftError> {
-        let errors = ShiftErrors { valve_delay_s, ..ShiftErrors::STANDARD };
-        let tables = ShiftTables::of_car(file, &errors).map_err(AnyShiftError::TooManyElements)?;
-        let filter = any_shift_filter(file, &tables, &ShiftErrors::STANDARD, Some(sensors));
+        let tables = ShiftTables::of_car(file, budget).map_err(AnyShiftError::TooManyElements)?;
+        let filter = any_shift_filter(file, &tables, budget, Some(sensors));
         Ok(score_samples(&tables, &filter, &self.samples, inputs))
     }
 }

@@ -3,8 +3,8 @@
 //! The car makes every shift between neighbouring gears in every kind. What its sensors read is estimated with its file, and again with
 //! one value of the file off by its bound, one way and the other. Each error by itself, so that their squares can be added.
 
-use config::{Car, CarErrorBounds, Sensors, ShiftClutch};
-use design::ShiftErrors;
+use config::{Car, Sensors, ShiftClutch};
+use design::{ElementErrors, ErrorBudget};
 use serde::Serialize;
 
 use super::matrix::{MatrixShift, controlling_of};
@@ -12,8 +12,6 @@ use super::nominal::{NominalShift, nominal_shifts};
 use super::{AnyShiftError, ShiftScoreRow, TruePhase};
 use crate::StudyError;
 
-/// The bounds.
-const ERRORS: ShiftErrors = ShiftErrors::STANDARD;
 /// Share of the valve model's deviation above which the speeds are of no use.
 const HIDDEN: f64 = 0.9;
 /// Rows that a phase needs.
@@ -80,19 +78,19 @@ impl ShiftErrorKind {
         }
     }
 
-    /// The bound as it is printed.
-    pub fn bound(self) -> String {
-        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    /// The bound of a budget as it is printed, of the elements the widest.
+    pub fn bound(self, budget: &ErrorBudget) -> String {
+        let percent = |relative: f64| format!("{:.0} %", 100.0 * relative);
         match self {
-            Self::Friction | Self::OtherFriction => percent(ERRORS.friction),
-            Self::ValveGain | Self::OtherValveGain => percent(ERRORS.valve_gain),
-            Self::ValveLag => percent(ERRORS.valve_lag),
-            Self::ValveDelay => format!("{:.0} ms", 500.0 * (ERRORS.valve_delay_s[1] - ERRORS.valve_delay_s[0])),
-            Self::KissPoint => format!("{:.0} kPa", 1e-3 * ERRORS.hysteresis_pa),
-            Self::Converter => percent(ERRORS.converter),
-            Self::EngineTorque => percent(ERRORS.engine),
-            Self::Inertia => percent(ERRORS.inertia),
-            Self::Stiffness => percent(ERRORS.stiffness),
+            Self::Friction | Self::OtherFriction => percent(budget.widest(ElementErrors::friction)),
+            Self::ValveGain | Self::OtherValveGain => percent(budget.widest(ElementErrors::valve_gain)),
+            Self::ValveLag => percent(budget.widest(ElementErrors::valve_lag)),
+            Self::ValveDelay => format!("{:.0} ms", 1e3 * budget.widest(ElementErrors::valve_delay)),
+            Self::KissPoint => format!("{:.0} kPa", 1e-3 * budget.widest(|element| element.valve_hysteresis_pa)),
+            Self::Converter => percent(budget.converter),
+            Self::EngineTorque => percent(budget.engine),
+            Self::Inertia => percent(budget.inertia),
+            Self::Stiffness => percent(budget.stiffness),
         }
     }
 
@@ -171,27 +169,30 @@ pub struct ShiftSensitivity {
     pub phases: [Option<PhaseOfShift>; 2],
 }
 
-/// What the errors do to the estimates of all shifts between neighbouring gears: at the bounds of a car in series
-/// ([`ShiftErrors::STANDARD`]), also for a file that has bounds of its own.
+/// What the errors do to the estimates of all shifts between neighbouring gears, each at its bound in the error budget of the car.
 ///
 /// # Errors
 /// A shift of the car cannot be simulated, or the gearbox has more clutches than the filter has room for.
 pub fn car_sensitivity(car: &Car, sensors: &Sensors) -> Result<Vec<ShiftSensitivity>, StudyError> {
-    // Bounds of the file would stand before those that are tried.
-    let car = &Car { error_bounds: CarErrorBounds::default(), ..car.clone() };
+    let budget = ErrorBudget::of_car(car).read_by(car, Some(sensors));
     let shifts = nominal_shifts(car, sensors)?;
-    let found = shifts.iter().filter_map(|shift| of_shift(car, sensors, shift).transpose());
+    let found = shifts.iter().filter_map(|shift| of_shift(car, &budget, sensors, shift).transpose());
     Ok(found.collect::<Result<_, AnyShiftError>>()?)
 }
 
-fn of_shift(car: &Car, sensors: &Sensors, nominal: &NominalShift) -> Result<Option<ShiftSensitivity>, AnyShiftError> {
+fn of_shift(
+    car: &Car,
+    budget: &ErrorBudget,
+    sensors: &Sensors,
+    nominal: &NominalShift,
+) -> Result<Option<ShiftSensitivity>, AnyShiftError> {
     let Some(clutches) = nominal.elements() else { return Ok(None) };
-    let as_it_is = nominal.estimated(car, sensors, ERRORS.valve_delay_s, &nominal.inputs)?;
+    let as_it_is = nominal.estimated(car, sensors, budget, &nominal.inputs)?;
     let main = controlling_of(&as_it_is, nominal.shift.kind);
     let (own, other) = (clutches[main], clutches[1 - main]);
     let mut effects: [Vec<EffectInShift>; 2] = Default::default();
     for error in ShiftErrorKind::ALL.into_iter().filter(|error| error.is_of(car)) {
-        let off = [-1.0, 1.0].map(|sign| with_error(car, sensors, nominal, error, sign, [own, other]));
+        let off = [-1.0, 1.0].map(|sign| with_error((car, budget), sensors, nominal, (error, sign), [own, other]));
         let [low, high] = off;
         let (low, high) = (low?, high?);
         for (phase, effects) in PHASES.into_iter().zip(&mut effects) {
@@ -219,56 +220,70 @@ const PHASES: [TruePhase; 2] = [TruePhase::Torque, TruePhase::Inertia];
 
 /// The estimates with one error at its bound, in this direction.
 fn with_error(
-    car: &Car,
+    (car, budget): (&Car, &ErrorBudget),
     sensors: &Sensors,
     nominal: &NominalShift,
-    error: ShiftErrorKind,
-    sign: f64,
+    (error, sign): (ShiftErrorKind, f64),
     [own, other]: [usize; 2],
 ) -> Result<Vec<ShiftScoreRow>, AnyShiftError> {
-    let mut file = car.clone();
-    let mut delay_s = ERRORS.valve_delay_s;
+    let (mut file, mut budget) = (car.clone(), budget.clone());
     let mut inputs = std::borrow::Cow::Borrowed(&nominal.inputs);
-    let factor = |share: f64| 1.0 + sign * share;
-    let friction = |clutch: &mut ShiftClutch| {
-        clutch.clutch.friction = clutch.clutch.friction.scaled(factor(ERRORS.friction));
-        clutch.clutch.static_friction *= factor(ERRORS.friction);
-    };
-    let gain = |clutch: &mut ShiftClutch| clutch.valve = clutch.valve.changed(1.0, factor(ERRORS.valve_gain), None);
+    let end = usize::from(sign > 0.0);
+    let factor = |relative: f64| 1.0 + sign * relative;
     match error {
-        ShiftErrorKind::Friction => of_element(&mut file, own, friction),
-        ShiftErrorKind::OtherFriction => of_element(&mut file, other, friction),
-        ShiftErrorKind::ValveGain => of_element(&mut file, own, gain),
-        ShiftErrorKind::OtherValveGain => of_element(&mut file, other, gain),
-        ShiftErrorKind::ValveLag => of_element(&mut file, own, |clutch| {
-            clutch.valve = clutch.valve.changed(factor(ERRORS.valve_lag), 1.0, None);
+        ShiftErrorKind::Friction => scale_friction(&mut file, &budget, own, end),
+        ShiftErrorKind::OtherFriction => scale_friction(&mut file, &budget, other, end),
+        ShiftErrorKind::ValveGain => scale_gain(&mut file, &budget, own, end),
+        ShiftErrorKind::OtherValveGain => scale_gain(&mut file, &budget, other, end),
+        ShiftErrorKind::ValveLag => of_element(&mut file, &budget, own, |clutch, errors| {
+            clutch.valve = clutch.valve.changed(errors.valve_lag_factor[end], 1.0, None);
         }),
-        ShiftErrorKind::ValveDelay => delay_s = [delay_s[usize::from(sign > 0.0)]; 2],
-        ShiftErrorKind::KissPoint => of_element(&mut file, own, |clutch| {
-            clutch.clutch.return_spring_n += sign * ERRORS.hysteresis_pa * clutch.clutch.piston_area_m2;
+        ShiftErrorKind::ValveDelay => {
+            for element in budget.elements.iter_mut().flatten() {
+                element.valve_delay_s = [element.valve_delay_s[end]; 2];
+            }
+        }
+        ShiftErrorKind::KissPoint => of_element(&mut file, &budget, own, |clutch, errors| {
+            clutch.clutch.return_spring_n += sign * errors.valve_hysteresis_pa * clutch.clutch.piston_area_m2;
         }),
         ShiftErrorKind::Converter => {
             if let Some(converter) = &mut file.converter {
-                converter.capacity_n_m_s2 = converter.capacity_n_m_s2.scaled(factor(ERRORS.converter));
+                converter.capacity_n_m_s2 = converter.capacity_n_m_s2.scaled(factor(budget.converter));
             }
         }
         ShiftErrorKind::EngineTorque => {
             for (_, input) in inputs.to_mut() {
-                input.engine_n_m.iter_mut().for_each(|reading| reading.value *= factor(ERRORS.engine));
+                input.engine_n_m.iter_mut().for_each(|reading| reading.value *= factor(budget.engine));
             }
         }
         ShiftErrorKind::Inertia => {
             for reduced in file.gearbox.shifts.iter_mut().filter_map(|shift| shift.reduced.as_mut()) {
-                reduced.mass_kg_m2[0][0] *= factor(ERRORS.inertia);
+                reduced.mass_kg_m2[0][0] *= factor(budget.inertia);
             }
         }
-        ShiftErrorKind::Stiffness => file.driveline.shaft_stiffness_n_m_rad *= factor(ERRORS.stiffness),
+        ShiftErrorKind::Stiffness => file.driveline.shaft_stiffness_n_m_rad *= factor(budget.stiffness),
     }
-    nominal.estimated(&file, sensors, delay_s, &inputs)
+    nominal.estimated(&file, sensors, &budget, &inputs)
 }
 
-fn of_element(car: &mut Car, element: usize, change: impl Fn(&mut ShiftClutch)) {
-    car.clutches.get_mut(element).into_iter().flatten().for_each(change);
+fn scale_friction(car: &mut Car, budget: &ErrorBudget, element: usize, end: usize) {
+    of_element(car, budget, element, |clutch, errors| {
+        let factor = errors.friction_factor[end];
+        clutch.clutch.friction = clutch.clutch.friction.scaled(factor);
+        clutch.clutch.static_friction *= factor;
+    });
+}
+
+fn scale_gain(car: &mut Car, budget: &ErrorBudget, element: usize, end: usize) {
+    of_element(car, budget, element, |clutch, errors| {
+        clutch.valve = clutch.valve.changed(1.0, errors.valve_gain_factor[end], None);
+    });
+}
+
+fn of_element(car: &mut Car, budget: &ErrorBudget, element: usize, change: impl Fn(&mut ShiftClutch, &ElementErrors)) {
+    if let (Some(Some(clutch)), Some(errors)) = (car.clutches.get_mut(element), budget.element(element)) {
+        change(clutch, errors);
+    }
 }
 
 /// The rows of a phase in which the clutch slips.

@@ -1,7 +1,7 @@
 //! A drive through all gears of any car: up under power, down coasting, up without power, down under power.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use plant::car::{CarCalibration, CarError, CarModel, CarRun, CarSample, CarShift, Driver, idle_throttle};
 
 use super::{AnyShiftError, RECORD_S};
@@ -162,7 +162,7 @@ pub fn drive_tour(
     mut record: impl FnMut(&CarSample),
     mut done: impl FnMut(),
 ) -> Result<Vec<LeftOut>, AnyShiftError> {
-    let tables = ShiftTables::of_car(known, &ShiftErrors::STANDARD).map_err(AnyShiftError::TooManyElements)?;
+    let tables = ShiftTables::of_car(known, &ErrorBudget::of_car(known)).map_err(AnyShiftError::TooManyElements)?;
     let legs = legs(known, &tables);
     let Some(first) = legs.first() else {
         let message = "the gearbox has no shift from one clutch to another\nhint: `wetclutch check` lists its shifts";

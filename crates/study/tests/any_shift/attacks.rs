@@ -2,7 +2,7 @@
 //! precision, and input without sense.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::any_shift::{GearCommand, MAX_ELEMENTS, ShiftInput};
 use observer::{ChannelHealth, Health, Reading};
@@ -15,11 +15,9 @@ use study::shift_learning::tables_with_inertia;
 use crate::cars::{Random, cars, sensors, shifts};
 use crate::controlling;
 
-const ERRORS: ShiftErrors = ShiftErrors::STANDARD;
-
 fn draw(car: &Car, seed: u64) -> Car {
     let mut random = Random(seed);
-    ShiftDraw::within(car, &ERRORS, || random.uniform()).car(car)
+    ShiftDraw::within(car, &ErrorBudget::of_car(car), || random.uniform()).car(car)
 }
 
 /// A shift with a throttle that is moved a time after the request.
@@ -46,9 +44,9 @@ fn moved_throttle(known: &Car, truth: &Car, shift: &CarShift, after_s: f64, thro
 }
 
 fn rows(known: &Car, samples: &[CarSample], seed: u64, change: impl Fn(&mut ShiftInput<f64>)) -> Vec<ShiftScoreRow> {
-    let tables = ShiftTables::of_car(known, &ERRORS).unwrap();
+    let tables = ShiftTables::of_car(known, &ErrorBudget::of_car(known)).unwrap();
     let sensors = sensors();
-    let filter = any_shift_filter(known, &tables, &ERRORS, Some(&sensors));
+    let filter = any_shift_filter(known, &tables, &ErrorBudget::of_car(known), Some(&sensors));
     let mut inputs = inputs(known, &tables, samples, &sensors, seed);
     inputs.iter_mut().for_each(|(_, input)| change(input));
     score_samples(&tables, &filter, samples, &inputs)
@@ -199,7 +197,7 @@ fn an_inertia_that_is_wrong_by_a_fifth_costs_little() {
             let samples = simulated(car, &draw(car, seed_of(shift)), shift).unwrap();
             let tables = tables_with_inertia(car, factor).unwrap();
             let sensors = sensors();
-            let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+            let filter = any_shift_filter(car, &tables, &ErrorBudget::of_car(car), Some(&sensors));
             let inputs = inputs(car, &tables, &samples, &sensors, 1);
             score_samples(&tables, &filter, &samples, &inputs)
         })
@@ -285,8 +283,8 @@ fn the_range_is_guaranteed_whatever_is_lost() {
     for (name, loss) in losses {
         let [mut clutches, mut ranges, mut outside] = [0_u32; 3];
         for (from, to, throttle) in shifts(car).into_iter().step_by(3) {
-            let draw = ShiftDraw::within(car, &ERRORS, || random.uniform());
-            let truth = draw.with_timing(car, &ERRORS, || random.uniform()).car(car);
+            let draw = ShiftDraw::within(car, &ErrorBudget::of_car(car), || random.uniform());
+            let truth = draw.with_timing(&ErrorBudget::of_car(car), || random.uniform()).car(car);
             let samples = simulated(car, &truth, &CarShift::usual(car, from, to, throttle)).unwrap();
             let steps = std::cell::Cell::new(0);
             let rows = rows(car, &samples, 1, |input| {
@@ -311,9 +309,9 @@ fn the_range_is_guaranteed_whatever_is_lost() {
 #[test]
 fn a_long_gap_in_a_shift_leaves_possible_numbers() {
     let car = &cars()[0];
-    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
     let sensors = sensors();
-    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let filter = any_shift_filter(car, &tables, &ErrorBudget::of_car(car), Some(&sensors));
     let (from, to, throttle) = shifts(car)[0];
     let samples = simulated(car, car, &CarShift::usual(car, from, to, throttle)).unwrap();
     let inputs = inputs(car, &tables, &samples, &sensors, 1);
@@ -376,10 +374,10 @@ fn single_precision_estimates_the_same() {
     let (mut input_clutches, mut of_input_clutch) = (0, 0.0_f64);
     let (mut steps, mut time_s) = (0.0, 0.0);
     for car in cars() {
-        let tables = ShiftTables::of_car(&car, &ERRORS).unwrap();
+        let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
         let single_tables = tables.cast::<f32>();
         let sensors = sensors();
-        let filter = any_shift_filter(&car, &tables, &ERRORS, Some(&sensors));
+        let filter = any_shift_filter(&car, &tables, &ErrorBudget::of_car(&car), Some(&sensors));
         let single = filter.cast(single_tables.tables());
         for (from, to, throttle) in shifts(&car).into_iter().step_by(3) {
             let shift = CarShift::usual(&car, from, to, throttle);
@@ -444,9 +442,9 @@ pub(crate) fn cast(input: &ShiftInput<f64>) -> ShiftInput<f32> {
 #[test]
 fn an_unknown_gear_and_a_lost_command_are_said() {
     let car = &cars()[0];
-    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
     let sensors = sensors();
-    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let filter = any_shift_filter(car, &tables, &ErrorBudget::of_car(car), Some(&sensors));
     let gear = |name: &str| car.gearbox.gear(name).unwrap();
     let samples = simulated(car, car, &CarShift::usual(car, gear("2"), gear("3"), 0.15)).unwrap();
     let inputs = inputs(car, &tables, &samples, &sensors, 1);
@@ -531,9 +529,9 @@ fn one_filter_serves_a_whole_drive() {
 #[test]
 fn input_without_sense_gives_numbers_and_a_word() {
     let car = &cars()[0];
-    let tables = ShiftTables::of_car(car, &ERRORS).unwrap();
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
     let sensors = sensors();
-    let filter = any_shift_filter(car, &tables, &ERRORS, Some(&sensors));
+    let filter = any_shift_filter(car, &tables, &ErrorBudget::of_car(car), Some(&sensors));
     let gear = |name: &str| car.gearbox.gear(name).unwrap();
     let shift = CarShift::usual(car, gear("2"), gear("3"), 0.15);
     let samples = simulated(car, car, &shift).unwrap();

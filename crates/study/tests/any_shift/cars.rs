@@ -1,7 +1,7 @@
 //! The shipped gearboxes as cars, their shifts, and the sensors.
 
 use config::{Car, Sensors, Source};
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use std::path::Path;
 use study::any_shift::matrix::neighbouring_shifts;
 
@@ -47,7 +47,7 @@ pub(crate) fn cars_with_strokes() -> Vec<Car> {
 
 /// Neighbouring gears in both directions, with and without power.
 pub(crate) fn shifts(car: &Car) -> Vec<(usize, usize, f64)> {
-    let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
     let (shifts, without_tables) = neighbouring_shifts(car, &tables);
     assert_eq!(without_tables, Vec::<[usize; 2]>::new());
     shifts.iter().map(|shift| (shift.from, shift.to, shift.throttle())).collect()

@@ -1,7 +1,7 @@
 //! Logs whose commands come late or early against the speeds.
 
 use config::Car;
-use design::ShiftErrors;
+use design::ErrorBudget;
 use observer::Health;
 use observer::any_shift::ShiftInput;
 use plant::car::CarModel;
@@ -28,8 +28,8 @@ fn recorded(truth: Car, known: &Car) -> Recording {
 
 /// A car whose friction, converter, valves and strokes are within their bounds of the known one.
 fn drawn(known: &Car, seed: u64) -> Car {
-    let (mut random, errors) = (Random(seed), ShiftErrors::STANDARD);
-    let draw = ShiftDraw::within(known, &errors, || random.uniform()).with_timing(known, &errors, || random.uniform());
+    let (mut random, errors) = (Random(seed), ErrorBudget::of_car(known));
+    let draw = ShiftDraw::within(known, &errors, || random.uniform()).with_timing(&errors, || random.uniform());
     draw.with_strokes(known, || random.uniform()).car(known)
 }
 
@@ -40,7 +40,7 @@ fn said(known: &Car, recording: &Recording, late: isize) -> ScoredDrive {
 
 /// The same with another change of the readings.
 fn said_with(known: &Car, recording: &Recording, late: isize, change: impl Fn(&mut ShiftInput<f64>)) -> ScoredDrive {
-    let (tables, sensors) = (LoggedDrive::tables(known).unwrap(), sensors());
+    let (tables, sensors) = (LoggedDrive::tables(known, None).unwrap(), sensors());
     let mut logged = LoggedDrive::new(known, &tables, Some(&sensors), None);
     let inputs: Vec<_> = recording.inputs(known, &tables, &sensors, 1).collect();
     for (at, (sample, input)) in recording.samples.iter().zip(&inputs).enumerate() {
@@ -89,8 +89,8 @@ fn commands_that_come_late_or_early_are_noticed() {
 fn slow_and_fast_valves_are_no_delay_of_the_commands() {
     let known = cars().remove(0);
     for end in [0.0, 1.0] {
-        let errors = ShiftErrors::STANDARD;
-        let draw = ShiftDraw::within(&known, &errors, || 0.5).with_timing(&known, &errors, || end);
+        let errors = ErrorBudget::of_car(&known);
+        let draw = ShiftDraw::within(&known, &errors, || 0.5).with_timing(&errors, || end);
         let drive = said(&known, &recorded(draw.car(&known), &known), 0);
         assert_eq!(delay_ms(&drive), None, "{end}: {:?}", drive.warnings);
     }

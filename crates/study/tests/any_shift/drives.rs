@@ -1,7 +1,7 @@
 //! Whole drives: through all gears of every shipped gearbox.
 
 use config::Car;
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::Health;
 use plant::car::CarModel;
 use study::any_shift::drive::{ScoredDrive, score_drive};
@@ -113,7 +113,7 @@ fn the_pressure_of_every_element_is_within_its_range_in_gears_too() {
         let model = CarModel::new(drawn_car(&known, 0, 0, 1)).unwrap();
         let mut recording = Recording::default();
         drive_tour(&model, &known, |sample| recording.push(sample), || ()).unwrap();
-        let (errors, sensors) = (ShiftErrors::STANDARD, sensors());
+        let (errors, sensors) = (ErrorBudget::of_car(&known), sensors());
         let tables = ShiftTables::of_car(&known, &errors).unwrap();
         let filter = any_shift_filter(&known, &tables, &errors, Some(&sensors));
         let (mut state, mut in_gear, mut widths_pa) = (filter.start(), 0, Vec::new());
@@ -147,7 +147,7 @@ fn a_gear_without_a_shift_between_two_clutches_is_passed_over() {
     let gear = |name: &str| car.gearbox.gear(name).unwrap();
     let (two, three, four) = (gear("2"), gear("3"), gear("4"));
     car.gearbox.shifts.retain(|shift| ![[two, three], [three, two]].contains(&[shift.from, shift.to]));
-    let tables = design::ShiftTables::of_car(&car, &design::ShiftErrors::STANDARD).unwrap();
+    let tables = design::ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
     let legs = legs(&car, &tables);
     let has = |from: usize, to: usize| legs.iter().any(|leg| (leg.from, leg.to) == (from, to));
     assert!(!has(two, three) && has(two, four), "{legs:?}");

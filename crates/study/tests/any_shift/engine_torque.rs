@@ -1,7 +1,7 @@
 //! The torque that the engine's controller reports, beside the maps of an open converter.
 
 use config::{Car, Drive};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use drivetrain::ShiftKind;
 use observer::Reading;
 use observer::any_shift::ShiftInput;
@@ -36,7 +36,7 @@ const ALL: [(With, &str); 5] = [
 
 /// Six minutes of town by a car of the budget, a column for each source.
 fn drive(known: &Car, seed: u64) -> [Vec<MatrixRow>; ALL.len()] {
-    let (mut random, errors) = (Random(seed * 77), ShiftErrors::STANDARD);
+    let (mut random, errors) = (Random(seed * 77), ErrorBudget::of_car(known));
     let truth = ShiftDraw::within(known, &errors, || random.uniform()).car(known);
     let factor = 1.0 + errors.engine * (2.0 * random.uniform() - 1.0);
     let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml");
@@ -45,7 +45,7 @@ fn drive(known: &Car, seed: u64) -> [Vec<MatrixRow>; ALL.len()] {
     let mut recording = Recording::default();
     simulate_car_drive(&model, known, CarCalibration::STANDARD, &town, |sample| recording.push(sample)).unwrap();
     ALL.map(|(with, _)| {
-        let (mut car, mut errors) = (known.clone(), errors);
+        let (mut car, mut errors) = (known.clone(), errors.clone());
         if with == With::Exact {
             errors.converter = 0.05;
             car.converter = truth.converter;

@@ -1,7 +1,7 @@
 //! Holes in the speeds of a drive.
 
 use config::{Car, Drive};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::any_shift::ShiftInput;
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use std::path::Path;
@@ -17,7 +17,7 @@ const HOLE_S: f64 = 0.2;
 /// Three minutes of town by a car of the budget.
 fn town(known: &Car) -> (CarModel, Recording) {
     let mut random = Random(5);
-    let truth = ShiftDraw::within(known, &ShiftErrors::STANDARD, || random.uniform()).car(known);
+    let truth = ShiftDraw::within(known, &ErrorBudget::of_car(known), || random.uniform()).car(known);
     let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../drives/city.toml");
     let town = Drive { repetitions: 1, sample_time_s: RECORD_S, ..Drive::read(&town).unwrap() };
     let (model, mut recording) = (CarModel::new(truth).unwrap(), Recording::default());
@@ -32,7 +32,7 @@ fn errors(
     (model, recording): &(CarModel, Recording),
     lose: fn(&mut ShiftInput<f64>),
 ) -> ([f64; 2], usize) {
-    let errors = ShiftErrors::STANDARD;
+    let errors = ErrorBudget::of_car(known);
     let tables = ShiftTables::of_car(known, &errors).unwrap();
     let filter = any_shift_filter(known, &tables, &errors, Some(&sensors()));
     let mut scorer = DriveScorer::new(known, model, &tables, &filter);

@@ -1,7 +1,7 @@
 //! The clutch between engine and gearbox: the lock-up clutch of a converter, and the clutch that starts a car without one.
 
 use config::{Car, Drive, LockUp, Source};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::any_shift::{ShiftEstimate, ShiftInput};
 use plant::car::{CarCalibration, CarModel, CarSample, simulate_car_drive};
 use study::any_shift::RECORD_S;
@@ -55,8 +55,8 @@ fn score(car: &Car, errors: &Errors, is_scored: impl Fn(&CarSample) -> bool) -> 
     assert!((drive.sample_time_s - RECORD_S).abs() < 1e-12);
     let mut recording = Recording::default();
     simulate_car_drive(&model, car, CarCalibration::STANDARD, &drive, |sample| recording.push(sample)).unwrap();
-    let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
-    let filter = any_shift_filter(car, &tables, &ShiftErrors::STANDARD, Some(&sensors()));
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
+    let filter = any_shift_filter(car, &tables, &ErrorBudget::of_car(car), Some(&sensors()));
     let mut state = filter.start();
     let mut score = Score::default();
     let inputs: Vec<ShiftInput<f64>> = recording.inputs(&truth, &tables, &sensors(), 7).collect();

@@ -2,7 +2,7 @@
 //! not know, or the car or its sensors are without it.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ElementErrors, ErrorBudget, ShiftTables, any_shift_filter};
 use drivetrain::{ClutchValve, ShiftKind, Table1};
 use observer::Reading;
 use observer::any_shift::{AnyShiftFilter, ShiftInput};
@@ -59,7 +59,7 @@ const EXACT_RAD_S: [f64; 3] = [0.01, 0.01, 0.002];
 impl Without {
     /// The car without the error, if it is one of the car.
     fn car(self, truth: &Car) -> Option<Car> {
-        let [least_s, most_s] = ShiftErrors::STANDARD.valve_delay_s;
+        let budget = ErrorBudget::of_car(truth);
         let (drag, delay) = match self {
             Self::Drag => (true, false),
             Self::Delay => (false, true),
@@ -67,7 +67,9 @@ impl Without {
             _ => return None,
         };
         let mut car = truth.clone();
-        for clutch in car.clutches.iter_mut().flatten() {
+        for (clutch, errors) in car.clutches.iter_mut().zip(&budget.elements) {
+            let Some((clutch, errors)) = clutch.as_mut().zip(errors.as_ref()) else { continue };
+            let [least_s, most_s] = errors.valve_delay_s;
             if drag {
                 clutch.drag_n_m = 0.0;
             }
@@ -79,10 +81,13 @@ impl Without {
     }
 
     /// The car that the filter knows, and what it does not know.
-    fn known(self, known: &Car, truth: &Car) -> (Car, ShiftErrors) {
-        let (mut car, mut errors) = (known.clone(), ShiftErrors::STANDARD);
+    fn known(self, known: &Car, truth: &Car) -> (Car, ErrorBudget) {
+        let (mut car, mut errors) = (known.clone(), ErrorBudget::of_car(known));
         if self == Self::Clutches {
-            (errors.friction, errors.valve_gain) = (LITTLE, LITTLE);
+            for element in errors.elements.iter_mut().flatten() {
+                (element.friction_factor, element.valve_gain_factor) =
+                    ([1.0 - LITTLE, 1.0 + LITTLE], [1.0 - LITTLE, 1.0 + LITTLE]);
+            }
             for (clutch, truth) in car.clutches.iter_mut().zip(&truth.clutches) {
                 if let (Some(clutch), Some(truth)) = (clutch, truth) {
                     (clutch.clutch, clutch.valve) = (truth.clutch, truth.valve);
@@ -123,7 +128,7 @@ impl Without {
     fn rows(self, [known, truth]: [&Car; 2], samples: &[CarSample], noise: u64) -> Vec<ShiftScoreRow> {
         let seen = sensors();
         let read = |sensors: &Sensors, tables: &_| inputs(known, tables, samples, sensors, noise);
-        let standard = ShiftErrors::STANDARD;
+        let standard = ErrorBudget::of_car(known);
         let tables = ShiftTables::of_car(known, &standard).unwrap();
         let filter = any_shift_filter(known, &tables, &standard, Some(&seen));
         let untold = score_samples(&tables, &filter, samples, &read(&seen, &tables));
@@ -144,7 +149,7 @@ impl Without {
             }
         }
         if self == Self::AllButDrawn {
-            sure_of_all_but_drawn(&mut filter);
+            sure_of_all_but_drawn(&mut filter, &standard);
         }
         if self != Self::TurbineTorque || filter.turbine.converter.take().is_some() {
             inputs.iter_mut().for_each(|(at, input)| self.tell(input, &samples[*at]));
@@ -161,8 +166,8 @@ impl Without {
 }
 
 /// Leaves the covariance of friction, gain and converter alone, as they are drawn: uniformly, and once for a shift.
-fn sure_of_all_but_drawn(filter: &mut AnyShiftFilter<'_, f64>) {
-    let ShiftErrors { friction, valve_gain, .. } = ShiftErrors::STANDARD;
+fn sure_of_all_but_drawn(filter: &mut AnyShiftFilter<'_, f64>, budget: &ErrorBudget) {
+    let [friction, valve_gain] = [budget.widest(ElementErrors::friction), budget.widest(ElementErrors::valve_gain)];
     let u = &mut filter.uncertainty;
     u.torque_share = ((friction * friction + valve_gain * valve_gain) / 3.0).sqrt();
     (u.slow_part, u.torque_share_s) = (0.9999, 1e6);
@@ -198,7 +203,7 @@ fn runs(known: &Car, shift: MatrixShift, draws: u64) -> Vec<MatrixRow> {
 fn columns(cars: &[Car], draws: u64) -> Vec<Vec<MatrixRow>> {
     let mut columns = vec![Vec::new(); ALL.len()];
     for car in cars {
-        let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
+        let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
         for shift in neighbouring_shifts(car, &tables).0 {
             columns.iter_mut().zip(runs(car, shift, draws)).for_each(|(column, row)| column.push(row));
         }
@@ -211,7 +216,7 @@ fn columns(cars: &[Car], draws: u64) -> Vec<Vec<MatrixRow>> {
 #[test]
 fn a_clutch_that_grips_too_early_in_the_filter_has_the_torque_of_both_phases() {
     let (car, draws) = (&cars()[0], std::env::var("LIMITS_DRAWS").map_or(2, |draws| draws.parse().unwrap()));
-    let tables = ShiftTables::of_car(car, &ShiftErrors::STANDARD).unwrap();
+    let tables = ShiftTables::of_car(car, &ErrorBudget::of_car(car)).unwrap();
     let coasting = |shift: &MatrixShift| shift.kind == ShiftKind::CoastDown && class(shift.gain) == 2;
     let (mut early, mut rows, mut sum) = (0, 0, 0.0);
     for shift in neighbouring_shifts(car, &tables).0.into_iter().filter(coasting) {

@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 mod attacks;
+mod bounds;
 mod cars;
 mod command_delay;
 mod drives;

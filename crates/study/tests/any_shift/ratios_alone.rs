@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use config::{Car, Drive, Source};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::Health;
 use observer::any_shift::ShiftPhase;
 use plant::car::{CarCalibration, CarModel, CarSample, CarShift, simulate_car_drive};
@@ -57,7 +57,7 @@ fn score(truth: &Car, with_masses: bool) -> [f64; 4] {
     let drive = Drive::from_source(Source::built_in("drive.toml", DRIVE)).unwrap();
     let mut recording = Recording::default();
     simulate_car_drive(&model, truth, CarCalibration::STANDARD, &drive, |sample| recording.push(sample)).unwrap();
-    let errors = ShiftErrors::STANDARD;
+    let errors = ErrorBudget::of_car(&known);
     let tables = ShiftTables::of_car(&known, &errors).unwrap();
     let filter = any_shift_filter(&known, &tables, &errors, Some(&sensors()));
     let mut state = filter.start();
@@ -102,7 +102,7 @@ fn a_shift_past_a_gear_is_not_modelled() {
     let truth = cars().remove(0);
     let known = by_ratios(&truth, false);
     let gear = |name: &str| truth.gearbox.gear(name).unwrap();
-    let tables = LoggedDrive::tables(&known).unwrap();
+    let tables = LoggedDrive::tables(&known, None).unwrap();
     let samples = simulated(&truth, &truth, &CarShift::usual(&truth, gear("5"), gear("7"), 0.15)).unwrap();
     let mut logged = LoggedDrive::new(&known, &tables, Some(&sensors()), None);
     let mut healths = Vec::new();

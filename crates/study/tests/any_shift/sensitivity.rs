@@ -42,11 +42,24 @@ fn the_valve_model_alone_has_its_own_errors_and_no_other() {
             assert!(phase.largest().unwrap().torque_n_m[0] <= 3.0_f64.sqrt() * filter);
         }
     }
-    // Bounds of the file itself do not hide the errors that are tried.
-    let own = ElementErrorBounds { valve_delay_s: Some([0.01; 2]), ..ElementErrorBounds::default() };
+    // Each error is at its bound in the file: one without any has no effect, half of one has half of it.
+    let own = ElementErrorBounds {
+        valve_delay_s: Some([0.01; 2]),
+        friction_factor: Some([0.925, 1.075]),
+        ..ElementErrorBounds::default()
+    };
     let elements = vec![own; car.clutches.len()];
     let fitted = Car { error_bounds: CarErrorBounds { elements, ..CarErrorBounds::default() }, ..car.clone() };
-    assert_eq!(car_sensitivity(&fitted, &sensors()).unwrap(), shifts);
+    let narrow = car_sensitivity(&fitted, &sensors()).unwrap();
+    for (narrow, shift) in narrow.iter().zip(&shifts) {
+        for (narrow, phase) in narrow.phases.iter().flatten().zip(shift.phases.iter().flatten()) {
+            let alone = |phase, error| effect(phase, error).unwrap().torque_n_m[1];
+            assert_eq!(alone(narrow, ShiftErrorKind::ValveDelay), 0.0);
+            // The valve model of the delay in the middle of the bounds is another, by a little.
+            let ratio = alone(narrow, ShiftErrorKind::Friction) / alone(phase, ShiftErrorKind::Friction);
+            assert!((ratio - 0.5).abs() < 0.1 || alone(phase, ShiftErrorKind::Friction) < 1.0, "{ratio}");
+        }
+    }
     // In the inertia phase under power the speeds show the clutch torque, but for the turbine torque.
     let up = shifts.iter().find(|shift| shift.shift.kind.name() == "power-on upshift").unwrap();
     let inertia = up.phases[1].as_ref().unwrap();

@@ -1,7 +1,7 @@
 //! Cars whose pistons have a stroke, with other volumes, return springs, passages and oil than those that the filter knows.
 
 use config::{Car, ShiftClutch};
-use design::{ShiftErrors, ShiftTables};
+use design::{ErrorBudget, ShiftTables};
 use drivetrain::ShiftKind;
 use observer::any_shift::{AnyShiftFilter, FrictionElement, GearboxTables, Learnt};
 use plant::car::CarShift;
@@ -55,7 +55,7 @@ fn whole_shift(rows: &[ShiftScoreRow], clutch: usize) -> SquaredErrors {
 #[test]
 fn a_filter_that_knows_of_no_pistons_is_worse() {
     let car = cars_with_strokes().remove(0);
-    let tables = ShiftTables::of_car(&car, &ShiftErrors::STANDARD).unwrap();
+    let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
     let mut all = [[SquaredErrors::default(); 2]; 2];
     for kind in ShiftKind::ALL {
         let mut sums = [[SquaredErrors::default(); 2]; 2];
@@ -102,11 +102,11 @@ fn kiss_errors_pa(known: &Car, truth: &Car, draw: &ShiftDraw, learnt: &Learnt<f6
 #[test]
 fn kiss_points_are_learnt_in_cars_with_strokes() {
     let car = cars_with_strokes().remove(0);
-    assert!(ShiftTables::of_car(&car, &ShiftErrors::STANDARD).unwrap().tables().elements[0].piston.is_some());
+    assert!(ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap().tables().elements[0].piston.is_some());
     let (mut sums, mut kiss) = ([Errors::default(), Errors::default()], [0.0; 2]);
     for seed in 1..=2 * crate::learning::draws() {
         let mut random = Random(seed * 77);
-        let draw = ShiftDraw::within(&car, &ShiftErrors::STANDARD, || random.uniform());
+        let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
         let draw = draw.with_strokes(&car, || random.uniform());
         let truth = draw.car(&car);
         let drive = Drive::of(&car, &truth, seed);

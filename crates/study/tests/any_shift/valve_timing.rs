@@ -1,7 +1,7 @@
 //! Lag and delay of the valves, which the filter learns, against a filter that is told both.
 
 use config::Car;
-use design::ShiftErrors;
+use design::ErrorBudget;
 use study::any_shift::{ShiftDraw, ValveTiming};
 
 use crate::cars::{Random, cars};
@@ -104,8 +104,8 @@ fn in_thirty_shifts_lag_and_delay_are_learnt() {
     let mut found = Found::default();
     for seed in 1..=2 * draws() {
         let mut random = Random(seed * 77);
-        let draw = ShiftDraw::within(&car, &ShiftErrors::STANDARD, || random.uniform());
-        let draw = draw.with_timing(&car, &ShiftErrors::STANDARD, || random.uniform());
+        let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
+        let draw = draw.with_timing(&ErrorBudget::of_car(&car), || random.uniform());
         let truth = draw.car(&car);
         let timing =
             |at: usize| draw.timing[at].map_or((1.0, None), |ValveTiming { lag, delay_s, .. }| (lag, Some(delay_s)));

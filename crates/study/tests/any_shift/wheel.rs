@@ -1,7 +1,7 @@
 //! A wheel speed that is not what the filter takes it to be: of another scale, as with a worn tyre, or later than is said.
 
 use config::{Car, Sensors};
-use design::{ShiftErrors, ShiftTables, any_shift_filter};
+use design::{ErrorBudget, ShiftTables, any_shift_filter};
 use observer::any_shift::{AnyShiftFilter, AnyShiftState, ShiftInput};
 use observer::{ChannelHealth, Reading};
 use plant::car::{CarModel, CarShift};
@@ -16,8 +16,6 @@ use study::any_shift::{inputs, score_samples, simulated};
 use crate::PHASES;
 use crate::attacks::cast;
 use crate::cars::{cars, sensors};
-
-const ERRORS: ShiftErrors = ShiftErrors::STANDARD;
 
 /// The wheel speed that the filter is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,8 +73,8 @@ fn draws() -> Option<u64> {
 
 /// All shifts of a car, each in a log of its own: a column for each wheel speed.
 fn short_logs(known: &Car, draws: u64) -> Vec<Vec<MatrixRow>> {
-    let tables = ShiftTables::of_car(known, &ERRORS).unwrap();
-    let filter = any_shift_filter(known, &tables, &ERRORS, Some(&sensors()));
+    let tables = ShiftTables::of_car(known, &ErrorBudget::of_car(known)).unwrap();
+    let filter = any_shift_filter(known, &tables, &ErrorBudget::of_car(known), Some(&sensors()));
     let mut columns = vec![Vec::new(); ALL.len()];
     for shift in neighbouring_shifts(known, &tables).0 {
         let usual = CarShift::usual(known, shift.from, shift.to, shift.throttle());
@@ -101,8 +99,8 @@ fn short_logs(known: &Car, draws: u64) -> Vec<Vec<MatrixRow>> {
 
 /// A drive through all gears of a car, with one filter for the whole drive.
 fn driven(known: &Car, seed: u64) -> Vec<Vec<MatrixRow>> {
-    let tables = ShiftTables::of_car(known, &ERRORS).unwrap();
-    let filter = any_shift_filter(known, &tables, &ERRORS, Some(&sensors()));
+    let tables = ShiftTables::of_car(known, &ErrorBudget::of_car(known)).unwrap();
+    let filter = any_shift_filter(known, &tables, &ErrorBudget::of_car(known), Some(&sensors()));
     let model = CarModel::new(drawn_car(known, 0, 0, seed)).unwrap();
     let mut recording = Recording::default();
     drive_tour(&model, known, |sample| recording.push(sample), || ()).unwrap();
@@ -192,7 +190,7 @@ struct Known {
 impl Known {
     fn new() -> Self {
         let car = cars().swap_remove(4);
-        let tables = ShiftTables::of_car(&car, &ERRORS).unwrap();
+        let tables = ShiftTables::of_car(&car, &ErrorBudget::of_car(&car)).unwrap();
         let model = CarModel::new(drawn_car(&car, 0, 0, 1)).unwrap();
         let mut recording = Recording::default();
         drive_tour(&model, &car, |sample| recording.push(sample), || ()).unwrap();
@@ -200,7 +198,7 @@ impl Known {
     }
 
     fn filter(&self) -> AnyShiftFilter<'_, f64> {
-        any_shift_filter(&self.car, &self.tables, &ERRORS, Some(&sensors()))
+        any_shift_filter(&self.car, &self.tables, &ErrorBudget::of_car(&self.car), Some(&sensors()))
     }
 
     fn inputs(&self, wheel: Wheel) -> Vec<ShiftInput<f64>> {

@@ -13,7 +13,7 @@ use study::LogSample;
 use study::shift_estimates::no_estimate;
 
 use super::findings::Findings;
-use super::measured::{Measured, Step, check_span, old_commands, slow_log};
+use super::measured::{Measured, Step, WITHOUT_SENSORS, check_span, old_commands, slow_log};
 use super::observer::Chosen;
 use super::outputs::{EstimateTable, beside, chosen, remove_old};
 use super::shifts::{self, Shifts};
@@ -62,6 +62,9 @@ pub(super) fn estimate(
     let sentences = findings.sentences();
     sentences.iter().for_each(|sentence| say.note(sentence));
     report_shifts(&shifts, say);
+    if options.sensors.is_none() {
+        say.note(WITHOUT_SENSORS);
+    }
     say.note(&format!("observer: {}", observer.name));
     if !vehicle.defaults_taken.is_empty() {
         say.note(

@@ -371,6 +371,10 @@ pub(super) fn slow_log(median_s: f64) -> Option<String> {
     })
 }
 
+/// What the ranges assume of the sensors where no file describes them.
+pub(super) const WITHOUT_SENSORS: &str = "ranges: no sensor file was given (--sensors), so a reading of a speed counts as one of the time of its row, and a command errs \
+     by no more than the error bounds of the vehicle file. The ranges are guaranteed only where that is so; a [sensors] table makes them those of the sensors";
+
 /// Says that commands may be older than the bounds of the vehicle file allow: a row shows a command that was sent since the row before.
 pub(super) fn old_commands(median_s: f64, bound_s: f64) -> Option<String> {
     (median_s > bound_s * (1.0 + ROUNDING)).then(|| {

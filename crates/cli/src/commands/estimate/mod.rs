@@ -109,7 +109,10 @@ fn inputs(options: &Estimate) -> impl Iterator<Item = &PathBuf> {
 }
 
 fn setup(options: &Estimate) -> Result<Setup<'_>, Failure> {
-    let vehicle = Vehicle::read(&options.vehicle)?;
+    let mut vehicle = Vehicle::read(&options.vehicle)?;
+    if let Some(path) = &options.sensors {
+        vehicle.error_bounds = vehicle.error_bounds.read_by(vehicle.oncoming.valve.command_kind(), &sensors(path)?);
+    }
     let map = channel_map_of_car(&options.mapping, vehicle.road.wheel_radius_m)?;
     Ok(Setup { options, vehicle, map, stop: stop(options)? })
 }

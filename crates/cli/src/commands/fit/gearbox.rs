@@ -37,8 +37,9 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
             options.vehicle.display()
         )));
     }
-    let tables = LoggedDrive::tables(&car)?;
-    let ages = options.sensors.as_deref().map(sensors).transpose()?.map(|sensors| ReadingAges::of(&sensors));
+    let sensors = options.sensors.as_deref().map(sensors).transpose()?;
+    let tables = LoggedDrive::tables(&car, sensors.as_ref())?;
+    let ages = sensors.as_ref().map(ReadingAges::of);
     let bar = progress();
     let recorded = record(options, &car, &tables, ages.unwrap_or_default(), &bar)?;
     bar.suspend(|| reasons("not used", &recorded.skipped));
@@ -55,7 +56,8 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
     let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
     let file = |checked: Option<&HeldOut>| found.vehicle_file(&car, &options.output, &names.join(", "), checked);
     let fitted = file(None)?;
-    let checked = found.validate((&car, &tables), (&fitted, &LoggedDrive::tables(&fitted)?), &held_out);
+    let checked =
+        found.validate((&car, &tables), (&fitted, &LoggedDrive::tables(&fitted, sensors.as_ref())?), &held_out);
     let fitted = file(checked.as_ref())?;
     bar.finish_and_clear();
     let against = found.reason_against(checked.as_ref());

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use config::{CarStudy, CarStudyRuns};
+use config::{CarStudy, CarStudyRuns, ElementErrors};
 use report::matrix_page::kind_rows;
 use study::StudyError;
 use study::any_shift::campaign::{CarCampaign, CarRow, CarSummary};
@@ -61,6 +61,7 @@ pub(super) fn study(options: &StudyOptions) -> Result<(), Failure> {
     writable(&options.output, &["runs.csv", "runs.parquet"])?;
     let campaign = CarCampaign::new(CarStudy::read(&options.study)?, &bench_sensors()?)?;
     warn_of_slipping(&campaign.study.car);
+    warn_of_exceeded(&campaign);
     let part = Part { campaign: &campaign, folder: &options.output, shard: options.shard };
     let mut summary = campaign.summary();
     part.make(options, |row| campaign.push(&mut summary, row))?;
@@ -72,6 +73,18 @@ pub(super) fn merge(options: &Merge) -> Result<(), Failure> {
     let mut summary = campaign.summary();
     let (whole, _lock) = merged(&campaign, options, |row| campaign.push(&mut summary, row))?;
     finish(&whole, &summary)
+}
+
+/// Warns of sampled cars beyond the error bounds of the file.
+fn warn_of_exceeded(campaign: &CarCampaign) {
+    let exceeded = campaign.exceeded();
+    if !exceeded.is_empty() {
+        output::note(&format!(
+            "warning: [errors] of the study exceeds the error bounds of the vehicle file: {}. The guaranteed ranges are those of the file and need \
+             not hold for these cars\nhint: give the bounds under [clutch.NAME.error_bounds] of the vehicle file",
+            exceeded.join(", ")
+        ));
+    }
 }
 
 fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Failure> {
@@ -111,17 +124,18 @@ pub(crate) fn describe(path: &Path) -> Result<(), Failure> {
         CarStudyRuns::Shifts(pairs) => format!("{} shifts, with power and without", pairs.len()),
     };
     let campaign = CarCampaign::new(study, &bench_sensors()?)?;
-    let (study, errors) = (&campaign.study, campaign.errors());
+    let (study, sampled) = (&campaign.study, campaign.sampled());
     output::line(&format!(
         "study {} \"{}\": {} cars, each {what}; friction within {} %, gain of the valves {} %, capacity of the converter {} %",
         study.name,
         study.title,
         study.runs,
-        100.0 * errors.friction,
-        100.0 * errors.valve_gain,
-        100.0 * errors.converter,
+        100.0 * sampled.widest(ElementErrors::friction),
+        100.0 * sampled.widest(ElementErrors::valve_gain),
+        100.0 * sampled.converter,
     ))?;
     describe_car(&study.car)?;
     warn_of_slipping(&study.car);
+    warn_of_exceeded(&campaign);
     Ok(())
 }

@@ -7,7 +7,8 @@ use geartrain::{Change, Shift};
 
 use super::facts::{Facts, ValveKind};
 use super::{ENGINE_TORQUE_N_M, MASS_SHARE, PISTON_AREAS_M2, PLATE_RADII_M, RATIO_BEFORE, TORQUE_SHARES, text_of};
-use crate::vehicle::{Car, ElementErrors, SHAFT_OVER_TYRES, ShiftClutch, ShiftErrors, Uncertainty};
+use crate::vehicle::error_budget::command_max;
+use crate::vehicle::{Car, ElementErrors, ErrorBudget, SHAFT_OVER_TYRES, ShiftClutch, Uncertainty};
 use crate::{CompliantRequirement, ConfigError, DesignRequirement, ErrorBounds, Source, Vehicle};
 
 /// Turbine torque of the shift at which the errors are weighed, over the greatest torque of the engine: 133 of 190 N m in the car that is scaled.
@@ -18,8 +19,6 @@ const FACES: f64 = 3.0;
 /// Turbine acceleration of an inertia phase at which an error of the inertia is weighed, rad/s^2, per share by which the ratio falls
 /// \[chosen\]: a turbine of 400 rad/s that reaches its new speed in 0.4 s.
 const TURBINE_RAD_S2: f64 = 1000.0;
-/// Largest command that is one of a valve, over the one for the highest pressure.
-const COMMAND_ROOM: f64 = 1.2;
 
 /// Why a car has no vehicle of one shift.
 #[derive(Debug, thiserror::Error)]
@@ -100,7 +99,7 @@ struct OneShift<'c> {
     oncoming: ShiftClutch,
     /// What is not known of the oncoming clutch and of the car.
     element: ElementErrors,
-    errors: ShiftErrors,
+    budget: ErrorBudget,
 }
 
 impl Car {
@@ -140,7 +139,7 @@ impl Car {
     ///
     /// Engine, converter, clutches, driveline, tyre and road are the car's, the gear train is its reduction to the shift. The
     /// observers' valve is that of the oncoming element, linear around the pressure of a shift; of a normally-high valve the command is
-    /// `zero_pressure_a` less the current. The bounds of the errors are those of the car ([`ShiftErrors::of_car`]). All else is
+    /// `zero_pressure_a` less the current. The bounds of the errors are those of the car ([`ErrorBudget::of_car`]). All else is
     /// the default of a short file, scaled to the car and to the torques that the two elements carry. Its source is that of the car, so
     /// that none of its values can be changed by its key.
     ///
@@ -165,13 +164,14 @@ impl<'c> OneShift<'c> {
             let change = shift.change.name();
             return Err(OneShiftError::Several { shift: name, change, upshifts: upshifts() });
         };
-        let clutch = |element: usize| {
-            car.clutches.get(element).copied().flatten().ok_or_else(|| OneShiftError::NoPlates {
-                shift: name.clone(),
-                element: car.gearbox.elements[element].name.clone(),
-            })
+        let no_plates = |element: usize| OneShiftError::NoPlates {
+            shift: name.clone(),
+            element: car.gearbox.elements[element].name.clone(),
         };
+        let clutch = |element: usize| car.clutches.get(element).copied().flatten().ok_or_else(|| no_plates(element));
         let (offgoing_clutch, oncoming_clutch) = (clutch(offgoing)?, clutch(oncoming)?);
+        let budget = ErrorBudget::of_car(car);
+        let element = budget.element(oncoming).copied().ok_or_else(|| no_plates(oncoming))?;
         let Some(reduced) = shift.reduced else { return Err(OneShiftError::NoMass { shift: name }) };
         let Some(converter) = car.converter else { return Err(OneShiftError::NoConverter) };
         Ok(Self {
@@ -179,8 +179,8 @@ impl<'c> OneShift<'c> {
             converter,
             offgoing: offgoing_clutch,
             oncoming: with_rising_command(oncoming_clutch),
-            element: ShiftErrors::STANDARD.of_element(car, oncoming),
-            errors: ShiftErrors::STANDARD.of_car(car),
+            element,
+            budget,
             car,
             name,
         })
@@ -189,7 +189,7 @@ impl<'c> OneShift<'c> {
     fn vehicle(&self) -> Result<Vehicle, OneShiftError> {
         let car = self.car;
         let size = self.of_size()?;
-        let pressure_max_pa = car.line_pressure_pa * self.element.valve_gain_factor[1];
+        let pressure_max_pa = self.element.pressure_max_pa;
         let error_bounds = self.error_bounds(&size.error_bounds, pressure_max_pa);
         let mut supervisor = size.supervisor;
         supervisor.kiss_pressure_pa = self.oncoming.clutch.kiss_pressure();
@@ -197,7 +197,8 @@ impl<'c> OneShift<'c> {
         limits.pressure_max_pa = pressure_max_pa;
         limits.shaft_torque_max_n_m = SHAFT_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m;
         if self.oncoming.valve.command_kind() == CommandKind::Current {
-            limits.command_max = COMMAND_ROOM * self.oncoming.valve.command_for(pressure_max_pa);
+            limits.command_max =
+                command_max(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor);
         }
         let mut filter = size.filter;
         filter.offgoing_n_m *= self.offgoing_size();
@@ -259,7 +260,7 @@ impl<'c> OneShift<'c> {
 
     /// The error budget of the car of the defaults, for this shift.
     fn error_bounds(&self, size: &ErrorBounds, pressure_max_pa: f64) -> ErrorBounds {
-        let (car, errors, element) = (self.car, &self.errors, &self.element);
+        let (car, errors, element) = (self.car, &self.budget, &self.element);
         let torque_n_m = SHIFT_TORQUE * car.engine.largest_torque();
         let lower_gear = self.reduced.ratio_offgoing() / RATIO_BEFORE;
         let (pressure, slip) = (self.pressure_size(), self.slip_size());
@@ -310,7 +311,7 @@ impl<'c> OneShift<'c> {
     /// What an error of the turbine-side inertia is worth in the inertia phase, N m.
     fn inertia_torque_n_m(&self) -> f64 {
         let step = 1.0 - self.reduced.ratio_oncoming() / self.reduced.ratio_offgoing();
-        self.errors.inertia * self.reduced.mass_kg_m2[0][0] * TURBINE_RAD_S2 * step
+        self.budget.inertia * self.reduced.mass_kg_m2[0][0] * TURBINE_RAD_S2 * step
     }
 
     /// Torque of the offgoing clutch per turbine torque, over that of the car of the defaults.

@@ -2,11 +2,10 @@
 
 use super::*;
 use crate::ValveModel;
-use crate::any_shift::Piston;
+use crate::any_shift::{Piston, ValveLimits};
 use drivetrain::{Clutch, ClutchValve, Cylinder, Table1, ValveMaps};
 
-const LIMITS: InputLimits<f64> =
-    InputLimits { speed_max_rad_s: 1e3, command_max: 1.2, pressure_max_pa: 1.1e6, shaft_torque_max_n_m: 1e4 };
+const LIMITS: ValveLimits<f64> = ValveLimits { command_max: 1.2, command_error: 0.01, pressure_max_pa: 1.1e6 };
 
 const UNCERTAINTY: ShiftUncertainty<f64> = ShiftUncertainty {
     torque_share: 0.12,
@@ -46,6 +45,7 @@ fn element() -> FrictionElement<f64> {
             static_friction: 0.14,
         },
         valve: ValveModel { valve: ClutchValve::Proportional(maps), delay_s: 0.015 },
+        limits: LIMITS,
         piston: None,
         budget: None,
     }
@@ -64,7 +64,7 @@ fn a_valve_that_rests_goes_on_as_one_that_never_does() {
 }
 
 fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
-    let mut rests = ElementState::new(element, &LIMITS);
+    let mut rests = ElementState::new(element);
     let (mut moves, mut rested) = (rests, 0);
     for k in 0..6000_usize {
         // Every new command is late, after two that were lost or out of order.
@@ -72,8 +72,7 @@ fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
         let value = [0.3, 0.0, 1.0, 0.31, 0.9][held % 5];
         let age_s = if at == 0 { 0.025 } else { 0.0 };
         let command = (at < 9 || held % 2 == 0).then_some(Reading { value, age_s });
-        let health =
-            [&mut rests, &mut moves].map(|valve: &mut ElementState<f64>| valve.step(element, &LIMITS, command, 0.01));
+        let health = [&mut rests, &mut moves].map(|valve: &mut ElementState<f64>| valve.step(element, command, 0.01));
         assert_eq!(health[0], health[1]);
         [&mut rests, &mut moves].into_iter().for_each(|valve| valve.move_pistons(element, &UNCERTAINTY, 0.01));
         // So it never begins to rest.
@@ -93,7 +92,7 @@ fn rests_as_one_that_never_does(element: &FrictionElement<f64>) {
 fn an_element_holds_what_it_carries_by_the_estimate() {
     let u = UNCERTAINTY;
     let (element, shift) = (element(), ShiftClutch { element: 0, alpha: -1.4, ratio: 2.0 });
-    let mut state = ElementState::new(&element, &LIMITS);
+    let mut state = ElementState::new(&element);
     for (valve_pa, factor, pressure, kiss) in [
         (2e5, 0.0, 0.0, 0.0),
         (2e5, 0.8, 0.5, -0.7),
@@ -122,12 +121,12 @@ fn an_element_whose_plates_do_not_touch_carries_nothing() {
     let (with, without) = (with_stroke(), element());
     let shift = ShiftClutch { element: 0, alpha: 1.0, ratio: 2.0 };
     let wrong = PressureError { pressure: 0.4, kiss: 0.3, variance: [0.8, 0.9], covariance: 0.0 };
-    let mut states = [with, without].map(|element| (element, ElementState::new(&element, &LIMITS)));
+    let mut states = [with, without].map(|element| (element, ElementState::new(&element)));
     let mut carried = [0.0; 300];
     for (k, carried) in carried.iter_mut().enumerate() {
         let command = Some(Reading::now(if k < 5 { 0.0 } else { 0.25 }));
         let [stroke, none] = states.each_mut().map(|(element, state)| {
-            state.step(element, &LIMITS, command, 0.01);
+            state.step(element, command, 0.01);
             state.move_pistons(element, &u, 0.01);
             let torque = state.torque(element, &shift, &u, [50.0, 1.0], &wrong);
             let all = torque.base_n_m + 0.3 * torque.per_kiss_n_m + 0.4 * torque.per_pressure_n_m;
@@ -156,8 +155,8 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
     let (known, u) = (element(), UNCERTAINTY);
     let truth = ValveModel { valve: known.valve.valve.changed(1.0 + 0.8 * 0.3, 1.0, None), delay_s: 0.006 };
     let truth = FrictionElement { valve: truth, ..known };
-    let [mut learnt, mut slow, mut late, mut unlearnt] = [ElementState::new(&known, &LIMITS); 4];
-    let mut true_state = ElementState::new(&truth, &LIMITS);
+    let [mut learnt, mut slow, mut late, mut unlearnt] = [ElementState::new(&known); 4];
+    let mut true_state = ElementState::new(&truth);
     for (state, mean) in [(&mut learnt, [0.8, -1.0]), (&mut slow, [0.01, 0.0]), (&mut late, [0.0, 0.01])] {
         state.take_timing(&known, &u, &ValveTiming { mean, variance: [0.3; 2] });
         assert_eq!(state.taken_off(), mean);
@@ -165,9 +164,9 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
     let (mut most_pa, mut found, mut expected) = (0.0_f64, [0.0; 2], [0.0; 2]);
     for k in 0..150 {
         let command = Some(Reading::now(if k < 20 { 0.1 } else { 0.25 + 0.002 * f64::from(k) }));
-        true_state.step(&truth, &LIMITS, command, 0.01);
+        true_state.step(&truth, command, 0.01);
         for state in [&mut learnt, &mut slow, &mut late, &mut unlearnt] {
-            state.step(&known, &LIMITS, command, 0.01);
+            state.step(&known, command, 0.01);
         }
         assert!((learnt.valve_pa - true_state.valve_pa).abs() < 1.0, "{k}");
         most_pa = most_pa.max((unlearnt.valve_pa - true_state.valve_pa).abs());
@@ -189,11 +188,11 @@ fn a_learnt_lag_and_delay_are_those_of_the_valve() {
 #[test]
 fn a_command_that_is_lost_while_the_valve_rests_is_said_to_be() {
     let element = element();
-    let mut state = ElementState::new(&element, &LIMITS);
+    let mut state = ElementState::new(&element);
     (0..500).for_each(|_| {
-        state.step(&element, &LIMITS, Some(Reading::now(0.3)), 0.01);
+        state.step(&element, Some(Reading::now(0.3)), 0.01);
     });
     assert!(state.newest.is_some_and(|newest| newest.rests_s.is_some()));
-    let health: [ChannelHealth; 200] = core::array::from_fn(|_| state.step(&element, &LIMITS, None, 0.01));
+    let health: [ChannelHealth; 200] = core::array::from_fn(|_| state.step(&element, None, 0.01));
     assert_eq!((health[0], health[199]), (ChannelHealth::Absent, ChannelHealth::Lost));
 }

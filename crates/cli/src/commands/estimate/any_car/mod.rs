@@ -24,7 +24,7 @@ use self::columns::{Knows, Row, before_readings, chosen, columns};
 use self::learnt::Kept;
 use self::passing::Passing;
 use self::source::{CarReading, CarSource};
-use super::measured::slow_log;
+use super::measured::{WITHOUT_SENSORS, slow_log};
 use super::observer::sensors;
 use super::outputs::{Output, beside, remove_old};
 use super::ratios::check_wheel;
@@ -73,7 +73,7 @@ impl<'a> CarSetup<'a> {
             return Err(Failure::Input(format!("{message}\nhint: {hint}")));
         }
         let sensors = options.sensors.as_deref().map(sensors).transpose()?;
-        let tables = LoggedDrive::tables(&car)?;
+        let tables = LoggedDrive::tables(&car, sensors.as_ref())?;
         let map = channel_map_of_car(&options.mapping, car.road.wheel_radius_m)?;
         options.learnt.as_deref().map(|path| learnt::check(path, &car)).transpose()?;
         Ok(Self { options, car, tables, sensors, map, stop: super::stop(options)? })
@@ -147,6 +147,9 @@ pub(super) fn estimate(
     drive = drive.earlier_by(origin_s);
     drive.warnings.splice(0..0, said_of_origin(origin_s));
     report(&drive, car, say);
+    if setup.sensors.is_none() && !car.gearbox.has_ratios_alone() {
+        say.note(WITHOUT_SENSORS);
+    }
     match (output, places) {
         (None, _) => say.note("estimate: on standard output"),
         (Some(output), places) => {

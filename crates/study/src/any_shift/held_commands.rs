@@ -1,0 +1,156 @@
+//! Commands that change more rarely than their readings come: a logger that repeats a slow message in each row.
+//!
+//! A command then may have changed up to one message before the row that shows it first, and the guaranteed range allows for one row alone.
+
+use config::Car;
+use design::ShiftTables;
+use observer::Reading;
+use observer::any_shift::MAX_ELEMENTS;
+
+/// Longest time between two changes that is one message, s \[chosen\]: what stands longer is a command that rests.
+const LONGEST_S: f64 = 0.5;
+/// Changes after repeated readings that are needed to judge, and the fraction of changes from one reading to the next that a message leaves
+/// by chance \[chosen\].
+const ENOUGH: u64 = 20;
+const BY_CHANCE: f64 = 0.05;
+/// A change counts after repeated readings only if it is more than so many times the smallest one \[chosen\]: a slow ramp stands still
+/// within the resolution of its reading.
+const RESOLUTIONS: f64 = 3.0;
+/// Width of a class of times, s.
+const CLASS_S: f64 = 0.01;
+const CLASSES: usize = 51;
+
+/// The changes of one command.
+#[derive(Clone)]
+struct Changes {
+    newest: Option<f64>,
+    changed_s: f64,
+    /// Readings since the last change.
+    repeated: u32,
+    smallest: f64,
+    /// Changes from one reading to the next, and those after repeated readings by the time since the change before.
+    at_once: u64,
+    later: [u64; CLASSES],
+}
+
+/// The changes of all commands of a log.
+pub(super) struct HeldCommands {
+    of_elements: [Changes; MAX_ELEMENTS],
+}
+
+impl Default for HeldCommands {
+    fn default() -> Self {
+        let none = Changes {
+            newest: None,
+            changed_s: f64::NEG_INFINITY,
+            repeated: 0,
+            smallest: f64::INFINITY,
+            at_once: 0,
+            later: [0; CLASSES],
+        };
+        Self { of_elements: std::array::from_fn(|_| none.clone()) }
+    }
+}
+
+impl HeldCommands {
+    /// Takes the commands of a row.
+    pub(super) fn push(&mut self, time_s: f64, commands: &[Option<Reading<f64>>; MAX_ELEMENTS]) {
+        for (changes, command) in self.of_elements.iter_mut().zip(commands) {
+            if let Some(reading) = command {
+                changes.push(time_s - reading.age_s, reading.value);
+            }
+        }
+    }
+
+    /// The elements whose command is repeated, in a sentence.
+    pub(super) fn warning(&self, car: &Car, tables: &ShiftTables<f64>) -> Option<String> {
+        let elements = car.gearbox.elements.iter().enumerate();
+        let held = elements.filter_map(|(element, described)| {
+            let period_s = self.of_elements[tables.place(element)?].period_s()?;
+            Some(format!("{} (every {period_s:.2} s)", described.name))
+        });
+        let held: Vec<String> = held.collect();
+        (!held.is_empty()).then(|| {
+            format!(
+                "warning: commands that change more rarely than the rows come: {}. If the log repeats a slow message, a command was sent up to that long \
+                 before the row that shows it, and the guaranteed ranges do not hold. Leave repeated cells empty, or record the commands more often",
+                held.join(", ")
+            )
+        })
+    }
+}
+
+impl Changes {
+    fn push(&mut self, time_s: f64, value: f64) {
+        let Some(before) = self.newest.replace(value) else { return };
+        if before == value {
+            self.repeated += 1;
+            return;
+        }
+        let change = (value - before).abs();
+        self.smallest = self.smallest.min(change);
+        let since_s = time_s - self.changed_s;
+        if self.repeated == 0 {
+            self.at_once += 1;
+        } else if since_s <= LONGEST_S && change > RESOLUTIONS * self.smallest {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "positive, and at most LONGEST_S"
+            )]
+            let class = (since_s / CLASS_S).round().max(0.0) as usize;
+            self.later[class.min(CLASSES - 1)] += 1;
+        }
+        (self.changed_s, self.repeated) = (time_s, 0);
+    }
+
+    /// The usual time between two changes, s, if they come more rarely than the readings.
+    fn period_s(&self) -> Option<f64> {
+        let later: u64 = self.later.iter().sum();
+        #[expect(clippy::cast_precision_loss, reason = "counts")]
+        let is_held = later >= ENOUGH && self.at_once as f64 <= BY_CHANCE * later as f64;
+        let mut below = 0;
+        let middle = self.later.iter().position(|count| {
+            below += count;
+            2 * below >= later
+        });
+        #[expect(clippy::cast_precision_loss, reason = "a class")]
+        middle.filter(|_| is_held).map(|class| class as f64 * CLASS_S)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ramps of 0.2 A/s up and down through a minute, sent so often and read every 10 ms with this resolution.
+    fn period_s(sent_s: f64, resolution: f64) -> Option<f64> {
+        let mut changes = HeldCommands::default().of_elements[0].clone();
+        for row in 0..6000 {
+            let time_s = 0.01 * f64::from(row);
+            let at_s = (time_s / sent_s + 1e-6).floor() * sent_s;
+            let command = 0.4 * (0.5 * at_s).rem_euclid(1.0);
+            changes.push(time_s, (command / resolution).round() * resolution);
+        }
+        changes.period_s()
+    }
+
+    #[test]
+    fn a_repeated_command_differs_from_one_that_rests_or_creeps() {
+        for sent_s in [0.05, 0.1, 0.2, 0.4] {
+            let found_s = period_s(sent_s, 0.001).unwrap();
+            assert!((found_s - sent_s).abs() < 0.011, "{sent_s}: {found_s}");
+        }
+        assert_eq!(period_s(0.01, 0.001), None);
+        // Within the resolution of its reading a ramp stands still for two rows.
+        assert_eq!(period_s(0.01, 0.005), None);
+    }
+
+    #[test]
+    fn a_command_that_never_changes_has_no_period() {
+        let mut changes = HeldCommands::default().of_elements[0].clone();
+        assert_eq!(changes.period_s(), None);
+        (0..1000).for_each(|row| changes.push(0.01 * f64::from(row), 0.3));
+        assert_eq!(changes.period_s(), None);
+    }
+}
