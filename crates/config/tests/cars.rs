@@ -2,7 +2,7 @@
 
 use config::gearbox::SHIPPED;
 use config::vehicle::short::{CarFacts, short_car_file, sized_gearbox};
-use config::{Car, Drive, ShiftPlan, Source};
+use config::{Car, Drive, ErrorBudget, ShiftPlan, Source, Vehicle};
 
 const GEARBOX: &str = include_str!("../../../gearboxes/8hp.toml");
 
@@ -338,5 +338,70 @@ fn wrong_drive_files_get_their_line_and_a_hint() {
     ] {
         let error = drive(&text).unwrap_err();
         assert!(parts.iter().all(|part| error.contains(part)), "{text}: {error}");
+    }
+}
+
+#[test]
+fn the_budget_of_an_element_contains_the_valve_of_the_file() {
+    let slow = "[valve]\nkind = \"proportional\"\nhysteresis_pa = 50e3\nlag = { pressure_pa = [0.0, 1e6], time_constant_s = [0.05, 0.04] }\ngain = { current_a = [0.0, 1.0], gain_pa_a = [1e6, 1e6] }\ndelay = { current_a = [0.0, 1.0], delay_s = [0.08, 0.06] }\n";
+    let slow = car(slow).unwrap();
+    let budget = ErrorBudget::of_car(&slow);
+    let element = budget.elements.iter().flatten().next().unwrap();
+    assert_eq!(element.valve_hysteresis_pa, 50e3);
+    let [shortest_s, longest_s] = element.valve_delay_s;
+    assert!((shortest_s - 0.045).abs() < 1e-12 && (longest_s - 0.095).abs() < 1e-12, "{:?}", element.valve_delay_s);
+    // A shorter one is within the usual bounds.
+    let usual = ErrorBudget::of_car(&car("").unwrap());
+    assert_eq!(usual.elements.iter().flatten().next().unwrap().valve_delay_s, [0.0, 0.03]);
+}
+
+#[test]
+fn bounds_that_do_not_contain_the_valve_of_the_file_are_refused() {
+    let message = car("[clutch.B.error_bounds]\nvalve_delay_s = [0.1, 0.2]\n").unwrap_err();
+    assert!(
+        message.contains("car.toml:4: `clutch.B.error_bounds.valve_delay_s`: 0.1 to 0.2 does not contain"),
+        "{message}"
+    );
+    assert!(message.contains("hint: [0.0") || message.contains("hint: [0"), "{message}");
+    assert!(car("[clutch.B.error_bounds]\nvalve_delay_s = [0.0, 0.2]\n").is_ok());
+    let message = car("[clutch.B.error_bounds]\nduty_percent = 2.0\n").unwrap_err();
+    assert!(message.contains("`clutch.B.error_bounds.duty_percent`") && message.contains("`current_a`"), "{message}");
+    // The file of one shift has the same rule.
+    let text = include_str!("../../../vehicles/two_speed_at.toml");
+    let late = text.replacen("valve_delay_s = [", "valve_delay_s = [0.1, 0.2] # [", 1);
+    assert_ne!(late, text);
+    let message = Vehicle::from_source(Source::built_in("v.toml", &late)).unwrap_err().to_string();
+    assert!(message.contains("`design.error_bounds.valve_delay_s`: 0.1 to 0.2 does not contain"), "{message}");
+}
+
+#[test]
+fn one_pulse_width_valve_changes_no_limit_of_the_others() {
+    let pulse_width = "[clutch.B.valve]\nkind = \"pulse-width\"\nflow_sqrt_pa_s = 6000\nline_pressure_pa = 1.6e6\ndelay = { duty_percent = [0.0, 100.0], delay_s = [0.016, 0.016] }\n";
+    let (alone, mixed) = (car("").unwrap(), car(pulse_width).unwrap());
+    let [alone, mixed] = [&alone, &mixed].map(ErrorBudget::of_car);
+    let mut others = 0;
+    for (alone, mixed) in alone.elements.iter().flatten().zip(mixed.elements.iter().flatten()) {
+        if mixed.command_max == 100.0 {
+            assert_eq!(mixed.command, 1.0);
+        } else {
+            assert_eq!(alone, mixed);
+            assert!(mixed.command_max < 3.0 && mixed.command < 0.03, "{mixed:?}");
+            others += 1;
+        }
+    }
+    assert_eq!(others, 4);
+}
+
+#[test]
+fn weak_valves_within_the_bounds_have_their_commands() {
+    let bounds: String = ["A", "B", "C", "D", "E"]
+        .map(|name| format!("[clutch.{name}.error_bounds]\nvalve_gain_factor = [0.75, 1.25]\ncurrent_a = 0.02\n"))
+        .concat();
+    let car = car(&bounds).unwrap();
+    for (clutch, element) in car.clutches.iter().zip(&ErrorBudget::of_car(&car).elements) {
+        let (Some(clutch), Some(element)) = (clutch, element) else { continue };
+        assert_eq!((element.pressure_max_pa, element.command), (1.25 * car.line_pressure_pa, 0.02));
+        let weak = clutch.valve.changed(1.0, 0.75, None);
+        assert!(element.command_max > weak.command_for(car.line_pressure_pa));
     }
 }

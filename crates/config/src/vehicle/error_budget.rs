@@ -144,14 +144,14 @@ impl ElementErrors {
 
     fn of(clutch: &ShiftClutch, own: &ElementErrorBounds, line_pressure_pa: f64) -> Self {
         let valve_gain_factor = own.valve_gain_factor.unwrap_or(around(VALVE_GAIN));
-        let command_max = command_max(&clutch.valve, line_pressure_pa, valve_gain_factor);
+        let [needed, command_max] = command_limits(&clutch.valve, line_pressure_pa, valve_gain_factor);
         Self {
             friction_factor: own.friction_factor.unwrap_or(around(FRICTION)),
             valve_gain_factor,
             valve_lag_factor: own.valve_lag_factor.unwrap_or(around(VALVE_LAG)),
             valve_delay_s: own.valve_delay_s.unwrap_or_else(|| default_delay_s(&clutch.valve)),
             valve_hysteresis_pa: own.valve_hysteresis_pa.unwrap_or(HYSTERESIS_PA.max(clutch.hysteresis_pa)),
-            command: own.command.unwrap_or(COMMAND * command_max / COMMAND_ROOM),
+            command: own.command.unwrap_or(COMMAND * needed),
             command_max,
             pressure_max_pa: line_pressure_pa * valve_gain_factor[1],
         }
@@ -178,15 +178,16 @@ impl ElementErrors {
     }
 }
 
-/// The largest command of a valve, A or %, with this line pressure and these factors on its gain.
-pub(super) fn command_max(valve: &ClutchValve<f64>, line_pressure_pa: f64, gain_factor: [f64; 2]) -> f64 {
+/// The largest command that a valve needs, A or %, with this line pressure and these factors on its gain, and the largest that it may get.
+pub(super) fn command_limits(valve: &ClutchValve<f64>, line_pressure_pa: f64, gain_factor: [f64; 2]) -> [f64; 2] {
     match valve.command_kind() {
         // The controller of the weakest valve commands what that one needs. A normally-high valve has its largest command without pressure.
         CommandKind::Current => {
-            let most_pa = line_pressure_pa * gain_factor[1].max(gain_factor[0].recip());
-            COMMAND_ROOM * valve.command_for(0.0).max(valve.command_for(most_pa))
+            let highest_pa = line_pressure_pa * gain_factor[1].max(gain_factor[0].recip());
+            let needed = valve.command_for(0.0).max(valve.command_for(highest_pa));
+            [needed, COMMAND_ROOM * needed]
         }
-        CommandKind::DutyCycle => 100.0,
+        CommandKind::DutyCycle => [100.0; 2],
     }
 }
 

@@ -7,7 +7,7 @@ use geartrain::{Change, Shift};
 
 use super::facts::{Facts, ValveKind};
 use super::{ENGINE_TORQUE_N_M, MASS_SHARE, PISTON_AREAS_M2, PLATE_RADII_M, RATIO_BEFORE, TORQUE_SHARES, text_of};
-use crate::vehicle::error_budget::command_max;
+use crate::vehicle::error_budget::command_limits;
 use crate::vehicle::{Car, ElementErrors, ErrorBudget, SHAFT_OVER_TYRES, ShiftClutch, Uncertainty};
 use crate::{CompliantRequirement, ConfigError, DesignRequirement, ErrorBounds, Source, Vehicle};
 
@@ -197,8 +197,8 @@ impl<'c> OneShift<'c> {
         limits.pressure_max_pa = pressure_max_pa;
         limits.shaft_torque_max_n_m = SHAFT_OVER_TYRES * car.tyre.max_force_n * car.road.wheel_radius_m;
         if self.oncoming.valve.command_kind() == CommandKind::Current {
-            limits.command_max =
-                command_max(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor);
+            [_, limits.command_max] =
+                command_limits(&self.oncoming.valve, car.line_pressure_pa, self.element.valve_gain_factor);
         }
         let mut filter = size.filter;
         filter.offgoing_n_m *= self.offgoing_size();
