@@ -12,6 +12,7 @@ mod signals;
 use std::process::ExitCode;
 
 use clap::Parser;
+use trace::ShownPath as _;
 
 use args::{Arguments, Command};
 use failure::Failure;
@@ -19,6 +20,12 @@ use failure::Failure;
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
     let result = signals::end_cleanly(&command).and_then(|()| run(command));
+    for left in trace::left_by_killed() {
+        output::note(&format!(
+            "{}: an unfinished file of a run that was killed\nhint: remove it if no other run still writes it",
+            left.shown()
+        ));
+    }
     match result {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of standard output, such as `head`, has closed it: this is not an error.

@@ -26,9 +26,10 @@ pub use experiment::{
 };
 pub use gearbox::GearboxFile;
 pub use learnt::{read_learnt, write_learnt};
-pub use source::{Kind, Source, toml_number, toml_string};
+pub use source::{Kind, Source, toml_number};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
+pub use trace::toml_string;
 pub use vehicle::{
     Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ElementErrors,
     ErrorBounds, FilterSettings, LockUp, OneShiftError, ShiftClutch, ShiftErrors, TURBINE_SIDE_INERTIA_KG_M2,
