@@ -4,6 +4,8 @@
 //! no further checks. An error names file, line, key, value and allowed range, and gives a hint for a
 //! likely mistake.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod car_study;
 pub mod check;
 pub mod drive;

@@ -4,6 +4,8 @@
 //! use other common units (`_rpm`, `_bar`, `_ms`); they are converted when the file is read, so that all
 //! other crates use SI units.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod atomic;
 pub mod csv_file;
 mod early_sync;

@@ -136,7 +136,9 @@ fn a_name_of_a_file_that_controls_a_terminal_is_escaped_wherever_it_is_printed()
     let log = printed(&wetclutch(&["simulate", EXPERIMENT, "-o", &folder.path("sim")]));
     let log = folder.write(&name(".csv"), std::fs::read(log.lines().nth(1).unwrap()).unwrap());
     let estimate = format!("{out}.csv");
-    let cases: [&[&str]; 14] = [
+    let cases: [&[&str]; 16] = [
+        &["check", VEHICLE, &hostile],
+        &["check", "--all", &wrong, &missing],
         &["check", &wrong],
         &["check", &missing],
         &["check", &sensors],

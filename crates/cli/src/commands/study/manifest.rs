@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use trace::text_file::{LARGEST_LIST, read_text_of};
 use trace::{ShownPath as _, printable};
 
 use super::part::Runs;
@@ -33,19 +34,25 @@ pub(super) struct Manifest {
 }
 
 impl Manifest {
-    pub(super) fn of<R: Runs>(campaign: &R, shard: Option<Shard>) -> Self {
-        let all = campaign.count();
-        let runs = shard.map_or(0..all, |shard| shard.of(all));
+    /// Of a whole study.
+    pub(super) fn of<R: Runs>(campaign: &R) -> Self {
         let files = campaign.sources().into_iter().map(|(role, source)| (role.to_owned(), source.values()));
         Self {
             wetclutch: env!("CARGO_PKG_VERSION").to_owned(),
             study: campaign.name().to_owned(),
             sha256: campaign.fingerprint(),
-            shard: shard.map(|shard| shard.to_string()),
-            first_run: runs.start,
-            runs: runs.end - runs.start,
+            shard: None,
+            first_run: 0,
+            runs: campaign.count(),
             files: files.collect(),
         }
+    }
+
+    /// Of a shard of a study with so many runs.
+    #[must_use]
+    pub(super) fn of_shard(self, shard: Shard, all: u64) -> Self {
+        let runs = shard.of(all);
+        Self { shard: Some(shard.to_string()), first_run: runs.start, runs: runs.end - runs.start, ..self }
     }
 
     pub(super) fn path(folder: &Path) -> PathBuf {
@@ -59,7 +66,7 @@ impl Manifest {
     /// The manifest of a folder.
     pub(super) fn read(folder: &Path) -> Result<Self, Failure> {
         let path = Self::path(folder);
-        let text = trace::read_text(&path).map_err(|error| {
+        let text = read_text_of(&path, LARGEST_LIST).map_err(|error| {
             let hint = if error.to_string().contains("\nhint: ") { "" } else { "\nhint: name the folder of a study" };
             Failure::Input(format!("{}: {error}{hint}", path.shown()))
         })?;
@@ -157,7 +164,7 @@ fn cut(value: &str) -> String {
 
 /// The folders of all shards of a study in the order of their runs.
 pub(super) fn in_order<'a, R: Runs>(campaign: &R, folders: &'a [PathBuf]) -> Result<Vec<(&'a Path, Shard)>, Failure> {
-    let expected = Manifest::of(campaign, None);
+    let mut expected = Manifest::of(campaign);
     let mut shards: Vec<(&Path, Shard)> = Vec::new();
     for folder in folders {
         let found = Manifest::read(folder)?;
@@ -173,7 +180,8 @@ pub(super) fn in_order<'a, R: Runs>(campaign: &R, folders: &'a [PathBuf]) -> Res
         let shard: Shard = shard.parse().map_err(|error| {
             Failure::Input(format!("{}: `shard` is \"{}\": {error}", path.shown(), printable(shard)))
         })?;
-        found.check(&Manifest::of(campaign, Some(shard)), folder)?;
+        expected = expected.of_shard(shard, campaign.count());
+        found.check(&expected, folder)?;
         match shards.iter().find(|(_, other)| other.count != shard.count || other.index == shard.index) {
             Some((other, first)) if first.count != shard.count => {
                 return Err(Failure::Input(format!(

@@ -139,7 +139,11 @@ impl<R: Runs> Part<'_, R> {
 
     /// Everything that determines the rows.
     fn manifest(&self) -> Manifest {
-        Manifest::of(self.campaign, self.shard)
+        let whole = Manifest::of(self.campaign);
+        match self.shard {
+            Some(shard) => whole.of_shard(shard, self.campaign.count()),
+            None => whole,
+        }
     }
 
     pub(super) fn check_manifest(&self) -> Result<(), Failure> {
