@@ -207,14 +207,9 @@ fn an_output_does_not_replace_what_it_is_made_from_or_another_kind_of_file() {
     let of_folder = |text: String| text.replace("../vehicles", &format!("{ROOT}vehicles"));
     let speeds = "time_s,speed_km_h\n0,0\n5,20\n";
     let drive = format!("name = \"cycle\"\nvehicle = \"{CAR}\"\n[trace]\nfile = \"cycle.csv\"\n");
-    let drive = folder.write(
-        "d.toml",
-        drive
-            + &text("drives/city.toml")[text("drives/city.toml").find("[schedule]").unwrap()..]
-                .split("\n[[")
-                .next()
-                .unwrap(),
-    );
+    let city = text("drives/city.toml");
+    let schedule = city[city.find("[schedule]").unwrap()..].split("\n[[").next().unwrap();
+    let drive = folder.write("d.toml", format!("{drive}{schedule}"));
     folder.write("cycle.csv", speeds);
     let error = refused(&wetclutch(&["simulate", &drive, "-o", &folder.path("")]));
     assert!(error.contains("cycle.csv: the output would replace this input"), "{error}");
