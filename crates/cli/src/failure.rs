@@ -13,7 +13,7 @@ use plant::PlantError;
 use report::PageError;
 use study::StudyError;
 use study::any_shift::AnyShiftError;
-use trace::TraceError;
+use trace::{ShownPath as _, TraceError};
 
 /// Why a command failed.
 #[derive(Debug)]
@@ -37,12 +37,29 @@ impl Failure {
 
     /// A file that could not be written.
     pub(crate) fn writing(path: &Path, error: &io::Error) -> Self {
-        let message = format!("{}: {error}", path.display());
+        let mut message = format!("{}: {error}", path.shown());
+        if let Some(hint) = hint_for(error.kind()).filter(|_| !message.contains("\nhint: ")) {
+            message += &format!("\nhint: {hint}");
+        }
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::BrokenPipe,
             io::ErrorKind::IsADirectory => Self::Input(message),
             _ => Self::Work(message),
         }
+    }
+}
+
+/// What to do about a file that cannot be written.
+fn hint_for(kind: io::ErrorKind) -> Option<&'static str> {
+    match kind {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            Some("make room on the disk, or choose another place after -o")
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            Some("choose a folder after -o that can be written to")
+        }
+        io::ErrorKind::InvalidFilename => Some("choose a shorter name after -o"),
+        _ => None,
     }
 }
 

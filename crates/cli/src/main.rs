@@ -3,6 +3,8 @@
 //! **Architecture invariant:** this is the only crate that prints. Data goes to standard output, messages
 //! and progress to standard error.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod args;
 mod commands;
 mod failure;
@@ -12,13 +14,28 @@ mod signals;
 use std::process::ExitCode;
 
 use clap::Parser;
+use trace::{ShownPath as _, printable};
 
 use args::{Arguments, Command};
 use failure::Failure;
 
 fn main() -> ExitCode {
-    let command = Arguments::parse().command;
+    let command = match Arguments::try_parse() {
+        Ok(arguments) => arguments.command,
+        // The message repeats what was typed, and a shell may have completed the name of a file.
+        Err(error) if error.use_stderr() => {
+            let shown = std::env::args_os().map(|of| printable(&of.to_string_lossy()).into_owned());
+            Arguments::try_parse_from(shown).err().unwrap_or(error).exit()
+        }
+        Err(error) => error.exit(),
+    };
     let result = signals::end_cleanly(&command).and_then(|()| run(command));
+    for left in trace::left_by_killed() {
+        output::note(&format!(
+            "{}: an unfinished file of a run that was killed\nhint: remove it if no other run still writes it",
+            left.shown()
+        ));
+    }
     match result {
         Ok(()) => ExitCode::SUCCESS,
         // The reader of standard output, such as `head`, has closed it: this is not an error.

@@ -1,8 +1,17 @@
 //! Messages and tables. Colours appear on terminals only and never under `NO_COLOR`.
+//!
+//! Names of files, and names in files, are other people's. Whatever is written here for people has no character that controls a
+//! terminal: see [`printable_lines`]. JSON and TOML have escapes of their own.
 
+use std::borrow::Cow;
+use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use anstyle::{AnsiColor, Style};
+use serde::Serialize;
+use trace::{is_unprintable, printable};
+
+use crate::failure::Failure;
 
 const ERROR: Style = AnsiColor::Red.on_default().bold();
 const HINT: Style = AnsiColor::Cyan.on_default();
@@ -11,12 +20,20 @@ const HINT: Style = AnsiColor::Cyan.on_default();
 pub(crate) fn error(message: &str) {
     let mut stderr = anstream::stderr().lock();
     // There is no other place to report that standard error cannot be written.
-    let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", coloured_hints(message));
+    let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", coloured_hints(&printable_lines(message)));
 }
 
 /// A message on standard error.
 pub(crate) fn note(message: &str) {
-    let _ = writeln!(anstream::stderr().lock(), "{message}");
+    let _ = writeln!(anstream::stderr().lock(), "{}", printable_lines(message));
+}
+
+/// A text whose characters are all printed, those that are not escaped. Only its own line breaks stay.
+fn printable_lines(text: &str) -> Cow<'_, str> {
+    if !text.chars().any(|c| c != '\n' && is_unprintable(c)) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.split('\n').map(printable).collect::<Vec<_>>().join("\n"))
 }
 
 fn coloured_hints(message: &str) -> String {
@@ -34,6 +51,7 @@ pub(crate) fn table(left: usize, rows: &[Vec<String>]) -> io::Result<()> {
 
 /// The same, of rows that may be very many: each is made twice, and none is kept.
 pub(crate) fn long_table<R: Iterator<Item = Vec<String>>>(left: usize, rows: impl Fn() -> R) -> io::Result<()> {
+    let rows = || rows().map(printable_cells);
     let mut widths = Vec::new();
     for row in rows() {
         widths.resize(row.len().max(widths.len()), 0);
@@ -42,9 +60,15 @@ pub(crate) fn long_table<R: Iterator<Item = Vec<String>>>(left: usize, rows: imp
     rows().try_for_each(|row| self::line(&line_of(left, &row, &widths)))
 }
 
+/// The cells of a row, each on one line.
+fn printable_cells(row: Vec<String>) -> Vec<String> {
+    row.into_iter().map(|cell| if let Cow::Owned(escaped) = printable(&cell) { escaped } else { cell }).collect()
+}
+
 /// The lines of a table, as [`table`] has them, below its titles. A title that is wider than the cells of its
 /// column takes several lines.
 pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>]) -> Vec<String> {
+    let rows: Vec<Vec<String>> = rows.iter().cloned().map(printable_cells).collect();
     let length = |text: &str| text.chars().count();
     let widest = |j: usize| rows.iter().filter_map(|row| row.get(j)).map(|cell| length(cell)).max().unwrap_or(0);
     let word = |title: &str| words(title).map(|word| length(&word)).max().unwrap_or(0);
@@ -58,7 +82,7 @@ pub(crate) fn titled_lines(left: usize, titles: &[String], rows: &[Vec<String>])
         titles.iter().map(of).collect::<Vec<_>>()
     };
     let titles: Vec<Vec<String>> = (0..height).map(title_line).collect();
-    titles.iter().chain(rows).map(|row| line_of(left, row, &widths)).collect()
+    titles.iter().chain(&rows).map(|row| line_of(left, row, &widths)).collect()
 }
 
 /// A text in lines of at most this width, as far as its words are no wider. The two words of a unit stay together.
@@ -92,6 +116,36 @@ fn line_of(left: usize, row: &[String], widths: &[usize]) -> String {
 /// A line on standard output. A reader that has closed it, such as `head`, misses the rest: that is no error, and the files of the
 /// command are still written.
 pub(crate) fn line(text: &str) -> io::Result<()> {
+    raw_line(&printable_lines(text))
+}
+
+/// A text in TOML on standard output.
+pub(crate) fn toml(text: &str) -> io::Result<()> {
+    raw_line(text)
+}
+
+/// A value in JSON on standard output.
+pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
+    Ok(raw_line(&escaped_json(&serde_json::to_string_pretty(value)?))?)
+}
+
+/// JSON without characters that are not printed: they stand in strings alone.
+fn escaped_json(json: &str) -> String {
+    let mut escaped = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c == '\n' || !is_unprintable(c) {
+            escaped.push(c);
+            continue;
+        }
+        for unit in c.encode_utf16(&mut [0; 2]) {
+            // A string takes everything.
+            let _ = write!(escaped, "\\u{unit:04x}");
+        }
+    }
+    escaped
+}
+
+fn raw_line(text: &str) -> io::Result<()> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         written => written,
@@ -130,6 +184,26 @@ mod tests {
         );
         assert_eq!(titled_lines(1, &titles, &[]).len(), 4);
         assert!(titled_lines(1, &[], &[]).is_empty());
+    }
+
+    #[test]
+    fn no_message_or_table_has_a_character_that_controls_a_terminal() {
+        let hostile = "a\u{1b}]0;x\u{7}\u{9b}2J\u{202e}\tb\nhint: c";
+        assert_eq!(printable_lines(hostile), "a\\u{1b}]0;x\\u{7}\\u{9b}2J\\u{202e}\\tb\nhint: c");
+        assert!(matches!(printable_lines("two lines\nof ü"), Cow::Borrowed(_)));
+        let row = vec![hostile.to_owned(), "1".to_owned()];
+        let escaped = "a\\u{1b}]0;x\\u{7}\\u{9b}2J\\u{202e}\\tb\\nhint: c";
+        assert_eq!(printable_cells(row.clone()), [escaped, "1"]);
+        let lines = titled_lines(1, &["name".to_owned(), "x".to_owned()], &[row]);
+        assert_eq!(lines[1..], [format!("{escaped}  1")]);
+    }
+
+    #[test]
+    fn json_without_unprintable_characters_is_the_same_value() {
+        let value = serde_json::json!({ "a\u{9b}b": ["\u{1b}[2J\n", "\u{e0041}\u{202e}ü", "plain \\ \"quoted\""] });
+        let text = escaped_json(&serde_json::to_string_pretty(&value).unwrap());
+        assert!(!text.chars().any(|c| c != '\n' && is_unprintable(c)), "{text:?}");
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use drivetrain::table::{MAX_POINTS, check_axis};
 use drivetrain::{Table1, TableError};
 use toml::Spanned;
+use trace::printable;
 
 use crate::source::Layers;
 use crate::{ConfigError, Source};
@@ -248,7 +249,7 @@ impl<'a> Check<'a> {
         ))
     }
 
-    /// An error about what a value means.
+    /// An error about what a value means: message and hint of one line each, which may quote the file.
     pub(crate) fn meaning(
         &self,
         key: impl Display,
@@ -257,7 +258,9 @@ impl<'a> Check<'a> {
         hint: Option<String>,
     ) -> ConfigError {
         let (path, line) = self.layers.place(offset);
-        ConfigError::Meaning { path, line, key: key.to_string(), message, hint }
+        let one_line = |text: String| printable(&text).into_owned();
+        let (key, message) = (one_line(key.to_string()), one_line(message));
+        ConfigError::Meaning { path, line, key, message, hint: hint.map(one_line) }
     }
 
     fn in_range(
@@ -271,7 +274,7 @@ impl<'a> Check<'a> {
             return Ok(value);
         }
         let (path, line) = self.layers.place(offset);
-        let key = key.to_string();
+        let key = printable(&key.to_string()).into_owned();
         Err(ConfigError::Range {
             path,
             line,

@@ -230,7 +230,7 @@ fn read_trace(check: &Check<'_>, source: &Source, raw: &RawTrace) -> Result<Spee
         Some(grade) => check.number("trace.grade_rad", grade, -0.4..=0.4)?,
         None => 0.0,
     };
-    let file = Source::read(&folder.join(raw.file.get_ref()));
+    let file = Source::read_list(&folder.join(raw.file.get_ref()));
     let file = file.map_err(|error| error.named_by(source, "trace.file", raw.file.span().start))?;
     SpeedTrace::from_source(&file, grade_rad)
 }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use trace::ShownPath as _;
+
 use crate::Source;
 use crate::check::Check;
 
@@ -9,7 +11,7 @@ use crate::check::Check;
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", path.shown())]
     Read {
         /// The file.
         path: PathBuf,
@@ -17,7 +19,7 @@ pub enum ConfigError {
         source: std::io::Error,
     },
     /// The text is not TOML, has an unknown key, or has a value of the wrong type.
-    #[error("{}:{line}: {message}", path.display())]
+    #[error("{}:{line}: {message}", path.shown())]
     Syntax {
         /// The file.
         path: PathBuf,
@@ -27,7 +29,7 @@ pub enum ConfigError {
         message: String,
     },
     /// A number outside its range.
-    #[error("{}:{line}: `{key}` is {value}, expected {allowed}{}", path.display(), hint_line(hint))]
+    #[error("{}:{line}: `{key}` is {value}, expected {allowed}{}", path.shown(), hint_line(hint))]
     Range {
         /// The file.
         path: PathBuf,
@@ -43,7 +45,7 @@ pub enum ConfigError {
         hint: Option<String>,
     },
     /// A value that does not fit the others.
-    #[error("{}:{line}: `{key}`: {message}{}", path.display(), hint_line(hint))]
+    #[error("{}:{line}: `{key}`: {message}{}", path.shown(), hint_line(hint))]
     Meaning {
         /// The file.
         path: PathBuf,
@@ -73,7 +75,12 @@ impl ConfigError {
     pub(crate) fn named_by(self, by: &Source, key: &str, offset: usize) -> Self {
         match self {
             Self::Read { path, source } => {
-                Check::of(by).meaning(key, offset, format!("{}: {source}", path.display()), None)
+                let text = source.to_string();
+                let (what, hint) = match text.split_once("\nhint: ") {
+                    Some((what, hint)) => (what, Some(hint.to_owned())),
+                    None => (text.as_str(), None),
+                };
+                Check::of(by).meaning(key, offset, format!("{}: {what}", path.shown()), hint)
             }
             other => other,
         }

@@ -6,8 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::check::Check;
-use crate::source::toml_string;
-use crate::{ConfigError, Source};
+use crate::{ConfigError, Source, toml_string};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

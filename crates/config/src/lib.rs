@@ -4,6 +4,8 @@
 //! no further checks. An error names file, line, key, value and allowed range, and gives a hint for a
 //! likely mistake.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod car_study;
 pub mod check;
 pub mod drive;
@@ -26,9 +28,10 @@ pub use experiment::{
 };
 pub use gearbox::GearboxFile;
 pub use learnt::{read_learnt, write_learnt};
-pub use source::{Kind, Source, toml_number, toml_string};
+pub use source::{Kind, Source, toml_number};
 pub use speed_trace::SpeedTrace;
 pub use study::{Change, Factor, Plan, Sometimes, Study, Target, Values, Varied};
+pub use trace::toml_string;
 pub use vehicle::{
     Car, CarErrorBounds, CompliantRequirement, DefaultTaken, DesignRequirement, ElementErrorBounds, ElementErrors,
     ErrorBounds, ErrorBudget, FilterSettings, LockUp, OneShiftError, ShiftClutch, TURBINE_SIDE_INERTIA_KG_M2,

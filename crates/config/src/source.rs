@@ -1,5 +1,7 @@
 //! The text of a configuration file.
 
+use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +9,7 @@ use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
+use trace::text_file::{LARGEST_LIST, LARGEST_TEXT, read_text_of};
 
 use crate::ConfigError;
 
@@ -31,6 +34,8 @@ pub enum Kind {
     Sensors,
     /// A gearbox.
     Gearbox,
+    /// What the filter for any shift has learnt of a car.
+    Learnt,
 }
 
 impl Kind {
@@ -46,6 +51,7 @@ impl Kind {
             Self::Overlay => "a file with a part of a vehicle file, such as bounds",
             Self::Sensors => "a sensors file",
             Self::Gearbox => "a gearbox file",
+            Self::Learnt => "a file of what was learnt of a car",
         }
     }
 
@@ -60,18 +66,9 @@ impl Kind {
             Self::Overlay => "`wetclutch design VEHICLE` takes it after --bounds",
             Self::Sensors => "`wetclutch estimate` takes it after --sensors",
             Self::Gearbox => "a vehicle file names it as `gearbox`; `wetclutch check` describes it",
+            Self::Learnt => "`wetclutch estimate` takes it after --learnt",
         }
     }
-}
-
-/// A text as a TOML file holds it: in double quotes, on one line, with everything else escaped.
-pub fn toml_string(text: &str) -> String {
-    let escaped = text.chars().map(|c| match c {
-        '"' | '\\' => format!("\\{c}"),
-        _ if c.is_control() => format!("\\u{:04x}", u32::from(c)),
-        _ => c.to_string(),
-    });
-    format!("\"{}\"", escaped.collect::<String>())
 }
 
 /// A number with five digits as TOML has it.
@@ -106,12 +103,24 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a file.
+    /// Reads a TOML file.
     ///
     /// # Errors
-    /// The file cannot be read as UTF-8 text.
+    /// The file is no regular file, is larger than [`trace::text_file::LARGEST_TEXT`], or is not UTF-8 text.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| {
+        Self::read_of(path, LARGEST_TEXT)
+    }
+
+    /// Reads a file with an entry in each line, such as a speed cycle: it may be longer than TOML.
+    ///
+    /// # Errors
+    /// See [`Self::read`].
+    pub(crate) fn read_list(path: &Path) -> Result<Self, ConfigError> {
+        Self::read_of(path, LARGEST_LIST)
+    }
+
+    fn read_of(path: &Path, largest_bytes: u64) -> Result<Self, ConfigError> {
+        let text = read_text_of(path, largest_bytes).map_err(|source| {
             let source = match source.kind() {
                 io::ErrorKind::InvalidData => io::Error::new(
                     source.kind(),
@@ -134,6 +143,15 @@ impl Source {
         Sha256::digest(self.text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
+    /// The values of the file by their keys, such as `shift.request_s` or `factor.0.key`, as TOML; none of a text that is not TOML.
+    pub fn values(&self) -> BTreeMap<String, String> {
+        let mut values = BTreeMap::new();
+        if let Ok(table) = self.parse::<toml::Table>() {
+            values_of("", &toml::Value::Table(table), &mut values);
+        }
+        values
+    }
+
     /// Line, counted from 1, of a byte offset.
     pub fn line(&self, offset: usize) -> usize {
         1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
@@ -150,6 +168,7 @@ impl Source {
         match (has("gear_train"), has("shift"), has("factor")) {
             (true, false, false) => Ok(Kind::Vehicle),
             (false, _, false) if has("segment") || has("trace") => Ok(Kind::Drive),
+            (false, false, false) if has("gearbox") && has("elements") && has("covariance") => Ok(Kind::Learnt),
             (false, false, false) if has("runs") && has("vehicle") => Ok(Kind::CarStudy),
             (false, false, false) if tables.get("gearbox").is_some_and(toml::Value::is_str) => Ok(Kind::Car),
             (false, true, false) => Ok(Kind::Experiment),
@@ -218,6 +237,20 @@ impl Source {
     }
 }
 
+/// Adds the values below a key to `values`. A list of numbers or words is one value.
+fn values_of(key: &str, value: &toml::Value, values: &mut BTreeMap<String, String>) {
+    let below = |name: &dyn Display| if key.is_empty() { name.to_string() } else { format!("{key}.{name}") };
+    match value {
+        toml::Value::Table(table) => table.iter().for_each(|(name, value)| values_of(&below(name), value, values)),
+        toml::Value::Array(list) if list.iter().any(toml::Value::is_table) => {
+            list.iter().enumerate().for_each(|(at, value)| values_of(&below(&at), value, values));
+        }
+        value => {
+            values.insert(key.to_owned(), value.to_string());
+        }
+    }
+}
+
 /// A file, and a second file whose values replace those of the first.
 ///
 /// A place in the second file is its offset there plus the length of the first one's text.
@@ -241,7 +274,7 @@ impl Layers<'_> {
     /// An error of the parser with its place.
     fn syntax(&self, error: &toml::de::Error) -> ConfigError {
         let (path, line) = self.place(error.span().map_or(0, |span| span.start));
-        ConfigError::Syntax { path, line, message: error.message().to_owned() }
+        ConfigError::Syntax { path, line, message: trace::printable(error.message()).into_owned() }
     }
 
     /// Reads the text into raw types.
@@ -275,13 +308,20 @@ fn lay_over<'t>(below: &mut DeTable<'t>, above: DeTable<'t>) {
 
 #[cfg(test)]
 mod tests {
+    use trace::toml_string;
+
     use super::*;
 
     #[test]
     fn a_text_in_a_toml_file_is_read_back_as_it_was() {
-        for text in
-            ["", "a \"b\"", "C:\\new", "it's # no = comment", "two\nlines\tand\u{7f}\u{85}", "Kupplung ü 离合器"]
-        {
+        for text in [
+            "",
+            "a \"b\"",
+            "C:\\new",
+            "it's # no = comment",
+            "two\nlines\tand\u{7f}\u{85}\u{202e}\u{e0041}",
+            "Kupplung ü 离合器",
+        ] {
             let quoted = toml_string(text);
             let table: toml::Table = toml::from_str(&format!("# {quoted}\ntext = {quoted}\n")).unwrap();
             assert_eq!(table["text"].as_str(), Some(text), "{quoted}");

@@ -1,5 +1,7 @@
 //! Speeds over time that a driver follows: a file of two columns.
 
+use std::path::PathBuf;
+
 use crate::check::Check;
 use crate::{ConfigError, Source};
 
@@ -11,6 +13,8 @@ const SPEEDS: [(&str, f64); 3] = [("speed_m_s", 1.0), ("speed_km_h", 1.0 / 3.6),
 /// Speeds over time, linear between the points, on a road of one grade.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedTrace {
+    /// The file.
+    pub path: PathBuf,
     /// Rising times, s; the first is zero.
     time_s: Vec<f64>,
     /// A speed for each, m/s.
@@ -33,7 +37,7 @@ impl SpeedTrace {
         const HEAD: &str =
             "the first line is \"time_s,speed_km_h\" (or speed_m_s, speed_mph), then one point in each line";
         let mut unit_m_s = None;
-        let mut trace = Self { time_s: Vec::new(), speed_m_s: Vec::new(), grade_rad };
+        let mut trace = Self { path: source.path.clone(), time_s: Vec::new(), speed_m_s: Vec::new(), grade_rad };
         let mut at = 0;
         for line in source.text.split_inclusive('\n') {
             let begin = at;

@@ -15,6 +15,7 @@ use config::Vehicle;
 use nalgebra::DMatrix;
 use observer::{CompliantGains, CompliantModel, CompliantObserver, Discretisation, Phase, Schedule};
 use serde::Serialize;
+use trace::ShownPath as _;
 
 use crate::budget::{grade_n_m, mass_n_m, turbine_n_m};
 use crate::certificate::BOTH_DIRECTIONS;
@@ -310,7 +311,7 @@ pub fn best_compliant_phase(
         let key = format!("design.compliant.{}.offset_max_pa", phase.name());
         OffsetMissed {
             phase,
-            required_by: format!("`{key}` of {}", vehicle.source.path.display()),
+            required_by: format!("`{key}` of {}", vehicle.source.path.shown()),
             required_pa: requirement.offset_max_pa,
             settling_time_s,
             offset_pa: certificate.offset_pa,

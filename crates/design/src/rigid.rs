@@ -6,6 +6,7 @@ use observer::{
     ShaftErrors, ShaftRange, Tracker,
 };
 use serde::Serialize;
+use trace::ShownPath as _;
 
 use crate::iss::{OffsetMissed, required, settling_time_for};
 use crate::{Certificate, DesignError, IssRequirement, Polytope, design_iss};
@@ -173,7 +174,7 @@ pub fn best_phase(
         let offset = |kappa2_per_s| design(kappa2_per_s).ok().map(|certificate| certificate.offset_pa);
         OffsetMissed {
             phase,
-            required_by: format!("`design.{}.offset_max_pa` of {}", phase.name(), vehicle.source.path.display()),
+            required_by: format!("`design.{}.offset_max_pa` of {}", phase.name(), vehicle.source.path.shown()),
             required_pa: requirement.offset_max_pa,
             settling_time_s,
             offset_pa: certificate.offset_pa,

@@ -8,7 +8,7 @@ use drivetrain::{ClutchValve, CommandKind};
 use logs::{
     ChannelMap, Direction, Gearbox, Load, Log, LogError, Mapped, Quality, Reading, Readings, Role, Shift, ShiftFinder,
 };
-use trace::{Unit, signal};
+use trace::{ShownPath as _, Unit, signal};
 
 use crate::drives::driven_car;
 use crate::driving::{Driving, DrivingRecorder, RowState, turns_by};
@@ -66,7 +66,7 @@ pub fn own_names(log: &Log) -> Result<ChannelMap, FitError> {
         return Err(FitError::input(format!(
             "{}: column `{age}` has ages of readings, which a fit does not read\n\
              hint: give a log in which each channel has its own times, with --map",
-            log.path().display()
+            log.path().shown()
         )));
     }
     for name in names() {
@@ -138,7 +138,7 @@ fn needed(path: &Path, map: &ChannelMap, command: Role) -> Result<(), FitError> 
         Some(missing) => Err(FitError::input(format!(
             "{}: there is no {role}, and a fit needs {}\n\
              hint: say which channel it is with --map or `--channel {role}=NAME`; `wetclutch inspect` lists the channels",
-            path.display(),
+            path.shown(),
             needed.map(Role::name).join(", "),
             role = missing.name(),
         ))),
@@ -156,7 +156,7 @@ fn reason_against(shift: &Shift) -> Option<&'static str> {
 }
 
 fn name(path: &Path, time_s: f64) -> String {
-    format!("{} at {time_s:.2} s", path.display())
+    format!("{} at {time_s:.2} s", path.shown())
 }
 
 /// The shifts of a log, and what is to be said about its channels.

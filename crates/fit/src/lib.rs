@@ -5,6 +5,8 @@
 //! readings. [`fit`] finds the parameters of the car that are the same in all shifts, with intervals
 //! ([`Precision`]); what the readings cannot tell keeps what was known before, and the report says so.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod budget;
 mod car;
 pub mod collect;

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use trace::shown_path;
+use trace::ShownPath as _;
 
 /// Why a log cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read.
-    #[error("{}: {source}", shown_path(path))]
+    #[error("{}: {source}", path.shown())]
     Io {
         /// The file.
         path: PathBuf,
@@ -16,7 +16,7 @@ pub enum LogError {
         source: std::io::Error,
     },
     /// The file as a whole is not what it should be.
-    #[error("{}: {message}", shown_path(path))]
+    #[error("{}: {message}", path.shown())]
     File {
         /// The file.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum LogError {
         message: String,
     },
     /// The file is damaged at one place.
-    #[error("{}: {position}: {message}", shown_path(path))]
+    #[error("{}: {position}: {message}", path.shown())]
     Damaged {
         /// The file.
         path: PathBuf,

@@ -7,6 +7,8 @@
 //!
 //! **Architecture invariant:** this is the only crate that reads the formats of recorders.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod ahead;
 pub mod arrays;
 pub mod can;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use trace::csv_file::LONGEST_ROW;
-use trace::{Following, shown_path};
+use trace::{Following, ShownPath as _};
 
 use crate::ahead::Crew;
 use crate::arrays::Arrays;
@@ -256,14 +256,14 @@ impl Log {
             [one] => Ok(one),
             [] => Err(LogError::map(format!(
                 "{}: there is no channel `{}`{}\nhint: {}",
-                shown_path(&self.path),
+                self.path.shown(),
                 error::shown(name),
                 group.map_or(String::new(), |group| format!(" in group `{}`", error::shown(group))),
                 self.nearest(name)
             ))),
             _ => Err(LogError::map(format!(
                 "{}: there are {} channels `{}`\nhint: {}",
-                shown_path(&self.path),
+                self.path.shown(),
                 found.len(),
                 error::shown(name),
                 self.told_apart(&found)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use trace::{Quantity, Unit};
+use trace::{Quantity, ShownPath as _, Unit};
 
 use crate::{Channel, Log, LogError, OpenOptions, Role, TimeColumn, csv_log, error};
 
@@ -149,9 +149,13 @@ impl ChannelMap {
     /// # Errors
     /// The file cannot be read, or something in it is wrong; the message has the line.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let text = std::fs::read_to_string(path).map_err(LogError::io(path))?;
-        let wrong = |message: String| LogError::map(format!("{}: {message}", path.display()));
-        let raw: RawMap = toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))?;
+        let text = trace::read_text(path).map_err(LogError::io(path))?;
+        let wrong = |message: String| LogError::map(format!("{}: {message}", path.shown()));
+        let raw: RawMap = toml::from_str(&text).map_err(|error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let line = 1 + before.matches('\n').count();
+            LogError::map(format!("{}:{line}: {}", path.shown(), trace::printable(error.message())))
+        })?;
         let channels =
             raw.channel.into_iter().map(|(role, raw)| mapped(&role, raw).map_err(&wrong)).collect::<Result<_, _>>()?;
         let folder = path.parent().unwrap_or(Path::new(""));

@@ -279,7 +279,11 @@ fn of_share(table: &str) -> String {
 
 /// A text as TOML writes it.
 fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+    match text.chars().any(trace::is_unprintable) {
+        // The text goes to a terminal.
+        true => trace::toml_string(text),
+        false => toml::Value::String(text.to_owned()).to_string(),
+    }
 }
 
 #[cfg(test)]

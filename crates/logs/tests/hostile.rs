@@ -151,3 +151,29 @@ fn a_broken_dbc_is_an_error() {
         assert!(error.contains(message), "{error}");
     }
 }
+
+#[test]
+fn a_text_that_is_no_dbc_or_map_is_named_by_its_line_and_not_repeated() {
+    let folder = Folder::new("named-by-line");
+    let long = "x".repeat(1 << 20);
+    for text in ["VERSION \"\"\nBO_ 1 \u{1b}[31mM: 8 X\n", &format!("VERSION \"\"\nBO_ 1 {long}")] {
+        let path = folder.write("wrong.dbc", text);
+        let error = logs::can::Database::read(&path).unwrap_err().to_string();
+        assert!(
+            error.starts_with(&format!("{}: line 2: this is no DBC that can be read: ", path.display())),
+            "{error}"
+        );
+        assert!(error.len() < 1000 && !error.contains('\u{1b}'), "{error:?}");
+    }
+    for (line, text) in [
+        (2, "[time]\nname = \u{1b}[31m\n"),
+        (3, &format!("[time]\n\nname = {long}\n")),
+        (3, "[time]\nname = \"t\"\n\"\\u001b[31m\" = 1\n"),
+        (2, "[channel.engine_speed]\nname = [1]\n"),
+    ] {
+        let path = folder.write("map.toml", text);
+        let error = logs::ChannelMap::read(&path).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("{}:{line}: ", path.display())), "{error}");
+        assert!(error.len() < 1000 && !error.contains('\u{1b}'), "{error:?}");
+    }
+}

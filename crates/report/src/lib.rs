@@ -1,5 +1,7 @@
 //! Figures and the HTML reports.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod axis;
 pub mod bench_page;
 pub mod car_sensitivity_page;

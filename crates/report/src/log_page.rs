@@ -9,6 +9,7 @@ use minijinja::{Value, context};
 use observer::Health;
 use study::shift_estimates::{EstimatedShift, Ranged, thinned};
 use study::{LogSample, Overview, ShiftEstimate};
+use trace::ShownPath as _;
 use trace::units::{mpa, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
@@ -76,7 +77,7 @@ impl LogPage<'_> {
             version => env!("CARGO_PKG_VERSION"),
             vehicle_name => &self.vehicle.name,
             observer => self.observer,
-            log => self.log.display().to_string(),
+            log => self.log.shown().to_string(),
             shifts_of_log => self.shifts_of_log,
             shown => self.shifts.len(),
             undrawn => self.shifts.len() - drawn,

@@ -4,6 +4,7 @@ use config::{Source, Vehicle};
 use minijinja::{Environment, Value, context};
 use observer::Phase;
 use study::Comparison;
+use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::shift_figure::{drive_figure, shift_figure};
@@ -45,7 +46,7 @@ pub(crate) fn templates() -> Result<Environment<'static>, minijinja::Error> {
 
 /// The files that a page follows from, for the end of the page.
 pub(crate) fn origin(sources: &[&Source]) -> Vec<Value> {
-    let one = |source: &&Source| context! { path => source.path.display().to_string(), sha256 => source.sha256() };
+    let one = |source: &&Source| context! { path => source.path.shown().to_string(), sha256 => source.sha256() };
     sources.iter().map(one).collect()
 }
 

@@ -6,6 +6,7 @@ use config::{Study, Vehicle};
 use minijinja::{Value, context};
 use study::statements::{BoundCheck, Case, Figure, Settings, Unit};
 use study::{Chapter, Comparison, Statement};
+use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::map_figures::map_figures;
@@ -50,7 +51,7 @@ impl Reproduction {
                     scores => score_rows(comparison),
                     quality => comparison.quality.as_ref().map(quality_rows),
                     seed => comparison.experiment.sensors.map(|sensors| sensors.seed),
-                    source => comparison.experiment.source.path.display().to_string(),
+                    source => comparison.experiment.source.path.shown().to_string(),
                     sha256 => comparison.experiment.source.sha256(),
                 }
             })
@@ -60,7 +61,7 @@ impl Reproduction {
             title => "The chapter’s experiments",
             version => env!("CARGO_PKG_VERSION"),
             vehicle_name => &vehicle.name,
-            vehicle_source => vehicle.source.path.display().to_string(),
+            vehicle_source => vehicle.source.path.shown().to_string(),
             vehicle_sha256 => vehicle.source.sha256(),
             range_mpa => format!("{:.1}", mpa(chapter.experiments[0].experiment.shift.line_pressure_pa)),
             statements => groups(chapter).iter().filter(|rows| rows[0].bound.is_none()).map(|rows| statement_view(rows)).collect::<Vec<_>>(),
@@ -69,7 +70,7 @@ impl Reproduction {
             offset_tests => OFFSETS,
             agreeing => agreeing(chapter),
             experiments => experiments,
-            study_source => study.source.path.display().to_string(),
+            study_source => study.source.path.shown().to_string(),
             study_sha256 => study.source.sha256(),
             study_seed => study.seed,
             maps => maps.iter().map(|(_, svg)| inline(svg)).collect::<Vec<_>>(),

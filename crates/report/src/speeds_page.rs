@@ -7,6 +7,7 @@ use fit::Series as Readings;
 use fit::drive::{ConverterFit, DriveRecord, Moment, ShiftTorque};
 use logs::Shift;
 use minijinja::{Value, context};
+use trace::ShownPath as _;
 use trace::units::{km_h, rpm};
 
 use crate::figure::{Axis, Band, Figure, Panel, Series, Span, Stroke};
@@ -76,7 +77,7 @@ impl SpeedsPage<'_> {
             name => file,
             title => "drive",
             version => env!("CARGO_PKG_VERSION"),
-            log => self.log.display().to_string(),
+            log => self.log.shown().to_string(),
             shifts => self.shifts.len(),
             findings => self.findings(&torques),
             cannot => self.cannot(),

@@ -3,6 +3,8 @@
 //! A simulated drive and a measured log give the same kind of samples. [`run()`] runs an observer over them, in memory or
 //! read row by row; [`score()`] compares the estimates with the true values, if there are any.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod any_shift;
 pub mod bench;
 pub mod campaign;

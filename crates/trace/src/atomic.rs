@@ -2,15 +2,18 @@
 //!
 //! The data are written to `NAME.PID.partial` in the same folder, under an advisory lock. The file gets its name when
 //! it is complete. The lock distinguishes the partial file of a running program from the partial file of a killed
-//! one: process ids are used again, but a lock ends with its process. Only regular files are replaced. Data for a
-//! device or pipe are written directly to it; a link stays, and the file behind the link is replaced.
+//! one: process ids are used again, but a lock ends with its process. The next program that writes to a file removes what a killed
+//! one left of it; partial files of other names in the folder are not removed, but can be listed ([`left_by_killed`]). Only regular
+//! files are replaced. Data for a device or pipe are written directly to it; a link stays, and the file behind the link is replaced.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::ShownPath as _;
 use crate::early_sync::EarlySync;
 
 /// A file under construction. If it is dropped before [`Self::finish`], the file at its path is unchanged.
@@ -33,6 +36,19 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Partial files of killed programs in folders that this program wrote to.
+static LEFT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn left() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The partial files that killed programs left in the folders of the files that this program wrote, under names that it did not
+/// write. They are not removed: nothing replaces them.
+pub fn left_by_killed() -> Vec<PathBuf> {
+    left().iter().filter(|path| path.exists()).cloned().collect()
 }
 
 /// Removes the partial files of this program, which is about to end on a signal. The files at their paths stay as they were.
@@ -61,7 +77,7 @@ impl WholeFile {
             .file_name()
             .ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "the path does not name a file"))?;
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        fs::create_dir_all(folder)?;
+        create_folder(folder)?;
         remove_dead(folder, name);
         let mut partial = name.to_owned();
         partial.push(format!(".{}.partial", std::process::id()));
@@ -157,17 +173,63 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut (dyn Write + Send)) -> i
     file.finish()
 }
 
+/// The file that [`check_writable`] writes and removes.
+const PROBE: &str = "wetclutch.probe";
+
+/// Checks that a file can be written, before the work for it starts. Leaves nothing behind.
+///
+/// # Errors
+/// The path is a folder or a write-protected file, or the first folder above it that exists cannot be written to.
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    if check_target(path)?.is_some_and(|there| !there.is_file()) {
+        return Ok(());
+    }
+    let target = behind_links(path)?;
+    let there = target.ancestors().skip(1).find(|folder| folder.as_os_str().is_empty() || folder.exists());
+    let folder = there.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    check_folder(folder)?;
+    remove_dead(folder, OsStr::new(PROBE));
+    let probe = folder.join(format!("{PROBE}.{}.partial", std::process::id()));
+    drop(locked(&probe)?);
+    fs::remove_file(probe)
+}
+
+/// Makes a folder and those above it.
+pub(crate) fn create_folder(folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder).map_err(|error| match folder.ancestors().find(|part| part.exists()) {
+        Some(part) => check_folder(part).err().unwrap_or(error),
+        None => error,
+    })
+}
+
+/// Refuses a file where a folder is expected.
+fn check_folder(folder: &Path) -> io::Result<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let message = format!("{} is a file, expected a folder\nhint: choose another name after -o", folder.shown());
+    Err(io::Error::new(ErrorKind::NotADirectory, message))
+}
+
 /// The metadata of the file at the path of an output, if there is one.
 ///
 /// # Errors
-/// The path is a folder, or its metadata cannot be read.
+/// The path is a folder or a write-protected file, or its metadata cannot be read.
 pub fn check_target(path: &Path) -> io::Result<Option<fs::Metadata>> {
     let folder = || io::Error::new(ErrorKind::IsADirectory, "this is a folder\nhint: name a file in it");
     match fs::metadata(path) {
         Ok(there) if there.is_dir() => Err(folder()),
+        // A rename would replace it all the same.
+        Ok(there) if there.is_file() && there.permissions().readonly() => Err(io::Error::new(
+            ErrorKind::PermissionDenied,
+            "the file is write-protected\nhint: choose another name, or allow writing to it",
+        )),
         Ok(there) => Ok(Some(there)),
         Err(_) if path.as_os_str().to_string_lossy().ends_with(std::path::is_separator) => Err(folder()),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(error) if error.kind() == ErrorKind::NotADirectory => {
+            Err(path.ancestors().find(|part| part.exists()).and_then(|part| check_folder(part).err()).unwrap_or(error))
+        }
         Err(error) => Err(error),
     }
 }
@@ -191,28 +253,34 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::new(ErrorKind::InvalidInput, "too many symbolic links"))
 }
 
-/// Removes partial files of this name that no running program holds.
+/// Removes partial files of this name that no running program holds, and notes those of other names.
 fn remove_dead(folder: &Path, name: &OsStr) {
     // A folder that cannot be listed may still be written to, and a file that is gone already needs no removing.
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if !is_file || !is_partial_of(name, &entry.file_name()) {
+        let (file, path) = (entry.file_name(), entry.path());
+        let Some(of) = name_of_partial(&file) else { continue };
+        if !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        if let Ok(file) = File::open(entry.path())
-            && file.try_lock().is_ok()
-        {
-            let _ = fs::remove_file(entry.path());
+        match File::open(&path).map(|file| file.try_lock()) {
+            Ok(Ok(())) if of == name.as_encoded_bytes() => {
+                let _ = fs::remove_file(path);
+            }
+            // Without locks nothing tells whether its program still runs.
+            Ok(Ok(()) | Err(TryLockError::Error(_))) => {
+                left().insert(path);
+            }
+            Ok(Err(TryLockError::WouldBlock)) | Err(_) => {}
         }
     }
 }
 
-/// Whether a file is called `NAME.PID.partial`.
-fn is_partial_of(name: &OsStr, file: &OsStr) -> bool {
-    let digits = (file.as_encoded_bytes().strip_prefix(name.as_encoded_bytes()))
-        .and_then(|rest| rest.strip_prefix(b"."))
-        .and_then(|rest| rest.strip_suffix(b".partial"));
-    digits.is_some_and(|digits| !digits.is_empty() && digits.iter().all(u8::is_ascii_digit))
+/// The name of the file that a file called `NAME.PID.partial` becomes.
+fn name_of_partial(file: &OsStr) -> Option<&[u8]> {
+    let rest = file.as_encoded_bytes().strip_suffix(b".partial")?;
+    let dot = rest.iter().rposition(|&byte| byte == b'.')?;
+    let (name, digits) = (&rest[..dot], &rest[dot + 1..]);
+    (!name.is_empty() && !digits.is_empty() && digits.iter().all(u8::is_ascii_digit)).then_some(name)
 }
 
 /// A new file that is locked until it is closed.
@@ -237,30 +305,7 @@ fn locked(path: &Path) -> io::Result<File> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    struct Folder(PathBuf);
-
-    impl Folder {
-        fn new(name: &str) -> Self {
-            let path = std::env::temp_dir().join(format!("wetclutch-atomic-{name}-{}", std::process::id()));
-            let _ = fs::remove_dir_all(&path);
-            fs::create_dir_all(&path).unwrap();
-            Self(path)
-        }
-
-        fn names(&self) -> Vec<String> {
-            let names = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-            let mut names: Vec<String> = names.collect();
-            names.sort();
-            names
-        }
-    }
-
-    impl Drop for Folder {
-        fn drop(&mut self) {
-            let _ = fs::remove_dir_all(&self.0);
-        }
-    }
+    use crate::scratch::Folder;
 
     fn write(path: &Path, text: &str) -> io::Result<()> {
         write_whole(path, |w| w.write_all(text.as_bytes()))
@@ -383,6 +428,51 @@ mod tests {
             folder.names(),
             ["other.csv.1.partial", "out.csv", "out.csv.2.partial", "out.csv.partial", "out.csv.x.partial"]
         );
+        // What stays of a killed program is listed; what a running one holds is not.
+        let here: Vec<PathBuf> = left_by_killed().into_iter().filter(|path| path.starts_with(&folder.0)).collect();
+        assert_eq!(here, [folder.0.join("other.csv.1.partial")]);
+    }
+
+    #[test]
+    fn a_file_in_place_of_a_folder_is_named_and_nothing_is_made() {
+        let folder = Folder::new("no-folder");
+        let file = folder.0.join("file");
+        fs::write(&file, "kept").unwrap();
+        let what = format!("{} is a file, expected a folder\nhint: choose another name after -o", file.display());
+        for path in [file.join("out.csv"), file.join("sub/out.csv"), folder.0.join("file/../file/out.csv")] {
+            assert!(
+                check_writable(&path).unwrap_err().to_string().ends_with(&what[what.find(" is a file").unwrap()..])
+            );
+            assert!(WholeFile::create(&path).unwrap_err().to_string().contains(" is a file, expected a folder"));
+        }
+        assert!(create_folder(&file.join("sub")).unwrap_err().to_string() == what);
+        assert_eq!((folder.names(), fs::read_to_string(&file).unwrap()), (vec!["file".to_owned()], "kept".to_owned()));
+    }
+
+    #[test]
+    fn a_file_that_can_be_written_is_checked_without_a_trace() {
+        let folder = Folder::new("writable");
+        for path in [folder.0.join("out.csv"), folder.0.join("not/there/yet/out.csv")] {
+            check_writable(&path).unwrap();
+        }
+        assert!(folder.names().is_empty());
+        let error = check_writable(&folder.0).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::IsADirectory);
+    }
+
+    /// The super-user may write to it all the same, and a rename asks the folder alone.
+    #[test]
+    fn a_write_protected_file_is_not_replaced() {
+        let folder = Folder::new("protected");
+        let path = folder.0.join("log.csv");
+        fs::write(&path, "measured").unwrap();
+        let mut permissions = fs::metadata(&path).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&path, permissions).unwrap();
+        let error = write(&path, "new").unwrap_err();
+        assert!(error.to_string().starts_with("the file is write-protected\nhint: "), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "measured");
+        assert_eq!(folder.names(), ["log.csv"]);
     }
 
     #[test]

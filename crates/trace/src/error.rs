@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::{shown_path, signal, units};
+use crate::{ShownPath as _, signal, units};
 
 /// Why a trace cannot be read or used.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// The file cannot be read.
-    #[error("{}: {source}", shown_path(path))]
+    #[error("{}: {source}", path.shown())]
     Io {
         /// The file.
         path: PathBuf,
@@ -16,7 +16,7 @@ pub enum TraceError {
         source: std::io::Error,
     },
     /// The file is not a table.
-    #[error("{}: {message}", shown_path(path))]
+    #[error("{}: {message}", path.shown())]
     Table {
         /// The file.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum TraceError {
         message: String,
     },
     /// A row that does not fit.
-    #[error("{}:{line}: {message}", shown_path(path))]
+    #[error("{}:{line}: {message}", path.shown())]
     Row {
         /// The file.
         path: PathBuf,
@@ -36,7 +36,7 @@ pub enum TraceError {
     /// A signal that is needed contains text that is not a number.
     #[error(
         "{}: column `{column}` contains `{text}` (row {row}), which is not a number\nhint: leave a lost sample empty",
-        shown_path(path)
+        path.shown()
     )]
     NotNumbers {
         /// The file.
@@ -52,7 +52,7 @@ pub enum TraceError {
     #[error(
         "{}: the log has `{found}`, but the command of the vehicle's valve is `{wanted}`\n\
          hint: give the vehicle file of this log, or check `kind` in its [observer.valve] and [clutch.*.valve]",
-        shown_path(path)
+        path.shown()
     )]
     OtherCommand {
         /// The file.
@@ -63,7 +63,7 @@ pub enum TraceError {
         found: String,
     },
     /// A signal that is needed is missing.
-    #[error("{}: there is no column `{wanted}`\nhint: {}", shown_path(path), column_hint(wanted, present))]
+    #[error("{}: there is no column `{wanted}`\nhint: {}", path.shown(), column_hint(wanted, present))]
     MissingColumn {
         /// The file.
         path: PathBuf,

@@ -4,6 +4,8 @@
 //! use other common units (`_rpm`, `_bar`, `_ms`); they are converted when the file is read, so that all
 //! other crates use SI units.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod atomic;
 pub mod csv_file;
 mod early_sync;
@@ -12,29 +14,30 @@ pub mod follow;
 pub mod mdf_file;
 pub mod parquet_file;
 pub mod rows;
+#[cfg(test)]
+mod scratch;
+pub mod shown;
 pub mod signal;
 #[cfg(test)]
 mod slow;
 pub mod table;
+pub mod text_file;
 pub mod units;
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-pub use atomic::{WholeFile, check_target, remove_unfinished, write_whole};
+pub use atomic::{WholeFile, check_writable, left_by_killed, remove_unfinished, write_whole};
 pub use csv_file::{Cell, CsvRows, CsvWriter, RecordError, Records, csv_written, read_csv, write_csv};
 pub use error::TraceError;
 pub use follow::Following;
 pub use mdf_file::MdfWriter;
 pub use parquet_file::{ColumnKind, ParquetWriter, write_parquet};
 pub use rows::{Damage, FolderLock, GrowingTable, partial_path, read_rows};
+pub use shown::{ShownPath, is_unprintable, printable, toml_string};
 pub use table::{TableFormat, TableWriter};
+pub use text_file::{read_small, read_text};
 pub use units::{Quantity, Unit};
-
-/// A file as messages show it; `-` is standard input.
-pub fn shown_path(path: &Path) -> std::path::Display<'_> {
-    if path == Path::new("-") { Path::new("standard input").display() } else { path.display() }
-}
 
 /// A word of a column; the program's own cost nothing to copy.
 pub type Word = Cow<'static, str>;

@@ -4,10 +4,13 @@
 //! continued.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::TraceError;
+use crate::atomic::create_folder;
+use crate::csv_file::LONGEST_ROW;
+use crate::text_file::open_regular;
 
 /// The file that is locked.
 const LOCK: &str = "wetclutch.lock";
@@ -27,7 +30,7 @@ impl FolderLock {
     /// # Errors
     /// The folder cannot be made or written to.
     pub fn take(folder: &Path) -> io::Result<Option<Self>> {
-        fs::create_dir_all(folder)?;
+        create_folder(folder)?;
         let file = OpenOptions::new().create(true).append(true).open(folder.join(LOCK))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(None),
@@ -57,11 +60,12 @@ fn good_rows(
     loop {
         line += 1;
         bytes.clear();
-        if reader.read_until(b'\n', &mut bytes)? == 0 {
+        if reader.by_ref().take(LONGEST_ROW as u64).read_until(b'\n', &mut bytes)? == 0 {
             let missing = Damage { line, message: "the names of the columns are missing".to_owned() };
             return Ok((good, (line == 1).then_some(missing)));
         }
-        let text = bytes.strip_suffix(b"\n").ok_or("the line is incomplete").map(std::str::from_utf8);
+        let cut = if bytes.len() < LONGEST_ROW { "the line is incomplete" } else { "the line is too long for a row" };
+        let text = bytes.strip_suffix(b"\n").ok_or(cut).map(std::str::from_utf8);
         let taken = match text {
             Err(cut) => Err(cut.to_owned()),
             Ok(Err(_)) => Err("the line is not UTF-8 text".to_owned()),
@@ -99,7 +103,7 @@ impl GrowingTable {
     /// The file cannot be written.
     pub fn create(path: &Path, header: &str) -> io::Result<Self> {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            fs::create_dir_all(folder)?;
+            create_folder(folder)?;
         }
         let partial = partial_path(path);
         let mut writer = BufWriter::new(File::create(&partial)?);
@@ -120,7 +124,7 @@ impl GrowingTable {
     ) -> Result<(Self, Option<Damage>), TraceError> {
         let partial = partial_path(path);
         let io = |source| TraceError::Io { path: partial.clone(), source };
-        let (good, damage) = good_rows(File::open(&partial).map_err(io)?, header, row).map_err(io)?;
+        let (good, damage) = good_rows(open_regular(&partial).map_err(io)?, header, row).map_err(io)?;
         if good == 0 {
             if fs::metadata(&partial).map_err(io)?.len() > header.len() as u64 {
                 return Err(damaged(&partial, damage));
@@ -173,7 +177,7 @@ impl GrowingTable {
 /// The file cannot be read, or a line is wrong; `row` returns what is wrong with a line.
 pub fn read_rows(path: &Path, header: &str, row: impl FnMut(&str) -> Result<(), String>) -> Result<(), TraceError> {
     let io = |source| TraceError::Io { path: path.to_owned(), source };
-    match good_rows(File::open(path).map_err(io)?, header, row).map_err(io)? {
+    match good_rows(open_regular(path).map_err(io)?, header, row).map_err(io)? {
         (_, None) => Ok(()),
         (_, damage) => Err(damaged(path, damage)),
     }
@@ -248,6 +252,23 @@ mod tests {
             said("other", b"run,y\n0,1\n"),
             both(&format!("FILE:1: {other}"), &format!("FILE.partial:1: {other}"))
         );
+    }
+
+    #[test]
+    fn a_row_without_end_and_a_device_in_place_of_a_table_are_refused() {
+        let folder = crate::scratch::Folder::new("endless-row");
+        let path = folder.0.join("runs.csv");
+        // A hole: it is read as zeros.
+        File::create(&path).unwrap().set_len(LONGEST_ROW as u64 + 5).unwrap();
+        let error = read_rows(&path, "run,x", |_| Ok(())).unwrap_err().to_string();
+        assert!(error.ends_with(":1: the line is longer than 32 MiB"), "{error}");
+        #[cfg(unix)]
+        {
+            fs::remove_file(&path).unwrap();
+            std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
+            let error = read_rows(&path, "run,x", |_| Ok(())).unwrap_err().to_string();
+            assert!(error.contains("this is a device or a pipe"), "{error}");
+        }
     }
 
     #[test]

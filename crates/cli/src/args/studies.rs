@@ -214,7 +214,7 @@ impl fmt::Display for Shard {
 pub(crate) struct Merge {
     /// Study file
     pub(crate) study: PathBuf,
-    /// Folders of all shards, in their order
+    /// Folders of all shards
     #[arg(required = true)]
     pub(crate) shards: Vec<PathBuf>,
     /// Folder for the merged study

@@ -5,7 +5,7 @@ use report::bench_page;
 use report::tables::{coverage, number};
 use study::Bench;
 use study::bench::{BenchConsistency, BenchRow, open_loop};
-use trace::units;
+use trace::{ShownPath as _, units};
 
 use crate::args;
 use crate::commands::{progress, writable, write_text};
@@ -35,7 +35,7 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
         write_text(&folder.join("bench.html"), &bench_page(&result, &vehicle, &experiment)?)?;
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&result)?)?;
+        output::json(&result)?;
         return Ok(());
     }
 
@@ -47,7 +47,7 @@ pub(crate) fn bench(options: &args::Bench) -> Result<(), Failure> {
     }
     failures(&result)?;
     if let Some(folder) = &options.output {
-        output::line(&format!("\npage: {}", folder.join("bench.html").display()))?;
+        output::line(&format!("\npage: {}", folder.join("bench.html").shown()))?;
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use config::{Car, Kind, Source, TURBINE_SIDE_INERTIA_KG_M2};
+use trace::ShownPath as _;
 
 use super::gearbox;
 use crate::failure::Failure;
@@ -13,7 +14,7 @@ pub(super) fn read_car(path: &Path) -> Result<Car, Failure> {
     if Source::read(path)?.kind()? == Kind::Vehicle {
         return Err(Failure::Input(format!(
             "{}: this vehicle file describes one shift, and not a gearbox\nhint: use one with `gearbox`, such as vehicles/eight_speed.toml",
-            path.display()
+            path.shown()
         )));
     }
     let car = Car::read(path)?;
@@ -35,7 +36,7 @@ pub(super) fn no_shift(car: &Car, path: &Path) -> String {
          valves, which ratios alone do not give"
             .to_owned()
     });
-    format!("{}: {why}", path.display())
+    format!("{}: {why}", path.shown())
 }
 
 /// Prints what a vehicle file with a gearbox describes.

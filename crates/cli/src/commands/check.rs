@@ -4,6 +4,7 @@ use std::path::Path;
 
 use config::{Car, Drive, Experiment, GainMethod, GearboxFile, Kind, Sensors, Source, Study, Values, Vehicle};
 use design::{longest_step_of, unstable_corners};
+use trace::ShownPath as _;
 
 use report::tables::phase_name;
 
@@ -21,7 +22,7 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
     let kind = source.kind()?;
     if options.output.is_some() && !matches!(kind, Kind::Gearbox | Kind::Car) {
         let what = "only a gearbox is drawn, of a gearbox file or of a vehicle file that names one";
-        let message = format!("{}: {what}\nhint: leave -o out", options.file.display());
+        let message = format!("{}: {what}\nhint: leave -o out", options.file.shown());
         return Err(Failure::Input(message));
     }
     if options.sensors.is_some() && kind != Kind::Car {
@@ -68,6 +69,11 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
             let command = "wetclutch estimate LOG --vehicle VEHICLE --observer kalman --sensors";
             describe_use("sensors of a car", command, &options.file)
         }
+        Kind::Learnt => describe_use(
+            "what the filter for any shift has learnt of a car",
+            "wetclutch estimate LOG --vehicle CAR --learnt",
+            &options.file,
+        ),
         Kind::Study => {
             let study = Study::read(&options.file)?;
             describe_study(&study)?;
@@ -79,7 +85,7 @@ pub(crate) fn check(options: &Check) -> Result<(), Failure> {
 
 /// Says what a file holds that belongs to a command.
 fn describe_use(what: &str, command: &str, file: &Path) -> Result<(), Failure> {
-    output::line(&format!("{what}\nuse: {command} {}", file.display()))?;
+    output::line(&format!("{what}\nuse: {command} {}", file.shown()))?;
     Ok(())
 }
 

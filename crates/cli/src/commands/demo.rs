@@ -7,7 +7,7 @@ use report::Page;
 use report::page::findings;
 use report::tables::phase_name;
 use study::{AnyObserver, Comparison, RunColumns, compare, estimates_trace};
-use trace::{Trace, signal, units};
+use trace::{ShownPath as _, Trace, signal, units};
 
 use crate::args::Demo;
 use crate::commands::estimate::{best, kind};
@@ -76,6 +76,6 @@ fn print(comparison: &Comparison, report: &Path) -> Result<(), Failure> {
     for sentence in findings(comparison) {
         output::line(&sentence.replace('’', "'"))?;
     }
-    output::line(&format!("\nreport: {}", report.display()))?;
+    output::line(&format!("\nreport: {}", report.shown()))?;
     Ok(())
 }

@@ -13,10 +13,10 @@ use study::any_shift::measured::MeasuredRow;
 use study::any_shift::recording::Recording;
 use study::any_shift::tour::{LeftOut, drive_tour};
 use study::any_shift::{RECORD_S, ShiftDraw};
-use trace::Cell;
+use trace::{Cell, ShownPath as _};
 
 use super::matrix::bench_sensors;
-use super::simulate_drive::DriveTables;
+use super::simulate_drive::{DriveTables, keeps_inputs};
 use crate::args::Demo;
 use crate::commands::{read_car, writable, write_cells, write_text};
 use crate::failure::Failure;
@@ -33,6 +33,8 @@ pub(super) fn demo(options: &Demo, vehicle: &Path) -> Result<(), Failure> {
     let drive = options.drive.as_deref().map(Drive::read).transpose()?;
     let folder = &options.output;
     writable(folder, &[PAGE, SHIFTS])?;
+    let speeds = drive.iter().filter_map(|drive| drive.trace.as_ref());
+    keeps_inputs(folder, NAME, speeds.map(|trace| &trace.path))?;
     let mut random = Random(options.seed);
     let draw = ShiftDraw::within(&car, &ErrorBudget::of_car(&car), || random.uniform());
     let model = CarModel::new(draw.car(&car)).map_err(|error| Failure::Input(error.to_string()))?;
@@ -121,6 +123,6 @@ fn print(drive: &ScoredDrive, car: &Car, page: &Path) -> Result<(), Failure> {
     for sentence in findings(drive) {
         output::line(&sentence)?;
     }
-    output::line(&format!("\nreport: {}", page.display()))?;
+    output::line(&format!("\nreport: {}", page.shown()))?;
     Ok(())
 }

@@ -11,7 +11,7 @@ use design::{
 use observer::{Discretisation, Phase};
 use report::tables::phase_name;
 use serde_json::{Map, Value, json};
-use trace::units;
+use trace::{ShownPath as _, units};
 
 use super::design_car::of_car;
 use crate::args::{Design, DesignChoice, MethodChoice, SAMPLE_TIME_S};
@@ -46,9 +46,9 @@ pub(super) fn of_vehicle(vehicle: &Vehicle, options: &Design, about: &[String]) 
         text.extend(lines);
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&object)?)?;
+        output::json(&object)?;
     } else {
-        output::line(&format!("{} ({})", vehicle.name, vehicle.source.path.display()))?;
+        output::line(&format!("{} ({})", vehicle.name, vehicle.source.path.shown()))?;
         for line in about {
             output::line(line)?;
         }

@@ -5,7 +5,7 @@ use design::{DiscreteCertificate, Model, Quantity, design_discrete_phase};
 use observer::Phase;
 use report::tables::phase_name;
 use serde_json::{Map, Value, json};
-use trace::units;
+use trace::{ShownPath as _, units};
 
 use super::design::{not_met, of_vehicle, options_apply};
 use super::progress;
@@ -30,7 +30,7 @@ pub(super) fn of_car(options: &Design) -> Result<(), Failure> {
         ));
     }
     let car = Car::read(&options.vehicle)?;
-    let path = options.vehicle.display();
+    let path = options.vehicle.shown();
     let named = |error: OneShiftError| match error {
         OneShiftError::Config(error) => error.into(),
         error => Failure::Input(format!("{path}: {error}")),
@@ -134,7 +134,8 @@ fn table(car: &Car, options: &Design) -> Result<(), TableError> {
     bar.finish_and_clear();
     if options.json {
         let objects: Vec<_> = rows.iter().map(|row| row.json(car)).collect();
-        return Ok(output::line(&serde_json::to_string_pretty(&objects).map_err(Failure::from)?)?);
+        output::json(&objects)?;
+        return Ok(());
     }
     print(car, options, (model, method, quantity), &rows, &without)?;
     Ok(())
@@ -221,7 +222,7 @@ fn print(
          (observer {of_model}, method {method}, sample time {} ms), with all errors of the car at their bounds at the same time.\n\
          {OPEN_LOOP}: no gain reduces the bound; in this phase the shift hides its pressure.\n",
         car.name,
-        car.source.path.display(),
+        car.source.path.shown(),
         1e3 * options.sample_time_s(),
     ))?;
     let mut titles = ["upshift", "oncoming", "alpha", "1/|i_off - i_on|"].map(str::to_owned).to_vec();

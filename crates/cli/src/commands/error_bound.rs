@@ -2,32 +2,38 @@
 
 use std::path::{Path, PathBuf};
 
-use config::Study;
+use config::{Kind, Source, Study};
 use report::error_bound_page;
 use report::error_bound_page::named;
 use report::tables::phase_name;
 use study::campaign::PHASES;
 use study::error_bound as find;
+use trace::ShownPath as _;
 
 use crate::args::ErrorBoundOptions;
-use crate::commands::{check_output, not_an_input, progress, writable, write_text};
+use crate::commands::written::{is_page, replaces_only};
+use crate::commands::{check_output, not_an_input, progress, write_text};
 use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     check_output(options.output.as_ref())?;
-    not_an_input(options.output.as_ref(), [&options.study])?;
     let study = Study::read(&options.study)?;
+    let inputs = [&options.study, &study.experiment.source.path, &study.vehicle.source.path];
+    not_an_input(options.output.as_ref(), inputs)?;
     if let Some(path) = &options.output {
         let page = path.with_extension("html");
         if page == *path {
-            let path = path.display();
+            let path = path.shown();
             return Err(Failure::Input(format!(
                 "{path}: the bounds cannot have the name of their page\nhint: for example bounds.toml, whose page is bounds.html"
             )));
         }
-        writable(path.parent().unwrap_or(Path::new("")), &[])?;
-        check_output(page_beside(path).as_ref())?;
+        replaces_only("file of bounds", path, is_overlay)?;
+        if let Some(page) = page_beside(path) {
+            check_output(Some(&page))?;
+            replaces_only("page in HTML", &page, is_page)?;
+        }
     }
     let bar = progress(study.runs, 0);
     let found = find(&study, options.threads.count(), || bar.inc(1))?;
@@ -45,7 +51,7 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
         }
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&found)?)?;
+        output::json(&found)?;
         return Ok(());
     }
     output::line(&format!("{} runs, {} without a complete shift\n", found.runs, found.unfinished))?;
@@ -64,14 +70,18 @@ pub(crate) fn error_bound(options: &ErrorBoundOptions) -> Result<(), Failure> {
     output::table(2, &rows)?;
     match &options.output {
         Some(path) => {
-            output::line(&format!("\nbounds: {}", path.display()))?;
+            output::line(&format!("\nbounds: {}", path.shown()))?;
             if let Some(page) = page_beside(path) {
-                output::line(&format!("page: {}", page.display()))?;
+                output::line(&format!("page: {}", page.shown()))?;
             }
         }
-        None => output::line(&format!("\n{}", found.toml(&study)))?,
+        None => output::toml(&format!("\n{}", found.toml(&study)))?,
     }
     Ok(())
+}
+
+fn is_overlay(path: &Path) -> bool {
+    Source::read(path).and_then(|source| source.kind()).is_ok_and(|kind| kind == Kind::Overlay)
 }
 
 /// The page beside a file of bounds; there is none beside a device or a pipe.

@@ -6,6 +6,7 @@ use config::GearboxFile;
 use drivetrain::{PhaseOrder, ShiftKind};
 use geartrain::{Capacity, Change, Gearbox, Shift};
 use report::gearbox_figure::{gear_figure, train_figure};
+use trace::ShownPath as _;
 
 use crate::failure::Failure;
 use crate::output;
@@ -242,7 +243,7 @@ pub(super) fn draw(gearbox: &Gearbox, folder: &Path) -> Result<(), Failure> {
     for (name, svg) in &figures {
         super::write_text(&folder.join(name), svg)?;
     }
-    output::line(&format!("\nwrote {} and {} gears to {}", names[0], names.len() - 1, folder.display()))?;
+    output::line(&format!("\nwrote {} and {} gears to {}", names[0], names.len() - 1, folder.shown()))?;
     Ok(())
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use config::Source;
 use config::gearbox::SHIPPED;
 use config::vehicle::short::{CarFacts, Facts, complete_file, short_car_file, short_file, sized_gearbox};
+use trace::ShownPath as _;
 
 use crate::args::{Init, LaunchChoice};
 use crate::commands::{check_output, shell_quoted, write_text};
@@ -16,7 +17,7 @@ pub(crate) fn init(options: &Init) -> Result<(), Failure> {
     // A file that somebody has filled in is not to be lost by a second call.
     if options.output.exists() {
         let message =
-            format!("{}: the file is there already\nhint: choose another name after -o", options.output.display());
+            format!("{}: the file is there already\nhint: choose another name after -o", options.output.shown());
         return Err(Failure::Input(message));
     }
     match &options.gearbox {
@@ -79,7 +80,7 @@ fn car(options: &Init, gearbox: &str) -> Result<(), Failure> {
     let text = short_car_file(&facts, &source)?;
     if let Some(path) = &beside {
         write_text(path, &source.text)?;
-        output::note(&format!("gearbox file: {}", path.display()));
+        output::note(&format!("gearbox file: {}", path.shown()));
     }
     write_text(&options.output, &text)?;
     say_what_is_next(options);
@@ -104,17 +105,17 @@ fn from_folder_of(output: &Path, named: &str) -> Result<String, Failure> {
     }
     let whole = Path::new(named).canonicalize();
     let whole = whole.map_err(|error| Failure::Input(format!("--gearbox {named}: {error}")))?;
-    Ok(whole.display().to_string())
+    Ok(whole.to_string_lossy().into_owned())
 }
 
 /// Refuses to write over a gearbox file that somebody has changed.
 fn refuse_existing(path: &Path, text: &str) -> Result<(), Failure> {
-    match std::fs::read_to_string(path) {
+    match trace::read_text(path) {
         Ok(there) if there == text => Ok(()),
         _ if !path.exists() => Ok(()),
         _ => Err(Failure::Input(format!(
             "{0}: the file is there already, and is another gearbox\nhint: use it by `--gearbox {1}`, or write into another folder",
-            path.display(),
+            path.shown(),
             shell_quoted(path),
         ))),
     }
@@ -125,6 +126,6 @@ fn say_what_is_next(options: &Init) {
     output::note(&format!(
         "vehicle file: {}\nnext: `wetclutch check {file}` says which of its values matter most; `wetclutch fit LOG --vehicle {file} -o fitted.toml`, \
          or `wetclutch estimate LOG --vehicle {file}`",
-        options.output.display()
+        options.output.shown()
     ));
 }

@@ -8,6 +8,7 @@ use logs::{
     Channel, ChannelMap, ChannelSummary, Inspection, Log, Reading, Readings, Role, RoleSummary, Shift, ShiftFinder,
 };
 use report::SpeedsPage;
+use trace::ShownPath as _;
 use trace::units::rpm;
 
 use crate::args::{Inspect, available_threads};
@@ -31,8 +32,9 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     if options.suggest {
         // The map may be put into any folder.
         let dbc = options.mapping.dbc.as_ref();
-        let dbc = dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).display().to_string());
-        return Ok(output::line(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
+        let dbc =
+            dbc.map(|dbc| std::path::absolute(dbc).unwrap_or_else(|_| dbc.clone()).to_string_lossy().into_owned());
+        return Ok(output::toml(logs::suggest(log.channels(), dbc.as_deref()).trim_end())?);
     }
     if options.shifts {
         if map.channels.is_empty() {
@@ -50,7 +52,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
     if inspection.channels.iter().all(|summary| summary.counts.total() == 0) {
         return Err(nothing_in(&options.log, "samples"));
     }
-    output::line(&format!("{}: {}, {} channels", trace::shown_path(&options.log), log.format(), log.channels().len()))?;
+    output::line(&format!("{}: {}, {} channels", options.log.shown(), log.format(), log.channels().len()))?;
     channels(&log, &inspection)?;
     remarks(&inspection.notes);
     let steps_s = inspection.channels.iter().filter_map(|summary| summary.period_s);
@@ -63,7 +65,7 @@ pub(crate) fn inspect(options: &Inspect) -> Result<(), Failure> {
 
 /// A log without channels or samples.
 fn nothing_in(log: &Path, what: &str) -> Failure {
-    let shown = trace::shown_path(log);
+    let shown = log.shown();
     Failure::Input(format!(
         "{shown}: there are no {what} in it\nhint: check that the recorder had channels to write, and has written them"
     ))
@@ -292,7 +294,7 @@ fn page(
     for sentence in page.findings(&page.torques()) {
         output::line(&sentence)?;
     }
-    output::note(&format!("page: {}", path.display()));
+    output::note(&format!("page: {}", path.shown()));
     Ok(())
 }
 

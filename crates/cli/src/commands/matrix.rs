@@ -5,7 +5,7 @@ use std::path::Path;
 use config::{Car, Experiment, Sensors};
 use report::matrix_page::{failures, kind_rows, matrix_page, shift_cells, shift_rows, without_tables};
 use study::any_shift::matrix::{Matrix, MatrixPlan, Pooled, matrix, runs};
-use trace::Cell;
+use trace::{Cell, ShownPath as _};
 
 use super::car::no_shift;
 use crate::args::Bench;
@@ -39,13 +39,13 @@ pub(super) fn bench(options: &Bench, vehicle: &Path) -> Result<(), Failure> {
     }
     if options.json {
         let objects: Vec<_> = cells.into_iter().map(JsonObject::of).collect();
-        output::line(&serde_json::to_string_pretty(&objects)?)?;
+        output::json(&objects)?;
         return Ok(());
     }
     print(&result, &car)?;
     if let Some(folder) = &options.output {
-        output::line(&format!("\ntable: {}", folder.join(TABLE).display()))?;
-        output::line(&format!("page: {}", folder.join(PAGE).display()))?;
+        output::line(&format!("\ntable: {}", folder.join(TABLE).shown()))?;
+        output::line(&format!("page: {}", folder.join(PAGE).shown()))?;
     }
     Ok(())
 }

@@ -47,7 +47,7 @@ use config::Source;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use logs::ChannelMap;
 use serde::{Serialize, Serializer};
-use trace::{Cell, CsvWriter, Trace, WholeFile};
+use trace::{Cell, CsvWriter, ShownPath as _, Trace, WholeFile};
 
 use crate::args::Mapping;
 use crate::failure::Failure;
@@ -143,8 +143,8 @@ fn not_an_input<'a>(output: Option<&PathBuf>, inputs: impl IntoIterator<Item = &
     match inputs.into_iter().find(|input| std::fs::canonicalize(input).is_ok_and(|input| input == there)) {
         None => Ok(()),
         Some(input) => Err(Failure::Input(format!(
-            "{}: the output would replace this input\nhint: choose another name after -o",
-            input.display()
+            "{}: the output would replace this input\nhint: choose another name or folder after -o",
+            input.shown()
         ))),
     }
 }
@@ -162,7 +162,7 @@ fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
         Some(path) => ChannelMap::read(path).map_err(|error| match Source::read(path).and_then(|source| source.kind()) {
             Ok(kind) => Failure::Input(format!(
                 "{}: this looks like {}, expected a channel map\nhint: `wetclutch inspect LOG --suggest` writes a first one",
-                path.display(),
+                path.shown(),
                 kind.words()
             )),
             Err(_) => error.into(),
@@ -177,8 +177,8 @@ fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
     } else if let (Some(path), Some(dbc)) = (&options.map, map.open.dbc.as_ref().filter(|dbc| !dbc.exists())) {
         return Err(Failure::Input(format!(
             "{}: `dbc` leads to {}, which does not exist\nhint: a path in a map counts from the folder of the map; --dbc replaces it",
-            path.display(),
-            dbc.display()
+            path.shown(),
+            dbc.shown()
         )));
     }
     Ok(map)
@@ -186,17 +186,17 @@ fn channel_map(options: &Mapping) -> Result<ChannelMap, Failure> {
 
 /// A path as a shell takes it.
 fn shell_quoted(path: &Path) -> String {
-    let path = path.display().to_string();
+    let path = path.shown().to_string();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
     // A path that begins with a dash would be read as an option.
     let path = if path.starts_with('-') { format!("./{path}") } else { path };
     if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', r"'\''")) }
 }
 
-/// Refuses an output that is a folder, before the work starts.
+/// Refuses an output that cannot be written, before the work starts.
 fn check_output(path: Option<&PathBuf>) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };
-    trace::check_target(path).map(drop).map_err(|error| Failure::writing(path, &error))
+    trace::check_writable(path).map_err(|error| Failure::writing(path, &error))
 }
 
 /// A bar on standard error with rate and time left; nothing if standard error is not a terminal.

@@ -5,6 +5,7 @@ use report::Reproduction;
 use report::reproduction::{agreeing, ours};
 use study::Chapter;
 use study::statements::Case;
+use trace::ShownPath as _;
 
 use crate::args::Reproduce;
 use crate::commands::{progress, writable, write_text};
@@ -44,7 +45,7 @@ pub(crate) fn reproduce(options: &Reproduce) -> Result<(), Failure> {
     for line in agreeing(&chapter) {
         output::line(&line.replace('−', "-"))?;
     }
-    output::line(&format!("\nreport: {}", options.output.join(FILES[0]).display()))?;
+    output::line(&format!("\nreport: {}", options.output.join(FILES[0]).shown()))?;
     Ok(())
 }
 

@@ -9,6 +9,7 @@ use serde_json::json;
 use study::any_shift::sensitivity::{PhaseOfShift, ShiftErrorKind, ShiftSensitivity, car_sensitivity};
 use study::sensitivity as find;
 use study::sensitivity::{ShaftEffect, ValveEffect, shaft_level, valve_alone};
+use trace::ShownPath as _;
 
 use super::car::no_shift;
 use super::matrix::sensors_or_bench;
@@ -29,7 +30,7 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         write_text(&folder.join("sensitivity.html"), &sensitivity_page(&phases, &valve, &shaft, &vehicle)?)?;
     }
     if options.json {
-        output::line(&serde_json::to_string_pretty(&json!({ "phases": phases, "valve": valve, "shaft": shaft }))?)?;
+        output::json(&json!({ "phases": phases, "valve": valve, "shaft": shaft }))?;
         return Ok(());
     }
     for phase in &phases {
@@ -74,7 +75,7 @@ pub(crate) fn sensitivity(options: &SensitivityOptions) -> Result<(), Failure> {
         shaft.iter().map(n_m).collect::<Vec<_>>().join(", ")
     ))?;
     if let Some(folder) = &options.output {
-        output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
+        output::line(&format!("page: {}", folder.join("sensitivity.html").shown()))?;
     }
     Ok(())
 }
@@ -91,7 +92,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
     }
     if options.json {
         let objects: Vec<_> = shifts.iter().map(|shift| json_of(shift, &car)).collect();
-        output::line(&serde_json::to_string_pretty(&objects)?)?;
+        output::json(&objects)?;
         return Ok(());
     }
     output::line(
@@ -112,7 +113,7 @@ fn of_car(options: &SensitivityOptions, path: &Path) -> Result<(), Failure> {
         output::line(&format!("{BOUND_AND_DEVIATION}: `wetclutch design {}`.", shell_quoted(path)))?;
     }
     if let Some(folder) = &options.output {
-        output::line(&format!("page: {}", folder.join("sensitivity.html").display()))?;
+        output::line(&format!("page: {}", folder.join("sensitivity.html").shown()))?;
     }
     Ok(())
 }

@@ -6,10 +6,11 @@ use config::{Experiment, Kind, Sensors, Source, Vehicle};
 use study::drive::{DriveColumns, DriveRow, Recording};
 use study::sampling::through_sensors;
 use study::{ShiftRating, ShiftSample};
-use trace::{CsvWriter, Trace, WholeFile, signal};
+use trace::{CsvWriter, ShownPath as _, Trace, WholeFile, signal};
 
 use super::simulate_drive::simulate_drive;
 use crate::args::Simulate;
+use crate::commands::not_an_input;
 use crate::failure::Failure;
 use crate::output;
 
@@ -19,12 +20,15 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
     }
     if let Some(vehicle) = &options.vehicle {
         let message =
-            format!("{}: an experiment names its vehicle file\nhint: --vehicle is for a drive file", vehicle.display());
+            format!("{}: an experiment names its vehicle file\nhint: --vehicle is for a drive file", vehicle.shown());
         return Err(Failure::Input(message));
     }
     let experiment = Experiment::read(&options.experiment)?;
     let vehicle = experiment.read_vehicle()?;
     let (experiment, name) = chosen(experiment, options)?;
+    for name in [format!("{name}.csv"), format!("{name}_measured.csv")] {
+        not_an_input(Some(&options.output.join(name)), [&options.experiment, &vehicle.source.path])?;
+    }
     let mut whole = Table::create(options.output.join(format!("{name}.csv")), &vehicle, |_| true)?;
     let path = options.output.join(format!("{name}_measured.csv"));
     let mut measured = Measured::create(path, &vehicle, &experiment)?;
@@ -55,8 +59,8 @@ pub(crate) fn simulate(options: &Simulate) -> Result<(), Failure> {
         )),
         None => output::note("the shift was not completed within the simulated time"),
     }
-    output::line(&whole.display().to_string())?;
-    output::line(&measured.display().to_string())?;
+    output::line(&whole.shown().to_string())?;
+    output::line(&measured.shown().to_string())?;
     Ok(())
 }
 
@@ -171,7 +175,7 @@ fn chosen(experiment: Experiment, options: &Simulate) -> Result<(Experiment, Str
             Ok((experiment.with_scenario(scenario), format!("{name}.{}", scenario.file_name())))
         }
         None => {
-            let path = experiment.source.path.display();
+            let path = experiment.source.path.shown();
             let hint = match experiment.scenarios.is_empty() {
                 true => "the experiment has no scenarios".to_owned(),
                 false => format!("the scenarios are\n  {}", names()),

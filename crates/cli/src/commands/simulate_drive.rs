@@ -11,9 +11,10 @@ use study::any_shift::car_log::{command_age, element_commands};
 use study::any_shift::measured::{MeasuredRow, SensedDrive, has_ages};
 use study::any_shift::recording::{input_clutch_n_m, lock_up_is_applied, reported_engine_n_m};
 use trace::units::{km_h, rpm};
-use trace::{Cell, CsvWriter, WholeFile, signal};
+use trace::{Cell, CsvWriter, ShownPath as _, WholeFile, signal};
 
 use super::car::{describe_car, read_car, warn_of_slipping};
+use super::not_an_input;
 use super::simulate::size_note;
 use crate::args::Simulate;
 use crate::failure::Failure;
@@ -29,13 +30,15 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         None => drive.read_vehicle().inspect(warn_of_slipping)?,
     };
     if options.scenario.is_some() {
-        let message = format!("{}: a drive has no scenarios\nhint: leave --scenario out", options.experiment.display());
+        let message = format!("{}: a drive has no scenarios\nhint: leave --scenario out", options.experiment.shown());
         return Err(Failure::Input(message));
     }
     if let Some(note) = size_note(drive.duration_s(), drive.sample_time_s, ROW_BYTES) {
         output::note(&note);
     }
     let name = drive.name.to_lowercase();
+    let inputs = std::iter::once(&options.experiment).chain(&options.vehicle);
+    keeps_inputs(&options.output, &name, inputs.chain(drive.trace.iter().map(|trace| &trace.path)))?;
     let model = CarModel::new(car.clone()).map_err(|error| Failure::Input(error.to_string()))?;
     let mut tables =
         DriveTables::create(&options.output, &name, &car, drive.sensors.as_ref().zip(Some(drive.sample_time_s)))?;
@@ -77,7 +80,7 @@ pub(super) fn simulate_drive(options: &Simulate) -> Result<(), Failure> {
         output::note(&over_speed(over, &car));
     }
     for path in paths {
-        output::line(&path.display().to_string())?;
+        output::line(&path.shown().to_string())?;
     }
     Ok(())
 }
@@ -106,6 +109,20 @@ pub(super) struct DriveTables {
     measured: Table,
 }
 
+/// The files of a drive of this name.
+fn paths(folder: &Path, name: &str) -> [PathBuf; 2] {
+    [format!("{name}.csv"), format!("{name}_measured.csv")].map(|name| folder.join(name))
+}
+
+/// Refuses to write the files of a drive over what it is made from, such as its speed cycle.
+pub(super) fn keeps_inputs<'a>(
+    folder: &Path,
+    name: &str,
+    inputs: impl Iterator<Item = &'a PathBuf> + Clone,
+) -> Result<(), Failure> {
+    paths(folder, name).iter().try_for_each(|path| not_an_input(Some(path), inputs.clone()))
+}
+
 impl DriveTables {
     /// Begins `NAME.csv` and `NAME_measured.csv`; the latter goes through sensors where there are some, with this time between rows.
     pub(super) fn create(
@@ -117,10 +134,8 @@ impl DriveTables {
         let columns = columns(car);
         let measured = columns.iter().filter(|column| column.is_measured).cloned();
         let measured: Vec<_> = measured.chain(sensors.iter().flat_map(|of| ages(car, *of))).collect();
-        Ok(Self {
-            whole: Table::create(folder.join(format!("{name}.csv")), columns)?,
-            measured: Table::create(folder.join(format!("{name}_measured.csv")), measured)?,
-        })
+        let [whole_path, measured_path] = paths(folder, name);
+        Ok(Self { whole: Table::create(whole_path, columns)?, measured: Table::create(measured_path, measured)? })
     }
 
     pub(super) fn write(&mut self, car: &Car, row: &MeasuredRow) -> Result<(), Failure> {
@@ -341,7 +356,7 @@ pub(super) fn describe_drive(drive: &Drive, path: &Path) -> Result<(), Failure> 
             Ok(())
         }
         None => {
-            output::line(&format!("use: wetclutch simulate {} --vehicle VEHICLE -o DIR", path.display()))?;
+            output::line(&format!("use: wetclutch simulate {} --vehicle VEHICLE -o DIR", path.shown()))?;
             Ok(())
         }
     }

@@ -1,16 +1,17 @@
 //! `wetclutch worst-case`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use config::Study;
 use report::shift_figure::observers_of;
 use report::tables::phase_name;
 use study::campaign::{Metric, PHASES};
 use study::{Campaign, Row, Target, worst_case as search};
+use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::args::{PhaseChoice, WorstCaseOptions};
-use crate::commands::{progress, shell_quoted, writable, write_text};
+use crate::commands::{not_an_input, progress, shell_quoted, writable, write_text};
 use crate::failure::Failure;
 use crate::output;
 
@@ -30,6 +31,10 @@ pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
         PhaseChoice::Both => vec![0, 1],
     };
     writable(&options.output, &[])?;
+    let inputs = [&options.study, &study.experiment.source.path, &study.vehicle.source.path];
+    for &phase in &phases {
+        places(options, phase).iter().try_for_each(|place| not_an_input(Some(place), inputs))?;
+    }
     let campaign = Campaign::new(study)?;
     for phase in phases {
         one(&campaign, &experiment, Target { observer, phase, metric: Metric::PressureRms }, options)?;
@@ -40,9 +45,9 @@ pub(crate) fn worst_case(options: &WorstCaseOptions) -> Result<(), Failure> {
 /// The absolute path of the study's experiment, for a study file in any folder.
 fn experiment_path(study: &Study) -> Result<String, Failure> {
     let path = &study.experiment.source.path;
-    let whole = std::fs::canonicalize(path).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+    let whole = std::fs::canonicalize(path).map_err(|error| Failure::Input(format!("{}: {error}", path.shown())))?;
     whole.into_os_string().into_string().map_err(|whole| {
-        let path = Path::new(&whole).display();
+        let path = Path::new(&whole).shown();
         Failure::Input(format!("{path}: the path is not UTF-8, so that a study file cannot contain it"))
     })
 }
@@ -72,12 +77,17 @@ fn one(campaign: &Campaign, experiment: &str, target: Target, options: &WorstCas
     for (factor, value) in campaign.layout.factors.iter().zip(&found.row.numbers) {
         output::line(&format!("  {factor} = {value:.5}"))?;
     }
-    let start = options.output.join(format!("worst_{}", phase.name()));
-    let (study, figure) = (start.with_extension("toml"), start.with_extension("svg"));
+    let [study, figure] = places(options, target.phase);
     write_text(&study, &found.study_file(campaign, experiment))?;
     let run = Campaign::new(Study::read(&study)?)?.run_in_full(0)?;
     write_text(&figure, &observers_of(&run.observers, &run.trace, run.quality.as_ref()).svg())?;
     print_places(&study, &figure)
+}
+
+/// The study file and the figure of the worst case of a phase.
+fn places(options: &WorstCaseOptions, phase: usize) -> [PathBuf; 2] {
+    let start = options.output.join(format!("worst_{}", PHASES[phase].name()));
+    [start.with_extension("toml"), start.with_extension("svg")]
 }
 
 /// The score of a run, with its unit.
@@ -89,7 +99,7 @@ fn score(campaign: &Campaign, target: Target, row: &Row) -> String {
 }
 
 fn print_places(study: &Path, figure: &Path) -> Result<(), Failure> {
-    output::line(&format!("figure: {}", figure.display()))?;
+    output::line(&format!("figure: {}", figure.shown()))?;
     output::line(&format!("to repeat: wetclutch study {} --run 0\n", shell_quoted(study)))?;
     Ok(())
 }

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use trace::ShownPath as _;
+
 use crate::failure::Failure;
 
 /// Bytes at the beginning of a file that tell its kind.
@@ -16,7 +18,7 @@ pub(super) fn replaces_only(kind: &str, output: &Path, is_kind: impl FnOnce(&Pat
     }
     Err(Failure::Input(format!(
         "{}: exists and is no {kind}\nhint: choose another name after -o, or move the file",
-        output.display()
+        output.shown()
     )))
 }
 

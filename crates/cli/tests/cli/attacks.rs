@@ -149,41 +149,87 @@ fn a_reader_that_goes_away_does_not_cost_the_files() {
     assert!(std::path::Path::new(&folder.path("figures/train.svg")).exists());
 }
 
+/// An estimate that waits for the rest of its log, with its unfinished file, and what it reads.
 #[cfg(unix)]
+fn waiting(folder: &Folder, before: &[&str]) -> (std::process::Child, std::process::ChildStdin) {
+    use std::io::Write as _;
+    let program = env!("CARGO_BIN_EXE_wetclutch");
+    let out = folder.path("out.csv");
+    let arguments = ["estimate", "-", "--vehicle", VEHICLE, "--observer", "open-loop", "-o", &out];
+    let all = [before, &[program], &arguments].concat();
+    let mut child = Command::new(all[0])
+        .args(&all[1..])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut feed = child.stdin.take().unwrap();
+    // More rows than are looked at before the first estimate.
+    let log = text(&rows(folder), ",");
+    let (names, rows) = log.split_once('\n').unwrap();
+    writeln!(feed, "{names}").unwrap();
+    for repeat in 0..12 {
+        for row in rows.lines() {
+            let (time, rest) = row.split_once(',').unwrap();
+            writeln!(feed, "{},{rest}", time.parse::<f64>().unwrap() + 9.51 * f64::from(repeat)).unwrap();
+        }
+    }
+    feed.flush().unwrap();
+    for _ in 0..500 {
+        if is_unfinished(folder) {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    assert!(is_unfinished(folder));
+    (child, feed)
+}
+
+#[cfg(unix)]
+fn is_unfinished(folder: &Folder) -> bool {
+    folder.names().iter().any(|name| name.ends_with(".partial"))
+}
+
+#[cfg(unix)]
+fn send(signal: &str, child: &std::process::Child) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+/// The signals that this process, and so a child of it, ignores.
+#[cfg(target_os = "linux")]
+fn ignored() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap();
+    u64::from_str_radix(mask.trim(), 16).unwrap()
+}
+
+#[cfg(target_os = "linux")]
 #[test]
 fn a_signal_leaves_no_unfinished_file() {
-    use std::io::Write as _;
     use std::os::unix::process::ExitStatusExt;
     let folder = Folder::new("signal");
-    let log = text(&rows(&folder), ",");
-    for (signal, number) in [("-INT", 2), ("-TERM", 15)] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_wetclutch"))
-            .args(["estimate", "-", "--vehicle", VEHICLE, "--observer", "open-loop", "-o", &folder.path("out.csv")])
-            .stdin(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut feed = child.stdin.take().unwrap();
-        let is_partial = |name: &String| name.ends_with(".partial");
-        // More rows than are looked at before the first estimate.
-        let (names, rows) = log.split_once('\n').unwrap();
-        writeln!(feed, "{names}").unwrap();
-        for repeat in 0..12 {
-            for row in rows.lines() {
-                let (time, rest) = row.split_once(',').unwrap();
-                writeln!(feed, "{},{rest}", time.parse::<f64>().unwrap() + 9.51 * f64::from(repeat)).unwrap();
-            }
+    for (signal, number) in [("-HUP", 1), ("-INT", 2), ("-QUIT", 3), ("-TERM", 15)] {
+        // A test that is run in the background or by `nohup` ignores some of them.
+        if ignored() >> (number - 1) & 1 == 1 && number != 2 {
+            continue;
         }
-        feed.flush().unwrap();
-        for _ in 0..500 {
-            if folder.names().iter().any(is_partial) {
-                break;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-        assert!(folder.names().iter().any(is_partial));
-        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let (mut child, feed) = waiting(&folder, &[]);
+        send(signal, &child);
         assert_eq!(child.wait().unwrap().signal(), Some(number));
-        assert!(!folder.names().iter().any(is_partial), "{:?}", folder.names());
+        drop(feed);
+        assert!(!is_unfinished(&folder), "{signal}: {:?}", folder.names());
     }
+}
+
+/// `nohup` starts a program that ignores SIGHUP, to go on when its terminal ends.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_program_that_was_started_to_ignore_the_end_of_its_terminal_goes_on() {
+    let folder = Folder::new("nohup");
+    let (mut child, feed) = waiting(&folder, &["nohup"]);
+    send("-HUP", &child);
+    drop(feed);
+    assert!(child.wait().unwrap().success());
+    assert!(folder.names().contains(&"out.csv".to_owned()) && !is_unfinished(&folder), "{:?}", folder.names());
 }

@@ -94,7 +94,8 @@ fn a_file_of_another_kind_is_named() {
     let (drive, car) = (format!("{ROOT}drives/city.toml"), format!("{ROOT}vehicles/eight_speed.toml"));
     let (gearbox, map) = (format!("{ROOT}gearboxes/8hp.toml"), format!("{ROOT}maps/genesis_at8.toml"));
     let (out, table) = (folder.path("out"), folder.write("log.csv", "time_s,engine_speed_rad_s,turbine_speed_rad_s\n"));
-    let cases: [(&[&str], &str); 12] = [
+    let binary = folder.write("binary.toml", [0x7f, b'E', b'L', b'F', 0, 0xff]);
+    let cases: [(&[&str], &str); 13] = [
         (&["simulate", &study, "-o", &out], "this looks like a study file, expected an experiment file"),
         (&["simulate", &car_study, "-o", &out], "this looks like a study file of a car with a gearbox"),
         (&["simulate", &car, "-o", &out], "this looks like a vehicle file of a car with a gearbox"),
@@ -106,7 +107,8 @@ fn a_file_of_another_kind_is_named() {
         (&["estimate", &table, "--vehicle", &table], "this looks like a table, expected TOML"),
         (&["estimate", &car, "--vehicle", &car], "this is a TOML file, expected a log"),
         (&["estimate", &table, "--vehicle", VEHICLE, "--map", &car], "a gearbox, expected a channel map\nhint: "),
-        (&["check", env!("CARGO_BIN_EXE_wetclutch")], "this is no text file, expected TOML"),
+        (&["check", &binary], "this is no text file, expected TOML"),
+        (&["check", env!("CARGO_BIN_EXE_wetclutch")], "the file is larger than 4 MiB"),
     ];
     for (arguments, words) in cases {
         let text = refused(&wetclutch(arguments));

@@ -187,7 +187,7 @@ fn an_existing_folder_takes_the_estimate_under_the_name_of_its_log() {
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("the output would replace this input"), "{}", stderr(&output));
     let output = estimate("-", &["-o", &folder.path("out")]);
-    assert!(stderr(&output).contains("-: this is no file"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("standard input: this is no file"), "{}", stderr(&output));
 }
 
 #[cfg(unix)]

@@ -15,6 +15,7 @@ mod equations;
 mod fit;
 mod fit_gearbox;
 mod garage;
+mod hostile_files;
 mod late_commands;
 mod layshaft;
 mod learnt;

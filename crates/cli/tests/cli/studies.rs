@@ -73,10 +73,80 @@ fn a_study_is_the_same_on_one_thread_and_on_three_in_shards_and_whole() {
         done(&["study", &study.file(), "-o", shard, "--shard", &format!("{}/3", i + 1)]);
     }
     let [a, b, c] = &shards;
-    let error = refused(&["merge", &study.file(), a, c, "-o", &merged]);
-    assert!(error.contains("in their order") && !Path::new(&merged).exists(), "{error}");
-    done(&["merge", &study.file(), a, b, c, "-o", &merged]);
+    let wrong: [(&[&str], &str); 5] = [
+        (&[a, c], "shard 2/3 is missing\nhint: give the folders of all 3 shards"),
+        (&[b], "shards 1/3, 3/3 are missing"),
+        (&[a, b, a, c], &format!("shard1/study.json: shard 1/3 is given twice, the first time by {a}\n")),
+        (&[a, b, c, &one], "one/study.json: this is a whole study, expected a shard"),
+        (&[a, &study.path(""), c], "study.json: No such file or directory"),
+    ];
+    for (folders, expected) in wrong {
+        let error = refused(&[&["merge", &study.file()], folders, &["-o", &merged]].concat());
+        assert!(error.contains(expected) && error.contains("\nhint: "), "{folders:?}: {error}");
+        assert!(!Path::new(&merged).exists());
+    }
+    // Their order is known.
+    done(&["merge", &study.file(), c, a, b, "-o", &merged]);
     same_study(&one, &merged);
+}
+
+#[test]
+fn a_folder_of_another_study_or_division_is_told_by_what_differs() {
+    let text = FACTORS.replace("runs = 48", "runs = 4");
+    let study = Study::new("differs", &text);
+    let folders = ["1/2", "1/3", "2/3"].map(|shard| {
+        let folder = study.path(&shard.replace('/', "of"));
+        done(&["study", &study.file(), "-o", &folder, "--shard", shard]);
+        folder
+    });
+    let [half, first, second] = &folders;
+    let merged = study.path("merged");
+    let error = refused(&["merge", &study.file(), first, half, second, "-o", &merged]);
+    assert!(error.contains(&format!("1of2/study.json: this is shard 1/2, and {first} is shard 1/3\n")), "{error}");
+    let error = refused(&["study", &study.file(), "-o", half, "--shard", "2/2", "--resume"]);
+    assert!(error.contains("study.json: this is shard 1/2, expected shard 2/2"), "{error}");
+    let error = refused(&["study", &study.file(), "-o", half, "--resume"]);
+    assert!(error.contains("study.json: this is shard 1/2, expected a whole study"), "{error}");
+    let head = study.0.read("study.toml");
+    let vehicle = std::fs::read_to_string(crate::support::VEHICLE).unwrap();
+    study.0.write("heavy.toml", vehicle.replace("mass_kg = 1500", "mass_kg = 1501"));
+    let bench = std::fs::read_to_string(BENCH).unwrap();
+    study.0.write("bench.toml", bench.replace("../vehicles/two_speed_at.toml", "heavy.toml"));
+    for (from, to, expected) in [
+        ("seed = 3", "seed = 4", "of the study file, `seed` is 3 there and 4 here\nhint: "),
+        ("runs = 4", "runs = 5", "of the study file, `runs` is 4 there and 5 here\n"),
+        (
+            "[1300, 2000]",
+            "[1300, 2001]",
+            "of the study file, `factor.0.range` is [1300, 2000] there and [1300, 2001] here\n",
+        ),
+        ("deviation = 0.1", "deviation = 0.2", "`factor.1.normal.deviation` is 0.1 there and 0.2 here\n"),
+        ("name = \"small\"", "name = \"tiny\"", "its name is \"small\", expected \"tiny\""),
+        ("plan = ", "# a comment\nplan = ", "the values of its files are the same, and their text"),
+        (BENCH, "bench.toml", "of the experiment file, `vehicle` is "),
+    ] {
+        let other = study.0.write("other.toml", head.replace(from, to));
+        let error = support::refused(&wetclutch(&["merge", &other, half, "-o", &merged]));
+        assert!(
+            error.contains("1of2/study.json: belongs to another study: ") && error.contains(expected),
+            "{to}: {error}"
+        );
+    }
+    assert!(!Path::new(&merged).exists());
+    // A manifest that was cut, or is something else.
+    let manifest = Path::new(half).join("study.json");
+    let whole = std::fs::read_to_string(&manifest).unwrap();
+    let version = format!("\"wetclutch\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    for (text, expected) in [
+        (&whole[..whole.len() / 2], "this is no description of a study: "),
+        ("\u{1b}[2J", "this is no description of a study: "),
+        (&whole.replace(&version, "\"wetclutch\": \"0.0.1\""), "was made by wetclutch 0.0.1, and this is wetclutch "),
+        (&whole.replace("\"1/2\"", "\"3/2\""), "`shard` is \"3/2\": expected I/N"),
+    ] {
+        std::fs::write(&manifest, text).unwrap();
+        let error = refused(&["merge", &study.file(), half, "-o", &merged]);
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl Vehicle {
     fn laid_over(source: Source, over: &Source) -> Result<Self, ConfigError> {
         let layers = Layers { source: &source, over: Some(over) };
         let vehicle = Self::of_file(&Check { layers }, &layers.parse()?)?;
-        let path = format!("{} with {}", source.path.display(), over.path.display());
+        let path = format!("{} with {}", source.path.to_string_lossy(), over.path.to_string_lossy());
         Ok(Self { source: Source { path: path.into(), text: source.text + &over.text }, ..vehicle })
     }
 
@@ -310,7 +310,7 @@ impl Vehicle {
         let command_kind = observer_valve.command_kind();
         let supervisor = supervisor(check, &raw.observer, kiss_pressure_pa)?;
         Ok(Self {
-            name: raw.name.clone(),
+            name: check.title("name", &raw.name)?,
             engine: engine(check, &raw.engine)?,
             converter: converter(check, &raw.converter)?,
             shift: gear.reduced,

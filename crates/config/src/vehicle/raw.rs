@@ -12,7 +12,7 @@ use crate::check::{Number, Numbers, Word};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct RawVehicleFile {
-    pub(super) name: String,
+    pub(super) name: Word,
     pub(super) engine: RawEngine,
     pub(super) converter: RawConverter,
     pub(super) gear_train: RawGearTrain,

@@ -4,6 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 use config::{Car, Source, toml_string};
 use drivetrain::{ClutchValve, Table1};
+use trace::ShownPath as _;
 
 use super::fitting::GearboxFit;
 use super::quantities::{DELAY_UNIT_S, KISS_UNIT_PA, Quantity};
@@ -352,7 +353,7 @@ fn gearbox_path(car: &Car) -> Result<PathBuf, FitError> {
 }
 
 fn no_gearbox(path: &Path) -> FitError {
-    FitError::input(format!("{}: the gearbox file of the vehicle file is not there", path.display()))
+    FitError::input(format!("{}: the gearbox file of the vehicle file is not there", path.shown()))
 }
 
 /// The way from a folder to a file, both from the root; the file itself where there is none.

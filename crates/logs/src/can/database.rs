@@ -3,9 +3,13 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use can_dbc::{ByteOrder, Dbc, MessageId, MultiplexIndicator, SignalExtendedValueType, ValueType};
+use can_dbc::{
+    ByteOrder, Dbc, DbcError, ExtendedMultiplex, MessageId, MultiplexIndicator, SignalExtendedValueType, ValueType,
+};
+use trace::text_file::LARGEST_LIST;
 
 use super::Frame;
+use crate::error::shown;
 use crate::samples::{Quality, Sample};
 use crate::{Channel, LogError};
 
@@ -79,21 +83,22 @@ impl Database {
     /// # Errors
     /// The file cannot be read, is no DBC, or has a signal of an impossible size.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let bytes = std::fs::read(path).map_err(LogError::io(path))?;
+        let bytes = trace::read_small(path, LARGEST_LIST).map_err(LogError::io(path))?;
         let text = String::from_utf8(bytes)
             .unwrap_or_else(|error| error.as_bytes().iter().map(|&byte| char::from(byte)).collect());
         Self::parse(path, &text)
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, LogError> {
-        let dbc = Dbc::try_from(text)
-            .map_err(|error| LogError::file(path, format!("this is no DBC that can be read: {error}")))?;
+        let dbc = Dbc::try_from(text).map_err(|error| no_dbc(path, &error))?;
+        let entries = Entries::of(&dbc);
         let mut database = Self { messages: HashMap::new(), channels: Vec::new() };
         for message in &dbc.messages {
             let key = match message.id {
                 MessageId::Standard(id) => (false, u32::from(id)),
                 MessageId::Extended(id) => (true, id),
             };
+            let multiplexors = Multiplexors::of(&entries, message);
             let mut signals = Vec::with_capacity(message.signals.len());
             for signal in &message.signals {
                 let whole = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
@@ -107,11 +112,8 @@ impl Database {
                         ),
                     ));
                 }
-                let float = dbc
-                    .signal_extended_value_type_list
-                    .iter()
-                    .find(|entry| entry.message_id == message.id && entry.signal_name == signal.name);
-                let number = match (float.map(|entry| entry.signal_extended_value_type), signal.value_type, size) {
+                let float = entries.floats.get(&(message.id, signal.name.as_str())).copied();
+                let number = match (float, signal.value_type, size) {
                     (Some(SignalExtendedValueType::IEEEfloat32Bit), _, 32) => Number::Float,
                     (Some(SignalExtendedValueType::IEEEdouble64bit), _, 64) => Number::Double,
                     (Some(SignalExtendedValueType::IEEEfloat32Bit | SignalExtendedValueType::IEEEdouble64bit), ..) => {
@@ -132,7 +134,7 @@ impl Database {
                     number,
                     factor: signal.factor,
                     offset: signal.offset,
-                    multiplexed: multiplexed(&dbc, message, signal),
+                    multiplexed: multiplexors.multiplexed(signal),
                 });
                 database.channels.push(Channel {
                     name: signal.name.clone(),
@@ -206,26 +208,74 @@ fn in_force(signals: &[Signal], signal: &Signal, data: &[u8], depth: u32) -> boo
         && in_force(signals, by, data, depth + 1)
 }
 
-/// When a signal is in force; none if always.
-fn multiplexed(dbc: &Dbc, message: &can_dbc::Message, signal: &can_dbc::Signal) -> Option<Multiplexed> {
-    let extended = |name: &str| {
-        dbc.extended_multiplex.iter().find(|entry| entry.message_id == message.id && entry.signal_name == name)
-    };
-    // A multiplexor in another one is not marked as multiplexed by every writer: the ranges say it.
-    if let Some(extended) = extended(&signal.name) {
-        let by = message.signals.iter().position(|other| other.name == extended.multiplexor_signal_name);
-        let values = extended.mappings.iter().map(|mapping| (mapping.min_value, mapping.max_value)).collect();
-        return Some(Multiplexed { by: by.unwrap_or(usize::MAX), values });
-    }
-    let value = match signal.multiplexer_indicator {
-        MultiplexIndicator::Plain | MultiplexIndicator::Multiplexor => return None,
-        MultiplexIndicator::MultiplexedSignal(value) | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value) => {
-            value
+/// The entries of a DBC about single signals, by message and name; the first one of each counts. They stand in lists after all messages:
+/// to look through the lists for each signal would take a time of the square of the file's size.
+struct Entries<'d> {
+    floats: HashMap<(MessageId, &'d str), SignalExtendedValueType>,
+    ranges: HashMap<(MessageId, &'d str), &'d ExtendedMultiplex>,
+}
+
+impl<'d> Entries<'d> {
+    fn of(dbc: &'d Dbc) -> Self {
+        let (mut floats, mut ranges) = (HashMap::new(), HashMap::new());
+        for entry in &dbc.signal_extended_value_type_list {
+            floats.entry((entry.message_id, &*entry.signal_name)).or_insert(entry.signal_extended_value_type);
         }
+        for entry in &dbc.extended_multiplex {
+            ranges.entry((entry.message_id, &*entry.signal_name)).or_insert(entry);
+        }
+        Self { floats, ranges }
+    }
+}
+
+/// What the signals of a message may be multiplexed by.
+struct Multiplexors<'d> {
+    message: MessageId,
+    entries: &'d Entries<'d>,
+    /// The place of each signal, by its name.
+    places: HashMap<&'d str, usize>,
+    /// The multiplexor that is not multiplexed itself.
+    main: Option<usize>,
+}
+
+impl<'d> Multiplexors<'d> {
+    fn of(entries: &'d Entries<'d>, message: &'d can_dbc::Message) -> Self {
+        let mut places = HashMap::new();
+        for (place, signal) in message.signals.iter().enumerate() {
+            places.entry(&*signal.name).or_insert(place);
+        }
+        let main = message.signals.iter().position(|signal| {
+            signal.multiplexer_indicator == MultiplexIndicator::Multiplexor
+                && !entries.ranges.contains_key(&(message.id, &*signal.name))
+        });
+        Self { message: message.id, entries, places, main }
+    }
+
+    /// When a signal is in force; none if always.
+    fn multiplexed(&self, signal: &can_dbc::Signal) -> Option<Multiplexed> {
+        // A multiplexor in another one is not marked as multiplexed by every writer: the ranges say it.
+        if let Some(extended) = self.entries.ranges.get(&(self.message, &*signal.name)) {
+            let by = self.places.get(&*extended.multiplexor_signal_name).copied();
+            let values = extended.mappings.iter().map(|mapping| (mapping.min_value, mapping.max_value)).collect();
+            return Some(Multiplexed { by: by.unwrap_or(usize::MAX), values });
+        }
+        let value = match signal.multiplexer_indicator {
+            MultiplexIndicator::Plain | MultiplexIndicator::Multiplexor => return None,
+            MultiplexIndicator::MultiplexedSignal(value)
+            | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value) => value,
+        };
+        Some(Multiplexed { by: self.main.unwrap_or(usize::MAX), values: vec![(value, value)] })
+    }
+}
+
+/// A text that is no DBC. The message of the parser has the whole line, which may be the whole file: only its place is taken.
+fn no_dbc(path: &Path, error: &DbcError) -> LogError {
+    const WHAT: &str = "this is no DBC that can be read";
+    let DbcError::Pest(error) = error else {
+        return LogError::file(path, format!("{WHAT}: {}", shown(&error.to_string())));
     };
-    let is_main = |other: &can_dbc::Signal| {
-        other.multiplexer_indicator == MultiplexIndicator::Multiplexor && extended(&other.name).is_none()
-    };
-    let main = message.signals.iter().position(is_main);
-    Some(Multiplexed { by: main.unwrap_or(usize::MAX), values: vec![(value, value)] })
+    let text = error.to_string();
+    let place = text.lines().next().and_then(|first| first.trim().strip_prefix("--> "));
+    let line = place.and_then(|place| place.split(':').next()).unwrap_or("1");
+    LogError::damaged(path, format!("line {line}"), format!("{WHAT}: {}", shown(&error.variant.message())))
 }

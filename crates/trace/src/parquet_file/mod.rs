@@ -64,16 +64,16 @@ impl<W: Write + Send> ParquetWriter<W> {
                 let first = ColumnPath::new(vec![name.to_owned()]);
                 properties = properties.set_column_statistics_enabled(first, EnabledStatistics::Chunk);
             }
-            fields.push(field(name, kind).map_err(io::Error::other)?);
+            fields.push(field(name, kind).map_err(of_writer)?);
             values.push(match kind {
                 ColumnKind::Whole => Values::Whole(Vec::new()),
                 ColumnKind::Number => Values::Numbers(Vec::new(), Vec::new()),
                 ColumnKind::Word => Values::Words(Words::default()),
             });
         }
-        let schema = Type::group_type_builder("rows").with_fields(fields).build().map_err(io::Error::other)?;
+        let schema = Type::group_type_builder("rows").with_fields(fields).build().map_err(of_writer)?;
         let properties = Arc::new(properties.build());
-        let file = SerializedFileWriter::new(writer, Arc::new(schema), properties).map_err(io::Error::other)?;
+        let file = SerializedFileWriter::new(writer, Arc::new(schema), properties).map_err(of_writer)?;
         let descriptions = file.schema_descr().columns().to_vec();
         Ok(Self { file, columns: values, descriptions, rows: 0 })
     }
@@ -111,31 +111,31 @@ impl<W: Write + Send> ParquetWriter<W> {
         if rows == 0 {
             return Ok(());
         }
-        let mut group = self.file.next_row_group().map_err(io::Error::other)?;
+        let mut group = self.file.next_row_group().map_err(of_writer)?;
         for (values, description) in self.columns.iter_mut().zip(&self.descriptions) {
             if let Values::Words(words) = values {
-                let (bytes, close) = words.encode(description.clone()).map_err(io::Error::other)?;
-                group.append_column(&bytes, close).map_err(io::Error::other)?;
+                let (bytes, close) = words.encode(description.clone()).map_err(of_writer)?;
+                group.append_column(&bytes, close).map_err(of_writer)?;
                 words.begin_anew();
                 continue;
             }
-            let Some(mut column) = group.next_column().map_err(io::Error::other)? else { break };
+            let Some(mut column) = group.next_column().map_err(of_writer)? else { break };
             match (column.untyped(), &mut *values) {
                 (ColumnWriter::Int64ColumnWriter(writer), Values::Whole(values)) => {
-                    writer.write_batch(values, None, None).map_err(io::Error::other)?;
+                    writer.write_batch(values, None, None).map_err(of_writer)?;
                     values.clear();
                 }
                 (ColumnWriter::DoubleColumnWriter(writer), Values::Numbers(values, absent)) => {
                     let mut present = vec![1; rows];
                     absent.drain(..).for_each(|row| present[row] = 0);
-                    writer.write_batch(values, Some(&present), None).map_err(io::Error::other)?;
+                    writer.write_batch(values, Some(&present), None).map_err(of_writer)?;
                     values.clear();
                 }
                 _ => return Err(io::Error::other("a column is not of its kind")),
             }
-            column.close().map_err(io::Error::other)?;
+            column.close().map_err(of_writer)?;
         }
-        group.close().map_err(io::Error::other)?;
+        group.close().map_err(of_writer)?;
         Ok(())
     }
 
@@ -145,7 +145,18 @@ impl<W: Write + Send> ParquetWriter<W> {
     /// What the writer meets.
     pub fn finish(mut self) -> io::Result<W> {
         self.write_group()?;
-        self.file.into_inner().map_err(io::Error::other)
+        self.file.into_inner().map_err(of_writer)
+    }
+}
+
+/// What the writer met, as it was; other errors with their message.
+fn of_writer(error: ParquetError) -> io::Error {
+    match error {
+        ParquetError::External(source) => match source.downcast::<io::Error>() {
+            Ok(source) => *source,
+            Err(source) => io::Error::other(source),
+        },
+        error => io::Error::other(error),
     }
 }
 

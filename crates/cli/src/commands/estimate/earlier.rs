@@ -4,7 +4,7 @@ use std::path::Path;
 
 use logs::{Log, OpenOptions};
 use study::EstimateColumns;
-use trace::signal;
+use trace::{ShownPath as _, signal};
 
 use super::any_car::is_car_column;
 use super::outputs::beside;
@@ -19,8 +19,8 @@ pub(super) fn replaces_only_estimates(output: &Path) -> Result<(), Failure> {
         None => Ok(()),
         Some(foreign) => Err(Failure::Input(format!(
             "{}: no estimate wrote this file, and one into {} would replace it\nhint: choose another name after -o, or move the file",
-            foreign.display(),
-            output.display()
+            foreign.shown(),
+            output.shown()
         ))),
     }
 }

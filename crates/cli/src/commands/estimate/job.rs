@@ -11,6 +11,7 @@ use logs::{Log, Role, Shift};
 use report::log_page::{LogPage, shift_rows};
 use study::LogSample;
 use study::shift_estimates::no_estimate;
+use trace::ShownPath as _;
 
 use super::findings::Findings;
 use super::measured::{Measured, Step, WITHOUT_SENSORS, check_span, old_commands, slow_log};
@@ -76,7 +77,7 @@ pub(super) fn estimate(
         say.note("estimate: on standard output");
         return Ok(());
     };
-    say.note(&format!("estimate: {}", output.display()));
+    say.note(&format!("estimate: {}", output.shown()));
     let page = LogPage {
         log: path,
         vehicle,
@@ -163,8 +164,8 @@ fn check_findings(
 /// Writes the page, beside the table of shifts.
 fn write_page(page: &LogPage<'_>, [csv, json, html]: &[PathBuf; 3], say: &mut Messages) -> Result<(), Failure> {
     write_text(html, &page.html()?)?;
-    say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
-    say.note(&format!("report: {}", html.display()));
+    say.note(&format!("table of shifts: {}, {}", csv.shown(), json.shown()));
+    say.note(&format!("report: {}", html.shown()));
     Ok(())
 }
 

@@ -17,7 +17,7 @@ use observer::{ChannelHealth, Input, Reading as Measurement};
 use study::any_shift::pressure_command::command_of_valve;
 use study::log::{Beside, FIRST_LOOK, LogRow, Truth};
 use study::shift_estimates::is_refused;
-use trace::{CsvRows, Following, TraceError, shown_path, signal};
+use trace::{CsvRows, Following, ShownPath as _, TraceError, signal};
 
 use super::Messages;
 use super::watched::{WatchedColumn, WatchedColumns};
@@ -157,7 +157,7 @@ impl<'a> Measured<'a> {
         if !is_pipe && logs::needs_map(path)? {
             return Err(Failure::Input(format!(
                 "{}: this log needs a channel map\nhint: `wetclutch inspect` with --suggest writes a first one, for --map",
-                path.display()
+                path.shown()
             )));
         }
         let look = if stop.is_some() { FOLLOWED_LOOK } else { FIRST_LOOK };
@@ -324,11 +324,11 @@ pub(super) fn other_delimiter(path: &Path, error: TraceError) -> Failure {
         _ => None,
     };
     let Some(delimiter) = delimiter else { return error.into() };
-    let given = path.display();
+    let given = path.shown();
     Failure::Input(format!(
         "{}: the columns are separated by `{}`, which is read by a channel map only\n\
          hint: `wetclutch inspect {given} --suggest > map.toml` writes one; check it, then add --map map.toml",
-        shown_path(path),
+        path.shown(),
         delimiter.escape_debug()
     ))
 }
@@ -348,14 +348,14 @@ pub(super) fn check_step(path: &Path, median_s: f64, is_mapped: bool) -> Result<
     Err(Failure::Input(format!(
         "{}: the middle time between two rows is {median_s} s, longer than a phase of a shift\n\
          hint: if the time is in {unit}, {hint}",
-        shown_path(path)
+        path.shown()
     )))
 }
 
 /// Refuses a log whose time passes too fast, once its last row is known.
 pub(super) fn check_span(path: &Path, median_s: f64, span_s: f64) -> Result<(), Failure> {
     let wrong = too_fast_a_time(median_s, span_s);
-    wrong.map_or(Ok(()), |wrong| Err(Failure::Input(format!("{}: {wrong}", shown_path(path)))))
+    wrong.map_or(Ok(()), |wrong| Err(Failure::Input(format!("{}: {wrong}", path.shown()))))
 }
 
 /// Says that a log has too few rows for its shifts.

@@ -20,6 +20,7 @@ use std::sync::{Mutex, PoisonError};
 
 use config::{Kind, Source, Vehicle};
 use logs::ChannelMap;
+use trace::ShownPath as _;
 
 use self::earlier::replaces_only_estimates;
 use crate::args::{Estimate, FormatChoice};
@@ -63,7 +64,7 @@ pub(crate) fn estimate(options: &Estimate) -> Result<(), Failure> {
     outputs::check_name(options)?;
     if let Some(toml) = options.logs.iter().find(|log| log.extension().is_some_and(|ending| ending == "toml")) {
         let message =
-            format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.display());
+            format!("{}: this is a TOML file, expected a log\nhint: check the order of the files", toml.shown());
         return Err(Failure::Input(message));
     }
     if Source::read(&options.vehicle)?.kind()? == Kind::Car {
@@ -172,7 +173,7 @@ fn several<S: Sync>(
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let (Some(log), Some(output)) = (logs.get(at), outputs.get(at)) else { return };
-            let mut messages = Messages { held: Some(vec![format!("log: {}", log.display())]) };
+            let mut messages = Messages { held: Some(vec![format!("log: {}", log.shown())]) };
             let result = estimate(&setup, log, Some(output), &mut messages);
             output::note(&(messages.held.unwrap_or_default().join("\n") + "\n"));
             if let Err(failure) = result {
@@ -192,7 +193,7 @@ fn several<S: Sync>(
         return Ok(());
     }
     failures.sort_by_key(|(at, _)| *at);
-    let failed: Vec<String> = failures.iter().map(|(at, _)| logs[*at].display().to_string()).collect();
+    let failed: Vec<String> = failures.iter().map(|(at, _)| logs[*at].shown().to_string()).collect();
     let message = format!("{} of {} logs have no estimate: {}", failed.len(), logs.len(), failed.join(", "));
     Err(match failures.iter().any(|(_, failure)| matches!(failure, Failure::Work(_))) {
         true => Failure::Work(message),
@@ -212,7 +213,7 @@ fn not_the_learnt(options: &Estimate, outputs: &[PathBuf]) -> Result<(), Failure
         false => Ok(()),
         true => Err(Failure::Input(format!(
             "{}: an estimate goes into this file\nhint: choose another name after --learnt",
-            learnt.display()
+            learnt.shown()
         ))),
     }
 }
@@ -223,7 +224,7 @@ fn names_in(folder: &Path, logs: &[PathBuf], ending: &str) -> Result<Vec<PathBuf
     logs.iter()
         .map(|log| {
             let stem = log.file_stem().filter(|_| log.as_path() != Path::new("-")).ok_or_else(|| {
-                let log = log.display();
+                let log = log.shown();
                 Failure::Input(format!("{log}: this is no file\nhint: standard input can only be the one log"))
             })?;
             let mut name = stem.to_owned();
@@ -231,12 +232,12 @@ fn names_in(folder: &Path, logs: &[PathBuf], ending: &str) -> Result<Vec<PathBuf
             name.push(ending);
             let output = folder.join(name);
             for name in outputs::beside(&output).into_iter().flatten().chain([output.clone()]) {
-                let both = name.display().to_string();
+                let both = name.shown().to_string();
                 if let Some(other) = taken.insert(name, log) {
                     return Err(Failure::Input(format!(
                         "{} and {} would both give {both}\nhint: estimate them one by one",
-                        other.display(),
-                        log.display()
+                        other.shown(),
+                        log.shown()
                     )));
                 }
             }

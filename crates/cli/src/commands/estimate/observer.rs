@@ -7,6 +7,7 @@ use config::{ObserverKind, Sensors, Vehicle};
 use design::{compliant_open_loop_phases, rigid_open_loop_phases};
 use report::tables::phase_name;
 use study::AnyObserver;
+use trace::ShownPath as _;
 
 use super::Messages;
 use super::measured::Measured;
@@ -167,7 +168,7 @@ fn name_of(choice: ObserverChoice, method: MethodChoice) -> String {
 /// The sensors that a file describes.
 pub(in crate::commands) fn sensors(path: &Path) -> Result<Sensors, Failure> {
     Sensors::read(path)?.ok_or_else(|| {
-        let path = path.display();
+        let path = path.shown();
         Failure::Input(format!("{path}: there is no [sensors] table\nhint: add one, as in experiments/bench.toml"))
     })
 }

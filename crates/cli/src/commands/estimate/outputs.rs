@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use observer::{ChannelHealth, Channels, Estimate, Health, Phase};
 use study::{EstimateColumns, OutputColumn};
-use trace::{Cell, ColumnKind, CsvWriter, TableFormat, TableWriter};
+use trace::{Cell, ColumnKind, CsvWriter, ShownPath as _, TableFormat, TableWriter};
 
 use crate::args::{self, FormatChoice};
 use crate::failure::Failure;
@@ -63,14 +63,14 @@ pub(super) fn check_name(options: &args::Estimate) -> Result<(), Failure> {
     if let Some(ending) = ending.filter(|ending| by_name == TableFormat::Csv && !TEXT.contains(&ending.as_str())) {
         return Err(Failure::Input(format!(
             "{}: no table is written as .{}\nhint: estimates are CSV (.csv), Parquet (.parquet) or MDF (.mf4)",
-            output.display(),
+            output.shown(),
             ending.escape_debug()
         )));
     }
     match options.format {
         Some(format) if TableFormat::from(format) != by_name => Err(Failure::Input(format!(
             "{}: the name is not that of a file in --format {}\nhint: the ending says the format; leave --format out, or end the name in .{1}",
-            output.display(),
+            output.shown(),
             format.ending()
         ))),
         _ => Ok(()),
@@ -208,7 +208,7 @@ pub(super) fn beside(output: &Path) -> Option<[PathBuf; 3]> {
 pub(super) fn remove_old(places: &[PathBuf; 3], mut note: impl FnMut(&str)) -> Result<(), Failure> {
     for old in places.iter().filter(|old| old.is_file()) {
         std::fs::remove_file(old).map_err(|error| Failure::writing(old, &error))?;
-        note(&format!("removed: {}, of an earlier estimate", old.display()));
+        note(&format!("removed: {}, of an earlier estimate", old.shown()));
     }
     Ok(())
 }

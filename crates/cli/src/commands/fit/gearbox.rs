@@ -9,6 +9,7 @@ use fit::{FitError, ReadingAges};
 use indicatif::ProgressBar;
 use logs::ChannelMap;
 use study::any_shift::logged::LoggedDrive;
+use trace::ShownPath as _;
 
 use super::{HELD_OUT_MIN, LEAST_FOR_HELD_OUT, nothing_held_out, progress, reasons, said_of_file, table};
 use crate::args::Fit;
@@ -34,7 +35,7 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
             "{}: the ratios alone are known of its gearbox, and a fit finds values of clutches and valves\n\
              hint: describe its elements (level = \"stick-diagram\", or \"shares\"); `wetclutch inspect LOG --shifts -o PAGE.html` fits the \
              converter without them",
-            options.vehicle.display()
+            options.vehicle.shown()
         )));
     }
     let sensors = options.sensors.as_deref().map(sensors).transpose()?;
@@ -53,7 +54,7 @@ pub(super) fn fit(options: &Fit) -> Result<(), Failure> {
         bar.set_message(format!("{} shifts, iteration {}", progress.shifts, progress.iteration + 1));
         bar.tick();
     })?;
-    let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
+    let names: Vec<String> = options.logs.iter().map(|log| log.shown().to_string()).collect();
     let file = |checked: Option<&HeldOut>| found.vehicle_file(&car, &options.output, &names.join(", "), checked);
     let fitted = file(None)?;
     let checked =
@@ -89,7 +90,7 @@ fn record(
     let map = channel_map_of_car(&options.mapping, car.road.wheel_radius_m)?;
     let mut all = Recorded::default();
     for log in &options.logs {
-        bar.set_message(format!("reading {}", log.display()));
+        bar.set_message(format!("reading {}", log.shown()));
         bar.tick();
         let one = record_one(log, &map, Recorder::new(car, tables, ages), (car, tables), bar)?;
         check_ratios(one.in_gear, None, &options.vehicle, log)?;
@@ -114,7 +115,7 @@ fn record_one(
         recorder.push_pressure(step.time_s, step.shift_pressures(tables));
         count += 1;
         if count.is_multiple_of(STEPS) {
-            bar.set_message(format!("reading {}, {:.0} s", log.display(), step.time_s));
+            bar.set_message(format!("reading {}, {:.0} s", log.shown(), step.time_s));
             bar.tick();
         }
     }
@@ -140,7 +141,7 @@ fn no_shift(options: &Fit) -> Failure {
         "the logs have no shift between two gears that can be fitted\n\
          hint: `wetclutch inspect {log} --shifts` with the same map and the ratios of {} lists the shifts that it finds; a fit needs \
          `gear` and `target_gear`, which differ during a shift",
-        options.vehicle.display()
+        options.vehicle.shown()
     ))
     .into()
 }

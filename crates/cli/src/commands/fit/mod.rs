@@ -7,6 +7,7 @@ use std::path::Path;
 use config::{Kind, Source, Vehicle};
 use fit::{Collected, FitError, HeldOut, ReadingAges, ReportRow, SHIFTS_MAX, ShiftRecord};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use trace::ShownPath as _;
 
 use crate::args::Fit;
 use crate::commands::estimate::observer::sensors;
@@ -54,7 +55,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
     })?;
     bar.set_message("checking on shifts that were held out");
     reasons("not fitted", &found.unusable);
-    let names: Vec<String> = options.logs.iter().map(|log| log.display().to_string()).collect();
+    let names: Vec<String> = options.logs.iter().map(|log| log.shown().to_string()).collect();
     let fitted = found.vehicle_file(&vehicle, &names.join(", "))?;
     let checked = found.validate(&vehicle, &fitted, &held_out, ages)?;
     bar.finish_and_clear();
@@ -74,7 +75,7 @@ pub(crate) fn fit(options: &Fit) -> Result<(), Failure> {
 
 /// Says what the file has, and of how many shifts, or why it has the given values.
 fn said_of_file(options: &Fit, shifts: usize, against: Option<String>) {
-    let output = options.output.display();
+    let output = options.output.shown();
     let shifts = if shifts == 1 { "1 shift".to_owned() } else { format!("{shifts} shifts") };
     output::note(&match against {
         None => format!("fitted to {shifts}: {output}"),
@@ -108,10 +109,10 @@ fn collect(options: &Fit, vehicle: &Vehicle, bar: &ProgressBar) -> Result<Collec
     let map = channel_map_of_car(&options.mapping, vehicle.road.wheel_radius_m)?;
     let mut all = Collected::default();
     for log in &options.logs {
-        bar.set_message(format!("reading {}", log.display()));
+        bar.set_message(format!("reading {}", log.shown()));
         bar.tick();
         let mut one = fit::collect(log, &map, vehicle)?;
-        one.notes.iter_mut().for_each(|note| *note = format!("{}: {note}", log.display()));
+        one.notes.iter_mut().for_each(|note| *note = format!("{}: {note}", log.shown()));
         all.add(one);
     }
     Ok(all)

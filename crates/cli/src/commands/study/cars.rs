@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use config::{CarStudy, CarStudyRuns, ElementErrors};
+use config::{CarStudy, CarStudyRuns, ElementErrors, Source};
 use report::matrix_page::kind_rows;
 use study::StudyError;
 use study::any_shift::campaign::{CarCampaign, CarRow, CarSummary};
 use study::any_shift::matrix::Pooled;
+use trace::ShownPath as _;
 
 use super::part::{Part, Runs, lock, merged};
 use crate::args::{Merge, StudyOptions};
@@ -21,6 +22,15 @@ impl Runs for CarCampaign {
 
     fn name(&self) -> &str {
         &self.study.name
+    }
+
+    fn sources(&self) -> Vec<(&'static str, &Source)> {
+        let study = &self.study;
+        let mut sources = vec![("study", &study.source), ("vehicle", &study.car.source)];
+        if let CarStudyRuns::Drive(drive) = &study.what {
+            sources.push(("drive", &drive.source));
+        }
+        sources
     }
 
     fn fingerprint(&self) -> String {
@@ -112,7 +122,7 @@ fn finish(part: &Part<'_, CarCampaign>, summary: &CarSummary) -> Result<(), Fail
         output::grouped(counts.outside),
         output::grouped(counts.values),
     ))?;
-    output::line(&format!("\ntable: {}", part.table().display()))?;
+    output::line(&format!("\ntable: {}", part.table().shown()))?;
     Ok(())
 }
 

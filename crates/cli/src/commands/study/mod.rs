@@ -1,6 +1,7 @@
 //! `wetclutch study` and `wetclutch merge`.
 
 mod cars;
+mod manifest;
 mod one_run;
 mod part;
 
@@ -12,7 +13,7 @@ use report::study_page::diverged;
 use report::tables::{COMPARED_NAMES, number, phase_name};
 use study::campaign::PHASES;
 use study::{Campaign, Row, StudyError, Summary};
-use trace::units;
+use trace::{ShownPath as _, units};
 
 pub(super) use self::cars::describe as describe_cars;
 use self::one_run::one_run;
@@ -27,6 +28,11 @@ impl Runs for Campaign {
 
     fn name(&self) -> &str {
         &self.study.name
+    }
+
+    fn sources(&self) -> Vec<(&'static str, &Source)> {
+        let study = &self.study;
+        vec![("study", &study.source), ("experiment", &study.experiment.source), ("vehicle", &study.vehicle.source)]
     }
 
     fn fingerprint(&self) -> String {
@@ -122,7 +128,7 @@ fn print(summary: &Summary, page: &Path) -> Result<(), Failure> {
     if let Some(diverged) = diverged(summary) {
         output::line(&format!("\ndiverged: {diverged}"))?;
     }
-    output::line(&format!("\npage: {}", page.display()))?;
+    output::line(&format!("\npage: {}", page.shown()))?;
     Ok(())
 }
 

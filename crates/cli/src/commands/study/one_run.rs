@@ -7,6 +7,7 @@ use report::shift_figure::observers_of;
 use report::tables::{coverage, number, phase_name, quality_rows};
 use study::campaign::{Layout, Metric, PHASES, Run};
 use study::{Campaign, Row, estimates_trace};
+use trace::ShownPath as _;
 use trace::units::mpa;
 
 use crate::args::StudyOptions;
@@ -42,7 +43,7 @@ pub(super) fn one_run(campaign: &Campaign, number: u64, options: &StudyOptions) 
         scores(&campaign.layout, &row)?;
     }
     output::line("\nfiles\n")?;
-    let files = files.into_iter().map(|(path, what)| vec![path.display().to_string(), what]);
+    let files = files.into_iter().map(|(path, what)| vec![path.shown().to_string(), what]);
     Ok(output::table(2, &files.collect::<Vec<_>>())?)
 }
 

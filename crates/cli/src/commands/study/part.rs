@@ -1,19 +1,21 @@
 //! The rows of a study, whole or a shard of it, in a folder: made, resumed, checked.
 
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use config::Source;
 use study::StudyError;
 use study::campaign::{BLOCK, in_blocks};
-use trace::{ColumnKind, Damage, FolderLock, GrowingTable, partial_path, read_rows};
+use trace::{ColumnKind, Damage, FolderLock, GrowingTable, ShownPath as _, partial_path, read_rows};
 
+use super::manifest::{Manifest, in_order};
 use crate::args::{Merge, Shard, StudyOptions};
 use crate::commands::{progress, write_text};
 use crate::failure::Failure;
 use crate::output;
 
 const ROWS: &str = "runs.csv";
-const MANIFEST: &str = "study.json";
 /// Number of rows after which the table is flushed: a killed program loses fewer rows than that.
 const FLUSH_EVERY: u64 = 64;
 
@@ -22,6 +24,8 @@ pub(super) trait Runs: Sync {
     type Row: Send;
 
     fn name(&self) -> &str;
+    /// The files that determine the rows, by their roles.
+    fn sources(&self) -> Vec<(&'static str, &Source)>;
     /// SHA-256 of everything that determines the rows.
     fn fingerprint(&self) -> String;
     fn count(&self) -> u64;
@@ -47,13 +51,10 @@ pub(super) fn lock(folder: &Path) -> Result<FolderLock, Failure> {
     let lock = FolderLock::take(folder).map_err(|error| Failure::writing(folder, &error))?;
     let lock = lock.ok_or_else(|| {
         let hint = "wait until the other process has ended, or choose another folder";
-        Failure::Input(format!(
-            "{}: another wetclutch process is writing to this folder\nhint: {hint}",
-            folder.display()
-        ))
+        Failure::Input(format!("{}: another wetclutch process is writing to this folder\nhint: {hint}", folder.shown()))
     })?;
     if !lock.is_held {
-        let folder = folder.display();
+        let folder = folder.shown();
         output::note(&format!(
             "{folder}: this file system has no locks; do not start another wetclutch process with this folder"
         ));
@@ -89,7 +90,7 @@ impl<R: Runs> Part<'_, R> {
             if !options.resume {
                 return Err(Failure::Input(format!(
                     "{}: the study is complete\nhint: choose another folder, or use --resume to write the page again",
-                    self.table().display()
+                    self.table().shown()
                 )));
             }
             return self.each_row(|row| {
@@ -98,7 +99,7 @@ impl<R: Runs> Part<'_, R> {
             });
         }
         let (mut table, done) = self.open(options.resume, &mut push)?;
-        let writing = |error| Failure::writing(&partial_path(&self.table()), &error);
+        let writing = |error| self.writing(&error);
         let all = self.runs();
         let bar = progress(all.end - all.start, done);
         let mut number = all.start + done;
@@ -119,40 +120,39 @@ impl<R: Runs> Part<'_, R> {
         table.finish().map_err(writing)
     }
 
+    /// The growing table could not be written; the rows so far are not lost.
+    fn writing(&self, error: &io::Error) -> Failure {
+        match Failure::writing(&partial_path(&self.table()), error) {
+            Failure::Work(message) if error.kind() == io::ErrorKind::StorageFull => {
+                let message = message.split('\n').next().unwrap_or_default();
+                Failure::Work(format!(
+                    "{message}\nhint: make room on the disk; --resume then goes on after the rows that are there"
+                ))
+            }
+            failure => failure,
+        }
+    }
+
     fn header(&self) -> String {
         self.campaign.header().join(",")
     }
 
     /// Everything that determines the rows.
-    fn manifest(&self) -> String {
-        let (study, runs) = (self.campaign, self.runs());
-        let manifest = serde_json::json!({
-            "wetclutch": env!("CARGO_PKG_VERSION"),
-            "study": study.name(),
-            "sha256": study.fingerprint(),
-            "shard": self.shard.map(|shard| shard.to_string()),
-            "first_run": runs.start,
-            "runs": runs.end - runs.start,
-        });
-        format!("{manifest:#}\n")
+    fn manifest(&self) -> Manifest {
+        let whole = Manifest::of(self.campaign);
+        match self.shard {
+            Some(shard) => whole.of_shard(shard, self.campaign.count()),
+            None => whole,
+        }
     }
 
     pub(super) fn check_manifest(&self) -> Result<(), Failure> {
-        let path = self.folder.join(MANIFEST);
-        let found = std::fs::read_to_string(&path).map_err(|error| {
-            Failure::Input(format!("{}: {error}\nhint: name the folder of a study", path.display()))
-        })?;
-        if found == self.manifest() {
-            return Ok(());
-        }
-        let hint =
-            "the study file, its experiment or vehicle, the program or the shard has changed; choose another folder";
-        Err(Failure::Input(format!("{}: belongs to another study\nhint: {hint}", path.display())))
+        Manifest::read(self.folder)?.check(&self.manifest(), self.folder)
     }
 
     /// A new table of rows.
     pub(super) fn create(&self) -> Result<GrowingTable, Failure> {
-        write_text(&self.folder.join(MANIFEST), &self.manifest())?;
+        write_text(&Manifest::path(self.folder), &self.manifest().text()?)?;
         let table = self.table();
         GrowingTable::create(&table, &self.header()).map_err(|error| Failure::writing(&partial_path(&table), &error))
     }
@@ -169,7 +169,7 @@ impl<R: Runs> Part<'_, R> {
         if !resume {
             return Err(Failure::Input(format!(
                 "{}: there is an unfinished study in this folder\nhint: use --resume to complete it, or choose another folder",
-                self.folder.display()
+                self.folder.shown()
             )));
         }
         self.check_manifest()?;
@@ -181,7 +181,7 @@ impl<R: Runs> Part<'_, R> {
         })?;
         if let Some(Damage { line, message }) = damage {
             let path = partial_path(&path);
-            output::note(&format!("{}:{line}: {message}; the runs from this line on are made again", path.display()));
+            output::note(&format!("{}:{line}: {message}; the runs from this line on are made again", path.shown()));
         }
         let all = self.runs();
         output::note(&format!("resuming after {done} of {} runs", all.end - all.start));
@@ -211,33 +211,29 @@ impl<R: Runs> Part<'_, R> {
         let hint = "the table has been changed since it was written; make its runs again in another folder";
         read.map_err(|error| Failure::Input(format!("{error}\nhint: {hint}")))?;
         if count != all.end - all.start {
-            let message = format!("{}: contains {count} of {} runs", table.display(), all.end - all.start);
+            let message = format!("{}: contains {count} of {} runs", table.shown(), all.end - all.start);
             return Err(Failure::Input(format!("{message}\nhint: {hint}")));
         }
         Ok(())
     }
 }
 
-/// Puts the shards of a study together and shows every row in its order. The folder is locked as long as the lock lives.
+/// Puts the shards of a study together, given in any order, and shows every row in its order. The folder is locked as long as the lock lives.
 pub(super) fn merged<'a, R: Runs>(
     campaign: &'a R,
     options: &'a Merge,
     mut push: impl FnMut(&R::Row),
 ) -> Result<(Part<'a, R>, FolderLock), Failure> {
-    let count = options.shards.len() as u64;
-    let shards = (1..=count).map(|index| Some(Shard { index, count }));
-    let parts: Vec<Part<'_, R>> =
-        options.shards.iter().zip(shards).map(|(folder, shard)| Part { campaign, folder, shard }).collect();
-    for part in &parts {
-        part.check_manifest()
-            .map_err(|failure| Failure::Input(format!("{failure}\nhint: give all {count} shards, in their order")))?;
-    }
+    let parts: Vec<Part<'_, R>> = in_order(campaign, &options.shards)?
+        .into_iter()
+        .map(|(folder, shard)| Part { campaign, folder, shard: Some(shard) })
+        .collect();
     let whole = Part { campaign, folder: &options.output, shard: None };
     let lock = lock(whole.folder)?;
     if whole.table().exists() {
         return Err(Failure::Input(format!(
             "{}: there is already a study in this folder\nhint: choose another folder",
-            whole.folder.display()
+            whole.folder.shown()
         )));
     }
     // An unfinished table of the same study may be replaced: the shards contain all of its rows.

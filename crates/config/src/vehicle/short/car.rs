@@ -98,7 +98,7 @@ pub(in super::super) fn car_defaults(
         radius: number(&["vehicle", "wheel_radius_m"], WHEEL_RADII_M)?.map_or(1.0, |radius| radius / WHEEL_RADIUS_M),
     };
     let text = scaled(&shipped, |key| sizes.factor(key))?;
-    Ok(Source { path: format!("defaults of {}", source.path.display()).into(), text })
+    Ok(Source { path: format!("defaults of {}", source.path.to_string_lossy()).into(), text })
 }
 
 /// The text of a file with some of its numbers times a factor.

@@ -50,7 +50,7 @@ impl Short {
         }
         complete::check_lists(source)?;
         let facts = Facts::of_file(source)?;
-        let path = format!("defaults of {}", source.path.display()).into();
+        let path = format!("defaults of {}", source.path.to_string_lossy()).into();
         Ok(Some(Self { defaults: Source { path, text: text_of(&facts)? } }))
     }
 
@@ -62,7 +62,7 @@ impl Short {
     /// The whole file, with the values of the short one in their places, and the defaults that it took.
     pub(super) fn complete(&self, source: &Source) -> Result<(Source, Vec<DefaultTaken>), ConfigError> {
         let (text, taken) = complete::complete(&self.defaults, source)?;
-        let path = format!("{}, completed with defaults", source.path.display()).into();
+        let path = format!("{}, completed with defaults", source.path.to_string_lossy()).into();
         Ok((Source { path, text }, taken))
     }
 }

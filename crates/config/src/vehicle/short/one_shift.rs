@@ -254,7 +254,7 @@ impl<'c> OneShift<'c> {
                 CommandKind::DutyCycle => ValveKind::PulseWidth,
             },
         };
-        let path = format!("defaults for a shift of {}", car.source.path.display());
+        let path = format!("defaults for a shift of {}", car.source.path.to_string_lossy());
         Vehicle::from_source(Source { path: path.into(), text: text_of(&facts)? })
     }
 

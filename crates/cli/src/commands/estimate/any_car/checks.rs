@@ -14,7 +14,7 @@ use study::any_shift::car_log::{CarLog, LogStep, element_commands, element_press
 use study::any_shift::logged::Unusable;
 use study::any_shift::pressure_command::pressure_command_column;
 use study::log::FIRST_LOOK;
-use trace::{shown_path, signal};
+use trace::{ShownPath as _, signal};
 
 use super::super::measured::{check_span, check_step};
 use super::super::watched::{WatchedColumn, WatchedColumns};
@@ -69,7 +69,7 @@ pub(super) fn refused(unusable: Unusable, path: &Path) -> Failure {
     };
     Failure::Input(format!(
         "{}: in none of {} rows in a gear, with the car moving, can the estimate be used; most of them have {} (`{}`)\nhint: {hint}",
-        shown_path(path),
+        path.shown(),
         output::grouped(rows),
         health_meaning(health),
         health.name()

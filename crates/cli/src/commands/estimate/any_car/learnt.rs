@@ -7,7 +7,7 @@ use config::{Car, ConfigError, Source, read_learnt, write_learnt};
 use design::ShiftTables;
 use observer::any_shift::{Learnt, LearntElement};
 use study::any_shift::logged::LoggedDrive;
-use trace::WholeFile;
+use trace::{ShownPath as _, WholeFile};
 
 use super::super::Messages;
 use crate::commands::{check_output, write_text};
@@ -60,7 +60,7 @@ pub(super) struct Kept<'a> {
 impl<'a> Kept<'a> {
     pub(super) fn of(path: &'a Path, car: &Car, tables: &ShiftTables<f64>, drive: &LoggedDrive<'_>) -> Self {
         let (_, learnt, count) = drive.learnt();
-        let file = path.display();
+        let file = path.shown();
         if !count.has_changed() {
             let state = if path.exists() { "stays as it is" } else { "is not written" };
             let nothing = format!("learnt: nothing, no shift of this log could be learnt from; {file} {state}");

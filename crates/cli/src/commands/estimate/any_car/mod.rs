@@ -16,7 +16,7 @@ use logs::ChannelMap;
 use report::drive_page::{DrivePage, MOST_DRAWN, findings, shift_cells, shift_rows, shift_words};
 use study::any_shift::drive::ScoredDrive;
 use study::any_shift::logged::LoggedDrive;
-use trace::{Cell, shown_path};
+use trace::{Cell, ShownPath as _};
 
 use self::checks::{RowTimes, refused};
 pub(super) use self::columns::is_car_column;
@@ -66,7 +66,7 @@ impl<'a> CarSetup<'a> {
     pub(super) fn new(options: &'a Estimate) -> Result<Self, Failure> {
         let car = Car::read(&options.vehicle)?;
         if options.learnt.is_some() && car.gearbox.has_ratios_alone() {
-            let vehicle = options.vehicle.display();
+            let vehicle = options.vehicle.shown();
             let message = format!("--learnt has no effect with {vehicle}: the ratios alone are known of its gearbox");
             let hint =
                 "leave it out; what is learnt is of clutches and valves, which such a gearbox file does not have";
@@ -153,7 +153,7 @@ pub(super) fn estimate(
     match (output, places) {
         (None, _) => say.note("estimate: on standard output"),
         (Some(output), places) => {
-            say.note(&format!("estimate: {}", output.display()));
+            say.note(&format!("estimate: {}", output.shown()));
             match places {
                 Some(places) => write_page(&drive, car, path, &places, say)?,
                 None => beside(output).map_or(Ok(()), |old| remove_old(&old, |note| say.note(note)))?,
@@ -192,8 +192,8 @@ pub(in crate::commands) fn check_ratios(
     let [all, unfit] = rows;
     Err(Failure::Input(format!(
         "{}: in {unfit} of {all} rows in a gear the turbine speed is not the output speed times the ratio of that gear in {}\nhint: {}",
-        shown_path(log),
-        vehicle.display(),
+        log.shown(),
+        vehicle.shown(),
         wrong_scale
             .unwrap_or("check the units of both speeds, the gear, and whether this is the vehicle file of the car")
     )))
@@ -217,8 +217,8 @@ fn write_page(
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let html = DrivePage { name: &name, car, draw: None, drive, sources: &[&car.source] }.html()?;
     write_text(page, &html)?;
-    say.note(&format!("table of shifts: {}, {}", csv.display(), json.display()));
-    say.note(&format!("report: {}", page.display()));
+    say.note(&format!("table of shifts: {}, {}", csv.shown(), json.shown()));
+    say.note(&format!("report: {}", page.shown()));
     Ok(())
 }
 

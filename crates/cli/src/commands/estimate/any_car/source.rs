@@ -11,7 +11,7 @@ use design::ShiftTables;
 use logs::{ChannelMap, Log, LogError};
 use study::any_shift::car_log::{CarLog, LogStep};
 use study::any_shift::channels::{CarChannels, own_map};
-use trace::{CsvRows, Following, shown_path};
+use trace::{CsvRows, Following, ShownPath as _};
 
 use super::super::Messages;
 use super::super::measured::{other_delimiter, report_readings};
@@ -66,7 +66,7 @@ impl<'a> CarSource<'a> {
                 Failure::Input(format!(
                     "{}: this log needs a channel map, because its channels have other names than those of `wetclutch simulate`\n\
                      hint: `wetclutch inspect` with --suggest writes a first one, for --map",
-                    shown_path(path)
+                    path.shown()
                 ))
             })?;
             &own

@@ -1,0 +1,77 @@
+//! Names and paths in messages. They come from other people's files: a control character in one must not reach the terminal.
+
+use std::borrow::Cow;
+use std::fmt::{self, Display, Write};
+use std::path::Path;
+
+/// Whether a character does something else than to be printed: it controls the terminal, ends the line, is invisible or turns
+/// the direction of writing.
+pub fn is_unprintable(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+        || matches!(c, '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+}
+
+/// A text on one line in which every character is printed, the others as `\n` or `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if text.chars().any(is_unprintable) { Cow::Owned(Printable(text).to_string()) } else { Cow::Borrowed(text) }
+}
+
+/// A text as a TOML file holds it: in double quotes, on one line, with everything else escaped.
+pub fn toml_string(text: &str) -> String {
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        _ if is_unprintable(c) && u32::from(c) > 0xffff => format!("\\U{:08x}", u32::from(c)),
+        _ if is_unprintable(c) => format!("\\u{:04x}", u32::from(c)),
+        _ => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
+}
+
+/// A path in a message. Use it in place of `Path::display`, which prints what a terminal obeys.
+pub trait ShownPath {
+    /// The path on one line, every character printed; `-` is standard input.
+    fn shown(&self) -> impl Display + '_;
+}
+
+impl ShownPath for Path {
+    fn shown(&self) -> impl Display + '_ {
+        Lossy(if self == Self::new("-") { Self::new("standard input") } else { self })
+    }
+}
+
+struct Printable<'a>(&'a str);
+
+impl Display for Printable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for c in self.0.chars() {
+            if is_unprintable(c) { write!(f, "{}", c.escape_default())? } else { f.write_char(c)? }
+        }
+        Ok(())
+    }
+}
+
+struct Lossy<'a>(&'a Path);
+
+impl Display for Lossy<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Printable(&self.0.to_string_lossy()).fmt(f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_printed_is_escaped_and_the_rest_stays() {
+        let plain = "C:\\logs\\Fahrt ü 离合器 'a' \"b\".csv";
+        assert!(matches!(printable(plain), Cow::Borrowed(text) if text == plain));
+        let hostile = "a\u{1b}[2J\nhint: b\t\u{9b}31m\u{202e}gpj.\u{7f}\u{feff}";
+        let escaped = r"a\u{1b}[2J\nhint: b\t\u{9b}31m\u{202e}gpj.\u{7f}\u{feff}";
+        assert_eq!(printable(hostile), escaped);
+        assert_eq!(Path::new(hostile).shown().to_string(), escaped);
+        assert_eq!(Path::new("-").shown().to_string(), "standard input");
+        assert_eq!(Path::new("./-").shown().to_string(), "./-");
+    }
+}
