@@ -109,9 +109,9 @@ impl Source {
     /// Reads a file.
     ///
     /// # Errors
-    /// The file cannot be read as UTF-8 text.
+    /// The file cannot be read as text in UTF-8 or UTF-16.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| {
+        let text = std::fs::read(path).and_then(text_of).map_err(|source| {
             let source = match source.kind() {
                 io::ErrorKind::InvalidData => io::Error::new(
                     source.kind(),
@@ -273,6 +273,21 @@ fn lay_over<'t>(below: &mut DeTable<'t>, above: DeTable<'t>) {
     }
 }
 
+/// The text in the bytes of a file: UTF-8, or UTF-16 by its mark or, without one, by two letters of ASCII at its beginning.
+fn text_of(bytes: Vec<u8>) -> io::Result<String> {
+    let order: fn([u8; 2]) -> u16 = match bytes[..] {
+        [0xff, 0xfe, ..] => u16::from_le_bytes,
+        [0xfe, 0xff, ..] => u16::from_be_bytes,
+        [1..=0x7f, 0, 1..=0x7f, 0, ..] => u16::from_le_bytes,
+        [0, 1..=0x7f, 0, 1..=0x7f, ..] => u16::from_be_bytes,
+        _ => return String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error)),
+    };
+    let (pairs, rest) = bytes.as_chunks::<2>();
+    let text = char::decode_utf16(pairs.iter().map(|pair| order(*pair))).collect::<Result<String, _>>().ok();
+    let text = text.filter(|_| rest.is_empty()).ok_or(io::ErrorKind::InvalidData)?;
+    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -296,5 +311,29 @@ mod tests {
             assert_eq!(toml_number(value), text);
             assert!((text.parse::<f64>().unwrap() - value).abs() <= 1e-4 * value.abs());
         }
+    }
+    #[test]
+    fn a_file_in_utf_16_or_with_a_mark_is_the_same_text() {
+        let text = "[engine]\r\nname = \"Öl\"\r\n";
+        let path = std::env::temp_dir().join(format!("wetclutch-source-{}.toml", std::process::id()));
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            Source::read(&path)
+        };
+        let wide = |mark: bool, order: fn(u16) -> [u8; 2]| {
+            let mark = mark.then_some(0xfeff);
+            mark.into_iter().chain(text.encode_utf16()).flat_map(order).collect::<Vec<u8>>()
+        };
+        for (mark, order) in [(true, u16::to_le_bytes as fn(u16) -> [u8; 2]), (true, u16::to_be_bytes)] {
+            assert_eq!(read(&wide(mark, order)).unwrap().text, text);
+            assert_eq!(read(&wide(false, order)).unwrap().text, text);
+            // Half a letter at the end, and half of one that needs four bytes.
+            assert!(read(&[wide(mark, order), vec![0]].concat()).is_err());
+            assert!(read(&[wide(mark, order), order(0xd83d).to_vec()].concat()).is_err());
+        }
+        let marked = read(&[&[0xef, 0xbb, 0xbf], text.as_bytes()].concat()).unwrap();
+        assert!(marked.parse::<toml::Table>().unwrap().contains_key("engine"));
+        assert!(read(&[0xff, 0x80, 0x81]).is_err());
+        let _ = std::fs::remove_file(&path);
     }
 }

@@ -149,7 +149,7 @@ impl ChannelMap {
     /// # Errors
     /// The file cannot be read, or something in it is wrong; the message has the line.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let text = std::fs::read_to_string(path).map_err(LogError::io(path))?;
+        let text = trace::text::text_of(&std::fs::read(path).map_err(LogError::io(path))?);
         let wrong = |message: String| LogError::map(format!("{}: {message}", path.display()));
         let raw: RawMap = toml::from_str(&text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))?;
         let channels =

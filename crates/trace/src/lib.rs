@@ -16,6 +16,7 @@ pub mod signal;
 #[cfg(test)]
 mod slow;
 pub mod table;
+pub mod text;
 pub mod units;
 
 use std::borrow::Cow;
