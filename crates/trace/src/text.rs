@@ -35,8 +35,11 @@ fn utf16(head: &[u8]) -> Option<&'static Encoding> {
 
 /// The text in the bytes of a whole file, without its mark. What is neither UTF-16 nor UTF-8 is Latin-1, in which every byte is a letter.
 pub fn text_of(bytes: &[u8]) -> String {
-    if let Some(encoding) = utf16(bytes) {
-        return encoding.decode_with_bom_removal(bytes).0.into_owned();
+    if is_utf16(bytes) {
+        let mut text = Vec::new();
+        // Reading from memory does not fail.
+        let _ = Utf16::new(bytes.to_vec(), Box::new(io::empty())).read_to_end(&mut text);
+        return String::from_utf8_lossy(&text).into_owned();
     }
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&byte| char::from(byte)).collect(), str::to_owned)
