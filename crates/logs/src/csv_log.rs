@@ -87,19 +87,15 @@ impl CsvLog {
         let by_form = by_form.map(|i| TimeColumn { name: names[i].0.clone(), unit: None });
         let time = time.or(by_form.as_ref());
         let column = time_column(path, &names, &titles, time)?;
-        // The last line of the head may be cut.
-        let lines = beginning.lines().enumerate().skip(dialect.first);
-        let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
-        one_clock(
-            path,
-            &names,
-            column,
-            lines.take(whole.saturating_sub(dialect.first)).map(|(line, text)| (line, cells(text, dialect.delimiter))),
-        )?;
         let time = match stamp(column) {
             Some(form) => (column, TimeForm::Stamps(form)),
             None => (column, TimeForm::Numbers(time_unit(path, &names[column], time, &mut notes)?)),
         };
+        // The last line of the head may be cut.
+        let whole = beginning.lines().count().saturating_sub(usize::from(!beginning.ends_with('\n')));
+        let lines = beginning.lines().enumerate().take(whole).skip(dialect.first);
+        let size_s = if let TimeForm::Numbers(size) = time.1 { size } else { 1.0 };
+        one_clock(path, &names, (column, size_s), lines.map(|(line, text)| (line, cells(text, dialect.delimiter))))?;
         let named = |i: &usize| *i != time.0 && !names[*i].0.is_empty();
         let columns: Vec<usize> = (0..titles.len()).filter(named).collect();
         let (path, width) = (path.to_owned(), titles.len());
@@ -123,7 +119,7 @@ impl CsvLog {
         format!("CSV, delimiter {delimiter}, decimal {}", if self.dialect.decimal_comma { "comma" } else { "point" })
     }
 
-    /// Adds to what is to be said about it.
+    /// Adds a note.
     pub(crate) fn note(&mut self, note: &str) {
         self.notes.push(note.to_owned());
     }

@@ -65,7 +65,7 @@ enum Source {
     Can(CanLog),
 }
 
-/// What is said of a DBC that is given for a log without frames.
+/// The warning of a DBC that is given for a log without frames.
 pub const NO_FRAMES: &str = "the DBC has no effect: there are no frames of a CAN bus in this log";
 
 /// Bytes that tell the format of a file, and the lines that tell the form of a table.
@@ -149,7 +149,7 @@ impl Log {
         }
     }
 
-    /// Adds to what is to be said about it.
+    /// Adds a note.
     fn note(&mut self, note: &str) {
         match &mut self.source {
             Source::Csv(log) => log.note(note),
@@ -329,10 +329,11 @@ impl Log {
 /// The file cannot be read, or is of a format that is known and not read.
 pub fn needs_map(path: &Path) -> Result<bool, LogError> {
     let io = LogError::io(path);
-    let file = File::open(path).map_err(&io)?;
-    if !file.metadata().map_err(&io)?.is_file() {
+    // A pipe is opened once.
+    if !path.metadata().map_err(&io)?.is_file() {
         return Ok(false);
     }
+    let file = File::open(path).map_err(&io)?;
     match Format::of(&beginning(path, Box::new(file))?.0) {
         Format::NotRead(why) => Err(LogError::file(path, why)),
         format => Ok(format != Format::Csv),

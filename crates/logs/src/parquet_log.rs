@@ -102,7 +102,7 @@ impl ParquetLog {
         Ok((Self { path: path.to_owned(), reader, time, time_form, is_of_day, columns, notes }, channels))
     }
 
-    /// Adds to what is to be said about it.
+    /// Adds a note.
     pub(crate) fn note(&mut self, note: &str) {
         self.notes.push(note.to_owned());
     }

@@ -66,54 +66,79 @@ fn base_name(name: &str) -> Option<String> {
     [name.as_str(), plain].into_iter().find(|name| is_time_name(name)).map(|_| plain.to_owned())
 }
 
-/// Refuses a table with a time for each signal: another column has the name of the time, and other values. `rows` are some of its first rows, with their lines.
+/// Refuses a table with a time for each signal: another column has the name of the time and other values, or is named as a time and rises
+/// at another rate. `size_s` is that of the unit of the time, and `rows` are some of its first rows, with their lines.
 pub(crate) fn one_clock<'c>(
     path: &Path,
     names: &[(String, String)],
-    time: usize,
-    mut rows: impl Iterator<Item = (usize, Vec<Cow<'c, str>>)>,
+    (time, size_s): (usize, f64),
+    rows: impl Iterator<Item = (usize, Vec<Cow<'c, str>>)>,
 ) -> Result<(), LogError> {
-    let Some(base) = base_name(&names[time].0) else { return Ok(()) };
-    let is_other = |&i: &usize| {
-        let (name, unit) = &names[i];
-        let may_be_time = unit.is_empty() || Unit::parse(unit).is_none_or(|unit| unit.quantity == Quantity::Time);
-        // A `T` beside a `t` is a temperature.
-        let is_same = || if base.len() == 1 { *name == names[time].0 } else { base_name(name).as_ref() == Some(&base) };
-        i != time && may_be_time && is_same()
-    };
-    let others: Vec<usize> = (0..names.len()).filter(is_other).collect();
+    let others: Vec<(usize, bool)> = (0..names.len()).filter_map(|i| Some((i, may_be_time(names, time, i)?))).collect();
     if others.is_empty() {
         return Ok(());
     }
-    // The same time may have another unit, and other digits.
+    let rows: Vec<_> = rows.collect();
     let time_s = |column: usize, cell: &str| {
-        let size = Unit::parse(&names[column].1).map_or(1.0, |unit| unit.size);
+        let own_s = Unit::parse(&names[column].1).map(|unit| unit.size).filter(|_| column != time);
+        let size = own_s.unwrap_or(size_s);
         cell.replace(',', ".").parse::<f64>().ok().map(|number| number * size)
     };
-    let is_same = |(at, cell): (usize, &str), own: &str| {
-        let both = || time_s(at, cell).zip(time_s(time, own));
-        cell == own || both().is_some_and(|(one, other)| (one - other).abs() <= 1e-9 * one.abs().max(other.abs()))
+    let cell = |row: usize, column: usize| rows[row].1.get(column).map_or("", |cell| cell);
+    // The same time may have another unit, and other digits.
+    let is_same = |row: usize, other: usize| {
+        let both = time_s(other, cell(row, other)).zip(time_s(time, cell(row, time)));
+        let is_close = |(one, own): (f64, f64)| (one - own).abs() <= 1e-9 * one.abs().max(own.abs());
+        cell(row, other) == cell(row, time) || both.is_some_and(is_close)
     };
-    let differs = |(line, row): (usize, Vec<Cow<'c, str>>)| {
-        let own = row.get(time)?.to_string();
-        let cells = others.iter().filter_map(|&i| Some((i, row.get(i)?)));
-        let (other, text) = cells.into_iter().find(|(i, cell)| !is_same((*i, cell), &own))?;
-        Some((line, own, (other, text.to_string())))
+    // How long the first rows take by a column that rises with each of them, s.
+    let span_s = |column: usize| {
+        const FEWEST: usize = 3;
+        let times: Option<Vec<f64>> = (0..rows.len()).map(|row| time_s(column, cell(row, column))).collect();
+        let times = times.filter(|times| times.len() >= FEWEST && times.is_sorted_by(|one, next| one < next))?;
+        Some(times.last()? - times.first()?)
     };
-    let Some((line, own, (other, text))) = rows.find_map(differs) else { return Ok(()) };
+    let differs = |&(other, has_name): &(usize, bool)| {
+        // Digits are few at the beginning of a log.
+        const RATE: f64 = 0.05;
+        let is_rate = |(one, own): (f64, f64)| (one - own).abs() > RATE * own;
+        let is_other = has_name || span_s(other).zip(span_s(time)).is_some_and(is_rate);
+        let row = (0..rows.len()).find(|&row| !is_same(row, other)).filter(|_| is_other)?;
+        Some((row, other))
+    };
+    let Some((row, other)) = others.iter().find_map(differs) else { return Ok(()) };
+    let [own, text] = [time, other].map(|column| error::shown(cell(row, column)));
     Err(LogError::damaged(
         path,
-        format!("line {}", line + 1),
+        format!("line {}", rows[row].0 + 1),
         format!(
-            "columns {} and {} are both a time `{}`, and differ (`{}` and `{}`): a table is read over one time\n\
+            "columns {} `{}` and {} `{}` are both a time, and differ (`{own}` and `{text}`): a table is read over one time\n\
              hint: write a table for each of them, or all signals over one time",
             time + 1,
-            other + 1,
             error::shown(&names[time].0),
-            error::shown(&own),
-            error::shown(&text)
+            other + 1,
+            error::shown(&names[other].0),
         ),
     ))
+}
+
+/// Whether another column may be a time as well by its name and unit, and then whether it has the name of the time.
+fn may_be_time(names: &[(String, String)], time: usize, other: usize) -> Option<bool> {
+    let (name, unit) = &names[other];
+    let in_time = unit.is_empty() || Unit::parse(unit).is_none_or(|unit| unit.quantity == Quantity::Time);
+    if other == time || !in_time {
+        return None;
+    }
+    let base = base_name(&names[time].0);
+    // A `T` next to a `t` is a temperature.
+    let has_name = match &base {
+        Some(base) if base.len() == 1 => *name == names[time].0,
+        Some(_) => base_name(name) == base,
+        None => *name == names[time].0,
+    };
+    let name = name.to_lowercase();
+    let is_named = ["time", "zeit", "stamp"].iter().any(|word| name.contains(word));
+    (has_name || is_named).then_some(has_name)
 }
 
 /// The column of the time: the one that is wanted, or has a usual name, or is the first one and in a unit of time.
@@ -134,7 +159,7 @@ pub(crate) fn time_column(
     found.ok_or_else(|| LogError::file(path, without_time(names, wanted)))
 }
 
-/// What is said of a table without a time, with what to do.
+/// The error of a table without a time, with what to do.
 fn without_time(names: &[(String, String)], wanted: Option<&TimeColumn>) -> String {
     let find =
         |words: &[&str]| names.iter().map(|(name, _)| name).find(|name| words.contains(&name.to_lowercase().as_str()));

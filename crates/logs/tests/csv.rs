@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use common::{Folder, channel, read};
-use logs::{OpenOptions, Quality};
+use logs::{OpenOptions, Quality, TimeColumn};
 
 /// The values of a channel of a table, and what was said; the error where it cannot be read.
 fn values(folder: &Folder, text: &str, name: &str) -> Result<(Vec<f64>, Vec<String>), String> {
@@ -155,7 +155,7 @@ fn a_table_with_a_time_for_each_signal_is_refused() {
             "{one};N [rpm];{other};M [rpm]\n0.00;1500;0.000;1400\n0.01;1501;0.005;1401\n0.02;1502;0.010;1402\n"
         );
         let error = values(&folder, &text, "N").unwrap_err();
-        assert!(error.contains("line 3: columns 1 and 3 are both a time `"), "{one} {other}: {error}");
+        assert!(error.contains("line 3: columns 1 `") && error.contains("` are both a time, and differ"), "{error}");
         assert!(
             error.contains(
                 "and differ (`0.01` and `0.005`): a table is read over one time\nhint: write a table for each"
@@ -170,7 +170,23 @@ fn a_table_with_a_time_for_each_signal_is_refused() {
     assert_eq!(values(&folder, in_ms, "N").map(|found| found.0), Ok(vec![1500.0, 1501.0]));
     // A signal of one clock ends before that of the other.
     let error = values(&folder, "Time [s];N [rpm];Time [s];M [rpm]\n0.00;1;0.00;1\n0.01;2;;\n", "N").unwrap_err();
-    assert!(error.contains("line 3: columns 1 and 3"), "{error}");
+    assert!(error.contains("line 3: columns 1 `Time` and 3 `Time` are both"), "{error}");
+    // Names of the log's own.
+    let by = |other: &dyn Fn(u32) -> String, title: &str| {
+        let rows: String = (0..5).map(|i| format!("{};{};{};{}\n", 10 * i, 1500 + i, other(i), 1400 + i)).collect();
+        let time = TimeColumn { name: "N_time".to_owned(), unit: Some("ms".to_owned()) };
+        let options = OpenOptions { dbc: None, time: Some(time) };
+        let path = folder.write("log.csv", format!("N_time;N [rpm];{title};M [rpm]\n{rows}"));
+        read(&path, &options).map(|_| ()).map_err(|error| error.to_string())
+    };
+    let error = by(&|i| format!("{}", 5 * i), "M_time").unwrap_err();
+    assert!(
+        error.contains("line 3: columns 1 `N_time` and 3 `M_time` are both a time, and differ (`10` and `5`)"),
+        "{error}"
+    );
+    assert_eq!(by(&|i| format!("{}", 1.7e9 + 0.01 * f64::from(i)), "Unix time [s]"), Ok(()));
+    assert_eq!(by(&|i| format!("{}", i / 3), "Engine run time [s]"), Ok(()));
+    assert_eq!(by(&|i| format!("{}", 10 * i + 3), "M_time"), Ok(()));
     // No time: a temperature, a date, a time with another meaning.
     for other in ["T [degC]", "T1", "T", "time_ms", "Date", "Time at gear [rpm]", "Time to lock"] {
         let text = format!(

@@ -128,7 +128,7 @@ impl Named<'_> {
 
     /// The bits of a number before factor and offset. A negative one may also be written as its bits.
     fn raw(&self, id: i64) -> u64 {
-        #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "the signal has no more bits")]
+        #[expect(clippy::cast_precision_loss, reason = "the signal has no more bits")]
         match self.number {
             Number::Float => u64::from((id as f32).to_bits()),
             Number::Double => (id as f64).to_bits(),
@@ -168,14 +168,14 @@ impl Named<'_> {
     /// Whether a named value of a quantity is a reading by what the DBC says of it.
     fn is_reading(&self, id: i64) -> bool {
         let value = self.value(self.raw(id));
-        let [least, most] = self.range;
+        let [min, max] = self.range;
         let half = 0.5 * self.factor.abs();
-        let is_inside = |value: f64| (least - half..=most + half).contains(&value);
+        let is_inside = |value: f64| (min - half..=max + half).contains(&value);
         let (lowest, highest) = match self.number {
             Number::Signed => (self.mask() / 2 + 1, self.mask() / 2),
             _ => (0, self.mask()),
         };
-        let is_part = least < most && !(is_inside(self.value(lowest)) && is_inside(self.value(highest)));
+        let is_part = min < max && !(is_inside(self.value(lowest)) && is_inside(self.value(highest)));
         if is_part { is_inside(value) } else { value == 0.0 }
     }
 
@@ -185,9 +185,9 @@ impl Named<'_> {
 
     /// Whether a value with every bit set is a reading: that of a percentage which the DBC lets end there, as OBD does.
     pub(super) fn ends_at_all_bits(&self) -> bool {
-        let [least, most] = self.range;
+        let [min, max] = self.range;
         let is_percentage = Unit::parse(self.unit).is_some_and(|unit| unit.name == "%");
-        is_percentage && least < most && self.value(self.mask()) <= most + 0.5 * self.factor.abs()
+        is_percentage && min < max && self.value(self.mask()) <= max + 0.5 * self.factor.abs()
     }
 }
 

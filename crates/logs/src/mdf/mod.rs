@@ -107,7 +107,7 @@ impl MdfLog {
         }
         if log.lacks_dbc() {
             log.notes.push(
-                "there are frames of a CAN bus, whose signals are not read\nhint: a DBC says which signals are in them: give it with --dbc"
+                "there are frames of a CAN bus, whose signals are not read\nhint: a DBC defines the signals in them: give it with --dbc"
                     .to_owned(),
             );
         }
@@ -127,7 +127,7 @@ impl MdfLog {
         self.database.is_none() && self.has_frames()
     }
 
-    /// Adds to what is to be said about it.
+    /// Adds a note.
     pub(crate) fn note(&mut self, note: &str) {
         self.notes.push(note.to_owned());
     }

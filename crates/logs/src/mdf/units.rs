@@ -60,7 +60,7 @@ fn text(file: &Mf4File, block: u64) -> Option<String> {
 pub(super) struct TimeUnits(HashMap<GroupAt, f64>);
 
 impl TimeUnits {
-    /// Those of these times, and what is to be said of them. A unit of `wanted` replaces that of the times with its name.
+    /// Those of these times, and notes on them. A unit of `wanted` replaces that of the times with its name.
     pub(super) fn of<'f>(
         path: &Path,
         file: &'f Mf4File,
