@@ -216,6 +216,7 @@ fn frames_before_the_start_of_a_recording_have_negative_times() {
 
 #[test]
 fn a_text_in_any_encoding_is_the_same_bus_log() {
+    type Encode<'e> = &'e dyn Fn(&str) -> Vec<u8>;
     let folder = Folder::new("encodings");
     let wide = |text: &str, mark: bool, order: fn(u16) -> [u8; 2]| {
         let mark = mark.then_some(0xfeff);
@@ -225,7 +226,7 @@ fn a_text_in_any_encoding_is_the_same_bus_log() {
     let candump: String = (0..4).map(|i| format!("({i}.0) can0 100#400C000000000000\n")).collect();
     let asc = "date Sun Mar 31 12:00:00 2024\nbase hex  timestamps absolute\n".to_owned()
         + &(0..4).map(|i| format!("{i}.0 1 100 Rx d 8 40 0C 00 00 00 00 00 00\n")).collect::<String>();
-    let encodings: [&dyn Fn(&str) -> Vec<u8>; 5] = [
+    let encodings: [Encode<'_>; 5] = [
         &|text| [&[0xef, 0xbb, 0xbf], text.as_bytes()].concat(),
         &|text| wide(text, true, u16::to_le_bytes),
         &|text| wide(text, true, u16::to_be_bytes),

@@ -235,7 +235,7 @@ fn exports_of_loggers_and_apps_are_read() {
     assert_eq!(values(&folder, &format!("{tuner}{rows}"), "N").unwrap().1, Vec::<String>::new());
     // Minutes and seconds, as a spreadsheet shows times, over the end of an hour.
     let minutes =
-        table("Time,N [rpm],M [rpm]", &|i| format!("{}", ["59:59.8", "59:59.9", "00:00.0", "00:00.1"][i as usize]));
+        table("Time,N [rpm],M [rpm]", &|i| ["59:59.8", "59:59.9", "00:00.0", "00:00.1"][i as usize].to_owned());
     let found = times(&minutes, "N").unwrap();
     found
         .iter()
