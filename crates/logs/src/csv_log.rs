@@ -70,16 +70,7 @@ impl CsvLog {
         for _ in 0..dialect.marks {
             read_row(path, &mut records, dialect.preamble)?;
         }
-        let name_and_unit = |(i, title): (usize, &String)| {
-            let (name, own) = split_unit(title);
-            let unit = match units.get(i).filter(|unit| !unit.is_empty()) {
-                Some(unit) => unit.clone(),
-                None if !own.is_empty() => own,
-                None => Unit::of_name(&name).map_or(String::new(), |unit| unit.name.to_owned()),
-            };
-            (name, unit)
-        };
-        let names: Vec<(String, String)> = titles.iter().enumerate().map(name_and_unit).collect();
+        let names = names_and_units(&titles, &units);
         let mut notes = Vec::new();
         // A column of clock times or dates is the time where no name says so.
         let named = names.iter().any(|(name, _)| is_time_name(name));
@@ -329,6 +320,20 @@ impl Stream for Rows<'_> {
         }
         notes
     }
+}
+
+/// Name and unit of each column; the unit stands below its title, in it, or at the end of the name.
+fn names_and_units(titles: &[String], units: &[String]) -> Vec<(String, String)> {
+    let name_and_unit = |(i, title): (usize, &String)| {
+        let (name, own) = split_unit(title);
+        let unit = match units.get(i).filter(|unit| !unit.is_empty()) {
+            Some(unit) => unit.clone(),
+            None if !own.is_empty() => own,
+            None => Unit::of_name(&name).map_or(String::new(), |unit| unit.name.to_owned()),
+        };
+        (name, unit)
+    };
+    titles.iter().enumerate().map(name_and_unit).collect()
 }
 
 /// Reads a row; false at the end.
