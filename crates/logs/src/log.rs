@@ -344,15 +344,15 @@ pub fn needs_map(path: &Path) -> Result<bool, LogError> {
 fn beginning(path: &Path, mut reader: Box<dyn Read>) -> Result<(Vec<u8>, Box<dyn Read>), LogError> {
     let io = LogError::io(path);
     let mut head = first_bytes(&mut reader).map_err(&io)?;
-    if head.is_empty() {
-        return Err(LogError::file(path, "the file is empty"));
-    }
     if is_utf16(&head) {
         reader = Box::new(Utf16::new(head, reader));
         head = first_bytes(&mut reader).map_err(&io)?;
     }
     if head.starts_with(BYTE_ORDER_MARK) {
         head.drain(..BYTE_ORDER_MARK.len());
+    }
+    if head.is_empty() {
+        return Err(LogError::file(path, "the file is empty"));
     }
     if head.len() > LONGEST_ROW && !head.iter().any(|byte| matches!(byte, b'\n' | b'\r' | 0)) {
         return Err(csv_log::too_long(path, 1));
